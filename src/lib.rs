@@ -1,1 +1,18 @@
-//! Placeholder while the house is being built.
+//! A linear oscillator with a vibro-impact nonlinear energy sink, exact between events.
+#![forbid(unsafe_code)]
+
+pub mod base_motion;
+pub mod clearance;
+pub mod flight;
+pub mod forcing;
+pub mod motion;
+pub mod oscillator;
+pub mod parameters;
+pub mod plant;
+pub mod sticking;
+pub mod wall;
+
+pub use base_motion::{BaseMotion, Drive};
+pub use parameters::{InvalidValue, Parameters};
+pub use plant::{Event, Outcome, Plant, State, Tally};
+pub use wall::Wall;

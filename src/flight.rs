@@ -1,0 +1,114 @@
+//! The particle's free flight between the walls, up to the first instant it touches one.
+
+use crate::clearance::{Gap, clear_after_release, first_closure};
+use crate::motion::{Derivatives, Motion, Series, nearby, velocity_change};
+use crate::wall::Wall;
+
+/// One flight: the primary mass's motion, and where the particle is relative to it at the start.
+#[derive(Clone, Copy, Debug)]
+pub struct Flight<'a> {
+    motion: Motion<'a>,
+    series: Series,
+    /// `w = q1 - q2` at the start, m, and its velocity, m/s.
+    start: (f64, f64),
+    half_width: f64,
+}
+
+/// How a flight ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Landing {
+    /// Seconds since the start of the flight.
+    pub t: f64,
+    /// The wall touched; `None` where the flight reached the time limit.
+    pub wall: Option<Wall>,
+    /// Position (m) and velocity (m/s) of the primary mass.
+    pub primary: (f64, f64),
+    /// Relative position `w` (m) and velocity (m/s).
+    pub relative: (f64, f64),
+}
+
+impl<'a> Flight<'a> {
+    /// A flight of a particle at `w` (m) with velocity `w'` (m/s) relative to the primary mass in `motion`.
+    pub fn new(motion: Motion<'a>, start: (f64, f64), half_width: f64) -> Self {
+        Self {
+            series: motion.series(),
+            motion,
+            start,
+            half_width,
+        }
+    }
+
+    /// Follows the flight to its first contact, or for `limit` seconds if there is none.
+    ///
+    /// `released` names the wall that has just ceased to push, if the flight begins so.
+    pub fn first_contact(&self, limit: f64, released: Option<Wall>) -> Landing {
+        let from = released.map_or(0.0, |wall| self.clear_of(wall).min(limit));
+        let look = |t: f64| {
+            let (change, d) = self.relative_change(t);
+            (Wall::BOTH.map(|wall| self.gap(wall, change, &d)), d)
+        };
+        let jerk = |d: &Derivatives, h: f64| self.motion.third_derivative_bound(d, h);
+        match first_closure((from, limit), self.motion.fastest(), look, jerk) {
+            Some(closure) => {
+                let wall = Wall::BOTH[closure.which];
+                let d = &closure.derivatives;
+                let (_, dw_change) = self.relative_change(closure.t).0;
+                Landing {
+                    t: closure.t + closure.h,
+                    wall: Some(wall),
+                    primary: nearby(d, closure.h),
+                    relative: (
+                        wall.sign() * self.half_width,
+                        self.start.1 + (dw_change + velocity_change(d, closure.h)),
+                    ),
+                }
+            }
+            None => self.unhindered(limit),
+        }
+    }
+
+    /// The state after `t` seconds, with no regard to walls.
+    fn unhindered(&self, t: f64) -> Landing {
+        let ((w_change, dw_change), d) = self.relative_change(t);
+        Landing {
+            t,
+            wall: None,
+            primary: (d[0], d[1]),
+            relative: (self.start.0 + w_change, self.start.1 + dw_change),
+        }
+    }
+
+    /// How `w` and its velocity have changed since the start, and the primary mass's derivatives.
+    fn relative_change(&self, t: f64) -> ((f64, f64), Derivatives) {
+        if t == 0.0 {
+            return ((0.0, 0.0), self.motion.derivatives_at_start());
+        }
+        let now = self.motion.at(&self.series, t);
+        let (dx, dv) = now.departure;
+        ((self.start.1 * t + dx, dv), now.derivatives)
+    }
+
+    /// The particle flies straight on, so that beyond the first derivative `w` moves as the primary mass does.
+    fn gap(&self, wall: Wall, change: (f64, f64), d: &Derivatives) -> Gap {
+        let s = wall.sign();
+        // On the wall the bracket is exactly 0: what is left is the change alone, with all its digits.
+        let gap = (self.half_width - s * self.start.0) - s * change.0;
+        Gap {
+            gap: gap.max(0.0),
+            closing: s * (self.start.1 + change.1),
+            acceleration: s * d[2],
+            jerk: s * d[3],
+        }
+    }
+
+    /// How long the wall that has just ceased to push is certainly out of reach, and the other one too.
+    fn clear_of(&self, wall: Wall) -> f64 {
+        let d = self.motion.derivatives_at_start();
+        let window = 2.0 / self.motion.fastest();
+        let fourth = d[4].abs() + window * self.motion.fifth_derivative_bound(&d, window);
+        let clear = clear_after_release(-wall.sign() * d[3], fourth);
+        let other = self.gap(wall.other(), (0.0, 0.0), &d);
+        let jerk = |h| self.motion.third_derivative_bound(&d, h);
+        clear.min(other.certainly_open(window, jerk))
+    }
+}

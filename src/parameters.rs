@@ -1,0 +1,157 @@
+//! What the rig is made of, in SI units, validated once.
+
+use core::fmt;
+
+/// The physical parameters of the linear oscillator and its vibro-impact particle.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parameters {
+    /// Primary mass `M`, kg.
+    pub primary_mass: f64,
+    /// Stiffness `k` between base and primary mass, N/m.
+    pub stiffness: f64,
+    /// Viscous damping `c` between base and primary mass, N·s/m.
+    pub damping: f64,
+    /// Particle mass `m`, kg.
+    pub particle_mass: f64,
+    /// Half-width `b` of the cavity, m: the particle is free while `|q1 - q2| < b`.
+    pub half_width: f64,
+    /// Newton's coefficient of restitution `r`.
+    pub restitution: f64,
+}
+
+impl Parameters {
+    /// The dimensionless rig: `M = k = b = 1`, `m = epsilon`, `c = epsilon lambda`.
+    pub fn dimensionless(epsilon: f64, lambda: f64, restitution: f64) -> Self {
+        Self {
+            primary_mass: 1.0,
+            stiffness: 1.0,
+            damping: epsilon * lambda,
+            particle_mass: epsilon,
+            half_width: 1.0,
+            restitution,
+        }
+    }
+
+    /// Natural frequency `omega0 = sqrt(k/M)`, rad/s.
+    pub fn natural_frequency(&self) -> f64 {
+        libm::sqrt(self.stiffness / self.primary_mass)
+    }
+
+    /// Mass ratio `epsilon = m/M`.
+    pub fn mass_ratio(&self) -> f64 {
+        self.particle_mass / self.primary_mass
+    }
+
+    /// Effective mass of the relative motion, `M m/(M + m)`, kg.
+    pub fn relative_mass(&self) -> f64 {
+        self.primary_mass * (self.particle_mass / (self.primary_mass + self.particle_mass))
+    }
+
+    /// Says which value makes no sense, if one does.
+    pub fn validate(&self) -> Result<(), InvalidValue> {
+        let positive = |name, value: f64, unit| {
+            let allowed = "a finite number above 0";
+            InvalidValue::unless(value.is_finite() && value > 0.0, name, value, unit, allowed)
+        };
+        positive("M (primary mass)", self.primary_mass, "kg")?;
+        positive("k (stiffness)", self.stiffness, "N/m")?;
+        InvalidValue::unless(
+            self.damping.is_finite() && self.damping >= 0.0,
+            "c (damping)",
+            self.damping,
+            "N.s/m",
+            "a finite number, 0 or above",
+        )?;
+        positive("m (particle mass)", self.particle_mass, "kg")?;
+        positive("b (half-width of the cavity)", self.half_width, "m")?;
+        InvalidValue::unless(
+            self.restitution > 0.0 && self.restitution <= 1.0,
+            "r (coefficient of restitution)",
+            self.restitution,
+            "1",
+            "a number above 0 and at most 1",
+        )
+    }
+}
+
+/// A value that makes no sense: which, what it is, and what is allowed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct InvalidValue {
+    /// Symbol and meaning of the quantity.
+    pub name: &'static str,
+    /// The value refused.
+    pub value: f64,
+    /// Its unit.
+    pub unit: &'static str,
+    /// What would have been accepted.
+    pub allowed: &'static str,
+}
+
+impl InvalidValue {
+    pub(crate) fn unless(
+        valid: bool,
+        name: &'static str,
+        value: f64,
+        unit: &'static str,
+        allowed: &'static str,
+    ) -> Result<(), Self> {
+        if valid {
+            Ok(())
+        } else {
+            Err(Self {
+                name,
+                value,
+                unit,
+                allowed,
+            })
+        }
+    }
+}
+
+impl fmt::Display for InvalidValue {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let Self {
+            name,
+            value,
+            unit,
+            allowed,
+        } = self;
+        write!(f, "{name} is {value} {unit}; allowed: {allowed}")
+    }
+}
+
+impl core::error::Error for InvalidValue {}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn refused(change: impl Fn(&mut Parameters)) -> String {
+        let mut parameters = Parameters::dimensionless(0.01, 1.0, 0.65);
+        change(&mut parameters);
+        parameters.validate().unwrap_err().to_string()
+    }
+
+    #[test]
+    fn a_value_that_makes_no_sense_is_named_with_its_unit_and_what_is_allowed() {
+        let message = refused(|p| p.particle_mass = -0.5);
+        assert_eq!(
+            message,
+            "m (particle mass) is -0.5 kg; allowed: a finite number above 0"
+        );
+        assert!(refused(|p| p.restitution = 1.5).contains("at most 1"));
+        assert!(refused(|p| p.damping = -1e-9).contains("N.s/m"));
+    }
+
+    #[test]
+    fn nan_and_infinity_are_refused_everywhere() {
+        for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            refused(|p| p.primary_mass = bad);
+            refused(|p| p.stiffness = bad);
+            refused(|p| p.damping = bad);
+            refused(|p| p.particle_mass = bad);
+            refused(|p| p.half_width = bad);
+            refused(|p| p.restitution = bad);
+        }
+    }
+}

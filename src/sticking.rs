@@ -1,0 +1,56 @@
+//! Persistent contact: both masses move as one while the wall must push, and part at the instant it need not.
+
+use crate::clearance::{Gap, first_closure};
+use crate::motion::{Derivatives, Motion, nearby};
+use crate::wall::Wall;
+
+/// How a stretch of sticking ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Parting {
+    /// Seconds since the start of the stretch.
+    pub t: f64,
+    /// Whether the wall ceased to push; else the time limit was reached.
+    pub released: bool,
+    /// Position (m) and velocity (m/s) of the joint mass.
+    pub joint: (f64, f64),
+}
+
+/// Follows both masses, stuck together at `wall`, until the wall ceases to push or for `limit` seconds.
+///
+/// The wall at `w = +b` pushes while the joint acceleration is positive, that at `w = -b` while it is negative.
+/// `noise` (m/s²) is the rounding of that acceleration: a push is said to have ceased only below `-noise`, so that two
+/// masses at rest do not part over a last digit.
+pub fn until_released(motion: &Motion, wall: Wall, limit: f64, noise: f64) -> Parting {
+    let s = wall.sign();
+    let series = motion.series();
+    let look = |t: f64| {
+        let d = if t == 0.0 {
+            motion.derivatives_at_start()
+        } else {
+            motion.at(&series, t).derivatives
+        };
+        let push = Gap {
+            gap: (s * d[2] + noise).max(0.0),
+            closing: -s * d[3],
+            acceleration: -s * d[4],
+            jerk: -s * d[5],
+        };
+        ([push], d)
+    };
+    let jerk = |d: &Derivatives, h: f64| motion.fifth_derivative_bound(d, h);
+    match first_closure((0.0, limit), motion.fastest(), look, jerk) {
+        Some(closure) => Parting {
+            t: closure.t + closure.h,
+            released: true,
+            joint: nearby(&closure.derivatives, closure.h),
+        },
+        None => {
+            let [x, v, ..] = motion.at(&series, limit).derivatives;
+            Parting {
+                t: limit,
+                released: false,
+                joint: (x, v),
+            }
+        }
+    }
+}

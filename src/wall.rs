@@ -1,0 +1,121 @@
+//! The two walls of the cavity, and what happens at an impact.
+
+use crate::parameters::Parameters;
+
+/// A wall of the cavity.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Wall {
+    /// The wall touched at `w = +b`; it pushes the particle towards +q2.
+    Plus,
+    /// The wall touched at `w = -b`; it pushes the particle towards -q2.
+    Minus,
+}
+
+impl Wall {
+    /// Both walls.
+    pub const BOTH: [Wall; 2] = [Wall::Plus, Wall::Minus];
+
+    /// +1 or -1.
+    pub fn sign(self) -> f64 {
+        match self {
+            Wall::Plus => 1.0,
+            Wall::Minus => -1.0,
+        }
+    }
+
+    /// The wall on the other side.
+    pub fn other(self) -> Self {
+        match self {
+            Wall::Plus => Wall::Minus,
+            Wall::Minus => Wall::Plus,
+        }
+    }
+}
+
+/// Coefficients of Newton's impact law, derived once.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ImpactLaw {
+    restitution: f64,
+    /// Velocity taken from the primary mass per unit of approach: `(1 + r) m/(M + m)`.
+    primary_share: f64,
+    /// Velocity given to the particle per unit of approach: `(1 + r) M/(M + m)`.
+    particle_share: f64,
+    /// `m/(M + m)`.
+    particle_fraction: f64,
+    /// Half the effective mass, kg.
+    half_relative_mass: f64,
+}
+
+/// Velocities right after an impact, m/s, and what it dissipated, J.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rebound {
+    /// Velocity of the primary mass.
+    pub primary: f64,
+    /// Velocity of the particle.
+    pub particle: f64,
+    /// Relative velocity `w'`.
+    pub relative: f64,
+    /// Energy dissipated.
+    pub dissipated: f64,
+}
+
+impl ImpactLaw {
+    /// The law for these masses and this coefficient of restitution.
+    pub fn new(p: &Parameters) -> Self {
+        let total = p.primary_mass + p.particle_mass;
+        Self {
+            restitution: p.restitution,
+            primary_share: (1.0 + p.restitution) * (p.particle_mass / total),
+            particle_share: (1.0 + p.restitution) * (p.primary_mass / total),
+            particle_fraction: p.particle_mass / total,
+            half_relative_mass: 0.5 * p.relative_mass(),
+        }
+    }
+
+    /// Newton's law: the relative velocity turns round and shrinks by `r`, momentum is conserved.
+    pub fn rebound(&self, primary: f64, particle: f64, relative: f64) -> Rebound {
+        let r = self.restitution;
+        Rebound {
+            primary: primary - self.primary_share * relative,
+            particle: particle + self.particle_share * relative,
+            relative: -r * relative,
+            dissipated: self.half_relative_mass * ((1.0 - r) * (1.0 + r)) * (relative * relative),
+        }
+    }
+
+    /// Both masses go on as one: the velocity that conserves momentum, and the energy that is lost.
+    pub fn join(&self, primary: f64, relative: f64) -> (f64, f64) {
+        (
+            primary - self.particle_fraction * relative,
+            self.half_relative_mass * relative * relative,
+        )
+    }
+
+    /// How long infinitely many impacts take that begin with this rebound speed under a constant pressing acceleration:
+    /// `2 u/a (1 + r + r² + ...)`, s; infinite without loss.
+    pub fn chatter_duration(&self, speed: f64, pressing: f64) -> f64 {
+        2.0 * speed / (pressing * (1.0 - self.restitution))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn an_impact_keeps_momentum_and_dissipates_what_it_says(
+            epsilon in 1e-6..1.0f64, r in 1e-3..=1.0f64, v1 in -2.0..2.0f64, v2 in -2.0..2.0f64,
+        ) {
+            let p = Parameters::dimensionless(epsilon, 1.0, r);
+            let after = ImpactLaw::new(&p).rebound(v1, v2, v1 - v2);
+            prop_assert!((after.primary + epsilon * after.particle - v1 - epsilon * v2).abs() < 4e-15);
+            prop_assert!((after.primary - after.particle - after.relative).abs() < 4e-15);
+            let energy = |v1: f64, v2: f64| 0.5 * (v1 * v1 + epsilon * v2 * v2);
+            let lost = energy(v1, v2) - energy(after.primary, after.particle);
+            prop_assert!((lost - after.dissipated).abs() < 2e-14);
+            prop_assert!(after.dissipated >= 0.0);
+        }
+    }
+}
