@@ -1,2 +1,9 @@
-//! Placeholder while the house is being built.
-fn main() {}
+//! `vines`: the command line of the lab.
+
+#![forbid(unsafe_code)]
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::run()
+}

@@ -1,0 +1,68 @@
+//! The command line: one file per command.
+
+mod failure;
+mod orbit;
+mod pack;
+mod scene_arguments;
+mod table;
+mod theory;
+
+use std::{
+    io::{self, Write},
+    process::ExitCode,
+};
+
+use clap::{Parser, Subcommand};
+
+use failure::Failure;
+
+const EXAMPLES: &str = "\
+Examples:
+  vines orbit                                  exact orbits of the default scene
+  vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
+  vines theory --scene scenes/dimensionless.toml --set plant.epsilon=0.0042
+  vines pack --out fmus                        write LoViNes.fmu and PhaseLock.fmu
+
+Without --scene, the default scene built into the program is used; it is scenes/paper.toml.";
+
+/// A virtual test bench for a linear oscillator with a vibro-impact nonlinear energy sink
+#[derive(Debug, Parser)]
+#[command(name = "vines", version, after_help = EXAMPLES)]
+struct Cli {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Debug, Subcommand)]
+enum Command {
+    Orbit(orbit::Arguments),
+    Theory(theory::Arguments),
+    Pack(pack::Arguments),
+}
+
+/// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input.
+pub fn run() -> ExitCode {
+    let output = match Cli::parse().command {
+        Command::Orbit(arguments) => orbit::run(&arguments),
+        Command::Theory(arguments) => theory::run(&arguments),
+        Command::Pack(arguments) => pack::run(&arguments),
+    };
+    match output.and_then(|text| print(&text)) {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(failure) => {
+            eprintln!("error: {failure}");
+            ExitCode::from(failure.code())
+        }
+    }
+}
+
+/// Prints to a reader that may have seen enough, such as `head`: that is no failure.
+fn print(text: &str) -> Result<(), Failure> {
+    let mut out = io::stdout().lock();
+    match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
+        Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
+            Err(Failure::run(format!("cannot write the result: {error}")))
+        }
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,61 @@
+//! How a command fails: with one message and an exit code.
+
+use std::fmt::{self, Display, Formatter};
+
+use vines::{pack::PackError, scene::SceneError};
+
+/// One clear message, and whose fault it was.
+#[derive(Debug)]
+pub(super) struct Failure {
+    code: u8,
+    message: String,
+}
+
+impl Failure {
+    /// Bad usage or input: exit code 2.
+    pub(super) fn input(message: impl Display) -> Self {
+        Self {
+            code: 2,
+            message: message.to_string(),
+        }
+    }
+
+    /// Something failed on the way: exit code 1.
+    pub(super) fn run(message: impl Display) -> Self {
+        Self {
+            code: 1,
+            message: message.to_string(),
+        }
+    }
+
+    pub(super) fn code(&self) -> u8 {
+        self.code
+    }
+}
+
+impl Display for Failure {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.message)
+    }
+}
+
+impl From<SceneError> for Failure {
+    fn from(error: SceneError) -> Self {
+        Self::input(error)
+    }
+}
+
+impl From<PackError> for Failure {
+    fn from(error: PackError) -> Self {
+        match error {
+            PackError::Read { .. } | PackError::Write { .. } => Self::run(error),
+            _ => Self::input(error),
+        }
+    }
+}
+
+impl From<serde_json::Error> for Failure {
+    fn from(error: serde_json::Error) -> Self {
+        Self::run(format!("cannot write JSON: {error}"))
+    }
+}

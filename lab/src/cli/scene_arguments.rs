@@ -1,0 +1,23 @@
+//! `--scene` and `--set`, which several commands share.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use vines::scene::{Override, Scene, SceneError};
+
+#[derive(Debug, Args)]
+pub(super) struct SceneArguments {
+    /// Scene file (TOML); without it, the default scene
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+
+    /// Replace one value of the scene, such as plant.r=0.7; may be given again
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Override>,
+}
+
+impl SceneArguments {
+    pub(super) fn load(&self) -> Result<Scene, SceneError> {
+        Scene::load(self.scene.as_deref(), &self.set)
+    }
+}

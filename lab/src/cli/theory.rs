@@ -1,0 +1,128 @@
+//! `vines theory`: what the first-order theory says about a scene.
+
+use clap::Args;
+use serde::Serialize;
+use vines::{
+    scene::Dimensionless,
+    theory::{B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, SlowFlow},
+};
+
+use super::{
+    failure::Failure,
+    scene_arguments::SceneArguments,
+    table::{number, parameters, table, yes_no},
+};
+
+const HELP: &str = "\
+Everything is of first order in epsilon. Both branches of the slow invariant manifold are one curve over B, the particle's
+speed over b omega0; C is the amplitude of v over b, and sigma the detuning (Omega - 1)/epsilon.
+
+Examples:
+  vines theory
+  vines theory --set excitation.G=1.0
+  vines theory --points 500 --json > theory.json";
+
+/// First-order theory: invariant manifold, solutions at phase resonance, backbone
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    /// Samples of the backbone
+    #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(2..=100_000))]
+    points: u32,
+
+    /// Print JSON, with the samples of the backbone, instead of a table
+    #[arg(long)]
+    json: bool,
+}
+
+/// The JSON that is printed.
+#[derive(Debug, Serialize)]
+struct Report {
+    scene: Dimensionless,
+    manifold: Constants,
+    solutions: Vec<BackbonePoint>,
+    backbone: Vec<BackbonePoint>,
+}
+
+#[derive(Debug, Serialize)]
+struct Constants {
+    #[serde(rename = "R")]
+    dissipation: f64,
+    #[serde(rename = "B_min")]
+    b_min: f64,
+    #[serde(rename = "C_min")]
+    c_min: f64,
+    #[serde(rename = "B_symmetry_breaking")]
+    b_symmetry_breaking: f64,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+    let scene = arguments.scene.load()?.dimensionless();
+    let flow = SlowFlow::new(scene.lambda, scene.r);
+    let points = arguments.points as usize;
+    // From near the end of the left branch, where the particle stands still, to a little beyond the stable range.
+    let highest = 1.2 * B_SYMMETRY_BREAKING;
+    let report = Report {
+        scene,
+        manifold: Constants {
+            dissipation: flow.manifold.dissipation,
+            b_min: flow.manifold.b_min(),
+            c_min: flow.manifold.c_min(),
+            b_symmetry_breaking: B_SYMMETRY_BREAKING,
+        },
+        solutions: flow.phase_resonant(scene.g),
+        backbone: flow.backbone(highest / points as f64, highest, points),
+    };
+    if arguments.json {
+        return Ok(serde_json::to_string_pretty(&report)? + "\n");
+    }
+    Ok(readable(&report))
+}
+
+fn readable(report: &Report) -> String {
+    let Constants {
+        dissipation,
+        b_min,
+        c_min,
+        b_symmetry_breaking,
+    } = report.manifold;
+    format!(
+        "First-order theory\n  {}\n\n\
+         Slow invariant manifold: R = {dissipation:.6}, fold at B = {b_min:.6}, C = {c_min:.6}\n\
+         Symmetric impacts are stable for {b_min:.6} < B < {b_symmetry_breaking:.6}\n\n\
+         Phase resonance\n{}",
+        parameters(&report.scene),
+        solutions(&report.solutions),
+    )
+}
+
+fn solutions(points: &[BackbonePoint]) -> String {
+    if points.is_empty() {
+        return "  none at this excitation\n".into();
+    }
+    let rows: Vec<_> = points
+        .iter()
+        .map(|point| {
+            let branch = match point.branch {
+                BranchSide::Left => "left",
+                BranchSide::Right => "right",
+            };
+            let mut row = vec![branch.to_string()];
+            row.extend([point.sigma, point.c, point.b].map(number));
+            row.extend([point.impacts_stable, point.slow_flow_stable].map(yes_no));
+            row
+        })
+        .collect();
+    let headings = [
+        "branch",
+        "sigma",
+        "C",
+        "B",
+        "impacts stable",
+        "slow flow stable",
+    ];
+    table(&headings, &rows)
+}

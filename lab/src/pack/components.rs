@@ -1,0 +1,41 @@
+//! The components that this project packs.
+
+/// One FMU to be.
+#[derive(Debug, Clone)]
+pub struct Component {
+    /// `modelIdentifier`: the name of the FMU and of the library inside it.
+    pub identifier: &'static str,
+    /// Cargo's name of the library, without prefix and suffix.
+    pub library: &'static str,
+    /// Cargo's package, for the hint how to build it.
+    pub package: &'static str,
+    /// The finished `modelDescription.xml`.
+    pub description: String,
+}
+
+/// The plant and the controller.
+#[must_use]
+pub fn components() -> [Component; 2] {
+    [
+        Component {
+            identifier: "LoViNes",
+            library: "lovines",
+            package: "lovines",
+            description: describe(PLANT),
+        },
+        Component {
+            identifier: "PhaseLock",
+            library: "phase_lock_fmu",
+            package: "phase-lock-fmu",
+            description: describe(CONTROLLER),
+        },
+    ]
+}
+
+const PLANT: &str = include_str!("../../../modelDescription.xml");
+const CONTROLLER: &str = "";
+
+/// Gives the description the guid that the library was built with.
+fn describe(xml: &str) -> String {
+    xml.into()
+}

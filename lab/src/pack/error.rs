@@ -1,0 +1,63 @@
+//! What can go wrong while packing.
+
+use std::path::PathBuf;
+
+/// A failure that names the file and what to do.
+#[derive(Debug, thiserror::Error)]
+pub enum PackError {
+    /// There is no such library.
+    #[error(
+        "the library of {identifier} is not there: looked for {}; build it with \
+         `cargo build --release -p {package}`, or say where it is with --libraries", path.display()
+    )]
+    Missing {
+        /// The component.
+        identifier: &'static str,
+        /// Where it was looked for.
+        path: PathBuf,
+        /// The package that builds it.
+        package: &'static str,
+    },
+    /// The library exists but cannot be read.
+    #[error("cannot read {}: {source}", path.display())]
+    Read {
+        /// The library.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// The library cannot run here.
+    #[error(
+        "{} is {found}, but this platform needs {needed}; build it here with `cargo build --release -p {package}`",
+        path.display()
+    )]
+    Platform {
+        /// The library.
+        path: PathBuf,
+        /// What its header says.
+        found: String,
+        /// What would be right.
+        needed: &'static str,
+        /// The package that builds it.
+        package: &'static str,
+    },
+    /// The library is one for this platform, but without FMI functions.
+    #[error(
+        "{} has no function fmi2Instantiate, so it is no FMI 2.0 component; \
+         build it with `cargo build --release -p {package}`", path.display()
+    )]
+    NotAComponent {
+        /// The library.
+        path: PathBuf,
+        /// The package that builds it.
+        package: &'static str,
+    },
+    /// The FMU could not be written.
+    #[error("cannot write {}: {source}", path.display())]
+    Write {
+        /// The file or folder.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+}

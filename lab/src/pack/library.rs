@@ -1,0 +1,45 @@
+//! Finding and checking the shared library of a component.
+
+use std::{
+    env::consts::{DLL_PREFIX, DLL_SUFFIX},
+    io::ErrorKind,
+    path::Path,
+};
+
+use super::{
+    Component, PackError,
+    platform::{Platform, exports},
+};
+
+/// The bytes of the component's library in `folder`, if it is one for `platform`.
+pub(super) fn read(
+    component: &Component,
+    folder: &Path,
+    platform: &Platform,
+) -> Result<Vec<u8>, PackError> {
+    let package = component.package;
+    let path = folder.join(format!("{DLL_PREFIX}{}{DLL_SUFFIX}", component.library));
+    let bytes = std::fs::read(&path).map_err(|source| match source.kind() {
+        ErrorKind::NotFound => PackError::Missing {
+            identifier: component.identifier,
+            path: path.clone(),
+            package,
+        },
+        _ => PackError::Read {
+            path: path.clone(),
+            source,
+        },
+    })?;
+    if let Err(found) = platform.check(&bytes) {
+        return Err(PackError::Platform {
+            path,
+            found,
+            needed: platform.name,
+            package,
+        });
+    }
+    if !exports(&bytes, "fmi2Instantiate") {
+        return Err(PackError::NotAComponent { path, package });
+    }
+    Ok(bytes)
+}

@@ -1,0 +1,51 @@
+//! The short table of an identification.
+
+use crate::identification::{COMPARED_ABOVE, Identification};
+
+/// The result in a few lines: the locked point beside theory and exact orbit, then the decay.
+#[must_use]
+pub fn table(found: &Identification) -> String {
+    let (p, lock) = (&found.parameters, &found.lock);
+    let mut lines = vec![
+        format!(
+            "epsilon = {:.6}, lambda = {:.4}, r = {}, G = {:.4}",
+            p.epsilon, p.lambda, p.r, lock.g
+        ),
+        format!(
+            "Locked after {:.0} periods: {}, {:.3} impacts per period, phase error {:.1e} degrees",
+            lock.periods_to_lock, lock.regime, lock.impacts_per_period, lock.phase_error_deg
+        ),
+        String::new(),
+        format!(
+            "  {:<24}{:>12}{:>12}{:>12}",
+            "", "sigma", "C", "B"
+        ),
+    ];
+    let mut row = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
+        let b = b.map_or("-".into(), |b| format!("{b:.6}"));
+        lines.push(format!("  {name:<24}{sigma:>12.6}{c:>12.6}{b:>12}"));
+    };
+    row("measured at the lock", lock.sigma, lock.c, lock.b);
+    if let Some(exact) = &found.exact {
+        row("exact orbit", exact.sigma, exact.c, Some(exact.b));
+    }
+    if let Some(theory) = &found.theory {
+        row("theory, first order", theory.sigma, theory.c, Some(theory.b));
+    }
+    lines.push(String::new());
+    if let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) {
+        lines.push(format!(
+            "Free decay: {} points from C = {:.4} down to {:.4}, where the impacts lose synchrony",
+            found.decay.len(),
+            first.c,
+            last.c
+        ));
+    }
+    lines.push(match found.rms_sigma_error {
+        Some(rms) => format!(
+            "RMS of sigma against theory over C > {COMPARED_ABOVE}: {rms:.4} (theory is of first order in epsilon)"
+        ),
+        None => format!("No point of the decay lies above C = {COMPARED_ABOVE}"),
+    });
+    lines.join("\n") + "\n"
+}

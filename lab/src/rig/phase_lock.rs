@@ -1,0 +1,73 @@
+//! The built-in phase-locked loop as a controller of the bench.
+
+use phase_lock::{Config, ConfigError, Input, LockCriterion, PhaseLock, State};
+
+use super::{Command, Controller, Drive, Sensors};
+use crate::scene::Scene;
+
+/// The built-in controller: coefficients and state.
+pub struct BuiltIn {
+    lock: PhaseLock,
+    state: State,
+}
+
+impl BuiltIn {
+    /// The controller that the scene describes.
+    ///
+    /// # Errors
+    /// Settings that the controller cannot work with.
+    pub fn new(scene: &Scene) -> Result<Self, ConfigError> {
+        let lock = configuration(scene).build()?;
+        Ok(Self {
+            state: lock.start(),
+            lock,
+        })
+    }
+}
+
+/// The scene's controller settings in SI units.
+fn configuration(scene: &Scene) -> Config {
+    let omega0 = scene.plant.omega0();
+    let c = &scene.controller;
+    let amplitude = scene.amplitude;
+    let defaults = Config::for_resonance(omega0, amplitude);
+    Config {
+        sample_time: scene.sample_time(),
+        omega_start: c.omega_start * omega0,
+        omega_min: c.omega_min * omega0,
+        omega_max: c.omega_max * omega0,
+        bandwidth: c.bandwidth * omega0,
+        damping_rate: 0.5 * scene.plant.damping / scene.plant.mass,
+        phase_target: c.phase_target_radians(),
+        lock: LockCriterion {
+            phase_tolerance: c.phase_tolerance.to_radians(),
+            frequency_drift: c.frequency_drift,
+            amplitude_drift: c.amplitude_drift,
+            dwell: c.dwell_periods,
+            ..defaults.lock
+        },
+        ..defaults
+    }
+}
+
+impl Controller for BuiltIn {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Command {
+        let output = self.lock.process(
+            &mut self.state,
+            Input {
+                response: sensors.response,
+                reference: sensors.reference,
+                active,
+            },
+        );
+        Command {
+            drive: Drive {
+                omega: output.omega,
+                amplitude: output.amplitude,
+                displacement: output.drive,
+            },
+            phase_error: output.phase_error,
+            settled: output.settled,
+        }
+    }
+}

@@ -1,0 +1,85 @@
+//! The `[controller]` section: the phase-locked loop.
+
+use serde::{Deserialize, Serialize};
+
+use super::{SceneError, validate::Quantity};
+
+/// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Controller {
+    /// Samples per natural period `2 pi/omega0`.
+    pub samples_per_period: f64,
+    /// Bandwidth of the loop, in units of omega0.
+    pub bandwidth: f64,
+    /// Frequency at the start, in units of omega0.
+    pub omega_start: f64,
+    /// Lowest frequency allowed, in units of omega0.
+    pub omega_min: f64,
+    /// Highest frequency allowed, in units of omega0.
+    pub omega_max: f64,
+    /// Phase of the response relative to the base, degrees.
+    pub phase_target: f64,
+    /// Largest phase error that counts as locked, degrees.
+    pub phase_tolerance: f64,
+    /// Largest relative variation of the frequency that counts as stationary.
+    pub frequency_tolerance: f64,
+    /// Largest relative variation of the response amplitude that counts as stationary.
+    pub amplitude_tolerance: f64,
+    /// How long all tolerances must hold, natural periods.
+    pub settle_periods: f64,
+}
+
+impl Default for Controller {
+    fn default() -> Self {
+        Self {
+            samples_per_period: 100.0,
+            bandwidth: 0.002,
+            omega_start: 1.0,
+            omega_min: 0.9,
+            omega_max: 1.1,
+            phase_target: -90.0,
+            phase_tolerance: 0.5,
+            frequency_tolerance: 1e-4,
+            amplitude_tolerance: 2e-3,
+            settle_periods: 100.0,
+        }
+    }
+}
+
+impl Controller {
+    /// The phase target in radians.
+    #[must_use]
+    pub fn phase_target_radians(&self) -> f64 {
+        self.phase_target.to_radians()
+    }
+
+    pub(super) fn check(&self) -> Result<(), SceneError> {
+        let samples = self.samples_per_period;
+        Quantity::new("controller.samples_per_period", samples, "(samples)")
+            .check(samples >= 8.0, "must be at least 8 and finite")?;
+        Quantity::new("controller.bandwidth", self.bandwidth, "(omega0)").positive()?;
+        Quantity::new("controller.omega_min", self.omega_min, "(omega0)").positive()?;
+        let (low, high) = (self.omega_min, self.omega_max);
+        Quantity::new("controller.omega_max", high, "(omega0)")
+            .check(high > low, format!("must be above omega_min = {low}"))?;
+        let start = self.omega_start;
+        Quantity::new("controller.omega_start", start, "(omega0)").check(
+            (low..=high).contains(&start),
+            format!("must lie between omega_min = {low} and omega_max = {high}"),
+        )?;
+        let target = self.phase_target;
+        Quantity::new("controller.phase_target", target, "degrees").check(
+            target.abs() <= 180.0,
+            "must lie between -180 and 180 degrees",
+        )?;
+        let tolerance = self.phase_tolerance;
+        Quantity::new("controller.phase_tolerance", tolerance, "degrees").positive()?;
+        let tolerance = self.frequency_tolerance;
+        Quantity::new("controller.frequency_tolerance", tolerance, "(relative)").positive()?;
+        let tolerance = self.amplitude_tolerance;
+        Quantity::new("controller.amplitude_tolerance", tolerance, "(relative)").positive()?;
+        let settle = self.settle_periods;
+        Quantity::new("controller.settle_periods", settle, "(natural periods)").positive()
+    }
+}

@@ -1,0 +1,36 @@
+//! The `[record]` section: how long to drive, to record and to average.
+
+use serde::{Deserialize, Serialize};
+
+use super::{SceneError, validate::Quantity};
+
+/// Durations of an experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Record {
+    /// Longest wait for the lock, natural periods.
+    pub lock_periods: f64,
+    /// Length of the recorded decay, natural periods.
+    pub decay_periods: f64,
+    /// Analysis window along the decay, periods of the motion.
+    pub window_periods: f64,
+}
+
+impl Default for Record {
+    fn default() -> Self {
+        Self {
+            lock_periods: 5000.0,
+            decay_periods: 300.0,
+            window_periods: 1.0,
+        }
+    }
+}
+
+impl Record {
+    pub(super) fn check(&self) -> Result<(), SceneError> {
+        let unit = "(natural periods)";
+        Quantity::new("record.lock_periods", self.lock_periods, unit).positive()?;
+        Quantity::new("record.decay_periods", self.decay_periods, unit).positive()?;
+        Quantity::new("record.window_periods", self.window_periods, "(periods)").positive()
+    }
+}

@@ -1,0 +1,126 @@
+//! FMUs from libraries built here, and the refusal of everything else.
+
+use std::{
+    env::consts::{DLL_PREFIX, DLL_SUFFIX},
+    fs,
+    io::Read,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use vines::pack::{Component, Platform, pack};
+
+fn component() -> Component {
+    Component {
+        identifier: "Tiny",
+        library: "tiny",
+        package: "tiny-fmu",
+        description: "<fmiModelDescription/>".into(),
+    }
+}
+
+fn library(folder: &Path) -> PathBuf {
+    folder.join(format!("{DLL_PREFIX}tiny{DLL_SUFFIX}"))
+}
+
+/// Builds a shared library that exports one function.
+fn build(folder: &Path, function: &str) {
+    let source = folder.join("tiny.rs");
+    let code = format!("#[unsafe(no_mangle)] pub extern \"C\" fn {function}() {{}}");
+    fs::write(&source, code).unwrap();
+    let rustc = std::env::var_os("RUSTC").unwrap_or("rustc".into());
+    let status = Command::new(rustc)
+        .args(["--edition", "2024", "--crate-type", "cdylib", "-o"])
+        .arg(library(folder))
+        .arg(&source)
+        .status()
+        .expect("rustc runs");
+    assert!(status.success());
+}
+
+fn complaint(folder: &Path) -> String {
+    let out = folder.join("out");
+    let error = pack(&[component()], folder, &out).expect_err("a mistake");
+    assert!(!out.exists(), "nothing is written");
+    error.to_string()
+}
+
+#[test]
+fn a_component_is_packed_with_its_library_in_its_platforms_folder() {
+    let folder = tempfile::tempdir().unwrap();
+    build(folder.path(), "fmi2Instantiate");
+    let out = folder.path().join("new/out");
+    let written = pack(&[component()], folder.path(), &out).unwrap();
+    assert_eq!(written, [out.join("Tiny.fmu")]);
+    assert_eq!(
+        fs::read_dir(&out).unwrap().count(),
+        1,
+        "no temporary file is left"
+    );
+
+    let mut zip = zip::ZipArchive::new(fs::File::open(&written[0]).unwrap()).unwrap();
+    let mut description = String::new();
+    let mut entry = zip.by_name("modelDescription.xml").unwrap();
+    entry.read_to_string(&mut description).unwrap();
+    assert_eq!(description, component().description);
+    drop(entry);
+    let inside = format!("binaries/{}/Tiny{DLL_SUFFIX}", Platform::running().folder);
+    let size = fs::metadata(library(folder.path())).unwrap().len();
+    assert_eq!(zip.by_name(&inside).unwrap().size(), size);
+}
+
+#[test]
+fn a_missing_library_is_named_with_the_way_to_build_it() {
+    let folder = tempfile::tempdir().unwrap();
+    let message = complaint(folder.path());
+    let path = library(folder.path()).display().to_string();
+    for part in [
+        path.as_str(),
+        "cargo build --release -p tiny-fmu",
+        "--libraries",
+    ] {
+        assert!(message.contains(part), "{message}");
+    }
+}
+
+#[test]
+fn a_library_for_another_platform_is_refused() {
+    // The header of a library of the other world: a PE file for x86-64 here, or an ELF file on Windows.
+    let mut other = vec![0u8; 1024];
+    if cfg!(windows) {
+        other[..6].copy_from_slice(b"\x7fELF\x02\x01");
+        other[18] = 62;
+    } else {
+        other[..2].copy_from_slice(b"MZ");
+        other[0x3c] = 0x40;
+        other[0x40..0x44].copy_from_slice(b"PE\0\0");
+        other[0x44..0x46].copy_from_slice(&0x8664u16.to_le_bytes());
+        other[0x54..0x56].copy_from_slice(&0xf0u16.to_le_bytes());
+        other[0x58..0x5a].copy_from_slice(&0x20bu16.to_le_bytes());
+        other[0x58 + 108] = 16;
+    }
+    let folder = tempfile::tempdir().unwrap();
+    fs::write(library(folder.path()), other).unwrap();
+    let message = complaint(folder.path());
+    let found = if cfg!(windows) { "Linux" } else { "Windows" };
+    assert!(
+        message.contains(found) && message.contains(Platform::running().name),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_file_that_is_no_library_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    for content in [&b""[..], b"hello", b"\x7fELF"] {
+        fs::write(library(folder.path()), content).unwrap();
+        assert!(complaint(folder.path()).contains("library"));
+    }
+}
+
+#[test]
+fn a_library_without_fmi_functions_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    build(folder.path(), "something_else");
+    assert!(complaint(folder.path()).contains("no FMI 2.0 component"));
+}
