@@ -1,6 +1,7 @@
 //! The command line: one file per command.
 
 mod failure;
+mod identify;
 mod orbit;
 mod pack;
 mod scene_arguments;
@@ -18,6 +19,7 @@ use failure::Failure;
 
 const EXAMPLES: &str = "\
 Examples:
+  vines identify                               the whole experiment on the default scene, results in out/
   vines orbit                                  exact orbits of the default scene
   vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
   vines theory --scene scenes/dimensionless.toml --set plant.epsilon=0.0042
@@ -35,6 +37,7 @@ struct Cli {
 
 #[derive(Debug, Subcommand)]
 enum Command {
+    Identify(identify::Arguments),
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Pack(pack::Arguments),
@@ -43,6 +46,7 @@ enum Command {
 /// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input.
 pub fn run() -> ExitCode {
     let output = match Cli::parse().command {
+        Command::Identify(arguments) => identify::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Pack(arguments) => pack::run(&arguments),

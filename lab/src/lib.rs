@@ -7,7 +7,12 @@
 
 #![forbid(unsafe_code)]
 
+pub mod experiment;
+mod files;
+pub mod identification;
 pub mod orbit;
 pub mod pack;
+pub mod report;
+pub mod rig;
 pub mod scene;
 pub mod theory;

@@ -10,6 +10,7 @@ use std::path::{Path, PathBuf};
 
 use thiserror::Error;
 
+use crate::files::temporary;
 use crate::identification::Identification;
 
 pub use table::table;
@@ -61,10 +62,7 @@ pub fn write(found: &Identification, out: &Path) -> Result<Vec<PathBuf>, ReportE
     let mut written = Vec::new();
     for (name, text) in files {
         let path = out.join(name);
-        let mut file = tempfile::Builder::new()
-            .permissions_like_a_new_file()
-            .tempfile_in(out)
-            .map_err(refused(&path))?;
+        let mut file = temporary(out).map_err(refused(&path))?;
         file.write_all(text.as_bytes()).map_err(refused(&path))?;
         file.persist(&path).map_err(|error| refused(&path)(error.error))?;
         written.push(path);

@@ -4,9 +4,11 @@
 
 mod fmu;
 mod phase_lock;
+mod simulated;
 
 pub use fmu::{FmuRig, RigError};
 pub use phase_lock::BuiltIn;
+pub use simulated::Simulated;
 
 /// What the controller asks of the rig for the coming sample period.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

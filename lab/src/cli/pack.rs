@@ -37,7 +37,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .collect())
 }
 
-fn beside_this_program() -> Result<PathBuf, Failure> {
+pub(super) fn beside_this_program() -> Result<PathBuf, Failure> {
     let program = std::env::current_exe()
         .map_err(|error| Failure::run(format!("cannot tell where this program is: {error}")))?;
     Ok(program.parent().map(PathBuf::from).unwrap_or_default())

@@ -9,6 +9,7 @@ use tempfile::NamedTempFile;
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
 use super::PackError;
+use crate::files::temporary;
 
 /// Writes `entries`, (name inside, content), to a temporary file in `folder`; persist it to keep it.
 ///
@@ -32,18 +33,6 @@ fn fill(folder: &Path, entries: &[(&str, &[u8])]) -> io::Result<NamedTempFile> {
     }
     zip.finish()?.flush()?;
     Ok(file)
-}
-
-/// A temporary file that others may read once it is kept, as with any file made here.
-fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
-    let mut builder = tempfile::Builder::new();
-    builder.prefix(".fmu-");
-    #[cfg(unix)]
-    {
-        use std::os::unix::fs::PermissionsExt;
-        builder.permissions(std::fs::Permissions::from_mode(0o666));
-    }
-    builder.tempfile_in(folder)
 }
 
 #[cfg(test)]

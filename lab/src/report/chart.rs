@@ -17,6 +17,7 @@ pub const UNSTABLE: RGBColor = RGBColor(150, 150, 150);
 pub const EXACT: RGBColor = RGBColor(0, 114, 178);
 pub const DECAY: RGBColor = RGBColor(213, 94, 0);
 pub const LOCK: RGBColor = RGBColor(0, 0, 0);
+pub const DECAY_LABEL: &str = "free decay, identified";
 const FONT: &str = "Helvetica, Arial, sans-serif";
 
 /// Draws into a string; plotters reports its own errors.
@@ -47,7 +48,8 @@ pub fn plane<'a, 'b>(
         p.epsilon, p.lambda, p.r, found.lock.g
     );
     area.draw_text(title, &(FONT, 22).into_text_style(area), (70, 14))?;
-    let small = (FONT, 14).into_text_style(area).color(&BLACK.mix(0.7));
+    let grey = BLACK.mix(0.7);
+    let small = (FONT, 14).into_text_style(area).color(&grey);
     area.draw_text(&caption, &small, (70, 42))?;
     let mut chart = ChartBuilder::on(area)
         .margin_top(66)
@@ -72,8 +74,8 @@ pub fn plane<'a, 'b>(
 }
 
 /// A curve, dashed where it is unstable.
-pub fn curve(
-    chart: &mut Plane,
+pub fn curve<'a, 'b: 'a>(
+    chart: &mut Plane<'a, 'b>,
     points: Vec<(f64, f64)>,
     style: ShapeStyle,
     dashed: bool,
@@ -82,39 +84,39 @@ pub fn curve(
     if dashed {
         let series = chart.draw_series(DashedLineSeries::new(points, 7, 5, style))?;
         if let Some(label) = label {
-            let dash = move |x, y| {
-                let piece = |from| PathElement::new(vec![(x + from, y), (x + from + 7, y)], style);
-                EmptyElement::at((0, 0)) + piece(0) + piece(12) + piece(24)
-            };
-            series.label(label).legend(move |(x, y)| dash(x, y).into_dyn());
+            series.label(label).legend(move |at| {
+                let piece = |from| PathElement::new(vec![(from, 0), (from + 7, 0)], style);
+                EmptyElement::at(at) + piece(0) + piece(12) + piece(24)
+            });
         }
     } else {
         let series = chart.draw_series(LineSeries::new(points, style))?;
         if let Some(label) = label {
             series
                 .label(label)
-                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 31, y)], style).into_dyn());
+                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 31, y)], style));
         }
     }
     Ok(())
 }
 
 /// Hollow circles: points along the decay.
-pub fn decay_points(
-    chart: &mut Plane,
+pub fn decay_points<'a, 'b: 'a>(
+    chart: &mut Plane<'a, 'b>,
     points: Vec<(f64, f64)>,
+    label: &str,
 ) -> Result<(), Box<dyn std::error::Error>> {
     let style = DECAY.stroke_width(2);
     chart
         .draw_series(points.into_iter().map(|at| Circle::new(at, 4, style)))?
-        .label("free decay, identified")
-        .legend(move |(x, y)| Circle::new((x + 15, y), 4, style).into_dyn());
+        .label(label)
+        .legend(move |(x, y)| Circle::new((x + 15, y), 4, style));
     Ok(())
 }
 
 /// A filled square: the locked point.
-pub fn locked_point(
-    chart: &mut Plane,
+pub fn locked_point<'a, 'b: 'a>(
+    chart: &mut Plane<'a, 'b>,
     at: (f64, f64),
 ) -> Result<(), Box<dyn std::error::Error>> {
     let square = |(x, y): (i32, i32)| Rectangle::new([(x - 5, y - 5), (x + 5, y + 5)], LOCK.filled());
@@ -123,13 +125,13 @@ pub fn locked_point(
             EmptyElement::at(at) + square((0, 0)),
         ))?
         .label("locked, measured")
-        .legend(move |(x, y)| square((x + 15, y)).into_dyn());
+        .legend(move |(x, y)| square((x + 15, y)));
     Ok(())
 }
 
 /// The legend, where the picture is empty.
-pub fn legend(
-    chart: &mut Plane,
+pub fn legend<'a, 'b: 'a>(
+    chart: &mut Plane<'a, 'b>,
     position: SeriesLabelPosition,
 ) -> Result<(), Box<dyn std::error::Error>> {
     chart

@@ -10,7 +10,7 @@ use super::{SceneError, validate::Quantity};
 pub struct Controller {
     /// Samples per natural period `2 pi/omega0`.
     pub samples_per_period: f64,
-    /// Bandwidth of the loop, in units of omega0.
+    /// Bandwidth of the phase detector, in units of omega0: the one tuning knob, from which the loop's gains follow.
     pub bandwidth: f64,
     /// Frequency at the start, in units of omega0.
     pub omega_start: f64,
@@ -22,27 +22,27 @@ pub struct Controller {
     pub phase_target: f64,
     /// Largest phase error that counts as locked, degrees.
     pub phase_tolerance: f64,
-    /// Largest relative variation of the frequency that counts as stationary.
-    pub frequency_tolerance: f64,
-    /// Largest relative variation of the response amplitude that counts as stationary.
-    pub amplitude_tolerance: f64,
-    /// How long all tolerances must hold, natural periods.
-    pub settle_periods: f64,
+    /// Largest relative drift of the frequency per period that counts as stationary.
+    pub frequency_drift: f64,
+    /// Largest relative drift of the response amplitude per period that counts as stationary.
+    pub amplitude_drift: f64,
+    /// How long all of this must hold, periods.
+    pub dwell_periods: u32,
 }
 
 impl Default for Controller {
     fn default() -> Self {
         Self {
             samples_per_period: 100.0,
-            bandwidth: 0.002,
+            bandwidth: 0.1,
             omega_start: 1.0,
             omega_min: 0.9,
             omega_max: 1.1,
             phase_target: -90.0,
-            phase_tolerance: 0.5,
-            frequency_tolerance: 1e-4,
-            amplitude_tolerance: 2e-3,
-            settle_periods: 100.0,
+            phase_tolerance: 0.3,
+            frequency_drift: 1e-6,
+            amplitude_drift: 5e-5,
+            dwell_periods: 20,
         }
     }
 }
@@ -75,11 +75,12 @@ impl Controller {
         )?;
         let tolerance = self.phase_tolerance;
         Quantity::new("controller.phase_tolerance", tolerance, "degrees").positive()?;
-        let tolerance = self.frequency_tolerance;
-        Quantity::new("controller.frequency_tolerance", tolerance, "(relative)").positive()?;
-        let tolerance = self.amplitude_tolerance;
-        Quantity::new("controller.amplitude_tolerance", tolerance, "(relative)").positive()?;
-        let settle = self.settle_periods;
-        Quantity::new("controller.settle_periods", settle, "(natural periods)").positive()
+        let drift = self.frequency_drift;
+        Quantity::new("controller.frequency_drift", drift, "(relative, per period)").positive()?;
+        let drift = self.amplitude_drift;
+        Quantity::new("controller.amplitude_drift", drift, "(relative, per period)").positive()?;
+        let dwell = self.dwell_periods;
+        Quantity::new("controller.dwell_periods", dwell.into(), "(periods)")
+            .check((4..=400).contains(&dwell), "must be from 4 to 400")
     }
 }

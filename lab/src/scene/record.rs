@@ -10,6 +10,8 @@ use super::{SceneError, validate::Quantity};
 pub struct Record {
     /// Longest wait for the lock, natural periods.
     pub lock_periods: f64,
+    /// How long the settled lock is held and measured, natural periods.
+    pub hold_periods: f64,
     /// Length of the recorded decay, natural periods.
     pub decay_periods: f64,
     /// Analysis window along the decay, periods of the motion.
@@ -19,9 +21,10 @@ pub struct Record {
 impl Default for Record {
     fn default() -> Self {
         Self {
-            lock_periods: 5000.0,
-            decay_periods: 300.0,
-            window_periods: 1.0,
+            lock_periods: 2000.0,
+            hold_periods: 20.0,
+            decay_periods: 50.0,
+            window_periods: 1.5,
         }
     }
 }
@@ -30,6 +33,7 @@ impl Record {
     pub(super) fn check(&self) -> Result<(), SceneError> {
         let unit = "(natural periods)";
         Quantity::new("record.lock_periods", self.lock_periods, unit).positive()?;
+        Quantity::new("record.hold_periods", self.hold_periods, unit).positive()?;
         Quantity::new("record.decay_periods", self.decay_periods, unit).positive()?;
         Quantity::new("record.window_periods", self.window_periods, "(periods)").positive()
     }

@@ -1,0 +1,51 @@
+//! Angles and small complex numbers.
+
+use core::f64::consts::{PI, TAU};
+
+/// The angle equal to `x` modulo a turn, rad, in [-pi, pi].
+pub fn wrap(x: f64) -> f64 {
+    (x - TAU * libm::rint(x / TAU)).clamp(-PI, PI)
+}
+
+/// A complex number; as a rotor, `exp(i phase)`.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Complex {
+    pub re: f64,
+    pub im: f64,
+}
+
+impl Complex {
+    /// `exp(i angle)`, angle in rad.
+    pub fn unit(angle: f64) -> Self {
+        let (im, re) = libm::sincos(angle);
+        Self { re, im }
+    }
+
+    pub fn times(self, other: Self) -> Self {
+        Self {
+            re: self.re * other.re - self.im * other.im,
+            im: self.re * other.im + self.im * other.re,
+        }
+    }
+
+    pub fn magnitude(self) -> f64 {
+        libm::hypot(self.re, self.im)
+    }
+
+    pub fn argument(self) -> f64 {
+        libm::atan2(self.im, self.re)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_angle_wraps_into_half_a_turn_either_way() {
+        for (x, expected) in [(0.3, 0.3), (PI + 0.5, 0.5 - PI), (-5.0, TAU - 5.0)] {
+            assert!((wrap(x) - expected).abs() < 1e-15, "{x}");
+        }
+        assert!(wrap(1e9).abs() <= PI);
+    }
+}

@@ -1,0 +1,263 @@
+//! The controller: one function per sample.
+
+mod sense;
+
+use crate::config::Config;
+use crate::detector::{Detector, Estimate};
+use crate::drive::{Drive, Level};
+use crate::error::ConfigError;
+use crate::gains::Gains;
+use crate::loop_filter::{Frequency, LoopFilter};
+use crate::oscillator::Oscillator;
+use crate::signals::{Input, Output};
+use crate::stationarity::{Dwell, Reading, Stationarity};
+use crate::supervisor::{Fault, Phase, Signs};
+use sense::Sense;
+
+/// A checked configuration and its coefficients; immutable but for [`PhaseLock::retune`].
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhaseLock {
+    config: Config,
+    detector: Detector,
+    filter: LoopFilter,
+    drive: Drive,
+    stationarity: Stationarity,
+}
+
+/// Everything that changes from sample to sample. A copy of it, put back later, continues with the same bits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct State {
+    oscillator: Oscillator,
+    response: Estimate,
+    reference: Estimate,
+    /// Whether the reference channel has ever read other than exactly zero.
+    connected: bool,
+    frequency: Frequency,
+    level: Level,
+    dwell: Dwell,
+    phase: Phase,
+    fault: Option<Fault>,
+    /// Whether the last sample ended a ramp.
+    ready: bool,
+    /// Whether the last sample ended a period in which the phase escaped.
+    escaped: bool,
+    /// Samples since acquiring began.
+    acquiring: u64,
+    /// Amplitude and phase target that the dwell is about.
+    tuning: (f64, f64),
+}
+
+impl PhaseLock {
+    pub(crate) fn new(config: Config) -> Self {
+        let per_sample = |range: f64, time: f64| {
+            if time > 0.0 {
+                range * (config.sample_time / time)
+            } else {
+                f64::INFINITY
+            }
+        };
+        Self {
+            detector: Detector::new(config.detector, config.bandwidth, config.sample_time),
+            filter: LoopFilter {
+                gains: Gains::from_bandwidth(config.bandwidth, config.damping_rate),
+                omega_min: config.omega_min,
+                omega_max: config.omega_max,
+                max_change: if config.omega_rate > 0.0 {
+                    config.omega_rate * config.sample_time
+                } else {
+                    f64::INFINITY
+                },
+                sample_time: config.sample_time,
+            },
+            drive: Drive {
+                amplitude_max: config.amplitude_max,
+                ramp_step: per_sample(config.amplitude_max, config.ramp_time),
+                release_step: per_sample(config.amplitude_max, config.release_time),
+                control_step: -libm::expm1(-config.base_bandwidth * config.sample_time),
+            },
+            stationarity: Stationarity {
+                phase_tolerance: config.lock.phase_tolerance,
+                unlock_tolerance: config.lock.unlock_tolerance,
+                frequency_drift: config.lock.frequency_drift,
+                amplitude_drift: config.lock.amplitude_drift,
+                block: config.lock.dwell.div_ceil(4),
+            },
+            config,
+        }
+    }
+
+    /// The configuration in use.
+    #[must_use]
+    pub fn config(&self) -> &Config {
+        &self.config
+    }
+
+    /// The gains in use.
+    #[must_use]
+    pub fn gains(&self) -> Gains {
+        self.filter.gains
+    }
+
+    /// The state before the first sample.
+    #[must_use]
+    pub fn start(&self) -> State {
+        State {
+            oscillator: Oscillator::default(),
+            response: Estimate::default(),
+            reference: Estimate::default(),
+            connected: false,
+            frequency: Frequency::at(self.config.omega_start),
+            level: Level::default(),
+            dwell: Dwell::default(),
+            phase: Phase::Idle,
+            fault: None,
+            ready: false,
+            escaped: false,
+            acquiring: 0,
+            tuning: self.tuning(),
+        }
+    }
+
+    /// Changes drive amplitude (m) and phase target (rad) between samples. The state goes on; `settled` starts anew.
+    ///
+    /// # Errors
+    /// A value out of range; then nothing is changed.
+    pub fn retune(&mut self, amplitude: f64, phase_target: f64) -> Result<(), ConfigError> {
+        let tuned = Config {
+            amplitude,
+            phase_target,
+            ..self.config
+        };
+        *self = tuned.build()?;
+        Ok(())
+    }
+
+    /// One sample: takes what the sensors read now, returns what the drive shall be until the next sample.
+    pub fn process(&self, state: &mut State, input: Input) -> Output {
+        let rotor = state.oscillator.rotor();
+        let sense = self.sense(state, &input, rotor);
+        self.sequence(state, input.active, &sense);
+        self.steer(state, &sense);
+        let output = self.output(state, &sense, rotor.im * state.level.amplitude);
+        let omega = state.frequency.omega;
+        let period_ends = state.oscillator.advance(omega, self.config.sample_time);
+        self.judge(state, &sense, period_ends);
+        output
+    }
+
+    fn tuning(&self) -> (f64, f64) {
+        (self.config.amplitude, self.config.phase_target)
+    }
+
+    /// Moves the sequence on.
+    fn sequence(&self, state: &mut State, active: bool, sense: &Sense) {
+        let timeout = self.config.acquire_timeout;
+        let elapsed = state.acquiring as f64 * self.config.sample_time;
+        let before = state.phase;
+        let (phase, fault) = before.next(&Signs {
+            active,
+            fault: sense.fault,
+            ready: state.ready,
+            settled: state.dwell.settled(),
+            escaped: state.escaped,
+            late: timeout > 0.0 && elapsed >= timeout,
+        });
+        state.phase = phase;
+        if fault.is_some() || (phase == Phase::Ramping && before != Phase::Ramping) {
+            state.fault = fault;
+        }
+        state.acquiring = if phase == Phase::Acquiring {
+            state.acquiring + 1
+        } else {
+            0
+        };
+    }
+
+    /// Sets frequency and drive amplitude as the state of the sequence demands.
+    fn steer(&self, state: &mut State, sense: &Sense) {
+        let Self { filter, drive, .. } = self;
+        let State {
+            frequency, level, ..
+        } = state;
+        let Config {
+            omega_start,
+            amplitude,
+            ..
+        } = self.config;
+        state.ready = false;
+        match state.phase {
+            Phase::Idle => {
+                filter.go_to(frequency, omega_start);
+                drive.ramp_down(level);
+            }
+            Phase::Ramping => {
+                filter.go_to(frequency, omega_start);
+                state.ready = drive.ramp(level, amplitude) && frequency.omega == omega_start;
+            }
+            Phase::Acquiring | Phase::Locked => {
+                if sense.qualified {
+                    filter.follow(frequency, sense.error);
+                } else {
+                    filter.hold(frequency);
+                }
+                if sense.qualified && sense.measured {
+                    drive.control(level, amplitude, sense.reference_amplitude);
+                }
+                state.ready = drive.ramp(level, amplitude);
+            }
+            Phase::LockLost | Phase::Tripped => {
+                filter.hold(frequency);
+                drive.ramp_down(level);
+            }
+            Phase::ShutDown => {
+                filter.hold(frequency);
+                drive.release(level);
+            }
+        }
+    }
+
+    /// Feeds the lock criterion, which starts anew where the loop is open or its aim has changed.
+    fn judge(&self, state: &mut State, sense: &Sense, period_ends: bool) {
+        let aim = self.tuning();
+        if !state.phase.is_closed() || state.tuning != aim || !state.ready {
+            state.dwell = Dwell::default();
+        }
+        state.tuning = aim;
+        state.escaped = false;
+        if state.phase.is_closed() {
+            let reading = Reading {
+                error: sense.error,
+                integral: state.frequency.integral,
+                omega: state.frequency.omega,
+                amplitude: state.response.amplitude(),
+                qualified: sense.qualified,
+            };
+            state.escaped = self
+                .stationarity
+                .update(&mut state.dwell, &reading, period_ends);
+        }
+    }
+
+    fn output(&self, state: &State, sense: &Sense, drive: f64) -> Output {
+        let omega = state.frequency.omega;
+        let response_amplitude = state.response.amplitude();
+        let means = state.dwell.means();
+        let (frequency, response_mean) = means.unwrap_or((omega, response_amplitude));
+        Output {
+            omega,
+            amplitude: state.level.amplitude,
+            drive,
+            phase_error: sense.error,
+            response_amplitude,
+            reference_amplitude: sense.reference_amplitude,
+            coherence: state.response.coherence(),
+            // The mean of values at a limit may round to beyond it.
+            frequency: frequency.clamp(self.config.omega_min, self.config.omega_max),
+            response_mean,
+            locked: state.phase == Phase::Locked,
+            settled: state.dwell.settled() && state.tuning == self.tuning(),
+            state: state.phase,
+            fault: state.fault,
+        }
+    }
+}

@@ -1,0 +1,72 @@
+//! The gains of the loop, from one knob.
+
+/// Gains of the PI loop filter.
+///
+/// Near phase resonance the phase of a lightly damped structure follows `phi' = -delta phi + omega_0 - omega` (`delta`: its
+/// damping rate), the detector is a low pass of bandwidth `wLP`, and the loop filter is `omega = omega_c + kp e + ki ∫e`.
+/// With `x = s/wLP` and `d = delta/wLP` the closed loop has the characteristic polynomial
+/// `x^3 + (1 + d) x^2 + (d + kp/wLP) x + ki/wLP^2`. The sum of its roots is fixed, so the slowest is fastest where
+/// all three have the real part `p = -(d + 1)/3`; with imaginary parts `0, ±l` that is
+///
+/// ```text
+/// kp = wLP (3 p^2 + l^2 - d),     ki = -wLP^2 p (p^2 + l^2)
+/// ```
+///
+/// `l = 0`, three equal real roots, is the conservative choice, and the one taken here. `delta = 0` may be given
+/// where the damping is unknown.
+///
+/// Source: P. Hippold, M. Scheel, L. Renson, M. Krack, "Robust and fast backbone tracking via phase-locked loops"
+/// (2024), arXiv:2403.06639, for an ideal exciter.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// Proportional gain, rad/s per rad.
+    pub proportional: f64,
+    /// Integral gain, rad/s² per rad.
+    pub integral: f64,
+}
+
+impl Gains {
+    /// Gains for a detector of the given bandwidth (rad/s, above 0) and a structure of the given damping rate (rad/s,
+    /// damping ratio times natural frequency; 0 or above).
+    #[must_use]
+    pub fn from_bandwidth(bandwidth: f64, damping_rate: f64) -> Self {
+        let d = damping_rate / bandwidth;
+        let p = -(d + 1.0) / 3.0;
+        Self {
+            proportional: bandwidth * (3.0 * p * p - d),
+            integral: -bandwidth * bandwidth * p * p * p,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_closed_loop_has_a_triple_root() {
+        let (bandwidth, delta) = (5.5, 0.33);
+        let gains = Gains::from_bandwidth(bandwidth, delta);
+        let s = -(bandwidth + delta) / 3.0;
+        let [c2, c1, c0] = [
+            bandwidth + delta,
+            bandwidth * (delta + gains.proportional),
+            bandwidth * gains.integral,
+        ];
+        for residual in [
+            s * s * s + c2 * s * s + c1 * s + c0,
+            3.0 * s * s + 2.0 * c2 * s + c1,
+            6.0 * s + 2.0 * c2,
+        ] {
+            assert!(residual.abs() < 1e-12, "{residual}");
+        }
+    }
+
+    #[test]
+    fn gains_are_positive_for_every_damping() {
+        for delta in [0.0, 0.1, 1.0, 10.0, 1e3] {
+            let gains = Gains::from_bandwidth(1.0, delta);
+            assert!(gains.proportional > 0.0 && gains.integral > 0.0);
+        }
+    }
+}

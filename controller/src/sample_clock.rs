@@ -1,0 +1,98 @@
+//! A sampling grid inside steps of any length.
+
+use core::ops::Range;
+
+/// Slack, in samples, below which an instant is not told from a grid point, ...
+const SLACK: f64 = 1e-6;
+/// ... what it grows by per sample, because the error of a caller's step adds up, ...
+const SLACK_PER_SAMPLE: f64 = 2e-9;
+/// ... and where it ends.
+const SLACK_MAX: f64 = 0.25;
+
+/// Tells which samples, taken at `0, sample_time, 2 sample_time, …`, fall into successive steps `[t, t + h)`.
+///
+/// Samples are counted, never timed, so none is lost or taken twice. Steps which are nominally a multiple of the
+/// sample time but deviate from it by up to 1e-9 relative hold the same number of samples every time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct SampleClock {
+    sample_time: f64,
+    taken: u64,
+}
+
+impl SampleClock {
+    /// A clock at time 0 with no sample taken; `sample_time` in s, above 0.
+    #[must_use]
+    pub const fn new(sample_time: f64) -> Self {
+        Self {
+            sample_time,
+            taken: 0,
+        }
+    }
+
+    /// Number of samples taken so far.
+    #[must_use]
+    pub const fn taken(&self) -> u64 {
+        self.taken
+    }
+
+    /// Numbers of the samples not yet taken that lie before `until` (s since the start); they count as taken after.
+    ///
+    /// A long step holds several, a short one none, an `until` that goes backwards or is NaN none.
+    pub fn take(&mut self, until: f64) -> Range<u64> {
+        let end = until / self.sample_time;
+        let slack = (SLACK + SLACK_PER_SAMPLE * end).min(SLACK_MAX);
+        // The conversion saturates: NaN and negative numbers become 0.
+        let end = libm::ceil(end - slack) as u64;
+        let first = self.taken;
+        self.taken = first.max(end);
+        first..self.taken
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn counts(sample_time: f64, step: f64, steps: u32) -> impl Iterator<Item = usize> {
+        let mut clock = SampleClock::new(sample_time);
+        let mut t = 0.0;
+        (0..steps).map(move |_| {
+            t += step;
+            clock.take(t).count()
+        })
+    }
+
+    #[test]
+    fn steps_of_one_sample_hold_one_sample_each_though_they_deviate() {
+        for deviation in [0.0, 1e-9, -1e-9, 1e-12, -1e-12] {
+            assert!(counts(0.1, 0.1 * (1.0 + deviation), 1_000_000).all(|n| n == 1));
+        }
+    }
+
+    #[test]
+    fn a_long_step_holds_several_samples() {
+        assert!(counts(0.1, 0.7, 1000).all(|n| n == 7));
+    }
+
+    #[test]
+    fn short_steps_hold_a_sample_now_and_then() {
+        let held: Vec<_> = counts(0.1, 0.025, 12).collect();
+        assert_eq!(held, [1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0, 0]);
+    }
+
+    #[test]
+    fn uneven_steps_lose_no_sample() {
+        let mut clock = SampleClock::new(0.1);
+        let mut seen = 0;
+        for until in [0.05, 0.35, 0.35, 0.2, f64::NAN, 0.4, 1.01] {
+            for n in clock.take(until) {
+                assert_eq!(n, seen);
+                seen += 1;
+            }
+        }
+        assert_eq!((seen, clock.taken()), (11, 11));
+    }
+
+    extern crate std;
+    use std::vec::Vec;
+}

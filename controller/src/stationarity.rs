@@ -1,0 +1,239 @@
+//! Whether phase, frequency and amplitude have been stationary.
+
+/// Blocks that a dwell is cut into.
+const BLOCKS: usize = 4;
+
+/// The criterion. Impacts make every sample ripple, so only means over whole periods are ever compared.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stationarity {
+    /// rad
+    pub phase_tolerance: f64,
+    /// rad
+    pub unlock_tolerance: f64,
+    /// Relative, per period.
+    pub frequency_drift: f64,
+    /// Relative, per period.
+    pub amplitude_drift: f64,
+    /// Periods in a block.
+    pub block: u32,
+}
+
+/// What enters the criterion at a sample.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Reading {
+    /// Phase error, rad.
+    pub error: f64,
+    /// Integral part of the frequency, rad/s: the smoother one, and the same where the phase error is 0.
+    pub integral: f64,
+    /// Frequency, rad/s.
+    pub omega: f64,
+    /// Response amplitude, m.
+    pub amplitude: f64,
+    /// Whether these can be believed.
+    pub qualified: bool,
+}
+
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Sums {
+    error: f64,
+    integral: f64,
+    omega: f64,
+    amplitude: f64,
+    samples: u64,
+    unqualified: u64,
+}
+
+impl Sums {
+    fn add(&mut self, other: &Sums) {
+        self.error += other.error;
+        self.integral += other.integral;
+        self.omega += other.omega;
+        self.amplitude += other.amplitude;
+        self.samples += other.samples;
+        self.unqualified += other.unqualified;
+    }
+}
+
+/// Means over a block.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+struct Block {
+    integral: f64,
+    omega: f64,
+    amplitude: f64,
+}
+
+/// The running dwell: the last complete blocks, and the one being filled.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Dwell {
+    blocks: [Block; BLOCKS],
+    complete: usize,
+    period: Sums,
+    block: Sums,
+    periods: u32,
+    settled: bool,
+}
+
+impl Dwell {
+    /// Whether the criterion is met.
+    pub fn settled(&self) -> bool {
+        self.settled
+    }
+
+    /// Means over the complete blocks: frequency, rad/s, and response amplitude, m.
+    pub fn means(&self) -> Option<(f64, f64)> {
+        let complete = &self.blocks[BLOCKS - self.complete..];
+        let mean = |value: fn(&Block) -> f64| {
+            complete.iter().map(value).sum::<f64>() / self.complete as f64
+        };
+        (self.complete > 0).then(|| (mean(|block| block.omega), mean(|block| block.amplitude)))
+    }
+}
+
+impl Stationarity {
+    /// Takes a sample; `period_ends` where it is the last one of a period. True where the phase has escaped.
+    pub fn update(&self, dwell: &mut Dwell, reading: &Reading, period_ends: bool) -> bool {
+        dwell.period.add(&Sums {
+            error: reading.error,
+            integral: reading.integral,
+            omega: reading.omega,
+            amplitude: reading.amplitude,
+            samples: 1,
+            unqualified: u64::from(!reading.qualified),
+        });
+        if !period_ends {
+            return false;
+        }
+        let period = core::mem::take(&mut dwell.period);
+        let error = (period.error / period.samples as f64).abs();
+        let believed = period.unqualified == 0;
+        if believed && error <= self.phase_tolerance {
+            self.end_period(dwell, &period);
+        } else {
+            *dwell = Dwell::default();
+        }
+        !believed || error > self.unlock_tolerance
+    }
+
+    fn end_period(&self, dwell: &mut Dwell, period: &Sums) {
+        dwell.block.add(period);
+        dwell.periods += 1;
+        if dwell.periods < self.block {
+            return;
+        }
+        let sums = core::mem::take(&mut dwell.block);
+        let samples = sums.samples as f64;
+        dwell.periods = 0;
+        dwell.blocks.rotate_left(1);
+        dwell.blocks[BLOCKS - 1] = Block {
+            integral: sums.integral / samples,
+            omega: sums.omega / samples,
+            amplitude: sums.amplitude / samples,
+        };
+        dwell.complete = (dwell.complete + 1).min(BLOCKS);
+        // Between the middles of the first and the last block. The range also sees what a slope would miss: the crest
+        // of a slow modulation.
+        let apart = f64::from(self.block) * (BLOCKS - 1) as f64;
+        dwell.settled = dwell.complete == BLOCKS
+            && range(&dwell.blocks, |block| block.integral) <= self.frequency_drift * apart
+            && range(&dwell.blocks, |block| block.amplitude) <= self.amplitude_drift * apart;
+    }
+}
+
+/// Largest less smallest, relative to the last.
+fn range(blocks: &[Block; BLOCKS], value: impl Fn(&Block) -> f64) -> f64 {
+    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    for block in blocks {
+        low = low.min(value(block));
+        high = high.max(value(block));
+    }
+    (high - low) / value(&blocks[BLOCKS - 1])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CRITERION: Stationarity = Stationarity {
+        phase_tolerance: 0.01,
+        unlock_tolerance: 0.1,
+        frequency_drift: 1e-6,
+        amplitude_drift: 1e-4,
+        block: 5,
+    };
+    const STILL: Reading = Reading {
+        error: 0.0,
+        integral: 1.0,
+        omega: 1.0,
+        amplitude: 1.0,
+        qualified: true,
+    };
+
+    /// Periods of ten samples until settled, or None within 200.
+    fn periods_to_settle(reading: impl Fn(f64) -> Reading) -> Option<u32> {
+        let mut dwell = Dwell::default();
+        (1..=200).find(|period| {
+            for sample in 0..10 {
+                let periods = f64::from(*period) + f64::from(sample) / 10.0;
+                CRITERION.update(&mut dwell, &reading(periods), sample == 9);
+            }
+            dwell.settled()
+        })
+    }
+
+    #[test]
+    fn a_still_signal_settles_after_the_dwell() {
+        assert_eq!(periods_to_settle(|_| STILL), Some(20));
+    }
+
+    #[test]
+    fn ripple_within_the_period_does_not_matter() {
+        let reading = |t: f64| Reading {
+            error: 0.05 * libm::sin(core::f64::consts::TAU * t),
+            ..STILL
+        };
+        assert_eq!(periods_to_settle(reading), Some(20));
+    }
+
+    #[test]
+    fn what_drifts_too_fast_does_not_settle() {
+        let amplitude = |rate: f64| {
+            move |t: f64| Reading {
+                amplitude: 1.0 + rate * t,
+                ..STILL
+            }
+        };
+        assert_eq!(periods_to_settle(amplitude(1.1e-4)), None);
+        assert_eq!(periods_to_settle(amplitude(0.9e-4)), Some(20));
+        let frequency = |t: f64| Reading {
+            integral: 1.0 + 1.1e-6 * t,
+            ..STILL
+        };
+        assert_eq!(periods_to_settle(frequency), None);
+    }
+
+    #[test]
+    fn a_slow_modulation_is_not_stationary_at_its_crest() {
+        let reading = |t: f64| Reading {
+            amplitude: 1.0 + 0.1 * libm::sin(0.06 * t),
+            ..STILL
+        };
+        assert_eq!(periods_to_settle(reading), None);
+    }
+
+    #[test]
+    fn one_unbelievable_sample_starts_the_dwell_again() {
+        let reading = |t: f64| Reading {
+            qualified: t != 10.5,
+            ..STILL
+        };
+        assert_eq!(periods_to_settle(reading), Some(30));
+    }
+
+    #[test]
+    fn the_phase_escapes_only_beyond_the_wider_tolerance() {
+        let mut dwell = Dwell::default();
+        let mut escapes = |error| CRITERION.update(&mut dwell, &Reading { error, ..STILL }, true);
+        assert!(!escapes(0.05) && !escapes(-0.09));
+        assert!(escapes(0.11));
+    }
+}

@@ -1,0 +1,145 @@
+//! Limits, and what is refused.
+
+mod rig;
+
+use phase_lock::{Config, Input, Phase};
+use proptest::prelude::*;
+use rig::{Bench, OMEGA_0, config};
+
+#[test]
+fn ramps_keep_to_their_rates() {
+    let mut bench = Bench::new(Config {
+        ramp_time: 2.0,
+        omega_rate: 0.5,
+        omega_start: 0.97 * OMEGA_0,
+        ..config()
+    });
+    let Config {
+        sample_time,
+        amplitude_max,
+        ..
+    } = *bench.controller.config();
+    let mut before = bench.sample();
+    for _ in 0..30_000 {
+        let output = bench.sample();
+        let (omega, level) = (
+            output.omega - before.omega,
+            output.amplitude - before.amplitude,
+        );
+        assert!(omega.abs() <= 0.5 * sample_time * (1.0 + 1e-9));
+        assert!(level.abs() <= amplitude_max * sample_time / 2.0 * (1.0 + 1e-9));
+        before = output;
+    }
+    assert!(before.locked);
+}
+
+#[test]
+fn a_configuration_that_makes_no_sense_is_refused_by_name() {
+    let refusal = |config: Config| config.build().expect_err("must be refused").to_string();
+    assert_eq!(
+        refusal(Config {
+            sample_time: f64::NAN,
+            ..config()
+        }),
+        "sample_time = NaN s: must be a finite number above 0"
+    );
+    for (name, bad) in [
+        (
+            "omega_max",
+            Config {
+                omega_max: 1.0,
+                ..config()
+            },
+        ),
+        (
+            "omega_start",
+            Config {
+                omega_start: 1e3,
+                ..config()
+            },
+        ),
+        (
+            "amplitude",
+            Config {
+                amplitude: -1.0,
+                ..config()
+            },
+        ),
+        (
+            "bandwidth",
+            Config {
+                bandwidth: 1e4,
+                ..config()
+            },
+        ),
+        (
+            "phase_target",
+            Config {
+                phase_target: 4.0,
+                ..config()
+            },
+        ),
+        (
+            "sample_time",
+            Config {
+                sample_time: 0.05,
+                bandwidth: 0.1,
+                ..config()
+            },
+        ),
+        (
+            "delay",
+            Config {
+                delay: f64::INFINITY,
+                ..config()
+            },
+        ),
+    ] {
+        assert!(refusal(bad).starts_with(name), "{}", refusal(bad));
+    }
+}
+
+fn reading() -> impl Strategy<Value = f64> {
+    prop_oneof![
+        8 => -1.0..1.0_f64,
+        2 => Just(0.0),
+        2 => -1e100..1e100_f64,
+        1 => any::<f64>(),
+        1 => prop_oneof![Just(f64::NAN), Just(f64::INFINITY), Just(f64::NEG_INFINITY)],
+    ]
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::default() })]
+    #[test]
+    fn outputs_are_finite_and_within_limits_for_any_input(
+        readings in prop::collection::vec((reading(), prop::option::of(reading()), prop::bool::weighted(0.9)), 1..400),
+        bandwidth in 0.02..1.0_f64,
+        ramp_time in prop_oneof![Just(0.0), 0.01..1.0_f64],
+        base_bandwidth in 0.0..0.02_f64,
+        demodulate: bool,
+    ) {
+        let mut config = Config {
+            bandwidth: bandwidth * OMEGA_0,
+            base_bandwidth: base_bandwidth * OMEGA_0,
+            ramp_time,
+            ..config()
+        };
+        if demodulate {
+            config.detector = phase_lock::Detector::Demodulator;
+        }
+        let controller = config.build().unwrap();
+        let mut state = controller.start();
+        for (response, reference, active) in readings {
+            let output = controller.process(&mut state, Input { response, reference, active });
+            prop_assert!((config.omega_min..=config.omega_max).contains(&output.omega));
+            prop_assert!((config.omega_min..=config.omega_max).contains(&output.frequency));
+            prop_assert!((0.0..=config.amplitude_max).contains(&output.amplitude));
+            prop_assert!(output.drive.abs() <= output.amplitude);
+            prop_assert!(output.phase_error.abs() <= std::f64::consts::PI);
+            prop_assert!(output.response_amplitude.is_finite() && output.reference_amplitude.is_finite());
+            prop_assert!((0.0..=1.0).contains(&output.coherence));
+            prop_assert!(!output.locked || output.state == Phase::Locked);
+        }
+    }
+}

@@ -1,0 +1,217 @@
+//! The loop around a resonator: that it locks, where, and how fast.
+
+mod rig;
+
+use phase_lock::{Config, Detector, Phase};
+use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, ZETA, config};
+
+fn relative(a: f64, b: f64) -> f64 {
+    (a / b - 1.0).abs()
+}
+
+#[test]
+fn locks_at_the_natural_frequency_from_ten_percent_off() {
+    for start in [0.9, 1.1] {
+        let mut bench = Bench::new(Config {
+            omega_start: start * OMEGA_0,
+            ..config()
+        });
+        let (periods, output) = bench.run_to_lock(2000).expect("a lock");
+        println!("from {start}: {periods} periods");
+        assert!(relative(output.frequency, OMEGA_0) < 4e-5, "{output:?}");
+        let resonance = AMPLITUDE / (2.0 * ZETA);
+        assert!(relative(output.response_amplitude, resonance) < 5e-3);
+        let output = bench.run(400);
+        assert!(relative(output.frequency, OMEGA_0) < 1e-6, "{output:?}");
+        assert!(relative(output.omega, OMEGA_0) < 1e-6, "{output:?}");
+        assert!(output.locked && output.settled);
+    }
+}
+
+#[test]
+fn locks_with_either_detector() {
+    for detector in [
+        Detector::Demodulator,
+        Detector::Adaptive {
+            harmonics: 1,
+            odd_only: true,
+        },
+        Detector::Adaptive {
+            harmonics: 4,
+            odd_only: false,
+        },
+    ] {
+        let mut bench = Bench::new(Config {
+            detector,
+            ..config()
+        });
+        let (_, output) = bench.run_to_lock(2000).expect("a lock");
+        assert!(
+            relative(output.frequency, OMEGA_0) < 1e-4,
+            "{detector:?} {output:?}"
+        );
+    }
+}
+
+#[test]
+fn the_own_oscillator_agrees_with_a_measured_reference() {
+    let locked = |measured_reference| {
+        let mut bench = Bench::new(config());
+        bench.measured_reference = measured_reference;
+        bench.run_to_lock(2000).expect("a lock");
+        bench.run(400)
+    };
+    let (own, measured) = (locked(false), locked(true));
+    assert!(relative(own.frequency, measured.frequency) < 1e-9);
+    assert!(relative(own.response_amplitude, measured.response_amplitude) < 1e-9);
+}
+
+/// Response and drive late by one sample, as FMI co-simulation makes them.
+fn locked_frequency_with_a_late_sensor(delay_samples: f64, measured_reference: bool) -> f64 {
+    let mut bench = Bench::new(Config {
+        delay: delay_samples * config().sample_time,
+        ..config()
+    });
+    let mut late = (0.0, 0.0);
+    let mut frequency = 0.0;
+    for _ in 0..80_000 {
+        let now = (bench.resonator.q, bench.resonator.base);
+        frequency = bench
+            .sample_reading(late.0, measured_reference.then_some(late.1))
+            .frequency;
+        late = now;
+    }
+    frequency
+}
+
+#[test]
+fn a_stated_delay_is_compensated() {
+    assert!(relative(locked_frequency_with_a_late_sensor(1.0, false), OMEGA_0) < 1e-6);
+    assert!(relative(locked_frequency_with_a_late_sensor(0.0, false), OMEGA_0) > 1e-4);
+}
+
+#[test]
+fn a_delay_common_to_both_sensors_cancels() {
+    assert!(relative(locked_frequency_with_a_late_sensor(0.0, true), OMEGA_0) < 1e-6);
+}
+
+#[test]
+fn follows_a_resonance_that_moves() {
+    let mut bench = Bench::new(config());
+    bench.run_to_lock(2000).expect("a lock");
+    for _ in 0..500 * 100 {
+        bench.resonator.omega_0 -= 1e-5 * OMEGA_0 / 100.0;
+        let output = bench.sample();
+        assert!(
+            output.locked && output.phase_error.abs() < 0.02,
+            "{output:?}"
+        );
+    }
+    assert!(relative(bench.run(400).frequency, 0.995 * OMEGA_0) < 1e-5);
+}
+
+#[test]
+fn retuning_keeps_the_lock_and_settles_anew() {
+    let mut bench = Bench::new(config());
+    bench.run_to_lock(2000).expect("a lock");
+    let target = bench.controller.config().phase_target;
+    bench
+        .controller
+        .retune(0.9 * AMPLITUDE, target)
+        .expect("within limits");
+    let output = bench.sample();
+    assert!(output.locked && !output.settled);
+    let output = bench.run(400);
+    assert!(output.locked && output.settled);
+    assert!(relative(output.response_amplitude, 0.9 * AMPLITUDE / (2.0 * ZETA)) < 1e-3);
+}
+
+#[test]
+fn the_base_amplitude_is_controlled_where_that_is_wanted() {
+    let mut bench = Bench::new(Config {
+        base_bandwidth: 0.02 * OMEGA_0,
+        ..config()
+    });
+    let mut output = bench.sample();
+    for _ in 0..60_000 {
+        // A shaker that gives only 80 % of what it is told.
+        let (q, base) = (bench.resonator.q, 0.8 * bench.resonator.base);
+        output = bench.sample_reading(q, Some(base));
+    }
+    assert!(
+        relative(output.amplitude, AMPLITUDE / 0.8) < 1e-6,
+        "{output:?}"
+    );
+    assert!(output.locked);
+}
+
+#[test]
+fn locks_through_sensor_noise() {
+    let mut bench = Bench::new(config());
+    let mut noise = Noise(1);
+    let amplitude = AMPLITUDE / (2.0 * ZETA);
+    let mut locked = None;
+    for n in 0..1000 * 100 {
+        // Uniform within ±a has the power a²/3: this is 40 dB below the response.
+        let q = bench.resonator.q + 0.01 * amplitude * 1.5_f64.sqrt() * noise.next();
+        let base = bench.resonator.base;
+        let output = bench.sample_reading(q, Some(base));
+        if output.locked {
+            locked.get_or_insert(n / 100);
+            assert!(relative(output.frequency, OMEGA_0) < 2e-4);
+        }
+    }
+    println!("40 dB: locked after {locked:?} periods");
+    assert!(locked.is_some());
+}
+
+#[test]
+fn periods_to_lock_over_bandwidth() {
+    println!("wLP/omega0   phase within 0.5 deg   locked");
+    for (ratio, most) in [(0.02, 400), (0.05, 350), (0.1, 320), (0.2, 320), (0.5, 320)] {
+        let mut bench = Bench::new(Config {
+            bandwidth: ratio * OMEGA_0,
+            damping_rate: ZETA * OMEGA_0,
+            omega_start: 0.98 * OMEGA_0,
+            ..config()
+        });
+        let mut last_outside = 0;
+        let mut locked = None;
+        for n in 0..100 * most {
+            let output = bench.sample();
+            if output.phase_error.abs() > 0.5_f64.to_radians() {
+                last_outside = n;
+            }
+            if output.locked {
+                locked.get_or_insert(f64::from(n) / 100.0);
+            }
+        }
+        println!(
+            "{ratio:10} {:22.1} {locked:?}",
+            f64::from(last_outside) / 100.0
+        );
+        assert!(locked.is_some(), "{ratio}");
+    }
+}
+
+#[test]
+fn two_runs_give_the_same_bits() {
+    let outputs = || {
+        let mut bench = Bench::new(config());
+        let mut outputs: Vec<_> = (0..5_000).map(|_| bench.sample()).collect();
+        // A state put back continues the same way, too.
+        let (state, resonator) = (bench.state, bench.resonator);
+        let ahead: Vec<_> = (0..5_000).map(|_| bench.sample()).collect();
+        (bench.state, bench.resonator) = (state, resonator);
+        outputs.extend((0..5_000).map(|_| bench.sample()));
+        assert_eq!(outputs[5_000..], ahead);
+        outputs
+    };
+    let (first, second) = (outputs(), outputs());
+    for (a, b) in first.iter().zip(&second) {
+        assert_eq!(a.omega.to_bits(), b.omega.to_bits());
+        assert_eq!(a.phase_error.to_bits(), b.phase_error.to_bits());
+    }
+    assert_eq!(first, second);
+    assert_eq!(first[0].state, Phase::Ramping);
+}

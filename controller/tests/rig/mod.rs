@@ -1,0 +1,131 @@
+//! A linear resonator on a moving base, exact between samples, and a loop around it.
+#![allow(dead_code)] // every test binary uses its part
+
+use phase_lock::{Config, Input, Output, PhaseLock, State};
+
+pub const OMEGA_0: f64 = 55.39;
+/// Damping ratio: the response relaxes with a time constant of 1/(2 pi ZETA) = 32 periods.
+pub const ZETA: f64 = 0.005;
+pub const AMPLITUDE: f64 = 1e-4;
+
+/// `q'' + 2 zeta omega0 q' + omega0^2 q = omega0^2 e`, `e = E sin(phase)`, in closed form.
+///
+/// The base acts through the spring alone, so phase resonance (a quarter turn of lag) is at omega0 exactly.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Resonator {
+    pub omega_0: f64,
+    pub zeta: f64,
+    pub q: f64,
+    pub dq: f64,
+    pub phase: f64,
+    pub base: f64,
+}
+
+impl Resonator {
+    pub fn new() -> Self {
+        Self {
+            omega_0: OMEGA_0,
+            zeta: ZETA,
+            ..Self::default()
+        }
+    }
+
+    /// Advances under a base oscillator of amplitude `e`, m, and frequency `omega`, rad/s.
+    pub fn advance(&mut self, e: f64, omega: f64, h: f64) {
+        let (w, z) = (self.omega_0, self.zeta);
+        // Steady state: q = Im(a exp(i phase)).
+        let (re, im) = (w * w - omega * omega, 2.0 * z * w * omega);
+        let scale = w * w * e / (re * re + im * im);
+        let steady = |phase: f64| {
+            let (s, c) = phase.sin_cos();
+            let q = scale * (re * s - im * c);
+            (q, scale * omega * (re * c + im * s))
+        };
+        let (q_p, dq_p) = steady(self.phase);
+        let (x, v) = (self.q - q_p, self.dq - dq_p);
+        // Free decay of what is left.
+        let wd = w * (1.0 - z * z).sqrt();
+        let (s, c) = (wd * h).sin_cos();
+        let decay = (-z * w * h).exp();
+        let b = (v + z * w * x) / wd;
+        let free = decay * (x * c + b * s);
+        let dfree = -z * w * free + decay * wd * (b * c - x * s);
+        self.phase = (self.phase + omega * h) % std::f64::consts::TAU;
+        let (q_p, dq_p) = steady(self.phase);
+        (self.q, self.dq) = (free + q_p, dfree + dq_p);
+        self.base = e * self.phase.sin();
+    }
+}
+
+pub fn config() -> Config {
+    Config::for_resonance(OMEGA_0, AMPLITUDE)
+}
+
+/// A controller and what it knows, coupled to a resonator.
+pub struct Bench {
+    pub controller: PhaseLock,
+    pub state: State,
+    pub resonator: Resonator,
+    pub active: bool,
+    pub measured_reference: bool,
+}
+
+impl Bench {
+    pub fn new(config: Config) -> Self {
+        let controller = config.build().expect("a sensible configuration");
+        Self {
+            state: controller.start(),
+            controller,
+            resonator: Resonator::new(),
+            active: true,
+            measured_reference: true,
+        }
+    }
+
+    /// One sample: the sensors are read, and the drive holds until the next.
+    pub fn sample(&mut self) -> Output {
+        let reference = self.measured_reference.then_some(self.resonator.base);
+        self.sample_reading(self.resonator.q, reference)
+    }
+
+    /// One sample in which the sensors read something else.
+    pub fn sample_reading(&mut self, response: f64, reference: Option<f64>) -> Output {
+        let input = Input {
+            response,
+            reference,
+            active: self.active,
+        };
+        let output = self.controller.process(&mut self.state, input);
+        let h = self.controller.config().sample_time;
+        self.resonator.advance(output.amplitude, output.omega, h);
+        output
+    }
+
+    /// Runs for nominal periods; the last output.
+    pub fn run(&mut self, periods: u32) -> Output {
+        (0..100 * periods)
+            .map(|_| self.sample())
+            .last()
+            .expect("at least one sample")
+    }
+
+    /// Runs until locked; periods it took, and the output then.
+    pub fn run_to_lock(&mut self, most_periods: u32) -> Option<(f64, Output)> {
+        (0..100 * most_periods).find_map(|n| {
+            let output = self.sample();
+            output.locked.then_some((f64::from(n) / 100.0, output))
+        })
+    }
+}
+
+/// A reproducible sequence of uniform numbers in [-1, 1) (xorshift).
+pub struct Noise(pub u64);
+
+impl Noise {
+    pub fn next(&mut self) -> f64 {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 7;
+        self.0 ^= self.0 << 17;
+        (self.0 >> 11) as f64 / (1u64 << 52) as f64 - 1.0
+    }
+}

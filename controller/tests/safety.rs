@@ -1,0 +1,178 @@
+//! What must never happen, whatever the sensors read.
+
+mod rig;
+
+use phase_lock::{Config, Fault, LockCriterion, Phase};
+use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, config};
+
+#[test]
+fn never_locks_on_silence() {
+    let mut bench = Bench::new(config());
+    for _ in 0..50_000 {
+        let output = bench.sample_reading(0.0, None);
+        assert!(!output.locked && !output.settled);
+        assert_eq!(output.omega, OMEGA_0, "the loop has nothing to follow");
+    }
+}
+
+#[test]
+fn never_locks_on_noise() {
+    let mut bench = Bench::new(Config {
+        // As lenient as can be: only the coherence is left to tell.
+        lock: LockCriterion {
+            phase_tolerance: 3.0,
+            unlock_tolerance: 3.1,
+            frequency_drift: 1.0,
+            amplitude_drift: 1.0,
+            response_min: 0.0,
+            ..LockCriterion::default()
+        },
+        ..config()
+    });
+    let mut noise = Noise(7);
+    for _ in 0..200_000 {
+        let base = bench.resonator.base;
+        let output = bench.sample_reading(noise.next(), Some(base));
+        assert!(!output.locked, "{output:?}");
+    }
+}
+
+#[test]
+fn never_locks_without_a_drive() {
+    let mut bench = Bench::new(Config {
+        amplitude: 0.0,
+        ..config()
+    });
+    bench.resonator.q = 0.01;
+    for _ in 0..50_000 {
+        assert!(!bench.sample().locked);
+    }
+}
+
+#[test]
+fn a_reference_that_goes_dead_does_not_keep_the_lock() {
+    let mut bench = Bench::new(config());
+    bench.run_to_lock(2000).expect("a lock");
+    let mut output = bench.sample();
+    for _ in 0..20_000 {
+        let q = bench.resonator.q;
+        output = bench.sample_reading(q, Some(0.0));
+    }
+    assert_eq!(output.state, Phase::LockLost);
+}
+
+#[test]
+fn a_reading_that_is_no_number_ramps_the_drive_down_and_latches() {
+    for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
+        for (response, reference) in [(bad, 0.0), (0.0, bad)] {
+            let mut bench = Bench::new(Config {
+                ramp_time: 1.0,
+                ..config()
+            });
+            bench.run_to_lock(2000).expect("a lock");
+            let before = bench.sample().amplitude;
+            let output = bench.sample_reading(response, Some(reference));
+            assert_eq!(
+                (output.state, output.fault),
+                (Phase::Tripped, Some(Fault::Sensor))
+            );
+            assert!(
+                output.amplitude < before && output.amplitude > 0.9 * before,
+                "gradual"
+            );
+            let output = bench.run(100);
+            assert_eq!((output.state, output.amplitude), (Phase::Tripped, 0.0));
+            bench.active = false;
+            assert_eq!(bench.sample().state, Phase::Idle);
+            bench.active = true;
+            assert_eq!(bench.sample().fault, None);
+            assert!(
+                bench.run_to_lock(2000).is_some(),
+                "armed again, it locks again"
+            );
+        }
+    }
+}
+
+#[test]
+fn too_large_a_response_trips() {
+    let mut bench = Bench::new(Config {
+        response_max: 50.0 * AMPLITUDE,
+        ..config()
+    });
+    let output = bench.run(400);
+    assert_eq!(output.state, Phase::Tripped);
+    assert_eq!(output.fault, Some(Fault::ResponseTooLarge));
+}
+
+#[test]
+fn acquiring_times_out() {
+    let mut bench = Bench::new(Config {
+        acquire_timeout: 0.5,
+        ..config()
+    });
+    let states: Vec<_> = (0..600)
+        .map(|_| bench.sample_reading(0.0, None).state)
+        .collect();
+    assert_eq!(states[400], Phase::Acquiring);
+    assert_eq!(states[599], Phase::Tripped);
+    assert_eq!(bench.sample().fault, Some(Fault::TimedOut));
+}
+
+#[test]
+fn a_lost_lock_is_latched() {
+    let mut bench = Bench::new(config());
+    bench.run_to_lock(2000).expect("a lock");
+    bench.resonator.omega_0 *= 1.1;
+    let output = bench.run(100);
+    assert_eq!(
+        (output.state, output.fault),
+        (Phase::LockLost, Some(Fault::LockLost))
+    );
+    bench.resonator.omega_0 /= 1.1;
+    let output = bench.run(500);
+    assert_eq!((output.state, output.amplitude), (Phase::LockLost, 0.0));
+}
+
+#[test]
+fn a_disturbance_between_the_two_tolerances_does_not_unlock() {
+    let mut bench = Bench::new(config());
+    bench.run_to_lock(2000).expect("a lock");
+    bench.resonator.omega_0 *= 1.0005;
+    let mut largest = 0.0_f64;
+    for _ in 0..100 * 100 {
+        let output = bench.sample();
+        largest = largest.max(output.phase_error.abs());
+        assert!(output.locked);
+    }
+    let LockCriterion {
+        phase_tolerance,
+        unlock_tolerance,
+        ..
+    } = bench.controller.config().lock;
+    assert!(
+        largest > phase_tolerance && largest < unlock_tolerance,
+        "{largest}"
+    );
+}
+
+#[test]
+fn the_drive_is_switched_off_at_once_or_gradually_as_configured() {
+    for (release_time, expected) in [(0.0, 0.0), (10.0, 0.999)] {
+        let mut bench = Bench::new(Config {
+            release_time,
+            ..config()
+        });
+        let before = bench.run(10);
+        bench.active = false;
+        let output = bench.sample();
+        assert_eq!(output.state, Phase::ShutDown);
+        assert!((output.amplitude / AMPLITUDE - expected).abs() < 1e-3);
+        let after = bench.run(200);
+        assert_eq!(after.amplitude, 0.0);
+        assert!(
+            (after.omega - before.omega).abs() < 0.1,
+            "the frequency stays"
+        );
+    }
+}

@@ -1,0 +1,104 @@
+//! The backbone with the decay on it: amplitude over detuning.
+
+use plotters::chart::SeriesLabelPosition;
+use plotters::prelude::*;
+
+use super::chart::{
+    DECAY_LABEL, EXACT, THEORY, UNSTABLE, curve, decay_points, legend, locked_point, plane, svg,
+};
+use crate::identification::Identification;
+use crate::orbit;
+use crate::theory::{BackbonePoint, SlowFlow};
+
+/// Amplitude drawn up to at least this, C.
+const TOP: f64 = 0.8;
+/// Points of the exact curve.
+const EXACT_POINTS: usize = 400;
+
+pub(super) fn draw(found: &Identification) -> Result<String, String> {
+    let p = &found.parameters;
+    let slow_flow = SlowFlow::new(p.lambda, p.r);
+    let top = (1.25 * found.lock.c).max(TOP);
+    let reach = slow_flow
+        .manifold
+        .b(top, crate::theory::BranchSide::Right)
+        .unwrap_or(1.0);
+    let theory = slow_flow.backbone(slow_flow.manifold.b_min(), reach, 400);
+    let sigmas = theory.iter().map(|point| point.sigma);
+    let measured = found.decay.iter().map(|point| point.sigma);
+    let (low, high) = sigmas
+        .chain(measured)
+        .fold((f64::MAX, f64::MIN), |(low, high), s| (low.min(s), high.max(s)));
+    let margin = 0.06 * (high - low);
+    let (low, high) = (low - margin, high + margin);
+
+    svg(|area| {
+        let mut chart = plane(
+            area,
+            "Backbone: phase resonance of the centre of mass",
+            found,
+            ((low, high), "detuning sigma = (omega/omega0 - 1)/epsilon"),
+            ((0.0, top), "amplitude C of v, over b"),
+        )?;
+        let solid = THEORY.stroke_width(2);
+        let label = "first-order theory, stable";
+        for (n, run) in runs(&theory, BackbonePoint::stable).into_iter().enumerate() {
+            let points = run.iter().map(|point| (point.sigma, point.c)).collect();
+            curve(&mut chart, points, solid, false, (n == 0).then_some(label))?;
+        }
+        let label = "first-order theory, unstable";
+        let unstable = runs(&theory, |point| !point.stable());
+        for (n, run) in unstable.into_iter().enumerate() {
+            let points = run.iter().map(|point| (point.sigma, point.c)).collect();
+            let style = UNSTABLE.stroke_width(2);
+            curve(&mut chart, points, style, true, (n == 0).then_some(label))?;
+        }
+        let exact = exact_curve(found, &slow_flow, (low, high), top);
+        curve(&mut chart, exact, EXACT.stroke_width(1), false, Some("exact orbits"))?;
+        let decay = found.decay.iter().map(|point| (point.sigma, point.c));
+        decay_points(&mut chart, decay.collect(), DECAY_LABEL)?;
+        locked_point(&mut chart, (found.lock.sigma, found.lock.c))?;
+        legend(&mut chart, SeriesLabelPosition::UpperLeft)
+    })
+}
+
+/// Consecutive points for which `wanted` holds, each run with the point after it so that the curve has no holes.
+fn runs(points: &[BackbonePoint], wanted: impl Fn(&BackbonePoint) -> bool) -> Vec<&[BackbonePoint]> {
+    let mut runs = Vec::new();
+    let mut start = None;
+    for (n, point) in points.iter().enumerate() {
+        match (wanted(point), start) {
+            (true, None) => start = Some(n),
+            (false, Some(from)) => {
+                runs.push(&points[from..=n]);
+                start = None;
+            }
+            _ => {}
+        }
+    }
+    if let Some(from) = start {
+        runs.push(&points[from..]);
+    }
+    runs
+}
+
+/// The exact backbone beyond the fold, by amplitude.
+fn exact_curve(
+    found: &Identification,
+    slow_flow: &SlowFlow,
+    (low, high): (f64, f64),
+    top: f64,
+) -> Vec<(f64, f64)> {
+    let fold = slow_flow.manifold.b_min();
+    let mut points: Vec<(f64, f64)> = (0..=EXACT_POINTS)
+        .map(|n| low + (high - low) * n as f64 / EXACT_POINTS as f64)
+        .flat_map(|sigma| {
+            let omega = 1.0 + found.parameters.epsilon * sigma;
+            orbit::exact_backbone(&found.parameters, omega)
+        })
+        .filter(|orbit| orbit.b >= fold && orbit.c <= top)
+        .map(|orbit| (orbit.sigma, orbit.c))
+        .collect();
+    points.sort_by(|a, b| a.1.total_cmp(&b.1));
+    points
+}
