@@ -40,7 +40,7 @@ pub struct LockCriterion {
     pub dwell: u32,
     /// Smallest share of the fundamental in the power of the signal, 0 to 1: noise has none.
     pub coherence_min: f64,
-    /// Smallest response amplitude that is believed, m. Silence never is.
+    /// Smallest response amplitude that is believed, as a multiple of the drive amplitude wanted. Silence never is.
     pub response_min: f64,
 }
 
@@ -53,7 +53,7 @@ impl Default for LockCriterion {
             amplitude_drift: 5e-5,
             dwell: 20,
             coherence_min: 0.5,
-            response_min: 0.0,
+            response_min: 0.1,
         }
     }
 }
@@ -73,11 +73,11 @@ pub struct Config {
     pub omega_rate: f64,
     /// Drive amplitude wanted, m; tunable.
     pub amplitude: f64,
-    /// Largest drive amplitude allowed, m.
+    /// Largest drive amplitude allowed, m; 0 for none.
     pub amplitude_max: f64,
-    /// Time of a ramp of the drive from 0 to `amplitude_max`, s, also down after a fault; 0 to jump.
+    /// Time of a ramp of the drive from 0 to `amplitude`, s, also down after a fault; 0 to jump.
     pub ramp_time: f64,
-    /// Time of a ramp of the drive from `amplitude_max` to 0 where `active` is taken away, s; 0 to switch off at once, which
+    /// Time of a ramp of the drive from `amplitude` to 0 where `active` is taken away, s; 0 to switch off at once, which
     /// is what a free decay wants.
     pub release_time: f64,
     /// Bandwidth, rad/s, of the control that makes the *measured* amplitude of the base the wanted one; 0 where the
@@ -105,7 +105,7 @@ pub struct Config {
 
 impl Config {
     /// A sensible start for a structure that resonates near `omega` (rad/s) and a base of the given amplitude (m):
-    /// 100 samples per period, ±20 % of frequency, a bandwidth of a tenth of `omega`, no ramps and no time-out.
+    /// 100 samples per period, ±20 % of frequency, a bandwidth of a tenth of `omega`, no ramps, no limits and no time-out.
     #[must_use]
     pub fn for_resonance(omega: f64, amplitude: f64) -> Self {
         Self {
@@ -115,7 +115,7 @@ impl Config {
             omega_max: 1.2 * omega,
             omega_rate: 0.0,
             amplitude,
-            amplitude_max: 2.0 * amplitude,
+            amplitude_max: 0.0,
             ramp_time: 0.0,
             release_time: 0.0,
             base_bandwidth: 0.0,
@@ -127,10 +127,7 @@ impl Config {
             bandwidth: 0.1 * omega,
             damping_rate: 0.0,
             delay: 0.0,
-            lock: LockCriterion {
-                response_min: 0.1 * amplitude,
-                ..LockCriterion::default()
-            },
+            lock: LockCriterion::default(),
             response_max: 0.0,
             acquire_timeout: 0.0,
         }
@@ -148,6 +145,15 @@ impl Config {
         Ok(PhaseLock::new(self))
     }
 
+    /// Largest drive amplitude, m: infinite where none is set.
+    pub(crate) fn amplitude_limit(&self) -> f64 {
+        if self.amplitude_max > 0.0 {
+            self.amplitude_max
+        } else {
+            f64::INFINITY
+        }
+    }
+
     fn check_frequencies(&self) -> Result<(), ConfigError> {
         Quantity::new("sample_time", self.sample_time, "s").positive()?;
         Quantity::new("omega_min", self.omega_min, "rad/s").positive()?;
@@ -163,10 +169,10 @@ impl Config {
     }
 
     fn check_drive(&self) -> Result<(), ConfigError> {
-        Quantity::new("amplitude_max", self.amplitude_max, "m").positive()?;
+        Quantity::new("amplitude_max", self.amplitude_max, "m").not_negative()?;
         Quantity::new("amplitude", self.amplitude, "m").check(
-            (0.0..=self.amplitude_max).contains(&self.amplitude),
-            "between 0 and amplitude_max",
+            (0.0..=self.amplitude_limit()).contains(&self.amplitude),
+            "a finite number, 0 or above and at most amplitude_max",
         )?;
         Quantity::new("phase_target", self.phase_target, "rad")
             .check(self.phase_target.abs() <= PI, "between -pi and pi")?;
@@ -214,7 +220,7 @@ impl Config {
             lock.coherence_min > 0.0 && lock.coherence_min < 1.0,
             "above 0 and below 1",
         )?;
-        Quantity::new("lock.response_min", lock.response_min, "m").not_negative()?;
+        Quantity::new("lock.response_min", lock.response_min, "").not_negative()?;
         Quantity::new("response_max", self.response_max, "m").not_negative()?;
         Quantity::new("acquire_timeout", self.acquire_timeout, "s").not_negative()
     }

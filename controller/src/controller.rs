@@ -70,9 +70,9 @@ impl PhaseLock {
                 sample_time: config.sample_time,
             },
             drive: Drive {
-                amplitude_max: config.amplitude_max,
-                ramp_step: per_sample(config.amplitude_max, config.ramp_time),
-                release_step: per_sample(config.amplitude_max, config.release_time),
+                amplitude_max: config.amplitude_limit(),
+                ramp_step: per_sample(config.amplitude, config.ramp_time),
+                release_step: per_sample(config.amplitude, config.release_time),
                 control_step: -libm::expm1(-config.base_bandwidth * config.sample_time),
             },
             stationarity: Stationarity {

@@ -19,7 +19,7 @@ pub struct Input {
 pub struct Output {
     /// Drive frequency, rad/s; always between `omega_min` and `omega_max`.
     pub omega: f64,
-    /// Drive amplitude `E`, m; always between 0 and `amplitude_max`.
+    /// Drive amplitude `E`, m; always between 0 and `amplitude_max` (where that is set).
     pub amplitude: f64,
     /// The base displacement wanted at this sample, `E sin(phase)`, m, for a rig that takes samples.
     pub drive: f64,

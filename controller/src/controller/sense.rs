@@ -60,7 +60,7 @@ impl PhaseLock {
             reference_amplitude: reference.amplitude,
             qualified: measurable
                 && reference.qualified
-                && amplitude >= self.config.lock.response_min
+                && amplitude >= self.config.lock.response_min * self.config.amplitude
                 && self.is_coherent(response),
             measured: channel.is_some(),
         }
