@@ -3,11 +3,12 @@
 //! `e(t) = u0 + u1 t + u2 t² + u3 t³ + E sin(phase + omega t)`, with `t` counted from now. The phase is carried
 //! instead of absolute time, so that a run of any length costs no accuracy.
 
+use serde::{Deserialize, Serialize};
 /// 2π split in two: the nearest double, and what it misses.
 const TAU: (f64, f64) = (core::f64::consts::TAU, 2.449_293_598_294_706_5e-16);
 
 /// What drives the base during one communication step: held until it is changed.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Drive {
     /// Coefficients of the displacement signal, m, m/s, m/s², m/s³ (a polynomial in the time since the step began;
     /// an input of derivatives d1, d2, d3 gives `[e, d1, d2/2, d3/6]`).
@@ -45,7 +46,7 @@ impl Drive {
 }
 
 /// A drive and the phase its oscillator has reached.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct BaseMotion {
     /// What drives the base; the signal's time is counted from now.
     pub drive: Drive,
@@ -64,6 +65,11 @@ impl BaseMotion {
         self.drive.signal[0] + oscillator
     }
 
+    /// The motion from now on under another drive, its phase going on.
+    pub fn with(&self, drive: Drive) -> Self {
+        Self { drive, ..*self }
+    }
+
     /// The same motion seen from `t` seconds later.
     pub fn after(&self, t: f64) -> Self {
         Self {
@@ -79,7 +85,7 @@ impl BaseMotion {
 /// A phase in [0, 2π), rad, and what rounding has kept out of it.
 ///
 /// Without the second part the rounding of equal steps adds up in one direction (1e-10 rad after a million of them).
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Phase(f64, f64);
 
 impl Phase {

@@ -14,12 +14,13 @@
 
 use crate::oscillator::{Oscillator, Regime};
 use num_complex::Complex64;
+use serde::{Deserialize, Serialize};
 
 /// Below this damping ratio the answer is taken from rest, above it as a steady answer.
 const LIGHT_DAMPING: f64 = 0.5;
 
 /// Coefficients of the answer at one frequency.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Forcing {
     /// Frequency, rad/s, 0 or above.
     pub omega: f64,
@@ -28,7 +29,7 @@ pub struct Forcing {
     pub(crate) answer: Answer,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(crate) enum Answer {
     /// From rest, by divided differences.
     FromRest {

@@ -4,6 +4,8 @@
 pub mod base_motion;
 pub mod clearance;
 pub mod flight;
+#[cfg(feature = "fmu")]
+mod fmu;
 pub mod forcing;
 pub mod motion;
 pub mod oscillator;

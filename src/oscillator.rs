@@ -3,8 +3,9 @@
 //! `x'' + 2 delta x' + omega0² x = 0`. Position and velocity after `t` are a linear map of those now; the map's four
 //! entries are written so that none loses digits at any damping ratio, however near to critical.
 
+use serde::{Deserialize, Serialize};
 /// Coefficients of one oscillator, derived once from mass, stiffness and damping.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Oscillator {
     /// Decay rate `delta = c/(2 mass)`, 1/s.
     pub delta: f64,
@@ -21,7 +22,7 @@ pub struct Oscillator {
 }
 
 /// How the free motion goes.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub enum Regime {
     /// Below critical damping, down to none: oscillation at `omega_d`, rad/s.
     Oscillating {

@@ -1,9 +1,10 @@
 //! What the rig is made of, in SI units, validated once.
 
 use core::fmt;
+use serde::{Deserialize, Serialize};
 
 /// The physical parameters of the linear oscillator and its vibro-impact particle.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Parameters {
     /// Primary mass `M`, kg.
     pub primary_mass: f64,

@@ -8,6 +8,7 @@ use crate::oscillator::Oscillator;
 use crate::parameters::{InvalidValue, Parameters};
 use crate::sticking::until_released;
 use crate::wall::{ImpactLaw, Wall};
+use serde::{Deserialize, Serialize};
 
 /// A rebound that would lift the particle less than this fraction of the half-width off its wall cannot be told from
 /// contact in double precision.
@@ -18,7 +19,7 @@ const SHORTEST_HOP: f64 = 1e-9;
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
 /// Positions (m) and velocities (m/s) of both masses.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
     /// Displacement of the primary mass.
     pub q1: f64,
@@ -70,7 +71,7 @@ pub struct Outcome {
 }
 
 /// What has been counted since the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Tally {
     /// Impacts followed one by one. A chatter is followed until its hops can no longer be resolved.
     pub impacts: u64,
@@ -82,7 +83,7 @@ pub struct Tally {
     pub dissipated: f64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 enum Contact {
     Free,
     Stuck(Wall),
@@ -91,7 +92,7 @@ enum Contact {
 }
 
 /// An oscillator and its answer to the frequency in use: coefficients are kept while the frequency stays.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 struct Driven {
     oscillator: Oscillator,
     forcing: Forcing,
@@ -116,7 +117,7 @@ impl Driven {
 }
 
 /// The plant: parameters, what follows from them, and the state.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Plant {
     parameters: Parameters,
     law: ImpactLaw,
@@ -223,6 +224,12 @@ impl Plant {
         }
         self.time += duration;
         outcome
+    }
+
+    /// Says where the base is at the start: what drives it from the first advance on is compared with this.
+    pub fn begin(&mut self, drive: Drive) {
+        self.base.drive = drive;
+        self.under_way = true;
     }
 
     /// Takes over a new drive and the jump of the base that it brings.
@@ -401,10 +408,11 @@ impl Plant {
         &self.tally
     }
 
-    /// Mechanical energy, J: of both masses' motion, and of the spring between base and primary mass.
-    pub fn energy(&self) -> f64 {
+    /// Mechanical energy, J: of both masses' motion, and of the spring between the primary mass and a base at
+    /// `displacement`, m.
+    pub fn energy(&self, displacement: f64) -> f64 {
         let p = &self.parameters;
-        let stretch = self.primary.0 - self.base.displacement();
+        let stretch = self.primary.0 - displacement;
         0.5 * (p.primary_mass * self.primary.1 * self.primary.1
             + p.particle_mass * self.particle_velocity * self.particle_velocity
             + p.stiffness * stretch * stretch)

@@ -1,9 +1,10 @@
 //! The two walls of the cavity, and what happens at an impact.
 
 use crate::parameters::Parameters;
+use serde::{Deserialize, Serialize};
 
 /// A wall of the cavity.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub enum Wall {
     /// The wall touched at `w = +b`; it pushes the particle towards +q2.
     Plus,
@@ -33,7 +34,7 @@ impl Wall {
 }
 
 /// Coefficients of Newton's impact law, derived once.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImpactLaw {
     restitution: f64,
     /// Velocity taken from the primary mass per unit of approach: `(1 + r) m/(M + m)`.

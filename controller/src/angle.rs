@@ -9,6 +9,7 @@ pub fn wrap(x: f64) -> f64 {
 
 /// A complex number; as a rotor, `exp(i phase)`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Complex {
     pub re: f64,
     pub im: f64,

@@ -8,6 +8,7 @@ use crate::harmonics::MAX_HARMONICS;
 
 /// How amplitude and phase of the fundamental are found.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Detector {
     /// An adaptive (least mean squares) filter: follows an offset and several harmonics together, so that none ripples
     /// through the others.
@@ -27,6 +28,7 @@ pub enum Detector {
 /// periods, a drift of `x` per period leaves `T x` to go. The defaults of [`LockCriterion::default`] are for `T` = 33: they
 /// leave 0.17 % of the amplitude and 3.3e-5 of the frequency.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LockCriterion {
     /// Largest phase error that counts as locked, mean over a period, rad.
     pub phase_tolerance: f64,
@@ -60,6 +62,7 @@ impl Default for LockCriterion {
 
 /// Everything that can be chosen, in SI units. [`Config::build`] checks it.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Config {
     /// Time from sample to sample, s.
     pub sample_time: f64,

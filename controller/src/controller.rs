@@ -16,6 +16,7 @@ use sense::Sense;
 
 /// A checked configuration and its coefficients; immutable but for [`PhaseLock::retune`].
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PhaseLock {
     config: Config,
     detector: Detector,
@@ -26,6 +27,7 @@ pub struct PhaseLock {
 
 /// Everything that changes from sample to sample. A copy of it, put back later, continues with the same bits.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct State {
     oscillator: Oscillator,
     response: Estimate,
@@ -115,6 +117,27 @@ impl PhaseLock {
             escaped: false,
             acquiring: 0,
             tuning: self.tuning(),
+        }
+    }
+
+    /// What is put out before the first sample: no drive, nothing measured.
+    #[must_use]
+    pub fn idle(&self) -> Output {
+        let omega = self.config.omega_start;
+        Output {
+            omega,
+            amplitude: 0.0,
+            drive: 0.0,
+            phase_error: 0.0,
+            response_amplitude: 0.0,
+            reference_amplitude: 0.0,
+            coherence: 0.0,
+            frequency: omega,
+            response_mean: 0.0,
+            locked: false,
+            settled: false,
+            state: Phase::Idle,
+            fault: None,
         }
     }
 

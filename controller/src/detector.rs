@@ -6,6 +6,7 @@ use crate::harmonics::{Coefficients, Harmonics};
 
 /// Either detector, ready to run. Both are first order with the same bandwidth.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Detector {
     Adaptive(Harmonics),
     Demodulator { step: f64 },
@@ -13,6 +14,7 @@ pub enum Detector {
 
 /// What is known of one channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Estimate {
     /// In m, relative to the oscillator's phase; the demodulator knows only the fundamental.
     coefficients: Coefficients,

@@ -2,6 +2,7 @@
 
 /// Ramps of the drive amplitude, and the control that makes the measured base amplitude the wanted one.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Drive {
     /// m
     pub amplitude_max: f64,
@@ -15,6 +16,7 @@ pub struct Drive {
 
 /// State of the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Level {
     /// Amplitude put out, m.
     pub amplitude: f64,

@@ -18,6 +18,7 @@
 /// Source: P. Hippold, M. Scheel, L. Renson, M. Krack, "Robust and fast backbone tracking via phase-locked loops"
 /// (2024), arXiv:2403.06639, for an ideal exciter.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gains {
     /// Proportional gain, rad/s per rad.
     pub proportional: f64,

@@ -7,6 +7,7 @@ pub const MAX_HARMONICS: usize = 8;
 
 /// Which harmonics to follow, and how fast.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Harmonics {
     /// How many, the fundamental included.
     pub count: usize,
@@ -19,6 +20,7 @@ pub struct Harmonics {
 /// A constant and Fourier coefficients relative to the oscillator's phase: the signal is
 /// `offset + Σ Re(c_h exp(i h phase))`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Coefficients {
     offset: f64,
     /// The first is the fundamental's.

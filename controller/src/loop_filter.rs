@@ -4,6 +4,7 @@ use crate::gains::Gains;
 
 /// A PI filter with bounds, a limited rate of change, and conditional anti-windup.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LoopFilter {
     pub gains: Gains,
     /// rad/s
@@ -18,6 +19,7 @@ pub struct LoopFilter {
 
 /// State of the loop filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frequency {
     /// Centre frequency and integral part, rad/s.
     pub integral: f64,

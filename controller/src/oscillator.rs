@@ -7,6 +7,7 @@ use crate::angle::Complex;
 /// Phase of the own oscillator, in turns: taking off a whole turn is exact in binary, so wrapping costs no accuracy
 /// however long the run.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Oscillator {
     turns: f64,
 }

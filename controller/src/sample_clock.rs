@@ -14,6 +14,7 @@ const SLACK_MAX: f64 = 0.25;
 /// Samples are counted, never timed, so none is lost or taken twice. Steps which are nominally a multiple of the
 /// sample time but deviate from it by up to 1e-9 relative hold the same number of samples every time.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SampleClock {
     sample_time: f64,
     taken: u64,

@@ -4,6 +4,7 @@ use crate::supervisor::{Fault, Phase};
 
 /// What the sensors read at a sample, and what the operator wants.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Input {
     /// Response of the structure, m.
     pub response: f64,
@@ -16,6 +17,7 @@ pub struct Input {
 
 /// What the controller wants until the next sample, and what it knows.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Output {
     /// Drive frequency, rad/s; always between `omega_min` and `omega_max`.
     pub omega: f64,

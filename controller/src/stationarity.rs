@@ -5,6 +5,7 @@ const BLOCKS: usize = 4;
 
 /// The criterion. Impacts make every sample ripple, so only means over whole periods are ever compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stationarity {
     /// rad
     pub phase_tolerance: f64,
@@ -34,6 +35,7 @@ pub struct Reading {
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Sums {
     error: f64,
     integral: f64,
@@ -56,6 +58,7 @@ impl Sums {
 
 /// Means over a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Block {
     integral: f64,
     omega: f64,
@@ -64,6 +67,7 @@ struct Block {
 
 /// The running dwell: the last complete blocks, and the one being filled.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Dwell {
     blocks: [Block; BLOCKS],
     complete: usize,

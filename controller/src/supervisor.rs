@@ -2,6 +2,7 @@
 
 /// State of the sequence. The numbers are those of the FMU's `state`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Phase {
     /// Not armed; the drive is off, or on its way there after a fault. The oscillator runs at `omega_start`.
     #[default]
@@ -22,6 +23,7 @@ pub enum Phase {
 
 /// Why the drive was taken away. The numbers are those of the FMU's `fault`, where 0 is none.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Fault {
     /// A sensor read NaN, infinity, or a number beyond all reason.
     Sensor = 1,

@@ -2,6 +2,7 @@
 
 use thiserror::Error;
 
+use crate::scene::Scene;
 use crate::rig::{Command, Controller, Rig, RigError, Sensors, Witness};
 
 /// How long each stage may or shall last, in samples.
@@ -15,6 +16,22 @@ pub struct Plan {
     pub hold: usize,
     /// Length of the recorded decay.
     pub decay: usize,
+}
+
+impl Plan {
+    /// The plan that a scene lays down.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Self {
+        let sample_time = scene.sample_time();
+        let period = scene.plant.natural_period();
+        let samples = |periods: f64| (periods * period / sample_time).round() as usize;
+        Self {
+            sample_time,
+            lock: samples(scene.record.lock_periods),
+            hold: samples(scene.record.hold_periods),
+            decay: samples(scene.record.decay_periods),
+        }
+    }
 }
 
 /// The stage an experiment is in.

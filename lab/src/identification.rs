@@ -28,7 +28,7 @@ pub enum IdentificationError {
     /// The loop locked something else than the symmetric 1:1 regime.
     #[error(
         "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the regime is {regime}, not symmetric 1:1 with two \
-         impacts per period: a phase lock alone proves nothing. Try another [start] (the particle must be moving) or G"
+         impacts per period. Try another [start] (the particle must be moving) or another G"
     )]
     Regime {
         /// What was found instead.

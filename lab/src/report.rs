@@ -43,15 +43,16 @@ pub enum ReportError {
 /// # Errors
 /// A folder or file that cannot be written.
 pub fn write(found: &Identification, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let format = |name| {
-        move |message: String| ReportError::Format { name, message }
-    };
+    let format = |name| move |message: String| ReportError::Format { name, message };
     let json = serde_json::to_string_pretty(found)
         .map_err(|error| format("identification.json")(error.to_string()))?;
     let files = [
         ("identification.json", json + "\n"),
         ("backbone.csv", csv(found).map_err(format("backbone.csv"))?),
-        ("backbone.svg", backbone::draw(found).map_err(format("backbone.svg"))?),
+        (
+            "backbone.svg",
+            backbone::draw(found).map_err(format("backbone.svg"))?,
+        ),
         ("sim.svg", manifold::draw(found).map_err(format("sim.svg"))?),
     ];
     let refused = |path: &Path| {
@@ -64,7 +65,8 @@ pub fn write(found: &Identification, out: &Path) -> Result<Vec<PathBuf>, ReportE
         let path = out.join(name);
         let mut file = temporary(out).map_err(refused(&path))?;
         file.write_all(text.as_bytes()).map_err(refused(&path))?;
-        file.persist(&path).map_err(|error| refused(&path)(error.error))?;
+        file.persist(&path)
+            .map_err(|error| refused(&path)(error.error))?;
         written.push(path);
     }
     Ok(written)

@@ -8,7 +8,6 @@ use vines::{
     experiment::{self, Plan, Stage},
     identification, pack, report,
     rig::{BuiltIn, FmuRig},
-    scene::Scene,
 };
 
 use super::{failure::Failure, pack::beside_this_program, scene_arguments::SceneArguments};
@@ -49,7 +48,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             let message = format!("{} is not there: --plant takes an FMU", file.display());
             return Err(Failure::input(message));
         }
-        None => pack::pack(&pack::components(), &beside_this_program()?, &arguments.out)?[0].clone(),
+        None => {
+            pack::pack(&pack::components(), &beside_this_program()?, &arguments.out)?[0].clone()
+        }
     };
     env_logger::Builder::new()
         .filter_level(log::LevelFilter::Warn)
@@ -58,9 +59,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut controller = BuiltIn::new(&scene).map_err(Failure::input)?;
     let mut rig = FmuRig::load(&plant, &scene).map_err(Failure::run)?;
     let bar = progress_bar();
-    let record = experiment::run(&mut rig, &mut controller, &plan(&scene), |stage, done, of| {
-        show(&bar, stage, done, of);
-    });
+    let record = experiment::run(
+        &mut rig,
+        &mut controller,
+        &Plan::of(&scene),
+        |stage, done, of| {
+            show(&bar, stage, done, of);
+        },
+    );
     bar.finish_and_clear();
     let record = record.map_err(Failure::run)?;
     let found = identification::identify(&record, &scene).map_err(Failure::run)?;
@@ -68,21 +74,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if arguments.json {
         return Ok(serde_json::to_string_pretty(&found)? + "\n");
     }
-    let files: Vec<String> = written.iter().map(|path| path.display().to_string()).collect();
-    Ok(format!("{}\nWritten: {}\n", report::table(&found), files.join(", ")))
-}
-
-fn plan(scene: &Scene) -> Plan {
-    let sample_time = scene.sample_time();
-    let samples = |periods: f64| {
-        (periods * scene.plant.natural_period() / sample_time).ceil() as usize
-    };
-    Plan {
-        sample_time,
-        lock: samples(scene.record.lock_periods),
-        hold: samples(scene.record.hold_periods),
-        decay: samples(scene.record.decay_periods),
-    }
+    let files: Vec<String> = written
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    Ok(format!(
+        "{}\nWritten: {}\n",
+        report::table(&found),
+        files.join(", ")
+    ))
 }
 
 /// A bar on stderr; indicatif hides it where that is no terminal.

@@ -37,7 +37,10 @@ pub(super) fn points(record: &Record, scene: &Scene, slow_flow: &SlowFlow) -> Ve
         return Vec::new();
     };
     // The command of the last held sample: the frequency to start from.
-    let mut omega = record.hold().last().map_or(d.omega0, |s| s.command.drive.omega);
+    let mut omega = record
+        .hold()
+        .last()
+        .map_or(d.omega0, |s| s.command.drive.omega);
     let half_period = std::f64::consts::PI / omega;
     let end = if first.witness.is_some() {
         end_of_synchrony(&impacts(decay), half_period).unwrap_or(first.time)
@@ -77,7 +80,11 @@ pub(super) fn rms_sigma_error(points: &[DecayPoint]) -> Option<f64> {
     let squares: Vec<f64> = points
         .iter()
         .filter(|point| point.c > COMPARED_ABOVE)
-        .filter_map(|point| point.sigma_theory.map(|theory| (point.sigma - theory).powi(2)))
+        .filter_map(|point| {
+            point
+                .sigma_theory
+                .map(|theory| (point.sigma - theory).powi(2))
+        })
         .collect();
     (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }

@@ -73,7 +73,11 @@ pub(super) fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64
         return (f64::NAN, Regime::Unknown);
     };
     let impacts = impacts(samples);
-    let Some(span) = impacts.last().zip(impacts.first()).map(|(b, a)| b.time - a.time) else {
+    let Some(span) = impacts
+        .last()
+        .zip(impacts.first())
+        .map(|(b, a)| b.time - a.time)
+    else {
         return (0.0, Regime::Silent);
     };
     let period = std::f64::consts::TAU / omega;

@@ -1,10 +1,10 @@
 //! The backbone with the decay on it: amplitude over detuning.
 
 use plotters::chart::SeriesLabelPosition;
-use plotters::prelude::*;
 
 use super::chart::{
-    DECAY_LABEL, EXACT, THEORY, UNSTABLE, curve, decay_points, legend, locked_point, plane, svg,
+    DECAY_LABEL, EXACT, THEORY, THINNED, UNSTABLE, curve, decay_points, legend, line, locked_point,
+    plane, svg,
 };
 use crate::identification::Identification;
 use crate::orbit;
@@ -24,11 +24,16 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
         .b(top, crate::theory::BranchSide::Right)
         .unwrap_or(1.0);
     let theory = slow_flow.backbone(slow_flow.manifold.b_min(), reach, 400);
-    let sigmas = theory.iter().map(|point| point.sigma);
-    let measured = found.decay.iter().map(|point| point.sigma);
-    let (low, high) = sigmas
-        .chain(measured)
-        .fold((f64::MAX, f64::MIN), |(low, high), s| (low.min(s), high.max(s)));
+    // Below the fold there is no backbone, and the frequency of what is left of the motion goes anywhere.
+    let fold = slow_flow.manifold.c_min();
+    let above = found.decay.iter().filter(|point| point.c >= fold);
+    let (low, high) = theory
+        .iter()
+        .map(|point| point.sigma)
+        .chain(above.map(|point| point.sigma))
+        .fold((f64::MAX, f64::MIN), |(low, high), s| {
+            (low.min(s), high.max(s))
+        });
     let margin = 0.06 * (high - low);
     let (low, high) = (low - margin, high + margin);
 
@@ -40,7 +45,7 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
             ((low, high), "detuning sigma = (omega/omega0 - 1)/epsilon"),
             ((0.0, top), "amplitude C of v, over b"),
         )?;
-        let solid = THEORY.stroke_width(2);
+        let solid = line(THEORY, 20);
         let label = "first-order theory, stable";
         for (n, run) in runs(&theory, BackbonePoint::stable).into_iter().enumerate() {
             let points = run.iter().map(|point| (point.sigma, point.c)).collect();
@@ -50,20 +55,31 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
         let unstable = runs(&theory, |point| !point.stable());
         for (n, run) in unstable.into_iter().enumerate() {
             let points = run.iter().map(|point| (point.sigma, point.c)).collect();
-            let style = UNSTABLE.stroke_width(2);
+            let style = line(UNSTABLE, 20);
             curve(&mut chart, points, style, true, (n == 0).then_some(label))?;
         }
         let exact = exact_curve(found, &slow_flow, (low, high), top);
-        curve(&mut chart, exact, EXACT.stroke_width(1), false, Some("exact orbits"))?;
-        let decay = found.decay.iter().map(|point| (point.sigma, point.c));
-        decay_points(&mut chart, decay.collect(), DECAY_LABEL)?;
+        curve(
+            &mut chart,
+            exact,
+            line(EXACT, 14),
+            false,
+            Some("exact orbits"),
+        )?;
+        let decay = found.decay.iter().step_by(THINNED);
+        let decay = decay.map(|point| (point.sigma, point.c));
+        let inside = decay.filter(|(sigma, _)| (low..=high).contains(sigma));
+        decay_points(&mut chart, inside.collect(), DECAY_LABEL)?;
         locked_point(&mut chart, (found.lock.sigma, found.lock.c))?;
-        legend(&mut chart, SeriesLabelPosition::UpperLeft)
+        legend(&mut chart, SeriesLabelPosition::UpperRight)
     })
 }
 
 /// Consecutive points for which `wanted` holds, each run with the point after it so that the curve has no holes.
-fn runs(points: &[BackbonePoint], wanted: impl Fn(&BackbonePoint) -> bool) -> Vec<&[BackbonePoint]> {
+fn runs(
+    points: &[BackbonePoint],
+    wanted: impl Fn(&BackbonePoint) -> bool,
+) -> Vec<&[BackbonePoint]> {
     let mut runs = Vec::new();
     let mut start = None;
     for (n, point) in points.iter().enumerate() {

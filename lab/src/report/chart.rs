@@ -2,23 +2,44 @@
 //!
 //! The colours are told apart in grey as well, and every kind of line and mark differs in shape too.
 
-use plotters::chart::{ChartContext, ChartBuilder, SeriesLabelPosition};
+use plotters::chart::{ChartBuilder, ChartContext, SeriesLabelPosition};
 use plotters::coord::{Shift, types::RangedCoordf64};
 use plotters::prelude::*;
 
 use crate::identification::Identification;
 
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
-pub type Plane<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
+pub type Plane<'a, 'b> =
+    ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
-pub const SIZE: (u32, u32) = (860, 600);
+/// Size of the picture, px.
+const SIZE: (u32, u32) = (860, 600);
+/// plotters rounds to whole units: drawn this many times larger, curves are smooth.
+const FINE: u32 = 8;
 pub const THEORY: RGBColor = RGBColor(40, 40, 40);
 pub const UNSTABLE: RGBColor = RGBColor(150, 150, 150);
 pub const EXACT: RGBColor = RGBColor(0, 114, 178);
 pub const DECAY: RGBColor = RGBColor(213, 94, 0);
 pub const LOCK: RGBColor = RGBColor(0, 0, 0);
+/// Of the points along the decay every so many-th is drawn.
+pub const THINNED: usize = 4;
 pub const DECAY_LABEL: &str = "free decay, identified";
 const FONT: &str = "Helvetica, Arial, sans-serif";
+
+/// Units of the drawing for `px` pixels of the picture.
+const fn px(px: u32) -> u32 {
+    px * FINE
+}
+
+/// The same, as a place.
+const fn at(px: i32) -> i32 {
+    px * FINE as i32
+}
+
+/// A line of that colour, `tenths` of a pixel wide.
+pub fn line(colour: RGBColor, tenths: u32) -> ShapeStyle {
+    colour.stroke_width(tenths * FINE / 10)
+}
 
 /// Draws into a string; plotters reports its own errors.
 pub fn svg(
@@ -26,12 +47,15 @@ pub fn svg(
 ) -> Result<String, String> {
     let mut text = String::new();
     {
-        let area = SVGBackend::with_string(&mut text, SIZE).into_drawing_area();
+        let area = SVGBackend::with_string(&mut text, (px(SIZE.0), px(SIZE.1))).into_drawing_area();
         area.fill(&WHITE).map_err(|error| error.to_string())?;
         draw(&area).map_err(|error| error.to_string())?;
         area.present().map_err(|error| error.to_string())?;
     }
-    Ok(text)
+    // The drawing keeps its units (the viewBox); the picture has its size.
+    let drawn = format!("width=\"{}\" height=\"{}\"", px(SIZE.0), px(SIZE.1));
+    let shown = format!("width=\"{}\" height=\"{}\"", SIZE.0, SIZE.1);
+    Ok(text.replacen(&drawn, &shown, 1))
 }
 
 /// Title, caption with the parameters, and labelled axes over the ranges given.
@@ -47,26 +71,32 @@ pub fn plane<'a, 'b>(
         "epsilon = {:.5}, lambda = {:.3}, r = {}, G = {:.3}; lengths over b, time over 1/omega0",
         p.epsilon, p.lambda, p.r, found.lock.g
     );
-    area.draw_text(title, &(FONT, 22).into_text_style(area), (70, 14))?;
+    area.draw_text(
+        title,
+        &(FONT, px(22)).into_text_style(area),
+        (at(70), at(14)),
+    )?;
     let grey = BLACK.mix(0.7);
-    let small = (FONT, 14).into_text_style(area).color(&grey);
-    area.draw_text(&caption, &small, (70, 42))?;
+    let small = (FONT, px(14)).into_text_style(area).color(&grey);
+    area.draw_text(&caption, &small, (at(70), at(42)))?;
     let mut chart = ChartBuilder::on(area)
-        .margin_top(66)
-        .margin_right(24)
-        .margin_bottom(10)
-        .margin_left(10)
-        .x_label_area_size(52)
-        .y_label_area_size(62)
+        .margin_top(px(66))
+        .margin_right(px(24))
+        .margin_bottom(px(10))
+        .margin_left(px(10))
+        .x_label_area_size(px(52))
+        .y_label_area_size(px(62))
         .build_cartesian_2d(x.0..x.1, y.0..y.1)?;
     chart
         .configure_mesh()
         .x_desc(x_label)
         .y_desc(y_label)
-        .axis_desc_style((FONT, 17))
-        .label_style((FONT, 14))
+        .axis_desc_style((FONT, px(17)))
+        .label_style((FONT, px(14)))
         .light_line_style(WHITE)
-        .bold_line_style(BLACK.mix(0.10))
+        .bold_line_style(BLACK.mix(0.10).stroke_width(px(1)))
+        .axis_style(BLACK.stroke_width(px(1)))
+        .set_all_tick_mark_size(px(4))
         .x_labels(9)
         .y_labels(8)
         .draw()?;
@@ -82,11 +112,11 @@ pub fn curve<'a, 'b: 'a>(
     label: Option<&str>,
 ) -> Result<(), Box<dyn std::error::Error>> {
     if dashed {
-        let series = chart.draw_series(DashedLineSeries::new(points, 7, 5, style))?;
+        let series = chart.draw_series(DashedLineSeries::new(points, px(7), px(5), style))?;
         if let Some(label) = label {
-            series.label(label).legend(move |at| {
-                let piece = |from| PathElement::new(vec![(from, 0), (from + 7, 0)], style);
-                EmptyElement::at(at) + piece(0) + piece(12) + piece(24)
+            series.label(label).legend(move |place| {
+                let piece = |from| PathElement::new(vec![(at(from), 0), (at(from + 7), 0)], style);
+                EmptyElement::at(place) + piece(0) + piece(12) + piece(24)
             });
         }
     } else {
@@ -94,7 +124,7 @@ pub fn curve<'a, 'b: 'a>(
         if let Some(label) = label {
             series
                 .label(label)
-                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + 31, y)], style));
+                .legend(move |(x, y)| PathElement::new(vec![(x, y), (x + at(31), y)], style));
         }
     }
     Ok(())
@@ -106,26 +136,33 @@ pub fn decay_points<'a, 'b: 'a>(
     points: Vec<(f64, f64)>,
     label: &str,
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let style = DECAY.stroke_width(2);
+    let style = line(DECAY, 16);
     chart
-        .draw_series(points.into_iter().map(|at| Circle::new(at, 4, style)))?
+        .draw_series(
+            points
+                .into_iter()
+                .map(|place| Circle::new(place, px(4), style)),
+        )?
         .label(label)
-        .legend(move |(x, y)| Circle::new((x + 15, y), 4, style));
+        .legend(move |(x, y)| Circle::new((x + at(15), y), px(4), style));
     Ok(())
 }
 
 /// A filled square: the locked point.
 pub fn locked_point<'a, 'b: 'a>(
     chart: &mut Plane<'a, 'b>,
-    at: (f64, f64),
+    place: (f64, f64),
 ) -> Result<(), Box<dyn std::error::Error>> {
-    let square = |(x, y): (i32, i32)| Rectangle::new([(x - 5, y - 5), (x + 5, y + 5)], LOCK.filled());
+    let square = |(x, y): (i32, i32)| {
+        Rectangle::new(
+            [(x - at(5), y - at(5)), (x + at(5), y + at(5))],
+            LOCK.filled(),
+        )
+    };
     chart
-        .draw_series(std::iter::once(
-            EmptyElement::at(at) + square((0, 0)),
-        ))?
+        .draw_series(std::iter::once(EmptyElement::at(place) + square((0, 0))))?
         .label("locked, measured")
-        .legend(move |(x, y)| square((x + 15, y)));
+        .legend(move |(x, y)| square((x + at(15), y)));
     Ok(())
 }
 
@@ -137,11 +174,11 @@ pub fn legend<'a, 'b: 'a>(
     chart
         .configure_series_labels()
         .position(position)
-        .margin(14)
-        .legend_area_size(42)
-        .label_font((FONT, 15))
+        .margin(px(14))
+        .legend_area_size(px(42))
+        .label_font((FONT, px(15)))
         .background_style(WHITE.mix(0.9))
-        .border_style(BLACK.mix(0.3))
+        .border_style(BLACK.mix(0.3).stroke_width(px(1)))
         .draw()?;
     Ok(())
 }

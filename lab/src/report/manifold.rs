@@ -1,10 +1,10 @@
 //! The slow invariant manifold with the decay on it: particle speed over amplitude.
 
 use plotters::chart::SeriesLabelPosition;
-use plotters::prelude::*;
 
 use super::chart::{
-    DECAY_LABEL, THEORY, UNSTABLE, curve, decay_points, legend, locked_point, plane, svg,
+    DECAY_LABEL, THEORY, THINNED, UNSTABLE, curve, decay_points, legend, line, locked_point, plane,
+    svg,
 };
 use crate::identification::Identification;
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
@@ -32,19 +32,32 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
         )?;
         let stable = between(manifold.b_min(), B_SYMMETRY_BREAKING);
         let label = "manifold, 1:1 impacts stable";
-        curve(&mut chart, stable, THEORY.stroke_width(2), false, Some(label))?;
-        let grey = UNSTABLE.stroke_width(2);
+        curve(&mut chart, stable, line(THEORY, 20), false, Some(label))?;
+        let grey = line(UNSTABLE, 20);
         let label = "manifold, unstable";
-        curve(&mut chart, between(0.0, manifold.b_min()), grey, true, Some(label))?;
-        curve(&mut chart, between(B_SYMMETRY_BREAKING, top), grey, true, None)?;
+        curve(
+            &mut chart,
+            between(0.0, manifold.b_min()),
+            grey,
+            true,
+            Some(label),
+        )?;
+        curve(
+            &mut chart,
+            between(B_SYMMETRY_BREAKING, top),
+            grey,
+            true,
+            None,
+        )?;
         let decay = found
             .decay
             .iter()
+            .step_by(THINNED)
             .filter_map(|point| point.b.map(|b| (point.c, b)));
         decay_points(&mut chart, decay.collect(), DECAY_LABEL)?;
         if let Some(b) = found.lock.b {
             locked_point(&mut chart, (found.lock.c, b))?;
         }
-        legend(&mut chart, SeriesLabelPosition::LowerRight)
+        legend(&mut chart, SeriesLabelPosition::UpperLeft)
     })
 }

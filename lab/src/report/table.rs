@@ -16,10 +16,7 @@ pub fn table(found: &Identification) -> String {
             lock.periods_to_lock, lock.regime, lock.impacts_per_period, lock.phase_error_deg
         ),
         String::new(),
-        format!(
-            "  {:<24}{:>12}{:>12}{:>12}",
-            "", "sigma", "C", "B"
-        ),
+        format!("  {:<24}{:>12}{:>12}{:>12}", "", "sigma", "C", "B"),
     ];
     let mut row = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
         let b = b.map_or("-".into(), |b| format!("{b:.6}"));
@@ -30,7 +27,12 @@ pub fn table(found: &Identification) -> String {
         row("exact orbit", exact.sigma, exact.c, Some(exact.b));
     }
     if let Some(theory) = &found.theory {
-        row("theory, first order", theory.sigma, theory.c, Some(theory.b));
+        row(
+            "theory, first order",
+            theory.sigma,
+            theory.c,
+            Some(theory.b),
+        );
     }
     lines.push(String::new());
     if let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) {

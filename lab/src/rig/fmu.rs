@@ -107,7 +107,9 @@ impl FmuRig {
         ];
         let impacts = find("impacts")?;
         let mut rig = Self {
-            instance: import.instantiate_cs("plant", false, true).map_err(loaded)?,
+            instance: import
+                .instantiate_cs("plant", false, true)
+                .map_err(loaded)?,
             _import: import,
             time: 0.0,
             inputs,
@@ -159,7 +161,9 @@ impl Rig for FmuRig {
         let (references, mut values) = (self.witness, [0.0; 3]);
         self.asked("tell its impacts", |i| i.get_real(&references, &mut values))?;
         let (reference, mut impacts) = ([self.impacts], [0]);
-        self.asked("tell its impacts", |i| i.get_integer(&reference, &mut impacts))?;
+        self.asked("tell its impacts", |i| {
+            i.get_integer(&reference, &mut impacts)
+        })?;
         Ok(Some(Witness {
             impacts: i64::from(impacts[0]),
             impact_time: values[0],

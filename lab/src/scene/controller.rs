@@ -76,9 +76,19 @@ impl Controller {
         let tolerance = self.phase_tolerance;
         Quantity::new("controller.phase_tolerance", tolerance, "degrees").positive()?;
         let drift = self.frequency_drift;
-        Quantity::new("controller.frequency_drift", drift, "(relative, per period)").positive()?;
+        Quantity::new(
+            "controller.frequency_drift",
+            drift,
+            "(relative, per period)",
+        )
+        .positive()?;
         let drift = self.amplitude_drift;
-        Quantity::new("controller.amplitude_drift", drift, "(relative, per period)").positive()?;
+        Quantity::new(
+            "controller.amplitude_drift",
+            drift,
+            "(relative, per period)",
+        )
+        .positive()?;
         let dwell = self.dwell_periods;
         Quantity::new("controller.dwell_periods", dwell.into(), "(periods)")
             .check((4..=400).contains(&dwell), "must be from 4 to 400")

@@ -1,0 +1,188 @@
+//! The Rust source of a table.
+
+use std::fmt::Write;
+
+use crate::guid::guid;
+use crate::identifier::identifier;
+use crate::table::{Kind, Literal, Table, Variable};
+
+/// The contents of `variables.rs`.
+pub(crate) fn source(table: &Table) -> String {
+    let mut out = String::new();
+    // Writing to a string cannot fail.
+    let _ = identity(&mut out, table);
+    for kind in Kind::ALL {
+        let variables: Vec<_> = table.of(kind).collect();
+        let _ = key(&mut out, kind, &variables);
+    }
+    let _ = categories(&mut out, &table.categories);
+    out
+}
+
+fn identity(out: &mut String, table: &Table) -> std::fmt::Result {
+    let guid = guid(table);
+    let Table {
+        name,
+        identifier,
+        categories,
+        ..
+    } = table;
+    writeln!(
+        out,
+        "/// `modelName`.
+#[allow(dead_code)]
+pub const MODEL_NAME: &str = {name:?};
+/// `modelIdentifier`.
+#[allow(dead_code)]
+pub const MODEL_IDENTIFIER: &str = {identifier:?};
+/// Derived from the variable table.
+#[allow(dead_code)]
+pub const GUID: &str = {guid:?};
+
+/// The model's identity and the types of its variables.
+#[derive(Clone, Copy, Debug)]
+pub enum Model {{}}
+
+impl ::fmi2_component::Model for Model {{
+    const NAME: &'static str = MODEL_NAME;
+    const IDENTIFIER: &'static str = MODEL_IDENTIFIER;
+    const GUID: &'static str = GUID;
+    const CATEGORIES: &'static [&'static str] = &{categories:?};
+    type Real = Real;
+    type Integer = Integer;
+    type Boolean = Boolean;
+    type String = String;
+}}
+"
+    )
+}
+
+fn key(out: &mut String, kind: Kind, variables: &[&Variable]) -> std::fmt::Result {
+    let value = match kind {
+        Kind::Real => "f64",
+        Kind::Integer => "i32",
+        Kind::Boolean => "bool",
+        Kind::String => "&'static str",
+    };
+    let variants: Vec<_> = variables.iter().map(|v| identifier(&v.name)).collect();
+
+    writeln!(
+        out,
+        "/// The variables of type {kind:?}.
+#[allow(non_camel_case_types, clippy::upper_case_acronyms, dead_code)]
+#[allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum {kind:?} {{"
+    )?;
+    for (variable, variant) in variables.iter().zip(&variants) {
+        writeln!(out, "    #[doc = {:?}]\n    {variant},", doc(variable))?;
+    }
+    writeln!(
+        out,
+        "}}
+
+impl ::fmi2_component::Key for {kind:?} {{
+    type Value = {value};
+    const VARIABLES: &'static [::fmi2_component::Variable<{value}>] = &["
+    )?;
+    for variable in variables {
+        entry(out, variable)?;
+    }
+    let all: Vec<_> = variants.iter().map(|v| format!("Self::{v}")).collect();
+    writeln!(
+        out,
+        "    ];
+    const ALL: &'static [Self] = &[{}];
+
+    #[inline]
+    fn find(value_reference: u32) -> ::core::option::Option<Self> {{
+        match value_reference {{",
+        all.join(", ")
+    )?;
+    for (variable, variant) in variables.iter().zip(&variants) {
+        writeln!(
+            out,
+            "            {} => ::core::option::Option::Some(Self::{variant}),",
+            variable.value_reference
+        )?;
+    }
+    // An enum without variants has no number.
+    let index = if variables.is_empty() {
+        "match self {}"
+    } else {
+        "self as usize"
+    };
+    writeln!(
+        out,
+        "            _ => ::core::option::Option::None,
+        }}
+    }}
+
+    #[inline]
+    fn index(self) -> usize {{
+        {index}
+    }}
+}}
+"
+    )
+}
+
+fn doc(v: &Variable) -> String {
+    let unit = v.unit.as_ref().map(|unit| format!(", {unit}"));
+    let description = match v.description.as_str() {
+        "" => String::new(),
+        text => format!(": {text}"),
+    };
+    format!("`{}`{}{description}", v.name, unit.unwrap_or_default())
+}
+
+fn entry(out: &mut String, v: &Variable) -> std::fmt::Result {
+    let option = |literal: &Option<Literal>| match literal {
+        Some(literal) => format!("::core::option::Option::Some({literal})"),
+        None => "::core::option::Option::None".into(),
+    };
+    let initial = (v.initial).map(|initial| format!("::fmi2_component::Initial::{initial:?}"));
+    let unit = v.unit.as_ref().map(|unit| format!("{unit:?}"));
+    writeln!(
+        out,
+        "        ::fmi2_component::Variable {{
+            name: {:?},
+            value_reference: {},
+            causality: ::fmi2_component::Causality::{:?},
+            variability: ::fmi2_component::Variability::{:?},
+            initial: {},
+            start: {},
+            min: {},
+            max: {},
+            unit: {},
+            description: {:?},
+        }},",
+        v.name,
+        v.value_reference,
+        v.causality,
+        v.variability,
+        option(&initial),
+        option(&v.start),
+        option(&v.min),
+        option(&v.max),
+        option(&unit),
+        v.description,
+    )
+}
+
+fn categories(out: &mut String, categories: &[String]) -> std::fmt::Result {
+    writeln!(
+        out,
+        "/// The log categories.
+#[allow(non_upper_case_globals, dead_code)]
+pub mod category {{"
+    )?;
+    for (index, name) in categories.iter().enumerate() {
+        writeln!(
+            out,
+            "    #[doc = \"`{name}`.\"]
+    pub const {name}: ::fmi2_component::Category = ::fmi2_component::Category::new({index}, {name:?});"
+        )?;
+    }
+    writeln!(out, "}}")
+}

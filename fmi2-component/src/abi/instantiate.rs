@@ -1,0 +1,122 @@
+//! Birth and death (FMI 2.0, clause 2.1.5).
+
+use std::ffi::{CStr, c_int};
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::ptr;
+
+use super::entry::{self, Handle, panic_message};
+use super::pointers::{input, text};
+use super::types::{CBoolean, CComponent, CString, CallbackFunctions};
+use crate::component::Component;
+use crate::instance::Instance;
+use crate::log::Log;
+use crate::model::Model;
+use crate::refusal::Refusal;
+use crate::status::Status;
+
+/// `fmi2CoSimulation`.
+const CO_SIMULATION: c_int = 1;
+
+/// `fmi2Instantiate`. The resource location is not used, so that every spelling of it is fine.
+pub unsafe fn instantiate<C: Component>(
+    instance_name: CString,
+    fmu_type: c_int,
+    guid: CString,
+    functions: *const CallbackFunctions,
+    logging_on: CBoolean,
+) -> CComponent {
+    // SAFETY: NULL or one readable structure, by contract.
+    let Ok([functions]) = (unsafe { input(functions, 1, "functions") }) else {
+        return ptr::null_mut(); // and no logger to tell
+    };
+    let name = if instance_name.is_null() {
+        c""
+    } else {
+        // SAFETY: not NULL, and by the standard it ends in NUL.
+        unsafe { CStr::from_ptr(instance_name) }
+    };
+    // SAFETY: by the standard the callbacks stay callable until `fmi2FreeInstance`, which drops the log.
+    let mut log = unsafe { log::<C>(functions, name) };
+    log.enable_all(logging_on != 0);
+    let make = || {
+        check_name(name)?;
+        check_type(fmu_type)?;
+        // SAFETY: NULL or a C string, by the standard.
+        check_guid::<C>(unsafe { text(guid) }.as_deref())?;
+        Instance::<C>::new(log)
+    };
+    let (status, reason) = match catch_unwind(AssertUnwindSafe(make)) {
+        Ok(Ok(instance)) => return Handle::into_pointer(instance),
+        Ok(Err(refusal)) => (refusal.status(), refusal.message().to_owned()),
+        Err(panic) => (
+            Status::Fatal,
+            format!("the component has panicked ({})", panic_message(&*panic)),
+        ),
+    };
+    // SAFETY: as above; the callbacks are callable during this call at least.
+    unsafe { self::log::<C>(functions, name) }
+        .reason(status, &format!("fmi2Instantiate: {reason}"));
+    ptr::null_mut()
+}
+
+/// `fmi2FreeInstance`. NULL is fine.
+pub unsafe fn free_instance<C: Component>(component: CComponent) {
+    // SAFETY: the contract is passed on.
+    unsafe { entry::free::<C>(component) }
+}
+
+unsafe fn log<C: Component>(functions: &CallbackFunctions, name: &CStr) -> Log {
+    let categories = C::Model::CATEGORIES;
+    // SAFETY: the contract is passed on.
+    unsafe {
+        Log::new(
+            functions.logger,
+            functions.component_environment,
+            name,
+            categories,
+        )
+    }
+}
+
+fn check_name(name: &CStr) -> Result<(), Refusal> {
+    if name.is_empty() {
+        return Err(Refusal::error(
+            "instanceName is NULL or empty; expected is a name",
+        ));
+    }
+    Ok(())
+}
+
+fn check_type(fmu_type: c_int) -> Result<(), Refusal> {
+    if fmu_type != CO_SIMULATION {
+        return Err(Refusal::error(format!(
+            "fmuType = {fmu_type} is refused; the component is for co-simulation ({CO_SIMULATION}) only"
+        )));
+    }
+    Ok(())
+}
+
+fn check_guid<C: Component>(guid: Option<&str>) -> Result<(), Refusal> {
+    let own = C::Model::GUID;
+    match guid {
+        // Some masters write the braces of a registry GUID around it.
+        Some(given) if given.trim_matches(['{', '}']) == own => Ok(()),
+        given => Err(Refusal::error(format!(
+            "fmuGUID is {}, but the library of {} was built with {own}: modelDescription.xml and library do not belong \
+             together",
+            given.unwrap_or("NULL"),
+            C::Model::IDENTIFIER,
+        ))),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_name_is_needed() {
+        assert!(check_name(c"").is_err());
+        assert!(check_name(c"rig").is_ok());
+    }
+}

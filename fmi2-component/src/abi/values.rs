@@ -1,0 +1,166 @@
+//! `fmi2GetReal`, `fmi2SetReal`, and the same for integers and truth values (FMI 2.0, clause 2.1.7).
+
+use std::ffi::c_int;
+
+use super::entry::enter;
+use super::pointers::{input, output};
+use super::types::{CBoolean, CComponent, CValueReference};
+use crate::component::Component;
+use crate::instance::Instance;
+use crate::life_cycle::Function;
+use crate::model::Key;
+use crate::refusal::Refusal;
+use crate::status::Status;
+
+/// Declares a getter and a setter of the ABI.
+macro_rules! values {
+    ($get:ident, $set:ident, $c_get:literal, $c_set:literal, $c_type:ty,
+     $read:expr, $check:expr, $write:expr) => {
+        #[doc = concat!("`", $c_get, "`.")]
+        #[inline]
+        pub unsafe fn $get<C: Component>(
+            component: CComponent,
+            references: *const CValueReference,
+            count: usize,
+            values: *mut $c_type,
+        ) -> Status {
+            // SAFETY: the contract is passed on.
+            unsafe { get(component, $c_get, references, count, values, $read) }
+        }
+
+        #[doc = concat!("`", $c_set, "`.")]
+        #[inline]
+        pub unsafe fn $set<C: Component>(
+            component: CComponent,
+            references: *const CValueReference,
+            count: usize,
+            values: *const $c_type,
+        ) -> Status {
+            // SAFETY: the contract is passed on.
+            unsafe { set(component, $c_set, references, count, values, $check, $write) }
+        }
+    };
+}
+
+values!(
+    get_real,
+    set_real,
+    "fmi2GetReal",
+    "fmi2SetReal",
+    f64,
+    |c: &C, key| c.get_real(key),
+    |key, &value| Instance::<C>::check_finite(key, value),
+    |c: &mut C, key, &value| c.set_real(key, value)
+);
+values!(
+    get_integer,
+    set_integer,
+    "fmi2GetInteger",
+    "fmi2SetInteger",
+    c_int,
+    |c: &C, key| c.get_integer(key),
+    |_, _| Ok(()),
+    |c: &mut C, key, &value| c.set_integer(key, value)
+);
+values!(
+    get_boolean,
+    set_boolean,
+    "fmi2GetBoolean",
+    "fmi2SetBoolean",
+    CBoolean,
+    |c: &C, key| CBoolean::from(c.get_boolean(key)),
+    |_, _| Ok(()),
+    |c: &mut C, key, &value| c.set_boolean(key, value != 0)
+);
+
+#[inline]
+unsafe fn get<C: Component, K: Key, T>(
+    component: CComponent,
+    name: &str,
+    references: *const CValueReference,
+    count: usize,
+    values: *mut T,
+    read: impl Fn(&C, K) -> T,
+) -> Status {
+    let body = |instance: &mut Instance<C>| {
+        // SAFETY: the arrays are as long as their count, by contract.
+        let (references, values) = unsafe {
+            (
+                input(references, count, "vr")?,
+                output(values, count, "value")?,
+            )
+        };
+        if instance.session.stale {
+            refresh_for::<C, K>(instance, references)?;
+        }
+        for (&reference, value) in references.iter().zip(values) {
+            let key = find::<K>(reference)?;
+            value.write(read(&instance.session.component, key));
+        }
+        Ok(())
+    };
+    // SAFETY: the contract is passed on.
+    unsafe { enter(component, Function::GetValues, name, body) }
+}
+
+#[inline]
+unsafe fn set<C: Component, K: Key, T>(
+    component: CComponent,
+    name: &str,
+    references: *const CValueReference,
+    count: usize,
+    values: *const T,
+    check: impl Fn(K, &T) -> Result<(), Refusal>,
+    write: impl Fn(&mut C, K, &T) -> Result<(), Refusal>,
+) -> Status {
+    let body = |instance: &mut Instance<C>| {
+        // SAFETY: the arrays are as long as their count, by contract.
+        let (references, values) = unsafe {
+            (
+                input(references, count, "vr")?,
+                input(values, count, "value")?,
+            )
+        };
+        // All are checked before the first is set.
+        for (&reference, value) in references.iter().zip(values) {
+            let key = find::<K>(reference)?;
+            instance.check_settable(key)?;
+            check(key, value)?;
+        }
+        instance.values_change();
+        for (&reference, value) in references.iter().zip(values) {
+            write(&mut instance.session.component, find(reference)?, value)?;
+        }
+        Ok(())
+    };
+    // SAFETY: the contract is passed on.
+    unsafe { enter(component, Function::SetValues, name, body) }
+}
+
+/// Makes computed values right in Initialization Mode; reading back what was set needs no more than that.
+#[cold]
+pub(super) fn refresh_for<C: Component, K: Key>(
+    instance: &mut Instance<C>,
+    references: &[CValueReference],
+) -> Result<(), Refusal> {
+    for &reference in references {
+        if find::<K>(reference)?.variable().computed() {
+            return instance.refresh();
+        }
+    }
+    Ok(())
+}
+
+#[inline]
+pub(super) fn find<K: Key>(reference: CValueReference) -> Result<K, Refusal> {
+    K::find(reference).ok_or_else(|| unknown::<K>(reference))
+}
+
+#[cold]
+fn unknown<K: Key>(reference: CValueReference) -> Refusal {
+    let kind = std::any::type_name::<K::Value>();
+    let known: Vec<_> = K::VARIABLES.iter().map(|v| v.value_reference).collect();
+    Refusal::error(format!(
+        "value reference {reference} is unknown among variables of type {kind}; known are {known:?}"
+    ))
+}

@@ -1,0 +1,151 @@
+//! The macro that gives the functions of [`abi`](crate::abi) their C names.
+
+/// Exports a [`Component`](crate::Component) under the C names of FMI 2.0, those of model exchange included.
+///
+/// Once per library, and in a crate of type `cdylib`: two components whose names meet in one program cannot be linked.
+/// The unsafe attributes and signatures are written by this macro, so that the crate it is used in may
+/// `#![forbid(unsafe_code)]`.
+///
+/// ```ignore
+/// fmi2_component::export!(MyComponent);
+/// ```
+#[macro_export]
+macro_rules! export {
+    ($component:ty) => {
+        #[allow(non_snake_case, clippy::missing_safety_doc, clippy::too_many_arguments, missing_docs)]
+        mod fmi2_functions {
+            use super::*;
+            use $crate::abi::{
+                CBoolean, CComponent, CFmuState, CString, CValueReference, CallbackFunctions, Status,
+            };
+            use ::std::ffi::{c_char, c_int, c_void};
+
+            #[unsafe(no_mangle)]
+            pub extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
+                $crate::abi::TYPES_PLATFORM.as_ptr()
+            }
+
+            #[unsafe(no_mangle)]
+            pub extern "C" fn fmi2GetVersion() -> *const c_char {
+                $crate::abi::VERSION.as_ptr()
+            }
+
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn fmi2Instantiate(
+                instance_name: CString,
+                fmu_type: c_int,
+                guid: CString,
+                _resource_location: CString,
+                functions: *const CallbackFunctions,
+                _visible: CBoolean,
+                logging_on: CBoolean,
+            ) -> CComponent {
+                // SAFETY: the master keeps the contract of the standard; so below.
+                unsafe {
+                    $crate::abi::instantiate::<$component>(
+                        instance_name, fmu_type, guid, functions, logging_on,
+                    )
+                }
+            }
+
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn fmi2FreeInstance(component: CComponent) {
+                unsafe { $crate::abi::free_instance::<$component>(component) }
+            }
+
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn fmi2SetupExperiment(
+                component: CComponent,
+                _tolerance_defined: CBoolean,
+                _tolerance: f64,
+                start_time: f64,
+                stop_time_defined: CBoolean,
+                stop_time: f64,
+            ) -> Status {
+                unsafe {
+                    $crate::abi::setup_experiment::<$component>(
+                        component, start_time, stop_time_defined, stop_time,
+                    )
+                }
+            }
+
+            $crate::export_functions! { $component,
+                fmi2SetDebugLogging = set_debug_logging(on: CBoolean, count: usize, categories: *const CString);
+                fmi2EnterInitializationMode = enter_initialization_mode();
+                fmi2ExitInitializationMode = exit_initialization_mode();
+                fmi2Terminate = terminate();
+                fmi2Reset = reset();
+                fmi2GetReal = get_real(vr: *const CValueReference, count: usize, value: *mut f64);
+                fmi2GetInteger = get_integer(vr: *const CValueReference, count: usize, value: *mut c_int);
+                fmi2GetBoolean = get_boolean(vr: *const CValueReference, count: usize, value: *mut CBoolean);
+                fmi2GetString = get_string(vr: *const CValueReference, count: usize, value: *mut CString);
+                fmi2SetReal = set_real(vr: *const CValueReference, count: usize, value: *const f64);
+                fmi2SetInteger = set_integer(vr: *const CValueReference, count: usize, value: *const c_int);
+                fmi2SetBoolean = set_boolean(vr: *const CValueReference, count: usize, value: *const CBoolean);
+                fmi2SetString = set_string(vr: *const CValueReference, count: usize, value: *const CString);
+                fmi2GetFMUstate = get_fmu_state(state: *mut CFmuState);
+                fmi2SetFMUstate = set_fmu_state(state: CFmuState);
+                fmi2FreeFMUstate = free_fmu_state(state: *mut CFmuState);
+                fmi2SerializedFMUstateSize = serialized_fmu_state_size(state: CFmuState, size: *mut usize);
+                fmi2SerializeFMUstate = serialize_fmu_state(state: CFmuState, bytes: *mut c_char, size: usize);
+                fmi2DeSerializeFMUstate = deserialize_fmu_state(bytes: *const c_char, size: usize, state: *mut CFmuState);
+                fmi2GetDirectionalDerivative = get_directional_derivative(unknown: *const CValueReference, unknowns: usize, known: *const CValueReference, knowns: usize, direction: *const f64, answer: *mut f64);
+                fmi2SetRealInputDerivatives = set_real_input_derivatives(vr: *const CValueReference, count: usize, order: *const c_int, value: *const f64);
+                fmi2GetRealOutputDerivatives = get_real_output_derivatives(vr: *const CValueReference, count: usize, order: *const c_int, value: *mut f64);
+                fmi2CancelStep = cancel_step();
+                fmi2GetStatus = get_status(kind: c_int, value: *mut Status);
+                fmi2GetRealStatus = get_real_status(kind: c_int, value: *mut f64);
+                fmi2GetIntegerStatus = get_integer_status(kind: c_int, value: *mut c_int);
+                fmi2GetBooleanStatus = get_boolean_status(kind: c_int, value: *mut CBoolean);
+                fmi2GetStringStatus = get_string_status(kind: c_int, value: *mut CString);
+            }
+
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn fmi2DoStep(
+                component: CComponent,
+                time: f64,
+                step: f64,
+                _no_set_fmu_state_prior_to_current_point: CBoolean,
+            ) -> Status {
+                unsafe { $crate::abi::do_step::<$component>(component, time, step) }
+            }
+
+            $crate::export_model_exchange! { $component,
+                fmi2EnterEventMode();
+                fmi2NewDiscreteStates(_info: *mut c_void);
+                fmi2EnterContinuousTimeMode();
+                fmi2CompletedIntegratorStep(_no_set_prior: CBoolean, _event: *mut CBoolean, _terminate: *mut CBoolean);
+                fmi2SetTime(_time: f64);
+                fmi2SetContinuousStates(_states: *const f64, _count: usize);
+                fmi2GetDerivatives(_derivatives: *mut f64, _count: usize);
+                fmi2GetEventIndicators(_indicators: *mut f64, _count: usize);
+                fmi2GetContinuousStates(_states: *mut f64, _count: usize);
+                fmi2GetNominalsOfContinuousStates(_nominals: *mut f64, _count: usize);
+            }
+        }
+    };
+}
+
+/// Functions that hand on their arguments.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! export_functions {
+    ($component:ty, $($c_name:ident = $function:ident($($argument:ident: $type:ty),*);)*) => {$(
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $c_name(component: CComponent, $($argument: $type),*) -> Status {
+            unsafe { $crate::abi::$function::<$component>(component, $($argument),*) }
+        }
+    )*};
+}
+
+/// Functions that have nothing to do in co-simulation.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! export_model_exchange {
+    ($component:ty, $($c_name:ident($($argument:ident: $type:ty),*);)*) => {$(
+        #[unsafe(no_mangle)]
+        pub unsafe extern "C" fn $c_name(component: CComponent, $($argument: $type),*) -> Status {
+            unsafe { $crate::abi::not_for_co_simulation::<$component>(component, stringify!($c_name)) }
+        }
+    )*};
+}

@@ -1,0 +1,162 @@
+//! Which function may be called in which state (FMI 2.0, clause 4.2.4), as one table.
+
+use std::fmt;
+
+/// A state of a co-simulation component.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(u8)]
+pub(crate) enum State {
+    Instantiated,
+    InitializationMode,
+    StepComplete,
+    StepInProgress,
+    StepFailed,
+    StepCanceled,
+    Terminated,
+    Error,
+    Fatal,
+}
+
+impl State {
+    pub(crate) const ALL: [Self; 9] = [
+        Self::Instantiated,
+        Self::InitializationMode,
+        Self::StepComplete,
+        Self::StepInProgress,
+        Self::StepFailed,
+        Self::StepCanceled,
+        Self::Terminated,
+        Self::Error,
+        Self::Fatal,
+    ];
+
+    /// The name that the standard gives it.
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::Instantiated => "instantiated",
+            Self::InitializationMode => "Initialization Mode",
+            Self::StepComplete => "stepComplete",
+            Self::StepInProgress => "stepInProgress",
+            Self::StepFailed => "stepFailed",
+            Self::StepCanceled => "stepCanceled",
+            Self::Terminated => "terminated",
+            Self::Error => "error",
+            Self::Fatal => "fatal",
+        }
+    }
+
+    const fn bit(self) -> u16 {
+        1 << self as u8
+    }
+}
+
+/// A set of states.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub(crate) struct States(u16);
+
+impl States {
+    const fn of(states: &[State]) -> Self {
+        let mut bits = 0;
+        let mut i = 0;
+        while i < states.len() {
+            bits |= states[i].bit();
+            i += 1;
+        }
+        Self(bits)
+    }
+
+    pub(crate) const fn contains(self, state: State) -> bool {
+        self.0 & state.bit() != 0
+    }
+}
+
+impl fmt::Display for States {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        let names = State::ALL.into_iter().filter(|&s| self.contains(s));
+        let names: Vec<_> = names.map(State::name).collect();
+        f.write_str(&names.join(", "))
+    }
+}
+
+/// Declares the functions, and with them the table.
+macro_rules! functions {
+    ($($(#[$note:meta])* $function:ident: $($state:ident)|*;)*) => {
+        /// A group of C functions that are legal in the same states.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        pub(crate) enum Function {
+            $($(#[$note])* $function,)*
+        }
+
+        impl Function {
+            #[cfg(test)]
+            pub(crate) const ALL: &'static [Self] = &[$(Self::$function),*];
+
+            /// The states that it is legal in.
+            pub(crate) const fn legal_in(self) -> States {
+                match self {
+                    $(Self::$function => const { States::of(&[$(State::$state),*]) },)*
+                }
+            }
+
+            #[cfg(test)]
+            /// Its name without the prefix `fmi2`.
+            pub(crate) const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$function => stringify!($function),)*
+                }
+            }
+        }
+    };
+}
+
+functions! {
+    SetDebugLogging: Instantiated | InitializationMode | StepComplete | StepInProgress | StepFailed | StepCanceled | Terminated | Error;
+    SetupExperiment: Instantiated;
+    EnterInitializationMode: Instantiated;
+    ExitInitializationMode: InitializationMode;
+    /// `fmi2SetReal`, `Integer`, `Boolean` and `String`; which variables, their causality decides.
+    SetValues: Instantiated | InitializationMode | StepComplete;
+    /// `fmi2GetReal`, `Integer`, `Boolean` and `String`.
+    GetValues: InitializationMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
+    SetRealInputDerivatives: Instantiated | InitializationMode | StepComplete;
+    GetRealOutputDerivatives: StepComplete | StepFailed | StepCanceled | Terminated | Error;
+    GetDirectionalDerivative: InitializationMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
+    DoStep: StepComplete;
+    CancelStep: StepInProgress;
+    /// `fmi2GetStatus`, and `fmi2GetRealStatus`, `Integer`, `Boolean` and `String`.
+    GetStatus: StepComplete | StepInProgress | StepFailed | Terminated;
+    /// `fmi2GetFMUstate`, `Set` and `Free`; `fmi2SerializedFMUstateSize`, `Serialize` and `DeSerialize`.
+    FMUstate: Instantiated | InitializationMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
+    Terminate: StepComplete | StepFailed;
+    Reset: Instantiated | InitializationMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
+    /// The functions of model exchange: a component for co-simulation is in no state for them.
+    ModelExchange: ;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The table as the crate's documentation shows it.
+    fn rendered() -> String {
+        let states = State::ALL.map(State::name);
+        let mut text = format!("| `fmi2…` | {} |\n", states.join(" | "));
+        text += &format!("|---|{}\n", ":-:|".repeat(states.len()));
+        for function in Function::ALL {
+            let marks = State::ALL.map(|s| {
+                if function.legal_in().contains(s) {
+                    "x"
+                } else {
+                    ""
+                }
+            });
+            text += &format!("| {} | {} |\n", function.name(), marks.join(" | "));
+        }
+        text
+    }
+
+    #[test]
+    fn the_documentation_shows_this_table() {
+        assert_eq!(include_str!("life_cycle.md"), rendered());
+    }
+}

@@ -1,0 +1,197 @@
+//! Lines for the master's logger (FMI 2.0, clause 2.1.5): categories, and text that is safe as a printf format.
+
+use std::ffi::{CStr, CString, c_char, c_void};
+use std::fmt::Arguments;
+
+use crate::status::Status;
+
+/// `fmi2CallbackLogger`.
+pub type Logger = unsafe extern "C" fn(
+    environment: *mut c_void,
+    instance_name: *const c_char,
+    status: Status,
+    category: *const c_char,
+    message: *const c_char,
+    ...
+);
+
+/// A category of log lines that the description declares; generated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Category {
+    name: &'static str,
+    bit: u64,
+}
+
+impl Category {
+    /// The category at `index` of the description's list, which has at most 64.
+    pub const fn new(index: u32, name: &'static str) -> Self {
+        Self {
+            name,
+            bit: 1 << index,
+        }
+    }
+}
+
+/// Where a component's log lines go.
+///
+/// Lines of a category appear only while the master has switched it on; the reasons of warnings and errors always do,
+/// since without them a status is a riddle.
+#[derive(Debug)]
+pub struct Log {
+    sink: Option<Sink>,
+    enabled: u64,
+    categories: &'static [&'static str],
+}
+
+#[derive(Debug)]
+struct Sink {
+    logger: Logger,
+    environment: *mut c_void,
+    instance_name: CString,
+}
+
+impl Log {
+    /// A log that nobody reads, for tests of components.
+    pub const fn silent() -> Self {
+        Self {
+            sink: None,
+            enabled: 0,
+            categories: &[],
+        }
+    }
+
+    /// A log that calls `logger`, if there is one.
+    ///
+    /// # Safety
+    /// As long as the log lives, `logger` can be called with `environment`, as `fmi2Instantiate` promises.
+    pub(crate) unsafe fn new(
+        logger: Option<Logger>,
+        environment: *mut c_void,
+        instance_name: &CStr,
+        categories: &'static [&'static str],
+    ) -> Self {
+        Self {
+            sink: logger.map(|logger| Sink {
+                logger,
+                environment,
+                instance_name: instance_name.into(),
+            }),
+            enabled: 0,
+            categories,
+        }
+    }
+
+    /// Whether lines of `category` are wanted.
+    pub fn wants(&self, category: Category) -> bool {
+        self.enabled & category.bit != 0
+    }
+
+    /// Logs a line, if the category is wanted; formats nothing if it is not.
+    #[inline]
+    pub fn tell(&self, category: Category, message: Arguments<'_>) {
+        if self.wants(category) {
+            self.write(Status::Ok, category.name, &message.to_string());
+        }
+    }
+
+    /// Logs a line about something that is not quite right.
+    #[cold]
+    pub fn warn(&self, message: Arguments<'_>) {
+        let category = if self.categories.contains(&"logStatusWarning") {
+            "logStatusWarning"
+        } else {
+            "logAll"
+        };
+        self.write(Status::Warning, category, &message.to_string());
+    }
+
+    /// Logs why a call ends in `status`.
+    #[cold]
+    pub(crate) fn reason(&self, status: Status, message: &str) {
+        self.write(status, "logStatusError", message);
+    }
+
+    /// Switches every category on or off.
+    pub(crate) fn enable_all(&mut self, on: bool) {
+        self.enabled = if on { u64::MAX } else { 0 };
+    }
+
+    /// Switches on the categories named and no other; answers whether each of them exists.
+    pub(crate) fn enable_only<'a>(&mut self, names: impl Iterator<Item = &'a str>) -> bool {
+        self.enabled = 0;
+        let mut known = true;
+        for name in names {
+            match self.categories.iter().position(|&c| c == name) {
+                _ if name == "logAll" => self.enable_all(true),
+                Some(index) => self.enabled |= 1 << index,
+                None => {
+                    known = false;
+                    self.warn(format_args!(
+                        "fmi2SetDebugLogging: there is no category {name:?}; there are {}",
+                        self.categories.join(", ")
+                    ));
+                }
+            }
+        }
+        known
+    }
+
+    #[cold]
+    fn write(&self, status: Status, category: &'static str, message: &str) {
+        let Some(sink) = &self.sink else { return };
+        // Generated names hold no NUL; an empty category would still be better than the NULL that crashes masters.
+        let category = CString::new(category).unwrap_or_default();
+        let message = printf_safe(message);
+        // SAFETY: `Log::new` was promised that the logger can be called. All strings end in NUL and outlive the call.
+        // The message is a format without a conversion, so that no further argument is looked for.
+        unsafe {
+            (sink.logger)(
+                sink.environment,
+                sink.instance_name.as_ptr(),
+                status,
+                category.as_ptr(),
+                message.as_ptr(),
+            );
+        }
+    }
+}
+
+/// The text as a printf format which prints it: `%` is doubled. So is `#`, which encloses variable references in FMI.
+fn printf_safe(text: &str) -> CString {
+    let text = text
+        .replace('%', "%%")
+        .replace('#', "##")
+        .replace('\0', "\u{fffd}");
+    CString::new(text).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_is_safe_as_a_printf_format() {
+        assert_eq!(
+            printf_safe("100 %n #r1# \0").to_str(),
+            Ok("100 %%n ##r1## \u{fffd}")
+        );
+    }
+
+    #[test]
+    fn a_category_is_told_only_when_it_is_switched_on() {
+        let impacts = Category::new(1, "logImpacts");
+        let mut log = Log {
+            categories: &["logEvents", "logImpacts", "logAll"],
+            ..Log::silent()
+        };
+        assert!(!log.wants(impacts));
+        assert!(log.enable_only(["logEvents"].into_iter()));
+        assert!(!log.wants(impacts));
+        assert!(log.enable_only(["logImpacts"].into_iter()));
+        assert!(log.wants(impacts));
+        assert!(log.enable_only(["logAll"].into_iter()));
+        assert!(log.wants(impacts));
+        assert!(!log.enable_only(["logNonsense"].into_iter()));
+        assert!(!log.wants(impacts));
+    }
+}

@@ -1,0 +1,104 @@
+//! Why a call was refused, and how bad that is.
+
+use std::fmt::Display;
+
+use crate::status::Status;
+
+/// How bad a refusal is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Severity {
+    /// The call could not be done; the component is as it was before.
+    Discard,
+    /// The call was wrong; a step that ends so cannot be continued.
+    Error,
+    /// The component is of no use any more.
+    Fatal,
+}
+
+/// A call that was not done, and one line which says what, where and what was expected.
+///
+/// Any error type converts into a refusal of severity [`Severity::Error`], so that `?` works on a component's own
+/// errors. (For that blanket conversion a refusal is not itself a `std::error::Error`.)
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Refusal {
+    severity: Severity,
+    message: Box<str>,
+}
+
+impl Refusal {
+    /// The call could not be done, and changed nothing.
+    pub fn discard(message: impl Into<String>) -> Self {
+        Self::new(Severity::Discard, message)
+    }
+
+    /// The call was wrong.
+    pub fn error(message: impl Into<String>) -> Self {
+        Self::new(Severity::Error, message)
+    }
+
+    /// The component is of no use any more.
+    pub fn fatal(message: impl Into<String>) -> Self {
+        Self::new(Severity::Fatal, message)
+    }
+
+    fn new(severity: Severity, message: impl Into<String>) -> Self {
+        Self {
+            severity,
+            message: message.into().into(),
+        }
+    }
+
+    /// How bad it is.
+    pub fn severity(&self) -> Severity {
+        self.severity
+    }
+
+    /// What, where, and what was expected.
+    pub fn message(&self) -> &str {
+        &self.message
+    }
+
+    pub(crate) fn status(&self) -> Status {
+        match self.severity {
+            Severity::Discard => Status::Discard,
+            Severity::Error => Status::Error,
+            Severity::Fatal => Status::Fatal,
+        }
+    }
+}
+
+impl<E: std::error::Error> From<E> for Refusal {
+    fn from(error: E) -> Self {
+        Self::error(describe(&error))
+    }
+}
+
+/// The error and what caused it, on one line.
+fn describe(error: &dyn std::error::Error) -> String {
+    let mut text = error.to_string();
+    let mut source = error.source();
+    while let Some(cause) = source {
+        text = join(&text, cause);
+        source = cause.source();
+    }
+    text
+}
+
+fn join(text: &str, cause: impl Display) -> String {
+    format!("{text}: {cause}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn any_error_becomes_a_refusal() {
+        fn parse() -> Result<f64, Refusal> {
+            Ok("seven".parse::<f64>()?)
+        }
+        let refusal = parse().unwrap_err();
+        assert_eq!(refusal.severity(), Severity::Error);
+        assert_eq!(refusal.message(), "invalid float literal");
+    }
+}

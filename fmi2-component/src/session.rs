@@ -1,0 +1,72 @@
+//! The part of an instance that is an FMU state: what can be taken, set back and serialised.
+
+use crate::archive::Archive;
+use crate::component::Component;
+use crate::life_cycle::State;
+use crate::model::{Key, Model};
+use crate::refusal::Refusal;
+
+/// A component and where it is in its life.
+#[derive(Clone, Debug)]
+pub(crate) struct Session<C> {
+    pub component: C,
+    pub state: State,
+    /// Something was set since the component was last initialised.
+    pub stale: bool,
+    pub start_time: f64,
+    pub stop_time: f64,
+    /// Where the last step has led.
+    pub time: f64,
+}
+
+impl<C: Component> Session<C> {
+    /// A component at its start values.
+    ///
+    /// # Errors
+    /// The component refuses a start value of its own description.
+    pub fn new() -> Result<Self, Refusal> {
+        let mut component = C::new();
+        for (key, start) in starts::<<C::Model as Model>::Real>() {
+            component.set_real(key, *start)?;
+        }
+        for (key, start) in starts::<<C::Model as Model>::Integer>() {
+            component.set_integer(key, *start)?;
+        }
+        for (key, start) in starts::<<C::Model as Model>::Boolean>() {
+            component.set_boolean(key, *start)?;
+        }
+        for (key, start) in starts::<<C::Model as Model>::String>() {
+            component.set_string(key, start)?;
+        }
+        Ok(Self {
+            component,
+            state: State::Instantiated,
+            stale: true,
+            start_time: 0.0,
+            stop_time: f64::INFINITY,
+            time: 0.0,
+        })
+    }
+
+    /// Writes or reads all of it.
+    pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
+        let mut state = self.state as u8;
+        archive.u8(&mut state)?;
+        self.state = State::ALL
+            .into_iter()
+            .find(|&s| s as u8 == state)
+            .ok_or_else(|| Refusal::error(format!("{state} is no state of the life cycle")))?;
+        archive.bool(&mut self.stale)?;
+        archive.f64s([&mut self.start_time, &mut self.stop_time, &mut self.time])?;
+        self.component.archive(archive)
+    }
+}
+
+/// The variables that a master may set at the start, with their start values.
+fn starts<K: Key>() -> impl Iterator<Item = (K, &'static K::Value)> {
+    K::ALL.iter().filter_map(|&key| {
+        let variable = key.variable();
+        let start = variable.start.as_ref()?;
+        variable.settable_at_start(false).then_some((key, start))
+    })
+}

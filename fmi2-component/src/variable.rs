@@ -1,0 +1,112 @@
+//! What `modelDescription.xml` says of a variable, as the build step found it (FMI 2.0, clause 2.2.7).
+
+use std::fmt::Display;
+
+use crate::refusal::Refusal;
+
+/// Who determines the value of a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Causality {
+    /// Set by the master before or during initialization; a tunable one also between steps.
+    Parameter,
+    /// Follows from parameters.
+    CalculatedParameter,
+    /// Set by the master at any time between steps.
+    Input,
+    /// Computed by the component, for others to use.
+    Output,
+    /// Computed by the component, for its own use; may be read.
+    Local,
+    /// Time.
+    Independent,
+}
+
+/// When the value of a variable may change.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Variability {
+    /// Never.
+    Constant,
+    /// Not after initialization.
+    Fixed,
+    /// Between steps, where the master wants it.
+    Tunable,
+    /// At events and communication points.
+    Discrete,
+    /// At any time.
+    Continuous,
+}
+
+/// How the value at the start is found.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Initial {
+    /// It is the start value.
+    Exact,
+    /// The start value is a guess.
+    Approx,
+    /// It is computed from other variables.
+    Calculated,
+}
+
+/// A variable whose values are of type `T`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Variable<T> {
+    /// The structured name, for example `der(q1)`.
+    pub name: &'static str,
+    /// The number by which a master refers to it; unique among the variables of its type.
+    pub value_reference: u32,
+    /// Who determines its value.
+    pub causality: Causality,
+    /// When its value may change.
+    pub variability: Variability,
+    /// How its initial value is found; none for inputs and for time.
+    pub initial: Option<Initial>,
+    /// The start value, where there is one.
+    pub start: Option<T>,
+    /// The least value that makes sense. The shell does not enforce it.
+    pub min: Option<T>,
+    /// The largest value that makes sense. The shell does not enforce it.
+    pub max: Option<T>,
+    /// The unit; none for a pure number.
+    pub unit: Option<&'static str>,
+    /// What an engineer should know of it.
+    pub description: &'static str,
+}
+
+impl<T> Variable<T> {
+    /// A refusal of `value` which names the variable, its unit and what is allowed.
+    pub fn refuse(&self, value: impl Display, allowed: &str) -> Refusal {
+        let unit = self.unit.map(|u| format!(" {u}")).unwrap_or_default();
+        Refusal::error(format!(
+            "{} = {value}{unit} is refused; allowed is {allowed}",
+            self.name
+        ))
+    }
+
+    /// Whether a master may set it while the component is being set up (FMI 2.0, clause 4.2.4, footnotes to the
+    /// table of states): before initialization (`approx` guesses included), and in Initialization Mode.
+    pub const fn settable_at_start(&self, in_initialization_mode: bool) -> bool {
+        if matches!(self.variability, Variability::Constant) {
+            return false;
+        }
+        match self.initial {
+            Some(Initial::Exact) => true,
+            Some(Initial::Approx) => !in_initialization_mode,
+            Some(Initial::Calculated) => false,
+            None => matches!(self.causality, Causality::Input),
+        }
+    }
+
+    /// Whether a master may set it between steps: inputs and tunable parameters.
+    pub const fn settable_between_steps(&self) -> bool {
+        match self.causality {
+            Causality::Input => true,
+            Causality::Parameter => matches!(self.variability, Variability::Tunable),
+            _ => false,
+        }
+    }
+
+    /// Whether its value is the component's to compute, not the master's to set.
+    pub(crate) const fn computed(&self) -> bool {
+        !matches!(self.causality, Causality::Parameter | Causality::Input)
+    }
+}

@@ -1,0 +1,146 @@
+//! The whole experiment on the plant itself, with no FMU in between.
+
+use vines::experiment::{self, ExperimentError, Plan, Record};
+use vines::identification::{Identification, IdentificationError, Regime, identify};
+use vines::rig::{BuiltIn, Command, Controller, Drive, Rig, RigError, Sensors, Simulated, Witness};
+use vines::scene::{Override, Scene};
+
+fn scene(settings: &[&str]) -> Scene {
+    let overrides: Vec<Override> = settings.iter().map(|s| s.parse().unwrap()).collect();
+    let text = include_str!("../../scenes/dimensionless.toml");
+    Scene::parse("dimensionless.toml", text, &overrides).unwrap()
+}
+
+fn plan(scene: &Scene) -> Plan {
+    Plan::of(scene)
+}
+
+fn measure(scene: &Scene) -> Record {
+    let mut rig = Simulated::new(scene).unwrap();
+    let mut controller = BuiltIn::new(scene).unwrap();
+    experiment::run(&mut rig, &mut controller, &plan(scene), |_, _, _| {}).unwrap()
+}
+
+fn identified(settings: &[&str]) -> Identification {
+    let scene = scene(settings);
+    identify(&measure(&scene), &scene).unwrap()
+}
+
+#[test]
+fn the_lock_is_the_exact_orbit_within_5e_3_in_sigma_and_half_a_percent_in_amplitude() {
+    let found = identified(&[]);
+    let exact = found.exact.unwrap();
+    let (sigma, c) = (found.lock.sigma - exact.sigma, found.lock.c / exact.c - 1.0);
+    println!("sigma off by {sigma:.1e}, C by {:.2} %", 100.0 * c);
+    assert!(sigma.abs() < 5e-3 && c.abs() < 5e-3);
+    assert!(exact.stable && found.lock.regime == Regime::Symmetric);
+    assert!(found.lock.phase_error_deg.abs() < 0.3);
+}
+
+#[test]
+fn a_longer_wait_brings_the_lock_closer_to_the_exact_orbit() {
+    let strict = ["controller.amplitude_drift=1e-8", "controller.frequency_drift=1e-9"];
+    let found = identified(&strict);
+    let exact = found.exact.unwrap();
+    let (sigma, c) = (found.lock.sigma - exact.sigma, found.lock.c / exact.c - 1.0);
+    println!("after {:.0} periods: sigma off by {sigma:.1e}, C by {c:.1e}", found.lock.periods_to_lock);
+    assert!(sigma.abs() < 1e-5 && c.abs() < 1e-5);
+}
+
+#[test]
+fn the_decay_follows_theory_and_the_distance_halves_with_epsilon() {
+    let rms = |settings: &[&str]| identified(settings).rms_sigma_error.unwrap();
+    let (full, half) = (rms(&[]), rms(&["plant.epsilon=0.0042"]));
+    println!("RMS of sigma over C > 0.2: {full:.4}, at half epsilon {half:.4}");
+    assert!(full <= 0.08);
+    assert!((0.4..0.6).contains(&(half / full)));
+}
+
+#[test]
+fn a_lock_of_the_linear_mode_is_not_taken_for_the_impacting_one() {
+    // At rest with the particle at the centre nothing ever hits, and the loop locks all the same, at sigma = 0.
+    let scene = scene(&["start.dq2=0"]);
+    let refusal = identify(&measure(&scene), &scene).unwrap_err();
+    let IdentificationError::Regime { regime, sigma, .. } = refusal else {
+        panic!("{refusal}");
+    };
+    assert_eq!(regime, Regime::Silent);
+    assert!(sigma.abs() < 0.05, "{sigma}");
+}
+
+/// A rig whose response is noise of a shift register.
+struct Noise(u32);
+
+impl Rig for Noise {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.0 ^= self.0 << 13;
+        self.0 ^= self.0 >> 17;
+        self.0 ^= self.0 << 5;
+        Ok(Sensors {
+            response: f64::from(self.0) / f64::from(u32::MAX) - 0.5,
+            reference: None,
+        })
+    }
+
+    fn advance(&mut self, _: Drive, _: f64) -> Result<(), RigError> {
+        Ok(())
+    }
+}
+
+#[test]
+fn noise_is_never_locked() {
+    let scene = scene(&["record.lock_periods=300"]);
+    let mut controller = BuiltIn::new(&scene).unwrap();
+    let outcome = experiment::run(&mut Noise(1), &mut controller, &plan(&scene), |_, _, _| {});
+    assert!(matches!(outcome, Err(ExperimentError::NoLock { .. })));
+}
+
+/// A rig that does not tell its impacts, as hardware would not.
+struct Mute(Simulated);
+
+impl Rig for Mute {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.0.sense()
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.0.advance(drive, step)
+    }
+}
+
+#[test]
+fn a_rig_that_does_not_tell_its_impacts_has_an_unknown_regime() {
+    let scene = scene(&[]);
+    let mut rig = Mute(Simulated::new(&scene).unwrap());
+    assert_eq!(rig.witness().unwrap(), None::<Witness>);
+    let mut controller = BuiltIn::new(&scene).unwrap();
+    let record = experiment::run(&mut rig, &mut controller, &plan(&scene), |_, _, _| {}).unwrap();
+    let refusal = identify(&record, &scene).unwrap_err();
+    assert!(matches!(
+        refusal,
+        IdentificationError::Regime { regime: Regime::Unknown, .. }
+    ));
+}
+
+/// A controller that runs open loop.
+struct OpenLoop(Drive);
+
+impl Controller for OpenLoop {
+    fn sample(&mut self, _: Sensors, active: bool) -> Command {
+        Command {
+            drive: if active { self.0 } else { Drive::default() },
+            settled: true,
+            ..Command::default()
+        }
+    }
+}
+
+#[test]
+fn an_experiment_takes_any_controller_and_records_every_stage() {
+    let scene = scene(&["record.hold_periods=3", "record.decay_periods=2"]);
+    let mut rig = Simulated::new(&scene).unwrap();
+    let drive = Drive { omega: 1.0, amplitude: 0.01, displacement: 0.0 };
+    let record = experiment::run(&mut rig, &mut OpenLoop(drive), &plan(&scene), |_, _, _| {}).unwrap();
+    assert_eq!((record.hold().len(), record.decay().len()), (300, 200));
+    assert!(record.decay().iter().all(|sample| sample.command.drive == Drive::default()));
+}
