@@ -152,10 +152,11 @@ pub trait Component: Clone + Send + 'static {
         )))
     }
 
-    /// Writes the whole component to `archive`, or reads it from there: one list of fields serves both ways.
+    /// Writes the whole component to `archive`, or reads it from there; where the component derives serde's traits, by
+    /// `archive.whole(self)`.
     ///
     /// # Errors
-    /// Contents that make no sense; by default always, since there is nothing to guess the fields from.
+    /// Contents that make no sense; by default always, since a component need not know serde.
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
         let _ = archive;
         Err(Refusal::error("the component cannot be serialised"))

@@ -15,7 +15,7 @@ const HEADER: usize = 16;
 pub(crate) fn serialise<C: Component>(session: &Session<C>) -> Result<Vec<u8>, Refusal> {
     let mut bytes = vec![0; HEADER];
     let mut archive = Archive::writer(&mut bytes);
-    archive.string(&mut C::Model::GUID.to_owned())?;
+    archive.whole(&mut C::Model::GUID.to_owned())?;
     session.clone().archive(&mut archive)?;
     let checksum = fnv1a(&bytes[HEADER..]);
     bytes[..8].copy_from_slice(&MAGIC);
@@ -43,7 +43,7 @@ pub(crate) fn deserialise<C: Component>(bytes: &[u8]) -> Result<Session<C>, Refu
     }
     let mut archive = Archive::reader(body);
     let mut guid = String::new();
-    archive.string(&mut guid)?;
+    archive.whole(&mut guid)?;
     if guid != C::Model::GUID {
         return Err(Refusal::error(format!(
             "the serialised state is of another model: its GUID is {guid}, expected is {}",

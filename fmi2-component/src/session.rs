@@ -51,13 +51,15 @@ impl<C: Component> Session<C> {
     /// Writes or reads all of it.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
         let mut state = self.state as u8;
-        archive.u8(&mut state)?;
+        archive.whole(&mut state)?;
         self.state = State::ALL
             .into_iter()
             .find(|&s| s as u8 == state)
             .ok_or_else(|| Refusal::error(format!("{state} is no state of the life cycle")))?;
-        archive.bool(&mut self.stale)?;
-        archive.f64s([&mut self.start_time, &mut self.stop_time, &mut self.time])?;
+        archive.whole(&mut self.stale)?;
+        for time in [&mut self.start_time, &mut self.stop_time, &mut self.time] {
+            archive.whole(time)?;
+        }
         self.component.archive(archive)
     }
 }

@@ -2,8 +2,8 @@
 
 use thiserror::Error;
 
-use crate::scene::Scene;
 use crate::rig::{Command, Controller, Rig, RigError, Sensors, Witness};
+use crate::scene::Scene;
 
 /// How long each stage may or shall last, in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]

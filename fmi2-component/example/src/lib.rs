@@ -1,7 +1,8 @@
 //! A water tank as an FMI 2.0 component.
 #![forbid(unsafe_code)]
 
-mod variables {
+/// What `modelDescription.xml` says.
+pub mod variables {
     include!(concat!(env!("OUT_DIR"), "/variables.rs"));
 }
 
@@ -9,7 +10,7 @@ use fmi2_component::{Archive, Component, Key, Log, Refusal};
 use variables::{Boolean, Integer, Model, Real, String, category};
 
 /// A tank with a vertical wall; what comes in above its rim is lost.
-#[derive(Clone, Default)]
+#[derive(Clone, Default, serde::Serialize, serde::Deserialize)]
 pub struct Tank {
     area: f64,
     height: f64,
@@ -133,11 +134,7 @@ impl Component for Tank {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
-        archive.f64s([&mut self.area, &mut self.height, &mut self.inflow])?;
-        archive.f64s([&mut self.initial_level, &mut self.level])?;
-        archive.i32(&mut self.overflows)?;
-        archive.bool(&mut self.valve)?;
-        archive.string(&mut self.label)
+        archive.whole(self)
     }
 }
 

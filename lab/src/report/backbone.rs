@@ -12,8 +12,10 @@ use crate::theory::{BackbonePoint, SlowFlow};
 
 /// Amplitude drawn up to at least this, C.
 const TOP: f64 = 0.8;
-/// Points of the exact curve.
-const EXACT_POINTS: usize = 400;
+/// Frequencies at which the exact curve is computed: many, for it turns back sharply, ...
+const EXACT_POINTS: usize = 4000;
+/// ... of which those are drawn that lie this far apart, as a fraction of the picture.
+const APART: f64 = 0.004;
 
 pub(super) fn draw(found: &Identification) -> Result<String, String> {
     let p = &found.parameters;
@@ -42,7 +44,7 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
             area,
             "Backbone: phase resonance of the centre of mass",
             found,
-            ((low, high), "detuning sigma = (omega/omega0 - 1)/epsilon"),
+            ((low, high), "detuning σ = (ω/ω₀ − 1)/ε"),
             ((0.0, top), "amplitude C of v, over b"),
         )?;
         let solid = line(THEORY, 20);
@@ -116,5 +118,14 @@ fn exact_curve(
         .map(|orbit| (orbit.sigma, orbit.c))
         .collect();
     points.sort_by(|a, b| a.1.total_cmp(&b.1));
-    points
+    let mut drawn: Vec<(f64, f64)> = Vec::new();
+    for point in points {
+        let far = |last: &(f64, f64)| {
+            ((point.0 - last.0) / (high - low)).hypot((point.1 - last.1) / top) >= APART
+        };
+        if drawn.last().is_none_or(far) {
+            drawn.push(point);
+        }
+    }
+    drawn
 }

@@ -68,7 +68,7 @@ pub fn plane<'a, 'b>(
 ) -> Result<Plane<'a, 'b>, Box<dyn std::error::Error>> {
     let p = &found.parameters;
     let caption = format!(
-        "epsilon = {:.5}, lambda = {:.3}, r = {}, G = {:.3}; lengths over b, time over 1/omega0",
+        "ε = {:.5}, λ = {:.3}, r = {}, G = {:.3}; lengths over b, times over 1/ω₀",
         p.epsilon, p.lambda, p.r, found.lock.g
     );
     area.draw_text(

@@ -28,7 +28,7 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
             "Slow invariant manifold and the free decay on it",
             found,
             ((0.0, right), "amplitude C of v, over b"),
-            ((0.0, top), "particle speed B, over b omega0"),
+            ((0.0, top), "particle speed B, over b ω₀"),
         )?;
         let stable = between(manifold.b_min(), B_SYMMETRY_BREAKING);
         let label = "manifold, 1:1 impacts stable";

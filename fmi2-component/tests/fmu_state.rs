@@ -1,0 +1,130 @@
+//! FMU states: taken, set back, freed, and as bytes.
+
+mod master;
+
+use std::ptr::{null, null_mut, without_provenance_mut};
+
+use fmi2_component::Status::{self, Error, Ok};
+use fmi2_example_tank::variables::GUID;
+use master::*;
+
+const INFLOW: u32 = 2;
+const LEVEL: u32 = 3;
+
+fn read_back(master: &Master, bytes: &[u8]) -> (Status, Raw) {
+    let mut state = null_mut();
+    let status =
+        unsafe { fmi2DeSerializeFMUstate(master.c, bytes.as_ptr(), bytes.len(), &mut state) };
+    (status, state)
+}
+
+#[test]
+fn a_state_set_back_continues_bit_by_bit() {
+    let master = Master::ready(GUID);
+    master.set_real(INFLOW, 0.1);
+    master.step(0.0, 0.3);
+    let mut state = null_mut();
+    assert_eq!(unsafe { fmi2GetFMUstate(master.c, &mut state) }, Ok);
+    let run = || {
+        (0..5).for_each(|i| assert_eq!(master.step(0.3 + 0.1 * f64::from(i), 0.1), Ok));
+        master.bytes()
+    };
+    let first = run();
+    assert_eq!(unsafe { fmi2SetFMUstate(master.c, state) }, Ok);
+    assert_eq!(run(), first);
+}
+
+#[test]
+fn a_serialised_state_continues_in_another_instance() {
+    let (one, two) = (Master::ready(GUID), Master::new(GUID));
+    one.set_real(INFLOW, 0.1);
+    one.step(0.0, 0.3);
+    let (status, state) = read_back(&two, &one.bytes());
+    assert_eq!(status, Ok);
+    assert_eq!(unsafe { fmi2SetFMUstate(two.c, state) }, Ok);
+    for master in [&one, &two] {
+        assert_eq!(master.step(0.3, 0.1), Ok);
+    }
+    assert_eq!(one.bytes(), two.bytes());
+    assert_eq!(one.real(LEVEL), two.real(LEVEL));
+}
+
+#[test]
+fn a_state_given_on_entry_is_overwritten() {
+    let master = Master::ready(GUID);
+    let mut state = null_mut();
+    unsafe { fmi2GetFMUstate(master.c, &mut state) };
+    let handle = state;
+    master.set_real(INFLOW, 0.2);
+    assert_eq!(unsafe { fmi2GetFMUstate(master.c, &mut state) }, Ok);
+    assert_eq!(state, handle);
+    master.set_real(INFLOW, 0.0);
+    unsafe { fmi2SetFMUstate(master.c, state) };
+    assert_eq!(master.real(INFLOW), 0.2);
+}
+
+#[test]
+fn every_damaged_or_truncated_blob_is_refused() {
+    let master = Master::ready(GUID);
+    let good = master.bytes();
+    for end in 0..good.len() {
+        let (status, state) = read_back(&master, &good[..end]);
+        assert_eq!((status, state), (Error, null_mut()), "{end} bytes");
+        master.heard();
+    }
+    for i in 0..good.len() {
+        let mut bad = good.clone();
+        bad[i] ^= 0x10;
+        assert_eq!(read_back(&master, &bad).0, Error, "byte {i}");
+    }
+    assert_eq!(read_back(&master, &[&good[..], b"!"].concat()).0, Error);
+    assert_eq!(master.bytes(), good);
+}
+
+#[test]
+fn a_handle_that_is_not_of_this_instance_is_refused() {
+    let (one, two) = (Master::ready(GUID), Master::ready(GUID));
+    let mut state = null_mut();
+    unsafe {
+        fmi2GetFMUstate(one.c, &mut state);
+        for foreign in [state, null_mut(), without_provenance_mut(usize::MAX)] {
+            assert_eq!(fmi2SetFMUstate(two.c, foreign), Error);
+            two.heard_one(&["not one that this instance has given out"]);
+        }
+        let mut freed = state;
+        assert_eq!(fmi2FreeFMUstate(one.c, &mut freed), Ok);
+        assert_eq!(fmi2SetFMUstate(one.c, state), Error);
+        assert_eq!(fmi2FreeFMUstate(one.c, &mut state), Error);
+        assert_eq!(fmi2SerializedFMUstateSize(one.c, state, &mut 0), Error);
+    }
+}
+
+#[test]
+fn null_and_a_small_buffer_are_dealt_with() {
+    let master = Master::ready(GUID);
+    let c = master.c;
+    let mut state = null_mut();
+    unsafe {
+        assert_eq!(fmi2FreeFMUstate(c, null_mut()), Ok);
+        assert_eq!(fmi2FreeFMUstate(c, &mut state), Ok);
+        assert_eq!(fmi2GetFMUstate(c, null_mut()), Error);
+        assert_eq!(fmi2DeSerializeFMUstate(c, null(), 100, &mut state), Error);
+        fmi2GetFMUstate(c, &mut state);
+        assert_eq!(fmi2SerializedFMUstateSize(c, state, null_mut()), Error);
+        master.heard();
+        assert_eq!(
+            fmi2SerializeFMUstate(c, state, [0; 4].as_mut_ptr(), 4),
+            Error
+        );
+        master.heard_one(&["size = 4 is too small"]);
+        assert_eq!(fmi2SerializeFMUstate(c, state, null_mut(), 4096), Error);
+    }
+}
+
+#[test]
+fn a_master_may_take_thousands_of_states_and_free_none() {
+    let master = Master::ready(GUID);
+    for _ in 0..10_000 {
+        assert_eq!(unsafe { fmi2GetFMUstate(master.c, &mut null_mut()) }, Ok);
+    }
+}

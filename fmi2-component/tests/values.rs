@@ -1,0 +1,218 @@
+//! Setting and getting values, through the C functions.
+
+mod master;
+
+use std::ffi::CStr;
+use std::ptr::{null, null_mut};
+
+use fmi2_component::Status::{Error, Ok};
+use fmi2_example_tank::variables::GUID;
+use master::*;
+
+const AREA: u32 = 0;
+const HEIGHT: u32 = 1;
+const INFLOW: u32 = 2;
+const LEVEL: u32 = 3;
+const RATE: u32 = 4;
+
+#[test]
+fn start_values_come_from_the_description() {
+    let master = Master::ready(GUID);
+    assert_eq!(master.real(AREA), 2.0);
+    assert_eq!(master.real(LEVEL), 0.5);
+    let mut label = null();
+    assert_eq!(unsafe { fmi2GetString(master.c, &0, 1, &mut label) }, Ok);
+    assert_eq!(unsafe { CStr::from_ptr(label) }, c"A \"tank\"");
+}
+
+#[test]
+fn outputs_are_right_in_initialization_mode_however_often_inputs_are_set() {
+    let master = Master::new(GUID);
+    unsafe { fmi2EnterInitializationMode(master.c) };
+    for (inflow, level) in [(1.0, 0.1), (3.0, 0.9)] {
+        assert_eq!(master.set_real(INFLOW, inflow), Ok);
+        assert_eq!(master.set_real(LEVEL, level), Ok);
+        assert_eq!(master.real(RATE), inflow / 2.0);
+        assert_eq!(master.real(LEVEL), level);
+    }
+    // What was set can be read back even where it makes no sense yet.
+    assert_eq!(master.set_real(LEVEL, 7.0), Ok);
+    assert_eq!(master.real(INFLOW), 3.0);
+    assert_eq!(unsafe { fmi2GetReal(master.c, &LEVEL, 1, &mut 0.0) }, Error);
+    master.heard_one(&["level = 7 m is refused", "height = 1 m"]);
+    assert_eq!(unsafe { fmi2ExitInitializationMode(master.c) }, Error);
+    master.heard_one(&["fmi2ExitInitializationMode: level = 7 m"]);
+    assert_eq!(master.set_real(HEIGHT, 8.0), Ok);
+    assert_eq!(unsafe { fmi2ExitInitializationMode(master.c) }, Ok);
+    assert_eq!(master.real(LEVEL), 7.0);
+}
+
+#[test]
+fn causality_and_variability_say_when_a_variable_may_be_set() {
+    let master = Master::new(GUID);
+    for (vr, expected) in [
+        (AREA, Ok),
+        (HEIGHT, Ok),
+        (INFLOW, Ok),
+        (LEVEL, Ok),
+        (RATE, Error),
+    ] {
+        assert_eq!(master.set_real(vr, 0.5), expected);
+    }
+    master.heard_one(&[
+        "der(level) cannot be set in state instantiated",
+        "calculated",
+    ]);
+    unsafe { fmi2EnterInitializationMode(master.c) };
+    for (vr, expected) in [
+        (AREA, Ok),
+        (HEIGHT, Ok),
+        (INFLOW, Ok),
+        (LEVEL, Ok),
+        (RATE, Error),
+    ] {
+        assert_eq!(master.set_real(vr, 0.5), expected);
+    }
+    unsafe { fmi2ExitInitializationMode(master.c) };
+    for (vr, expected) in [(AREA, Error), (HEIGHT, Ok), (INFLOW, Ok), (LEVEL, Error)] {
+        assert_eq!(master.set_real(vr, 0.5), expected);
+    }
+}
+
+#[test]
+fn a_number_that_is_not_finite_is_refused_by_name_and_unit() {
+    let master = Master::ready(GUID);
+    for (wrong, text) in [
+        (f64::NAN, "NaN"),
+        (f64::INFINITY, "inf"),
+        (f64::NEG_INFINITY, "-inf"),
+    ] {
+        assert_eq!(master.set_real(INFLOW, wrong), Error);
+        master.heard_one(&["inflow", text, "m3/s", "finite"]);
+    }
+    assert_eq!(master.real(INFLOW), 0.0);
+}
+
+#[test]
+fn a_component_refuses_values_of_its_own() {
+    let master = Master::new(GUID);
+    assert_eq!(master.set_real(AREA, -1.0), Error);
+    master.heard_one(&["fmi2SetReal: area = -1 m2 is refused; allowed is a number above 0"]);
+}
+
+#[test]
+fn nothing_is_set_where_one_of_several_is_wrong() {
+    let master = Master::ready(GUID);
+    let before = master.bytes();
+    for (vr, values) in [
+        ([INFLOW, 99], [1.0, 1.0]),
+        ([INFLOW, AREA], [1.0, 1.0]),
+        ([INFLOW, INFLOW], [1.0, f64::NAN]),
+    ] {
+        assert_eq!(
+            unsafe { fmi2SetReal(master.c, vr.as_ptr(), 2, values.as_ptr()) },
+            Error
+        );
+        assert_eq!(master.bytes(), before);
+    }
+}
+
+#[test]
+fn an_unknown_value_reference_is_named() {
+    let master = Master::ready(GUID);
+    assert_eq!(master.set_real(4711, 1.0), Error);
+    master.heard_one(&["value reference 4711 is unknown", "f64"]);
+    assert_eq!(unsafe { fmi2GetInteger(master.c, &1, 1, &mut 0) }, Error);
+    master.heard_one(&["value reference 1 is unknown", "i32", "[0]"]);
+}
+
+#[test]
+fn a_value_reference_may_be_given_twice() {
+    let master = Master::ready(GUID);
+    let mut values = [0.0; 2];
+    let vr = [LEVEL, LEVEL];
+    assert_eq!(
+        unsafe { fmi2GetReal(master.c, vr.as_ptr(), 2, values.as_mut_ptr()) },
+        Ok
+    );
+    assert_eq!(values, [0.5, 0.5]);
+}
+
+#[test]
+fn null_arrays_and_absurd_counts_are_refused() {
+    let master = Master::ready(GUID);
+    let c = master.c;
+    unsafe {
+        assert_eq!(fmi2GetReal(c, null(), 0, null_mut()), Ok);
+        assert_eq!(fmi2SetReal(c, null(), 0, null()), Ok);
+        assert_eq!(fmi2GetReal(c, null(), 1, &mut 0.0), Error);
+        master.heard_one(&["vr is NULL"]);
+        assert_eq!(fmi2GetReal(c, &LEVEL, 1, null_mut()), Error);
+        master.heard_one(&["value is NULL"]);
+        assert_eq!(fmi2SetReal(c, &INFLOW, usize::MAX, &0.0), Error);
+        master.heard_one(&["count of vr is 18446744073709551615"]);
+        let askew = std::ptr::from_ref(&INFLOW).wrapping_byte_add(1);
+        assert_eq!(fmi2GetReal(c, askew, 1, &mut 0.0), Error);
+        master.heard_one(&["vr is not aligned"]);
+        assert_eq!(fmi2GetString(c, &0, 1, null_mut()), Error);
+        assert_eq!(fmi2GetInteger(c, null(), 1, null_mut()), Error);
+        assert_eq!(fmi2GetBoolean(c, null(), 1, null_mut()), Error);
+    }
+}
+
+#[test]
+fn strings_may_be_anything_that_ends_in_nul() {
+    let master = Master::new(GUID);
+    let c = master.c;
+    unsafe {
+        assert_eq!(fmi2SetString(c, &0, 1, &null()), Error);
+        master.heard_one(&["label = NULL"]);
+        assert_eq!(fmi2SetString(c, &0, 1, &c"\xff%s".as_ptr()), Ok);
+        fmi2EnterInitializationMode(c);
+        let mut label = null();
+        assert_eq!(fmi2GetString(c, &0, 1, &mut label), Ok);
+        assert_eq!(CStr::from_ptr(label).to_str(), Result::Ok("\u{fffd}%s"));
+    }
+}
+
+#[test]
+fn derivatives_have_orders_and_causalities() {
+    let master = Master::ready(GUID);
+    let c = master.c;
+    master.set_real(INFLOW, 3.0);
+    let mut value = f64::NAN;
+    unsafe {
+        assert_eq!(
+            fmi2GetRealOutputDerivatives(c, &LEVEL, 1, &1, &mut value),
+            Ok
+        );
+        assert_eq!(value, 1.5);
+        assert_eq!(
+            fmi2GetRealOutputDerivatives(c, &LEVEL, 1, &0, &mut value),
+            Error
+        );
+        master.heard_one(&["derivative 0 of level is refused"]);
+        assert_eq!(
+            fmi2GetRealOutputDerivatives(c, &INFLOW, 1, &1, &mut value),
+            Error
+        );
+        master.heard_one(&["inflow", "expected is an output"]);
+        assert_eq!(fmi2SetRealInputDerivatives(c, &INFLOW, 1, &1, &0.0), Error);
+        master.heard_one(&["takes no input derivatives"]);
+        assert_eq!(fmi2SetRealInputDerivatives(c, &LEVEL, 1, &1, &0.0), Error);
+        master.heard_one(&["level", "expected is an input"]);
+
+        let (unknown, known, along) = ([RATE, LEVEL], [INFLOW, AREA], [4.0, 0.0]);
+        let mut answer = [f64::NAN; 2];
+        let status = fmi2GetDirectionalDerivative(
+            c,
+            unknown.as_ptr(),
+            2,
+            known.as_ptr(),
+            2,
+            along.as_ptr(),
+            answer.as_mut_ptr(),
+        );
+        assert_eq!((status, answer), (Ok, [2.0, 0.0]));
+    }
+}
