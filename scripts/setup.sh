@@ -34,3 +34,10 @@ libclang() {
     export LIBCLANG_PATH
     export BINDGEN_EXTRA_CLANG_ARGS="-I$(cc -print-file-name=include) ${BINDGEN_EXTRA_CLANG_ARGS:-}"
 }
+
+# The program and the two libraries; cargo shows its progress only where somebody can watch it.
+build() {
+    local quiet=--quiet
+    [ -t 2 ] && quiet=
+    cargo build --release --locked $quiet
+}

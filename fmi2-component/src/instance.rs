@@ -9,7 +9,7 @@ use crate::model::Key;
 use crate::refusal::{Refusal, Severity};
 use crate::session::Session;
 use crate::snapshots::Snapshots;
-use crate::variable::{Causality, Variability};
+use crate::variable::Variable;
 
 /// How far, relatively, a master's clock may be from ours: both round.
 const CLOCK_TOLERANCE: f64 = 1e-9;
@@ -87,12 +87,7 @@ impl<C: Component> Instance<C> {
         if settable {
             return Ok(());
         }
-        Err(Refusal::error(format!(
-            "{} cannot be set in state {}: it is {}",
-            variable.name,
-            self.session.state.name(),
-            nature(variable.causality, variable.variability)
-        )))
+        Err(not_settable(variable, self.session.state))
     }
 
     /// Says that values are about to be set: what was initialised from the old ones is out of date.
@@ -153,6 +148,17 @@ impl<C: Component> Instance<C> {
     }
 }
 
-fn nature(causality: Causality, variability: Variability) -> String {
-    format!("a variable of causality {causality:?} and variability {variability:?}").to_lowercase()
+#[cold]
+fn not_settable<T>(variable: &Variable<T>, state: State) -> Refusal {
+    let initial = match variable.initial {
+        Some(initial) => format!(", initial {initial:?}"),
+        None => String::new(),
+    };
+    Refusal::error(format!(
+        "{} cannot be set in state {}: it has causality {:?}, variability {:?}{initial}",
+        variable.name,
+        state.name(),
+        variable.causality,
+        variable.variability,
+    ))
 }

@@ -1,4 +1,81 @@
 //! An FMI 2.0 shell: write a struct, get an FMU.
+//!
+//! A component is exported for co-simulation by three files: its `modelDescription.xml`, a `build.rs` of two lines, and
+//! about a hundred lines that say which variable is which number. Everything else that the standard asks for (life
+//! cycle, pointers, value references, logging, FMU states) is here.
+//!
+//! # How to export a component
+//!
+//! `Cargo.toml` of the component, a crate of its own:
+//!
+//! ```toml
+//! [lib]
+//! crate-type = ["cdylib"]
+//!
+//! [dependencies]
+//! fmi2-component = "0.1"
+//! serde = { version = "1", features = ["derive"] }   # for serialised FMU states
+//!
+//! [build-dependencies]
+//! fmi2-component-build = "0.1"
+//! ```
+//!
+//! `build.rs` checks the description and turns it into a typed table, so that a name, unit, value reference or start
+//! value is written once:
+//!
+//! ```ignore
+#![doc = include_str!("../example/build.rs")]
+//! ```
+//!
+//! `src/lib.rs`; this is the whole example of a water tank, whose description lies beside it in `example/`:
+//!
+//! ```ignore
+#![doc = include_str!("../example/src/lib.rs")]
+//! ```
+//!
+//! The FMU is a zip of the description, as `fmi2_component_build::describe` completes it, and of the library as
+//! `binaries/linux64/<modelIdentifier>.so` (or the platform's equivalent).
+//!
+//! # What a component can rely on
+//!
+//! - [`Component::new`] is followed by the start values of the table, set through the component's own setters; a reset
+//!   does the same.
+//! - A setter is called only for a variable that may be set in the present state, and a real value is finite.
+//! - [`Component::initialise`] is called before the first step, and in Initialization Mode before a computed value is
+//!   read after something was set. Outputs that depend on inputs are thus right however often inputs are set.
+//! - [`Component::step`] is called with a positive length; communication points follow each other within 1e-9 of
+//!   their size.
+//! - A panic goes no further than the call: it is logged, and the instance is then of no use but to be freed.
+//!
+//! `min` and `max` are told to masters and not enforced: what makes sense is for the component to say.
+//!
+//! # What is legal when
+//!
+//! The life cycle of FMI 2.0, clause 4.2.4. An illegal call answers `fmi2Error`, logs a line that says where it would be
+//! legal, and changes nothing. *SetValues*, *GetValues*, *GetStatus* and *FMUstate* stand for the functions of that family,
+//! and *ModelExchange* for those of the other interface.
+//!
+#![doc = include_str!("life_cycle.md")]
+//!
+//! Which variables may be set depends on causality, variability and initial besides: [`Variable::settable_at_start`],
+//! [`Variable::settable_between_steps`].
+//!
+//! # What of FMI 2.0 is supported
+//!
+//! | feature | |
+//! |---|---|
+//! | co-simulation | all functions; a step is done when `fmi2DoStep` returns, so that there is none to cancel |
+//! | model exchange | the names only, which some masters look up; refused with a reason |
+//! | real, integer, enumeration, Boolean, string variables | yes; no aliases (two variables with one value reference) |
+//! | tunable parameters | between steps |
+//! | FMU states: get, set, free | yes, by [`Clone`]; those that a master forgets are freed with the instance |
+//! | FMU states: serialise | by [`Component::archive`]; blobs of another model, another version or damaged ones are refused |
+//! | input and output derivatives, directional derivatives | where the component provides them |
+//! | logging | categories of the description; reasons of warnings and errors always; text is safe as a printf format |
+//! | status queries | what there is to tell after a discarded step |
+//! | allocation callbacks, `visible`, resource location, tolerance | accepted, not used |
+//!
+//! Once set up, setting and getting real values and stepping allocate nothing.
 
 pub mod abi;
 mod archive;
