@@ -34,9 +34,9 @@ impl<C: Component> Instance<C> {
     }
 
     pub fn set_up(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
-        if !(start_time.is_finite() && start_time >= 0.0) {
+        if !start_time.is_finite() {
             return Err(Refusal::error(format!(
-                "startTime = {start_time} s is refused; allowed is a finite number of at least 0"
+                "startTime = {start_time} s is refused; allowed is a finite number"
             )));
         }
         if let Some(stop) = stop_time

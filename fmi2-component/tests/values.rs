@@ -61,7 +61,7 @@ fn causality_and_variability_say_when_a_variable_may_be_set() {
     }
     master.heard_one(&[
         "der(level) cannot be set in state instantiated",
-        "calculated",
+        "initial Calculated",
     ]);
     unsafe { fmi2EnterInitializationMode(master.c) };
     for (vr, expected) in [

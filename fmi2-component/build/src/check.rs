@@ -93,7 +93,10 @@ fn legal(v: &Variable) -> Result<(), String> {
         ));
     }
     if variability == Variability::Continuous && v.kind != Kind::Real {
-        return Err(format!("only a Real can be continuous, not a {:?}", v.kind));
+        return Err(format!(
+            "only a Real can be continuous, which is the default; a {:?} can be discrete",
+            v.kind
+        ));
     }
     let needs_start = matches!(v.initial, Some(Initial::Exact | Initial::Approx))
         || causality == Causality::Input;

@@ -81,6 +81,7 @@ pub enum {kind:?} {{"
         out,
         "}}
 
+#[allow(clippy::approx_constant, clippy::match_single_binding)]
 impl ::fmi2_component::Key for {kind:?} {{
     type Value = {value};
     const VARIABLES: &'static [::fmi2_component::Variable<{value}>] = &["

@@ -85,10 +85,7 @@ fn read(v: &ScalarVariable, types: &[SimpleType]) -> Result<Variable, String> {
     let variability = (v.variability.as_deref())
         .map(|text| named("variability", text, Variability::parse, Variability::NAMES))
         .transpose()?
-        .unwrap_or(match content.kind {
-            Kind::Real => Variability::Continuous,
-            _ => Variability::Discrete,
-        });
+        .unwrap_or(Variability::Continuous);
     let initial = (v.initial.as_deref())
         .map(|text| named("initial", text, Initial::parse, Initial::NAMES))
         .transpose()?

@@ -94,7 +94,7 @@ fn progress_bar() -> ProgressBar {
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {
     // A bar that moves a few hundred times is smooth; one that moves at every sample costs more than the experiment.
-    if done % 64 == 0 || done == of {
+    if done.is_multiple_of(64) || done == of {
         bar.set_message(match stage {
             Stage::Locking => "seeking phase resonance",
             Stage::Holding => "holding the lock",

@@ -69,7 +69,7 @@ pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
 /// Impacts per period of `omega` (rad/s) over the samples, and the regime they make.
 pub(super) fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64, Regime) {
     let mut witnesses = samples.iter().filter_map(|sample| sample.witness);
-    let (Some(first), Some(last)) = (witnesses.next(), witnesses.last()) else {
+    let (Some(first), Some(last)) = (witnesses.next(), witnesses.next_back()) else {
         return (f64::NAN, Regime::Unknown);
     };
     let impacts = impacts(samples);
