@@ -1,0 +1,140 @@
+"""The pair as a plain master couples it: sample by sample, both are read, both are fed, both are stepped."""
+
+from dataclasses import dataclass
+from math import pi
+
+import numpy as np
+
+from component import Component
+from identification import Harmonic, Regime, harmonic, regime
+
+SAMPLE_TIME = 2 * pi / 100
+PERIOD = 2 * pi
+HOLD_PERIODS = 20
+
+ROW = np.dtype(
+    [(name, float) for name in ("time", "v", "base", "omega", "E", "particle", "impact_time", "impact_velocity")]
+    + [("impacts", int), ("settled", bool)]
+)
+
+
+@dataclass(frozen=True)
+class Scene:
+    """The dimensionless rig, M = k = b = 1, with one excitation and one start; by default the default scene."""
+
+    epsilon: float = 0.0084
+    r: float = 0.65
+    excitation: float = 1.1
+    particle_velocity: float = 0.9
+    damping: float = 1.43
+
+    @property
+    def amplitude(self) -> float:
+        return self.epsilon * self.excitation
+
+    def plant(self) -> dict[str, float]:
+        coefficient = self.epsilon * self.damping
+        masses = {"M": 1, "k": 1, "b": 1, "m": self.epsilon, "c": coefficient}
+        return masses | {"r": self.r, "der(q2)": self.particle_velocity}
+
+    def controller(self) -> dict[str, float]:
+        return {
+            "sample_time": SAMPLE_TIME,
+            "omega_start": 1,
+            "omega_min": 0.9,
+            "omega_max": 1.1,
+            "amplitude": self.amplitude,
+            "amplitude_max": 2 * self.amplitude,
+            "bandwidth": 0.1,
+            "damping_rate": self.epsilon * self.damping / 2,
+            "lock.response_min": 0.1 * self.amplitude,
+        }
+
+    def sigma(self, omega: float) -> float:
+        return (omega - 1) / self.epsilon
+
+
+@dataclass(frozen=True)
+class Record:
+    """An experiment: everything up to the settled lock, the hold, and the decay with the drive off."""
+
+    scene: Scene
+    step: float
+    rows: np.ndarray
+    settled: int
+    released: int
+
+    @property
+    def hold(self) -> np.ndarray:
+        return self.rows[self.settled : self.released]
+
+    @property
+    def decay(self) -> np.ndarray:
+        """From the first sample at which the plant has felt the drive go."""
+        off = self.rows[self.released :]
+        return off[off["E"] == 0][1:]
+
+    def locked(self) -> Harmonic:
+        """Fundamental of the response over the hold."""
+        return harmonic(self.hold["v"], self.step, self.hold["omega"].mean())
+
+    def base(self) -> Harmonic:
+        """Fundamental of the base over the hold."""
+        return harmonic(self.hold["base"], self.step, self.hold["omega"].mean())
+
+    def regime(self) -> Regime:
+        return regime(self.hold, self.locked().omega)
+
+
+class Pair:
+    """Plant and controller on one clock."""
+
+    def __init__(
+        self, plant: Component, controller: Component, step: float, *, reference: bool = True, sampled: bool = False
+    ):
+        """`sampled`: the base follows samples of the drive signal instead of its own oscillator."""
+        self.plant, self.controller, self.step = plant, controller, step
+        self.sensors = plant.group("v", "base", "der(q2)", "impact_time", "impact_velocity")
+        self.impacts = plant.group("impacts")
+        self.sampled = sampled
+        self.drive = plant.group("e") if sampled else plant.group("omega", "E")
+        self.command = controller.group("omega", "E", "drive")
+        self.settled = controller.group("settled")
+        self.inputs = controller.group("response", "reference") if reference else controller.group("response")
+        self.active = controller.group("active")
+        self.rows: list[tuple] = []
+
+    def sample(self, active: bool) -> bool:
+        """One communication point, then one step; returns whether the controller calls its lock settled."""
+        v, base, *inside = self.sensors.get()
+        omega, amplitude, drive = self.command.get()
+        (settled,) = self.settled.get()
+        (impacts,) = self.impacts.get()
+        time = len(self.rows) * self.step
+        self.rows.append((time, v, base, omega, amplitude, *inside, impacts, settled))
+        self.inputs.set(*(v, base)[: self.inputs.count])
+        self.active.set(active)
+        self.drive.set(*([drive] if self.sampled else [omega, amplitude]))
+        self.plant.step(self.step)
+        self.controller.step(self.step)
+        return bool(settled)
+
+    def periods(self, count: float) -> int:
+        return round(count * PERIOD / self.step)
+
+
+def experiment(pair: Pair, scene: Scene, *, lock_periods: int = 2000) -> Record:
+    """Drives the pair until its lock is settled, holds it, lets go, and records the decay."""
+    for _ in range(pair.periods(lock_periods)):
+        if pair.sample(active=True):
+            break
+    else:
+        raise AssertionError(f"no settled lock within {lock_periods} periods: {pair.controller.outputs()}")
+    settled = len(pair.rows)
+    for _ in range(pair.periods(HOLD_PERIODS)):
+        pair.sample(active=True)
+    released = len(pair.rows)
+    # The decay slows down with epsilon: 50 periods at 0.0084 lead from the lock past the loss of synchrony.
+    for _ in range(pair.periods(0.42 / scene.epsilon)):
+        pair.sample(active=False)
+    return Record(scene, pair.step, np.array(pair.rows, dtype=ROW), settled, released)

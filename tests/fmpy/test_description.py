@@ -1,0 +1,101 @@
+"""What the FMUs say of themselves."""
+
+import pytest
+from fmpy import supported_platforms
+from fmpy.validation import validate_fmu
+
+PLANT = {
+    "parameter": {"M": "kg", "k": "N/m", "c": "N.s/m", "m": "kg", "b": "m", "r": "1"},
+    "input": {"e": "m", "E": "m", "omega": "rad/s"},
+    "output": {
+        "q1": "m",
+        "der(q1)": "m/s",
+        "q2": "m",
+        "der(q2)": "m/s",
+        "v": "m",
+        "w": "m",
+        "der(w)": "m/s",
+        "base": "m",
+        "phase": "rad",
+        "impacts": None,
+        "impact_time": "s",
+        "impact_velocity": "m/s",
+        "contact": None,
+        "energy": "J",
+        "dissipated": "J",
+    },
+}
+CONTROLLER = {
+    "parameter": {
+        "sample_time": "s",
+        "omega_start": "rad/s",
+        "omega_min": "rad/s",
+        "omega_max": "rad/s",
+        "amplitude": "m",
+        "phase_target": "rad",
+        "bandwidth": "rad/s",
+    },
+    "input": {"response": "m", "reference": "m", "active": None},
+    "output": {
+        "omega": "rad/s",
+        "E": "m",
+        "drive": "m",
+        "phase_error": "rad",
+        "response_amplitude": "m",
+        "locked": None,
+        "state": None,
+    },
+}
+TYPES = {"impacts": "Integer", "contact": "Integer", "active": "Boolean", "locked": "Boolean", "state": "Integer"}
+
+
+def units(fmu, causality):
+    return {name: fmu.variable(name).unit for name in fmu.names(causality)}
+
+
+@pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
+def test_fmpy_finds_no_problem_in_the_fmu(fmus, name, figure):
+    figure(f"{name}.fmu: problems found by FMPy", len(validate_fmu(str(fmus[name].path))), below=0)
+
+
+@pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
+def test_the_fmu_is_a_co_simulation_component_for_this_platform(fmus, name):
+    description = fmus[name].description
+    assert description.fmiVersion == "2.0"
+    assert description.modelName == name
+    assert description.coSimulation.modelIdentifier == name
+    assert description.coSimulation.canGetAndSetFMUstate
+    assert description.coSimulation.canSerializeFMUstate
+    assert description.coSimulation.canHandleVariableCommunicationStepSize
+    assert description.modelExchange is None
+    assert description.variableNamingConvention == "structured"
+    assert "linux64" in supported_platforms(str(fmus[name].path))
+
+
+@pytest.mark.parametrize("causality", PLANT)
+def test_the_plant_has_exactly_its_variables_in_si_units(fmus, causality):
+    assert units(fmus["LoViNes"], causality) == PLANT[causality]
+
+
+@pytest.mark.parametrize("causality", CONTROLLER)
+def test_the_controller_has_at_least_its_variables_in_si_units(fmus, causality):
+    found = units(fmus["PhaseLock"], causality)
+    assert {name: found.get(name, "missing") for name in CONTROLLER[causality]} == CONTROLLER[causality]
+
+
+@pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
+def test_types_and_descriptions_are_right(fmus, name):
+    for variable in fmus[name].description.modelVariables:
+        assert variable.description, f"{variable.name} has no description"
+        assert variable.type == TYPES.get(variable.name, variable.type)
+
+
+def test_the_states_of_the_plant_can_be_set_at_the_start(fmus):
+    for name in ("q1", "der(q1)", "q2", "der(q2)"):
+        assert fmus["LoViNes"].variable(name).initial == "exact"
+
+
+def test_amplitude_and_phase_target_can_be_tuned_while_it_runs(fmus):
+    for name in ("amplitude", "phase_target"):
+        assert fmus["PhaseLock"].variable(name).variability == "tunable"
+    assert float(fmus["PhaseLock"].variable("phase_target").start) == pytest.approx(-1.5707963267948966)
