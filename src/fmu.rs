@@ -10,6 +10,9 @@ mod variables {
 
 fmi2_component::export!(LoViNes);
 
+/// Radians of the fastest motion in one step: 16 million periods, some seconds of work.
+const MOST_RADIANS: f64 = 1e8;
+
 /// What a master has set, and the plant that came of it.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct LoViNes {
@@ -34,6 +37,34 @@ impl LoViNes {
             amplitude: self.amplitude,
             omega: self.omega,
         }
+    }
+
+    /// Numbers that are finite each by itself can still be beyond what double precision can put together.
+    fn check_state(&self) -> Result<(), Refusal> {
+        let State { q1, dq1, q2, dq2 } = self.plant.state();
+        let w = self.plant.relative_displacement();
+        let finite = [q1, dq1, q2, dq2].iter().all(|x| x.is_finite());
+        if finite && w.abs() <= self.parameters.half_width {
+            return Ok(());
+        }
+        Err(Refusal::error(format!(
+            "the state is beyond double precision: q1 = {q1} m, q2 = {q2} m, w = {w} m; \
+             allowed are inputs and start values of a size that leaves w from -b to b = {} m some digits",
+            self.parameters.half_width
+        )))
+    }
+
+    /// A step takes time in proportion to the radians of the fastest motion in it.
+    fn check_step(&self, drive: &Drive, step: f64) -> Result<(), Refusal> {
+        let rate = self.parameters.fastest_rate().max(drive.omega.abs());
+        if rate * step <= MOST_RADIANS {
+            return Ok(());
+        }
+        Err(Refusal::error(format!(
+            "a step of {step} s is refused; allowed is at most {} s while the fastest rate of the motion is {rate} rad/s \
+             ({MOST_RADIANS} rad in one step)",
+            MOST_RADIANS / rate
+        )))
     }
 
     fn state(&self) -> State {
@@ -147,16 +178,18 @@ impl Component for LoViNes {
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
         self.plant.set_time(time);
         let drive = self.drive();
+        self.check_step(&drive, step)?;
         if log.wants(category::logEvents) || log.wants(category::logImpacts) {
             self.plant
                 .advance_with(drive, step, |event| tell(log, time, event));
         } else {
             self.plant.advance(drive, step);
         }
-        self.e = [self.e[0], 0.0, 0.0, 0.0];
+        // The signal stays where its polynomial has led.
+        self.e = [self.plant.base().drive.signal[0], 0.0, 0.0, 0.0];
         self.stepped = true;
         self.inputs_set = false;
-        Ok(())
+        self.check_state()
     }
 
     fn set_real_input_derivative(

@@ -38,6 +38,12 @@ impl Parameters {
         libm::sqrt(self.stiffness / self.primary_mass)
     }
 
+    /// The fastest rate that the free motion can have, 1/s: of oscillation, or of creep where damping is heavy.
+    pub fn fastest_rate(&self) -> f64 {
+        self.natural_frequency()
+            .max(self.damping / self.primary_mass)
+    }
+
     /// Mass ratio `epsilon = m/M`.
     pub fn mass_ratio(&self) -> f64 {
         self.particle_mass / self.primary_mass
@@ -69,7 +75,7 @@ impl Parameters {
             self.restitution > 0.0 && self.restitution <= 1.0,
             "r (coefficient of restitution)",
             self.restitution,
-            "1",
+            "",
             "a number above 0 and at most 1",
         )
     }
@@ -117,7 +123,11 @@ impl fmt::Display for InvalidValue {
             unit,
             allowed,
         } = self;
-        write!(f, "{name} is {value} {unit}; allowed: {allowed}")
+        let space = if unit.is_empty() { "" } else { " " };
+        write!(
+            f,
+            "{name} = {value}{space}{unit} is refused; allowed is {allowed}"
+        )
     }
 }
 
@@ -138,7 +148,7 @@ mod tests {
         let message = refused(|p| p.particle_mass = -0.5);
         assert_eq!(
             message,
-            "m (particle mass) is -0.5 kg; allowed: a finite number above 0"
+            "m (particle mass) = -0.5 kg is refused; allowed is a finite number above 0"
         );
         assert!(refused(|p| p.restitution = 1.5).contains("at most 1"));
         assert!(refused(|p| p.damping = -1e-9).contains("N.s/m"));

@@ -21,7 +21,7 @@ impl fmt::Display for ConfigError {
         if !self.unit.is_empty() {
             write!(f, " {}", self.unit)?;
         }
-        write!(f, ": must be {}", self.allowed)
+        write!(f, " is refused; allowed is {}", self.allowed)
     }
 }
 

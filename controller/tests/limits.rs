@@ -41,7 +41,7 @@ fn a_configuration_that_makes_no_sense_is_refused_by_name() {
             sample_time: f64::NAN,
             ..config()
         }),
-        "sample_time = NaN s: must be a finite number above 0"
+        "sample_time = NaN s is refused; allowed is a finite number above 0"
     );
     for (name, bad) in [
         (

@@ -93,7 +93,7 @@ pub enum ExperimentError {
     Rig(#[from] RigError),
     /// The loop found no stationary phase resonance in the time allowed.
     #[error(
-        "no lock within {periods:.0} periods: the phase error is {phase_error:.3} degrees at omega = {omega:.6} rad/s; \
+        "no lock within {periods:.0} periods of the drive: the phase error is {phase_error:.3} degrees at omega = {omega:.6} rad/s; \
          see record.lock_periods and the [controller] section"
     )]
     NoLock {

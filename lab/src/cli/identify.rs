@@ -18,7 +18,7 @@ Examples:
   vines identify --set plant.r=0.7 --out r07       another coefficient of restitution
   vines identify --scene scenes/dimensionless.toml --set excitation.G=1.3
 
-Writes LoViNes.fmu, identification.json, backbone.csv, backbone.svg and sim.svg.";
+Writes LoViNes.fmu and PhaseLock.fmu, then identification.json, backbone.csv, backbone.svg and sim.svg.";
 
 /// Lock the plant at phase resonance, let it decay, and identify its backbone
 #[derive(Debug, Args)]

@@ -57,7 +57,7 @@ impl Controller {
     pub(super) fn check(&self) -> Result<(), SceneError> {
         let samples = self.samples_per_period;
         Quantity::new("controller.samples_per_period", samples, "(samples)")
-            .check(samples >= 8.0, "must be at least 8 and finite")?;
+            .check((8.0..=1e5).contains(&samples), "must be from 8 to 100000")?;
         Quantity::new("controller.bandwidth", self.bandwidth, "(omega0)").positive()?;
         Quantity::new("controller.omega_min", self.omega_min, "(omega0)").positive()?;
         let (low, high) = (self.omega_min, self.omega_max);

@@ -32,7 +32,7 @@ impl Raw {
         self.start.check(&plant)?;
         let amplitude = self.excitation.resolve(origin, &plant)?;
         self.controller.check()?;
-        self.record.check()?;
+        self.record.check(&self.controller)?;
         Ok(Scene {
             plant,
             start: self.start,

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{SceneError, validate::Quantity};
+use super::{Controller, SceneError, validate::Quantity};
 
 /// Durations of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -29,12 +29,29 @@ impl Default for Record {
     }
 }
 
+/// Most samples of one record: some 2 GiB in memory.
+const MOST_SAMPLES: f64 = 2e7;
+
 impl Record {
-    pub(super) fn check(&self) -> Result<(), SceneError> {
+    pub(super) fn check(&self, controller: &Controller) -> Result<(), SceneError> {
         let unit = "(natural periods)";
         Quantity::new("record.lock_periods", self.lock_periods, unit).positive()?;
-        Quantity::new("record.hold_periods", self.hold_periods, unit).positive()?;
+        Quantity::new("record.hold_periods", self.hold_periods, unit).check(
+            (3.0..=1e6).contains(&self.hold_periods),
+            "must be from 3 (to count impacts and measure) to 1000000",
+        )?;
         Quantity::new("record.decay_periods", self.decay_periods, unit).positive()?;
-        Quantity::new("record.window_periods", self.window_periods, "(periods)").positive()
+        Quantity::new("record.window_periods", self.window_periods, "(periods)").check(
+            (0.5..=self.decay_periods).contains(&self.window_periods),
+            format!("must be from 0.5 to decay_periods = {}", self.decay_periods),
+        )?;
+        let samples = controller.samples_per_period
+            * (self.lock_periods + self.hold_periods + self.decay_periods);
+        Quantity::new(
+            "samples_per_period times all periods of [record]",
+            samples,
+            "samples",
+        )
+        .check(samples <= MOST_SAMPLES, "must be at most 20 million")
     }
 }
