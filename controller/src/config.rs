@@ -25,8 +25,8 @@ pub enum Detector {
 /// When the loop counts as locked, and when no more.
 ///
 /// The phase locks long before the amplitude has settled. Where the slowest mode relaxes with a time constant of `T`
-/// periods, a drift of `x` per period leaves `T x` to go. The defaults of [`LockCriterion::default`] are for `T` = 33: they
-/// leave 0.17 % of the amplitude and 3.3e-5 of the frequency.
+/// periods, a drift of `x` per period leaves `T x` to go. The defaults of [`LockCriterion::default`]
+/// leave 0.03 % of the amplitude and 3.3e-5 of the frequency where `T` is 33, and 0.3 % of the amplitude where it is 270.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LockCriterion {
@@ -52,7 +52,7 @@ impl Default for LockCriterion {
             phase_tolerance: 5e-3,
             unlock_tolerance: 0.2,
             frequency_drift: 1e-6,
-            amplitude_drift: 5e-5,
+            amplitude_drift: 1e-5,
             dwell: 20,
             coherence_min: 0.5,
             response_min: 0.1,

@@ -151,7 +151,11 @@ impl PhaseLock {
             phase_target,
             ..self.config
         };
+        let before = self.drive;
         *self = tuned.build()?;
+        // A ramp keeps its rate: down to a small amplitude, or to none, it would otherwise take for ever.
+        self.drive.ramp_step = self.drive.ramp_step.max(before.ramp_step);
+        self.drive.release_step = self.drive.release_step.max(before.release_step);
         Ok(())
     }
 
@@ -186,6 +190,11 @@ impl PhaseLock {
             late: timeout > 0.0 && elapsed >= timeout,
         });
         state.phase = phase;
+        if phase == Phase::Locked && state.tuning.1 != self.config.phase_target {
+            // The new target is not held yet: being away from it is no loss of the lock.
+            state.phase = Phase::Acquiring;
+            state.dwell = Dwell::default();
+        }
         if fault.is_some() || (phase == Phase::Ramping && before != Phase::Ramping) {
             state.fault = fault;
         }

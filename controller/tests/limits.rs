@@ -20,7 +20,7 @@ fn ramps_keep_to_their_rates() {
         ..
     } = *bench.controller.config();
     let mut before = bench.sample();
-    for _ in 0..30_000 {
+    for _ in 0..60_000 {
         let output = bench.sample();
         let (omega, level) = (
             output.omega - before.omega,

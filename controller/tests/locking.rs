@@ -215,3 +215,35 @@ fn two_runs_give_the_same_bits() {
     assert_eq!(first, second);
     assert_eq!(first[0].state, Phase::Ramping);
 }
+
+#[test]
+fn a_new_phase_target_is_acquired_with_the_drive_on() {
+    for change in [-0.5, -0.2, 0.2, 0.5] {
+        let mut bench = Bench::new(config());
+        bench.run_to_lock(3000).expect("a lock");
+        let amplitude = bench.controller.config().amplitude;
+        let target = bench.controller.config().phase_target + change;
+        bench.controller.retune(amplitude, target).unwrap();
+        let output = bench.sample();
+        assert!(!output.locked && output.amplitude == amplitude);
+        let (_, output) = bench.run_to_lock(3000).expect("a lock");
+        assert!(output.phase_error.abs() < 0.01, "{change}: {output:?}");
+        assert_eq!(output.amplitude, amplitude);
+    }
+}
+
+#[test]
+fn a_ramp_goes_down_to_nothing_at_the_rate_it_came_up() {
+    let mut bench = Bench::new(Config {
+        ramp_time: 1.0,
+        ..config()
+    });
+    bench.run_to_lock(3000).expect("a lock");
+    bench
+        .controller
+        .retune(0.0, bench.controller.config().phase_target)
+        .unwrap();
+    let samples = (1.05 / bench.controller.config().sample_time) as usize;
+    let output = (0..samples).map(|_| bench.sample()).last().unwrap();
+    assert_eq!(output.amplitude, 0.0);
+}

@@ -22,6 +22,9 @@ pub use regime::{Impact, Regime, impacts};
 /// Nearer to the fold (C = Cmin) the slow flow is no longer slow against a period.
 pub const COMPARED_ABOVE: f64 = 0.2;
 
+/// Phase of the response at phase resonance, degrees: theory and exact orbits are for that one.
+const PHASE_RESONANCE: f64 = -90.0;
+
 /// Why a record cannot be identified.
 #[derive(Debug, Error)]
 pub enum IdentificationError {
@@ -53,9 +56,10 @@ pub struct Identification {
     pub parameters: Dimensionless,
     /// The locked point as measured.
     pub lock: Lock,
-    /// First-order theory at the same G: the stable solution nearest to the lock.
+    /// First-order theory at the same G: the stable solution nearest to the lock; absent where another phase than that of
+    /// resonance was sought.
     pub theory: Option<BackbonePoint>,
-    /// The exact phase-resonant orbit at the same G nearest to the lock.
+    /// The exact phase-resonant orbit at the same G nearest to the lock; absent as above.
     pub exact: Option<Orbit>,
     /// The decay, from the release to the loss of synchrony.
     pub decay: Vec<DecayPoint>,
@@ -78,14 +82,16 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
         });
     }
     let slow_flow = SlowFlow::new(parameters.lambda, parameters.r);
+    let at_resonance = scene.controller.phase_target == PHASE_RESONANCE;
     let nearest = |sigma: f64, c: f64| (sigma - lock.sigma).hypot(c - lock.c);
     let theory = slow_flow
         .phase_resonant(parameters.g)
         .into_iter()
-        .filter(BackbonePoint::stable)
+        .filter(|point| at_resonance && point.stable())
         .min_by(|a, b| nearest(a.sigma, a.c).total_cmp(&nearest(b.sigma, b.c)));
     let exact = orbit::phase_resonant(&parameters)
         .into_iter()
+        .filter(|_| at_resonance)
         .min_by(|a, b| nearest(a.sigma, a.c).total_cmp(&nearest(b.sigma, b.c)));
     let decay = decay::points(record, scene, &slow_flow);
     if decay.is_empty() {

@@ -44,10 +44,7 @@ class Scene:
             "omega_min": 0.9,
             "omega_max": 1.1,
             "amplitude": self.amplitude,
-            "amplitude_max": 2 * self.amplitude,
             "bandwidth": 0.1,
-            "damping_rate": self.epsilon * self.damping / 2,
-            "lock.response_min": 0.1 * self.amplitude,
         }
 
     def sigma(self, omega: float) -> float:

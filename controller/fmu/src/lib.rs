@@ -32,6 +32,8 @@ struct Running {
     output: Output,
 }
 
+/// Samples in one step: some seconds of work.
+const MOST_SAMPLES: f64 = 1e7;
 const ADAPTIVE: i32 = 1;
 const DEMODULATOR: i32 = 2;
 
@@ -58,6 +60,13 @@ impl Controller {
         };
         config.lock.dwell = u32::try_from(self.dwell).unwrap_or(0);
         Ok(config)
+    }
+
+    /// Whether the first sample has been taken; until then parameters may still change together.
+    fn is_stepping(&self) -> bool {
+        self.running
+            .as_ref()
+            .is_some_and(|running| running.clock.taken() > 0)
     }
 
     fn output(&self) -> Option<&Output> {
@@ -123,15 +132,15 @@ impl Component for Controller {
     }
 
     fn set_real(&mut self, variable: Real, value: f64) -> Result<(), Refusal> {
-        if matches!(variable, Real::amplitude | Real::phase_target)
-            && let Some(running) = &mut self.running
-        {
-            let (amplitude, phase_target) = if matches!(variable, Real::amplitude) {
-                (value, self.config.phase_target)
+        if matches!(variable, Real::amplitude | Real::phase_target) && self.is_stepping() {
+            // A tunable one: refused at once where it makes no sense, taken over with the next step.
+            let mut tuned = self.configuration()?;
+            if matches!(variable, Real::amplitude) {
+                tuned.amplitude = value;
             } else {
-                (self.config.amplitude, value)
-            };
-            running.lock.retune(amplitude, phase_target)?;
+                tuned.phase_target = value;
+            }
+            tuned.build()?;
         }
         let Self { config, input, .. } = self;
         let slot = match variable {
@@ -225,6 +234,23 @@ impl Component for Controller {
         let Some(running) = &mut self.running else {
             return Err(Refusal::error("a step before initialization"));
         };
+        let samples = step / self.config.sample_time;
+        if samples > MOST_SAMPLES {
+            return Err(Refusal::error(format!(
+                "a step of {step} s is refused; allowed is at most {} s, which is {MOST_SAMPLES} samples of {} s",
+                MOST_SAMPLES * self.config.sample_time,
+                self.config.sample_time
+            )));
+        }
+        let Config {
+            amplitude,
+            phase_target,
+            ..
+        } = self.config;
+        let tuned = running.lock.config();
+        if (tuned.amplitude, tuned.phase_target) != (amplitude, phase_target) {
+            running.lock.retune(amplitude, phase_target)?;
+        }
         let until = (time - running.start_time) + step;
         for sample in running.clock.take(until) {
             let before = running.output.state;

@@ -64,7 +64,7 @@ pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic
     fitted
 }
 
-/// Value and slope (per sample) at the middle of a window, by least squares.
+/// Value at the middle of a window of the straight line that fits it best.
 pub fn mean_at_middle(values: impl ExactSizeIterator<Item = f64>) -> f64 {
     // With equally spaced samples about the middle the value of the fitted line there is the mean.
     let n = values.len() as f64;

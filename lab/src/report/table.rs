@@ -34,6 +34,9 @@ pub fn table(found: &Identification) -> String {
             Some(theory.b),
         );
     }
+    if found.exact.is_none() && found.theory.is_none() {
+        lines.push("  (neither theory nor exact orbit to compare with: they are for phase resonance, -90 degrees)".into());
+    }
     lines.push(String::new());
     if let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) {
         lines.push(format!(

@@ -41,7 +41,7 @@ impl Default for Controller {
             phase_target: -90.0,
             phase_tolerance: 0.3,
             frequency_drift: 1e-6,
-            amplitude_drift: 5e-5,
+            amplitude_drift: 1e-5,
             dwell_periods: 20,
         }
     }
@@ -56,9 +56,18 @@ impl Controller {
 
     pub(super) fn check(&self) -> Result<(), SceneError> {
         let samples = self.samples_per_period;
-        Quantity::new("controller.samples_per_period", samples, "(samples)")
-            .check((8.0..=1e5).contains(&samples), "must be from 8 to 100000")?;
-        Quantity::new("controller.bandwidth", self.bandwidth, "(omega0)").positive()?;
+        // The detector follows the fifth harmonic, which takes more than two samples in its period.
+        let fewest = (10.0 * self.omega_max).floor() + 1.0;
+        Quantity::new("controller.samples_per_period", samples, "(samples)").check(
+            (fewest..=1e5).contains(&samples),
+            format!("must be from {fewest} (two in a period of the fifth harmonic at omega_max) to 100000"),
+        )?;
+        // Seven filter coefficients, each of which takes up bandwidth times sample time of the error at every sample.
+        let widest = samples / (7.0 * std::f64::consts::TAU);
+        Quantity::new("controller.bandwidth", self.bandwidth, "(omega0)").check(
+            self.bandwidth > 0.0 && self.bandwidth <= widest,
+            format!("must be above 0 and at most {widest:.3} with {samples} samples per period"),
+        )?;
         Quantity::new("controller.omega_min", self.omega_min, "(omega0)").positive()?;
         let (low, high) = (self.omega_min, self.omega_max);
         Quantity::new("controller.omega_max", high, "(omega0)")
