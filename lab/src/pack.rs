@@ -88,7 +88,8 @@ fn keep(out: &Path, files: &[File]) -> Result<Vec<PathBuf>, PackError> {
     for file in files {
         let path = out.join(&file.name);
         let mut kept = temporary(out).map_err(|source| failed(out, source))?;
-        kept.write_all(&file.content).map_err(|source| failed(&path, source))?;
+        kept.write_all(&file.content)
+            .map_err(|source| failed(&path, source))?;
         finished.push((kept, path));
     }
     let mut written = Vec::new();

@@ -15,8 +15,8 @@ const PERIODS: f64 = 300.0;
 
 /// The system file of the FMUs, with the parameters of the scene.
 pub(super) fn file(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
-    let plant = parameter_set("plant", &parameters::plant(scene));
-    let controller = parameter_set("controller", &parameters::controller(scene)?);
+    let plant = parameter_set(&parameters::plant(scene));
+    let controller = parameter_set(&parameters::controller(scene)?);
     let stop_time = format!("stopTime=\"{}\"", PERIODS * scene.plant.natural_period());
     let structure = STRUCTURE.replace("stopTime=\"derived\"", &stop_time);
 

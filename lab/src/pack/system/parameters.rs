@@ -72,12 +72,12 @@ pub(super) fn controller(scene: &Scene) -> Result<Vec<Named>, PackError> {
     ])
 }
 
-/// A file of parameter values.
-pub(super) fn parameter_set(name: &str, values: &[Named]) -> String {
-    let mut text = format!(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<ssv:ParameterSet version=\"1.0\" name=\"{name}\" \
+/// A file of parameter values. Both sets have one name, by which some masters choose among alternatives.
+pub(super) fn parameter_set(values: &[Named]) -> String {
+    let mut text = String::from(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<ssv:ParameterSet version=\"1.0\" name=\"scene\" \
          generationTool=\"vines\"\n  xmlns:ssv=\"http://ssp-standard.org/SSP1/SystemStructureParameterValues\">\n  \
-         <ssv:Parameters>\n"
+         <ssv:Parameters>\n",
     );
     for (name, value) in values {
         let value = match value {
