@@ -1,60 +1,101 @@
-//! Packing: a description and a shared library become an FMU.
+//! Packing: a description and shared libraries become an FMU, two FMUs and a scene a coupled system.
 
 mod archive;
+mod binary;
 mod components;
 mod error;
+mod fmu;
 mod library;
 mod platform;
+mod portable;
+mod symbols;
+mod system;
 
-use std::path::{Path, PathBuf};
+use std::{
+    io::Write,
+    path::{Path, PathBuf},
+};
 
+pub use binary::Binary;
 pub use components::{Component, components};
 pub use error::PackError;
 pub use platform::Platform;
+pub use portable::{GLIBC, portable};
+
+use crate::{files::temporary, scene::Scene};
+
+/// Where the libraries come from.
+#[derive(Debug, Clone)]
+pub struct Libraries {
+    /// Folder with those for this platform, under the names that cargo gives them.
+    pub folder: PathBuf,
+    /// Those for other platforms.
+    pub others: Vec<Binary>,
+}
+
+impl From<&Path> for Libraries {
+    fn from(folder: &Path) -> Self {
+        Self {
+            folder: folder.into(),
+            others: Vec::new(),
+        }
+    }
+}
+
+/// A file to be.
+struct File {
+    name: String,
+    content: Vec<u8>,
+}
 
 /// Packs the components into `out`, one `<identifier>.fmu` each, and returns their paths.
 ///
-/// The libraries are looked for in the folder `libraries` under the names that cargo gives them. Nothing is written
-/// unless all of them can be; an FMU is complete or absent.
+/// Nothing is written unless all of them can be; a file is complete or absent.
 ///
 /// # Errors
-/// A library that is missing, for another platform or not an FMI 2.0 component, and failures of the file system.
+/// A library that is missing, for another platform, of another version or not an FMI 2.0 component, and failures of the
+/// file system.
 pub fn pack(
     components: &[Component],
-    libraries: &Path,
+    libraries: &Libraries,
     out: &Path,
 ) -> Result<Vec<PathBuf>, PackError> {
-    let platform = Platform::running();
-    let binaries = components
-        .iter()
-        .map(|component| library::read(component, libraries, &platform))
-        .collect::<Result<Vec<_>, _>>()?;
+    keep(out, &fmu::all(components, libraries)?)
+}
 
-    std::fs::create_dir_all(out).map_err(|source| PackError::Write {
-        path: out.into(),
+/// Packs plant and controller into `out`, and the two of them coupled as `bench.ssp` with the parameters of the scene.
+///
+/// # Errors
+/// As [`pack`], and a scene whose controller settings make no sense.
+pub fn pack_bench(
+    scene: &Scene,
+    libraries: &Libraries,
+    out: &Path,
+) -> Result<Vec<PathBuf>, PackError> {
+    let mut files = fmu::all(&components(), libraries)?;
+    files.push(system::file(scene, &files)?);
+    keep(out, &files)
+}
+
+/// Writes all of the files under temporary names before any of them gets its own.
+fn keep(out: &Path, files: &[File]) -> Result<Vec<PathBuf>, PackError> {
+    let failed = |path: &Path, source| PackError::Write {
+        path: path.into(),
         source,
-    })?;
+    };
+    std::fs::create_dir_all(out).map_err(|source| failed(out, source))?;
     let mut finished = Vec::new();
-    for (component, binary) in components.iter().zip(&binaries) {
-        let name = component.identifier;
-        let inside = format!(
-            "binaries/{}/{name}{}",
-            platform.folder,
-            std::env::consts::DLL_SUFFIX
-        );
-        let entries = [
-            ("modelDescription.xml", component.description.as_bytes()),
-            (inside.as_str(), binary.as_slice()),
-        ];
-        let path = out.join(format!("{name}.fmu"));
-        finished.push((archive::write(out, &entries)?, path));
+    for file in files {
+        let path = out.join(&file.name);
+        let mut kept = temporary(out).map_err(|source| failed(out, source))?;
+        kept.write_all(&file.content)
+            .map_err(|source| failed(&path, source))?;
+        finished.push((kept, path));
     }
     let mut written = Vec::new();
     for (file, path) in finished {
-        file.persist(&path).map_err(|error| PackError::Write {
-            path: path.clone(),
-            source: error.error,
-        })?;
+        file.persist(&path)
+            .map_err(|error| failed(&path, error.error))?;
         written.push(path);
     }
     Ok(written)

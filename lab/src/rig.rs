@@ -6,8 +6,10 @@ mod fmu;
 mod phase_lock;
 mod simulated;
 
+pub(crate) use fmu::start_values;
 pub use fmu::{FmuRig, RigError};
 pub use phase_lock::BuiltIn;
+pub(crate) use phase_lock::configuration;
 pub use simulated::Simulated;
 
 /// What the controller asks of the rig for the coming sample period.

@@ -49,7 +49,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             return Err(Failure::input(message));
         }
         None => {
-            pack::pack(&pack::components(), &beside_this_program()?, &arguments.out)?[0].clone()
+            let libraries = beside_this_program()?.as_path().into();
+            pack::pack(&pack::components(), &libraries, &arguments.out)?[0].clone()
         }
     };
     env_logger::Builder::new()

@@ -1,36 +1,57 @@
-//! `vines pack`: the two FMUs.
+//! `vines pack`: the two FMUs, and the two of them coupled.
 
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::pack::{components, pack};
+use vines::pack::{Binary, Libraries, components, pack_bench, portable};
 
-use super::failure::Failure;
+use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Examples:
   cargo build --release && target/release/vines pack --out fmus
-  vines pack --libraries target/debug --out fmus";
+  vines pack --libraries target/debug --out fmus
+  vines pack --out fmus --scene scenes/dimensionless.toml      bench.ssp with other parameters
+  vines pack --out fmus --portable                             for older Linux; run it in the sources' folder
+  vines pack --out fmus --binary win64=lovines.dll --binary win64=phase_lock_fmu.dll";
 
-/// Write LoViNes.fmu (the plant) and PhaseLock.fmu (the controller)
+/// Write LoViNes.fmu (the plant), PhaseLock.fmu (the controller) and bench.ssp (the two coupled)
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
-    /// Folder for the FMUs; made if it is not there
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    /// Folder for the files; made if it is not there
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 
     /// Folder of the shared libraries; without it, the one that holds this program
     #[arg(long, value_name = "DIR")]
     libraries: Option<PathBuf>,
+
+    /// Build libraries that load on older Linux (glibc 2.17) with `cargo zigbuild`, and pack those
+    #[arg(long, conflicts_with = "libraries")]
+    portable: bool,
+
+    /// Add a library for another platform, such as win64 or darwin64; may be given many times. The guid inside tells
+    /// which FMU it belongs to
+    #[arg(long = "binary", value_name = "PLATFORM=FILE")]
+    binaries: Vec<Binary>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let libraries = match &arguments.libraries {
+    let scene = arguments.scene.load()?;
+    let folder = match &arguments.libraries {
         Some(folder) => folder.clone(),
+        None if arguments.portable => portable(&components())?,
         None => beside_this_program()?,
     };
-    let written = pack(&components(), &libraries, &arguments.out)?;
+    let libraries = Libraries {
+        folder,
+        others: arguments.binaries.clone(),
+    };
+    let written = pack_bench(&scene, &libraries, &arguments.out)?;
     Ok(written
         .iter()
         .map(|path| format!("{}\n", path.display()))

@@ -1,38 +1,26 @@
-//! Writing a zip archive that is complete before it gets its name.
+//! Zip archives that come out the same, byte for byte, whenever the same goes in.
 
-use std::{
-    io::{self, Write},
-    path::Path,
-};
+use std::io::{self, Cursor, Write};
 
-use tempfile::NamedTempFile;
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
-use super::PackError;
-use crate::files::temporary;
-
-/// Writes `entries`, (name inside, content), to a temporary file in `folder`; persist it to keep it.
-///
-/// The same entries give the same bytes: no time of day is stored.
-pub(super) fn write(folder: &Path, entries: &[(&str, &[u8])]) -> Result<NamedTempFile, PackError> {
-    fill(folder, entries).map_err(|source| PackError::Write {
-        path: folder.into(),
-        source,
-    })
-}
-
-fn fill(folder: &Path, entries: &[(&str, &[u8])]) -> io::Result<NamedTempFile> {
-    let mut file = temporary(folder)?;
-    let mut zip = ZipWriter::new(file.as_file_mut());
-    let options = SimpleFileOptions::DEFAULT
-        .compression_method(CompressionMethod::Deflated)
-        .unix_permissions(0o644);
+/// The archive of `entries`, (name inside, content).
+pub(super) fn zip(entries: &[(&str, &[u8])]) -> io::Result<Vec<u8>> {
+    let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, content) in entries {
+        // Without a time of day, and with nothing compressed twice.
+        let method = if name.ends_with(".fmu") {
+            CompressionMethod::Stored
+        } else {
+            CompressionMethod::Deflated
+        };
+        let options = SimpleFileOptions::DEFAULT
+            .compression_method(method)
+            .unix_permissions(0o644);
         zip.start_file(*name, options)?;
         zip.write_all(content)?;
     }
-    zip.finish()?.flush()?;
-    Ok(file)
+    Ok(zip.finish()?.into_inner())
 }
 
 #[cfg(test)]
@@ -43,24 +31,27 @@ mod tests {
 
     #[test]
     fn what_goes_in_comes_out_again() {
-        let folder = tempfile::tempdir().unwrap();
-        let entries: [(&str, &[u8]); 2] = [("a.xml", b"<a/>"), ("binaries/x/a.so", &[7; 5000])];
-        let file = write(folder.path(), &entries).unwrap();
-        let mut zip = zip::ZipArchive::new(file.reopen().unwrap()).unwrap();
+        let entries: [(&str, &[u8]); 3] = [
+            ("a.xml", b"<a/>"),
+            ("binaries/x/a.so", &[7; 5000]),
+            ("resources/a.fmu", &[8; 50]),
+        ];
+        let bytes = zip(&entries).unwrap();
+        let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
         for (name, content) in entries {
             let mut read = Vec::new();
-            zip.by_name(name).unwrap().read_to_end(&mut read).unwrap();
+            archive
+                .by_name(name)
+                .unwrap()
+                .read_to_end(&mut read)
+                .unwrap();
             assert_eq!(read, content);
         }
     }
 
     #[test]
     fn the_same_entries_give_the_same_bytes() {
-        let folder = tempfile::tempdir().unwrap();
-        let bytes = || {
-            let file = write(folder.path(), &[("a", b"content")]).unwrap();
-            std::fs::read(file.path()).unwrap()
-        };
+        let bytes = || zip(&[("a", b"content")]).unwrap();
         assert_eq!(bytes(), bytes());
     }
 }

@@ -13,6 +13,14 @@ pub struct Component {
     pub description: String,
 }
 
+impl Component {
+    /// The guid in the description, which the library must hold as well.
+    pub(super) fn guid(&self) -> Option<&str> {
+        let (_, rest) = self.description.split_once("guid=\"")?;
+        rest.split('"').next()
+    }
+}
+
 /// The plant and the controller.
 #[must_use]
 pub fn components() -> [Component; 2] {

@@ -52,7 +52,34 @@ pub enum PackError {
         /// The package that builds it.
         package: &'static str,
     },
-    /// The FMU could not be written.
+    /// The library was built from other variables than the description has.
+    #[error(
+        "{} was built from other variables than {identifier} has now: build it anew with \
+         `cargo build --release -p {package}`", path.display()
+    )]
+    Stale {
+        /// The library.
+        path: PathBuf,
+        /// The component.
+        identifier: &'static str,
+        /// The package that builds it.
+        package: &'static str,
+    },
+    /// A library for another platform that cannot be used.
+    #[error("{} {problem}", path.display())]
+    Binary {
+        /// The library.
+        path: PathBuf,
+        /// What is wrong with it.
+        problem: String,
+    },
+    /// There are no portable libraries.
+    #[error("--portable cannot be done: {0}")]
+    Portable(String),
+    /// The scene's controller cannot work.
+    #[error("the scene's controller: {0}")]
+    Controller(#[from] phase_lock::ConfigError),
+    /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
         /// The file or folder.

@@ -8,10 +8,11 @@ use std::{
 
 use super::{
     Component, PackError,
-    platform::{Platform, exports},
+    platform::Platform,
+    symbols::{exports, mentions},
 };
 
-/// The bytes of the component's library in `folder`, if it is one for `platform`.
+/// The bytes of the component's library in `folder`, if it is one for `platform` and belongs to the description.
 pub(super) fn read(
     component: &Component,
     folder: &Path,
@@ -40,6 +41,14 @@ pub(super) fn read(
     }
     if !exports(&bytes, "fmi2Instantiate") {
         return Err(PackError::NotAComponent { path, package });
+    }
+    if component.guid().is_some_and(|guid| !mentions(&bytes, guid)) {
+        let identifier = component.identifier;
+        return Err(PackError::Stale {
+            path,
+            identifier,
+            package,
+        });
     }
     Ok(bytes)
 }

@@ -2,7 +2,9 @@
 
 use std::env::consts::{ARCH, OS};
 
-use object::{Architecture, BinaryFormat, FileKind, NameOrOrdinal, Object};
+use object::{Architecture, BinaryFormat, FileKind, Object};
+
+use super::symbols::image;
 
 /// A platform that a library may be made for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -11,6 +13,8 @@ pub struct Platform {
     pub folder: &'static str,
     /// In words, with an article.
     pub name: &'static str,
+    /// How names of shared libraries end.
+    pub suffix: &'static str,
     format: BinaryFormat,
     architecture: Architecture,
 }
@@ -21,46 +25,50 @@ use BinaryFormat::{Elf, MachO, Pe};
 /// FMI 2.0 names no folder for 64-bit ARM: Linux and Windows use the names of FMI 3.0, and masters on Apple silicon look
 /// into `darwin64`.
 const KNOWN: [Platform; 8] = [
-    known(
-        "linux64",
-        "a 64-bit Linux library (ELF, x86-64)",
-        Elf,
-        X86_64,
-    ),
-    known("linux32", "a 32-bit Linux library (ELF, x86)", Elf, I386),
-    known(
+    linux("linux64", "a 64-bit Linux library (ELF, x86-64)", X86_64),
+    linux("linux32", "a 32-bit Linux library (ELF, x86)", I386),
+    linux(
         "aarch64-linux",
         "a 64-bit Linux library (ELF, ARM)",
-        Elf,
         Aarch64,
     ),
-    known("win64", "a 64-bit Windows library (PE, x86-64)", Pe, X86_64),
-    known("win32", "a 32-bit Windows library (PE, x86)", Pe, I386),
-    known(
+    windows("win64", "a 64-bit Windows library (PE, x86-64)", X86_64),
+    windows("win32", "a 32-bit Windows library (PE, x86)", I386),
+    windows(
         "aarch64-windows",
         "a 64-bit Windows library (PE, ARM)",
-        Pe,
         Aarch64,
     ),
-    known(
-        "darwin64",
-        "a macOS library (Mach-O, x86-64)",
-        MachO,
-        X86_64,
-    ),
-    known("darwin64", "a macOS library (Mach-O, ARM)", MachO, Aarch64),
+    macos("a macOS library (Mach-O, x86-64)", X86_64),
+    macos("a macOS library (Mach-O, ARM)", Aarch64),
 ];
 
-const fn known(
-    folder: &'static str,
-    name: &'static str,
-    format: BinaryFormat,
-    architecture: Architecture,
-) -> Platform {
+const fn linux(folder: &'static str, name: &'static str, architecture: Architecture) -> Platform {
     Platform {
         folder,
         name,
-        format,
+        suffix: ".so",
+        format: Elf,
+        architecture,
+    }
+}
+
+const fn windows(folder: &'static str, name: &'static str, architecture: Architecture) -> Platform {
+    Platform {
+        folder,
+        name,
+        suffix: ".dll",
+        format: Pe,
+        architecture,
+    }
+}
+
+const fn macos(name: &'static str, architecture: Architecture) -> Platform {
+    Platform {
+        folder: "darwin64",
+        name,
+        suffix: ".dylib",
+        format: MachO,
         architecture,
     }
 }
@@ -82,23 +90,39 @@ impl Platform {
         find(format, architecture).unwrap_or(KNOWN[0])
     }
 
-    /// Checks the header of a library against this platform; the error says what the file is instead.
-    pub(super) fn check(&self, file: &[u8]) -> Result<(), String> {
+    /// The names of the folders, for messages.
+    pub(super) fn folders() -> String {
+        let mut names = KNOWN.map(|platform| platform.folder).to_vec();
+        names.dedup();
+        names.join(", ")
+    }
+
+    /// A platform with this folder: two share `darwin64`.
+    pub(super) fn of_folder(folder: &str) -> Option<Self> {
+        KNOWN.into_iter().find(|platform| platform.folder == folder)
+    }
+
+    /// The platform that a library is made for; the error says what the file is instead.
+    pub(super) fn recognise(file: &[u8]) -> Result<Self, String> {
         if FileKind::parse(file).is_err() {
             return Err("no shared library (unknown header)".into());
         }
-        let parsed = match object::File::parse(file) {
+        let parsed = match object::File::parse(image(file)) {
             Ok(parsed) => parsed,
             Err(error) => return Err(format!("a damaged library ({error})")),
         };
         let (format, architecture) = (parsed.format(), parsed.architecture());
-        if (format, architecture) == (self.format, self.architecture) {
-            return Ok(());
+        find(format, architecture)
+            .ok_or_else(|| format!("a library for another platform ({format:?}, {architecture:?})"))
+    }
+
+    /// Checks the header of a library against this platform; the error says what the file is instead.
+    pub(super) fn check(&self, file: &[u8]) -> Result<(), String> {
+        match Self::recognise(file)? {
+            // A universal library for macOS serves both architectures from one folder.
+            found if found.folder == self.folder => Ok(()),
+            found => Err(found.name.into()),
         }
-        Err(find(format, architecture).map_or_else(
-            || format!("a library for another platform ({format:?}, {architecture:?})"),
-            |platform| platform.name.into(),
-        ))
     }
 }
 
@@ -106,20 +130,4 @@ fn find(format: BinaryFormat, architecture: Architecture) -> Option<Platform> {
     KNOWN
         .into_iter()
         .find(|one| (one.format, one.architecture) == (format, architecture))
-}
-
-/// Whether the library exports `function`; Mach-O puts an underscore before it.
-pub(super) fn exports(file: &[u8], function: &str) -> bool {
-    let Ok(parsed) = object::File::parse(file) else {
-        return false;
-    };
-    let Ok(mut exports) = parsed.exports() else {
-        return false;
-    };
-    exports.any(|export| match export.as_ref().map(object::Export::name) {
-        Ok(NameOrOrdinal::Name(name)) => {
-            name.strip_prefix(b"_").unwrap_or(name) == function.as_bytes()
-        }
-        _ => false,
-    })
 }

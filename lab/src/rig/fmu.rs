@@ -42,6 +42,23 @@ pub enum RigError {
     },
 }
 
+/// Parameters and start of the plant, under the names of its variables.
+pub(crate) fn start_values(scene: &Scene) -> [(&'static str, f64); 10] {
+    let (plant, start) = (&scene.plant, &scene.start);
+    [
+        ("M", plant.mass),
+        ("k", plant.stiffness),
+        ("c", plant.damping),
+        ("m", plant.particle_mass),
+        ("b", plant.half_width),
+        ("r", plant.restitution),
+        ("q1", start.q1),
+        ("der(q1)", start.dq1),
+        ("q2", start.q2),
+        ("der(q2)", start.dq2),
+    ]
+}
+
 type Reference = <Fmi2Import as FmiImport>::ValueRef;
 
 /// A plant FMU, initialised and stepped through FMI 2.0 co-simulation.
@@ -80,21 +97,8 @@ impl FmuRig {
                     name,
                 })
         };
-        let (plant, start) = (&scene.plant, &scene.start);
-        let values = [
-            ("M", plant.mass),
-            ("k", plant.stiffness),
-            ("c", plant.damping),
-            ("m", plant.particle_mass),
-            ("b", plant.half_width),
-            ("r", plant.restitution),
-            ("q1", start.q1),
-            ("der(q1)", start.dq1),
-            ("q2", start.q2),
-            ("der(q2)", start.dq2),
-        ];
         let (mut references, mut numbers) = (Vec::new(), Vec::new());
-        for (name, value) in values {
+        for (name, value) in start_values(scene) {
             references.push(find(name)?);
             numbers.push(value);
         }

@@ -26,7 +26,7 @@ impl BuiltIn {
 }
 
 /// The scene's controller settings in SI units.
-fn configuration(scene: &Scene) -> Config {
+pub(crate) fn configuration(scene: &Scene) -> Config {
     let omega0 = scene.plant.omega0();
     let c = &scene.controller;
     let amplitude = scene.amplitude;

@@ -1,0 +1,58 @@
+//! What a library says of itself: its symbols, and the version of the C library that it needs.
+
+use object::{
+    FileKind, NameOrOrdinal, Object,
+    read::{
+        ImportFlags,
+        macho::{FatArch, MachOFatFile32, MachOFatFile64},
+    },
+};
+
+/// The library itself, or the first of those in a universal library for macOS.
+pub(super) fn image(file: &[u8]) -> &[u8] {
+    let first = match FileKind::parse(file) {
+        Ok(FileKind::MachOFat32) => MachOFatFile32::parse(file)
+            .ok()
+            .and_then(|fat| fat.arches().first()?.data(file).ok()),
+        Ok(FileKind::MachOFat64) => MachOFatFile64::parse(file)
+            .ok()
+            .and_then(|fat| fat.arches().first()?.data(file).ok()),
+        _ => None,
+    };
+    first.unwrap_or(file)
+}
+
+/// Whether the library exports `function`; Mach-O puts an underscore before it.
+pub(super) fn exports(file: &[u8], function: &str) -> bool {
+    let Ok(parsed) = object::File::parse(image(file)) else {
+        return false;
+    };
+    let Ok(mut exports) = parsed.exports() else {
+        return false;
+    };
+    exports.any(|export| match export.as_ref().map(object::Export::name) {
+        Ok(NameOrOrdinal::Name(name)) => {
+            name.strip_prefix(b"_").unwrap_or(name) == function.as_bytes()
+        }
+        _ => false,
+    })
+}
+
+/// The newest version of the GNU C library that the library asks for; none where it asks for none.
+pub(super) fn glibc(file: &[u8]) -> Option<(u32, u32)> {
+    let parsed = object::File::parse(file).ok()?;
+    let versions = parsed.imports().ok()?.filter_map(|import| {
+        let ImportFlags::Elf { version, .. } = import.ok()?.flags() else {
+            return None;
+        };
+        let text = std::str::from_utf8(version?).ok()?;
+        let mut numbers = text.strip_prefix("GLIBC_")?.split('.').map(str::parse);
+        Some((numbers.next()?.ok()?, numbers.next()?.ok()?))
+    });
+    versions.max()
+}
+
+/// Whether `text` stands anywhere in the library.
+pub(super) fn mentions(file: &[u8], text: &str) -> bool {
+    file.windows(text.len()).any(|part| part == text.as_bytes())
+}

@@ -1,0 +1,42 @@
+//! Plant and controller coupled: a system in the format of SSP 1.0, System Structure and Parameterization.
+
+mod parameters;
+
+use super::{File, PackError, archive};
+use crate::scene::Scene;
+
+use parameters::parameter_set;
+
+/// The structure, but for the end of the default experiment.
+const STRUCTURE: &str = include_str!("system/SystemStructure.ssd");
+
+/// The end of the default experiment, natural periods: the default scene has been locked for 50 by then.
+const PERIODS: f64 = 300.0;
+
+/// The system file of the FMUs, with the parameters of the scene.
+pub(super) fn file(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
+    let plant = parameter_set(&parameters::plant(scene));
+    let controller = parameter_set(&parameters::controller(scene)?);
+    let stop_time = format!("stopTime=\"{}\"", PERIODS * scene.plant.natural_period());
+    let structure = STRUCTURE.replace("stopTime=\"derived\"", &stop_time);
+
+    let inside: Vec<String> = fmus
+        .iter()
+        .map(|fmu| format!("resources/{}", fmu.name))
+        .collect();
+    let mut entries = vec![
+        ("SystemStructure.ssd", structure.as_bytes()),
+        ("resources/plant.ssv", plant.as_bytes()),
+        ("resources/controller.ssv", controller.as_bytes()),
+    ];
+    let fmus = inside.iter().zip(fmus);
+    entries.extend(fmus.map(|(name, fmu)| (name.as_str(), fmu.content.as_slice())));
+    let name = String::from("bench.ssp");
+    match archive::zip(&entries) {
+        Ok(content) => Ok(File { name, content }),
+        Err(source) => Err(PackError::Write {
+            path: name.into(),
+            source,
+        }),
+    }
+}
