@@ -1,5 +1,6 @@
 //! The command line: one file per command.
 
+mod door;
 mod failure;
 mod identify;
 mod orbit;

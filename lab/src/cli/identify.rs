@@ -1,24 +1,26 @@
 //! `vines identify`: the whole experiment.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use vines::{
     experiment::{self, Plan, Stage},
     identification, pack, report,
-    rig::{BuiltIn, FmuRig},
 };
 
-use super::{failure::Failure, pack::beside_this_program, scene_arguments::SceneArguments};
+use super::{
+    door::Door, failure::Failure, pack::beside_this_program, scene_arguments::SceneArguments,
+};
 
 const HELP: &str = "\
 Examples:
   vines identify                                   the default scene, results in out/
   vines identify --set plant.r=0.7 --out r07       another coefficient of restitution
   vines identify --scene scenes/dimensionless.toml --set excitation.G=1.3
+  vines identify --controller mine.fmu             another controller on the same plant
 
-Writes LoViNes.fmu and PhaseLock.fmu, then identification.json, backbone.csv, backbone.svg and sim.svg.";
+Without --rig, writes LoViNes.fmu and PhaseLock.fmu and runs the first; then writes identification.json, backbone.csv, backbone.svg and sim.svg.";
 
 /// Lock the plant at phase resonance, let it decay, and identify its backbone
 #[derive(Debug, Args)]
@@ -31,9 +33,13 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
 
-    /// Use this plant FMU; without it, the one of this program is packed into the results' folder
-    #[arg(long, value_name = "FILE")]
-    plant: Option<PathBuf>,
+    /// What is shaken: an FMU, or `built-in`; without it, this program's plant FMU is packed into the results' folder
+    #[arg(long, value_name = "DOOR")]
+    rig: Option<Door>,
+
+    /// What controls it: `built-in`, or an FMU
+    #[arg(long, value_name = "DOOR", default_value = "built-in")]
+    controller: Door,
 
     /// Print identification.json instead of the table
     #[arg(long)]
@@ -42,26 +48,19 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let plant = match &arguments.plant {
-        Some(file) if file.is_file() => file.clone(),
-        Some(file) => {
-            let message = format!("{} is not there: --plant takes an FMU", file.display());
-            return Err(Failure::input(message));
-        }
-        None => {
-            pack::pack(&pack::components(), &beside_this_program()?, &arguments.out)?[0].clone()
-        }
-    };
     env_logger::Builder::new()
         .filter_level(log::LevelFilter::Warn)
         .format_timestamp(None)
         .init();
-    let mut controller = BuiltIn::new(&scene).map_err(Failure::input)?;
-    let mut rig = FmuRig::load(&plant, &scene).map_err(Failure::run)?;
+    let mut controller = arguments.controller.controller(&scene)?;
+    let mut rig = match &arguments.rig {
+        Some(door) => door.rig(&scene)?,
+        None => Door::Fmu(packed_plant(&arguments.out)?).rig(&scene)?,
+    };
     let bar = progress_bar();
     let record = experiment::run(
-        &mut rig,
-        &mut controller,
+        rig.as_mut(),
+        controller.as_mut(),
         &Plan::of(&scene),
         |stage, done, of| {
             show(&bar, stage, done, of);
@@ -83,6 +82,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         report::table(&found),
         files.join(", ")
     ))
+}
+
+/// This program's own plant, packed.
+fn packed_plant(out: &Path) -> Result<PathBuf, Failure> {
+    Ok(pack::pack(&pack::components(), &beside_this_program()?, out)?.swap_remove(0))
 }
 
 /// A bar on stderr; indicatif hides it where that is no terminal.

@@ -2,7 +2,7 @@
 
 use phase_lock::{Config, ConfigError, Input, LockCriterion, PhaseLock, State};
 
-use super::{Command, Controller, Drive, Sensors};
+use super::{Command, Controller, ControllerError, Drive, Sensors};
 use crate::scene::Scene;
 
 /// The built-in controller: coefficients and state.
@@ -26,7 +26,7 @@ impl BuiltIn {
 }
 
 /// The scene's controller settings in SI units.
-fn configuration(scene: &Scene) -> Config {
+pub(super) fn configuration(scene: &Scene) -> Config {
     let omega0 = scene.plant.omega0();
     let c = &scene.controller;
     let amplitude = scene.amplitude;
@@ -51,7 +51,7 @@ fn configuration(scene: &Scene) -> Config {
 }
 
 impl Controller for BuiltIn {
-    fn sample(&mut self, sensors: Sensors, active: bool) -> Command {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
         let output = self.lock.process(
             &mut self.state,
             Input {
@@ -60,7 +60,7 @@ impl Controller for BuiltIn {
                 active,
             },
         );
-        Command {
+        Ok(Command {
             drive: Drive {
                 omega: output.omega,
                 amplitude: output.amplitude,
@@ -68,6 +68,6 @@ impl Controller for BuiltIn {
             },
             phase_error: output.phase_error,
             settled: output.settled,
-        }
+        })
     }
 }

@@ -1,0 +1,21 @@
+//! Why one side of the bench cannot go on.
+
+use thiserror::Error;
+
+use super::FmuError;
+
+/// Why a rig cannot go on.
+#[derive(Debug, Error)]
+pub enum RigError {
+    /// The rig is an FMU, and it failed.
+    #[error("the rig: {0}")]
+    Fmu(#[from] FmuError),
+}
+
+/// Why a controller cannot go on.
+#[derive(Debug, Error)]
+pub enum ControllerError {
+    /// The controller is an FMU, and it failed.
+    #[error("the controller: {0}")]
+    Fmu(#[from] FmuError),
+}
