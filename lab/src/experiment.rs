@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::rig::{Command, Controller, ControllerError, Rig, RigError, Sensors, Witness};
+use crate::rig::{Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Witness};
 use crate::scene::Scene;
 
 /// How long each stage may or shall last, in samples.
@@ -122,7 +122,14 @@ pub fn run(
     let mut samples = Vec::new();
     let mut step = |active| -> Result<Command, ExperimentError> {
         let sensors = rig.sense()?;
-        let command = controller.sample(sensors, active)?;
+        let command = match controller.sample(sensors, active) {
+            Ok(command) => command,
+            Err(error) => {
+                // The rig is not left driven by a controller that has failed; what it says to that changes nothing.
+                let _ = rig.advance(Drive::default(), plan.sample_time);
+                return Err(error.into());
+            }
+        };
         samples.push(Sample {
             time: samples.len() as f64 * plan.sample_time,
             sensors,

@@ -10,7 +10,10 @@ use vines::{
 };
 
 use super::{
-    door::Door, failure::Failure, pack::beside_this_program, scene_arguments::SceneArguments,
+    door::{Door, OpenRig, ReachArguments},
+    failure::Failure,
+    pack::beside_this_program,
+    scene_arguments::SceneArguments,
 };
 
 const HELP: &str = "\
@@ -19,6 +22,7 @@ Examples:
   vines identify --set plant.r=0.7 --out r07       another coefficient of restitution
   vines identify --scene scenes/dimensionless.toml --set excitation.G=1.3
   vines identify --controller mine.fmu             another controller on the same plant
+  vines identify --rig udp://127.0.0.1:5510        a rig across the network; see `vines rig`
 
 Without --rig, writes LoViNes.fmu and PhaseLock.fmu and runs the first; then writes identification.json, backbone.csv, backbone.svg and sim.svg.";
 
@@ -33,13 +37,17 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
 
-    /// What is shaken: an FMU, or `built-in`; without it, this program's plant FMU is packed into the results' folder
+    /// What is shaken: an FMU, `built-in`, or udp://HOST:PORT; without it, this program's plant FMU is packed into the
+    /// results' folder
     #[arg(long, value_name = "DOOR")]
     rig: Option<Door>,
 
-    /// What controls it: `built-in`, or an FMU
+    /// What controls it: `built-in`, an FMU, or udp://HOST:PORT
     #[arg(long, value_name = "DOOR", default_value = "built-in")]
     controller: Door,
+
+    #[command(flatten)]
+    reach: ReachArguments,
 
     /// Print identification.json instead of the table
     #[arg(long)]
@@ -52,11 +60,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .filter_level(log::LevelFilter::Warn)
         .format_timestamp(None)
         .init();
-    let mut controller = arguments.controller.controller(&scene)?;
-    let mut rig = match &arguments.rig {
-        Some(door) => door.rig(&scene)?,
-        None => Door::Fmu(packed_plant(&arguments.out)?).rig(&scene)?,
+    let reach = arguments.reach.reach();
+    let OpenRig { mut rig, paced } = match &arguments.rig {
+        Some(door) => door.rig(&scene, reach)?,
+        None => Door::Fmu(packed_plant(&arguments.out)?).rig(&scene, reach)?,
     };
+    let mut controller = arguments.controller.controller(&scene, reach, paced)?;
     let bar = progress_bar();
     let record = experiment::run(
         rig.as_mut(),

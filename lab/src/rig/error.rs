@@ -3,6 +3,7 @@
 use thiserror::Error;
 
 use super::FmuError;
+use crate::net::LinkError;
 
 /// Why a rig cannot go on.
 #[derive(Debug, Error)]
@@ -10,6 +11,9 @@ pub enum RigError {
     /// The rig is an FMU, and it failed.
     #[error("the rig: {0}")]
     Fmu(#[from] FmuError),
+    /// The rig is at a network address, and the link failed.
+    #[error("the rig: {0}")]
+    Link(#[from] LinkError),
 }
 
 /// Why a controller cannot go on.
@@ -18,4 +22,7 @@ pub enum ControllerError {
     /// The controller is an FMU, and it failed.
     #[error("the controller: {0}")]
     Fmu(#[from] FmuError),
+    /// The controller is at a network address, and the link failed.
+    #[error("the controller: {0}")]
+    Link(#[from] LinkError),
 }

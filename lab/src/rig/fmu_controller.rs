@@ -36,17 +36,20 @@ impl FmuController {
     /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
     pub fn load(path: &Path, scene: &Scene) -> Result<Self, FmuError> {
         let mut fmu = Fmu::load(path, "controller")?;
-        fmu.start(&parameters(&configuration(scene)))?;
         let mut sensors = vec![fmu.need(Kind::Real, "response")?];
         sensors.extend(fmu.find(Kind::Real, "reference"));
+        let active = fmu.need(Kind::Boolean, "active")?;
+        let drive = [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?];
+        let settled = fmu.need(Kind::Boolean, "settled")?;
+        fmu.start(&parameters(&configuration(scene)))?;
         Ok(Self {
             sample_time: scene.sample_time(),
             sensors,
-            active: fmu.need(Kind::Boolean, "active")?,
-            drive: [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?],
+            active,
+            drive,
             displacement: fmu.find(Kind::Real, "drive"),
             phase_error: fmu.find(Kind::Real, "phase_error"),
-            settled: fmu.need(Kind::Boolean, "settled")?,
+            settled,
             fmu,
         })
     }

@@ -37,6 +37,8 @@ impl FmuRig {
     pub fn load(path: &Path, scene: &Scene) -> Result<Self, FmuError> {
         let mut fmu = Fmu::load(path, "plant")?;
         let (plant, start) = (&scene.plant, &scene.start);
+        let inputs = [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?];
+        let response = fmu.need(Kind::Real, "v")?;
         fmu.start(
             &[
                 ("M", plant.mass),
@@ -53,8 +55,8 @@ impl FmuRig {
             .map(|(name, value)| (name, Value::Real(value))),
         )?;
         Ok(Self {
-            inputs: [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?],
-            response: fmu.need(Kind::Real, "v")?,
+            inputs,
+            response,
             reference: fmu.find(Kind::Real, "base"),
             inside: Inside::of(&fmu),
             fmu,

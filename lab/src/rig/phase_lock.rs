@@ -6,6 +6,7 @@ use super::{Command, Controller, ControllerError, Drive, Sensors};
 use crate::scene::Scene;
 
 /// The built-in controller: coefficients and state.
+#[derive(Clone)]
 pub struct BuiltIn {
     lock: PhaseLock,
     state: State,
