@@ -76,6 +76,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         },
     );
     bar.finish_and_clear();
+    // A rig across the network is told that this is all, before it has to wonder.
+    drop((rig, controller));
     let record = record.map_err(Failure::run)?;
     let found = identification::identify(&record, &scene).map_err(Failure::run)?;
     let written = report::write(&found, &arguments.out).map_err(Failure::run)?;

@@ -215,6 +215,9 @@ impl Caller {
 
 impl Drop for Caller {
     fn drop(&mut self) {
+        if self.counters.is_troubled() {
+            log::warn!("udp://{}: {}", self.peer, self.counters);
+        }
         for _ in 0..FAREWELLS {
             // If it cannot be sent, the server's watch ends the session.
             let _ = self

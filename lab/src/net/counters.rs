@@ -27,6 +27,26 @@ pub struct Counters {
     pub held: u64,
 }
 
+impl Counters {
+    /// Whether anything went other than it should.
+    #[must_use]
+    pub fn is_troubled(&self) -> bool {
+        let Self {
+            resent,
+            lost,
+            late,
+            repeated,
+            foreign,
+            malformed,
+            held,
+            ..
+        } = self;
+        [resent, lost, late, repeated, foreign, malformed, held]
+            .iter()
+            .any(|count| **count > 0)
+    }
+}
+
 impl Display for Counters {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let Self {
