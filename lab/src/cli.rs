@@ -1,10 +1,14 @@
 //! The command line: one file per command.
 
+mod controller;
+mod door;
 mod failure;
 mod identify;
 mod orbit;
 mod pack;
+mod rig;
 mod scene_arguments;
+mod serving;
 mod table;
 mod theory;
 
@@ -24,6 +28,7 @@ Examples:
   vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
   vines theory --scene scenes/dimensionless.toml --set plant.epsilon=0.0042
   vines pack --out fmus                        write LoViNes.fmu and PhaseLock.fmu
+  vines rig --listen 127.0.0.1:5510            serve the plant in real time, for identify --rig udp://127.0.0.1:5510
 
 Without --scene, the default scene built into the program is used; it is scenes/paper.toml.";
 
@@ -41,6 +46,8 @@ enum Command {
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Pack(pack::Arguments),
+    Rig(rig::Arguments),
+    Controller(controller::Arguments),
 }
 
 /// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input.
@@ -50,6 +57,8 @@ pub fn run() -> ExitCode {
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Pack(arguments) => pack::run(&arguments),
+        Command::Rig(arguments) => rig::run(&arguments),
+        Command::Controller(arguments) => controller::run(&arguments),
     };
     match output.and_then(|text| print(&text)) {
         Ok(()) => ExitCode::SUCCESS,

@@ -2,7 +2,7 @@
 
 use thiserror::Error;
 
-use crate::rig::{Command, Controller, Rig, RigError, Sensors, Witness};
+use crate::rig::{Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Witness};
 use crate::scene::Scene;
 
 /// How long each stage may or shall last, in samples.
@@ -91,6 +91,9 @@ pub enum ExperimentError {
     /// The rig failed.
     #[error(transparent)]
     Rig(#[from] RigError),
+    /// The controller failed.
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
     /// The loop found no stationary phase resonance in the time allowed.
     #[error(
         "no lock within {periods:.0} periods of the drive: the phase error is {phase_error:.3} degrees at omega = {omega:.6} rad/s; \
@@ -109,17 +112,24 @@ pub enum ExperimentError {
 /// Runs the whole experiment; `progress` is told the stage, and how many samples of at most how many it has taken.
 ///
 /// # Errors
-/// A failure of the rig, or no lock in the time allowed.
+/// A failure of the rig or of the controller, or no lock in the time allowed.
 pub fn run(
-    rig: &mut impl Rig,
-    controller: &mut impl Controller,
+    rig: &mut (impl Rig + ?Sized),
+    controller: &mut (impl Controller + ?Sized),
     plan: &Plan,
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
     let mut samples = Vec::new();
-    let mut step = |active| -> Result<Command, RigError> {
+    let mut step = |active| -> Result<Command, ExperimentError> {
         let sensors = rig.sense()?;
-        let command = controller.sample(sensors, active);
+        let command = match controller.sample(sensors, active) {
+            Ok(command) => command,
+            Err(error) => {
+                // The rig is not left driven by a controller that has failed; what it says to that changes nothing.
+                let _ = rig.advance(Drive::default(), plan.sample_time);
+                return Err(error.into());
+            }
+        };
         samples.push(Sample {
             time: samples.len() as f64 * plan.sample_time,
             sensors,

@@ -2,12 +2,18 @@
 //! drive. An experiment knows these two traits and nothing else, so that an FMU, a network peer or hardware can stand on
 //! either side.
 
+mod error;
 mod fmu;
+mod fmu_controller;
+mod fmu_rig;
 mod phase_lock;
 mod simulated;
 
-pub(crate) use fmu::start_values;
-pub use fmu::{FmuRig, RigError};
+pub use error::{ControllerError, RigError};
+pub use fmu::{FmuError, Kind};
+pub use fmu_controller::FmuController;
+pub use fmu_rig::FmuRig;
+pub(crate) use fmu_rig::start_values;
 pub use phase_lock::BuiltIn;
 pub(crate) use phase_lock::configuration;
 pub use simulated::Simulated;
@@ -82,5 +88,8 @@ pub struct Command {
 /// Anything that can hold a rig at phase resonance.
 pub trait Controller {
     /// Takes the sensors of one sample, and whether the drive is wanted; returns the drive.
-    fn sample(&mut self, sensors: Sensors, active: bool) -> Command;
+    ///
+    /// # Errors
+    /// The controller's own: a refused call, a lost connection.
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError>;
 }

@@ -2,7 +2,10 @@
 
 use vines::experiment::{self, ExperimentError, Plan, Record};
 use vines::identification::{Identification, IdentificationError, Regime, identify};
-use vines::rig::{BuiltIn, Command, Controller, Drive, Rig, RigError, Sensors, Simulated, Witness};
+use vines::rig::{
+    BuiltIn, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated,
+    Witness,
+};
 use vines::scene::{Override, Scene};
 
 fn scene(settings: &[&str]) -> Scene {
@@ -135,12 +138,12 @@ fn a_rig_that_does_not_tell_its_impacts_has_an_unknown_regime() {
 struct OpenLoop(Drive);
 
 impl Controller for OpenLoop {
-    fn sample(&mut self, _: Sensors, active: bool) -> Command {
-        Command {
+    fn sample(&mut self, _: Sensors, active: bool) -> Result<Command, ControllerError> {
+        Ok(Command {
             drive: if active { self.0 } else { Drive::default() },
             settled: true,
             ..Command::default()
-        }
+        })
     }
 }
 

@@ -142,7 +142,7 @@ def test_an_unknown_key_in_a_scene_is_shown_with_its_line(call, tmp_path):
 
 def test_a_plant_that_is_no_fmu_is_refused(call, tmp_path):
     (tmp_path / "rig.fmu").write_text("no archive")
-    done = call("identify", "--plant", "rig.fmu")
+    done = call("identify", "--rig", "rig.fmu")
     assert done.returncode != 0
     assert done.stderr.startswith("error: ")
     assert "rig.fmu" in done.stderr

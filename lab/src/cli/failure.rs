@@ -2,7 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use vines::{pack::PackError, scene::SceneError};
+use vines::{net::LinkError, pack::PackError, scene::SceneError};
 
 /// One clear message, and whose fault it was.
 #[derive(Debug)]
@@ -42,6 +42,15 @@ impl Display for Failure {
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
         Self::input(error)
+    }
+}
+
+impl From<LinkError> for Failure {
+    fn from(error: LinkError) -> Self {
+        match error {
+            LinkError::Address { .. } | LinkError::Remote { .. } => Self::input(error),
+            _ => Self::run(error),
+        }
     }
 }
 

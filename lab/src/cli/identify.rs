@@ -1,24 +1,31 @@
 //! `vines identify`: the whole experiment.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
+use tempfile::TempDir;
 use vines::{
     experiment::{self, Plan, Stage},
     identification, pack, report,
-    rig::{BuiltIn, FmuRig},
 };
 
-use super::{failure::Failure, pack::beside_this_program, scene_arguments::SceneArguments};
+use super::{
+    door::{Door, OpenRig, ReachArguments},
+    failure::Failure,
+    pack::beside_this_program,
+    scene_arguments::SceneArguments,
+};
 
 const HELP: &str = "\
 Examples:
   vines identify                                   the default scene, results in out/
   vines identify --set plant.r=0.7 --out r07       another coefficient of restitution
   vines identify --scene scenes/dimensionless.toml --set excitation.G=1.3
+  vines identify --controller mine.fmu             another controller on the same plant
+  vines identify --rig udp://127.0.0.1:5510        a rig across the network; see `vines rig`
 
-Writes LoViNes.fmu and PhaseLock.fmu, then identification.json, backbone.csv, backbone.svg and sim.svg.";
+Without --rig, writes LoViNes.fmu and PhaseLock.fmu and runs the first; then writes identification.json, backbone.csv, backbone.svg and sim.svg.";
 
 /// Lock the plant at phase resonance, let it decay, and identify its backbone
 #[derive(Debug, Args)]
@@ -31,9 +38,17 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
 
-    /// Use this plant FMU; without it, the one of this program is packed into the results' folder
-    #[arg(long, value_name = "FILE")]
-    plant: Option<PathBuf>,
+    /// What is shaken: an FMU, `built-in`, or udp://HOST:PORT; without it, this program's plant FMU is packed into the
+    /// results' folder
+    #[arg(long, value_name = "DOOR")]
+    rig: Option<Door>,
+
+    /// What controls it: `built-in`, an FMU, or udp://HOST:PORT
+    #[arg(long, value_name = "DOOR", default_value = "built-in")]
+    controller: Door,
+
+    #[command(flatten)]
+    reach: ReachArguments,
 
     /// Print identification.json instead of the table
     #[arg(long)]
@@ -42,36 +57,35 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let plant = match &arguments.plant {
-        Some(file) if file.is_file() => file.clone(),
-        Some(file) => {
-            let message = format!("{} is not there: --plant takes an FMU", file.display());
-            return Err(Failure::input(message));
-        }
-        None => {
-            let libraries = beside_this_program()?.as_path().into();
-            pack::pack(&pack::components(), &libraries, &arguments.out)?[0].clone()
-        }
-    };
     env_logger::Builder::new()
         .filter_level(log::LevelFilter::Warn)
         .format_timestamp(None)
         .init();
-    let mut controller = BuiltIn::new(&scene).map_err(Failure::input)?;
-    let mut rig = FmuRig::load(&plant, &scene).map_err(Failure::run)?;
-    let bar = progress_bar();
+    let reach = arguments.reach.reach();
+    // Everything that can be refused is refused before anything is written.
+    let fmus = Packed::at(&arguments.out)?;
+    let OpenRig { mut rig, paced } = match &arguments.rig {
+        Some(door) => door.rig(&scene, reach)?,
+        None => Door::Fmu(fmus.plant()?).rig(&scene, reach)?,
+    };
+    let mut controller = arguments.controller.controller(&scene, reach, paced)?;
+    let plan = Plan::of(&scene);
+    let bar = progress_bar(&plan);
     let record = experiment::run(
-        &mut rig,
-        &mut controller,
-        &Plan::of(&scene),
+        rig.as_mut(),
+        controller.as_mut(),
+        &plan,
         |stage, done, of| {
             show(&bar, stage, done, of);
         },
     );
     bar.finish_and_clear();
+    // A rig across the network is told that this is all, before it has to wonder.
+    drop((rig, controller));
     let record = record.map_err(Failure::run)?;
     let found = identification::identify(&record, &scene).map_err(Failure::run)?;
-    let written = report::write(&found, &arguments.out).map_err(Failure::run)?;
+    let mut written = report::write(&found, &arguments.out).map_err(Failure::run)?;
+    written.extend(fmus.keep()?);
     if arguments.json {
         return Ok(serde_json::to_string_pretty(&found)? + "\n");
     }
@@ -86,22 +100,68 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     ))
 }
 
+/// This program's own FMUs: packed into a folder of their own inside the results' folder, and kept where the run succeeds.
+struct Packed {
+    folder: TempDir,
+    out: PathBuf,
+}
+
+impl Packed {
+    /// A folder for them inside `out`, which is made if it is not there.
+    fn at(out: &Path) -> Result<Self, Failure> {
+        let refused = |error| Failure::input(format!("cannot write to {}: {error}", out.display()));
+        std::fs::create_dir_all(out).map_err(refused)?;
+        let folder = tempfile::Builder::new().prefix(".vines-").tempdir_in(out);
+        Ok(Self {
+            folder: folder.map_err(refused)?,
+            out: out.into(),
+        })
+    }
+
+    /// The plant.
+    fn plant(&self) -> Result<PathBuf, Failure> {
+        let libraries = beside_this_program()?.as_path().into();
+        Ok(pack::pack(&pack::components(), &libraries, self.folder.path())?.swap_remove(0))
+    }
+
+    /// Puts them beside the results.
+    fn keep(self) -> Result<Vec<PathBuf>, Failure> {
+        let mut kept = Vec::new();
+        for component in pack::components() {
+            let name = format!("{}.fmu", component.identifier);
+            let (from, to) = (self.folder.path().join(&name), self.out.join(&name));
+            if from.is_file() {
+                std::fs::rename(from, &to).map_err(|error| {
+                    Failure::run(format!("cannot write {}: {error}", to.display()))
+                })?;
+                kept.push(to);
+            }
+        }
+        Ok(kept)
+    }
+}
+
 /// A bar on stderr; indicatif hides it where that is no terminal.
-fn progress_bar() -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg:>24} [{bar:40}] {pos}/{len} samples")
+fn progress_bar(plan: &Plan) -> ProgressBar {
+    let style = ProgressStyle::with_template("{msg:23} [{wide_bar}] {pos}/{len} samples")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(0).with_style(style)
+    ProgressBar::new(plan.lock as u64).with_style(style)
 }
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {
     // A bar that moves a few hundred times is smooth; one that moves at every sample costs more than the experiment.
-    if done.is_multiple_of(64) || done == of {
-        bar.set_message(match stage {
-            Stage::Locking => "seeking phase resonance",
-            Stage::Holding => "holding the lock",
-            Stage::Decaying => "recording the decay",
-        });
-        bar.set_length(of as u64);
-        bar.set_position(done as u64);
+    if !done.is_multiple_of(64) && done != of {
+        return;
     }
+    let message = match stage {
+        Stage::Locking => "seeking phase resonance",
+        Stage::Holding => "holding the lock",
+        Stage::Decaying => "recording the decay",
+    };
+    if bar.message() != message {
+        bar.set_message(message);
+        bar.set_length(of as u64);
+        bar.force_draw();
+    }
+    bar.set_position(done as u64);
 }

@@ -1,19 +1,17 @@
-//! A rig that is an FMU, loaded through the `fmi` crate: ours, or anybody's with the same variable names.
+//! An FMU on the bench: loaded through the `fmi` crate, its variables found by name, stepped on one clock.
 
 use std::path::{Path, PathBuf};
 
 use fmi::fmi2::Fmi2Error;
 use fmi::fmi2::import::Fmi2Import;
 use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
+use fmi::schema::fmi2::ScalarVariableElement;
 use fmi::traits::FmiImport;
 use thiserror::Error;
 
-use super::{Drive, Rig, Sensors, Witness};
-use crate::scene::Scene;
-
-/// Why a rig cannot go on.
+/// Why an FMU cannot take its side of the bench, or cannot go on.
 #[derive(Debug, Error)]
-pub enum RigError {
+pub enum FmuError {
     /// The file is not an FMU that can be loaded here.
     #[error("cannot load {}: {source}", path.display())]
     Load {
@@ -23,16 +21,20 @@ pub enum RigError {
         source: fmi::Error,
     },
     /// The FMU lacks a variable that the bench needs.
-    #[error("{} has no variable `{name}`, which the bench needs", path.display())]
+    #[error("{} has no {kind} variable `{name}`, which the bench needs", path.display())]
     Variable {
         /// The FMU.
         path: PathBuf,
+        /// Its type in FMI.
+        kind: Kind,
         /// What was looked for.
         name: &'static str,
     },
     /// The FMU refused a call; its own message has been logged.
-    #[error("the rig refused to {action} at t = {time} s: {source}")]
+    #[error("{} refused to {action} at t = {time} s: {source}", path.display())]
     Refused {
+        /// The FMU.
+        path: PathBuf,
         /// What was asked of it.
         action: &'static str,
         /// Simulated time, s.
@@ -42,137 +44,150 @@ pub enum RigError {
     },
 }
 
-/// Parameters and start of the plant, under the names of its variables.
-pub(crate) fn start_values(scene: &Scene) -> [(&'static str, f64); 10] {
-    let (plant, start) = (&scene.plant, &scene.start);
-    [
-        ("M", plant.mass),
-        ("k", plant.stiffness),
-        ("c", plant.damping),
-        ("m", plant.particle_mass),
-        ("b", plant.half_width),
-        ("r", plant.restitution),
-        ("q1", start.q1),
-        ("der(q1)", start.dq1),
-        ("q2", start.q2),
-        ("der(q2)", start.dq2),
-    ]
+/// Type of a variable, as FMI has it.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// A number.
+    Real,
+    /// A whole number.
+    Integer,
+    /// True or false.
+    Boolean,
 }
 
-type Reference = <Fmi2Import as FmiImport>::ValueRef;
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        std::fmt::Debug::fmt(self, f)
+    }
+}
 
-/// A plant FMU, initialised and stepped through FMI 2.0 co-simulation.
-pub struct FmuRig {
+/// A value to start with.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) enum Value {
+    Real(f64),
+    Integer(i32),
+    Boolean(bool),
+}
+
+impl Value {
+    fn kind(self) -> Kind {
+        match self {
+            Self::Real(_) => Kind::Real,
+            Self::Integer(_) => Kind::Integer,
+            Self::Boolean(_) => Kind::Boolean,
+        }
+    }
+}
+
+/// Names a variable in calls.
+pub(super) type Reference = <Fmi2Import as FmiImport>::ValueRef;
+
+/// A loaded FMU at its simulated time.
+pub(super) struct Fmu {
     instance: InstanceCS,
-    /// Keeps the unpacked FMU on disk while the instance lives.
-    _import: Fmi2Import,
+    /// Describes the FMU, and keeps it unpacked on disk while the instance lives.
+    import: Fmi2Import,
+    path: PathBuf,
     time: f64,
-    inputs: [Reference; 2],
-    /// `v` and `base`.
-    sensors: [Reference; 2],
-    /// `impact_time`, `impact_velocity` and `der(q2)`.
-    witness: [Reference; 3],
-    impacts: Reference,
 }
 
-impl FmuRig {
-    /// Loads the plant at `path` and initialises it with the parameters and the start of the scene.
-    ///
-    /// # Errors
-    /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
-    pub fn load(path: &Path, scene: &Scene) -> Result<Self, RigError> {
-        let loaded = |source| RigError::Load {
+impl Fmu {
+    /// Loads the FMU at `path`; `name` is the one it logs under.
+    pub fn load(path: &Path, name: &str) -> Result<Self, FmuError> {
+        let failed = |source| FmuError::Load {
             path: path.into(),
             source,
         };
-        let import: Fmi2Import = fmi::import::from_path(path).map_err(loaded)?;
-        let find = |name: &'static str| {
-            let variables = &import.model_description().model_variables.variables;
-            variables
-                .iter()
-                .find(|variable| variable.name == name)
-                .map(|variable| variable.value_reference)
-                .ok_or(RigError::Variable {
-                    path: path.into(),
-                    name,
-                })
-        };
-        let (mut references, mut numbers) = (Vec::new(), Vec::new());
-        for (name, value) in start_values(scene) {
-            references.push(find(name)?);
-            numbers.push(value);
-        }
-        let inputs = [find("omega")?, find("E")?];
-        let sensors = [find("v")?, find("base")?];
-        let witness = [
-            find("impact_time")?,
-            find("impact_velocity")?,
-            find("der(q2)")?,
-        ];
-        let impacts = find("impacts")?;
-        let mut rig = Self {
-            instance: import
-                .instantiate_cs("plant", false, true)
-                .map_err(loaded)?,
-            _import: import,
+        let import: Fmi2Import = fmi::import::from_path(path).map_err(failed)?;
+        Ok(Self {
+            instance: import.instantiate_cs(name, false, true).map_err(failed)?,
+            import,
+            path: path.into(),
             time: 0.0,
-            inputs,
-            sensors,
-            witness,
-            impacts,
+        })
+    }
+
+    /// The variable of that name and kind, if there is one.
+    pub fn find(&self, kind: Kind, name: &str) -> Option<Reference> {
+        let variables = &self.import.model_description().model_variables.variables;
+        let found = variables.iter().find(|variable| variable.name == name)?;
+        let is = match found.elem {
+            ScalarVariableElement::Real(_) => Some(Kind::Real),
+            ScalarVariableElement::Integer(_) => Some(Kind::Integer),
+            ScalarVariableElement::Boolean(_) => Some(Kind::Boolean),
+            _ => None,
         };
-        rig.asked("take its parameters", |i| i.set_real(&references, &numbers))?;
-        rig.asked("start", |i| i.setup_experiment(None, 0.0, None))?;
-        rig.asked("start", Common::enter_initialization_mode)?;
-        rig.asked("start", Common::exit_initialization_mode)?;
-        Ok(rig)
+        (is == Some(kind)).then_some(found.value_reference)
     }
 
-    fn asked<T>(
-        &mut self,
-        action: &'static str,
-        call: impl FnOnce(&mut InstanceCS) -> Result<T, Fmi2Error>,
-    ) -> Result<T, RigError> {
-        call(&mut self.instance).map_err(|source| RigError::Refused {
-            action,
-            time: self.time,
-            source,
-        })
-    }
-}
-
-impl Rig for FmuRig {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        let (references, mut values) = (self.sensors, [0.0; 2]);
-        self.asked("read its sensors", |i| i.get_real(&references, &mut values))?;
-        Ok(Sensors {
-            response: values[0],
-            reference: Some(values[1]),
+    /// The variable of that name and kind.
+    pub fn need(&self, kind: Kind, name: &'static str) -> Result<Reference, FmuError> {
+        self.find(kind, name).ok_or_else(|| FmuError::Variable {
+            path: self.path.clone(),
+            kind,
+            name,
         })
     }
 
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let (references, time) = (self.inputs, self.time);
-        self.asked("take a drive", |i| {
-            i.set_real(&references, &[drive.omega, drive.amplitude])
-        })?;
-        self.asked("advance", |i| i.do_step(time, step, true))?;
+    /// Sets what the FMU has of `values` and initialises it at time 0. What it does not have is said in the log: such
+    /// an FMU keeps its own.
+    pub fn start(&mut self, values: &[(&str, Value)]) -> Result<(), FmuError> {
+        let mut missing = Vec::new();
+        for &(name, value) in values {
+            let Some(reference) = self.find(value.kind(), name) else {
+                missing.push(format!("`{name}`"));
+                continue;
+            };
+            let reference = [reference];
+            self.ask("take its parameters", |i| match value {
+                Value::Real(x) => i.set_real(&reference, &[x]),
+                Value::Integer(n) => i.set_integer(&reference, &[n]),
+                Value::Boolean(b) => i.set_boolean(&reference, &[b.into()]),
+            })?;
+        }
+        if !missing.is_empty() {
+            let path = self.path.display();
+            log::warn!(
+                "{path} has no {}; it works with what it has instead",
+                missing.join(", ")
+            );
+        }
+        self.ask("start", |i| i.setup_experiment(None, 0.0, None))?;
+        self.ask("start", Common::enter_initialization_mode)?;
+        self.ask("start", Common::exit_initialization_mode)?;
+        Ok(())
+    }
+
+    /// One step of `step` seconds.
+    pub fn step(&mut self, step: f64) -> Result<(), FmuError> {
+        let time = self.time;
+        self.ask("advance", |i| i.do_step(time, step, true))?;
         self.time += step;
         Ok(())
     }
 
-    fn witness(&mut self) -> Result<Option<Witness>, RigError> {
-        let (references, mut values) = (self.witness, [0.0; 3]);
-        self.asked("tell its impacts", |i| i.get_real(&references, &mut values))?;
-        let (reference, mut impacts) = ([self.impacts], [0]);
-        self.asked("tell its impacts", |i| {
-            i.get_integer(&reference, &mut impacts)
-        })?;
-        Ok(Some(Witness {
-            impacts: i64::from(impacts[0]),
-            impact_time: values[0],
-            impact_velocity: values[1],
-            particle_velocity: values[2],
-        }))
+    /// Real numbers.
+    pub fn reals<const N: usize>(
+        &mut self,
+        action: &'static str,
+        references: [Reference; N],
+    ) -> Result<[f64; N], FmuError> {
+        let mut values = [0.0; N];
+        self.ask(action, |i| i.get_real(&references, &mut values))?;
+        Ok(values)
+    }
+
+    /// Asks the FMU for something; `action` completes "refused to".
+    pub fn ask<T>(
+        &mut self,
+        action: &'static str,
+        call: impl FnOnce(&mut InstanceCS) -> Result<T, Fmi2Error>,
+    ) -> Result<T, FmuError> {
+        call(&mut self.instance).map_err(|source| FmuError::Refused {
+            path: self.path.clone(),
+            action,
+            time: self.time,
+            source,
+        })
     }
 }

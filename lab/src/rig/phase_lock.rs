@@ -2,10 +2,11 @@
 
 use phase_lock::{Config, ConfigError, Input, LockCriterion, PhaseLock, State};
 
-use super::{Command, Controller, Drive, Sensors};
+use super::{Command, Controller, ControllerError, Drive, Sensors};
 use crate::scene::Scene;
 
 /// The built-in controller: coefficients and state.
+#[derive(Clone)]
 pub struct BuiltIn {
     lock: PhaseLock,
     state: State,
@@ -51,7 +52,7 @@ pub(crate) fn configuration(scene: &Scene) -> Config {
 }
 
 impl Controller for BuiltIn {
-    fn sample(&mut self, sensors: Sensors, active: bool) -> Command {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
         let output = self.lock.process(
             &mut self.state,
             Input {
@@ -60,7 +61,7 @@ impl Controller for BuiltIn {
                 active,
             },
         );
-        Command {
+        Ok(Command {
             drive: Drive {
                 omega: output.omega,
                 amplitude: output.amplitude,
@@ -68,6 +69,6 @@ impl Controller for BuiltIn {
             },
             phase_error: output.phase_error,
             settled: output.settled,
-        }
+        })
     }
 }

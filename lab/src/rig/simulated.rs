@@ -6,6 +6,7 @@ use super::{Drive, Rig, RigError, Sensors, Witness};
 use crate::scene::Scene;
 
 /// The plant, stepped directly.
+#[derive(Clone)]
 pub struct Simulated {
     plant: Plant,
 }

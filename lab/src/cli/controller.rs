@@ -1,0 +1,54 @@
+//! `vines controller`: the phase-locked loop at a network address.
+
+use clap::Args;
+use vines::net::{ControllerServer, ControllerService};
+use vines::rig::{BuiltIn, Controller};
+
+use super::{
+    failure::Failure,
+    scene_arguments::SceneArguments,
+    serving::{ServingArguments, seconds},
+};
+
+const HELP: &str = "\
+Examples:
+  vines controller --listen 127.0.0.1:5511      then: vines identify --controller udp://127.0.0.1:5511
+
+Answers every reading with a drive. A reading that is lost is replaced by the last good one; after --silence the
+session is over, and every further reading of it is answered with no drive. The protocol is docs/network-protocol.md.
+
+Listens on this machine only, unless --allow-remote is given: there is no authentication and no encryption.";
+
+/// Serve the phase-locked loop to a rig or an experiment across the network
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    #[command(flatten)]
+    serving: ServingArguments,
+
+    /// Longest silence before the session is shut down, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = seconds)]
+    silence: f64,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+    let scene = arguments.scene.load()?;
+    let first = BuiltIn::new(&scene).map_err(Failure::input)?;
+    let service = ControllerService {
+        sample_time: scene.sample_time(),
+        silence: arguments.silence,
+    };
+    let mut server = ControllerServer::listen(arguments.serving.address()?, service)?;
+    let (stop, tell) = arguments.serving.begin("controller", server.address()?)?;
+    server
+        .serve(
+            || Ok(Box::new(first.clone()) as Box<dyn Controller>),
+            stop,
+            tell,
+        )
+        .map_err(Failure::run)?;
+    Ok(String::new())
+}

@@ -1,0 +1,102 @@
+//! `--rig` and `--controller`: what stands on either side of the bench.
+
+use std::{path::PathBuf, str::FromStr};
+
+use clap::Args;
+use vines::{
+    net::{NetController, NetRig, Reach, resolve},
+    rig::{BuiltIn, Controller, FmuController, FmuRig, Rig, Simulated},
+    scene::Scene,
+};
+
+use super::failure::Failure;
+
+/// What stands behind a door, as written on the command line.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Door {
+    /// `built-in`: this program's own, with nothing in between.
+    BuiltIn,
+    /// The path of an FMU.
+    Fmu(PathBuf),
+    /// `udp://HOST:PORT`.
+    Udp(String),
+}
+
+impl FromStr for Door {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        if text == "built-in" {
+            return Ok(Self::BuiltIn);
+        }
+        if text.starts_with("udp://") {
+            return Ok(Self::Udp(text.into()));
+        }
+        let file = PathBuf::from(text);
+        if file.is_file() {
+            Ok(Self::Fmu(file))
+        } else {
+            Err(format!(
+                "{text} is not there; give `built-in`, the path of an FMU, or udp://HOST:PORT"
+            ))
+        }
+    }
+}
+
+/// A rig, and whether it runs in real time.
+pub(super) struct OpenRig {
+    pub rig: Box<dyn Rig>,
+    pub paced: bool,
+}
+
+impl Door {
+    /// The rig behind this door.
+    pub(super) fn rig(&self, scene: &Scene, reach: Reach) -> Result<OpenRig, Failure> {
+        let mut paced = false;
+        let rig: Box<dyn Rig> = match self {
+            Self::BuiltIn => Box::new(Simulated::new(scene).map_err(Failure::input)?),
+            Self::Fmu(file) => Box::new(FmuRig::load(file, scene).map_err(Failure::run)?),
+            Self::Udp(address) => {
+                let rig = NetRig::connect(resolve(address, reach)?, scene.sample_time())?;
+                paced = rig.is_paced();
+                Box::new(rig)
+            }
+        };
+        Ok(OpenRig { rig, paced })
+    }
+
+    /// The controller behind this door, for a rig that is `paced` or not.
+    pub(super) fn controller(
+        &self,
+        scene: &Scene,
+        reach: Reach,
+        paced: bool,
+    ) -> Result<Box<dyn Controller>, Failure> {
+        Ok(match self {
+            Self::BuiltIn => Box::new(BuiltIn::new(scene).map_err(Failure::input)?),
+            Self::Fmu(file) => Box::new(FmuController::load(file, scene).map_err(Failure::run)?),
+            Self::Udp(address) => {
+                let peer = resolve(address, reach)?;
+                Box::new(NetController::connect(peer, scene.sample_time(), paced)?)
+            }
+        })
+    }
+}
+
+/// `--allow-remote`, which several commands share.
+#[derive(Debug, Args)]
+pub(super) struct ReachArguments {
+    /// Allow network addresses beyond this machine. Nobody is asked who they are: whoever reaches the address can drive the rig
+    #[arg(long)]
+    allow_remote: bool,
+}
+
+impl ReachArguments {
+    pub(super) fn reach(&self) -> Reach {
+        if self.allow_remote {
+            Reach::Remote
+        } else {
+            Reach::Loopback
+        }
+    }
+}

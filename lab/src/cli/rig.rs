@@ -1,0 +1,82 @@
+//! `vines rig`: the plant at a network address.
+
+use clap::Args;
+use vines::net::{RigServer, RigService};
+use vines::rig::{Rig, Simulated};
+
+use super::{
+    failure::Failure,
+    scene_arguments::SceneArguments,
+    serving::{ServingArguments, seconds},
+};
+
+const HELP: &str = "\
+Examples:
+  vines rig --listen 127.0.0.1:5510                 in real time; then: vines identify --rig udp://127.0.0.1:5510
+  vines rig --listen 127.0.0.1:5510 --lock-step     as fast as drives arrive, with the same bits every time
+
+Every session begins with the plant at the start of the scene, and its clock with the first drive. Both sides take the sample
+time from their scene: give both the same one. Lost and late drives are counted, and the last one is held; after --silence
+the drive is brought to zero, and stays there until another session begins. The protocol is docs/network-protocol.md.
+
+Listens on this machine only, unless --allow-remote is given: there is no authentication and no encryption, and whoever
+reaches the address can drive the rig.";
+
+/// Longest silence in real time, s: about one period of the default scene.
+const SILENCE_PACED: f64 = 0.1;
+/// ... and in lock-step, where nothing moves meanwhile.
+const SILENCE_LOCK_STEP: f64 = 5.0;
+
+/// Serve the plant to a controller or an experiment across the network
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    #[command(flatten)]
+    serving: ServingArguments,
+
+    /// Advance when a drive arrives instead of in real time
+    #[arg(long)]
+    lock_step: bool,
+
+    /// Longest silence before the drive is shut down, s [default: 0.1, with --lock-step 5]
+    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    silence: Option<f64>,
+
+    /// Largest drive amplitude that is taken, m [default: the half-width b of the cavity]
+    #[arg(long, value_name = "METRES")]
+    max_amplitude: Option<f64>,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+    let scene = arguments.scene.load()?;
+    let first = Simulated::new(&scene).map_err(Failure::input)?;
+    let default = if arguments.lock_step {
+        SILENCE_LOCK_STEP
+    } else {
+        SILENCE_PACED
+    };
+    let service = RigService {
+        sample_time: scene.sample_time(),
+        paced: !arguments.lock_step,
+        silence: arguments.silence.unwrap_or(default),
+        max_amplitude: arguments.max_amplitude.unwrap_or(scene.plant.half_width),
+    };
+    let mut server = RigServer::listen(arguments.serving.address()?, service)?;
+    let mode = if service.paced {
+        "in real time"
+    } else {
+        "in lock-step"
+    };
+    let what = format!(
+        "rig, {mode}, {:.1} samples a second,",
+        1.0 / service.sample_time
+    );
+    let (stop, tell) = arguments.serving.begin(&what, server.address()?)?;
+    server
+        .serve(|| Ok(Box::new(first.clone()) as Box<dyn Rig>), stop, tell)
+        .map_err(Failure::run)?;
+    Ok(String::new())
+}

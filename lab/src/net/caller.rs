@@ -1,0 +1,233 @@
+//! The client's end of a link: asks for a session, sends, waits, sends again, and gives up.
+
+use std::hash::{BuildHasher, Hasher, RandomState};
+use std::net::SocketAddr;
+use std::time::{Duration, Instant};
+
+use super::counters::Counters;
+use super::error::LinkError;
+use super::frame::{Frame, FrameError, Kind, flag};
+use super::port::Port;
+use super::refusal::Refusal;
+
+/// After this long without an answer, the last frame is sent again.
+const RESEND: Duration = Duration::from_millis(50);
+/// How long a server may take to grant a session.
+const CONNECT: Duration = Duration::from_secs(2);
+/// Copies of the farewell: nobody answers it.
+const FAREWELLS: usize = 3;
+/// Relative difference of two sample times that are the same.
+const SAME_TIME: f64 = 1e-9;
+
+/// A session, seen from the client.
+#[derive(Debug)]
+pub(super) struct Caller {
+    port: Port,
+    peer: SocketAddr,
+    session: u64,
+    sample_time: f64,
+    paced: bool,
+    silence: Duration,
+    counters: Counters,
+    /// Sent again while there is no answer.
+    last: Frame,
+    last_sent: Instant,
+    /// Since when an answer is waited for.
+    waiting: Option<Instant>,
+}
+
+impl Caller {
+    /// Asks `peer` for a session as a rig, or as a `controller`, sampled every `sample_time` s.
+    pub fn connect(
+        peer: SocketAddr,
+        controller: bool,
+        sample_time: f64,
+    ) -> Result<Self, LinkError> {
+        let session = RandomState::new().build_hasher().finish();
+        let mut hello = Frame::new(Kind::Hello, session);
+        hello.flags = if controller { flag::CONTROLLER } else { 0 };
+        hello.values[0] = sample_time;
+        let mut caller = Self {
+            port: Port::towards(peer)?,
+            peer,
+            session,
+            sample_time,
+            paced: false,
+            silence: CONNECT,
+            counters: Counters::default(),
+            last: hello,
+            last_sent: Instant::now(),
+            waiting: None,
+        };
+        caller.send(hello)?;
+        let unreachable = LinkError::Unreachable {
+            peer,
+            role: if controller { "controller" } else { "rig" },
+            seconds: CONNECT.as_secs_f64(),
+        };
+        let mut busy: Option<Refusal> = None;
+        let welcome = loop {
+            let frame = match (caller.receive(None), busy) {
+                (Ok(Some(frame)), _) => frame,
+                (Ok(None), _) => continue,
+                (Err(LinkError::Silent { .. }), Some(reason)) => {
+                    return Err(LinkError::Refused { peer, reason });
+                }
+                (Err(LinkError::Silent { .. }), None) => return Err(unreachable),
+                (Err(other), _) => return Err(other),
+            };
+            match (frame.kind, Refusal::read(&frame)) {
+                (Kind::Welcome, _) => break frame,
+                // Its last client may just be leaving.
+                (Kind::Refusal, reason @ Refusal::Busy) => busy = Some(reason),
+                (Kind::Refusal, reason) => return Err(LinkError::Refused { peer, reason }),
+                _ => {}
+            }
+        };
+        caller.answered();
+        caller.paced = welcome.has(flag::PACED);
+        // What the server believes about silence is what the client does, within reason.
+        caller.silence = Duration::try_from_secs_f64(welcome.values[1]).unwrap_or(CONNECT);
+        Ok(caller)
+    }
+
+    /// Whether the server runs in real time.
+    pub fn is_paced(&self) -> bool {
+        self.paced
+    }
+
+    /// What has happened so far.
+    pub fn counters(&mut self) -> &mut Counters {
+        &mut self.counters
+    }
+
+    /// A frame of sample `sequence`, still without content.
+    pub fn frame(&self, kind: Kind, sequence: u64) -> Frame {
+        Frame {
+            sequence,
+            time: sequence as f64 * self.sample_time,
+            ..Frame::new(kind, self.session)
+        }
+    }
+
+    /// Sends a frame, and keeps it to be sent again.
+    pub fn send(&mut self, frame: Frame) -> Result<(), LinkError> {
+        self.last = frame;
+        self.last_sent = Instant::now();
+        self.counters.sent += 1;
+        Ok(self.port.send(&frame, self.peer)?)
+    }
+
+    /// The next good frame of this session, or None at `until`; the last frame sent is sent again meanwhile.
+    ///
+    /// # Errors
+    /// A peer that has not answered for too long, has shut down its drive, or speaks another version.
+    pub fn receive(&mut self, until: Option<Instant>) -> Result<Option<Frame>, LinkError> {
+        let since = *self.waiting.get_or_insert_with(Instant::now);
+        let end = since + self.silence;
+        let until = until.unwrap_or(end + RESEND);
+        loop {
+            let again = self.last_sent + RESEND;
+            if let Some((datagram, from)) = self.port.receive(until.min(end).min(again))?
+                && let Some(frame) = self.filter(datagram, from)?
+            {
+                return Ok(Some(frame));
+            }
+            let now = Instant::now();
+            if now >= end {
+                return Err(self.silent());
+            }
+            if now >= until {
+                return Ok(None);
+            }
+            if now >= again {
+                self.counters.resent += 1;
+                self.send(self.last)?;
+            }
+        }
+    }
+
+    /// What was waited for is here.
+    pub fn answered(&mut self) {
+        self.waiting = None;
+    }
+
+    /// That the peer is gone.
+    pub fn silent(&self) -> LinkError {
+        LinkError::Silent {
+            peer: self.peer,
+            seconds: self.silence.as_secs_f64(),
+            time: self.last.time,
+        }
+    }
+
+    /// Samples in the longest silence.
+    pub fn patience(&self) -> u64 {
+        (self.silence.as_secs_f64() / self.sample_time) as u64
+    }
+
+    /// Checks that a step is the one agreed on.
+    pub fn check_step(&self, step: f64) -> Result<(), LinkError> {
+        let sample_time = self.sample_time;
+        if same_time(step, sample_time) {
+            return Ok(());
+        }
+        Err(LinkError::Step {
+            peer: self.peer,
+            step,
+            sample_time,
+        })
+    }
+
+    fn filter(
+        &mut self,
+        datagram: Result<Frame, FrameError>,
+        from: SocketAddr,
+    ) -> Result<Option<Frame>, LinkError> {
+        if from != self.peer {
+            self.counters.foreign += 1;
+            return Ok(None);
+        }
+        match datagram {
+            Err(FrameError::Version(theirs)) if self.last.kind == Kind::Hello => {
+                let peer = self.peer;
+                Err(LinkError::Version { peer, theirs })
+            }
+            Err(_) => {
+                self.counters.malformed += 1;
+                Ok(None)
+            }
+            Ok(frame) if frame.session != self.session => {
+                self.counters.foreign += 1;
+                Ok(None)
+            }
+            Ok(frame) if frame.has(flag::SHUT_DOWN) => Err(LinkError::ShutDown {
+                peer: self.peer,
+                time: frame.time,
+            }),
+            Ok(frame) => {
+                self.counters.received += 1;
+                Ok(Some(frame))
+            }
+        }
+    }
+}
+
+impl Drop for Caller {
+    fn drop(&mut self) {
+        if self.counters.is_troubled() {
+            log::warn!("udp://{}: {}", self.peer, self.counters);
+        }
+        for _ in 0..FAREWELLS {
+            // If it cannot be sent, the server's watch ends the session.
+            let _ = self
+                .port
+                .send(&Frame::new(Kind::Farewell, self.session), self.peer);
+        }
+    }
+}
+
+/// Whether two sample times, s, are the same.
+pub(super) fn same_time(a: f64, b: f64) -> bool {
+    (a - b).abs() <= SAME_TIME * b.abs()
+}

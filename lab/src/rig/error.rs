@@ -1,0 +1,28 @@
+//! Why one side of the bench cannot go on.
+
+use thiserror::Error;
+
+use super::FmuError;
+use crate::net::LinkError;
+
+/// Why a rig cannot go on.
+#[derive(Debug, Error)]
+pub enum RigError {
+    /// The rig is an FMU, and it failed.
+    #[error("the rig: {0}")]
+    Fmu(#[from] FmuError),
+    /// The rig is at a network address, and the link failed.
+    #[error("the rig: {0}")]
+    Link(#[from] LinkError),
+}
+
+/// Why a controller cannot go on.
+#[derive(Debug, Error)]
+pub enum ControllerError {
+    /// The controller is an FMU, and it failed.
+    #[error("the controller: {0}")]
+    Fmu(#[from] FmuError),
+    /// The controller is at a network address, and the link failed.
+    #[error("the controller: {0}")]
+    Link(#[from] LinkError),
+}
