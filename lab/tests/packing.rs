@@ -8,14 +8,16 @@ use std::{
     process::Command,
 };
 
-use vines::pack::{Component, Platform, pack};
+use vines::pack::{Binary, Component, Libraries, Platform, pack};
+
+const GUID: &str = "0f2e5d6c-3b1a-4a7e-9c58-d40f1e2b7a96";
 
 fn component() -> Component {
     Component {
         identifier: "Tiny",
         library: "tiny",
         package: "tiny-fmu",
-        description: "<fmiModelDescription/>".into(),
+        description: format!("<fmiModelDescription guid=\"{GUID}\"/>"),
     }
 }
 
@@ -23,10 +25,12 @@ fn library(folder: &Path) -> PathBuf {
     folder.join(format!("{DLL_PREFIX}tiny{DLL_SUFFIX}"))
 }
 
-/// Builds a shared library that exports one function.
-fn build(folder: &Path, function: &str) {
+/// Builds a shared library that exports one function and holds a guid.
+fn build(folder: &Path, function: &str, guid: &str) {
     let source = folder.join("tiny.rs");
-    let code = format!("#[unsafe(no_mangle)] pub extern \"C\" fn {function}() {{}}");
+    let code = format!(
+        "#[unsafe(no_mangle)] pub extern \"C\" fn {function}() -> *const u8 {{ \"{guid}\".as_ptr() }}"
+    );
     fs::write(&source, code).unwrap();
     let rustc = std::env::var_os("RUSTC").unwrap_or("rustc".into());
     let status = Command::new(rustc)
@@ -39,8 +43,12 @@ fn build(folder: &Path, function: &str) {
 }
 
 fn complaint(folder: &Path) -> String {
+    complaint_of(folder, &folder.into())
+}
+
+fn complaint_of(folder: &Path, libraries: &Libraries) -> String {
     let out = folder.join("out");
-    let error = pack(&[component()], folder, &out).expect_err("a mistake");
+    let error = pack(&[component()], libraries, &out).expect_err("a mistake");
     assert!(!out.exists(), "nothing is written");
     error.to_string()
 }
@@ -48,9 +56,9 @@ fn complaint(folder: &Path) -> String {
 #[test]
 fn a_component_is_packed_with_its_library_in_its_platforms_folder() {
     let folder = tempfile::tempdir().unwrap();
-    build(folder.path(), "fmi2Instantiate");
+    build(folder.path(), "fmi2Instantiate", GUID);
     let out = folder.path().join("new/out");
-    let written = pack(&[component()], folder.path(), &out).unwrap();
+    let written = pack(&[component()], &folder.path().into(), &out).unwrap();
     assert_eq!(written, [out.join("Tiny.fmu")]);
     assert_eq!(
         fs::read_dir(&out).unwrap().count(),
@@ -121,6 +129,72 @@ fn a_file_that_is_no_library_is_refused() {
 #[test]
 fn a_library_without_fmi_functions_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    build(folder.path(), "something_else");
+    build(folder.path(), "something_else", GUID);
     assert!(complaint(folder.path()).contains("no FMI 2.0 component"));
+}
+
+#[test]
+fn a_library_of_another_version_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    build(folder.path(), "fmi2Instantiate", "of an older table");
+    assert!(complaint(folder.path()).contains("other variables than Tiny has now"));
+}
+
+/// The same library once more, as one for the platform of a folder.
+fn with_other(folder: &Path, argument: &str) -> Libraries {
+    let path = library(folder).display().to_string();
+    let other: Binary = format!("{argument}={path}").parse().unwrap();
+    Libraries {
+        folder: folder.into(),
+        others: vec![other],
+    }
+}
+
+#[test]
+fn a_platform_is_served_once() {
+    let folder = tempfile::tempdir().unwrap();
+    build(folder.path(), "fmi2Instantiate", GUID);
+    let running = Platform::running().folder;
+    let message = complaint_of(folder.path(), &with_other(folder.path(), running));
+    let expected = format!("the second {running} library of Tiny");
+    assert!(message.contains(&expected), "{message}");
+}
+
+#[test]
+fn a_library_in_the_place_of_another_platform_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    build(folder.path(), "fmi2Instantiate", GUID);
+    let running = Platform::running();
+    let other = if running.folder == "win32" {
+        "linux32"
+    } else {
+        "win32"
+    };
+    let message = complaint_of(folder.path(), &with_other(folder.path(), other));
+    assert!(
+        message.contains(running.name) && message.contains(other),
+        "{message}"
+    );
+}
+
+#[test]
+fn a_library_that_belongs_to_no_component_is_refused() {
+    let (folder, other) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+    build(folder.path(), "fmi2Instantiate", GUID);
+    build(other.path(), "fmi2Instantiate", "of a stranger");
+    let mut libraries = with_other(other.path(), Platform::running().folder);
+    libraries.folder = folder.path().into();
+    let message = complaint_of(folder.path(), &libraries);
+    assert!(message.contains("belongs to none of Tiny"), "{message}");
+}
+
+#[test]
+fn an_unknown_platform_is_named_with_those_there_are() {
+    for (argument, part) in [
+        ("win64", "PLATFORM=PATH"),
+        ("amiga=x.so", "linux64, linux32"),
+    ] {
+        let message = argument.parse::<Binary>().expect_err("a mistake");
+        assert!(message.contains(part), "{message}");
+    }
 }

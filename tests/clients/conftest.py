@@ -1,4 +1,4 @@
-"""Fixtures: the packed bench, the lab's own lock, the clients in their environments, and the table of figures at the end."""
+"""Fixtures: the packed bench, the lab's own lock, the clients in their environments, the table of figures."""
 
 import json
 import os
@@ -37,7 +37,7 @@ def bench(vines: Path, tmp_path_factory: pytest.TempPathFactory) -> Bench:
 
 @pytest.fixture(scope="session")
 def bench_in_millimetres(vines: Path, tmp_path_factory: pytest.TempPathFactory) -> Bench:
-    """The same with lengths in millimetres: every displacement is a thousand times the number, and nothing else changes."""
+    """The same with lengths in millimetres: the numbers of all lengths are a thousand times larger, and no others."""
     return pack(vines, tmp_path_factory.mktemp("millimetres"), *MILLIMETRES)
 
 

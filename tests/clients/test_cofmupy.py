@@ -5,7 +5,7 @@ def test_jacobi_locks_where_the_lab_does(bench, play, check_lock):
     check_lock("cofmupy, Jacobi", bench, play("cofmupy", "jacobi", bench))
 
 
-def test_iterations_with_rollback_lock_where_the_lab_does(bench_in_millimetres, play, check_lock, figure):
+def test_iterations_with_rollback_lock_where_the_lab_does(bench_in_millimetres, play, check_lock):
     """The controller reads the end of its step instead of the start, response and base alike: their phase is the same.
 
     Where nothing moves by 1e-3 cofmupy does not iterate, and there the controller reads the start: response and base

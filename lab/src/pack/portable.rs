@@ -27,7 +27,7 @@ pub fn portable(components: &[Component]) -> Result<PathBuf, PackError> {
         )));
     }
     let target = target_folder(components)?;
-    if !succeeds(cargo().args(["zigbuild", "--version"])) {
+    if !succeeds(cargo().args(["zigbuild", "--help"])) {
         return Err(failed(
             "`cargo zigbuild` was not found; `pip install cargo-zigbuild ziglang` brings it, and \
              `scripts/pack --portable` does that by itself",

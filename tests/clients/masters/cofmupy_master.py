@@ -7,7 +7,7 @@ from scene import Bench, Tape, run
 
 
 class TypedHandler:
-    """cofmupy 1.0 reads and writes every variable as Real, which FMI 2.0 forbids for others: here each has its own type."""
+    """cofmupy 1.0 reads and writes every variable as Real, which FMI 2.0 forbids: here each keeps its own type."""
 
     @staticmethod
     def write(handler: Fmu2Handler, name: str, value: list) -> None:

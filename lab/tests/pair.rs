@@ -1,0 +1,159 @@
+//! Both FMUs coupled through the `fmi` crate, which nobody here wrote.
+
+use std::{
+    fs,
+    io::Read,
+    path::{Path, PathBuf},
+    process::Command,
+};
+
+use fmi::fmi2::import::Fmi2Import;
+use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
+use fmi::traits::FmiImport;
+use vines::experiment::{self, Plan};
+use vines::identification::identify;
+use vines::pack::pack_bench;
+use vines::rig::{BuiltIn, Simulated};
+use vines::scene::Scene;
+
+/// The periods that are driven: the default scene has been locked for 50 by the end of them.
+const PERIODS: f64 = 300.0;
+const HOLD_PERIODS: f64 = 20.0;
+
+/// The libraries of this build; cargo makes one of the two only where it is asked for.
+fn libraries() -> PathBuf {
+    let folder = Path::new(env!("CARGO_BIN_EXE_vines")).parent().unwrap();
+    let mut build = Command::new(env!("CARGO"));
+    build.args(["build", "--quiet", "--locked"]);
+    build.args(["--package", "lovines", "--package", "phase-lock-fmu"]);
+    if folder.ends_with("release") {
+        build.arg("--release");
+    }
+    build.arg("--target-dir").arg(folder.parent().unwrap());
+    assert!(build.status().expect("cargo runs").success());
+    folder.into()
+}
+
+/// One FMU of the pair.
+struct Part {
+    instance: InstanceCS,
+    import: Fmi2Import,
+}
+
+impl Part {
+    /// Loads the FMU and starts it with the values that the system file binds to it.
+    fn start(out: &Path, file: &str, bound: &str) -> Self {
+        let import: Fmi2Import = fmi::import::from_path(out.join(file)).unwrap();
+        let mut part = Self {
+            instance: import.instantiate_cs(file, false, true).unwrap(),
+            import,
+        };
+        for (name, kind, value) in values(&out.join("bench.ssp"), bound) {
+            let reference = [part.find(&name)];
+            let instance = &mut part.instance;
+            match kind.as_str() {
+                "Real" => instance.set_real(&reference, &[value.parse().unwrap()]),
+                "Integer" => instance.set_integer(&reference, &[value.parse().unwrap()]),
+                _ => instance.set_boolean(&reference, &[i32::from(value == "true")]),
+            }
+            .unwrap();
+        }
+        let instance = &mut part.instance;
+        instance.setup_experiment(None, 0.0, None).unwrap();
+        instance.enter_initialization_mode().unwrap();
+        instance.exit_initialization_mode().unwrap();
+        part
+    }
+
+    fn find(&self, name: &str) -> u32 {
+        let mut variables = self
+            .import
+            .model_description()
+            .model_variables
+            .variables
+            .iter();
+        let found = variables.find(|variable| variable.name == name);
+        found.expect("the FMU has the variable").value_reference
+    }
+
+    fn find_two(&self, names: [&str; 2]) -> [u32; 2] {
+        names.map(|name| self.find(name))
+    }
+
+    fn read(&mut self, references: [u32; 2]) -> [f64; 2] {
+        let mut values = [0.0; 2];
+        self.instance.get_real(&references, &mut values).unwrap();
+        values
+    }
+
+    fn advance(&mut self, inputs: [u32; 2], values: [f64; 2], time: f64, step: f64) {
+        self.instance.set_real(&inputs, &values).unwrap();
+        self.instance.do_step(time, step, true).unwrap();
+    }
+}
+
+/// Name, type and value of what a parameter set of the system file binds.
+fn values(system: &Path, name: &str) -> Vec<(String, String, String)> {
+    let mut archive = zip::ZipArchive::new(fs::File::open(system).unwrap()).unwrap();
+    let mut text = String::new();
+    let mut entry = archive.by_name(name).unwrap();
+    entry.read_to_string(&mut text).unwrap();
+    let parameters = text.lines().filter(|line| line.contains("<ssv:Parameter "));
+    let values = parameters.map(|line| {
+        let words: Vec<&str> = line.split('"').collect();
+        let kind = words[2].trim_start_matches("><ssv:");
+        let kind = kind.trim_end_matches(" value=");
+        (words[1].into(), kind.into(), words[3].into())
+    });
+    values.collect()
+}
+
+#[test]
+fn the_pair_coupled_through_the_fmi_crate_locks_where_the_own_loop_does() {
+    let scene = Scene::load(None, &[]).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path();
+    pack_bench(&scene, &libraries().as_path().into(), out).unwrap();
+    let mut plant = Part::start(out, "LoViNes.fmu", "resources/plant.ssv");
+    let mut controller = Part::start(out, "PhaseLock.fmu", "resources/controller.ssv");
+
+    let sensed = plant.find_two(["v", "base"]);
+    let driven = plant.find_two(["omega", "E"]);
+    let sensors = controller.find_two(["response", "reference"]);
+    let drive = controller.find_two(["omega", "E"]);
+    let impacts = [plant.find("impacts")];
+
+    let step = scene.sample_time();
+    let samples = |periods: f64| (periods * scene.controller.samples_per_period) as usize;
+    let (mut omega, mut before, mut after) = (0.0, [0], [0]);
+    let hold = samples(HOLD_PERIODS);
+    for n in 0..samples(PERIODS) {
+        let (readings, command) = (plant.read(sensed), controller.read(drive));
+        if n + hold == samples(PERIODS) {
+            plant.instance.get_integer(&impacts, &mut before).unwrap();
+        }
+        if n + hold >= samples(PERIODS) {
+            omega += command[0] / hold as f64;
+        }
+        let time = n as f64 * step;
+        controller.advance(sensors, readings, time, step);
+        plant.advance(driven, command, time, step);
+    }
+    plant.instance.get_integer(&impacts, &mut after).unwrap();
+
+    let sigma = scene.dimensionless().sigma(omega);
+    let off = sigma - own_sigma(&scene);
+    println!("sigma = {sigma:.6}, off the own loop by {off:.1e}");
+    assert!(off.abs() < 5e-3);
+    let hits = after[0] - before[0];
+    assert!((39..=41).contains(&hits), "{hits} impacts in 20 periods");
+}
+
+/// Where the lab's own loop locks.
+fn own_sigma(scene: &Scene) -> f64 {
+    let mut rig = Simulated::new(scene).unwrap();
+    let mut controller = BuiltIn::new(scene).unwrap();
+    let plan = Plan::of(scene);
+    let record = experiment::run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
+    identify(&record, scene).unwrap().lock.sigma
+}
