@@ -8,6 +8,7 @@ use tempfile::TempDir;
 use vines::{
     experiment::{self, Plan, Stage},
     identification, pack, report,
+    rig::BuiltIn,
 };
 
 use super::{
@@ -62,11 +63,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .format_timestamp(None)
         .init();
     let reach = arguments.reach.reach();
-    // Everything that can be refused is refused before anything is written.
-    let fmus = Packed::at(&arguments.out)?;
-    let OpenRig { mut rig, paced } = match &arguments.rig {
-        Some(door) => door.rig(&scene, reach)?,
-        None => Door::Fmu(fmus.plant()?).rig(&scene, reach)?,
+    // Settings are refused before anything is written or connected.
+    BuiltIn::new(&scene).map_err(Failure::input)?;
+    let (OpenRig { mut rig, paced }, fmus) = match &arguments.rig {
+        Some(door) => (door.rig(&scene, reach)?, Packed::at(&arguments.out)?),
+        None => {
+            let fmus = Packed::at(&arguments.out)?;
+            (Door::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
+        }
     };
     let mut controller = arguments.controller.controller(&scene, reach, paced)?;
     let plan = Plan::of(&scene);
