@@ -11,7 +11,7 @@ use serde::Deserialize;
 
 use super::{Component, PackError, library, platform::Platform, symbols::glibc};
 
-/// The newest version of the GNU C library that a portable library may ask for: every Linux since 2014 has it.
+/// The newest version of the GNU C library that a portable library may ask for: every glibc Linux since 2014 has it.
 pub const GLIBC: (u32, u32) = (2, 17);
 
 /// Builds the libraries of the components for older Linux, from the sources in the working folder, and returns the
