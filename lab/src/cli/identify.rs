@@ -61,11 +61,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .format_timestamp(None)
         .init();
     let reach = arguments.reach.reach();
-    let OpenRig { mut rig, paced } = match &arguments.rig {
+    let OpenRig { mut rig, pace } = match &arguments.rig {
         Some(door) => door.rig(&scene, reach)?,
         None => Door::Fmu(packed_plant(&arguments.out)?).rig(&scene, reach)?,
     };
-    let mut controller = arguments.controller.controller(&scene, reach, paced)?;
+    let mut controller = arguments.controller.controller(&scene, reach, pace)?;
     let bar = progress_bar();
     let record = experiment::run(
         rig.as_mut(),

@@ -206,7 +206,8 @@ fn a_controller_that_vanishes_brings_the_drive_of_the_rig_down() {
         _ => Fate::Pass,
     });
     let mut rig = NetRig::connect(rig_server.address, scene.sample_time()).unwrap();
-    let mut peer = NetController::connect(proxy.address, scene.sample_time(), true).unwrap();
+    let mut peer =
+        NetController::connect(proxy.address, scene.sample_time(), Some(PATIENT)).unwrap();
     let outcome = experiment::run(&mut rig, &mut peer, &Plan::of(&scene), |_, _, _| {});
     let Err(ExperimentError::Controller(error)) = outcome else {
         panic!("{outcome:?}");
