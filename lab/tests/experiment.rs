@@ -2,6 +2,7 @@
 
 use vines::experiment::{self, ExperimentError, Plan, Record};
 use vines::identification::{Identification, IdentificationError, Regime, identify};
+use vines::net::LinkError;
 use vines::rig::{
     BuiltIn, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated,
     Witness,
@@ -132,6 +133,46 @@ fn a_rig_that_does_not_tell_its_impacts_has_an_unknown_regime() {
             ..
         }
     ));
+}
+
+/// A controller that drives for a while, then fails.
+struct Failing(usize);
+
+impl Controller for Failing {
+    fn sample(&mut self, _: Sensors, _: bool) -> Result<Command, ControllerError> {
+        let left = self.0.checked_sub(1);
+        self.0 = left.ok_or_else(|| LinkError::System(std::io::ErrorKind::NotConnected.into()))?;
+        Ok(Command {
+            drive: Drive {
+                omega: 1.0,
+                amplitude: 0.01,
+                displacement: 0.0,
+            },
+            ..Command::default()
+        })
+    }
+}
+
+/// A rig that keeps its last drive.
+struct Shaken(Drive);
+
+impl Rig for Shaken {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        Ok(Sensors::default())
+    }
+
+    fn advance(&mut self, drive: Drive, _: f64) -> Result<(), RigError> {
+        self.0 = drive;
+        Ok(())
+    }
+}
+
+#[test]
+fn a_controller_that_fails_does_not_leave_the_rig_driven() {
+    let (scene, mut rig) = (scene(&[]), Shaken(Drive::default()));
+    let outcome = experiment::run(&mut rig, &mut Failing(10), &plan(&scene), |_, _, _| {});
+    assert!(matches!(outcome, Err(ExperimentError::Controller(_))));
+    assert_eq!(rig.0, Drive::default());
 }
 
 /// A controller that runs open loop.

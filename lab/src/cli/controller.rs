@@ -7,7 +7,7 @@ use vines::rig::{BuiltIn, Controller};
 use super::{
     failure::Failure,
     scene_arguments::SceneArguments,
-    serving::{ServingArguments, seconds},
+    serving::{ServingArguments, positive},
 };
 
 const HELP: &str = "\
@@ -30,7 +30,7 @@ pub(super) struct Arguments {
     serving: ServingArguments,
 
     /// Longest silence before the session is shut down, s
-    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = positive)]
     silence: f64,
 }
 

@@ -43,41 +43,41 @@ impl FromStr for Door {
     }
 }
 
-/// A rig, and whether it runs in real time.
+/// A rig, and the longest silence, s, that it bears where it runs in real time.
 pub(super) struct OpenRig {
     pub rig: Box<dyn Rig>,
-    pub paced: bool,
+    pub pace: Option<f64>,
 }
 
 impl Door {
     /// The rig behind this door.
     pub(super) fn rig(&self, scene: &Scene, reach: Reach) -> Result<OpenRig, Failure> {
-        let mut paced = false;
+        let mut pace = None;
         let rig: Box<dyn Rig> = match self {
             Self::BuiltIn => Box::new(Simulated::new(scene).map_err(Failure::input)?),
             Self::Fmu(file) => Box::new(FmuRig::load(file, scene).map_err(Failure::run)?),
             Self::Udp(address) => {
                 let rig = NetRig::connect(resolve(address, reach)?, scene.sample_time())?;
-                paced = rig.is_paced();
+                pace = rig.pace();
                 Box::new(rig)
             }
         };
-        Ok(OpenRig { rig, paced })
+        Ok(OpenRig { rig, pace })
     }
 
-    /// The controller behind this door, for a rig that is `paced` or not.
+    /// The controller behind this door, beside a rig of that `pace`.
     pub(super) fn controller(
         &self,
         scene: &Scene,
         reach: Reach,
-        paced: bool,
+        pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
         Ok(match self {
             Self::BuiltIn => Box::new(BuiltIn::new(scene).map_err(Failure::input)?),
             Self::Fmu(file) => Box::new(FmuController::load(file, scene).map_err(Failure::run)?),
             Self::Udp(address) => {
                 let peer = resolve(address, reach)?;
-                Box::new(NetController::connect(peer, scene.sample_time(), paced)?)
+                Box::new(NetController::connect(peer, scene.sample_time(), pace)?)
             }
         })
     }

@@ -65,14 +65,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let reach = arguments.reach.reach();
     // Settings are refused before anything is written or connected.
     BuiltIn::new(&scene).map_err(Failure::input)?;
-    let (OpenRig { mut rig, paced }, fmus) = match &arguments.rig {
+    let (OpenRig { mut rig, pace }, fmus) = match &arguments.rig {
         Some(door) => (door.rig(&scene, reach)?, Packed::at(&arguments.out)?),
         None => {
             let fmus = Packed::at(&arguments.out)?;
             (Door::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
         }
     };
-    let mut controller = arguments.controller.controller(&scene, reach, paced)?;
+    let mut controller = arguments.controller.controller(&scene, reach, pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(&plan);
     let record = experiment::run(

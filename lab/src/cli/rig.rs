@@ -7,7 +7,7 @@ use vines::rig::{Rig, Simulated};
 use super::{
     failure::Failure,
     scene_arguments::SceneArguments,
-    serving::{ServingArguments, seconds},
+    serving::{ServingArguments, positive},
 };
 
 const HELP: &str = "\
@@ -42,11 +42,11 @@ pub(super) struct Arguments {
     lock_step: bool,
 
     /// Longest silence before the drive is shut down, s [default: 0.1, with --lock-step 5]
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
     silence: Option<f64>,
 
     /// Largest drive amplitude that is taken, m [default: the half-width b of the cavity]
-    #[arg(long, value_name = "METRES")]
+    #[arg(long, value_name = "METRES", value_parser = positive)]
     max_amplitude: Option<f64>,
 }
 

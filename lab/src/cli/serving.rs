@@ -24,7 +24,7 @@ pub(super) struct ServingArguments {
     reach: ReachArguments,
 
     /// End after this long, s; without it, on Ctrl-C
-    #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
     duration: Option<f64>,
 
     /// End after this many sessions
@@ -76,12 +76,12 @@ impl ServingArguments {
     }
 }
 
-/// A time in seconds: above 0, at most some years.
-pub(super) fn seconds(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "a number of seconds is wanted")?;
+/// A number above 0 and at most 1e8: seconds up to some years, or metres.
+pub(super) fn positive(text: &str) -> Result<f64, String> {
+    let value: f64 = text.parse().map_err(|_| "a number is wanted")?;
     if value > 0.0 && value <= 1e8 {
         Ok(value)
     } else {
-        Err("must be above 0 and at most 1e8 s".into())
+        Err("must be above 0 and at most 1e8".into())
     }
 }

@@ -91,9 +91,15 @@ impl Caller {
         Ok(caller)
     }
 
-    /// Whether the server runs in real time.
-    pub fn is_paced(&self) -> bool {
-        self.paced
+    /// Longest silence, s, where the server runs in real time.
+    pub fn pace(&self) -> Option<f64> {
+        self.paced.then_some(self.silence.as_secs_f64())
+    }
+
+    /// Allows no longer silence than this, s.
+    pub fn limit_silence(&mut self, seconds: f64) {
+        let limit = Duration::try_from_secs_f64(seconds).unwrap_or_default();
+        self.silence = self.silence.min(limit);
     }
 
     /// What has happened so far.

@@ -26,17 +26,26 @@ pub struct NetController {
 impl NetController {
     /// Asks the controller server at `peer` for a session, sampled every `sample_time` s.
     ///
-    /// With a rig that runs in real time (`paced`), an answer is waited for by half a sample period, then the last one is
-    /// held. Else the rig waits, too.
+    /// Beside a rig in real time, an answer is waited for by half a sample period, then the last one is held; `pace` is
+    /// the longest silence, s, that such a rig bears, and the controller is granted no longer one. Else (None) the rig waits,
+    /// too.
     ///
     /// # Errors
     /// A server that is not there, refuses, or speaks another version.
-    pub fn connect(peer: SocketAddr, sample_time: f64, paced: bool) -> Result<Self, LinkError> {
+    pub fn connect(
+        peer: SocketAddr,
+        sample_time: f64,
+        pace: Option<f64>,
+    ) -> Result<Self, LinkError> {
+        let mut caller = Caller::connect(peer, true, sample_time)?;
+        if let Some(seconds) = pace {
+            caller.limit_silence(seconds);
+        }
         Ok(Self {
-            caller: Caller::connect(peer, true, sample_time)?,
+            caller,
             order: Order::default(),
             at: 0,
-            patience: paced.then(|| Duration::from_secs_f64(0.5 * sample_time)),
+            patience: pace.map(|_| Duration::from_secs_f64(0.5 * sample_time)),
             good: Command::default(),
             failed: false,
         })

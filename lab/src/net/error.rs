@@ -78,7 +78,8 @@ pub enum LinkError {
     },
     /// The peer has taken its drive away.
     #[error(
-        "udp://{peer} has shut down its drive, at t = {time} s of the experiment: it had heard nothing from here for too long"
+        "udp://{peer} has shut down its drive, at t = {time} s of the experiment: it was stopped, or had heard nothing from \
+         here for too long"
     )]
     ShutDown {
         /// The address.

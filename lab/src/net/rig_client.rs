@@ -43,10 +43,10 @@ impl NetRig {
         })
     }
 
-    /// Whether the rig runs in real time.
+    /// The longest silence, s, that a rig in real time bears; None for one in lock-step.
     #[must_use]
-    pub fn is_paced(&self) -> bool {
-        self.caller.is_paced()
+    pub fn pace(&self) -> Option<f64> {
+        self.caller.pace()
     }
 
     /// What has happened on the link.

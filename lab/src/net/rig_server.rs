@@ -170,7 +170,7 @@ impl RigServer {
         };
         if let Some(pace) = &mut run.pace {
             pace.serve(run.at + 1);
-            if run.newest != Some(run.at) {
+            if run.newest != Some(run.at) && !run.watch.is_latched() {
                 self.host.counters.held += 1;
                 run.watch.silent(self.service.sample_time);
             }

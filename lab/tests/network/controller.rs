@@ -44,7 +44,8 @@ fn a_lost_reading_is_replaced_by_the_last_good_one_so_that_no_sample_is_missing(
         (Kind::Sensors, 5) => Fate::Lose,
         _ => Fate::Pass,
     });
-    let mut peer = NetController::connect(proxy.address, scene.sample_time(), true).unwrap();
+    let mut peer =
+        NetController::connect(proxy.address, scene.sample_time(), Some(PATIENT)).unwrap();
     let answers: Vec<Command> = (0..200)
         .map(|n| peer.sample(reading(n), true).unwrap())
         .collect();
@@ -77,7 +78,8 @@ fn a_held_drive_is_none_once_the_drive_is_not_wanted() {
         Kind::Drive if n >= 10 => Fate::Lose,
         _ => Fate::Pass,
     });
-    let mut peer = NetController::connect(proxy.address, scene.sample_time(), true).unwrap();
+    let mut peer =
+        NetController::connect(proxy.address, scene.sample_time(), Some(PATIENT)).unwrap();
     for n in 0..20 {
         peer.sample(reading(n), true).unwrap();
     }
@@ -95,8 +97,8 @@ fn a_controller_that_vanishes_is_an_error_that_stays() {
         Kind::Drive if n >= 30 => Fate::Lose,
         _ => Fate::Pass,
     });
-    for paced in [false, true] {
-        let mut peer = NetController::connect(proxy.address, scene.sample_time(), paced).unwrap();
+    for pace in [None, Some(0.3)] {
+        let mut peer = NetController::connect(proxy.address, scene.sample_time(), pace).unwrap();
         let error = (0..5000)
             .find_map(|n| peer.sample(reading(n), true).err())
             .unwrap();
@@ -111,7 +113,7 @@ fn a_controller_that_vanishes_is_an_error_that_stays() {
 fn a_client_that_is_silent_for_too_long_gets_no_more_drive() {
     let scene = scene(&[]);
     let server = controller(&scene, 0.2);
-    let mut peer = NetController::connect(server.address, scene.sample_time(), false).unwrap();
+    let mut peer = NetController::connect(server.address, scene.sample_time(), None).unwrap();
     peer.sample(reading(0), true).unwrap();
     assert_eq!(server.sessions(1)[0].ended, Ended::Silence);
     std::thread::sleep(Duration::from_millis(20));

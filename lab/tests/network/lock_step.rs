@@ -29,7 +29,7 @@ fn an_experiment_across_the_network_gives_the_same_bits() {
     {
         let mut rig = NetRig::connect(rig_server.address, sample_time).unwrap();
         let mut peer =
-            NetController::connect(controller_server.address, sample_time, false).unwrap();
+            NetController::connect(controller_server.address, sample_time, None).unwrap();
         assert_eq!(measure(&scene, &mut rig, &mut peer), direct);
     }
     for session in [rig_server.sessions(1), controller_server.sessions(1)] {

@@ -6,11 +6,12 @@
 use std::thread::sleep;
 use std::time::Duration;
 
+use vines::experiment::{self, ExperimentError, Plan};
 use vines::net::frame::Kind;
-use vines::net::{Counters, Ended, LinkError, NetRig, RAMP_SAMPLES, Session};
+use vines::net::{Counters, Ended, LinkError, NetController, NetRig, RAMP_SAMPLES, Session};
 use vines::rig::{Drive, Rig, RigError};
 
-use crate::bench::{drive, paced_rig, scene, shake};
+use crate::bench::{controller, drive, paced_rig, scene, shake};
 use crate::proxy::{Fate, Proxy};
 
 /// A silence that no busy machine makes by itself.
@@ -193,4 +194,28 @@ fn a_rig_that_vanishes_ends_the_experiment() {
         matches!(error, RigError::Link(LinkError::Silent { .. })),
         "{error}"
     );
+}
+
+#[test]
+fn a_controller_that_vanishes_brings_the_drive_of_the_rig_down() {
+    let scene = scene(&[]);
+    let (rig_server, log) = paced_rig(&scene, PATIENT);
+    let controller_server = controller(&scene, PATIENT);
+    let proxy = Proxy::before(controller_server.address, |kind, n| match kind {
+        Kind::Drive if n >= 200 => Fate::Lose,
+        _ => Fate::Pass,
+    });
+    let mut rig = NetRig::connect(rig_server.address, scene.sample_time()).unwrap();
+    let mut peer =
+        NetController::connect(proxy.address, scene.sample_time(), Some(PATIENT)).unwrap();
+    let outcome = experiment::run(&mut rig, &mut peer, &Plan::of(&scene), |_, _, _| {});
+    let Err(ExperimentError::Controller(error)) = outcome else {
+        panic!("{outcome:?}");
+    };
+    println!("{error}");
+    drop(rig);
+    assert_eq!(rig_server.sessions(1)[0].ended, Ended::Farewell);
+    let drives = log.lock().unwrap();
+    assert!(drives.iter().any(|drive| drive.amplitude > 9e-5));
+    assert_eq!(drives.last().unwrap().amplitude, 0.0);
 }

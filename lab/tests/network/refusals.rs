@@ -75,7 +75,7 @@ fn a_rig_and_a_controller_are_not_taken_for_each_other() {
     let sample_time = scene.sample_time();
     let error = NetRig::connect(peer.address, sample_time).unwrap_err();
     assert_eq!(refused(&error), Refusal::Role);
-    let error = NetController::connect(rig.address, sample_time, false).unwrap_err();
+    let error = NetController::connect(rig.address, sample_time, None).unwrap_err();
     assert_eq!(refused(&error), Refusal::Role);
 }
 
