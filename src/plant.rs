@@ -350,6 +350,21 @@ impl Plant {
         }
     }
 
+    /// Takes over other parameters from now on; displacements, velocities and counts stay. The masses and the half-width
+    /// are meant to stay, too: nothing here says what their change would do.
+    ///
+    /// # Errors
+    /// Parameters that make no sense; the old ones stay.
+    pub fn retune(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
+        parameters.validate()?;
+        let joint = parameters.primary_mass + parameters.particle_mass;
+        self.law = ImpactLaw::new(&parameters);
+        self.alone = Driven::new(parameters.primary_mass, &parameters);
+        self.joint = Driven::new(joint, &parameters);
+        self.parameters = parameters;
+        Ok(())
+    }
+
     /// The parameters.
     pub fn parameters(&self) -> &Parameters {
         &self.parameters
