@@ -29,6 +29,8 @@ struct LoViNes {
     rig: Rig,
     /// How far the rig has come.
     progress: Progress,
+    /// The fastest rate of the motion but for that of the drive, rad/s.
+    fastest: f64,
     /// Whether an input was set since the last step: the base is where they say, not where the step ended.
     inputs_set: bool,
 }
@@ -38,6 +40,14 @@ struct LoViNes {
 enum Rig {
     Steps(Plant),
     Equations(Hybrid),
+}
+
+/// The longest step that is taken, in radians of the fastest rate: more than a million periods.
+const LONGEST_STEP: f64 = 1e7;
+
+/// The rate that bounds what a second of simulation costs.
+fn fastest(p: &Parameters) -> f64 {
+    (p.natural_frequency()).max(p.damping / p.primary_mass)
 }
 
 #[derive(Clone, Copy, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
@@ -109,6 +119,7 @@ impl LoViNes {
             }
         }
         self.parameters = parameters;
+        self.fastest = fastest(&parameters);
         Ok(())
     }
 }
@@ -128,6 +139,7 @@ impl Component for LoViNes {
             omega: 0.0,
             rig: Rig::Steps(Plant::new(parameters, start).expect("unit parameters make sense")),
             progress: Progress::None,
+            fastest: 0.0,
             inputs_set: false,
         }
     }
@@ -203,9 +215,22 @@ impl Component for LoViNes {
             }
             Rig::Equations(hybrid) => *hybrid = Hybrid::new(self.parameters, self.start, drive)?,
         }
+        self.fastest = fastest(&self.parameters);
         self.progress = Progress::Initialised;
         self.inputs_set = false;
         Ok(())
+    }
+
+    fn accept_step(&self, step: f64) -> Result<(), Refusal> {
+        let rate = self.fastest.max(self.omega.abs());
+        if step * rate <= LONGEST_STEP {
+            return Ok(());
+        }
+        let longest = LONGEST_STEP / rate;
+        Err(Refusal::error(format!(
+            "communicationStepSize = {step} s is refused; allowed are at most {longest} s, which is {LONGEST_STEP} rad \
+             of the fastest rate"
+        )))
     }
 
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {

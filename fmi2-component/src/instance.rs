@@ -134,13 +134,13 @@ impl<C: Component> Instance<C> {
             stop_time,
             ..
         } = &self.session;
-        if !(step.is_finite() && step >= 0.0 && (time + step).is_finite()) {
+        if !(step.is_finite() && step >= 0.0) {
             return Err(Refusal::error(format!(
                 "communicationStepSize = {step} s is refused; allowed is a finite number of at least 0"
             )));
         }
         let tolerance = CLOCK_TOLERANCE * own.abs().max(step);
-        if time.is_nan() || (time - own).abs() > tolerance {
+        if !(time + step).is_finite() || (time - own).abs() > tolerance {
             return Err(Refusal::error(format!(
                 "currentCommunicationPoint = {time} s is refused; the last step has ended at {own} s"
             )));
@@ -150,7 +150,7 @@ impl<C: Component> Instance<C> {
                 "a step at {time} s is refused; the experiment was set up to end at stopTime = {stop_time} s"
             )));
         }
-        Ok(())
+        self.session.component.accept_step(step)
     }
 }
 

@@ -43,7 +43,7 @@
 //! - A setter is called only for a variable that may be set in the present state, and a real value is finite.
 //! - [`Component::initialise`] is called before the first step, and in Initialization Mode before a computed value is
 //!   read after something was set. Outputs that depend on inputs are thus right however often inputs are set.
-//! - [`Component::step`] is called with a positive length; communication points follow each other within 1e-9 of
+//! - [`Component::step`] is called with a positive length that [`Component::accept_step`] has accepted; communication points follow each other within 1e-9 of
 //!   their size.
 //! - A panic goes no further than the call: it is logged, and the instance is then of no use but to be freed.
 //!

@@ -35,6 +35,9 @@ struct Running {
 const ADAPTIVE: i32 = 1;
 const DEMODULATOR: i32 = 2;
 
+/// The most samples that one step may hold.
+const MOST_SAMPLES: f64 = 1e7;
+
 impl Controller {
     /// The configuration that the values set make.
     fn configuration(&self) -> Result<Config, Refusal> {
@@ -219,6 +222,17 @@ impl Component for Controller {
             state,
         });
         Ok(())
+    }
+
+    fn accept_step(&self, step: f64) -> Result<(), Refusal> {
+        let sample_time = self.config.sample_time;
+        if step / sample_time <= MOST_SAMPLES {
+            return Ok(());
+        }
+        let longest = MOST_SAMPLES * sample_time;
+        Err(Refusal::error(format!(
+            "communicationStepSize = {step} s is refused; allowed are at most {longest} s, which is {MOST_SAMPLES} samples"
+        )))
     }
 
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
