@@ -7,6 +7,7 @@ mod exchange;
 mod log;
 
 use crate::hybrid::Hybrid;
+use crate::plant::MOST_IMPACTS;
 use crate::{Drive, InvalidValue, Parameters, Plant, State};
 use fmi2_component::{Archive, Component, Log, Refusal};
 use variables::{Integer, Model, Real, category};
@@ -37,13 +38,30 @@ struct LoViNes {
 
 /// The rig as the master's choice of interface wants it.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
+#[allow(clippy::large_enum_variant)] // one of them in an instance, and no way round by a pointer in every step
 enum Rig {
     Steps(Plant),
     Equations(Hybrid),
 }
 
-/// The longest step that is taken, in radians of the fastest rate: more than a million periods.
-const LONGEST_STEP: f64 = 1e7;
+/// The longest step that is taken, in radians of the fastest rate: more than ten thousand periods.
+const LONGEST_STEP: f64 = 1e5;
+
+/// Why a step could not be finished.
+#[cold]
+fn lost(finite: bool, time: f64, step: f64) -> Refusal {
+    Refusal::error(if finite {
+        format!(
+            "there are more than {MOST_IMPACTS} impacts within the step of {step} s at t = {time} s; expected are \
+             velocities and a half-width of the cavity that make sense together, or a shorter step"
+        )
+    } else {
+        format!(
+            "displacements and velocities have left the range of numbers in the step at t = {time} s; expected are \
+             start values and inputs of a sensible size"
+        )
+    })
+}
 
 /// The rate that bounds what a second of simulation costs.
 fn fastest(p: &Parameters) -> f64 {
@@ -239,14 +257,19 @@ impl Component for LoViNes {
             return Err(Refusal::error("a step is of co-simulation"));
         };
         plant.set_time(time);
-        if log.wants(category::logEvents) || log.wants(category::logImpacts) {
-            plant.advance_with(drive, step, |event| log::tell(log, time, event));
+        let outcome = if log.wants(category::logEvents) || log.wants(category::logImpacts) {
+            plant.advance_with(drive, step, |event| log::tell(log, time, event))
         } else {
-            plant.advance(drive, step);
-        }
+            plant.advance(drive, step)
+        };
         self.e = [self.e[0], 0.0, 0.0, 0.0];
         self.progress = Progress::UnderWay;
         self.inputs_set = false;
+        let state = plant.state();
+        let finite = (state.q1 + state.dq1 + state.dq2).is_finite();
+        if outcome.cut_short || !finite {
+            return Err(lost(finite, time, step));
+        }
         Ok(())
     }
 

@@ -157,7 +157,8 @@ impl Hybrid {
             tell(Event::Released { t: 0.0, wall });
         } else if self.contact.is_none() {
             let now = self.instant();
-            let touched = (Wall::BOTH.into_iter()).find(|&wall| self.gap(wall, &now) <= 0.0);
+            let touched =
+                (Wall::BOTH.into_iter()).find(|&wall| self.gap(wall, &now) <= 0.5 * DEPTH);
             if let Some(wall) = touched {
                 self.touch(wall, time, &mut tell);
             }

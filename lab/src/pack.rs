@@ -2,6 +2,7 @@
 
 mod archive;
 mod components;
+mod documentation;
 mod error;
 mod library;
 mod platform;
@@ -9,6 +10,7 @@ mod platform;
 use std::path::{Path, PathBuf};
 
 pub use components::{Component, components};
+pub use documentation::documentation;
 pub use error::PackError;
 pub use platform::Platform;
 
@@ -42,10 +44,16 @@ pub fn pack(
             platform.folder,
             std::env::consts::DLL_SUFFIX
         );
-        let entries = [
+        let pages = documentation(name, &component.description).map_err(PackError::Description)?;
+        let mut entries = vec![
             ("modelDescription.xml", component.description.as_bytes()),
             (inside.as_str(), binary.as_slice()),
         ];
+        entries.extend(
+            pages
+                .iter()
+                .map(|(name, page)| (name.as_str(), page.as_slice())),
+        );
         let path = out.join(format!("{name}.fmu"));
         finished.push((archive::write(out, &entries)?, path));
     }

@@ -45,6 +45,8 @@ impl Tally {
     }
 }
 
+/// A call that takes longer is told of.
+const SLOW: Duration = Duration::from_secs(2);
 /// Calls in a sequence.
 const CALLS: usize = 80;
 
@@ -75,6 +77,13 @@ pub fn sequence(fmu: &Fmu, seed: u64) -> Tally {
         let began = Instant::now();
         let (name, status) = caller.call(&mut dice);
         tally.longest = tally.longest.max(began.elapsed());
+        if began.elapsed() > SLOW {
+            eprintln!(
+                "slow: {:?} for {name} ({status:?}) of {}, {interface:?}, seed {seed}, call {n}",
+                began.elapsed(),
+                fmu.name
+            );
+        }
         tally.statuses[status as usize] += 1;
         let heard = master.heard();
         let place = || {

@@ -52,6 +52,9 @@ pub enum PackError {
         /// The package that builds it.
         package: &'static str,
     },
+    /// The description is no XML.
+    #[error("the description cannot be read: {0}")]
+    Description(roxmltree::Error),
     /// The FMU could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {
