@@ -1,6 +1,14 @@
 //! The plant as an FMI 2.0 component: which variable is which number of the physics.
+//!
+//! For co-simulation that is the plant in closed form, for model exchange its equations.
 
-use crate::{Drive, Event, Parameters, Plant, State, Wall};
+mod derivatives;
+mod exchange;
+mod log;
+
+use crate::hybrid::Hybrid;
+use crate::plant::MOST_IMPACTS;
+use crate::{Drive, InvalidValue, Parameters, Plant, State};
 use fmi2_component::{Archive, Component, Log, Refusal};
 use variables::{Integer, Model, Real, category};
 
@@ -8,12 +16,9 @@ mod variables {
     include!(concat!(env!("OUT_DIR"), "/variables.rs"));
 }
 
-fmi2_component::export!(LoViNes);
+fmi2_component::export!(LoViNes, model_exchange);
 
-/// Radians of the fastest motion in one step: 16 million periods, some seconds of work.
-const MOST_RADIANS: f64 = 1e8;
-
-/// What a master has set, and the plant that came of it.
+/// What a master has set, and the rig that came of it.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct LoViNes {
     parameters: Parameters,
@@ -22,11 +27,54 @@ struct LoViNes {
     e: [f64; 4],
     amplitude: f64,
     omega: f64,
-    plant: Plant,
-    /// Whether the plant has left its start: until then the outputs with exact start values are just those.
-    stepped: bool,
+    rig: Rig,
+    /// How far the rig has come.
+    progress: Progress,
+    /// The fastest rate of the motion but for that of the drive, rad/s.
+    fastest: f64,
     /// Whether an input was set since the last step: the base is where they say, not where the step ended.
     inputs_set: bool,
+}
+
+/// The rig as the master's choice of interface wants it.
+#[derive(Clone, serde::Serialize, serde::Deserialize)]
+#[allow(clippy::large_enum_variant)] // one of them in an instance, and no way round by a pointer in every step
+enum Rig {
+    Steps(Plant),
+    Equations(Hybrid),
+}
+
+/// The longest step that is taken, in radians of the fastest rate: more than ten thousand periods.
+const LONGEST_STEP: f64 = 1e5;
+
+/// Why a step could not be finished.
+#[cold]
+fn lost(finite: bool, time: f64, step: f64) -> Refusal {
+    Refusal::error(if finite {
+        format!(
+            "there are more than {MOST_IMPACTS} impacts within the step of {step} s at t = {time} s; expected are \
+             velocities and a half-width of the cavity that make sense together, or a shorter step"
+        )
+    } else {
+        format!(
+            "displacements and velocities have left the range of numbers in the step at t = {time} s; expected are \
+             start values and inputs of a sensible size"
+        )
+    })
+}
+
+/// The rate that bounds what a second of simulation costs.
+fn fastest(p: &Parameters) -> f64 {
+    (p.natural_frequency()).max(p.damping / p.primary_mass)
+}
+
+#[derive(Clone, Copy, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
+enum Progress {
+    /// It is not yet made of the values set.
+    None,
+    /// It stands at its start: the outputs with exact start values are just those.
+    Initialised,
+    UnderWay,
 }
 
 impl LoViNes {
@@ -39,48 +87,58 @@ impl LoViNes {
         }
     }
 
-    /// Numbers that are finite each by itself can still be beyond what double precision can put together.
-    fn check_state(&self) -> Result<(), Refusal> {
-        let State { q1, dq1, q2, dq2 } = self.plant.state();
-        let w = self.plant.relative_displacement();
-        let finite = [q1, dq1, q2, dq2].iter().all(|x| x.is_finite());
-        if finite && w.abs() <= self.parameters.half_width {
-            return Ok(());
-        }
-        Err(Refusal::error(format!(
-            "the state is beyond double precision: q1 = {q1} m, q2 = {q2} m, w = {w} m; \
-             allowed are inputs and start values of a size that leaves w from -b to b = {} m some digits",
-            self.parameters.half_width
-        )))
-    }
-
-    /// A step takes time in proportion to the radians of the fastest motion in it.
-    fn check_step(&self, drive: &Drive, step: f64) -> Result<(), Refusal> {
-        let rate = self.parameters.fastest_rate().max(drive.omega.abs());
-        if rate * step <= MOST_RADIANS {
-            return Ok(());
-        }
-        Err(Refusal::error(format!(
-            "a step of {step} s is refused; allowed is at most {} s while the fastest rate of the motion is {rate} rad/s \
-             ({MOST_RADIANS} rad in one step)",
-            MOST_RADIANS / rate
-        )))
-    }
-
-    fn state(&self) -> State {
-        if self.stepped {
-            self.plant.state()
-        } else {
-            self.start
+    /// A value that follows from the plant's state.
+    fn of_plant(&self, plant: &Plant, variable: Real) -> f64 {
+        let state = || match self.progress {
+            Progress::UnderWay => plant.state(),
+            _ => self.start,
+        };
+        match variable {
+            Real::q1 => state().q1,
+            Real::der_q1 => state().dq1,
+            Real::q2 => state().q2,
+            Real::der_q2 => state().dq2,
+            Real::v => plant.centre(),
+            Real::w => plant.relative_displacement(),
+            Real::der_w => plant.relative_velocity(),
+            Real::base => self.base(plant),
+            Real::phase => plant.base().phase.radians(),
+            Real::impact_time => plant.tally().impact_time,
+            Real::impact_velocity => plant.tally().impact_velocity,
+            Real::energy => plant.energy(self.base(plant)),
+            Real::dissipated => plant.tally().dissipated,
+            _ => derivatives::of_instant(&self.instant(plant), variable),
         }
     }
 
-    fn base(&self) -> f64 {
+    fn base(&self, plant: &Plant) -> f64 {
         if self.inputs_set {
-            self.plant.base().with(self.drive()).displacement()
+            plant.base().with(self.drive()).displacement()
         } else {
-            self.plant.base().displacement()
+            plant.base().displacement()
         }
+    }
+
+    /// Tells the rig of changed inputs.
+    fn input(&mut self) {
+        self.inputs_set = true;
+        let drive = self.drive();
+        if let Rig::Equations(hybrid) = &mut self.rig {
+            hybrid.drive = drive;
+        }
+    }
+
+    /// Tells the rig of changed parameters.
+    fn retune(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
+        if self.progress != Progress::None {
+            match &mut self.rig {
+                Rig::Steps(plant) => plant.retune(parameters)?,
+                Rig::Equations(hybrid) => hybrid.retune(parameters)?,
+            }
+        }
+        self.parameters = parameters;
+        self.fastest = fastest(&parameters);
+        Ok(())
     }
 }
 
@@ -97,99 +155,124 @@ impl Component for LoViNes {
             e: [0.0; 4],
             amplitude: 0.0,
             omega: 0.0,
-            plant: Plant::new(parameters, start).expect("unit parameters make sense"),
-            stepped: false,
+            rig: Rig::Steps(Plant::new(parameters, start).expect("unit parameters make sense")),
+            progress: Progress::None,
+            fastest: 0.0,
             inputs_set: false,
         }
     }
 
     fn get_real(&self, variable: Real) -> f64 {
-        let Self {
-            parameters, plant, ..
-        } = self;
+        let Self { parameters: p, .. } = self;
         match variable {
-            Real::M => parameters.primary_mass,
-            Real::k => parameters.stiffness,
-            Real::c => parameters.damping,
-            Real::m => parameters.particle_mass,
-            Real::b => parameters.half_width,
-            Real::r => parameters.restitution,
+            Real::M => p.primary_mass,
+            Real::k => p.stiffness,
+            Real::c => p.damping,
+            Real::m => p.particle_mass,
+            Real::b => p.half_width,
+            Real::r => p.restitution,
             Real::e => self.e[0],
             Real::E => self.amplitude,
             Real::omega => self.omega,
-            Real::q1 => self.state().q1,
-            Real::der_q1 => self.state().dq1,
-            Real::q2 => self.state().q2,
-            Real::der_q2 => self.state().dq2,
-            Real::v => plant.centre(),
-            Real::w => plant.relative_displacement(),
-            Real::der_w => plant.relative_velocity(),
-            Real::base => self.base(),
-            Real::phase => plant.base().phase.radians(),
-            Real::impact_time => plant.tally().impact_time,
-            Real::impact_velocity => plant.tally().impact_velocity,
-            Real::energy => plant.energy(self.base()),
-            Real::dissipated => plant.tally().dissipated,
+            _ => match &self.rig {
+                Rig::Steps(plant) => self.of_plant(plant, variable),
+                Rig::Equations(hybrid) => exchange::of_hybrid(hybrid, variable),
+            },
         }
     }
 
     fn set_real(&mut self, variable: Real, value: f64) -> Result<(), Refusal> {
+        let mut parameters = self.parameters;
         let slot = match variable {
-            Real::M => &mut self.parameters.primary_mass,
-            Real::k => &mut self.parameters.stiffness,
-            Real::c => &mut self.parameters.damping,
-            Real::m => &mut self.parameters.particle_mass,
-            Real::b => &mut self.parameters.half_width,
-            Real::r => &mut self.parameters.restitution,
+            Real::e | Real::E | Real::omega => {
+                match variable {
+                    Real::e => self.e[0] = value,
+                    Real::E => self.amplitude = value,
+                    _ => self.omega = value,
+                }
+                self.input();
+                return Ok(());
+            }
             Real::q1 => &mut self.start.q1,
             Real::der_q1 => &mut self.start.dq1,
             Real::q2 => &mut self.start.q2,
             Real::der_q2 => &mut self.start.dq2,
-            Real::e | Real::E | Real::omega => {
-                self.inputs_set = true;
-                match variable {
-                    Real::e => &mut self.e[0],
-                    Real::E => &mut self.amplitude,
-                    _ => &mut self.omega,
-                }
-            }
+            Real::M => &mut self.parameters.primary_mass,
+            Real::m => &mut self.parameters.particle_mass,
+            Real::b => &mut self.parameters.half_width,
+            Real::k => &mut parameters.stiffness,
+            Real::c => &mut parameters.damping,
+            Real::r => &mut parameters.restitution,
             _ => return Err(Refusal::error("this variable is computed, not set")),
         };
         *slot = value;
+        if matches!(variable, Real::k | Real::c | Real::r) {
+            self.retune(parameters)?;
+        }
         Ok(())
     }
 
     fn get_integer(&self, variable: Integer) -> i32 {
+        let (tally, contact) = match &self.rig {
+            Rig::Steps(plant) => (plant.tally(), plant.contact()),
+            Rig::Equations(hybrid) => (hybrid.tally(), hybrid.contact()),
+        };
         match variable {
-            Integer::impacts => i32::try_from(self.plant.tally().impacts).unwrap_or(i32::MAX),
-            Integer::contact => self.plant.contact().map_or(0, |wall| wall.sign() as i32),
+            Integer::impacts => i32::try_from(tally.impacts).unwrap_or(i32::MAX),
+            Integer::contact => contact.map_or(0, |wall| wall.sign() as i32),
         }
     }
 
     fn initialise(&mut self, start_time: f64, _log: &Log) -> Result<(), Refusal> {
-        self.plant = Plant::new(self.parameters, self.start)?;
-        self.plant.set_time(start_time);
-        self.plant.begin(self.drive());
-        self.stepped = false;
+        let drive = self.drive();
+        match &mut self.rig {
+            Rig::Steps(plant) => {
+                *plant = Plant::new(self.parameters, self.start)?;
+                plant.set_time(start_time);
+                plant.begin(drive);
+            }
+            Rig::Equations(hybrid) => *hybrid = Hybrid::new(self.parameters, self.start, drive)?,
+        }
+        self.fastest = fastest(&self.parameters);
+        self.progress = Progress::Initialised;
         self.inputs_set = false;
         Ok(())
     }
 
-    fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
-        self.plant.set_time(time);
-        let drive = self.drive();
-        self.check_step(&drive, step)?;
-        if log.wants(category::logEvents) || log.wants(category::logImpacts) {
-            self.plant
-                .advance_with(drive, step, |event| tell(log, time, event));
-        } else {
-            self.plant.advance(drive, step);
+    fn accept_step(&self, step: f64) -> Result<(), Refusal> {
+        let rate = self.fastest.max(self.omega.abs());
+        if step * rate <= LONGEST_STEP {
+            return Ok(());
         }
+        let longest = LONGEST_STEP / rate;
+        Err(Refusal::error(format!(
+            "communicationStepSize = {step} s is refused; allowed are at most {longest} s, which is {LONGEST_STEP} rad \
+             of the fastest rate"
+        )))
+    }
+
+    fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
+        let drive = self.drive();
+        let Rig::Steps(plant) = &mut self.rig else {
+            return Err(Refusal::error("a step is of co-simulation"));
+        };
+        plant.set_time(time);
+        let outcome = if log.wants(category::logEvents) || log.wants(category::logImpacts) {
+            plant.advance_with(drive, step, |event| log::tell(log, time, event))
+        } else {
+            plant.advance(drive, step)
+        };
         // The signal stays where its polynomial has led.
-        self.e = [self.plant.base().drive.signal[0], 0.0, 0.0, 0.0];
-        self.stepped = true;
+        self.e = [plant.base().drive.signal[0], 0.0, 0.0, 0.0];
+        self.progress = Progress::UnderWay;
         self.inputs_set = false;
-        self.check_state()
+        let state = plant.state();
+        let finite = (state.q1 + state.dq1 + state.dq2).is_finite()
+            && plant.relative_displacement().abs() <= self.parameters.half_width;
+        if outcome.cut_short || !finite {
+            return Err(lost(finite, time, step));
+        }
+        Ok(())
     }
 
     fn set_real_input_derivative(
@@ -212,44 +295,15 @@ impl Component for LoViNes {
         }
     }
 
+    fn get_real_output_derivative(&self, variable: Real, order: u32) -> Result<f64, Refusal> {
+        self.time_derivative(variable, order)
+    }
+
+    fn partial_derivative(&self, unknown: Real, known: Real) -> Result<f64, Refusal> {
+        self.slope(unknown, known)
+    }
+
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
         archive.whole(self)
-    }
-}
-
-/// One line for the master's log.
-fn tell(log: &Log, time: f64, event: Event) {
-    let side = |wall: Wall| {
-        if wall == Wall::Plus {
-            "w = b"
-        } else {
-            "w = -b"
-        }
-    };
-    match event {
-        Event::Impact { t, wall, velocity } => log.tell(
-            category::logImpacts,
-            format_args!(
-                "impact on the wall {} at t = {} s, der(w) = {velocity} m/s",
-                side(wall),
-                time + t
-            ),
-        ),
-        Event::Stuck { t, wall } => log.tell(
-            category::logEvents,
-            format_args!(
-                "the particle came to rest on the wall {} at t = {} s",
-                side(wall),
-                time + t
-            ),
-        ),
-        Event::Released { t, wall } => log.tell(
-            category::logEvents,
-            format_args!(
-                "the wall {} let the particle go at t = {} s",
-                side(wall),
-                time + t
-            ),
-        ),
     }
 }

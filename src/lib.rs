@@ -3,14 +3,17 @@
 
 pub mod base_motion;
 pub mod clearance;
+pub mod equations;
 pub mod flight;
 #[cfg(feature = "fmu")]
 mod fmu;
 pub mod forcing;
+pub mod hybrid;
 pub mod motion;
 pub mod oscillator;
 pub mod parameters;
 pub mod plant;
+pub mod rates;
 pub mod sticking;
 pub mod wall;
 

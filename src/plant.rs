@@ -18,6 +18,9 @@ const SHORTEST_HOP: f64 = 1e-9;
 /// Relative rounding of an acceleration put together from a few terms.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
+/// An advance ends before its time at this many impacts, so that no value, however absurd, makes it endless.
+pub const MOST_IMPACTS: u64 = 10_000_000;
+
 /// Positions (m) and velocities (m/s) of both masses.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct State {
@@ -68,6 +71,8 @@ pub struct Outcome {
     pub stuck: u64,
     /// How often a wall let it go.
     pub released: u64,
+    /// Whether it has ended before its time, at [`MOST_IMPACTS`].
+    pub cut_short: bool,
 }
 
 /// What has been counted since the start.
@@ -206,7 +211,8 @@ impl Plant {
         if let (Contact::Free, Some(wall)) = (self.contact, self.wall_touched()) {
             dw = self.touch(wall, dw, &clock, &mut tell);
         }
-        while clock.left() > 0.0 {
+        let last_impact = self.tally.impacts + MOST_IMPACTS;
+        while clock.left() > 0.0 && self.tally.impacts < last_impact {
             if let Contact::Stuck(wall) = self.contact {
                 self.stay(wall, &mut clock, &mut tell);
                 dw = 0.0;
@@ -223,6 +229,7 @@ impl Plant {
             }
         }
         self.time += duration;
+        outcome.cut_short = clock.left() > 0.0;
         outcome
     }
 
@@ -348,6 +355,21 @@ impl Plant {
                 wall,
             });
         }
+    }
+
+    /// Takes over other parameters from now on; displacements, velocities and counts stay. The masses and the half-width
+    /// are meant to stay, too: nothing here says what their change would do.
+    ///
+    /// # Errors
+    /// Parameters that make no sense; the old ones stay.
+    pub fn retune(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
+        parameters.validate()?;
+        let joint = parameters.primary_mass + parameters.particle_mass;
+        self.law = ImpactLaw::new(&parameters);
+        self.alone = Driven::new(parameters.primary_mass, &parameters);
+        self.joint = Driven::new(joint, &parameters);
+        self.parameters = parameters;
+        Ok(())
     }
 
     /// The parameters.

@@ -32,14 +32,18 @@ pub use fmu_state::{
 };
 pub use instantiate::{free_instance, instantiate};
 pub use logging::set_debug_logging;
-pub use model_exchange::not_for_co_simulation;
+pub use model_exchange::{
+    completed_integrator_step, enter_continuous_time_mode, enter_event_mode, get_continuous_states,
+    get_derivatives, get_event_indicators, get_nominals_of_continuous_states, new_discrete_states,
+    not_for_co_simulation, set_continuous_states, set_time,
+};
 pub use status::{
     get_boolean_status, get_integer_status, get_real_status, get_status, get_string_status,
 };
 pub use strings::{get_string, set_string};
 pub use types::{
-    CBoolean, CComponent, CFmuState, CString, CValueReference, CallbackFunctions, TYPES_PLATFORM,
-    VERSION,
+    CBoolean, CComponent, CFmuState, CString, CValueReference, CallbackFunctions, EventInfo,
+    TYPES_PLATFORM, VERSION,
 };
 pub use values::{get_boolean, get_integer, get_real, set_boolean, set_integer, set_real};
 

@@ -97,6 +97,15 @@ pub trait Component: Clone + Send + 'static {
     /// Values that make no sense. The component stays in Initialization Mode.
     fn initialise(&mut self, start_time: f64, log: &Log) -> Result<(), Refusal>;
 
+    /// Whether a step of that length (finite, above 0) can be done at all. Asked before every step.
+    ///
+    /// # Errors
+    /// A step that would take for ever. Nothing happens then, and the master may make a shorter one.
+    fn accept_step(&self, step: f64) -> Result<(), Refusal> {
+        let _ = step;
+        Ok(())
+    }
+
     /// Advances from `time` by `step` seconds, which is finite and above 0. Inputs are as set before the step.
     ///
     /// # Errors

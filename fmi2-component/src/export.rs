@@ -2,6 +2,10 @@
 
 /// Exports a [`Component`](crate::Component) under the C names of FMI 2.0, those of model exchange included.
 ///
+/// `export!(MyComponent)` is for co-simulation alone: functions of model exchange, which some masters look up in every
+/// library, answer an error with a reason. `export!(MyComponent, model_exchange)` is for a component that is
+/// [`ModelExchange`](crate::ModelExchange) too.
+///
 /// Once per library, and in a crate of type `cdylib`: two components whose names meet in one program cannot be linked.
 /// The unsafe attributes and signatures are written by this macro, so that the crate it is used in may
 /// `#![forbid(unsafe_code)]`.
@@ -12,13 +16,56 @@
 #[macro_export]
 macro_rules! export {
     ($component:ty) => {
+        $crate::export!(@library $component, ::core::option::Option::None, {
+            $crate::export_refusals! { $component,
+                fmi2EnterEventMode();
+                fmi2NewDiscreteStates(_info: *mut EventInfo);
+                fmi2EnterContinuousTimeMode();
+                fmi2CompletedIntegratorStep(_no_set_prior: CBoolean, _event: *mut CBoolean, _terminate: *mut CBoolean);
+                fmi2SetTime(_time: f64);
+                fmi2SetContinuousStates(_states: *const f64, _count: usize);
+                fmi2GetDerivatives(_derivatives: *mut f64, _count: usize);
+                fmi2GetEventIndicators(_indicators: *mut f64, _count: usize);
+                fmi2GetContinuousStates(_states: *mut f64, _count: usize);
+                fmi2GetNominalsOfContinuousStates(_nominals: *mut f64, _count: usize);
+            }
+        });
+    };
+    ($component:ty, model_exchange) => {
+        $crate::export!(@library $component, ::core::option::Option::Some(<$component as $crate::ModelExchange>::select), {
+            #[unsafe(no_mangle)]
+            pub unsafe extern "C" fn fmi2CompletedIntegratorStep(
+                component: CComponent,
+                _no_set_fmu_state_prior_to_current_point: CBoolean,
+                event: *mut CBoolean,
+                terminate: *mut CBoolean,
+            ) -> Status {
+                unsafe {
+                    $crate::abi::completed_integrator_step::<$component>(component, event, terminate)
+                }
+            }
+
+            $crate::export_functions! { $component,
+                fmi2EnterEventMode = enter_event_mode();
+                fmi2NewDiscreteStates = new_discrete_states(info: *mut EventInfo);
+                fmi2EnterContinuousTimeMode = enter_continuous_time_mode();
+                fmi2SetTime = set_time(time: f64);
+                fmi2SetContinuousStates = set_continuous_states(states: *const f64, count: usize);
+                fmi2GetDerivatives = get_derivatives(derivatives: *mut f64, count: usize);
+                fmi2GetEventIndicators = get_event_indicators(indicators: *mut f64, count: usize);
+                fmi2GetContinuousStates = get_continuous_states(states: *mut f64, count: usize);
+                fmi2GetNominalsOfContinuousStates = get_nominals_of_continuous_states(nominals: *mut f64, count: usize);
+            }
+        });
+    };
+    (@library $component:ty, $select:expr, { $($model_exchange:tt)* }) => {
         #[allow(non_snake_case, clippy::missing_safety_doc, clippy::too_many_arguments, missing_docs)]
         mod fmi2_functions {
             use super::*;
             use $crate::abi::{
-                CBoolean, CComponent, CFmuState, CString, CValueReference, CallbackFunctions, Status,
+                CBoolean, CComponent, CFmuState, CString, CValueReference, CallbackFunctions, EventInfo, Status,
             };
-            use ::std::ffi::{c_char, c_int, c_void};
+            use ::std::ffi::{c_char, c_int};
 
             #[unsafe(no_mangle)]
             pub extern "C" fn fmi2GetTypesPlatform() -> *const c_char {
@@ -43,7 +90,7 @@ macro_rules! export {
                 // SAFETY: the master keeps the contract of the standard; so below.
                 unsafe {
                     $crate::abi::instantiate::<$component>(
-                        instance_name, fmu_type, guid, functions, logging_on,
+                        instance_name, fmu_type, guid, functions, logging_on, $select,
                     )
                 }
             }
@@ -110,18 +157,7 @@ macro_rules! export {
                 unsafe { $crate::abi::do_step::<$component>(component, time, step) }
             }
 
-            $crate::export_model_exchange! { $component,
-                fmi2EnterEventMode();
-                fmi2NewDiscreteStates(_info: *mut c_void);
-                fmi2EnterContinuousTimeMode();
-                fmi2CompletedIntegratorStep(_no_set_prior: CBoolean, _event: *mut CBoolean, _terminate: *mut CBoolean);
-                fmi2SetTime(_time: f64);
-                fmi2SetContinuousStates(_states: *const f64, _count: usize);
-                fmi2GetDerivatives(_derivatives: *mut f64, _count: usize);
-                fmi2GetEventIndicators(_indicators: *mut f64, _count: usize);
-                fmi2GetContinuousStates(_states: *mut f64, _count: usize);
-                fmi2GetNominalsOfContinuousStates(_nominals: *mut f64, _count: usize);
-            }
+            $($model_exchange)*
         }
     };
 }
@@ -138,10 +174,10 @@ macro_rules! export_functions {
     )*};
 }
 
-/// Functions that have nothing to do in co-simulation.
+/// Functions of model exchange, of a component without it.
 #[doc(hidden)]
 #[macro_export]
-macro_rules! export_model_exchange {
+macro_rules! export_refusals {
     ($component:ty, $($c_name:ident($($argument:ident: $type:ty),*);)*) => {$(
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $c_name(component: CComponent, $($argument: $type),*) -> Status {

@@ -3,11 +3,11 @@
 use std::ffi::CString;
 
 use crate::component::{Component, RealOf};
-use crate::life_cycle::State;
+use crate::life_cycle::{Interface, State};
 use crate::log::Log;
 use crate::model::Key;
 use crate::refusal::{Refusal, Severity};
-use crate::session::Session;
+use crate::session::{Select, Session};
 use crate::snapshots::Snapshots;
 use crate::variable::Variable;
 
@@ -17,6 +17,7 @@ const CLOCK_TOLERANCE: f64 = 1e-9;
 /// A component, its log and its FMU states.
 pub(crate) struct Instance<C> {
     pub session: Session<C>,
+    pub select: Select<C>,
     pub log: Log,
     pub snapshots: Snapshots<C>,
     /// What the last `fmi2GetString` has pointed at.
@@ -24,9 +25,10 @@ pub(crate) struct Instance<C> {
 }
 
 impl<C: Component> Instance<C> {
-    pub fn new(log: Log) -> Result<Self, Refusal> {
+    pub fn new(log: Log, select: Select<C>) -> Result<Self, Refusal> {
         Ok(Self {
-            session: Session::new()?,
+            session: Session::new(select)?,
+            select,
             log,
             snapshots: Snapshots::new(),
             strings: Vec::new(),
@@ -55,7 +57,10 @@ impl<C: Component> Instance<C> {
 
     pub fn leave_initialization(&mut self) -> Result<(), Refusal> {
         self.refresh()?;
-        self.session.state = State::StepComplete;
+        self.session.state = match self.session.interface {
+            Interface::CoSimulation => State::StepComplete,
+            Interface::ModelExchange => State::EventMode,
+        };
         Ok(())
     }
 
@@ -72,7 +77,7 @@ impl<C: Component> Instance<C> {
     }
 
     pub fn reset(&mut self) -> Result<(), Refusal> {
-        self.session = Session::new()?;
+        self.session = Session::new(self.select)?;
         Ok(())
     }
 
@@ -82,6 +87,7 @@ impl<C: Component> Instance<C> {
         let settable = match self.session.state {
             State::Instantiated => variable.settable_at_start(false),
             State::InitializationMode => variable.settable_at_start(true),
+            State::ContinuousTimeMode => variable.settable_in_continuous_time(),
             _ => variable.settable_between_steps(),
         };
         if settable {
@@ -128,13 +134,13 @@ impl<C: Component> Instance<C> {
             stop_time,
             ..
         } = &self.session;
-        if !(step.is_finite() && step >= 0.0 && (time + step).is_finite()) {
+        if !(step.is_finite() && step >= 0.0) {
             return Err(Refusal::error(format!(
                 "communicationStepSize = {step} s is refused; allowed is a finite number of at least 0"
             )));
         }
         let tolerance = CLOCK_TOLERANCE * own.abs().max(step);
-        if time.is_nan() || (time - own).abs() > tolerance {
+        if !(time + step).is_finite() || (time - own).abs() > tolerance {
             return Err(Refusal::error(format!(
                 "currentCommunicationPoint = {time} s is refused; the last step has ended at {own} s"
             )));
@@ -144,7 +150,7 @@ impl<C: Component> Instance<C> {
                 "a step at {time} s is refused; the experiment was set up to end at stopTime = {stop_time} s"
             )));
         }
-        Ok(())
+        self.session.component.accept_step(step)
     }
 }
 

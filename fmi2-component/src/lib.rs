@@ -1,6 +1,6 @@
 //! An FMI 2.0 shell: write a struct, get an FMU.
 //!
-//! A component is exported for co-simulation by three files: its `modelDescription.xml`, a `build.rs` of two lines, and
+//! A component is exported by three files: its `modelDescription.xml`, a `build.rs` of two lines, and
 //! about a hundred lines that say which variable is which number. Everything else that the standard asks for (life
 //! cycle, pointers, value references, logging, FMU states) is here.
 //!
@@ -33,6 +33,10 @@
 #![doc = include_str!("../example/src/lib.rs")]
 //! ```
 //!
+//! A component whose equations a master may integrate by itself says besides what they are ([`ModelExchange`]), and is
+//! exported by `fmi2_component::export!(MyComponent, model_exchange)`. Its description lists states and derivatives
+//! in `ModelStructure`, once; `src/fmu/exchange.rs` of the plant `lovines` is an example.
+//!
 //! The FMU is a zip of the description, as `fmi2_component_build::describe` completes it, and of the library as
 //! `binaries/linux64/<modelIdentifier>.so` (or the platform's equivalent).
 //!
@@ -43,7 +47,7 @@
 //! - A setter is called only for a variable that may be set in the present state, and a real value is finite.
 //! - [`Component::initialise`] is called before the first step, and in Initialization Mode before a computed value is
 //!   read after something was set. Outputs that depend on inputs are thus right however often inputs are set.
-//! - [`Component::step`] is called with a positive length; communication points follow each other within 1e-9 of
+//! - [`Component::step`] is called with a positive length that [`Component::accept_step`] has accepted; communication points follow each other within 1e-9 of
 //!   their size.
 //! - A panic goes no further than the call: it is logged, and the instance is then of no use but to be freed.
 //!
@@ -51,21 +55,22 @@
 //!
 //! # What is legal when
 //!
-//! The life cycle of FMI 2.0, clause 4.2.4. An illegal call answers `fmi2Error`, logs a line that says where it would be
-//! legal, and changes nothing. *SetValues*, *GetValues*, *GetStatus* and *FMUstate* stand for the functions of that family,
-//! and *ModelExchange* for those of the other interface.
+//! The life cycle of FMI 2.0, clauses 3.2.3 and 4.2.4, of both interfaces. An illegal call answers `fmi2Error`, logs a
+//! line that says where it would be legal, and changes nothing. *SetDiscrete* stands for the setters of integers, truth
+//! values and text, *GetValues*, *GetStatus* and *FMUstate* for the functions of that family, *GetEquations* for
+//! `fmi2GetContinuousStates`, `fmi2GetDerivatives` and `fmi2GetEventIndicators`.
 //!
 #![doc = include_str!("life_cycle.md")]
 //!
 //! Which variables may be set depends on causality, variability and initial besides: [`Variable::settable_at_start`],
-//! [`Variable::settable_between_steps`].
+//! [`Variable::settable_between_steps`], [`Variable::settable_in_continuous_time`].
 //!
 //! # What of FMI 2.0 is supported
 //!
 //! | feature | |
 //! |---|---|
 //! | co-simulation | all functions; a step is done when `fmi2DoStep` returns, so that there is none to cancel |
-//! | model exchange | the names only, which some masters look up; refused with a reason |
+//! | model exchange | all functions, where the component is [`ModelExchange`]; else refused with a reason |
 //! | real, integer, enumeration, Boolean, string variables | yes; no aliases (two variables with one value reference) |
 //! | tunable parameters | between steps |
 //! | FMU states: get, set, free | yes, by [`Clone`]; those that a master forgets are freed with the instance |
@@ -85,6 +90,7 @@ mod instance;
 mod life_cycle;
 mod log;
 mod model;
+mod model_exchange;
 mod refusal;
 mod serial;
 mod session;
@@ -96,6 +102,7 @@ pub use archive::Archive;
 pub use component::{BooleanOf, Component, IntegerOf, RealOf, StringOf};
 pub use log::{Category, Log, Logger};
 pub use model::{Key, Model};
+pub use model_exchange::{Discrete, ModelExchange};
 pub use refusal::{Refusal, Severity};
 pub use status::Status;
 pub use variable::{Causality, Initial, Variability, Variable};

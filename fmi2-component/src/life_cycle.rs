@@ -1,13 +1,31 @@
-//! Which function may be called in which state (FMI 2.0, clause 4.2.4), as one table.
+//! Which function may be called in which state, of both interfaces, as one table (FMI 2.0, clauses 3.2.3 and 4.2.4).
 
 use std::fmt;
 
-/// A state of a co-simulation component.
+/// Which of the two interfaces an instance was made for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Interface {
+    ModelExchange,
+    CoSimulation,
+}
+
+impl Interface {
+    pub(crate) const fn name(self) -> &'static str {
+        match self {
+            Self::ModelExchange => "model exchange",
+            Self::CoSimulation => "co-simulation",
+        }
+    }
+}
+
+/// A state of a component. The first two and the last three are in both interfaces.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[repr(u8)]
 pub(crate) enum State {
     Instantiated,
     InitializationMode,
+    EventMode,
+    ContinuousTimeMode,
     StepComplete,
     StepInProgress,
     StepFailed,
@@ -18,9 +36,11 @@ pub(crate) enum State {
 }
 
 impl State {
-    pub(crate) const ALL: [Self; 9] = [
+    pub(crate) const ALL: [Self; 11] = [
         Self::Instantiated,
         Self::InitializationMode,
+        Self::EventMode,
+        Self::ContinuousTimeMode,
         Self::StepComplete,
         Self::StepInProgress,
         Self::StepFailed,
@@ -35,6 +55,8 @@ impl State {
         match self {
             Self::Instantiated => "instantiated",
             Self::InitializationMode => "Initialization Mode",
+            Self::EventMode => "Event Mode",
+            Self::ContinuousTimeMode => "Continuous-Time Mode",
             Self::StepComplete => "stepComplete",
             Self::StepInProgress => "stepInProgress",
             Self::StepFailed => "stepFailed",
@@ -110,27 +132,68 @@ macro_rules! functions {
 }
 
 functions! {
-    SetDebugLogging: Instantiated | InitializationMode | StepComplete | StepInProgress | StepFailed | StepCanceled | Terminated | Error;
+    SetDebugLogging: Instantiated | InitializationMode | EventMode | ContinuousTimeMode | StepComplete | StepInProgress | StepFailed | StepCanceled | Terminated | Error;
     SetupExperiment: Instantiated;
     EnterInitializationMode: Instantiated;
     ExitInitializationMode: InitializationMode;
-    /// `fmi2SetReal`, `Integer`, `Boolean` and `String`; which variables, their causality decides.
-    SetValues: Instantiated | InitializationMode | StepComplete;
+    /// Which variables, their causality and variability decide.
+    SetReal: Instantiated | InitializationMode | EventMode | ContinuousTimeMode | StepComplete;
+    /// `fmi2SetInteger`, `Boolean` and `String`: none of them is continuous.
+    SetDiscrete: Instantiated | InitializationMode | EventMode | StepComplete;
     /// `fmi2GetReal`, `Integer`, `Boolean` and `String`.
-    GetValues: InitializationMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
+    GetValues: InitializationMode | EventMode | ContinuousTimeMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
+    GetDirectionalDerivative: InitializationMode | EventMode | ContinuousTimeMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
+    /// `fmi2GetFMUstate`, `Set` and `Free`; `fmi2SerializedFMUstateSize`, `Serialize` and `DeSerialize`.
+    FMUstate: Instantiated | InitializationMode | EventMode | ContinuousTimeMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
+    Terminate: EventMode | ContinuousTimeMode | StepComplete | StepFailed;
+    Reset: Instantiated | InitializationMode | EventMode | ContinuousTimeMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
     SetRealInputDerivatives: Instantiated | InitializationMode | StepComplete;
     GetRealOutputDerivatives: StepComplete | StepFailed | StepCanceled | Terminated | Error;
-    GetDirectionalDerivative: InitializationMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
     DoStep: StepComplete;
     CancelStep: StepInProgress;
     /// `fmi2GetStatus`, and `fmi2GetRealStatus`, `Integer`, `Boolean` and `String`.
     GetStatus: StepComplete | StepInProgress | StepFailed | Terminated;
-    /// `fmi2GetFMUstate`, `Set` and `Free`; `fmi2SerializedFMUstateSize`, `Serialize` and `DeSerialize`.
-    FMUstate: Instantiated | InitializationMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
-    Terminate: StepComplete | StepFailed;
-    Reset: Instantiated | InitializationMode | StepComplete | StepFailed | StepCanceled | Terminated | Error;
-    /// The functions of model exchange: a component for co-simulation is in no state for them.
-    ModelExchange: ;
+    EnterEventMode: EventMode | ContinuousTimeMode;
+    NewDiscreteStates: EventMode;
+    EnterContinuousTimeMode: EventMode;
+    CompletedIntegratorStep: ContinuousTimeMode;
+    SetTime: EventMode | ContinuousTimeMode;
+    SetContinuousStates: ContinuousTimeMode;
+    /// `fmi2GetContinuousStates`, `fmi2GetDerivatives` and `fmi2GetEventIndicators`.
+    GetEquations: InitializationMode | EventMode | ContinuousTimeMode | Terminated | Error;
+    GetNominalsOfContinuousStates: Instantiated | InitializationMode | EventMode | ContinuousTimeMode | Terminated | Error;
+}
+
+impl Function {
+    /// The interface that alone has it; none where both do.
+    pub(crate) const fn only_in(self) -> Option<Interface> {
+        match self {
+            Self::SetRealInputDerivatives
+            | Self::GetRealOutputDerivatives
+            | Self::DoStep
+            | Self::CancelStep
+            | Self::GetStatus => Some(Interface::CoSimulation),
+            Self::EnterEventMode
+            | Self::NewDiscreteStates
+            | Self::EnterContinuousTimeMode
+            | Self::CompletedIntegratorStep
+            | Self::SetTime
+            | Self::SetContinuousStates
+            | Self::GetEquations
+            | Self::GetNominalsOfContinuousStates => Some(Interface::ModelExchange),
+            _ => None,
+        }
+    }
+
+    /// Whether an instance for `interface` may be asked in `state`.
+    #[inline]
+    pub(crate) const fn legal(self, interface: Interface, state: State) -> bool {
+        let there = match self.only_in() {
+            None => true,
+            Some(only) => only as u8 == interface as u8,
+        };
+        there && self.legal_in().contains(state)
+    }
 }
 
 #[cfg(test)]

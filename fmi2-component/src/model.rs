@@ -10,6 +10,14 @@ pub trait Model: 'static {
     const IDENTIFIER: &'static str;
     /// Derived from the variable table: a library meets only the description that it was built with.
     const GUID: &'static str;
+    /// The version of the model; a serialised state of another one is refused.
+    const VERSION: &'static str;
+    /// The continuous states, in the order of the description's list of derivatives.
+    const STATES: &'static [Self::Real];
+    /// Their derivatives, in the same order.
+    const DERIVATIVES: &'static [Self::Real];
+    /// `numberOfEventIndicators`.
+    const EVENT_INDICATORS: usize;
     /// The names of the log categories.
     const CATEGORIES: &'static [&'static str];
     /// The variables that hold a real number.

@@ -4,10 +4,10 @@ use crate::archive::Archive;
 use crate::component::Component;
 use crate::model::Model;
 use crate::refusal::Refusal;
-use crate::session::Session;
+use crate::session::{Select, Session};
 
 /// Changes with the layout that the shell itself writes.
-const MAGIC: [u8; 8] = *b"FMU2 st1";
+const MAGIC: [u8; 8] = *b"FMU2 st2";
 /// Magic, checksum.
 const HEADER: usize = 16;
 
@@ -15,7 +15,7 @@ const HEADER: usize = 16;
 pub(crate) fn serialise<C: Component>(session: &Session<C>) -> Result<Vec<u8>, Refusal> {
     let mut bytes = vec![0; HEADER];
     let mut archive = Archive::writer(&mut bytes);
-    archive.whole(&mut C::Model::GUID.to_owned())?;
+    archive.whole(&mut identity::<C>())?;
     session.clone().archive(&mut archive)?;
     let checksum = fnv1a(&bytes[HEADER..]);
     bytes[..8].copy_from_slice(&MAGIC);
@@ -24,7 +24,10 @@ pub(crate) fn serialise<C: Component>(session: &Session<C>) -> Result<Vec<u8>, R
 }
 
 /// The session that `bytes` hold; refuses anything that [`serialise`] of the same model has not written.
-pub(crate) fn deserialise<C: Component>(bytes: &[u8]) -> Result<Session<C>, Refusal> {
+pub(crate) fn deserialise<C: Component>(
+    bytes: &[u8],
+    select: Select<C>,
+) -> Result<Session<C>, Refusal> {
     let Some((header, body)) = bytes.split_at_checked(HEADER) else {
         return Err(Refusal::error(format!(
             "the serialised state has {} bytes; expected are more than {HEADER}",
@@ -42,18 +45,26 @@ pub(crate) fn deserialise<C: Component>(bytes: &[u8]) -> Result<Session<C>, Refu
         ));
     }
     let mut archive = Archive::reader(body);
-    let mut guid = String::new();
-    archive.whole(&mut guid)?;
-    if guid != C::Model::GUID {
+    let mut found = Identity::default();
+    archive.whole(&mut found)?;
+    let expected = identity::<C>();
+    if found != expected {
         return Err(Refusal::error(format!(
-            "the serialised state is of another model: its GUID is {guid}, expected is {}",
-            C::Model::GUID
+            "the serialised state is of another model: its GUID and version are {} {:?}, expected are {} {:?}",
+            found.0, found.1, expected.0, expected.1
         )));
     }
-    let mut session = Session::new()?;
+    let mut session = Session::new(select)?;
     session.archive(&mut archive)?;
     archive.finish()?;
     Ok(session)
+}
+
+/// GUID and version of a model: together they fix what the bytes mean.
+type Identity = (String, String);
+
+fn identity<C: Component>() -> Identity {
+    (C::Model::GUID.to_owned(), C::Model::VERSION.to_owned())
 }
 
 /// The 64-bit Fowler–Noll–Vo hash, variant 1a.

@@ -2,20 +2,24 @@
 
 use crate::archive::Archive;
 use crate::component::Component;
-use crate::life_cycle::State;
+use crate::life_cycle::{Interface, State};
 use crate::model::{Key, Model};
 use crate::refusal::Refusal;
+
+/// What tells a component that it is for model exchange; there for an instance that is.
+pub(crate) type Select<C> = Option<fn(&mut C)>;
 
 /// A component and where it is in its life.
 #[derive(Clone, Debug)]
 pub(crate) struct Session<C> {
     pub component: C,
+    pub interface: Interface,
     pub state: State,
     /// Something was set since the component was last initialised.
     pub stale: bool,
     pub start_time: f64,
     pub stop_time: f64,
-    /// Where the last step has led.
+    /// Where the last step has led, or what the master has set.
     pub time: f64,
 }
 
@@ -24,8 +28,15 @@ impl<C: Component> Session<C> {
     ///
     /// # Errors
     /// The component refuses a start value of its own description.
-    pub fn new() -> Result<Self, Refusal> {
+    pub fn new(select: Select<C>) -> Result<Self, Refusal> {
         let mut component = C::new();
+        let interface = match select {
+            Some(select) => {
+                select(&mut component);
+                Interface::ModelExchange
+            }
+            None => Interface::CoSimulation,
+        };
         for (key, start) in starts::<<C::Model as Model>::Real>() {
             component.set_real(key, *start)?;
         }
@@ -40,6 +51,7 @@ impl<C: Component> Session<C> {
         }
         Ok(Self {
             component,
+            interface,
             state: State::Instantiated,
             stale: true,
             start_time: 0.0,
@@ -50,6 +62,14 @@ impl<C: Component> Session<C> {
 
     /// Writes or reads all of it.
     pub fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
+        let mut interface = self.interface as u8;
+        archive.whole(&mut interface)?;
+        if interface != self.interface as u8 {
+            return Err(Refusal::error(format!(
+                "the serialised state is of the other interface; this instance is for {}",
+                self.interface.name()
+            )));
+        }
         let mut state = self.state as u8;
         archive.whole(&mut state)?;
         self.state = State::ALL

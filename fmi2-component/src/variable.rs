@@ -66,6 +66,8 @@ pub struct Variable<T> {
     pub min: Option<T>,
     /// The largest value that makes sense. The shell does not enforce it.
     pub max: Option<T>,
+    /// A typical magnitude, where the description gives one.
+    pub nominal: Option<T>,
     /// The unit; none for a pure number.
     pub unit: Option<&'static str>,
     /// What an engineer should know of it.
@@ -103,6 +105,12 @@ impl<T> Variable<T> {
             Causality::Parameter => matches!(self.variability, Variability::Tunable),
             _ => false,
         }
+    }
+
+    /// Whether a master may set it while its integrator runs: continuous inputs.
+    pub const fn settable_in_continuous_time(&self) -> bool {
+        matches!(self.causality, Causality::Input)
+            && matches!(self.variability, Variability::Continuous)
     }
 
     /// Whether its value is the component's to compute, not the master's to set.

@@ -17,6 +17,10 @@ impl Model for Moody {
     const NAME: &'static str = "Moody";
     const IDENTIFIER: &'static str = "Moody";
     const GUID: &'static str = "moody";
+    const VERSION: &'static str = "0";
+    const STATES: &'static [Self::Real] = &[];
+    const DERIVATIVES: &'static [Self::Real] = &[];
+    const EVENT_INDICATORS: usize = 0;
     const CATEGORIES: &'static [&'static str] = &["logAll"];
     type Real = Nothing<f64>;
     type Integer = Mood;
@@ -64,6 +68,7 @@ impl Key for Mood {
         start: Some(0),
         min: None,
         max: None,
+        nominal: None,
         unit: None,
         description: "",
     }];

@@ -3,6 +3,7 @@
 mod archive;
 mod binary;
 mod components;
+mod documentation;
 mod error;
 mod fmu;
 mod library;
@@ -18,6 +19,7 @@ use std::{
 
 pub use binary::Binary;
 pub use components::{Component, components};
+pub use documentation::documentation;
 pub use error::PackError;
 pub use platform::Platform;
 pub use portable::{GLIBC, portable};

@@ -32,10 +32,11 @@ struct Running {
     output: Output,
 }
 
-/// Samples in one step: some seconds of work.
-const MOST_SAMPLES: f64 = 1e7;
 const ADAPTIVE: i32 = 1;
 const DEMODULATOR: i32 = 2;
+
+/// The most samples that one step may hold: some seconds of work.
+const MOST_SAMPLES: f64 = 1e7;
 
 impl Controller {
     /// The configuration that the values set make.
@@ -230,18 +231,21 @@ impl Component for Controller {
         Ok(())
     }
 
+    fn accept_step(&self, step: f64) -> Result<(), Refusal> {
+        let sample_time = self.config.sample_time;
+        if step / sample_time <= MOST_SAMPLES {
+            return Ok(());
+        }
+        let longest = MOST_SAMPLES * sample_time;
+        Err(Refusal::error(format!(
+            "communicationStepSize = {step} s is refused; allowed are at most {longest} s, which is {MOST_SAMPLES} samples"
+        )))
+    }
+
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
         let Some(running) = &mut self.running else {
             return Err(Refusal::error("a step before initialization"));
         };
-        let samples = step / self.config.sample_time;
-        if samples > MOST_SAMPLES {
-            return Err(Refusal::error(format!(
-                "a step of {step} s is refused; allowed is at most {} s, which is {MOST_SAMPLES} samples of {} s",
-                MOST_SAMPLES * self.config.sample_time,
-                self.config.sample_time
-            )));
-        }
         let Config {
             amplitude,
             phase_target,

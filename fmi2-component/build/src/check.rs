@@ -37,6 +37,14 @@ fn identity(description: &Description, table: &Table, faults: &mut Vec<String>) 
             "modelIdentifier is {name:?}; expected is a C identifier"
         ));
     }
+    if let (Some(exchange), Some(steps)) = (&description.model_exchange, &description.co_simulation)
+        && exchange.model_identifier != steps.model_identifier
+    {
+        faults.push(format!(
+            "ModelExchange has modelIdentifier {:?}; expected is that of CoSimulation, {:?}",
+            exchange.model_identifier, steps.model_identifier
+        ));
+    }
     if table.categories.len() > 64 {
         faults.push("LogCategories has more than 64 categories".into());
     }
@@ -170,6 +178,16 @@ fn structure(description: &Description, table: &Table, faults: &mut Vec<String>)
         }
     }
 
+    if description.model_exchange.is_some() {
+        states(
+            &derivatives,
+            table,
+            initial_unknowns,
+            &structure.derivatives.unknowns,
+            faults,
+        );
+    }
+
     let lists = [
         &structure.outputs,
         &structure.derivatives,
@@ -177,6 +195,34 @@ fn structure(description: &Description, table: &Table, faults: &mut Vec<String>)
     ];
     for unknown in lists.into_iter().flat_map(|list| &list.unknowns) {
         dependencies(unknown, table, faults);
+    }
+}
+
+/// What a master that integrates needs: every derivative listed, and the initial values that are computed.
+fn states(
+    derivatives: &[(usize, usize)],
+    table: &Table,
+    initial_unknowns: &[Unknown],
+    listed: &[Unknown],
+    faults: &mut Vec<String>,
+) {
+    for &(derivative, state) in derivatives {
+        let name = &table.variables[derivative - 1].name;
+        if listed.iter().filter(|u| u.index == derivative).count() != 1 {
+            faults.push(format!(
+                "Derivatives must list {name} (index {derivative}) once"
+            ));
+        }
+        for place in [derivative, state] {
+            let computed = (place.checked_sub(1))
+                .and_then(|place| table.variables.get(place))
+                .is_some_and(|v| matches!(v.initial, Some(Initial::Approx | Initial::Calculated)));
+            if computed && !initial_unknowns.iter().any(|u| u.index == place) {
+                faults.push(format!(
+                    "InitialUnknowns must list index {place}, a state or derivative whose initial value is not exact"
+                ));
+            }
+        }
     }
 }
 

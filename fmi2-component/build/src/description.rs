@@ -13,8 +13,14 @@ pub(crate) struct Description {
     pub fmi_version: String,
     #[serde(rename = "@modelName")]
     pub model_name: String,
+    #[serde(rename = "@version", default)]
+    pub version: String,
+    #[serde(rename = "@numberOfEventIndicators", default)]
+    pub number_of_event_indicators: usize,
+    #[serde(rename = "ModelExchange")]
+    pub model_exchange: Option<Interface>,
     #[serde(rename = "CoSimulation")]
-    pub co_simulation: Option<CoSimulation>,
+    pub co_simulation: Option<Interface>,
     #[serde(rename = "UnitDefinitions", default)]
     pub unit_definitions: UnitDefinitions,
     #[serde(rename = "TypeDefinitions", default)]
@@ -27,9 +33,9 @@ pub(crate) struct Description {
     pub model_structure: ModelStructure,
 }
 
-/// The co-simulation interface. Its capability flags are for the master.
+/// An interface. Its capability flags are for the master.
 #[derive(Debug, Deserialize)]
-pub(crate) struct CoSimulation {
+pub(crate) struct Interface {
     #[serde(rename = "@modelIdentifier")]
     pub model_identifier: String,
 }
@@ -144,7 +150,7 @@ pub(crate) struct Attributes<T> {
     #[serde(rename = "@relativeQuantity")]
     pub _relative_quantity: Option<IgnoredAny>,
     #[serde(rename = "@nominal")]
-    pub _nominal: Option<IgnoredAny>,
+    pub nominal: Option<T>,
     #[serde(rename = "@unbounded")]
     pub _unbounded: Option<IgnoredAny>,
     #[serde(rename = "@reinit")]

@@ -13,13 +13,13 @@ const NAMESPACE: Uuid = Uuid::from_u128(0x5c1d_1f8e_2f0a_4d5b_9a67_3e1b_7c90_42d
 /// The GUID of a table. Descriptions do not count: a better word is no other model.
 pub(crate) fn guid(table: &Table) -> String {
     let mut text = format!(
-        "{}\n{}\n{:?}\n",
-        table.name, table.identifier, table.categories
+        "{}\n{}\n{:?}\n{:?} {}\n",
+        table.name, table.identifier, table.categories, table.states, table.event_indicators
     );
     for v in &table.variables {
         let _ = writeln!(
             text,
-            "{:?} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+            "{:?} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
             v.name,
             v.value_reference,
             v.kind,
@@ -30,6 +30,7 @@ pub(crate) fn guid(table: &Table) -> String {
             v.start,
             v.min,
             v.max,
+            v.nominal,
         );
     }
     Uuid::new_v5(&NAMESPACE, text.as_bytes()).to_string()

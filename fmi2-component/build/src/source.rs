@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::guid::guid;
-use crate::identifier::identifier;
+use crate::identifier::identifier as identifier_of;
 use crate::table::{Kind, Literal, Table, Variable};
 
 /// The contents of `variables.rs`.
@@ -24,9 +24,19 @@ fn identity(out: &mut String, table: &Table) -> std::fmt::Result {
     let Table {
         name,
         identifier,
+        version,
+        event_indicators,
         categories,
         ..
     } = table;
+    let keys = |pick: fn(&(usize, usize)) -> usize| {
+        let names = table.states.iter().map(pick).map(|place| {
+            let name = table.variables.get(place).map_or("", |v| v.name.as_str());
+            format!("Real::{}", identifier_of(name))
+        });
+        names.collect::<Vec<_>>().join(", ")
+    };
+    let (states, derivatives) = (keys(|pair| pair.0), keys(|pair| pair.1));
     writeln!(
         out,
         "/// `modelName`.
@@ -47,6 +57,10 @@ impl ::fmi2_component::Model for Model {{
     const NAME: &'static str = MODEL_NAME;
     const IDENTIFIER: &'static str = MODEL_IDENTIFIER;
     const GUID: &'static str = GUID;
+    const VERSION: &'static str = {version:?};
+    const STATES: &'static [Real] = &[{states}];
+    const DERIVATIVES: &'static [Real] = &[{derivatives}];
+    const EVENT_INDICATORS: usize = {event_indicators};
     const CATEGORIES: &'static [&'static str] = &{categories:?};
     type Real = Real;
     type Integer = Integer;
@@ -64,7 +78,7 @@ fn key(out: &mut String, kind: Kind, variables: &[&Variable]) -> std::fmt::Resul
         Kind::Boolean => "bool",
         Kind::String => "&'static str",
     };
-    let variants: Vec<_> = variables.iter().map(|v| identifier(&v.name)).collect();
+    let variants: Vec<_> = variables.iter().map(|v| identifier_of(&v.name)).collect();
 
     writeln!(
         out,
@@ -155,6 +169,7 @@ fn entry(out: &mut String, v: &Variable) -> std::fmt::Result {
             start: {},
             min: {},
             max: {},
+            nominal: {},
             unit: {},
             description: {:?},
         }},",
@@ -166,6 +181,7 @@ fn entry(out: &mut String, v: &Variable) -> std::fmt::Result {
         option(&v.start),
         option(&v.min),
         option(&v.max),
+        option(&v.nominal),
         option(&unit),
         v.description,
     )

@@ -8,6 +8,10 @@ use crate::description::{Attributes, Description, ScalarVariable, SimpleType};
 pub(crate) struct Table {
     pub name: String,
     pub identifier: String,
+    pub version: String,
+    pub event_indicators: usize,
+    /// Places in `variables` of the continuous states and of their derivatives.
+    pub states: Vec<(usize, usize)>,
     pub categories: Vec<String>,
     pub variables: Vec<Variable>,
 }
@@ -42,6 +46,7 @@ pub(crate) struct Variable {
     pub start: Option<Literal>,
     pub min: Option<Literal>,
     pub max: Option<Literal>,
+    pub nominal: Option<Literal>,
 }
 
 impl Table {
@@ -60,6 +65,9 @@ impl Table {
                 .as_ref()
                 .map(|interface| interface.model_identifier.clone())
                 .unwrap_or_default(),
+            version: description.version.clone(),
+            event_indicators: description.number_of_event_indicators,
+            states: states(description),
             categories: (description.log_categories.categories.iter())
                 .map(|category| category.name.clone())
                 .collect(),
@@ -74,6 +82,20 @@ impl Table {
                 .collect(),
         }
     }
+}
+
+/// What `Derivatives` lists, with the states that the derivatives are of; `check` complains about what is missing.
+fn states(description: &Description) -> Vec<(usize, usize)> {
+    let variables = &description.model_variables.variables;
+    let unknowns = &description.model_structure.derivatives.unknowns;
+    unknowns
+        .iter()
+        .filter_map(|unknown| {
+            let derivative = unknown.index.checked_sub(1)?;
+            let of = variables.get(derivative)?.real.as_ref()?.derivative?;
+            Some((of.checked_sub(1)?, derivative))
+        })
+        .collect()
 }
 
 fn read(v: &ScalarVariable, types: &[SimpleType]) -> Result<Variable, String> {
@@ -102,6 +124,7 @@ fn read(v: &ScalarVariable, types: &[SimpleType]) -> Result<Variable, String> {
         start: content.start,
         min: content.min,
         max: content.max,
+        nominal: content.nominal,
     })
 }
 
@@ -124,6 +147,7 @@ struct Content {
     start: Option<Literal>,
     min: Option<Literal>,
     max: Option<Literal>,
+    nominal: Option<Literal>,
 }
 
 /// A pick of one element out of a declared type.
@@ -179,5 +203,6 @@ fn resolve<T: std::fmt::Debug>(
         start: own.start.as_ref().map(|value| format!("{value:?}")),
         min: inherited(|a| a.min.as_ref()),
         max: inherited(|a| a.max.as_ref()),
+        nominal: inherited(|a| a.nominal.as_ref()),
     }))
 }

@@ -54,7 +54,7 @@ pub(super) unsafe fn enter<C, R: Into<Status>>(
     handle.busy.store(true, Ordering::Relaxed);
     // SAFETY: no other reference exists: other threads keep out by contract, and re-entry was refused just now.
     let instance = unsafe { &mut *handle.instance.get() };
-    let status = if function.legal_in().contains(instance.session.state) {
+    let status = if function.legal(instance.session.interface, instance.session.state) {
         match catch_unwind(AssertUnwindSafe(|| body(instance))) {
             Ok(Ok(done)) => done.into(),
             Ok(Err(refusal)) => refuse(instance, name, &refusal),
@@ -103,20 +103,26 @@ fn illegal<C>(instance: &Instance<C>, function: Function, name: &str) -> Status 
             Status::Fatal,
             "nothing but fmi2FreeInstance is of use any more".to_owned(),
         ),
-        (_, Function::ModelExchange) => (
-            Status::Error,
-            "the component was instantiated for co-simulation, the function is one of model exchange".to_owned(),
-        ),
-        _ => (
-            Status::Error,
-            format!("the function is legal in {}", function.legal_in()),
-        ),
+        _ => (Status::Error, whereabouts(instance, function)),
     };
     instance.log.reason(
         status,
         &format!("{name} is illegal in state {}: {expected}", state.name()),
     );
     status
+}
+
+/// Where the function would be legal.
+fn whereabouts<C>(instance: &Instance<C>, function: Function) -> String {
+    let interface = instance.session.interface;
+    match function.only_in() {
+        Some(only) if only != interface => format!(
+            "the component was instantiated for {}, the function is one of {}",
+            interface.name(),
+            only.name()
+        ),
+        _ => format!("the function is legal in {}", function.legal_in()),
+    }
 }
 
 #[cold]

@@ -105,7 +105,7 @@ pub unsafe fn deserialize_fmu_state<C: Component>(
         // SAFETY: the array has `size` bytes by contract.
         let bytes = unsafe { input(bytes.cast::<u8>(), size, "serializedState") }?;
         // SAFETY: the contract is passed on.
-        unsafe { keep(instance, state, deserialise(bytes)?) }
+        unsafe { keep(instance, state, deserialise(bytes, instance.select)?) }
     };
     // SAFETY: the contract is passed on.
     unsafe { enter(component, FMUstate, "fmi2DeSerializeFMUstate", body) }

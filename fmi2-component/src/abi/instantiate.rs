@@ -12,18 +12,21 @@ use crate::instance::Instance;
 use crate::log::Log;
 use crate::model::Model;
 use crate::refusal::Refusal;
+use crate::session::Select;
 use crate::status::Status;
 
-/// `fmi2CoSimulation`.
+/// `fmi2Type`.
+const MODEL_EXCHANGE: c_int = 0;
 const CO_SIMULATION: c_int = 1;
 
-/// `fmi2Instantiate`. The resource location is not used, so that every spelling of it is fine.
+/// `fmi2Instantiate`; `select` is there for a component that has the interface of model exchange too. The resource location is not used, so that every spelling of it is fine.
 pub unsafe fn instantiate<C: Component>(
     instance_name: CString,
     fmu_type: c_int,
     guid: CString,
     functions: *const CallbackFunctions,
     logging_on: CBoolean,
+    select: Option<fn(&mut C)>,
 ) -> CComponent {
     // SAFETY: NULL or one readable structure, by contract.
     let Ok([functions]) = (unsafe { input(functions, 1, "functions") }) else {
@@ -40,10 +43,10 @@ pub unsafe fn instantiate<C: Component>(
     log.enable_all(logging_on != 0);
     let make = || {
         check_name(name)?;
-        check_type(fmu_type)?;
+        let select = interface(fmu_type, select)?;
         // SAFETY: NULL or a C string, by the standard.
         check_guid::<C>(unsafe { text(guid) }.as_deref())?;
-        Instance::<C>::new(log)
+        Instance::<C>::new(log, select)
     };
     let (status, reason) = match catch_unwind(AssertUnwindSafe(make)) {
         Ok(Ok(instance)) => return Handle::into_pointer(instance),
@@ -87,13 +90,18 @@ fn check_name(name: &CStr) -> Result<(), Refusal> {
     Ok(())
 }
 
-fn check_type(fmu_type: c_int) -> Result<(), Refusal> {
-    if fmu_type != CO_SIMULATION {
-        return Err(Refusal::error(format!(
+/// What selects the interface that the master wants.
+fn interface<C>(fmu_type: c_int, select: Select<C>) -> Result<Select<C>, Refusal> {
+    match (fmu_type, select) {
+        (CO_SIMULATION, _) => Ok(None),
+        (MODEL_EXCHANGE, Some(_)) => Ok(select),
+        (_, Some(_)) => Err(Refusal::error(format!(
+            "fmuType = {fmu_type} is refused; there are {MODEL_EXCHANGE} (model exchange) and {CO_SIMULATION} (co-simulation)"
+        ))),
+        (_, None) => Err(Refusal::error(format!(
             "fmuType = {fmu_type} is refused; the component is for co-simulation ({CO_SIMULATION}) only"
-        )));
+        ))),
     }
-    Ok(())
 }
 
 fn check_guid<C: Component>(guid: Option<&str>) -> Result<(), Refusal> {

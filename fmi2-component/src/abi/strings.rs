@@ -76,5 +76,5 @@ pub unsafe fn set_string<C: Component>(
         Ok(())
     };
     // SAFETY: the contract is passed on.
-    unsafe { enter(component, Function::SetValues, "fmi2SetString", body) }
+    unsafe { enter(component, Function::SetDiscrete, "fmi2SetString", body) }
 }

@@ -31,6 +31,19 @@ pub struct CallbackFunctions {
     pub component_environment: *mut c_void,
 }
 
+/// `fmi2EventInfo`: what an event has led to.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[allow(missing_docs)] // the names are those of the standard
+pub struct EventInfo {
+    pub new_discrete_states_needed: CBoolean,
+    pub terminate_simulation: CBoolean,
+    pub nominals_of_continuous_states_changed: CBoolean,
+    pub values_of_continuous_states_changed: CBoolean,
+    pub next_event_time_defined: CBoolean,
+    pub next_event_time: f64,
+}
+
 /// What `fmi2GetTypesPlatform` answers.
 pub const TYPES_PLATFORM: &CStr = c"default";
 /// What `fmi2GetVersion` answers.

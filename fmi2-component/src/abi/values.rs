@@ -14,7 +14,7 @@ use crate::status::Status;
 
 /// Declares a getter and a setter of the ABI.
 macro_rules! values {
-    ($get:ident, $set:ident, $c_get:literal, $c_set:literal, $c_type:ty,
+    ($get:ident, $set:ident, $c_get:literal, $c_set:literal, $setting:expr, $c_type:ty,
      $read:expr, $check:expr, $write:expr) => {
         #[doc = concat!("`", $c_get, "`.")]
         #[inline]
@@ -37,7 +37,17 @@ macro_rules! values {
             values: *const $c_type,
         ) -> Status {
             // SAFETY: the contract is passed on.
-            unsafe { set(component, $c_set, references, count, values, $check, $write) }
+            unsafe {
+                set(
+                    component,
+                    ($setting, $c_set),
+                    references,
+                    count,
+                    values,
+                    $check,
+                    $write,
+                )
+            }
         }
     };
 }
@@ -47,6 +57,7 @@ values!(
     set_real,
     "fmi2GetReal",
     "fmi2SetReal",
+    Function::SetReal,
     f64,
     |c: &C, key| c.get_real(key),
     |key, &value| Instance::<C>::check_finite(key, value),
@@ -57,6 +68,7 @@ values!(
     set_integer,
     "fmi2GetInteger",
     "fmi2SetInteger",
+    Function::SetDiscrete,
     c_int,
     |c: &C, key| c.get_integer(key),
     |_, _| Ok(()),
@@ -67,6 +79,7 @@ values!(
     set_boolean,
     "fmi2GetBoolean",
     "fmi2SetBoolean",
+    Function::SetDiscrete,
     CBoolean,
     |c: &C, key| CBoolean::from(c.get_boolean(key)),
     |_, _| Ok(()),
@@ -106,7 +119,7 @@ unsafe fn get<C: Component, K: Key, T>(
 #[inline]
 unsafe fn set<C: Component, K: Key, T>(
     component: CComponent,
-    name: &str,
+    (function, name): (Function, &str),
     references: *const CValueReference,
     count: usize,
     values: *const T,
@@ -134,7 +147,7 @@ unsafe fn set<C: Component, K: Key, T>(
         Ok(())
     };
     // SAFETY: the contract is passed on.
-    unsafe { enter(component, Function::SetValues, name, body) }
+    unsafe { enter(component, function, name, body) }
 }
 
 /// Makes computed values right in Initialization Mode; reading back what was set needs no more than that.

@@ -79,6 +79,9 @@ pub enum PackError {
     /// The scene's controller cannot work.
     #[error("the scene's controller: {0}")]
     Controller(#[from] phase_lock::ConfigError),
+    /// The description is no XML.
+    #[error("the description cannot be read: {0}")]
+    Description(roxmltree::Error),
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {

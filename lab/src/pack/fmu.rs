@@ -3,7 +3,7 @@
 use super::{
     Component, File, Libraries, PackError, archive,
     binary::{self, Fitted},
-    library,
+    documentation, library,
     platform::Platform,
 };
 
@@ -38,7 +38,14 @@ fn one<'a>(
             (name, library.content.as_slice())
         })
         .collect();
+    let pages =
+        documentation(identifier, &component.description).map_err(PackError::Description)?;
     let mut entries = vec![("modelDescription.xml", component.description.as_bytes())];
+    entries.extend(
+        pages
+            .iter()
+            .map(|(name, page)| (name.as_str(), page.as_slice())),
+    );
     entries.extend(
         libraries
             .iter()

@@ -1,0 +1,186 @@
+//! The life of an instance for model exchange, and jumps at its events.
+
+use fmi2_boundary::{Fmu, Interface, Master};
+use fmi2_component::Status;
+use fmi2_component::abi::EventInfo;
+
+const DQ1: u32 = 10;
+const DQ2: u32 = 12;
+const E: u32 = 6;
+
+fn event_mode(values: &[(u32, f64)]) -> Master {
+    let m = Master::new(&Fmu::plant(), Interface::ModelExchange);
+    for &(vr, value) in values {
+        m.well(m.set_real(vr, value));
+    }
+    m.start();
+    m
+}
+
+fn resolve(m: &Master) -> EventInfo {
+    let mut info = EventInfo::default();
+    // SAFETY: one place; so below.
+    m.well(unsafe { (m.f.fmi2NewDiscreteStates)(m.c, &mut info) });
+    info
+}
+
+fn go_on(m: &Master) {
+    m.well(unsafe { (m.f.fmi2EnterContinuousTimeMode)(m.c) });
+}
+
+fn integer(m: &Master, vr: u32) -> i32 {
+    let mut value = 0;
+    m.well(unsafe { (m.f.fmi2GetInteger)(m.c, &vr, 1, &mut value) });
+    value
+}
+
+fn indicators(m: &Master) -> [f64; 3] {
+    let mut z = [0.0; 3];
+    m.well(unsafe { (m.f.fmi2GetEventIndicators)(m.c, z.as_mut_ptr(), 3) });
+    z
+}
+
+fn states(m: &Master) -> [f64; 5] {
+    let mut x = [0.0; 5];
+    m.well(unsafe { (m.f.fmi2GetContinuousStates)(m.c, x.as_mut_ptr(), 5) });
+    x
+}
+
+#[test]
+fn each_mode_has_its_own_functions() {
+    let m = event_mode(&[]);
+    assert_eq!(m.step(0.0, 0.1), Status::Error);
+    assert!(m.heard()[0].text.contains("one of co-simulation"));
+    unsafe {
+        assert_eq!(
+            (m.f.fmi2CompletedIntegratorStep)(m.c, 1, &mut 0, &mut 0),
+            Status::Error
+        );
+        assert!(m.heard()[0].text.contains("legal in Continuous-Time Mode"));
+        m.well((m.f.fmi2EnterEventMode)(m.c));
+        resolve(&m);
+        go_on(&m);
+        m.well((m.f.fmi2CompletedIntegratorStep)(m.c, 1, &mut 0, &mut 0));
+        assert_eq!(
+            (m.f.fmi2NewDiscreteStates)(m.c, &mut EventInfo::default()),
+            Status::Error
+        );
+        let _ = m.heard();
+        m.well((m.f.fmi2Terminate)(m.c));
+        let _ = states(&m);
+    }
+}
+
+#[test]
+fn co_simulation_has_none_of_them() {
+    for fmu in [Fmu::plant(), Fmu::controller()] {
+        let m = Master::ready(&fmu);
+        // SAFETY: refused.
+        assert_eq!(unsafe { (m.f.fmi2SetTime)(m.c, 0.0) }, Status::Error);
+        assert!(m.heard()[0].text.contains("one of model exchange"));
+    }
+}
+
+#[test]
+fn a_parameter_is_not_tuned_while_the_integrator_runs() {
+    let m = event_mode(&[]);
+    m.well(m.set_real(2, 3.0));
+    go_on(&m);
+    assert_eq!(m.set_real(2, 4.0), Status::Error);
+    let _ = m.heard();
+    m.well(m.set_real(E, 1e-3));
+}
+
+#[test]
+fn a_particle_at_the_wall_rebounds_and_keeps_momentum() {
+    // w = b, approaching.
+    let m = event_mode(&[(0, 3.0), (3, 0.5), (9, 0.01), (DQ1, 0.4), (DQ2, -0.2)]);
+    assert_eq!(resolve(&m).values_of_continuous_states_changed, 1);
+    let (v1, v2) = (m.real(DQ1), m.real(DQ2));
+    assert!((3.0 * v1 + 0.5 * v2 - (3.0 * 0.4 - 0.5 * 0.2)).abs() < 1e-15);
+    assert!((v1 - v2 + 0.65 * 0.6).abs() < 1e-15);
+    assert_eq!((integer(&m, 18), integer(&m, 21)), (1, 0));
+    assert!(indicators(&m).iter().all(|&z| z > 0.0));
+    assert_eq!(resolve(&m).values_of_continuous_states_changed, 0, "once");
+}
+
+#[test]
+fn a_jump_of_the_base_is_the_velocity_jump_that_the_damper_makes() {
+    let m = event_mode(&[(0, 3.0), (2, 6.0)]);
+    resolve(&m);
+    go_on(&m);
+    m.well(unsafe { (m.f.fmi2EnterEventMode)(m.c) });
+    m.well(m.set_real(E, 0.01));
+    resolve(&m);
+    assert!((m.real(DQ1) - 6.0 / 3.0 * 0.01).abs() < 1e-16);
+}
+
+#[test]
+fn a_particle_that_is_pressed_sticks_and_a_jump_of_the_base_frees_it() {
+    // w = b at rest, the spring pushes towards +q2: the particle is carried along.
+    let held = [(0, 3.0), (2, 6.0), (9, -0.005), (11, -0.015), (DQ2, 0.0)]; // to the last digit or so
+    let m = event_mode(&held);
+    resolve(&m);
+    assert_eq!(integer(&m, 21), 1);
+    let mut dx = [0.0; 5];
+    m.well(unsafe { (m.f.fmi2GetDerivatives)(m.c, dx.as_mut_ptr(), 5) });
+    assert_eq!(dx[2], dx[3], "both are accelerated alike");
+    assert!((dx[2] - 11680.0 * 0.005 / 3.032).abs() < 1e-12);
+
+    go_on(&m);
+    m.well(unsafe { (m.f.fmi2EnterEventMode)(m.c) });
+    m.well(m.set_real(E, -0.001));
+    resolve(&m);
+    assert_eq!(integer(&m, 21), 0);
+    assert!(
+        (m.real(DQ1) + 6.0 / 3.0 * 0.001).abs() < 1e-16,
+        "the primary mass alone"
+    );
+    assert_eq!(m.real(DQ2), 0.0);
+}
+
+#[test]
+fn a_step_that_has_led_behind_a_wall_asks_for_an_event() {
+    let m = event_mode(&[]);
+    resolve(&m);
+    go_on(&m);
+    let (mut event, mut end) = (0, 0);
+    let mut x = states(&m);
+    x[1] = -0.0100001;
+    unsafe {
+        m.well((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5));
+        m.well((m.f.fmi2CompletedIntegratorStep)(
+            m.c, 1, &mut event, &mut end,
+        ));
+    }
+    assert_eq!((event, end), (1, 0));
+    assert!(indicators(&m)[0] < 0.0);
+}
+
+#[test]
+fn states_without_sense_are_refused() {
+    let m = event_mode(&[]);
+    go_on(&m);
+    let x = [0.0, f64::NAN, 0.0, 0.0, 0.0];
+    unsafe {
+        assert_eq!(
+            (m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5),
+            Status::Discard
+        );
+        assert_eq!(
+            (m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 4),
+            Status::Error
+        );
+    }
+    let heard = m.heard();
+    assert!(heard[0].text.contains("finite") && heard[1].text.contains("expected is 5"));
+    assert_eq!(states(&m)[1], 0.0);
+}
+
+#[test]
+fn nominal_values_are_those_of_the_rig() {
+    let m = event_mode(&[(0, 1.0), (1, 4.0), (4, 0.5)]);
+    let mut nominals = [0.0; 5];
+    m.well(unsafe { (m.f.fmi2GetNominalsOfContinuousStates)(m.c, nominals.as_mut_ptr(), 5) });
+    assert_eq!(nominals, [0.5, 0.5, 1.0, 1.0, 1.0]);
+}

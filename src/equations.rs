@@ -1,0 +1,166 @@
+//! The rig's differential equations between events, and what follows from its state at one instant: written once, for
+//! numbers and for numbers with a derivative, so that partial derivatives are those of these very lines.
+//!
+//! The damper feels the velocity of the base, and nobody knows the slope of a signal that only comes as values. So the
+//! states are not velocities but *reduced* velocities, from which the share that the damper has passed on is taken off:
+//!
+//! ```text
+//! free:   u1 = q1' - (c/M) base       u1' = (k (base - q1) - c q1')/M        u2 = q2'            u2' = 0
+//! stuck:  u1 = q' - c/(M + m) base    u1' = (k (base - q) - c q')/(M + m)    u2, u2' the same
+//! ```
+//!
+//! No slope of the base is needed, and where the base jumps, `u1` does not: the velocity jump `c Δe/M` comes by itself.
+
+mod dual;
+
+pub use dual::{Dual, Scalar};
+
+use crate::wall::Wall;
+
+/// Everything that the rig is made of, at one instant.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Instant<T> {
+    /// Primary mass, kg.
+    pub primary_mass: T,
+    /// Stiffness, N/m.
+    pub stiffness: T,
+    /// Damping, N·s/m.
+    pub damping: T,
+    /// Particle mass, kg.
+    pub particle_mass: T,
+    /// Base displacement signal, m.
+    pub signal: T,
+    /// Slope of that signal, m/s, where it is known.
+    pub slope: T,
+    /// Amplitude of the base oscillator, m.
+    pub amplitude: T,
+    /// Frequency of the base oscillator, rad/s.
+    pub omega: T,
+    /// Phase of the base oscillator, rad.
+    pub phase: T,
+    /// Displacement of the primary mass, m.
+    pub q1: T,
+    /// Velocity of the primary mass, m/s.
+    pub dq1: T,
+    /// Displacement of the particle, m.
+    pub q2: T,
+    /// Velocity of the particle, m/s.
+    pub dq2: T,
+    /// The wall that the particle is stuck to.
+    pub contact: Option<Wall>,
+}
+
+impl<T: Scalar> Instant<T> {
+    /// Displacement of the base, m.
+    pub fn base(&self) -> T {
+        self.signal + self.amplitude * self.phase.sine()
+    }
+
+    /// Velocity of the base as far as it is known, m/s.
+    pub fn base_velocity(&self) -> T {
+        self.slope + self.amplitude * self.omega * self.phase.cosine()
+    }
+
+    /// `v = q1 + (m/M) q2`, m.
+    pub fn centre(&self) -> T {
+        self.q1 + self.particle_mass / self.primary_mass * self.q2
+    }
+
+    /// `w = q1 - q2`, m.
+    pub fn relative_displacement(&self) -> T {
+        self.q1 - self.q2
+    }
+
+    /// `w'`, m/s.
+    pub fn relative_velocity(&self) -> T {
+        self.dq1 - self.dq2
+    }
+
+    /// Mechanical energy of both masses and the spring, J.
+    pub fn energy(&self) -> T {
+        let stretch = self.q1 - self.base();
+        T::from(0.5)
+            * (self.primary_mass * self.dq1 * self.dq1
+                + self.particle_mass * self.dq2 * self.dq2
+                + self.stiffness * stretch * stretch)
+    }
+
+    /// The mass that the spring moves: the primary one alone, or both.
+    fn moved_mass(&self) -> T {
+        match self.contact {
+            None => self.primary_mass,
+            Some(_) => self.primary_mass + self.particle_mass,
+        }
+    }
+
+    /// What the base's displacement takes off the velocity of the primary mass, and off that of the particle.
+    fn reductions(&self) -> (T, T) {
+        let passed_on = self.damping / self.moved_mass() * self.base();
+        match self.contact {
+            None => (passed_on, T::from(0.0)),
+            Some(_) => (passed_on, passed_on),
+        }
+    }
+
+    /// The reduced velocities `u1` and `u2`, m/s.
+    pub fn reduced_velocities(&self) -> (T, T) {
+        let (of_primary, of_particle) = self.reductions();
+        (self.dq1 - of_primary, self.dq2 - of_particle)
+    }
+
+    /// The same instant with velocities that belong to these reduced ones.
+    pub fn with_reduced(mut self, (u1, u2): (T, T)) -> Self {
+        let (of_primary, of_particle) = self.reductions();
+        self.dq1 = u1 + of_primary;
+        self.dq2 = u2 + of_particle;
+        self
+    }
+
+    /// The derivatives of `u1` and `u2`, m/s².
+    pub fn reduced_accelerations(&self) -> (T, T) {
+        let force = self.stiffness * (self.base() - self.q1) - self.damping * self.dq1;
+        let acceleration = force / self.moved_mass();
+        match self.contact {
+            None => (acceleration, T::from(0.0)),
+            Some(_) => (acceleration, acceleration),
+        }
+    }
+
+    /// Acceleration of the primary mass, or of both, m/s²; the slope of the signal is in it as far as it is known.
+    pub fn acceleration(&self) -> T {
+        let passed_on = self.damping / self.moved_mass() * self.base_velocity();
+        self.reduced_accelerations().0 + passed_on
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn velocities_come_back_from_reduced_ones() {
+        for contact in [None, Some(Wall::Plus)] {
+            let instant = Instant {
+                primary_mass: 3.0,
+                stiffness: 20.0,
+                damping: 0.7,
+                particle_mass: 0.2,
+                signal: 0.1,
+                amplitude: 0.02,
+                phase: 0.3,
+                dq1: -0.4,
+                dq2: -0.4,
+                contact,
+                ..Instant::default()
+            };
+            let reduced = instant.reduced_velocities();
+            let back = Instant {
+                dq1: 0.0,
+                dq2: 0.0,
+                ..instant
+            }
+            .with_reduced(reduced);
+            assert!((back.dq1 + 0.4).abs() < 1e-16 && (back.dq2 + 0.4).abs() < 1e-16);
+        }
+    }
+}

@@ -1,0 +1,175 @@
+//! Partial derivatives of what the master may ask for, and time derivatives of the outputs.
+
+use super::variables::Real;
+use super::{LoViNes, Progress, Rig};
+use crate::Plant;
+use crate::equations::{Dual, Instant, Scalar};
+use crate::rates::Movement;
+use fmi2_component::{Causality, Key, Refusal};
+
+/// The highest order of output derivatives, as the description says it.
+const MOST: u32 = 3;
+
+/// A value that follows from the rig at one instant; 0 for one that only changes at events.
+pub(super) fn of_instant<T: Scalar>(now: &Instant<T>, variable: Real) -> T {
+    match variable {
+        Real::q1 => now.q1,
+        Real::der_q1 => now.dq1,
+        Real::q2 => now.q2,
+        Real::der_q2 => now.dq2,
+        Real::v => now.centre(),
+        Real::w => now.relative_displacement(),
+        Real::der_w => now.relative_velocity(),
+        Real::base => now.base(),
+        Real::phase => now.phase,
+        Real::energy => now.energy(),
+        Real::u1 => now.reduced_velocities().0,
+        Real::u2 => now.reduced_velocities().1,
+        Real::der_u1 => now.reduced_accelerations().0,
+        Real::der_u2 => now.reduced_accelerations().1,
+        Real::der_phase => now.omega,
+        _ => T::from(0.0),
+    }
+}
+
+impl LoViNes {
+    /// The plant as it stands, with the inputs as they are set now.
+    pub(super) fn instant(&self, plant: &Plant) -> Instant<f64> {
+        let (p, state) = (&self.parameters, plant.state());
+        let base = if self.inputs_set {
+            plant.base().with(self.drive())
+        } else {
+            *plant.base()
+        };
+        Instant {
+            primary_mass: p.primary_mass,
+            stiffness: p.stiffness,
+            damping: p.damping,
+            particle_mass: p.particle_mass,
+            signal: base.drive.signal[0],
+            slope: base.drive.signal[1],
+            amplitude: base.drive.amplitude,
+            omega: base.drive.omega,
+            phase: base.phase.radians(),
+            q1: state.q1,
+            dq1: state.dq1,
+            q2: state.q2,
+            dq2: state.dq2,
+            contact: plant.contact(),
+        }
+    }
+
+    /// The partial derivative of `unknown` by `known`, all else being equal; the contact stays as it is.
+    ///
+    /// What else there is depends on the interface: in model exchange, once it is under way, the reduced velocities are
+    /// states, so that a velocity changes with the base; in co-simulation it does not.
+    pub(super) fn slope(&self, unknown: Real, known: Real) -> Result<f64, Refusal> {
+        let causality = unknown.variable().causality;
+        if !matches!(causality, Causality::Output | Causality::Local) {
+            return Err(Refusal::error(format!(
+                "{} is no unknown: expected is an output or a derivative",
+                unknown.variable().name
+            )));
+        }
+        let (now, integrated) = match &self.rig {
+            Rig::Steps(plant) => (self.instant(plant), false),
+            Rig::Equations(hybrid) => (hybrid.instant(), self.progress == Progress::UnderWay),
+        };
+        let reduced_are_states = match known {
+            Real::u1 | Real::u2 => true,
+            Real::der_q1 | Real::der_q2 => false,
+            _ => integrated,
+        };
+        let dual = perturbed(&now, known, reduced_are_states)?;
+        Ok(of_instant(&dual, unknown).slope)
+    }
+
+    /// The time derivative of an output at the end of the last step.
+    pub(super) fn time_derivative(&self, variable: Real, order: u32) -> Result<f64, Refusal> {
+        let Rig::Steps(plant) = &self.rig else {
+            return Err(Refusal::error("output derivatives are of co-simulation"));
+        };
+        if order > MOST {
+            return Err(Refusal::error(format!(
+                "derivative {order} of {} is refused; allowed are orders 1 to {MOST}",
+                variable.variable().name
+            )));
+        }
+        let n = order as usize;
+        let Movement {
+            base,
+            primary,
+            particle,
+        } = Movement::of(plant);
+        let p = &self.parameters;
+        Ok(match variable {
+            Real::q1 => primary[n],
+            Real::der_q1 => primary[n + 1],
+            Real::q2 => particle[n],
+            Real::der_q2 => particle[n + 1],
+            Real::v => primary[n] + p.mass_ratio() * particle[n],
+            Real::w => primary[n] - particle[n],
+            Real::der_w => primary[n + 1] - particle[n + 1],
+            Real::base => base[n],
+            Real::phase if n == 1 => plant.base().drive.omega,
+            Real::energy => Movement::of(plant).energy(p, n),
+            // The phase turns evenly, and what is told of impacts changes with the next one only.
+            _ => 0.0,
+        })
+    }
+}
+
+/// The instant with a derivative along `known`.
+fn perturbed(
+    now: &Instant<f64>,
+    known: Real,
+    reduced_are_states: bool,
+) -> Result<Instant<Dual>, Refusal> {
+    let along = |variable: Real, value: f64| Dual {
+        value,
+        slope: f64::from(u8::from(variable == known)),
+    };
+    let instant = Instant {
+        primary_mass: along(Real::M, now.primary_mass),
+        stiffness: along(Real::k, now.stiffness),
+        damping: along(Real::c, now.damping),
+        particle_mass: along(Real::m, now.particle_mass),
+        signal: along(Real::e, now.signal),
+        slope: Dual::from(now.slope),
+        amplitude: along(Real::E, now.amplitude),
+        omega: along(Real::omega, now.omega),
+        phase: along(Real::phase, now.phase),
+        q1: along(Real::q1, now.q1),
+        dq1: along(Real::der_q1, now.dq1),
+        q2: along(Real::q2, now.q2),
+        dq2: along(Real::der_q2, now.dq2),
+        contact: now.contact,
+    };
+    let (u1, u2) = now.reduced_velocities();
+    match known {
+        // Nothing but the next impact depends on them.
+        Real::b | Real::r => Ok(instant),
+        Real::M
+        | Real::k
+        | Real::c
+        | Real::m
+        | Real::e
+        | Real::E
+        | Real::omega
+        | Real::phase
+        | Real::q1
+        | Real::der_q1
+        | Real::q2
+        | Real::der_q2
+        | Real::u1
+        | Real::u2 => Ok(if reduced_are_states {
+            instant.with_reduced((along(Real::u1, u1), along(Real::u2, u2)))
+        } else {
+            instant
+        }),
+        _ => Err(Refusal::error(format!(
+            "{} is no known: expected is a parameter, an input or a state",
+            known.variable().name
+        ))),
+    }
+}

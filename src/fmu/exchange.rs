@@ -1,0 +1,96 @@
+//! The plant for masters that integrate its equations themselves.
+
+use super::derivatives::of_instant;
+use super::variables::Real;
+use super::{LoViNes, Progress, Rig, log};
+use crate::hybrid::Hybrid;
+use crate::{Drive, Parameters, State};
+use fmi2_component::{Discrete, Log, ModelExchange, Refusal};
+
+/// A value that follows from the equations' state.
+pub(super) fn of_hybrid(hybrid: &Hybrid, variable: Real) -> f64 {
+    match variable {
+        Real::q1 => hybrid.states.q1,
+        Real::q2 => hybrid.states.q2,
+        Real::phase => hybrid.states.phase,
+        Real::u1 => hybrid.states.u1,
+        Real::u2 => hybrid.states.u2,
+        Real::impact_time => hybrid.tally().impact_time,
+        Real::impact_velocity => hybrid.tally().impact_velocity,
+        Real::dissipated => hybrid.tally().dissipated,
+        _ => of_instant(&hybrid.instant(), variable),
+    }
+}
+
+impl LoViNes {
+    fn hybrid(&self) -> &Hybrid {
+        match &self.rig {
+            Rig::Equations(hybrid) => hybrid,
+            Rig::Steps(_) => unreachable!("the shell asks this only after select"),
+        }
+    }
+
+    fn hybrid_mut(&mut self) -> &mut Hybrid {
+        match &mut self.rig {
+            Rig::Equations(hybrid) => hybrid,
+            Rig::Steps(_) => unreachable!("the shell asks this only after select"),
+        }
+    }
+}
+
+impl ModelExchange for LoViNes {
+    fn select(&mut self) {
+        let parameters = Parameters::dimensionless(1.0, 0.0, 1.0);
+        let hybrid = Hybrid::new(parameters, State::default(), Drive::default());
+        self.rig = Rig::Equations(hybrid.expect("unit parameters make sense"));
+    }
+
+    fn set_state(&mut self, state: Real, value: f64) {
+        self.progress = Progress::UnderWay;
+        let states = &mut self.hybrid_mut().states;
+        match state {
+            Real::q1 => states.q1 = value,
+            Real::u1 => states.u1 = value,
+            Real::q2 => states.q2 = value,
+            Real::u2 => states.u2 = value,
+            _ => states.phase = value,
+        }
+    }
+
+    fn event_indicator(&self, index: usize) -> f64 {
+        self.hybrid().event_functions()[index]
+    }
+
+    fn enter_event_mode(&mut self) {
+        self.hybrid_mut().begin_event();
+    }
+
+    fn new_discrete_states(&mut self, time: f64, log: &Log) -> Result<Discrete, Refusal> {
+        self.progress = Progress::UnderWay;
+        let jumped = (self.hybrid_mut()).resolve(time, |event| log::tell(log, time, event));
+        Ok(Discrete {
+            states_changed: jumped,
+            ..Discrete::default()
+        })
+    }
+
+    fn completed_step(&mut self) -> bool {
+        self.hybrid().overdue()
+    }
+
+    fn nominal(&self, state: Real) -> f64 {
+        // Before initialization the rig is not yet made of the values set.
+        let length = self.parameters.half_width;
+        let velocity = length * self.parameters.natural_frequency();
+        let nominal = match state {
+            Real::q1 | Real::q2 => length,
+            Real::u1 | Real::u2 => velocity,
+            _ => 1.0,
+        };
+        if nominal.is_normal() && nominal > 0.0 {
+            nominal
+        } else {
+            1.0
+        }
+    }
+}

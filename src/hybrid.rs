@@ -1,0 +1,268 @@
+//! The rig as a hybrid system, for whoever integrates it: differential equations ([`crate::equations`]), functions whose
+//! zeros are events, and the jumps at events.
+//!
+//! Contact is a matter of rounding for an integrator: it stops a little before or behind a zero. Walls are therefore
+//! told to be touched [`DEPTH`] half-widths behind where they stand, and a wall to have ceased to push a little below no
+//! push at all. A function that is not of use in the present contact is held above zero.
+//!
+//! An integrator cannot follow a chatter to its accumulation point. A rebound that would lift the particle less than
+//! [`LOWEST_HOP`] half-widths off its wall, and whose chatter is over within [`LONGEST_CHATTER`] of the rig's time, ends in
+//! contact at once; what that neglects is of third order in the rebound's speed, 1e-15 here.
+//!
+//! The wall's push depends on the velocity of the base. That of the built-in oscillator is known while its amplitude is
+//! held, that of a signal is not, and is taken for zero; the plant in closed form ([`crate::plant`]) has no such limit.
+
+use crate::base_motion::Drive;
+use crate::equations::Instant;
+use crate::parameters::{InvalidValue, Parameters};
+use crate::plant::{Event, Plant, State, Tally};
+use crate::wall::{ImpactLaw, Wall};
+use serde::{Deserialize, Serialize};
+
+/// How far behind a wall a touch is told, as a fraction of the half-width.
+pub const DEPTH: f64 = 1e-12;
+/// The lowest hop that is followed, as a fraction of the half-width.
+pub const LOWEST_HOP: f64 = 1e-10;
+/// The longest chatter that is cut short, as a fraction of the time `1/omega0`.
+pub const LONGEST_CHATTER: f64 = 1e-2;
+
+/// What is integrated.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct States {
+    /// Displacement of the primary mass, m.
+    pub q1: f64,
+    /// Its reduced velocity, m/s.
+    pub u1: f64,
+    /// Displacement of the particle, m.
+    pub q2: f64,
+    /// Its reduced velocity, m/s.
+    pub u2: f64,
+    /// Phase of the base oscillator, rad.
+    pub phase: f64,
+}
+
+/// The rig between two looks of an integrator.
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+pub struct Hybrid {
+    parameters: Parameters,
+    contact: Option<Wall>,
+    tally: Tally,
+    /// Where the base was when the event began.
+    base_before: Option<f64>,
+    /// What moves the base now: set at any time.
+    pub drive: Drive,
+    /// What is integrated: set at any time between events.
+    pub states: States,
+}
+
+impl Hybrid {
+    /// The rig at `start`, at rest as to its contact; [`Self::resolve`] finds out what that means.
+    ///
+    /// # Errors
+    /// As for [`Plant::new`].
+    pub fn new(parameters: Parameters, start: State, drive: Drive) -> Result<Self, InvalidValue> {
+        let State { q1, dq1, q2, dq2 } = Plant::new(parameters, start)?.state();
+        let mut hybrid = Self {
+            parameters,
+            contact: None,
+            tally: Tally::default(),
+            base_before: None,
+            drive,
+            states: States {
+                q1,
+                q2,
+                ..States::default()
+            },
+        };
+        hybrid.set_velocities(dq1, dq2);
+        Ok(hybrid)
+    }
+
+    /// The rig as it stands.
+    pub fn instant(&self) -> Instant<f64> {
+        let p = &self.parameters;
+        let States {
+            q1,
+            u1,
+            q2,
+            u2,
+            phase,
+        } = self.states;
+        let instant = Instant {
+            primary_mass: p.primary_mass,
+            stiffness: p.stiffness,
+            damping: p.damping,
+            particle_mass: p.particle_mass,
+            signal: self.drive.signal[0],
+            slope: 0.0,
+            amplitude: self.drive.amplitude,
+            omega: self.drive.omega,
+            phase,
+            q1,
+            dq1: 0.0,
+            q2,
+            dq2: 0.0,
+            contact: self.contact,
+        };
+        instant.with_reduced((u1, u2))
+    }
+
+    /// The wall that the particle is stuck to.
+    pub fn contact(&self) -> Option<Wall> {
+        self.contact
+    }
+
+    /// What has been counted since the start.
+    pub fn tally(&self) -> &Tally {
+        &self.tally
+    }
+
+    /// Typical sizes of displacements (m) and velocities (m/s).
+    pub fn scales(&self) -> (f64, f64) {
+        let b = self.parameters.half_width;
+        (b, b * self.parameters.natural_frequency())
+    }
+
+    /// Functions of the state whose change of sign is an event: the gaps to both walls (as a fraction of the half-width)
+    /// and the push of the wall that the particle is stuck to (as a fraction of `omega0² b`).
+    pub fn event_functions(&self) -> [f64; 3] {
+        let now = self.instant();
+        match self.contact {
+            None => {
+                let [plus, minus] = Wall::BOTH.map(|wall| self.gap(wall, &now));
+                [plus + DEPTH, minus + DEPTH, 1.0]
+            }
+            Some(wall) => [1.0, 1.0, self.push(wall, &now) + DEPTH],
+        }
+    }
+
+    /// Whether an integrator has stepped over an event.
+    pub fn overdue(&self) -> bool {
+        self.event_functions().iter().any(|&value| value <= 0.0)
+    }
+
+    /// Says that an event begins: until [`Self::resolve`] the base may jump.
+    pub fn begin_event(&mut self) {
+        self.base_before = Some(self.instant().base());
+    }
+
+    /// Applies what is due now, at `time`: a jump of the base, an impact, rest, release; whether states have jumped.
+    pub fn resolve(&mut self, time: f64, mut tell: impl FnMut(Event)) -> bool {
+        let before = (self.states, self.contact);
+        self.base_jump();
+        if let Some(wall) = self.contact
+            && self.push(wall, &self.instant()) < -0.5 * DEPTH
+        {
+            self.part(None);
+            tell(Event::Released { t: 0.0, wall });
+        } else if self.contact.is_none() {
+            let now = self.instant();
+            let touched =
+                (Wall::BOTH.into_iter()).find(|&wall| self.gap(wall, &now) <= 0.5 * DEPTH);
+            if let Some(wall) = touched {
+                self.touch(wall, time, &mut tell);
+            }
+        }
+        // States may jump now, so that the phase can be brought back to one turn.
+        self.states.phase = self.states.phase.rem_euclid(core::f64::consts::TAU);
+        self.base_before = Some(self.instant().base());
+        before != (self.states, self.contact)
+    }
+
+    /// Takes over other parameters; displacements and velocities stay.
+    ///
+    /// # Errors
+    /// Parameters that make no sense; the old ones stay.
+    pub fn retune(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
+        parameters.validate()?;
+        let Instant { dq1, dq2, .. } = self.instant();
+        self.parameters = parameters;
+        self.set_velocities(dq1, dq2);
+        Ok(())
+    }
+
+    fn gap(&self, wall: Wall, now: &Instant<f64>) -> f64 {
+        1.0 - wall.sign() * now.relative_displacement() / self.parameters.half_width
+    }
+
+    fn push(&self, wall: Wall, now: &Instant<f64>) -> f64 {
+        let omega0_squared = self.parameters.stiffness / self.parameters.primary_mass;
+        wall.sign() * now.acceleration() / (omega0_squared * self.parameters.half_width)
+    }
+
+    fn set_velocities(&mut self, dq1: f64, dq2: f64) {
+        let now = Instant {
+            dq1,
+            dq2,
+            ..self.instant()
+        };
+        (self.states.u1, self.states.u2) = now.reduced_velocities();
+    }
+
+    /// Changes the contact; velocities stay.
+    fn part(&mut self, contact: Option<Wall>) {
+        let Instant { dq1, dq2, .. } = self.instant();
+        self.contact = contact;
+        self.set_velocities(dq1, dq2);
+    }
+
+    /// The impulse of a jump of the base acts on the primary mass alone: a particle at a wall is free to leave it.
+    fn base_jump(&mut self) {
+        let Some(before) = self.base_before.take() else {
+            return;
+        };
+        let jump = self.instant().base() - before;
+        if jump != 0.0 && self.contact.is_some() {
+            let joint = self.parameters.primary_mass + self.parameters.particle_mass;
+            let both = self.instant().dq1 - self.parameters.damping / joint * jump;
+            self.contact = None;
+            let alone = both + self.parameters.damping / self.parameters.primary_mass * jump;
+            self.set_velocities(alone, both);
+        }
+    }
+
+    /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
+    fn touch(&mut self, wall: Wall, time: f64, tell: &mut impl FnMut(Event)) {
+        let (s, law) = (wall.sign(), ImpactLaw::new(&self.parameters));
+        let Instant {
+            mut dq1, mut dq2, ..
+        } = self.instant();
+        if s * (dq1 - dq2) > 0.0 {
+            let velocity = dq1 - dq2;
+            let after = law.rebound(dq1, dq2, velocity);
+            self.tally.impacts += 1;
+            self.tally.impact_time = time;
+            self.tally.impact_velocity = velocity;
+            self.tally.dissipated += after.dissipated;
+            tell(Event::Impact {
+                t: 0.0,
+                wall,
+                velocity,
+            });
+            (dq1, dq2) = (after.primary, after.particle);
+        }
+        self.states.q2 = self.states.q1 - s * self.parameters.half_width;
+        self.set_velocities(dq1, dq2);
+        if self.rests(wall, s * (dq2 - dq1)) {
+            let (both, lost) = law.join(dq1, dq1 - dq2);
+            self.tally.dissipated += lost;
+            self.contact = Some(wall);
+            self.set_velocities(both, both);
+            tell(Event::Stuck { t: 0.0, wall });
+        }
+    }
+
+    /// Whether a particle that leaves `wall` at `speed` is in truth at rest on it.
+    fn rests(&self, wall: Wall, speed: f64) -> bool {
+        let pressing = wall.sign() * self.instant().acceleration();
+        let (b, fast) = self.scales();
+        if speed == 0.0 {
+            return pressing >= -0.5 * DEPTH * fast * fast / b;
+        }
+        let chatter = ImpactLaw::new(&self.parameters).chatter_duration(speed, pressing);
+        let over_soon = chatter * fast <= LONGEST_CHATTER * b;
+        // Without loss a hop is followed by its like for ever.
+        let endless = self.parameters.restitution == 1.0;
+        pressing > 0.0 && 0.5 * speed * speed <= LOWEST_HOP * b * pressing && (over_soon || endless)
+    }
+}

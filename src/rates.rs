@@ -1,0 +1,123 @@
+//! Time derivatives of everything that moves, at one instant between events: from the second on they follow from the
+//! equation of motion, differentiated again and again.
+
+use crate::base_motion::BaseMotion;
+use crate::parameters::Parameters;
+use crate::plant::Plant;
+
+/// A quantity and its first four time derivatives.
+pub type Rates = [f64; 5];
+
+/// Base, primary mass and particle with their time derivatives.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Movement {
+    /// Displacement of the base.
+    pub base: Rates,
+    /// Displacement of the primary mass.
+    pub primary: Rates,
+    /// Displacement of the particle.
+    pub particle: Rates,
+}
+
+impl Movement {
+    /// The movement of `plant` as it stands at the end of an advance.
+    pub fn of(plant: &Plant) -> Self {
+        let (p, state) = (plant.parameters(), plant.state());
+        let base = rates_of(plant.base());
+        let stuck = plant.contact().is_some();
+        let moved = p.primary_mass + if stuck { p.particle_mass } else { 0.0 };
+        let mut primary = [state.q1, state.dq1, 0.0, 0.0, 0.0];
+        for n in 2..primary.len() {
+            let damper = p.damping * (base[n - 1] - primary[n - 1]);
+            let spring = p.stiffness * (base[n - 2] - primary[n - 2]);
+            primary[n] = (damper + spring) / moved;
+        }
+        let mut particle = [state.q2, state.dq2, 0.0, 0.0, 0.0];
+        if stuck {
+            particle[2..].copy_from_slice(&primary[2..]);
+        }
+        Self {
+            base,
+            primary,
+            particle,
+        }
+    }
+
+    /// The `order`-th time derivative (0 to 3) of the mechanical energy.
+    pub fn energy(&self, p: &Parameters, order: usize) -> f64 {
+        let stretch = core::array::from_fn(|n| self.primary[n] - self.base[n]);
+        let moving = |mass: f64, x: &Rates| mass * squared([x[1], x[2], x[3], x[4], 0.0], order);
+        let spring = p.stiffness * squared(stretch, order);
+        0.5 * (moving(p.primary_mass, &self.primary)
+            + moving(p.particle_mass, &self.particle)
+            + spring)
+    }
+}
+
+/// Leibniz's rule for the `order`-th derivative of `x²`.
+fn squared(x: Rates, order: usize) -> f64 {
+    let mut binomial = 1.0;
+    let mut sum = 0.0;
+    for n in 0..=order {
+        sum += binomial * x[n] * x[order - n];
+        binomial = binomial * (order - n) as f64 / (n as f64 + 1.0);
+    }
+    sum
+}
+
+fn rates_of(base: &BaseMotion) -> Rates {
+    let [u0, u1, u2, u3] = base.drive.signal;
+    let omega = base.drive.omega;
+    let (sin, cos) = libm::sincos(base.phase.radians());
+    let (sin, cos) = (base.drive.amplitude * sin, base.drive.amplitude * cos);
+    let turning = [sin, cos, -sin, -cos, sin];
+    let signal = [u0, u1, 2.0 * u2, 6.0 * u3, 0.0];
+    let mut power = 1.0;
+    core::array::from_fn(|n| {
+        let rate = signal[n] + power * turning[n];
+        power *= omega;
+        rate
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::{Drive, State};
+
+    #[test]
+    fn each_derivative_is_the_difference_quotient_of_the_one_before() {
+        let p = Parameters::dimensionless(0.1, 1.0, 0.65);
+        let start = State {
+            q1: 0.2,
+            dq1: -0.5,
+            q2: 0.1,
+            dq2: 0.3,
+        };
+        let drive = Drive {
+            signal: [0.1, -0.2, 0.3, 0.05],
+            ..Drive::harmonic(0.2, 1.3)
+        };
+        let mut plant = Plant::new(p, start).unwrap();
+        plant.begin(drive);
+        let ahead = |t: f64| {
+            let mut ahead = plant;
+            ahead.advance(drive, t);
+            Movement::of(&ahead)
+        };
+        let (h, at) = (1e-4, 0.2);
+        let (before, now, after) = (ahead(at - h), ahead(at), ahead(at + h));
+        assert_eq!(plant.tally().impacts, 0);
+        let close = |a: f64, b: f64, n: usize| assert!((a - b).abs() < 1e-7, "{n}: {a} {b}");
+        for n in 0..4 {
+            let slope = |of: fn(&Movement) -> &Rates| (of(&after)[n] - of(&before)[n]) / (2.0 * h);
+            close(slope(|m| &m.base), now.base[n + 1], n);
+            close(slope(|m| &m.primary), now.primary[n + 1], n);
+            close(slope(|m| &m.particle), now.particle[n + 1], n);
+        }
+        for n in 0..3 {
+            let slope = (after.energy(&p, n) - before.energy(&p, n)) / (2.0 * h);
+            close(slope, now.energy(&p, n + 1), n);
+        }
+    }
+}
