@@ -67,7 +67,7 @@ def test_the_fmu_is_a_co_simulation_component_for_this_platform(fmus, name):
     assert description.coSimulation.canGetAndSetFMUstate
     assert description.coSimulation.canSerializeFMUstate
     assert description.coSimulation.canHandleVariableCommunicationStepSize
-    assert description.modelExchange is None
+    assert (description.modelExchange is not None) == (name == "LoViNes")
     assert description.variableNamingConvention == "structured"
     assert "linux64" in supported_platforms(str(fmus[name].path))
 
