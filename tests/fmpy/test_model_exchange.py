@@ -72,7 +72,8 @@ def test_both_interfaces_agree_to_the_tolerance_of_the_integrator(fmus, instance
     if scene is lock:
         assert exchange["impacts"][-1] == steps["impacts"][-1]
     else:
-        assert {-1, 0, 1} & set(exchange["contact"]) and np.any(exchange["contact"] != 0)
+        assert set(exchange["contact"]) <= {-1, 0, 1}
+        assert np.any(exchange["contact"] != 0)
         figure(
             "share of samples in the same contact, chatter",
             (exchange["contact"] == steps["contact"]).mean(),
