@@ -39,7 +39,7 @@ impl LoViNes {
         let base = if self.inputs_set {
             plant.base().with(self.drive())
         } else {
-            *plant.base()
+            plant.base()
         };
         Instant {
             primary_mass: p.primary_mass,

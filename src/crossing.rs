@@ -1,0 +1,346 @@
+//! The flight that most flights are: from somewhere in the cavity straight to the wall ahead, never turning round.
+//!
+//! While the particle is faster than the primary mass can ever be, `w'` keeps its sign: the wall ahead is met once, and
+//! the other one is left behind. That is the certificate, and it costs a dozen operations. The bound on the speed of the
+//! primary mass is the energy of its free motion, which never grows, and the amplitude of the steady one:
+//!
+//! ```text
+//! q1 = u0 + y + Im S,   y'' + 2 delta y' + omega0² y = 0,   S = H E e^{i (omega t + phase)}
+//! |q1'| <= sqrt(y'² + omega0² y²) + omega |H E|  <  |q2'|
+//! ```
+//!
+//! The instant is found from an *anchor*: a time near it (the last flight's) at which the closed form has been worked out,
+//! so that `e^{i omega t}` and `e^{lambda t}` need not be computed again while flights stay alike. From the anchor on the
+//! motion is its Taylor polynomial, and the root the polynomial's reversed series (P. Henrici, "Applied and Computational
+//! Complex Analysis" I, Wiley 1974, section 1.7), put right once by Newton's method.
+//!
+//! All this is for light damping, away from an undamped resonance, a harmonic or held base and displacements that are
+//! not large against the cavity. What lies outside is followed by [`crate::flight`], which is slower and knows no limits.
+
+use crate::base_motion::{Drive, Phase, sincos_of_product};
+use crate::lane::Lane;
+use crate::oscillator::{Oscillator, Regime};
+use num_complex::Complex64;
+use serde::{Deserialize, Serialize};
+
+/// Farthest arrival from its anchor, in units of the fastest rate's time: what the polynomials leave out is of the
+/// sixth order in this, below 1e-18.
+const NEAR: f64 = 1.0 / 1024.0;
+/// Largest displacements, in half-widths: the digits of `w` are those of `q1`.
+const WIDEST: f64 = 64.0;
+/// Largest damping ratio.
+const LIGHT_DAMPING: f64 = 0.5;
+/// Degree of the Taylor polynomial about the anchor.
+const DEGREE: usize = 5;
+
+type Pair<T> = (T, T);
+
+/// What follows from rig and drive.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Wave<T> {
+    /// Half-width of the cavity, m.
+    pub half_width: T,
+    /// Decay rate, 1/s.
+    delta: T,
+    omega_d: T,
+    inverse_omega_d: T,
+    /// Natural frequency squared, 1/s².
+    pub omega0_squared: T,
+    /// Driving frequency, rad/s.
+    pub omega: T,
+    /// `H E`: steady amplitude, m, real and imaginary part.
+    steady: Pair<T>,
+    /// `omega |H E|`, m/s.
+    pub speed: T,
+    /// Where the base is held, m.
+    pub offset: T,
+    /// Largest speed of the free motion that is accepted, squared, (m/s)².
+    widest: T,
+    /// Farthest arrival from its anchor, s.
+    near: T,
+    /// `lambda^n/n!`, n from 2 on.
+    free: [Pair<T>; DEGREE - 1],
+    /// `±omega^n/n!`, n from 2 on, with the sign that the derivative brings.
+    forced: [T; DEGREE - 1],
+}
+
+/// A time at which the closed form has been worked out.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Anchor<T> {
+    /// Seconds since the start of a flight.
+    pub t: T,
+    /// `omega t` reduced to one turn, rad, and what rounding has kept out of it.
+    pub angle: Pair<T>,
+    /// `e^{i omega t}`.
+    pub turned: Pair<T>,
+    /// `e^{lambda t}`.
+    pub decayed: Pair<T>,
+}
+
+/// The start of a flight.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Origin<T> {
+    /// Position of the primary mass, m.
+    pub x: T,
+    /// Its velocity, m/s.
+    pub v: T,
+    /// Relative displacement, m.
+    pub w: T,
+    /// Velocity of the particle, m/s.
+    pub particle: T,
+    /// `e^{i phase}` of the base.
+    pub turn: Pair<T>,
+}
+
+/// The end of a crossing, just before the impact.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Arrival<T> {
+    /// Seconds after the anchor.
+    pub beyond: T,
+    /// Position of the primary mass, m.
+    pub x: T,
+    /// Its velocity, m/s.
+    pub v: T,
+    /// `e^{i phase}` of the base.
+    pub turn: Pair<T>,
+}
+
+/// Where the free motion stands: displacement and velocity.
+#[derive(Clone, Copy, Debug)]
+pub struct Free<T> {
+    /// Displacement less that of the held base and of the steady motion, m.
+    pub y: T,
+    /// Its velocity, m/s.
+    pub dy: T,
+    /// `dy² + omega0² y²`, (m/s)².
+    pub speed_squared: T,
+}
+
+#[inline(always)]
+fn times<T: Lane>(a: Pair<T>, b: Pair<T>) -> Pair<T> {
+    (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
+}
+
+impl Wave<f64> {
+    /// Coefficients for an oscillator in a cavity of this half-width (m) under `drive`, where the limits above hold.
+    pub fn new(oscillator: &Oscillator, half_width: f64, drive: &Drive) -> Option<Self> {
+        let Oscillator {
+            delta,
+            omega0_squared,
+            omega0,
+            ..
+        } = *oscillator;
+        let Regime::Oscillating { omega_d } = oscillator.regime else {
+            return None;
+        };
+        let [offset, slopes @ ..] = drive.signal;
+        let (omega, amplitude) = (drive.omega, drive.amplitude);
+        let within = WIDEST * half_width;
+        let simple = delta < LIGHT_DAMPING * omega0
+            && slopes == [0.0; 3]
+            && omega >= 0.0
+            && offset.abs() <= within;
+        if !simple {
+            return None;
+        }
+        let steady = if amplitude == 0.0 {
+            Complex64::ZERO
+        } else {
+            let push = Complex64::new(omega0_squared, 2.0 * delta * omega);
+            let (detuning, damping) = ((omega0 - omega) * (omega0 + omega), 2.0 * delta * omega);
+            push * Complex64::new(detuning, -damping)
+                * (amplitude / (detuning * detuning + damping * damping))
+        };
+        let reach = libm::sqrt(steady.norm_sqr());
+        // Also false for an undamped resonance, where it is not a number.
+        if !(reach <= within && amplitude.abs() <= within) {
+            return None;
+        }
+        let lambda = Complex64::new(-delta, omega_d);
+        let mut free = [(0.0, 0.0); DEGREE - 1];
+        let mut forced = [0.0; DEGREE - 1];
+        let (mut power, mut frequency) = (lambda, omega);
+        for n in 2..=DEGREE {
+            power = power * lambda * (1.0 / n as f64);
+            frequency = frequency * omega * (1.0 / n as f64);
+            free[n - 2] = (power.re, power.im);
+            forced[n - 2] = if n < 4 { -frequency } else { frequency };
+        }
+        Some(Self {
+            half_width,
+            delta,
+            omega_d,
+            inverse_omega_d: 1.0 / omega_d,
+            omega0_squared,
+            omega,
+            steady: (steady.re, steady.im),
+            speed: omega * reach,
+            offset,
+            widest: (within * within) * omega0_squared,
+            near: NEAR / oscillator.fastest.max(omega),
+            free,
+            forced,
+        })
+    }
+
+    /// The closed form at `t` seconds.
+    pub fn anchor(&self, t: f64) -> Anchor<f64> {
+        let (turned_sin, turned_cos) = sincos_of_product(self.omega, t);
+        let (sin, cos) = sincos_of_product(self.omega_d, t);
+        let decay = libm::exp(-self.delta * t);
+        Anchor {
+            t,
+            angle: Phase::default().advanced(self.omega, t).parts(),
+            turned: (turned_cos, turned_sin),
+            decayed: (decay * cos, decay * sin),
+        }
+    }
+}
+
+impl<T: Lane> Wave<T> {
+    /// The free motion at the start of a flight.
+    #[inline(always)]
+    pub fn free_motion(&self, start: &Origin<T>) -> Free<T> {
+        let steady = times(self.steady, start.turn);
+        let y = start.x - self.offset - steady.1;
+        let dy = start.v - self.omega * steady.0;
+        Free {
+            y,
+            dy,
+            speed_squared: dy * dy + self.omega0_squared * (y * y),
+        }
+    }
+
+    /// Whether the particle certainly flies on to the wall ahead without turning round.
+    #[inline(always)]
+    pub fn certainly_crosses(&self, start: &Origin<T>, free: &Free<T>) -> T::Mask {
+        let spare = start.particle.abs() - self.speed;
+        // The factor covers the rounding of this very bound, and keeps the approach from being endlessly slow.
+        let bound = free.speed_squared * T::splat(1.0 + 1e-3);
+        T::both(
+            T::splat(0.0).below(spare),
+            T::both(
+                bound.below(spare * spare),
+                free.speed_squared.below(self.widest),
+            ),
+        )
+    }
+
+    /// The wall ahead: +1 or -1 as it is touched at `w = +b` or `-b`.
+    #[inline(always)]
+    pub fn ahead(start: &Origin<T>) -> T {
+        -start.particle.sign()
+    }
+
+    /// The arrival at the wall ahead, and whether it is near enough to the anchor for its digits to be trusted. If not,
+    /// `beyond` is still a better guess.
+    #[inline(always)]
+    pub fn arrival(
+        &self,
+        start: &Origin<T>,
+        free: &Free<T>,
+        anchor: &Anchor<T>,
+    ) -> (Arrival<T>, T::Mask) {
+        let n = T::splat;
+        // `y = Im(A e^{lambda t})`.
+        let at_start = (
+            (free.dy + self.delta * free.y) * self.inverse_omega_d,
+            free.y,
+        );
+        let a = times(at_start, anchor.decayed);
+        let turn = times(start.turn, anchor.turned);
+        let s = times(self.steady, turn);
+        let x = self.offset + a.1 + s.1;
+        let v = self.omega_d * a.0 - self.delta * a.1 + self.omega * s.0;
+        let term = |n: usize, s: T| {
+            let (re, im) = self.free[n - 2];
+            re * a.1 + im * a.0 + self.forced[n - 2] * s
+        };
+        let (c2, c3, c4, c5) = (term(2, s.1), term(3, s.0), term(4, s.1), term(5, s.0));
+
+        let w = start.w + ((x - start.x) - start.particle * anchor.t);
+        let target = Self::ahead(start) * self.half_width;
+        let slowness = (v - start.particle).inverse();
+        let y = (target - w) * slowness;
+        let (a2, a3, a4) = (c2 * slowness, c3 * slowness, c4 * slowness);
+        let a22 = a2 * a2;
+        let h = y
+            * (n(1.0) - y * (a2 - y * ((a22 + a22 - a3) - y * (n(5.0) * (a2 * (a3 - a22)) - a4))));
+
+        let h2 = h * h;
+        let moved = h * v + h2 * ((c2 + h * c3) + h2 * (c4 + h * c5));
+        let quickened =
+            h * ((n(2.0) * c2 + h * (n(3.0) * c3)) + h2 * (n(4.0) * c4 + h * (n(5.0) * c5)));
+        let left = (target - w) - (moved - start.particle * h);
+        let correction = left * slowness;
+        let beyond = h + correction;
+
+        let angle = self.omega * beyond;
+        let angle2 = angle * angle;
+        let sin = angle * (n(1.0) - angle2 * (n(1.0 / 6.0) - angle2 * n(1.0 / 120.0)));
+        let cos = n(1.0) - angle2 * (n(0.5) - angle2 * n(1.0 / 24.0));
+        let arrival = Arrival {
+            beyond,
+            x: x + (moved + correction * v),
+            v: v + (quickened + correction * (n(2.0) * c2)),
+            turn: times(turn, (cos, sin)),
+        };
+        (arrival, beyond.abs().below(self.near))
+    }
+
+    /// The start moved on by the anchor's time, as long as no wall is met; the particle flies straight on.
+    #[inline(always)]
+    pub fn stride(&self, start: &Origin<T>, anchor: &Anchor<T>) -> Origin<T> {
+        let free = self.free_motion(start);
+        let at_start = (
+            (free.dy + self.delta * free.y) * self.inverse_omega_d,
+            free.y,
+        );
+        let a = times(at_start, anchor.decayed);
+        let turn = times(start.turn, anchor.turned);
+        let s = times(self.steady, turn);
+        let x = self.offset + a.1 + s.1;
+        Origin {
+            x,
+            v: self.omega_d * a.0 - self.delta * a.1 + self.omega * s.0,
+            w: start.w + ((x - start.x) - start.particle * anchor.t),
+            particle: start.particle,
+            turn,
+        }
+    }
+}
+
+impl Wave<f64> {
+    /// How long both walls are certainly out of reach, s; infinite where they can never be reached.
+    ///
+    /// Two bounds, each for each wall: the particle cannot close in faster than at the largest speeds of both, and the
+    /// primary mass cannot be farther out than at the sum of its amplitudes.
+    pub fn clear(&self, start: &Origin<f64>, free: &Free<f64>) -> f64 {
+        let speed = libm::sqrt(free.speed_squared);
+        let omega0_squared = self.omega0_squared;
+        let (hr, hi) = self.steady;
+        let reach = libm::sqrt(free.speed_squared / omega0_squared) + libm::sqrt(hr * hr + hi * hi);
+        let rounding = 1e-12 * (self.half_width + reach + self.offset.abs());
+        let until = |s: f64| {
+            let gap = self.half_width - s * start.w - rounding;
+            let closing = speed + self.speed - s * start.particle;
+            let by_speed = if closing <= 0.0 {
+                f64::INFINITY
+            } else {
+                gap.max(0.0) / closing
+            };
+            let particle = start.x - start.w;
+            let room = self.half_width - rounding - reach - s * (self.offset - particle);
+            let approach = -s * start.particle;
+            let by_room = if room <= 0.0 {
+                0.0
+            } else if approach <= 0.0 {
+                f64::INFINITY
+            } else {
+                room / approach
+            };
+            by_speed.max(by_room)
+        };
+        until(1.0).min(until(-1.0)) * (1.0 - 1e-9)
+    }
+}

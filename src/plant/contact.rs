@@ -1,0 +1,128 @@
+//! The particle at a wall: impact, rest, release.
+
+use super::{Contact, Event, Plant};
+use crate::oscillator::Oscillator;
+use crate::sticking::until_released;
+use crate::wall::Wall;
+
+/// A rebound that would lift the particle less than this fraction of the half-width off its wall cannot be told from
+/// contact in double precision.
+const UNRESOLVED: f64 = 1.0 / (1u64 << 56) as f64;
+/// Rebounds that last less than this fraction of the fastest rate's time are not followed one by one.
+const SHORTEST_HOP: f64 = 1e-9;
+/// Relative rounding of an acceleration put together from a few terms.
+const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// When something happens within an advance, and how much of the advance is left then, s.
+#[derive(Clone, Copy, Debug)]
+pub(super) struct Moment {
+    pub now: f64,
+    pub left: f64,
+}
+
+impl Plant {
+    pub(super) fn wall_touched(&self) -> Option<Wall> {
+        Wall::BOTH
+            .into_iter()
+            .find(|wall| wall.sign() * self.w >= self.parameters.half_width)
+    }
+
+    /// The particle is at `wall` with relative velocity `dw`: impact if it approaches, then rest if it cannot leave.
+    pub(super) fn touch(
+        &mut self,
+        wall: Wall,
+        dw: f64,
+        moment: Moment,
+        tell: &mut impl FnMut(Event),
+    ) {
+        let s = wall.sign();
+        let mut dw = dw;
+        self.w = s * self.parameters.half_width;
+        if s * dw > 0.0 {
+            let after = self.law.rebound(self.primary.1, self.particle_velocity, dw);
+            let t = moment.now;
+            self.tally.impacts += 1;
+            self.tally.impact_time = self.time + t;
+            self.tally.impact_velocity = dw;
+            self.tally.dissipated += after.dissipated;
+            tell(Event::Impact {
+                t,
+                wall,
+                velocity: dw,
+            });
+            self.primary.1 = after.primary;
+            self.particle_velocity = after.particle;
+            dw = after.relative;
+        }
+        if self.rests(wall, dw, moment.left) {
+            let (velocity, lost) = self.law.join(self.primary.1, dw);
+            self.primary.1 = velocity;
+            self.particle_velocity = velocity;
+            self.tally.dissipated += lost;
+            self.contact = Contact::Stuck(wall);
+            tell(Event::Stuck {
+                t: moment.now,
+                wall,
+            });
+        }
+    }
+
+    /// Whether a particle that leaves `wall` with relative velocity `dw` is in truth at rest on it.
+    ///
+    /// Its hops are then below resolution (height `u²/(2a)`), and they die out within `2u/(a (1 - r))`. Letting both masses
+    /// move as one from now on conserves momentum exactly; what is neglected is the stiffness force on a gap of at most
+    /// that height for that time, which is of third order in `u` (docs/accuracy.md).
+    fn rests(&mut self, wall: Wall, dw: f64, left: f64) -> bool {
+        let s = wall.sign();
+        let speed = -s * dw;
+        let lowest = UNRESOLVED * self.parameters.half_width;
+        // Far from rest, whatever the acceleration: no need to work it out.
+        if speed * speed > 2.0 * lowest * self.acceleration_bound() {
+            return false;
+        }
+        let motion = self.alone.motion(&self.base, self.primary);
+        let pressing = s * motion.derivatives_at_start()[2];
+        if speed == 0.0 {
+            return pressing >= -self.acceleration_noise();
+        }
+        let height = 0.5 * speed * speed / pressing;
+        pressing > 0.0
+            && height <= lowest
+            && (self.law.chatter_duration(speed, pressing) <= left
+                || speed * self.alone.oscillator.fastest <= SHORTEST_HOP * pressing)
+    }
+
+    /// The acceleration of the primary mass is certainly not above this, m/s²: the sum of its terms.
+    fn acceleration_bound(&self) -> f64 {
+        let Oscillator {
+            delta,
+            omega0_squared,
+            ..
+        } = self.alone.oscillator;
+        let drive = &self.base.drive;
+        let position = self.primary.0.abs() + drive.signal[0].abs() + drive.amplitude.abs();
+        let velocity =
+            self.primary.1.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
+        (omega0_squared * position + 2.0 * delta * velocity) * (1.0 + 1e-9)
+    }
+
+    /// Rounding of an acceleration here, m/s².
+    fn acceleration_noise(&self) -> f64 {
+        ROUNDING * self.acceleration_bound()
+    }
+
+    /// Both masses move as one for at most `left` seconds, until the wall ceases to push. Returns the time passed, s, and
+    /// whether the particle was let go.
+    pub(super) fn stay(&mut self, wall: Wall, left: f64) -> (f64, bool) {
+        let noise = self.acceleration_noise();
+        let motion = self.joint.motion(&self.base, self.primary);
+        let parting = until_released(&motion, wall, left, noise);
+        self.base = self.base.after(parting.t);
+        self.primary = parting.joint;
+        self.particle_velocity = parting.joint.1;
+        if parting.released {
+            self.contact = Contact::Released(wall);
+        }
+        (parting.t, parting.released)
+    }
+}
