@@ -12,7 +12,7 @@
 //! The instant is found from an *anchor*: a time near it (the last flight's) at which the closed form has been worked out,
 //! so that `e^{i omega t}` and `e^{lambda t}` need not be computed again while flights stay alike. From the anchor on the
 //! motion is its Taylor polynomial, and the root the polynomial's reversed series (P. Henrici, "Applied and Computational
-//! Complex Analysis" I, Wiley 1974, section 1.7), put right once by Newton's method.
+//! Complex Analysis" I, Wiley 1974, section 1.7).
 //!
 //! All this is for light damping, away from an undamped resonance, a harmonic or held base and displacements that are
 //! not large against the cavity. What lies outside is followed by [`crate::flight`], which is slower and knows no limits.
@@ -20,12 +20,13 @@
 use crate::base_motion::{Drive, Phase, sincos_of_product};
 use crate::lane::Lane;
 use crate::oscillator::{Oscillator, Regime};
+use crate::plant::UNRESOLVED;
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
-/// Farthest arrival from its anchor, in units of the fastest rate's time: what the polynomials leave out is of the
-/// sixth order in this, below 1e-18.
-const NEAR: f64 = 1.0 / 1024.0;
+/// Farthest arrival from its anchor, in units of the fastest rate's time: what the series leave out is of the fifth order
+/// in this, below 1e-17.
+const NEAR: f64 = 1.0 / 4096.0;
 /// Largest displacements, in half-widths: the digits of `w` are those of `q1`.
 const WIDEST: f64 = 64.0;
 /// Largest damping ratio.
@@ -58,6 +59,8 @@ pub struct Wave<T> {
     widest: T,
     /// Farthest arrival from its anchor, s.
     near: T,
+    /// A rebound faster than this is no rest, squared, (m/s)².
+    pub restless: T,
     /// `lambda^n/n!`, n from 2 on.
     free: [Pair<T>; DEGREE - 1],
     /// `±omega^n/n!`, n from 2 on, with the sign that the derivative brings.
@@ -166,7 +169,12 @@ impl Wave<f64> {
             free[n - 2] = (power.re, power.im);
             forced[n - 2] = if n < 4 { -frequency } else { frequency };
         }
+        // Displacements and velocities are at most so large while the particle crosses.
+        let position = 4.0 * within;
+        let velocity = within * (omega0 + 2.0 * omega);
+        let acceleration = omega0_squared * position + 2.0 * delta * velocity;
         Some(Self {
+            restless: 2.0 * UNRESOLVED * half_width * acceleration,
             half_width,
             delta,
             omega_d,
@@ -263,29 +271,28 @@ impl<T: Lane> Wave<T> {
         let slowness = (v - start.particle).inverse();
         let y = (target - w) * slowness;
         let (a2, a3, a4) = (c2 * slowness, c3 * slowness, c4 * slowness);
-        let a22 = a2 * a2;
-        let h = y
-            * (n(1.0) - y * (a2 - y * ((a22 + a22 - a3) - y * (n(5.0) * (a2 * (a3 - a22)) - a4))));
+        let (bend, a22, y2) = (a2 * y, a2 * a2, y * y);
+        let third = (a22 + a22) - a3;
+        let fourth = n(5.0) * (a2 * (a3 - a22)) - a4;
+        let h = y * ((n(1.0) - bend) + y2 * (third + y * fourth));
 
         let h2 = h * h;
-        let moved = h * v + h2 * ((c2 + h * c3) + h2 * (c4 + h * c5));
         let quickened =
             h * ((n(2.0) * c2 + h * (n(3.0) * c3)) + h2 * (n(4.0) * c4 + h * (n(5.0) * c5)));
-        let left = (target - w) - (moved - start.particle * h);
-        let correction = left * slowness;
-        let beyond = h + correction;
-
-        let angle = self.omega * beyond;
+        let angle = self.omega * h;
         let angle2 = angle * angle;
-        let sin = angle * (n(1.0) - angle2 * (n(1.0 / 6.0) - angle2 * n(1.0 / 120.0)));
+        let sin = angle - angle * (angle2 * n(1.0 / 6.0));
         let cos = n(1.0) - angle2 * (n(0.5) - angle2 * n(1.0 / 24.0));
         let arrival = Arrival {
-            beyond,
-            x: x + (moved + correction * v),
-            v: v + (quickened + correction * (n(2.0) * c2)),
+            beyond: h,
+            // At the wall the primary mass is where the particle is, and that flies straight on.
+            x: ((start.x - start.w) + start.particle * anchor.t) + (target + start.particle * h),
+            v: v + quickened,
             turn: times(turn, (cos, sin)),
         };
-        (arrival, beyond.abs().below(self.near))
+        // Far from the anchor, or where the approach is slow and bent, the reversed series means nothing.
+        let near = T::both(y.abs().below(self.near), bend.abs().below(T::splat(NEAR)));
+        (arrival, near)
     }
 
     /// The start moved on by the anchor's time, as long as no wall is met; the particle flies straight on.

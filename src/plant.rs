@@ -3,6 +3,7 @@
 mod advance;
 mod contact;
 mod course;
+mod cross;
 
 use crate::base_motion::{BaseMotion, Drive};
 use crate::crossing::Origin;
@@ -13,6 +14,10 @@ use crate::parameters::{InvalidValue, Parameters};
 use crate::wall::{ImpactLaw, Wall};
 use course::Course;
 use serde::{Deserialize, Serialize};
+
+/// A rebound that would lift the particle less than this fraction of the half-width off its wall cannot be told from
+/// contact in double precision.
+pub(crate) const UNRESOLVED: f64 = 1.0 / (1u64 << 56) as f64;
 
 /// An advance ends before its time at this many impacts, so that no value, however absurd, makes it endless.
 pub const MOST_IMPACTS: u64 = 10_000_000;

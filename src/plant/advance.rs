@@ -1,13 +1,11 @@
 //! From event to event.
 
 use super::contact::Moment;
-use super::course::Landing;
 use super::{Contact, Event, MOST_IMPACTS, Outcome, Plant};
 use crate::base_motion::{BaseMotion, Drive};
 use crate::crossing::Origin;
 use crate::flight::Flight;
 use crate::span::Span;
-use crate::wall::Wall;
 
 impl Plant {
     /// Advances by `duration` seconds (0 or above) under `drive`, whose values are finite.
@@ -116,7 +114,7 @@ impl Plant {
         }
     }
 
-    fn hold(&mut self, state: &Origin<f64>) {
+    pub(super) fn hold(&mut self, state: &Origin<f64>) {
         self.primary = (state.x, state.v);
         self.w = state.w;
         self.particle_velocity = state.particle;
@@ -172,41 +170,35 @@ impl Plant {
             if self.course.landing.is_none() {
                 left = left.less(self.course.lag);
                 self.settle();
-                if self.contact == Contact::Free {
+            }
+            if self.contact == Contact::Free {
+                let (still_left, resting) = self.cross(duration, left, &mut tell);
+                left = still_left;
+                if let Some(wall) = resting {
+                    let dw = self.primary.1 - self.particle_velocity;
+                    self.touch(wall, dw, moment(left), &mut tell);
+                    continue;
+                }
+                if self.course.clear == 0.0 {
                     let start = self.origin();
-                    self.course
-                        .look_ahead(&start, self.base.phase, left.seconds());
+                    self.course.look_out(&start);
                 }
             }
             if left.seconds() < self.course.clear {
-                self.course.lag = left;
+                if self.course.lag == Span::default() && left == Span::of(duration) {
+                    self.idle(duration, left);
+                } else {
+                    self.course.lag = left;
+                }
                 left = Span::default();
                 break;
             }
-            if let Some(landing) = self.course.landing {
-                left = left.less(landing.at);
-                let wall = self.land(&landing);
-                let dw = self.primary.1 - self.particle_velocity;
-                self.touch(wall, dw, moment(left), &mut tell);
-            } else {
+            if left.seconds() > 0.0 {
                 left = self.search(left, moment, &mut tell);
             }
         }
         outcome.cut_short = left.seconds() > 0.0;
         outcome
-    }
-
-    /// Goes to where the flight lands.
-    fn land(&mut self, landing: &Landing) -> Wall {
-        self.primary = (landing.arrival.x, landing.arrival.v);
-        self.base.phase = landing.phase;
-        self.course.leave();
-        self.course.turn_to(landing.arrival.turn, landing.phase);
-        if landing.wall > 0.0 {
-            Wall::Plus
-        } else {
-            Wall::Minus
-        }
     }
 
     /// The state has been reached by the general way: nothing is known of what lies ahead.

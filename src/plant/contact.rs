@@ -1,13 +1,10 @@
 //! The particle at a wall: impact, rest, release.
 
-use super::{Contact, Event, Plant};
+use super::{Contact, Event, Plant, UNRESOLVED};
 use crate::oscillator::Oscillator;
 use crate::sticking::until_released;
 use crate::wall::Wall;
 
-/// A rebound that would lift the particle less than this fraction of the half-width off its wall cannot be told from
-/// contact in double precision.
-const UNRESOLVED: f64 = 1.0 / (1u64 << 56) as f64;
 /// Rebounds that last less than this fraction of the fastest rate's time are not followed one by one.
 const SHORTEST_HOP: f64 = 1e-9;
 /// Relative rounding of an acceleration put together from a few terms.

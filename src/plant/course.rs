@@ -5,13 +5,11 @@ use crate::base_motion::{BaseMotion, Phase};
 use crate::crossing::{Anchor, Arrival, Origin, Wave};
 use crate::oscillator::Oscillator;
 use crate::span::Span;
+use crate::wall::Wall;
 use serde::{Deserialize, Serialize};
 
 /// So many turns by a rounded `e^{i angle}` before it is worked out anew from the phase.
-const TURNS_KEPT: u32 = 16;
-/// So many guesses at an arrival before the general search is asked.
-const MOST_GUESSES: usize = 8;
-
+pub(super) const TURNS_KEPT: u32 = 16;
 /// An arrival, and when it is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Landing {
@@ -21,8 +19,8 @@ pub(super) struct Landing {
     pub arrival: Arrival<f64>,
     /// Phase of the base then.
     pub phase: Phase,
-    /// The wall, +1 or -1.
-    pub wall: f64,
+    /// The wall ahead.
+    pub wall: Wall,
 }
 
 /// The flight under way, seen from its *origin*: the state that the plant holds.
@@ -37,9 +35,9 @@ pub(super) struct Course {
     pub landing: Option<Landing>,
     /// `e^{i phase}` at the origin.
     pub turn: (f64, f64),
-    turns: u32,
+    pub turns: u32,
     /// Near the last arrival.
-    anchor: Anchor<f64>,
+    pub anchor: Anchor<f64>,
     /// The step that was repeated last.
     stride: Anchor<f64>,
     last_duration: f64,
@@ -114,52 +112,11 @@ impl Course {
         end
     }
 
-    /// Looks ahead from `start`, which has no lag: finds the landing, or how long there is certainly none. Neither, if
-    /// the quick way cannot tell; `left` is the time of interest, s.
-    pub fn look_ahead(&mut self, start: &Origin<f64>, phase: Phase, left: f64) {
-        let Some(wave) = &self.wave else {
-            return;
-        };
-        let free = wave.free_motion(start);
-        if !wave.certainly_crosses(start, &free) {
-            self.clear = wave.clear(start, &free);
-            return;
-        }
-        let wall = Wave::ahead(start);
-        let speed = start.particle.abs();
-        let distance = wave.half_width - wall * start.w;
-        // The primary mass is slower than the particle, so that they close in at less than twice its speed.
-        let soonest = 0.5 * distance / speed;
-        if left < soonest {
-            self.clear = soonest;
-            return;
-        }
-        if self.anchor.t <= 0.0 {
-            self.anchor = wave.anchor(distance / speed);
-        }
-        for _ in 0..MOST_GUESSES {
-            let (arrival, near) = wave.arrival(start, &free, &self.anchor);
-            if near {
-                let at = Span::of(self.anchor.t).plus(arrival.beyond);
-                self.clear = at.seconds();
-                self.landing = Some(Landing {
-                    at,
-                    phase: phase.turned(self.anchor.angle, wave.omega * arrival.beyond),
-                    arrival,
-                    wall,
-                });
-                return;
-            }
-            let guess = self.anchor.t + arrival.beyond;
-            // An arrival far from the anchor is a rough guess; a bad one is brought back to what is possible.
-            let slowest = speed - wave.speed - libm::sqrt(free.speed_squared);
-            let latest = distance / slowest;
-            let guess = if guess >= soonest && guess <= latest {
-                guess
-            } else {
-                distance / speed
-            };
-            self.anchor = wave.anchor(guess);
+    /// How long the walls are certainly out of reach of `start`, which has no lag and does not cross; 0 if that is not
+    /// known.
+    pub fn look_out(&mut self, start: &Origin<f64>) {
+        if let Some(wave) = &self.wave {
+            self.clear = wave.clear(start, &wave.free_motion(start));
         }
     }
 }
