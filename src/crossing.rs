@@ -51,6 +51,8 @@ pub struct Wave<T> {
     pub omega: T,
     /// `H E`: steady amplitude, m, real and imaginary part.
     steady: Pair<T>,
+    /// `|H E|`, m.
+    reach: T,
     /// `omega |H E|`, m/s.
     pub speed: T,
     /// Where the base is held, m.
@@ -87,12 +89,26 @@ pub struct Origin<T> {
     pub x: T,
     /// Its velocity, m/s.
     pub v: T,
-    /// Relative displacement, m.
+    /// Relative displacement `w = q1 - q2`, m, carried itself: in a narrow gap the difference of two large displacements
+    /// would have lost it.
     pub w: T,
     /// Velocity of the particle, m/s.
     pub particle: T,
     /// `e^{i phase}` of the base.
     pub turn: Pair<T>,
+}
+
+impl<T: Lane> Origin<T> {
+    /// Relative velocity `w'`.
+    #[inline(always)]
+    pub fn relative_velocity(&self) -> T {
+        self.v - self.particle
+    }
+
+    /// Position and velocity of the primary mass.
+    pub fn primary(&self) -> (T, T) {
+        (self.x, self.v)
+    }
 }
 
 /// The end of a crossing, just before the impact.
@@ -125,8 +141,8 @@ fn times<T: Lane>(a: Pair<T>, b: Pair<T>) -> Pair<T> {
 }
 
 impl Wave<f64> {
-    /// Coefficients for an oscillator in a cavity of this half-width (m) under `drive`, where the limits above hold.
-    pub fn new(oscillator: &Oscillator, half_width: f64, drive: &Drive) -> Option<Self> {
+    /// Coefficients for an oscillator in a cavity of this half-width (m), not driven; `None` where damping is not light.
+    pub fn new(oscillator: &Oscillator, half_width: f64) -> Option<Self> {
         let Oscillator {
             delta,
             omega0_squared,
@@ -136,71 +152,97 @@ impl Wave<f64> {
         let Regime::Oscillating { omega_d } = oscillator.regime else {
             return None;
         };
-        let [offset, slopes @ ..] = drive.signal;
-        let (omega, amplitude) = (drive.omega, drive.amplitude);
-        let within = WIDEST * half_width;
-        let simple = delta < LIGHT_DAMPING * omega0
-            && slopes == [0.0; 3]
-            && omega >= 0.0
-            && offset.abs() <= within;
-        if !simple {
-            return None;
-        }
-        let steady = if amplitude == 0.0 {
-            Complex64::ZERO
-        } else {
-            let push = Complex64::new(omega0_squared, 2.0 * delta * omega);
-            let (detuning, damping) = ((omega0 - omega) * (omega0 + omega), 2.0 * delta * omega);
-            push * Complex64::new(detuning, -damping)
-                * (amplitude / (detuning * detuning + damping * damping))
-        };
-        let reach = libm::sqrt(steady.norm_sqr());
-        // Also false for an undamped resonance, where it is not a number.
-        if !(reach <= within && amplitude.abs() <= within) {
+        if delta >= LIGHT_DAMPING * omega0 {
             return None;
         }
         let lambda = Complex64::new(-delta, omega_d);
         let mut free = [(0.0, 0.0); DEGREE - 1];
-        let mut forced = [0.0; DEGREE - 1];
-        let (mut power, mut frequency) = (lambda, omega);
+        let mut power = lambda;
         for n in 2..=DEGREE {
             power = power * lambda * (1.0 / n as f64);
-            frequency = frequency * omega * (1.0 / n as f64);
             free[n - 2] = (power.re, power.im);
-            forced[n - 2] = if n < 4 { -frequency } else { frequency };
         }
-        // Displacements and velocities are at most so large while the particle crosses.
-        let position = 4.0 * within;
-        let velocity = within * (omega0 + 2.0 * omega);
-        let acceleration = omega0_squared * position + 2.0 * delta * velocity;
+        let within = WIDEST * half_width;
         Some(Self {
-            restless: 2.0 * UNRESOLVED * half_width * acceleration,
             half_width,
             delta,
             omega_d,
             inverse_omega_d: 1.0 / omega_d,
             omega0_squared,
-            omega,
-            steady: (steady.re, steady.im),
-            speed: omega * reach,
-            offset,
+            omega: 0.0,
+            steady: (0.0, 0.0),
+            reach: 0.0,
+            speed: 0.0,
+            offset: 0.0,
             widest: (within * within) * omega0_squared,
-            near: NEAR / oscillator.fastest.max(omega),
+            near: NEAR / omega0,
+            restless: 0.0,
             free,
-            forced,
+            forced: [0.0; DEGREE - 1],
         })
+    }
+
+    /// Takes over a drive; false where it is none of those that this way is for.
+    pub fn take(&mut self, drive: &Drive) -> bool {
+        let [offset, slopes @ ..] = drive.signal;
+        let (omega, amplitude) = (drive.omega, drive.amplitude);
+        let (delta, omega0_squared) = (self.delta, self.omega0_squared);
+        let omega0 = libm::sqrt(omega0_squared);
+        let within = WIDEST * self.half_width;
+        self.offset = offset;
+        self.omega = omega;
+        self.steady = (0.0, 0.0);
+        self.reach = 0.0;
+        if amplitude != 0.0 {
+            let (detuning, damping) = ((omega0 - omega) * (omega0 + omega), 2.0 * delta * omega);
+            let scale = amplitude / (detuning * detuning + damping * damping);
+            // `H E = E (omega0² + i damping)/(detuning + i damping)`.
+            self.steady = (
+                scale * (omega0_squared * detuning + damping * damping),
+                scale * (damping * (detuning - omega0_squared)),
+            );
+            let (re, im) = self.steady;
+            self.reach = libm::sqrt(re * re + im * im);
+        }
+        self.speed = omega * self.reach;
+        let square = omega * omega;
+        self.forced = [
+            -square * (1.0 / 2.0),
+            -square * omega * (1.0 / 6.0),
+            square * square * (1.0 / 24.0),
+            square * square * omega * (1.0 / 120.0),
+        ];
+        self.near = NEAR / omega0.max(omega);
+        // Displacements and velocities are at most so large while the particle crosses.
+        let velocity = within * (omega0 + 2.0 * omega);
+        let acceleration = omega0_squared * (4.0 * within) + 2.0 * delta * velocity;
+        self.restless = 2.0 * UNRESOLVED * self.half_width * acceleration;
+        // False also for an undamped resonance, where the reach is not a number.
+        slopes == [0.0; 3]
+            && omega >= 0.0
+            && offset.abs() <= within
+            && amplitude.abs() <= within
+            && self.reach <= within
     }
 
     /// The closed form at `t` seconds.
     pub fn anchor(&self, t: f64) -> Anchor<f64> {
-        let (turned_sin, turned_cos) = sincos_of_product(self.omega, t);
         let (sin, cos) = sincos_of_product(self.omega_d, t);
         let decay = libm::exp(-self.delta * t);
-        Anchor {
+        self.turned(&Anchor {
             t,
-            angle: Phase::default().advanced(self.omega, t).parts(),
-            turned: (turned_cos, turned_sin),
             decayed: (decay * cos, decay * sin),
+            ..Anchor::default()
+        })
+    }
+
+    /// The same instant at the frequency that this wave has.
+    pub fn turned(&self, anchor: &Anchor<f64>) -> Anchor<f64> {
+        let (sin, cos) = sincos_of_product(self.omega, anchor.t);
+        Anchor {
+            angle: Phase::default().advanced(self.omega, anchor.t).parts(),
+            turned: (cos, sin),
+            ..*anchor
         }
     }
 }
@@ -325,8 +367,7 @@ impl Wave<f64> {
     pub fn clear(&self, start: &Origin<f64>, free: &Free<f64>) -> f64 {
         let speed = libm::sqrt(free.speed_squared);
         let omega0_squared = self.omega0_squared;
-        let (hr, hi) = self.steady;
-        let reach = libm::sqrt(free.speed_squared / omega0_squared) + libm::sqrt(hr * hr + hi * hi);
+        let reach = libm::sqrt(free.speed_squared / omega0_squared) + self.reach;
         let rounding = 1e-12 * (self.half_width + reach + self.offset.abs());
         let until = |s: f64| {
             let gap = self.half_width - s * start.w - rounding;

@@ -126,15 +126,14 @@ impl Driven {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub struct Plant {
     parameters: Parameters,
+    mass_ratio: f64,
     law: ImpactLaw,
     /// The primary mass alone, and with the particle stuck to it.
     alone: Driven,
     joint: Driven,
     contact: Contact,
-    primary: (f64, f64),
-    /// `w = q1 - q2`, carried itself: in a narrow gap the difference of two large displacements would have lost it.
-    w: f64,
-    particle_velocity: f64,
+    /// The state when the flight under way began, or a little later: see [`Course`].
+    here: Origin<f64>,
     base: BaseMotion,
     /// Whether the plant has advanced since its start: a drive set before that is where the base is, not a jump.
     under_way: bool,
@@ -164,23 +163,27 @@ impl Plant {
             "m",
             "a number from -b to b",
         )?;
+        let alone = Driven::new(parameters.primary_mass, &parameters);
+        let joint = parameters.primary_mass + parameters.particle_mass;
         Ok(Self {
             parameters,
+            mass_ratio: parameters.mass_ratio(),
             law: ImpactLaw::new(&parameters),
-            alone: Driven::new(parameters.primary_mass, &parameters),
-            joint: Driven::new(
-                parameters.primary_mass + parameters.particle_mass,
-                &parameters,
-            ),
+            joint: Driven::new(joint, &parameters),
             contact: Contact::Free,
-            primary: (start.q1, start.dq1),
-            w: w.clamp(-b, b),
-            particle_velocity: start.dq2,
+            here: Origin {
+                x: start.q1,
+                v: start.dq1,
+                w: w.clamp(-b, b),
+                particle: start.dq2,
+                turn: (1.0, 0.0),
+            },
             base: BaseMotion::default(),
             under_way: false,
             time: 0.0,
             tally: Tally::default(),
-            course: Course::default(),
+            course: Course::new(&alone.oscillator, b),
+            alone,
         })
     }
 
@@ -200,10 +203,12 @@ impl Plant {
         parameters.validate()?;
         self.settle();
         let joint = parameters.primary_mass + parameters.particle_mass;
+        self.mass_ratio = parameters.mass_ratio();
         self.law = ImpactLaw::new(&parameters);
         self.alone = Driven::new(parameters.primary_mass, &parameters);
         self.joint = Driven::new(joint, &parameters);
         self.parameters = parameters;
+        self.course = Course::new(&self.alone.oscillator, parameters.half_width);
         self.renew_course();
         Ok(())
     }
@@ -223,15 +228,10 @@ impl Plant {
         self.time = time;
     }
 
-    /// The state now: that of the origin, or worked out from there.
-    #[inline]
-    fn now(&self) -> Origin<f64> {
-        self.flown(self.course.lag.seconds()).0
-    }
-
     /// Positions and velocities now.
+    #[inline]
     pub fn state(&self) -> State {
-        let now = self.now();
+        let (now, _) = self.now();
         State {
             q1: now.x,
             dq1: now.v,
@@ -242,32 +242,36 @@ impl Plant {
 
     /// Relative displacement `w = q1 - q2`, m.
     pub fn relative_displacement(&self) -> f64 {
-        self.now().w
+        self.now().0.w
     }
 
     /// Relative velocity `w'`, m/s.
     pub fn relative_velocity(&self) -> f64 {
-        let now = self.now();
-        now.v - now.particle
+        self.now().0.relative_velocity()
     }
 
     /// `v = q1 + epsilon q2`, m: the displacement of the centre of mass times `1 + epsilon`.
+    #[inline]
     pub fn centre(&self) -> f64 {
-        let now = self.now();
-        now.x + self.parameters.mass_ratio() * (now.x - now.w)
+        let (now, _) = self.now();
+        now.x + self.mass_ratio * (now.x - now.w)
     }
 
     /// The base motion as it stands: drive, and the phase its oscillator has reached.
     pub fn base(&self) -> BaseMotion {
-        self.base.after(self.course.lag.seconds())
+        BaseMotion {
+            phase: self.now().1,
+            ..self.base
+        }
     }
 
     /// Displacement of the base now, m.
+    #[inline]
     pub fn base_displacement(&self) -> f64 {
-        if self.course.turn_is_known() {
-            self.base.drive.signal[0] + self.base.drive.amplitude * self.course.turn.1
+        if self.course.wave().is_some() {
+            self.base.drive.signal[0] + self.base.drive.amplitude * self.now().0.turn.1
         } else {
-            self.base().displacement()
+            self.base.displacement()
         }
     }
 
@@ -288,7 +292,7 @@ impl Plant {
     /// `displacement`, m.
     pub fn energy(&self, displacement: f64) -> f64 {
         let p = &self.parameters;
-        let now = self.now();
+        let (now, _) = self.now();
         let stretch = now.x - displacement;
         0.5 * (p.primary_mass * now.v * now.v
             + p.particle_mass * now.particle * now.particle

@@ -2,7 +2,7 @@
 
 use super::contact::Moment;
 use super::{Contact, Event, MOST_IMPACTS, Outcome, Plant};
-use crate::base_motion::{BaseMotion, Drive};
+use crate::base_motion::{Drive, Phase};
 use crate::crossing::Origin;
 use crate::flight::Flight;
 use crate::span::Span;
@@ -27,12 +27,11 @@ impl Plant {
         if drive != self.base.drive || !self.under_way {
             self.take(drive);
         }
-        let until = self.course.lag.plus(duration);
-        let outcome = if until.seconds() < self.course.clear {
-            self.idle(duration, until);
+        let outcome = if self.course.strides(duration) {
+            self.here = self.course.stride(&self.here, &mut self.base);
             Outcome::default()
         } else {
-            self.meet(until, duration, tell)
+            self.meet(duration, tell)
         };
         self.time += duration;
         outcome
@@ -46,7 +45,7 @@ impl Plant {
         if self.under_way && jumps {
             let jump = self.base.with(drive).displacement() - self.base.displacement();
             if jump != 0.0 {
-                self.primary.1 += self.parameters.damping / self.parameters.primary_mass * jump;
+                self.here.v += self.parameters.damping / self.parameters.primary_mass * jump;
                 // The impulse acts on the primary mass alone; what that means for a particle at the wall is decided anew.
                 self.contact = Contact::Free;
             }
@@ -57,39 +56,26 @@ impl Plant {
     }
 
     pub(super) fn renew_course(&mut self) {
-        let half_width = self.parameters.half_width;
-        self.course
-            .renew(&self.alone.oscillator, half_width, &self.base);
-    }
-
-    pub(super) fn origin(&self) -> Origin<f64> {
-        Origin {
-            x: self.primary.0,
-            v: self.primary.1,
-            w: self.w,
-            particle: self.particle_velocity,
-            turn: self.course.turn,
+        let known = self.course.wave().is_some();
+        self.course.renew(&self.base.drive);
+        if !known {
+            self.course.face(&mut self.here, self.base.phase);
         }
     }
 
-    /// The state `t` seconds after the origin, with no regard to walls, and the base then.
-    pub(super) fn flown(&self, t: f64) -> (Origin<f64>, BaseMotion) {
-        if t == 0.0 {
-            return (self.origin(), self.base);
+    /// The state now and the base's phase: as held, or worked out from there.
+    #[inline]
+    pub(super) fn now(&self) -> (Origin<f64>, Phase) {
+        match self.course.wave() {
+            Some(wave) if self.course.lag != Span::default() => {
+                let gone = self.course.gone(wave);
+                let mut now = wave.stride(&self.here, &gone);
+                let b = self.parameters.half_width;
+                now.w = now.w.clamp(-b, b);
+                (now, self.base.phase.turned(gone.angle, 0.0))
+            }
+            _ => (self.here, self.base.phase),
         }
-        let mut alone = self.alone;
-        let (x, v) = alone
-            .motion(&self.base, self.primary)
-            .position_and_velocity(t);
-        let b = self.parameters.half_width;
-        let w = self.w + ((x - self.primary.0) - self.particle_velocity * t);
-        let end = Origin {
-            x,
-            v,
-            w: w.clamp(-b, b),
-            ..self.origin()
-        };
-        (end, self.base.after(t))
     }
 
     /// Brings the state that the plant holds up to date. Nothing that can be asked for changes; asking costs less
@@ -101,39 +87,25 @@ impl Plant {
         }
     }
 
+    #[cold]
     fn catch_up(&mut self) {
-        let lag = self.course.lag;
-        let (end, base) = self.flown(lag.seconds());
-        self.base = base;
-        self.hold(&end);
-        self.course.face(base.phase);
-        self.course.lag = Span::default();
-        self.course.clear -= lag.seconds();
-        if let Some(landing) = &mut self.course.landing {
-            landing.at = landing.at.less(lag);
-        }
+        let phase;
+        (self.here, phase) = self.now();
+        self.base.phase = phase;
+        self.course.catch_up();
+        self.course.face(&mut self.here, phase);
     }
 
-    pub(super) fn hold(&mut self, state: &Origin<f64>) {
-        self.primary = (state.x, state.v);
-        self.w = state.w;
-        self.particle_velocity = state.particle;
-    }
-
-    /// A step that no event falls into.
-    fn idle(&mut self, duration: f64, until: Span) {
-        if self.course.repeats(duration) {
-            self.settle();
-            let start = self.origin();
-            let end = self.course.stride(&start, &mut self.base, duration);
-            self.hold(&end);
-        } else {
+    /// A step that an event may fall into.
+    fn meet(&mut self, duration: f64, mut tell: impl FnMut(Event)) -> Outcome {
+        let until = self.course.lag.plus(duration);
+        if until.seconds() < self.course.clear {
             self.course.lag = until;
+            if self.course.repeats(duration) {
+                self.settle();
+            }
+            return Outcome::default();
         }
-    }
-
-    /// A step that an event may fall into; `until` is its end as seen from the origin.
-    fn meet(&mut self, until: Span, duration: f64, mut tell: impl FnMut(Event)) -> Outcome {
         let mut outcome = Outcome::default();
         let mut tell = |event: Event| {
             match event {
@@ -152,8 +124,7 @@ impl Plant {
             && self.contact == Contact::Free
             && let Some(wall) = self.wall_touched()
         {
-            let dw = self.primary.1 - self.particle_velocity;
-            self.touch(wall, dw, moment(left), &mut tell);
+            self.touch(wall, self.here.relative_velocity(), moment(left), &mut tell);
         }
         let last_impact = self.tally.impacts + MOST_IMPACTS;
         while left.seconds() > 0.0 && self.tally.impacts < last_impact {
@@ -175,20 +146,17 @@ impl Plant {
                 let (still_left, resting) = self.cross(duration, left, &mut tell);
                 left = still_left;
                 if let Some(wall) = resting {
-                    let dw = self.primary.1 - self.particle_velocity;
-                    self.touch(wall, dw, moment(left), &mut tell);
+                    self.touch(wall, self.here.relative_velocity(), moment(left), &mut tell);
                     continue;
                 }
                 if self.course.clear == 0.0 {
-                    let start = self.origin();
-                    self.course.look_out(&start);
+                    self.course.look_out(&self.here);
                 }
             }
             if left.seconds() < self.course.clear {
-                if self.course.lag == Span::default() && left == Span::of(duration) {
-                    self.idle(duration, left);
-                } else {
-                    self.course.lag = left;
+                self.course.lag = left;
+                if left == Span::of(duration) && self.course.repeats(duration) {
+                    self.settle();
                 }
                 left = Span::default();
                 break;
@@ -204,9 +172,7 @@ impl Plant {
     /// The state has been reached by the general way: nothing is known of what lies ahead.
     fn afresh(&mut self) {
         self.course.leave();
-        if self.course.wave.is_some() {
-            self.course.face(self.base.phase);
-        }
+        self.course.face(&mut self.here, self.base.phase);
     }
 
     /// Follows the flight to its first contact by the general search, for at most `left`; returns what is left after it.
@@ -220,14 +186,14 @@ impl Plant {
             Contact::Released(wall) => Some(wall),
             _ => None,
         };
-        let dw = self.primary.1 - self.particle_velocity;
-        let motion = self.alone.motion(&self.base, self.primary);
-        let landing = Flight::new(motion, (self.w, dw), self.parameters.half_width)
+        let dw = self.here.relative_velocity();
+        let motion = self.alone.motion(&self.base, self.here.primary());
+        let landing = Flight::new(motion, (self.here.w, dw), self.parameters.half_width)
             .first_contact(left.seconds(), released);
         let left = left.plus(-landing.t);
         self.base = self.base.after(landing.t);
-        self.primary = landing.primary;
-        self.w = landing.relative.0;
+        (self.here.x, self.here.v) = landing.primary;
+        self.here.w = landing.relative.0;
         self.contact = Contact::Free;
         self.afresh();
         if let Some(wall) = landing.wall {

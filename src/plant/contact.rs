@@ -21,7 +21,7 @@ impl Plant {
     pub(super) fn wall_touched(&self) -> Option<Wall> {
         Wall::BOTH
             .into_iter()
-            .find(|wall| wall.sign() * self.w >= self.parameters.half_width)
+            .find(|wall| wall.sign() * self.here.w >= self.parameters.half_width)
     }
 
     /// The particle is at `wall` with relative velocity `dw`: impact if it approaches, then rest if it cannot leave.
@@ -34,9 +34,9 @@ impl Plant {
     ) {
         let s = wall.sign();
         let mut dw = dw;
-        self.w = s * self.parameters.half_width;
+        self.here.w = s * self.parameters.half_width;
         if s * dw > 0.0 {
-            let after = self.law.rebound(self.primary.1, self.particle_velocity, dw);
+            let after = self.law.rebound(self.here.v, self.here.particle, dw);
             let t = moment.now;
             self.tally.impacts += 1;
             self.tally.impact_time = self.time + t;
@@ -47,14 +47,14 @@ impl Plant {
                 wall,
                 velocity: dw,
             });
-            self.primary.1 = after.primary;
-            self.particle_velocity = after.particle;
+            self.here.v = after.primary;
+            self.here.particle = after.particle;
             dw = after.relative;
         }
         if self.rests(wall, dw, moment.left) {
-            let (velocity, lost) = self.law.join(self.primary.1, dw);
-            self.primary.1 = velocity;
-            self.particle_velocity = velocity;
+            let (velocity, lost) = self.law.join(self.here.v, dw);
+            self.here.v = velocity;
+            self.here.particle = velocity;
             self.tally.dissipated += lost;
             self.contact = Contact::Stuck(wall);
             tell(Event::Stuck {
@@ -77,7 +77,7 @@ impl Plant {
         if speed * speed > 2.0 * lowest * self.acceleration_bound() {
             return false;
         }
-        let motion = self.alone.motion(&self.base, self.primary);
+        let motion = self.alone.motion(&self.base, self.here.primary());
         let pressing = s * motion.derivatives_at_start()[2];
         if speed == 0.0 {
             return pressing >= -self.acceleration_noise();
@@ -97,9 +97,9 @@ impl Plant {
             ..
         } = self.alone.oscillator;
         let drive = &self.base.drive;
-        let position = self.primary.0.abs() + drive.signal[0].abs() + drive.amplitude.abs();
+        let position = self.here.x.abs() + drive.signal[0].abs() + drive.amplitude.abs();
         let velocity =
-            self.primary.1.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
+            self.here.v.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
         (omega0_squared * position + 2.0 * delta * velocity) * (1.0 + 1e-9)
     }
 
@@ -112,11 +112,11 @@ impl Plant {
     /// whether the particle was let go.
     pub(super) fn stay(&mut self, wall: Wall, left: f64) -> (f64, bool) {
         let noise = self.acceleration_noise();
-        let motion = self.joint.motion(&self.base, self.primary);
+        let motion = self.joint.motion(&self.base, self.here.primary());
         let parting = until_released(&motion, wall, left, noise);
         self.base = self.base.after(parting.t);
-        self.primary = parting.joint;
-        self.particle_velocity = parting.joint.1;
+        (self.here.x, self.here.v) = parting.joint;
+        self.here.particle = parting.joint.1;
         if parting.released {
             self.contact = Contact::Released(wall);
         }

@@ -1,7 +1,7 @@
 //! What is known of the flight under way: how long the walls are out of reach, where it will arrive, and a step that was
 //! worked out before. All of it only saves work.
 
-use crate::base_motion::{BaseMotion, Phase};
+use crate::base_motion::{BaseMotion, Drive, Phase};
 use crate::crossing::{Anchor, Arrival, Origin, Wave};
 use crate::oscillator::Oscillator;
 use crate::span::Span;
@@ -26,34 +26,47 @@ pub(super) struct Landing {
 /// The flight under way, seen from its *origin*: the state that the plant holds.
 #[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
 pub(super) struct Course {
-    /// Coefficients, where rig and drive allow the quick way.
-    pub wave: Option<Wave<f64>>,
+    /// Coefficients, where the rig allows the quick way.
+    pub rig: Option<Wave<f64>>,
+    /// Whether the drive allows it, too.
+    pub quick: bool,
     /// How far the plant has come since the origin.
     pub lag: Span,
     /// No wall is met until this time since the origin, s.
     pub clear: f64,
     pub landing: Option<Landing>,
-    /// `e^{i phase}` at the origin.
-    pub turn: (f64, f64),
+    /// How often `e^{i phase}` has been turned since it was worked out.
     pub turns: u32,
     /// Near the last arrival.
     pub anchor: Anchor<f64>,
     /// The step that was repeated last.
     stride: Anchor<f64>,
+    /// Whether it has been worked out for the present drive.
+    worked_out: bool,
     last_duration: f64,
 }
 
 impl Course {
-    /// Forgets what depends on the drive, and begins anew under the one of `base`.
-    pub fn renew(&mut self, oscillator: &Oscillator, half_width: f64, base: &BaseMotion) {
-        let had_turn = self.wave.is_some();
-        self.wave = Wave::new(oscillator, half_width, &base.drive);
-        self.anchor.t = 0.0;
-        self.stride.t = 0.0;
-        self.leave();
-        if self.wave.is_some() && !had_turn {
-            self.face(base.phase);
+    /// The course of a rig.
+    pub fn new(oscillator: &Oscillator, half_width: f64) -> Self {
+        Self {
+            rig: Wave::new(oscillator, half_width),
+            ..Self::default()
         }
+    }
+
+    /// The coefficients, where rig and drive allow the quick way.
+    #[inline]
+    pub fn wave(&self) -> Option<&Wave<f64>> {
+        if self.quick { self.rig.as_ref() } else { None }
+    }
+
+    /// Forgets what depends on the drive, and begins anew under another one.
+    pub fn renew(&mut self, drive: &Drive) {
+        self.quick = self.rig.as_mut().is_some_and(|wave| wave.take(drive));
+        self.anchor.t = 0.0;
+        self.worked_out = false;
+        self.leave();
     }
 
     /// Forgets what depends on the state.
@@ -63,51 +76,73 @@ impl Course {
         self.landing = None;
     }
 
-    /// Works `e^{i phase}` out anew.
-    pub fn face(&mut self, phase: Phase) {
-        let (sin, cos) = libm::sincos(phase.radians());
-        self.turn = (cos, sin);
-        self.turns = 0;
-    }
-
-    /// Whether `turn` is that of now.
-    pub fn turn_is_known(&self) -> bool {
-        self.wave.is_some() && self.lag == Span::default()
-    }
-
-    /// Takes over a turned `e^{i phase}`, and works it out anew from time to time.
-    pub fn turn_to(&mut self, turn: (f64, f64), phase: Phase) {
-        self.turn = turn;
-        self.turns += 1;
-        if self.turns >= TURNS_KEPT {
-            self.face(phase);
+    /// The state has come to where the plant stands.
+    pub fn catch_up(&mut self) {
+        let lag = core::mem::take(&mut self.lag);
+        self.clear -= lag.seconds();
+        if let Some(landing) = &mut self.landing {
+            landing.at = landing.at.less(lag);
         }
     }
 
-    /// Whether a step of this length has come twice in a row, so that it pays to work it out once.
+    /// Works `e^{i phase}` out anew, where it is of use.
+    pub fn face(&mut self, here: &mut Origin<f64>, phase: Phase) {
+        if self.quick {
+            let (sin, cos) = libm::sincos(phase.radians());
+            here.turn = (cos, sin);
+            self.turns = 0;
+        }
+    }
+
+    /// Notes the length of a step that meets nothing. Whether it came before, so that it pays to work it out for good.
     pub fn repeats(&mut self, duration: f64) -> bool {
-        let again = self.wave.is_some() && duration == self.last_duration && duration > 0.0;
+        let again = duration == self.last_duration && duration > 0.0 && self.quick;
         self.last_duration = duration;
+        if let (true, Some(wave)) = (again, &self.rig) {
+            self.stride = if self.stride.t == duration {
+                wave.turned(&self.stride)
+            } else {
+                wave.anchor(duration)
+            };
+            self.worked_out = true;
+        }
         again
     }
 
-    /// One repeated step with no event: moves `start` and `base` on.
-    pub fn stride(
-        &mut self,
-        start: &Origin<f64>,
-        base: &mut BaseMotion,
-        duration: f64,
-    ) -> Origin<f64> {
-        let wave = self.wave.as_ref().expect("a stride is of the quick way");
-        if self.stride.t != duration {
-            self.stride = wave.anchor(duration);
+    /// Whether a step of this length has been worked out and meets nothing.
+    #[inline]
+    pub fn strides(&self, duration: f64) -> bool {
+        self.worked_out
+            && duration == self.stride.t
+            && duration < self.clear
+            && self.lag == Span::default()
+    }
+
+    /// What time does to the state while it lags behind: worked out before, or now.
+    pub fn gone(&self, wave: &Wave<f64>) -> Anchor<f64> {
+        let lag = self.lag.seconds();
+        if self.worked_out && self.stride.t == lag {
+            self.stride
+        } else {
+            wave.anchor(lag)
         }
-        let end = wave.stride(start, &self.stride);
+    }
+
+    /// Such a step.
+    #[inline]
+    pub fn stride(&mut self, here: &Origin<f64>, base: &mut BaseMotion) -> Origin<f64> {
+        let Some(wave) = self.wave() else {
+            unreachable!("a stride is worked out from a wave");
+        };
+        let mut end = wave.stride(here, &self.stride);
         base.phase = base.phase.turned(self.stride.angle, 0.0);
-        self.turn_to(end.turn, base.phase);
-        self.clear -= duration;
+        self.turns += 1;
+        self.clear -= self.stride.t;
         if let Some(landing) = &mut self.landing {
-            landing.at = landing.at.plus(-duration);
+            landing.at = landing.at.plus(-self.stride.t);
+        }
+        if self.turns >= TURNS_KEPT {
+            self.face(&mut end, base.phase);
         }
         end
     }
@@ -115,8 +150,8 @@ impl Course {
     /// How long the walls are certainly out of reach of `start`, which has no lag and does not cross; 0 if that is not
     /// known.
     pub fn look_out(&mut self, start: &Origin<f64>) {
-        if let Some(wave) = &self.wave {
-            self.clear = wave.clear(start, &wave.free_motion(start));
-        }
+        self.clear = self
+            .wave()
+            .map_or(0.0, |wave| wave.clear(start, &wave.free_motion(start)));
     }
 }

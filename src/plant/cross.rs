@@ -1,6 +1,6 @@
 //! From wall to wall, again and again: the loop in which a steady motion spends its life.
 
-use super::course::{Landing, TURNS_KEPT};
+use super::course::{Course, Landing, TURNS_KEPT};
 use super::{Event, MOST_IMPACTS, Plant};
 use crate::crossing::{Anchor, Arrival, Free, Origin, Wave};
 use crate::span::Span;
@@ -20,15 +20,24 @@ impl Plant {
         left: Span,
         tell: &mut impl FnMut(Event),
     ) -> (Span, Option<Wall>) {
-        let mut start = self.origin();
+        let mut start = self.here;
         let mut known = self.course.landing.take();
         if known.is_some() {
             self.course.leave();
         }
-        let Some(wave) = &self.course.wave else {
+        let Course {
+            rig: Some(wave),
+            quick: true,
+            anchor,
+            landing: noted,
+            clear,
+            turns,
+            ..
+        } = &mut self.course
+        else {
             return (left, None);
         };
-        let (mut left, mut phase, mut turns) = (left, self.base.phase, self.course.turns);
+        let (mut left, mut phase) = (left, self.base.phase);
         let (mut impacts, mut dissipated, mut last, mut rest) = (0, 0.0, None, None);
         let mut guesses = 0;
         while impacts < MOST_IMPACTS && left.seconds() > 0.0 {
@@ -43,17 +52,16 @@ impl Plant {
                     let distance = wave.half_width - ahead * start.w;
                     // The primary mass is slower than the particle: they close in at less than twice its speed.
                     if 2.0 * start.particle.abs() * left.seconds() < distance {
-                        self.course.clear = 0.5 * distance / start.particle.abs();
+                        *clear = 0.5 * distance / start.particle.abs();
                         break;
                     }
-                    let anchor = &self.course.anchor;
                     let (arrival, near) = wave.arrival(&start, &free, anchor);
                     if !near {
                         guesses += 1;
                         if guesses > MOST_GUESSES {
                             break;
                         }
-                        self.course.anchor = guess(wave, &start, &free, anchor, &arrival);
+                        *anchor = guess(wave, &start, &free, anchor, &arrival);
                         continue;
                     }
                     guesses = 0;
@@ -64,8 +72,8 @@ impl Plant {
                         wall: if ahead > 0.0 { Wall::Plus } else { Wall::Minus },
                     };
                     if left.seconds() < landing.at.seconds() {
-                        self.course.clear = landing.at.seconds();
-                        self.course.landing = Some(landing);
+                        *clear = landing.at.seconds();
+                        *noted = Some(landing);
                         break;
                     }
                     landing
@@ -76,7 +84,7 @@ impl Plant {
             } = landing;
             left = left.less(at);
             phase = landing.phase;
-            turns += 1;
+            *turns += 1;
             let velocity = arrival.v - start.particle;
             let after = self.law.rebound(arrival.v, start.particle, velocity);
             start = Origin {
@@ -86,10 +94,10 @@ impl Plant {
                 particle: after.particle,
                 turn: arrival.turn,
             };
-            if turns >= TURNS_KEPT {
+            if *turns >= TURNS_KEPT {
                 let (sin, cos) = libm::sincos(phase.radians());
                 start.turn = (cos, sin);
-                turns = 0;
+                *turns = 0;
             }
             impacts += 1;
             dissipated += after.dissipated;
@@ -105,10 +113,8 @@ impl Plant {
             }
         }
         if let Some((left, velocity)) = last {
-            self.hold(&start);
+            self.here = start;
             self.base.phase = phase;
-            self.course.turn = start.turn;
-            self.course.turns = turns;
             self.tally.impacts += impacts;
             self.tally.impact_time = self.time + Span::of(duration).less(left).seconds();
             self.tally.impact_velocity = velocity;
