@@ -69,8 +69,8 @@ pub struct Wave<T> {
     forced: [T; DEGREE - 1],
 }
 
-/// A time at which the closed form has been worked out.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+/// A time at which the closed form has been worked out; that is no time at all by default.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Anchor<T> {
     /// Seconds since the start of a flight.
     pub t: T,
@@ -80,6 +80,17 @@ pub struct Anchor<T> {
     pub turned: Pair<T>,
     /// `e^{lambda t}`.
     pub decayed: Pair<T>,
+}
+
+impl Default for Anchor<f64> {
+    fn default() -> Self {
+        Self {
+            t: 0.0,
+            angle: (0.0, 0.0),
+            turned: (1.0, 0.0),
+            decayed: (1.0, 0.0),
+        }
+    }
 }
 
 /// The start of a flight.

@@ -64,7 +64,7 @@ impl Course {
     /// Forgets what depends on the drive, and begins anew under another one.
     pub fn renew(&mut self, drive: &Drive) {
         self.quick = self.rig.as_mut().is_some_and(|wave| wave.take(drive));
-        self.anchor.t = 0.0;
+        self.anchor = Anchor::default();
         self.worked_out = false;
         self.leave();
     }
