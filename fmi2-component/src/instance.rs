@@ -82,12 +82,12 @@ impl<C: Component> Instance<C> {
         Ok(())
     }
 
-    /// Whether a variable may be set now, in a state where setting is legal at all; answers whether it is an input.
+    /// Whether a variable may be set now, in a state where setting is legal at all; answers when else.
     #[inline]
-    pub fn check_settable<K: Key>(&self, key: K) -> Result<bool, Refusal> {
+    pub fn check_settable<K: Key>(&self, key: K) -> Result<Occasions, Refusal> {
         let occasions = K::OCCASIONS[key.index()];
         if occasions.meets(Occasions::now(self.session.state)) {
-            return Ok(occasions.is_input());
+            return Ok(occasions);
         }
         Err(not_settable(key.variable(), self.session.state))
     }

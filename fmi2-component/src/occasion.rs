@@ -56,6 +56,15 @@ impl Occasions {
         })
     }
 
+    /// All that there are.
+    pub(crate) const ALL: Self = Self(u8::MAX);
+
+    /// What both have in common.
+    #[inline]
+    pub(crate) const fn and(self, other: Self) -> Self {
+        Self(self.0 & other.0)
+    }
+
     /// Whether both have one in common.
     pub(crate) const fn meets(self, other: Self) -> bool {
         self.0 & other.0 != 0

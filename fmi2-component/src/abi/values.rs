@@ -9,6 +9,7 @@ use crate::component::Component;
 use crate::instance::Instance;
 use crate::life_cycle::Function;
 use crate::model::Key;
+use crate::occasion::Occasions;
 use crate::refusal::Refusal;
 use crate::status::Status;
 
@@ -127,13 +128,13 @@ unsafe fn set<C: Component, K: Key, T>(
         let (references, values) =
             unsafe { inputs((references, values), count, &["vr", "value"]) }?;
         // All are checked before the first is set.
-        let mut all_inputs = true;
+        let mut common = Occasions::ALL;
         for (&reference, value) in references.iter().zip(values) {
             let key = find::<K>(reference)?;
-            all_inputs &= instance.check_settable(key)?;
+            common = common.and(instance.check_settable(key)?);
             check(key, value)?;
         }
-        if count <= 1 || all_inputs && C::TAKES_EVERY_INPUT {
+        if count <= 1 || C::TAKES_EVERY_INPUT && common.is_input() {
             set_each(&mut instance.session.component, references, values, &write)?;
         } else {
             instance.change(|component| set_each(component, references, values, &write))?;
