@@ -28,13 +28,20 @@ fn slow() {
                 let o = plant.advance(s.drive, s.step);
                 cut |= o.cut_short;
                 if !driven && s.parameters.damping == 0.0 {
-                    worst = worst.max((plant.energy(0.0) + plant.tally().dissipated - e0).abs() / e0);
+                    worst =
+                        worst.max((plant.energy(0.0) + plant.tally().dissipated - e0).abs() / e0);
                 }
                 i += 1;
-                if t.elapsed().as_secs_f64() > 0.3 { break; }
+                if t.elapsed().as_secs_f64() > 0.3 {
+                    break;
+                }
             }
             if t.elapsed().as_secs_f64() > 0.1 || cut || worst > 1e-13 {
-                println!("{driven} {k}: {:.3} s, {i} steps, {} impacts, cut {cut}, energy {worst:.1e} {s:?}", t.elapsed().as_secs_f64(), plant.tally().impacts);
+                println!(
+                    "{driven} {k}: {:.3} s, {i} steps, {} impacts, cut {cut}, energy {worst:.1e} {s:?}",
+                    t.elapsed().as_secs_f64(),
+                    plant.tally().impacts
+                );
             }
         }
     }

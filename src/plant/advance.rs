@@ -120,11 +120,12 @@ impl Plant {
             now: Span::of(duration).less(left).seconds(),
             left: left.seconds(),
         };
+        let mut dw = self.here.relative_velocity();
         if self.course.lag == Span::default()
             && self.contact == Contact::Free
             && let Some(wall) = self.wall_touched()
         {
-            self.touch(wall, self.here.relative_velocity(), moment(left), &mut tell);
+            dw = self.touch(wall, dw, moment(left), &mut tell);
         }
         let last_impact = self.tally.impacts + MOST_IMPACTS;
         while left.seconds() > 0.0 && self.tally.impacts < last_impact {
@@ -136,18 +137,29 @@ impl Plant {
                     let t = moment(left).now;
                     tell(Event::Released { t, wall });
                 }
+                dw = 0.0;
                 continue;
             }
-            if self.course.landing.is_none() {
+            if self.course.landing.is_none() && self.course.lag != Span::default() {
                 left = left.less(self.course.lag);
                 self.settle();
+                dw = self.here.relative_velocity();
             }
             if self.contact == Contact::Free {
-                let (still_left, resting) = self.cross(duration, left, &mut tell);
-                left = still_left;
-                if let Some(wall) = resting {
-                    self.touch(wall, self.here.relative_velocity(), moment(left), &mut tell);
+                let crossed = self.cross(duration, left, &mut tell);
+                if let Some(wall) = crossed.resting {
+                    dw = self.touch(
+                        wall,
+                        self.here.relative_velocity(),
+                        moment(crossed.left),
+                        &mut tell,
+                    );
+                    left = crossed.left;
                     continue;
+                }
+                if crossed.left != left {
+                    left = crossed.left;
+                    dw = self.here.relative_velocity();
                 }
                 if self.course.clear == 0.0 {
                     self.course.look_out(&self.here);
@@ -162,7 +174,7 @@ impl Plant {
                 break;
             }
             if left.seconds() > 0.0 {
-                left = self.search(left, moment, &mut tell);
+                (left, dw) = self.search(dw, left, moment, &mut tell);
             }
         }
         outcome.cut_short = left.seconds() > 0.0;
@@ -175,18 +187,19 @@ impl Plant {
         self.course.face(&mut self.here, self.base.phase);
     }
 
-    /// Follows the flight to its first contact by the general search, for at most `left`; returns what is left after it.
+    /// Follows the flight to its first contact by the general search, for at most `left`; returns what is left after it,
+    /// and the relative velocity then.
     fn search(
         &mut self,
+        dw: f64,
         left: Span,
         moment: impl Fn(Span) -> Moment,
         tell: &mut impl FnMut(Event),
-    ) -> Span {
+    ) -> (Span, f64) {
         let released = match self.contact {
             Contact::Released(wall) => Some(wall),
             _ => None,
         };
-        let dw = self.here.relative_velocity();
         let motion = self.alone.motion(&self.base, self.here.primary());
         let landing = Flight::new(motion, (self.here.w, dw), self.parameters.half_width)
             .first_contact(left.seconds(), released);
@@ -196,9 +209,11 @@ impl Plant {
         self.here.w = landing.relative.0;
         self.contact = Contact::Free;
         self.afresh();
-        if let Some(wall) = landing.wall {
-            self.touch(wall, landing.relative.1, moment(left), tell);
-        }
-        left
+        let dw = landing.relative.1;
+        let dw = match landing.wall {
+            Some(wall) => self.touch(wall, dw, moment(left), tell),
+            None => dw,
+        };
+        (left, dw)
     }
 }

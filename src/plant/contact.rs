@@ -25,13 +25,14 @@ impl Plant {
     }
 
     /// The particle is at `wall` with relative velocity `dw`: impact if it approaches, then rest if it cannot leave.
+    /// Returns the relative velocity after that, which has more digits than the difference of two large velocities.
     pub(super) fn touch(
         &mut self,
         wall: Wall,
         dw: f64,
         moment: Moment,
         tell: &mut impl FnMut(Event),
-    ) {
+    ) -> f64 {
         let s = wall.sign();
         let mut dw = dw;
         self.here.w = s * self.parameters.half_width;
@@ -61,7 +62,9 @@ impl Plant {
                 t: moment.now,
                 wall,
             });
+            dw = 0.0;
         }
+        dw
     }
 
     /// Whether a particle that leaves `wall` with relative velocity `dw` is in truth at rest on it.

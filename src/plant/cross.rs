@@ -9,9 +9,16 @@ use crate::wall::Wall;
 /// So many guesses at an arrival before the general search is asked.
 const MOST_GUESSES: usize = 8;
 
+/// How a run of crossings ended.
+pub(super) struct Crossed {
+    /// What is left of the advance.
+    pub left: Span,
+    /// The wall at which the particle may be at rest.
+    pub resting: Option<Wall>,
+}
+
 impl Plant {
-    /// Crosses the cavity for as long as that is certain and time is left; tells what is left then, and the wall at which
-    /// it has ended because the particle may be at rest there.
+    /// Crosses the cavity for as long as that is certain and time is left.
     ///
     /// Starts with no lag or a known landing. Ends with a landing or a clear time noted where it was time that ran out.
     pub(super) fn cross(
@@ -19,7 +26,7 @@ impl Plant {
         duration: f64,
         left: Span,
         tell: &mut impl FnMut(Event),
-    ) -> (Span, Option<Wall>) {
+    ) -> Crossed {
         let mut start = self.here;
         let mut known = self.course.landing.take();
         if known.is_some() {
@@ -35,7 +42,10 @@ impl Plant {
             ..
         } = &mut self.course
         else {
-            return (left, None);
+            return Crossed {
+                left,
+                resting: None,
+            };
         };
         let (mut left, mut phase) = (left, self.base.phase);
         let (mut impacts, mut dissipated, mut last, mut rest) = (0, 0.0, None, None);
@@ -120,7 +130,10 @@ impl Plant {
             self.tally.impact_velocity = velocity;
             self.tally.dissipated += dissipated;
         }
-        (left, rest)
+        Crossed {
+            left,
+            resting: rest,
+        }
     }
 }
 
