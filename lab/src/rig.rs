@@ -9,6 +9,7 @@ mod fmu_rig;
 mod phase_lock;
 mod simulated;
 
+pub use ::phase_lock::Move;
 pub use error::{ControllerError, RigError};
 pub use fmu::{FmuError, Kind};
 pub use fmu_controller::FmuController;
@@ -92,4 +93,12 @@ pub trait Controller {
     /// # Errors
     /// The controller's own: a refused call, a lost connection.
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError>;
+
+    /// Holds the amplitude of the response from now on, and moves it as stated.
+    ///
+    /// # Errors
+    /// A controller that cannot do that, or not now.
+    fn hold_response(&mut self, _to: Move) -> Result<(), ControllerError> {
+        Err(ControllerError::NoResponseLoop)
+    }
 }

@@ -1,5 +1,6 @@
 //! Scenes: what is on the bench and what is done to it, read from TOML.
 
+mod backbone;
 mod controller;
 mod dimensionless;
 mod error;
@@ -15,6 +16,7 @@ use std::path::Path;
 
 use serde::Serialize;
 
+pub use backbone::{Backbone, Feed};
 pub use controller::Controller;
 pub use dimensionless::Dimensionless;
 pub use error::SceneError;
@@ -39,6 +41,8 @@ pub struct Scene {
     pub controller: Controller,
     /// How long to drive and to record, in periods.
     pub record: Record,
+    /// How the backbone is tracked, in units of b and in periods.
+    pub backbone: Backbone,
 }
 
 impl Scene {

@@ -1,6 +1,6 @@
 //! The built-in phase-locked loop as a controller of the bench.
 
-use phase_lock::{Config, ConfigError, Input, LockCriterion, PhaseLock, State};
+use phase_lock::{Config, ConfigError, Input, LockCriterion, Move, PhaseLock, State};
 
 use super::{Command, Controller, ControllerError, Drive, Sensors};
 use crate::scene::Scene;
@@ -19,6 +19,24 @@ impl BuiltIn {
     /// Settings that the controller cannot work with.
     pub fn new(scene: &Scene) -> Result<Self, ConfigError> {
         let lock = configuration(scene).build()?;
+        Ok(Self {
+            state: lock.start(),
+            lock,
+        })
+    }
+
+    /// The same, ready to hold the response: its drive has the limit of the scene's `[backbone]`.
+    ///
+    /// # Errors
+    /// As [`BuiltIn::new`].
+    pub fn for_backbone(scene: &Scene) -> Result<Self, ConfigError> {
+        let d = scene.dimensionless();
+        let lock = Config {
+            amplitude_max: scene.backbone.g_max * d.b * d.epsilon,
+            bandwidth: scene.backbone.bandwidth * d.omega0,
+            ..configuration(scene)
+        }
+        .build()?;
         Ok(Self {
             state: lock.start(),
             lock,
@@ -70,5 +88,9 @@ impl Controller for BuiltIn {
             phase_error: output.phase_error,
             settled: output.settled,
         })
+    }
+
+    fn hold_response(&mut self, to: Move) -> Result<(), ControllerError> {
+        Ok(self.lock.hold_response(&mut self.state, to)?)
     }
 }
