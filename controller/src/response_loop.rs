@@ -14,6 +14,9 @@ use core::f64::consts::TAU;
 
 use crate::gains::Gains;
 
+/// Share of its integral part below which the drive never goes: without a drive there is no phase to hold.
+const LEAST_SHARE: f64 = 0.2;
+
 /// Coefficients of the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -158,7 +161,8 @@ impl ResponseLoop {
         hold.integral += gone * hold.course.amplitude;
         let error = read.map_or(0.0, |read| hold.expected - read);
         let asked = hold.integral + self.carry * growth + self.proportional * error;
-        let granted = asked.clamp(0.0, self.amplitude_max);
+        let least = LEAST_SHARE * hold.integral;
+        let granted = asked.clamp(least, self.amplitude_max.max(least));
         // The integral moves unless a limit already withholds what it would ask more of.
         if (asked - granted) * error <= 0.0 {
             let integral = hold.integral + self.integral * error;

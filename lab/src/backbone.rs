@@ -8,10 +8,13 @@
 mod cycle;
 mod exact;
 mod forecast;
+mod picture;
+mod report;
 mod settle;
 mod track;
 
 pub use cycle::Cycle;
 pub use exact::{Distance, ExactCurve};
+pub use report::{Compared, Report};
 pub use settle::{Criterion, Estimate};
 pub use track::{Point, TrackError, Tracked, track};

@@ -6,8 +6,10 @@ use crate::orbit::{Orbit, exact_backbone};
 use crate::scene::Dimensionless;
 use crate::theory::SlowFlow;
 
-/// Frequencies at which the curve is computed.
-const FREQUENCIES: usize = 12_000;
+/// Frequencies at which the curve is computed over its whole range, ...
+const FREQUENCIES: usize = 3000;
+/// ... and about its lowest frequency, where it turns back, within so much of the detuning.
+const TURN: (usize, f64) = (1200, 0.02);
 /// Particle speed up to which it is looked for: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
@@ -40,11 +42,19 @@ impl ExactCurve {
             (low.min(sigma), high.max(sigma))
         });
         let (low, high) = (low - 0.5, high + 0.5);
-        let mut orbits: Vec<Orbit> = (0..=FREQUENCIES)
-            .map(|n| low + (high - low) * n as f64 / FREQUENCIES as f64)
-            .flat_map(|sigma| exact_backbone(scene, 1.0 + scene.epsilon * sigma))
-            .filter(|orbit| orbit.b < SPEED_MAX)
-            .collect();
+        let between = |low: f64, high: f64, steps: usize| {
+            (0..=steps)
+                .map(move |n| low + (high - low) * n as f64 / steps as f64)
+                .flat_map(|sigma| exact_backbone(scene, 1.0 + scene.epsilon * sigma))
+                .filter(|orbit| orbit.b < SPEED_MAX)
+        };
+        let mut orbits: Vec<Orbit> = between(low, high, FREQUENCIES).collect();
+        let lowest = orbits
+            .iter()
+            .map(|orbit| orbit.sigma)
+            .fold(f64::MAX, f64::min);
+        let (steps, width) = TURN;
+        orbits.extend(between(lowest - 0.1 * width, lowest + width, steps));
         orbits.sort_by(|a, b| a.b.total_cmp(&b.b));
         // From the fold on: C rises with B there.
         let fold = (0..orbits.len())

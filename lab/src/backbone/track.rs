@@ -7,8 +7,9 @@ use super::cycle::Cycle;
 use super::forecast::{self, Known};
 use super::settle::{Criterion, Estimate};
 use crate::experiment::Sample;
+use crate::identification::{Regime, classify, regime_by_response};
 use crate::rig::{Command, Controller, ControllerError, Drive, Move, Rig, RigError};
-use crate::scene::{Backbone, Dimensionless, Scene};
+use crate::scene::Scene;
 use crate::theory::SlowFlow;
 
 /// One point of the backbone; dimensionless.
@@ -30,8 +31,12 @@ pub struct Point {
     pub periods: f64,
     /// Periods averaged.
     pub averaged: usize,
-    /// The point was still; otherwise it was taken because time was up.
+    /// The point was settled; otherwise it was taken because time was up.
     pub settled: bool,
+    /// The regime as a rig would tell it, from the response alone.
+    pub regime: Regime,
+    /// The regime as the impacts tell it, where the rig is a simulation.
+    pub regime_by_impacts: Option<Regime>,
 }
 
 /// The tracked backbone.
@@ -107,7 +112,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
     /// One period of the drive.
     fn cycle(&mut self) -> Result<Cycle, TrackError> {
         loop {
-            self.samples.clear();
+            let begin = self.samples.len();
             let phase = self.turns * std::f64::consts::TAU;
             loop {
                 let command = self.sample()?;
@@ -119,7 +124,9 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
                     break;
                 }
             }
-            if let Some(cycle) = Cycle::of(&self.samples, self.sample_time, phase, self.target) {
+            if let Some(cycle) =
+                Cycle::of(&self.samples[begin..], self.sample_time, phase, self.target)
+            {
                 return Ok(cycle);
             }
         }
@@ -170,7 +177,7 @@ pub fn track(
             amplitude: g * d.b * d.epsilon,
             omega: sigma * d.epsilon * d.omega0,
         })?;
-        points.push(hold(&mut bench, &settings, &d, level)?);
+        points.push(hold(&mut bench, scene, level)?);
     }
     Ok(Tracked {
         points,
@@ -189,6 +196,7 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
         if bench.periods >= most {
             return Err(TrackError::NoLock { periods: most });
         }
+        bench.samples.clear();
         let cycle = bench.cycle()?;
         let driven = cycle.base.norm() > 0.0;
         near = if driven && cycle.phase_error.abs() < NEAR {
@@ -203,16 +211,18 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
 /// Goes to the level and holds it until the point is still.
 fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     bench: &mut Bench<R, C>,
-    settings: &Backbone,
-    d: &Dimensionless,
+    scene: &Scene,
     level: f64,
 ) -> Result<Point, TrackError> {
+    let (settings, d) = (&scene.backbone, scene.dimensionless());
     let start = bench.periods;
+    bench.samples.clear();
     while bench.periods - start < settings.move_periods {
         bench.cycle()?;
     }
     let criterion = Criterion {
         tolerance: settings.tolerance,
+        precision: settings.precision,
         fewest: settings.dwell_min as usize,
     };
     let mut cycles: Vec<Cycle> = Vec::new();
@@ -225,6 +235,8 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         }
     };
     let said = found.unwrap_or_else(|| Estimate::of(&cycles[cycles.len() / 2..]));
+    let samples = said.periods as f64 * std::f64::consts::TAU / (said.omega * bench.sample_time);
+    let averaged = &bench.samples[bench.samples.len().saturating_sub(samples as usize)..];
     Ok(Point {
         level,
         c: said.response / d.b,
@@ -232,6 +244,10 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         g: said.base / (d.b * d.epsilon),
         phase_error_deg: said.phase_error.to_degrees(),
         periods: bench.periods - start,
+        regime: regime_by_response(averaged, scene),
+        regime_by_impacts: bench.samples[0]
+            .witness
+            .map(|_| classify(averaged, bench.sample_time, said.omega).1),
         averaged: said.periods,
         settled: found.is_some(),
     })

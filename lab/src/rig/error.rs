@@ -15,6 +15,11 @@ pub enum RigError {
     /// The rig is at a network address, and the link failed.
     #[error("the rig: {0}")]
     Link(#[from] LinkError),
+    /// The rig cannot be driven by held samples.
+    #[error(
+        "the rig takes frequency and amplitude only, not samples of the base displacement as chain.hold asks"
+    )]
+    NoHold,
 }
 
 /// Why a controller cannot go on.

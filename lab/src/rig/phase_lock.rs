@@ -58,6 +58,7 @@ pub(crate) fn configuration(scene: &Scene) -> Config {
         bandwidth: c.bandwidth * omega0,
         damping_rate: 0.5 * scene.plant.damping / scene.plant.mass,
         phase_target: c.phase_target_radians(),
+        delay: scene.chain.stated_delay(omega0 * scene.sample_time()) / omega0,
         lock: LockCriterion {
             phase_tolerance: c.phase_tolerance.to_radians(),
             frequency_drift: c.frequency_drift,

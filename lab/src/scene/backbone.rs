@@ -39,9 +39,11 @@ pub struct Backbone {
     pub dwell_min: u32,
     /// Periods after which a point is taken, settled or not.
     pub dwell_max: u32,
-    /// How still a point must be: relative drift of response and drive, and drift of the frequency in half-power
-    /// bandwidths, over the periods averaged.
+    /// How well both halves of the periods averaged must agree, where noise does not hide it: in the drive, relative, and in
+    /// the frequency, relative to the damping rate.
     pub tolerance: f64,
+    /// Largest standard error that noise may leave in the same.
+    pub precision: f64,
     /// Where the next point's frequency and drive are foreseen from.
     pub feed: Feed,
 }
@@ -53,11 +55,12 @@ impl Default for Backbone {
             c_to: 0.14,
             points: 29,
             g_max: 4.0,
-            bandwidth: 0.2,
-            move_periods: 8.0,
-            dwell_min: 4,
+            bandwidth: 0.15,
+            move_periods: 4.0,
+            dwell_min: 8,
             dwell_max: 60,
             tolerance: 5e-4,
+            precision: 1.2e-3,
             feed: Feed::Previous,
         }
     }
@@ -96,13 +99,14 @@ impl Backbone {
         )?;
         let (least, most) = (self.dwell_min, self.dwell_max);
         Quantity::new("backbone.dwell_min", least.into(), "(periods)").check(
-            (4..=1000).contains(&least),
-            "must be from 4 (to judge a drift) to 1000",
+            (6..=1000).contains(&least),
+            "must be from 6 (to judge both halves) to 1000",
         )?;
         Quantity::new("backbone.dwell_max", most.into(), "(periods)").check(
             (least..=10_000).contains(&most),
             format!("must be from dwell_min = {least} to 10000"),
         )?;
-        Quantity::new("backbone.tolerance", self.tolerance, "(relative)").positive()
+        Quantity::new("backbone.tolerance", self.tolerance, "(relative)").positive()?;
+        Quantity::new("backbone.precision", self.precision, "(relative)").positive()
     }
 }

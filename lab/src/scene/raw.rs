@@ -3,7 +3,7 @@
 use serde::Deserialize;
 
 use super::{
-    Backbone, Controller, Record, Scene, SceneError, Start, excitation::RawExcitation,
+    Backbone, Chain, Controller, Record, Scene, SceneError, Start, excitation::RawExcitation,
     plant::RawPlant,
 };
 
@@ -23,6 +23,8 @@ pub(super) struct Raw {
     record: Record,
     #[serde(default)]
     backbone: Backbone,
+    #[serde(default)]
+    chain: Chain,
 }
 
 impl Raw {
@@ -37,6 +39,7 @@ impl Raw {
         self.controller.check()?;
         self.record.check(&self.controller)?;
         self.backbone.check(&self.controller)?;
+        self.chain.check(&self.controller)?;
         Ok(Scene {
             plant,
             start: self.start,
@@ -44,6 +47,7 @@ impl Raw {
             controller: self.controller,
             record: self.record,
             backbone: self.backbone,
+            chain: self.chain,
         })
     }
 }
