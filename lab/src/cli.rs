@@ -28,6 +28,7 @@ Examples:
   vines backbone                               the backbone level by level, with the loop closed
   vines orbit                                  exact orbits of the default scene
   vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
+  vines orbit --response                       the exact frequency response, stable and unstable
   vines theory --scene scenes/dimensionless.toml --set plant.epsilon=0.0042
   vines pack --out fmus                        write LoViNes.fmu and PhaseLock.fmu
   vines rig --listen 127.0.0.1:5510            serve the plant in real time, for identify --rig udp://127.0.0.1:5510

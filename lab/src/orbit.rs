@@ -1,4 +1,4 @@
-//! Exact symmetric 1:1 orbits with two impacts per period, at phase resonance.
+//! Exact periodic orbits: symmetric 1:1 ones at phase resonance in closed form, all others by shooting on the impact map.
 //!
 //! Everything is dimensionless: lengths over b, velocities over `b omega0`, time `tau = omega0 t`. Half a period after an
 //! impact the state of a symmetric orbit is minus itself; the particle flies in straight lines at speed ±B, so the wall gives
@@ -6,15 +6,32 @@
 //! given frequency is one quadratic for B. No first-order approximation is made anywhere.
 
 mod candidate;
+mod continuation;
+mod convergence;
+mod curves;
 mod flight;
+mod impact_map;
 mod multipliers;
 mod oscillator;
+mod periodic;
 mod roots;
 mod search;
+mod settle;
+mod shape;
 
 use serde::Serialize;
 
+pub use continuation::{
+    Bifurcation, Branch, Ended, Limits, Special, asymmetric_branch, continue_both_ways,
+    continue_from,
+};
+pub use convergence::{Convergence, Difference, convergence};
+pub use curves::{Response, backbone, response};
+pub use impact_map::{Bounce, ImpactMap};
+pub use periodic::{Condition, Periodic};
 pub use search::{exact_backbone, phase_resonant};
+pub use settle::settle;
+pub use shape::{Shape, Unknowns};
 
 /// An exact symmetric 1:1 orbit at phase resonance: the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -57,4 +74,19 @@ pub struct AfterImpact {
     pub q2: f64,
     /// Velocity of the particle over `b omega0`.
     pub dq2: f64,
+}
+
+impl Orbit {
+    /// The unknowns that shooting starts from: (phase, q1, q1', q2') after the impact on w = +1, sigma, G.
+    #[must_use]
+    pub fn unknowns(&self) -> Unknowns {
+        let AfterImpact {
+            phase,
+            q1,
+            dq1,
+            dq2,
+            ..
+        } = self.start;
+        Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
+    }
 }

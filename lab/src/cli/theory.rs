@@ -4,7 +4,7 @@ use clap::Args;
 use serde::Serialize;
 use vines::{
     scene::Dimensionless,
-    theory::{B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, SlowFlow},
+    theory::{Activation, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, SlowFlow},
 };
 
 use super::{
@@ -20,6 +20,7 @@ speed over b omega0; C is the amplitude of v over b, and sigma the detuning (Ome
 Examples:
   vines theory
   vines theory --set excitation.G=1.0
+  vines theory --sigma=-1.0                       all equilibria at that detuning
   vines theory --points 500 --json > theory.json";
 
 /// First-order theory: invariant manifold, solutions at phase resonance, backbone
@@ -33,6 +34,11 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 200, value_parser = clap::value_parser!(u32).range(2..=100_000))]
     points: u32,
 
+    /// Detuning at which to list all equilibria and the activation thresholds; without it, the thresholds at the backbone's
+    /// stable solution, or at 0
+    #[arg(long, value_name = "SIGMA", allow_negative_numbers = true)]
+    sigma: Option<f64>,
+
     /// Print JSON, with the samples of the backbone, instead of a table
     #[arg(long)]
     json: bool,
@@ -44,6 +50,10 @@ struct Report {
     scene: Dimensionless,
     manifold: Constants,
     solutions: Vec<BackbonePoint>,
+    sigma: f64,
+    activation: Activation,
+    /// At that sigma; empty unless it was given.
+    equilibria: Vec<Equilibrium>,
     backbone: Vec<BackbonePoint>,
 }
 
@@ -65,6 +75,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let points = arguments.points as usize;
     // From near the end of the left branch, where the particle stands still, to a little beyond the stable range.
     let highest = 1.2 * B_SYMMETRY_BREAKING;
+    let solutions = flow.phase_resonant(scene.g);
+    if let Some(sigma) = arguments.sigma.filter(|sigma| !sigma.is_finite()) {
+        return Err(Failure::input(format!(
+            "--sigma = {sigma} (dimensionless) is not a finite number"
+        )));
+    }
+    let stable = solutions.iter().find(|point| point.stable());
+    let sigma = arguments
+        .sigma
+        .unwrap_or_else(|| stable.map_or(0.0, |point| point.sigma));
+    let at_sigma = arguments.sigma.map(|sigma| flow.equilibria(scene.g, sigma));
     let report = Report {
         scene,
         manifold: Constants {
@@ -73,16 +94,28 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             c_min: flow.manifold.c_min(),
             b_symmetry_breaking: B_SYMMETRY_BREAKING,
         },
-        solutions: flow.phase_resonant(scene.g),
+        solutions,
+        sigma,
+        activation: flow.activation(sigma),
+        equilibria: at_sigma.unwrap_or_default(),
         backbone: flow.backbone(highest / points as f64, highest, points),
     };
     if arguments.json {
         return Ok(serde_json::to_string_pretty(&report)? + "\n");
     }
-    Ok(readable(&report))
+    Ok(readable(&report, arguments.sigma.is_some()))
 }
 
-fn readable(report: &Report) -> String {
+fn readable(report: &Report, listed: bool) -> String {
+    let equilibria = if listed {
+        format!(
+            "\nEquilibria at sigma = {}\n{}",
+            report.sigma,
+            equilibria(&report.equilibria)
+        )
+    } else {
+        String::new()
+    };
     let Constants {
         dissipation,
         b_min,
@@ -93,10 +126,56 @@ fn readable(report: &Report) -> String {
         "First-order theory\n  {}\n\n\
          Slow invariant manifold: R = {dissipation:.6}, fold at B = {b_min:.6}, C = {c_min:.6}\n\
          Symmetric impacts are stable for {b_min:.6} < B < {b_symmetry_breaking:.6}\n\n\
-         Phase resonance\n{}",
+         Phase resonance\n{}\n{}{equilibria}",
         parameters(&report.scene),
         solutions(&report.solutions),
+        thresholds(report),
     )
+}
+
+fn thresholds(report: &Report) -> String {
+    let Activation {
+        from_rest,
+        existence,
+        stable,
+    } = report.activation;
+    let stable = stable.map_or("none at any G".into(), |g| format!("G = {g:.6}"));
+    format!(
+        "Activation at sigma = {:.6}\n  impacts begin from rest    G = {from_rest:.6}\n  \
+         some 1:1 motion exists     G = {existence:.6}\n  a stable one exists        {stable}\n",
+        report.sigma
+    )
+}
+
+fn equilibria(found: &[Equilibrium]) -> String {
+    if found.is_empty() {
+        return "  none at this excitation\n".into();
+    }
+    let rows: Vec<_> = found
+        .iter()
+        .map(|one| {
+            let mut row = vec![branch(one.branch).to_string()];
+            row.extend([one.c, one.b, one.gamma.to_degrees()].map(number));
+            row.extend([one.impacts_stable, one.slow_flow_stable].map(yes_no));
+            row
+        })
+        .collect();
+    let headings = [
+        "branch",
+        "C",
+        "B",
+        "phase, degrees",
+        "impacts stable",
+        "slow flow stable",
+    ];
+    table(&headings, &rows)
+}
+
+fn branch(side: BranchSide) -> &'static str {
+    match side {
+        BranchSide::Left => "left",
+        BranchSide::Right => "right",
+    }
 }
 
 fn solutions(points: &[BackbonePoint]) -> String {
@@ -106,11 +185,7 @@ fn solutions(points: &[BackbonePoint]) -> String {
     let rows: Vec<_> = points
         .iter()
         .map(|point| {
-            let branch = match point.branch {
-                BranchSide::Left => "left",
-                BranchSide::Right => "right",
-            };
-            let mut row = vec![branch.to_string()];
+            let mut row = vec![branch(point.branch).to_string()];
             row.extend([point.sigma, point.c, point.b].map(number));
             row.extend([point.impacts_stable, point.slow_flow_stable].map(yes_no));
             row

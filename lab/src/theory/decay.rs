@@ -31,6 +31,15 @@ pub struct Decay {
     start: f64,
 }
 
+/// Nodes and weights of Gauss' rule of three points on [-1, 1].
+const GAUSS: [(f64, f64); 3] = [
+    (-0.774_596_669_241_483_4, 5.0 / 9.0),
+    (0.0, 8.0 / 9.0),
+    (0.774_596_669_241_483_4, 5.0 / 9.0),
+];
+/// Panels of that rule over a decay.
+const PANELS: u32 = 64;
+
 impl SlowFlow {
     /// The free decay from the particle speed `b`; None left of the fold, and without any dissipation.
     #[must_use]
@@ -85,6 +94,28 @@ impl Decay {
             .map(|i| self.start + (b_min - self.start) * i as f64 / steps)
             .map(|b| self.point(self.time(b), b))
             .collect()
+    }
+
+    /// Phase, rad, by which v has turned ahead of `omega0 t` when the particle speed has fallen to `b`: the integral of sigma
+    /// over tau1 (docs/theory.md, eq. 21), by Gauss' rule on panels; its integrand is smooth.
+    #[must_use]
+    pub fn turned(&self, b: f64) -> f64 {
+        let curvature = self.flow.manifold.curvature();
+        let integrand =
+            |b: f64| self.flow.free_detuning(b) * (2.0 * curvature * b - PI) / self.flow.loss(b);
+        let width = (self.start - b) / f64::from(PANELS);
+        (0..PANELS)
+            .map(|n| b + (f64::from(n) + 0.5) * width)
+            .flat_map(|middle| {
+                GAUSS.map(|(x, weight)| weight * integrand(middle + 0.5 * x * width))
+            })
+            .sum::<f64>()
+            * 0.5
+            * width
+    }
+
+    pub(super) fn flow(&self) -> &SlowFlow {
+        &self.flow
     }
 
     fn point(&self, tau1: f64, b: f64) -> DecayPoint {

@@ -44,7 +44,7 @@ impl SlowFlow {
     }
 
     /// `G C cos gamma = (4/pi) B (1 - pi B/2) - 2 sigma C^2` at an equilibrium.
-    fn spring(&self, sigma: f64, b: f64) -> f64 {
+    pub(super) fn spring(&self, sigma: f64, b: f64) -> f64 {
         2.0 * (self.free_detuning(b) - sigma) * self.manifold.c(b).powi(2)
     }
 
