@@ -4,6 +4,7 @@ mod controller;
 mod door;
 mod failure;
 mod identify;
+mod map;
 mod orbit;
 mod pack;
 mod rig;
@@ -28,6 +29,7 @@ Examples:
   vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
   vines orbit --response                       the exact frequency response, stable and unstable
   vines theory --scene scenes/dimensionless.toml --set plant.epsilon=0.0042
+  vines map                                    which regime where, over sigma and G
   vines pack --out fmus                        write LoViNes.fmu and PhaseLock.fmu
   vines rig --listen 127.0.0.1:5510            serve the plant in real time, for identify --rig udp://127.0.0.1:5510
 
@@ -46,6 +48,7 @@ enum Command {
     Identify(identify::Arguments),
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
+    Map(map::Arguments),
     Pack(pack::Arguments),
     Rig(rig::Arguments),
     Controller(controller::Arguments),
@@ -57,6 +60,7 @@ pub fn run() -> ExitCode {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
+        Command::Map(arguments) => map::run(&arguments),
         Command::Pack(arguments) => pack::run(&arguments),
         Command::Rig(arguments) => rig::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),

@@ -10,6 +10,7 @@
 pub mod experiment;
 mod files;
 pub mod identification;
+pub mod map;
 pub mod net;
 pub mod orbit;
 pub mod pack;

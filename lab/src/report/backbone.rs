@@ -3,9 +3,9 @@
 use plotters::chart::SeriesLabelPosition;
 
 use super::chart::{
-    DECAY_LABEL, EXACT, THEORY, THINNED, UNSTABLE, curve, decay_points, legend, line, locked_point,
-    plane, svg,
+    DECAY_LABEL, THINNED, caption, curve, decay_points, legend, line, locked_point, plane, svg,
 };
+use super::theme::{EXACT, THEORY, UNSTABLE};
 use crate::identification::Identification;
 use crate::orbit;
 use crate::theory::{BackbonePoint, SlowFlow};
@@ -42,8 +42,10 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
     svg(|area| {
         let mut chart = plane(
             area,
-            "Backbone: phase resonance of the centre of mass",
-            found,
+            Some((
+                "Backbone: phase resonance of the centre of mass",
+                &caption(&found.parameters, found.lock.g),
+            )),
             ((low, high), "detuning σ = (ω/ω₀ − 1)/ε"),
             ((0.0, top), "amplitude C of v, over b"),
         )?;
