@@ -7,6 +7,7 @@ mod identify;
 mod map;
 mod orbit;
 mod pack;
+mod report;
 mod rig;
 mod scene_arguments;
 mod serving;
@@ -30,6 +31,7 @@ Examples:
   vines orbit --response                       the exact frequency response, stable and unstable
   vines theory --scene scenes/dimensionless.toml --set plant.epsilon=0.0042
   vines map                                    which regime where, over sigma and G
+  vines report --out report                    all of it on one page, with pictures
   vines pack --out fmus                        write LoViNes.fmu and PhaseLock.fmu
   vines rig --listen 127.0.0.1:5510            serve the plant in real time, for identify --rig udp://127.0.0.1:5510
 
@@ -49,6 +51,7 @@ enum Command {
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Map(map::Arguments),
+    Report(report::Arguments),
     Pack(pack::Arguments),
     Rig(rig::Arguments),
     Controller(controller::Arguments),
@@ -61,6 +64,7 @@ pub fn run() -> ExitCode {
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
         Command::Pack(arguments) => pack::run(&arguments),
         Command::Rig(arguments) => rig::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),

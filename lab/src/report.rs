@@ -1,9 +1,18 @@
 //! What a person and a program get to see: files, pictures, a short table.
 
 mod backbone;
+mod backbones;
 mod chart;
+mod history;
+mod lines;
 mod manifold;
 mod map;
+mod page;
+mod period;
+mod responses;
+mod section;
+mod sections;
+mod study;
 mod table;
 mod theme;
 
@@ -17,6 +26,9 @@ use crate::files::temporary;
 use crate::identification::Identification;
 use crate::map::{Cell, Map, Point};
 
+pub use section::{Attachment, Block, Budget, Section};
+pub use sections::{Maker, SECTIONS, Subject};
+pub use study::{Progress, Report, write_report};
 pub use table::table;
 pub use theme::dark;
 
@@ -65,7 +77,7 @@ pub fn write(found: &Identification, out: &Path) -> Result<Vec<PathBuf>, ReportE
     write_files(out, &files)
 }
 
-/// Writes `map.csv`, `map.svg` and `map-dark.svg` into `out` and returns their paths, as [`write`] does.
+/// Writes `map.csv`, `map.svg` and `map-dark.svg` into `out` and returns their paths, as [`write()`] does.
 ///
 /// # Errors
 /// A folder or file that cannot be written.

@@ -3,7 +3,7 @@
 use super::grid::Plan;
 
 /// Fine cells across the picture, each way.
-const FINE: usize = 160;
+const FINE: usize = 100;
 
 /// A point of the plane.
 type Place = (f64, f64);

@@ -105,8 +105,16 @@ pub fn plane<'a, 'b>(
         .set_all_tick_mark_size(px(4))
         .x_labels(9)
         .y_labels(8)
+        .x_label_formatter(&tick)
+        .y_label_formatter(&tick)
         .draw()?;
     Ok(chart)
+}
+
+/// A number at an axis, without zeros that say nothing.
+fn tick(value: &f64) -> String {
+    let rounded = (value * 1e6).round() / 1e6;
+    format!("{}", rounded + 0.0).replace('-', "−")
 }
 
 /// A curve, dashed where it is unstable.

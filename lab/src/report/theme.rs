@@ -10,6 +10,8 @@ use crate::map::Regime;
 pub const THEORY: RGBColor = RGBColor(40, 40, 40);
 pub const UNSTABLE: RGBColor = RGBColor(150, 150, 150);
 pub const EXACT: RGBColor = RGBColor(0, 114, 178);
+/// The unstable part of what is drawn in [`EXACT`].
+pub const FAINT: RGBColor = RGBColor(120, 170, 210);
 pub const DECAY: RGBColor = RGBColor(213, 94, 0);
 pub const LOCK: RGBColor = RGBColor(0, 0, 0);
 
@@ -37,12 +39,13 @@ pub fn on_regime(regime: Regime) -> RGBColor {
 }
 
 /// Colours on white paper, and on a dark screen.
-const DARK: [(&str, &str); 8] = [
+const DARK: [(&str, &str); 9] = [
     ("#FFFFFF", "#14171A"),
     ("#000000", "#ECECEC"),
     ("#282828", "#DADADA"),
     ("#969696", "#868C93"),
     ("#0072B2", "#56B4E9"),
+    ("#78AAD2", "#3F7099"),
     ("#D55E00", "#F28C40"),
     // No impacts is like the paper in both, sticking like the ink.
     ("#F6F6F4", "#23272B"),
