@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use lovines::{Drive, Event, InvalidValue, Parameters, Plant, State};
+use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
 
 use super::regime::{Hit, Pattern, Regime, pattern};
@@ -49,17 +49,9 @@ pub fn observe(
     start: [f64; 4],
     (settle, record): (usize, usize),
 ) -> Result<Point, InvalidValue> {
-    let parameters = Parameters {
-        primary_mass: 1.0,
-        stiffness: 1.0,
-        damping: scene.epsilon * scene.lambda,
-        particle_mass: scene.epsilon,
-        half_width: 1.0,
-        restitution: scene.r,
-    };
     let omega = 1.0 + scene.epsilon * sigma;
     let drive = Drive::harmonic(scene.epsilon * scene.g, omega);
-    let mut plant = Plant::new(parameters, state(start))?;
+    let mut plant = scene.plant(start)?;
     let mut round = 0;
     loop {
         for _ in 0..settle {
@@ -82,7 +74,7 @@ pub fn observe(
         if let Some(one) = pattern(&hits) {
             return Ok(found(one.regime, Some(one), None));
         }
-        let growth = growth(&parameters, drive, &plant);
+        let growth = growth(scene, drive, &plant);
         round += 1;
         if growth < TRANSIENT && round < ROUNDS {
             continue;
@@ -114,10 +106,6 @@ fn watch(plant: &mut Plant, drive: Drive, periods: usize) -> (Vec<Hit>, usize) {
     (hits, rests)
 }
 
-fn state([q1, dq1, q2, dq2]: [f64; 4]) -> State {
-    State { q1, dq1, q2, dq2 }
-}
-
 fn numbers(plant: &Plant) -> [f64; 4] {
     let State { q1, dq1, q2, dq2 } = plant.state();
     [q1, dq1, q2, dq2]
@@ -125,7 +113,7 @@ fn numbers(plant: &Plant) -> [f64; 4] {
 
 /// Mean growth per period of the distance between the plant and a twin, which is brought near again after every period
 /// (Benettin et al., Meccanica 15, 1980). Both start anew at every passage of the base through zero.
-fn growth(parameters: &Parameters, drive: Drive, plant: &Plant) -> f64 {
+fn growth(scene: &Dimensionless, drive: Drive, plant: &Plant) -> f64 {
     let period = TAU / drive.omega;
     let mut here = numbers(plant);
     let mut apart = [DISTURBANCE / 2.0; 4];
@@ -135,9 +123,8 @@ fn growth(parameters: &Parameters, drive: Drive, plant: &Plant) -> f64 {
         let there_mirrored: [f64; 4] = std::array::from_fn(|n| here[n] - apart[n]);
         // A twin outside its cavity is put on the other side.
         let (Ok(mut one), Ok(mut other)) = (
-            Plant::new(*parameters, state(here)),
-            Plant::new(*parameters, state(there))
-                .or_else(|_| Plant::new(*parameters, state(there_mirrored))),
+            scene.plant(here),
+            scene.plant(there).or_else(|_| scene.plant(there_mirrored)),
         ) else {
             break;
         };

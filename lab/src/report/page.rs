@@ -86,10 +86,18 @@ fn rendered(block: &Block, pictures: &mut u32) -> String {
 }
 
 fn table(caption: &str, headings: &[String], rows: &[Vec<String>]) -> String {
+    // Columns of numbers are set to the right.
+    let numbers: Vec<bool> = (0..headings.len())
+        .map(|n| rows.iter().all(|row| is_number(&row[n])))
+        .collect();
     let cells = |tag: &str, cells: &[String]| -> String {
         cells
             .iter()
-            .map(|cell| format!("<{tag}>{}</{tag}>", escaped(cell)))
+            .zip(&numbers)
+            .map(|(cell, number)| {
+                let class = if *number { " class=\"number\"" } else { "" };
+                format!("<{tag}{class}>{}</{tag}>", escaped(cell))
+            })
             .collect()
     };
     let rows: String = rows
@@ -101,6 +109,10 @@ fn table(caption: &str, headings: &[String], rows: &[Vec<String>]) -> String {
         escaped(caption),
         cells("th", headings)
     )
+}
+
+fn is_number(cell: &str) -> bool {
+    cell == "–" || cell.trim_end_matches(" %").parse::<f64>().is_ok()
 }
 
 fn budget(sections: &[Section]) -> String {
