@@ -3,7 +3,9 @@
 //! `e(t) = u0 + u1 t + u2 t² + u3 t³ + E sin(phase + omega t)`, with `t` counted from now. The phase is carried
 //! instead of absolute time, so that a run of any length costs no accuracy.
 
+use crate::lane::Lane;
 use serde::{Deserialize, Serialize};
+
 /// 2π split in two: the nearest double, and what it misses.
 const TAU: (f64, f64) = (core::f64::consts::TAU, 2.449_293_598_294_706_5e-16);
 
@@ -99,26 +101,15 @@ impl Phase {
         (self.0, self.1)
     }
 
+    /// The phase of these parts.
+    pub(crate) fn of_parts(parts: (f64, f64)) -> Self {
+        Self(parts.0, parts.1)
+    }
+
     /// The phase after a turn by `angle` (reduced to one turn, and what rounding has kept out of it) and a little more.
+    #[inline]
     pub(crate) fn turned(self, angle: (f64, f64), more: f64) -> Self {
-        let (sum, missed) = two_sum(self.0, angle.0);
-        let mut missed = missed + (self.1 + angle.1 + more);
-        let mut rest = sum;
-        if sum >= TAU.0 {
-            rest -= TAU.0;
-            missed -= TAU.1;
-        }
-        let (mut rest, mut missed) = two_sum(rest, missed);
-        if rest < 0.0 || rest >= TAU.0 {
-            // At the seam the small parts have carried it across.
-            let turn = if rest < 0.0 { 1.0 } else { -1.0 };
-            let (turned, lost) = two_sum(rest, turn * TAU.0);
-            (rest, missed) = two_sum(turned, missed + lost + turn * TAU.1);
-            if !(0.0..TAU.0).contains(&rest) {
-                (rest, missed) = (0.0, 0.0);
-            }
-        }
-        Self(rest, missed)
+        Self::of_parts(turned(self.parts(), angle, more))
     }
 
     /// The phase `t` seconds later at `omega`, brought back to [0, 2π) without losing digits to the number of turns.
@@ -162,8 +153,30 @@ fn shift([u0, u1, u2, u3]: [f64; 4], t: f64) -> [f64; 4] {
     ]
 }
 
+/// [`Phase::turned`] for the parts of a phase, or of several abreast.
+#[inline(always)]
+pub(crate) fn turned<T: Lane>(phase: (T, T), angle: (T, T), more: T) -> (T, T) {
+    let n = T::splat;
+    let (sum, missed) = two_sum(phase.0, angle.0);
+    let missed = missed + (phase.1 + angle.1 + more);
+    let around = sum.below(n(TAU.0));
+    let rest = T::choose(around, sum, sum - n(TAU.0));
+    let missed = T::choose(around, missed, missed - n(TAU.1));
+    let (rest, missed) = two_sum(rest, missed);
+    // At the seam the small parts may have carried it across.
+    let under = rest.below(n(0.0));
+    let rest = T::choose(under, rest + n(TAU.0), rest);
+    let missed = T::choose(under, missed + n(TAU.1), missed);
+    let within = rest.below(n(TAU.0));
+    (
+        T::choose(within, rest, n(0.0)),
+        T::choose(within, missed, n(0.0)),
+    )
+}
+
 /// `a + b` as a rounded sum and its rounding error (Knuth).
-pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
+#[inline(always)]
+pub(crate) fn two_sum<T: Lane>(a: T, b: T) -> (T, T) {
     let sum = a + b;
     let part = sum - a;
     (sum, (a - (sum - part)) + (b - part))

@@ -1,5 +1,7 @@
 //! The rig: linear oscillator, particle and walls, advanced from event to event in closed form.
 
+#[cfg(feature = "batch")]
+pub(crate) mod abreast;
 mod advance;
 mod contact;
 mod course;

@@ -1,6 +1,7 @@
 //! Spans of time that are added and taken off by the million without losing digits to their length.
 
 use crate::base_motion::two_sum;
+use crate::lane::Lane;
 use serde::{Deserialize, Serialize};
 
 /// A time, s: the nearest number, and what it misses.
@@ -18,12 +19,20 @@ impl Span {
         self.0
     }
 
+    /// The span of these parts.
+    pub(crate) fn of_parts((seconds, missed): (f64, f64)) -> Self {
+        Self(seconds, missed)
+    }
+
+    /// Its length, s, and what that misses.
+    pub(crate) fn parts(self) -> (f64, f64) {
+        (self.0, self.1)
+    }
+
     /// Longer by `t` seconds.
     #[must_use]
     pub fn plus(self, t: f64) -> Self {
-        let (sum, missed) = two_sum(self.0, t);
-        let (sum, missed) = two_sum(sum, missed + self.1);
-        Self(sum, missed)
+        Self::of_parts(longer(self.parts(), t))
     }
 
     /// Shorter by another span.
@@ -31,6 +40,13 @@ impl Span {
     pub fn less(self, other: Self) -> Self {
         self.plus(-other.0).plus(-other.1)
     }
+}
+
+/// [`Span::plus`] for the parts of a span, or of several abreast.
+#[inline(always)]
+pub(crate) fn longer<T: Lane>(span: (T, T), t: T) -> (T, T) {
+    let (sum, missed) = two_sum(span.0, t);
+    two_sum(sum, missed + span.1)
 }
 
 #[cfg(test)]

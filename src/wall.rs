@@ -1,5 +1,6 @@
 //! The two walls of the cavity, and what happens at an impact.
 
+use crate::lane::{Lane, Lanes};
 use crate::parameters::Parameters;
 use serde::{Deserialize, Serialize};
 
@@ -35,29 +36,29 @@ impl Wall {
 
 /// Coefficients of Newton's impact law, derived once.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ImpactLaw {
-    restitution: f64,
+pub struct ImpactLaw<T = f64> {
+    restitution: T,
     /// Velocity taken from the primary mass per unit of approach: `(1 + r) m/(M + m)`.
-    primary_share: f64,
+    primary_share: T,
     /// Velocity given to the particle per unit of approach: `(1 + r) M/(M + m)`.
-    particle_share: f64,
+    particle_share: T,
     /// `m/(M + m)`.
-    particle_fraction: f64,
+    particle_fraction: T,
     /// Half the effective mass, kg.
-    half_relative_mass: f64,
+    half_relative_mass: T,
 }
 
 /// Velocities right after an impact, m/s, and what it dissipated, J.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rebound {
+pub struct Rebound<T = f64> {
     /// Velocity of the primary mass.
-    pub primary: f64,
+    pub primary: T,
     /// Velocity of the particle.
-    pub particle: f64,
+    pub particle: T,
     /// Relative velocity `w'`.
-    pub relative: f64,
+    pub relative: T,
     /// Energy dissipated.
-    pub dissipated: f64,
+    pub dissipated: T,
 }
 
 impl ImpactLaw {
@@ -73,17 +74,6 @@ impl ImpactLaw {
         }
     }
 
-    /// Newton's law: the relative velocity turns round and shrinks by `r`, momentum is conserved.
-    pub fn rebound(&self, primary: f64, particle: f64, relative: f64) -> Rebound {
-        let r = self.restitution;
-        Rebound {
-            primary: primary - self.primary_share * relative,
-            particle: particle + self.particle_share * relative,
-            relative: -r * relative,
-            dissipated: self.half_relative_mass * ((1.0 - r) * (1.0 + r)) * (relative * relative),
-        }
-    }
-
     /// Both masses go on as one: the velocity that conserves momentum, and the energy that is lost.
     pub fn join(&self, primary: f64, relative: f64) -> (f64, f64) {
         (
@@ -96,6 +86,34 @@ impl ImpactLaw {
     /// `2 u/a (1 + r + r² + ...)`, s; infinite without loss.
     pub fn chatter_duration(&self, speed: f64, pressing: f64) -> f64 {
         2.0 * speed / (pressing * (1.0 - self.restitution))
+    }
+}
+
+impl<T: Lane> ImpactLaw<T> {
+    /// Newton's law: the relative velocity turns round and shrinks by `r`, momentum is conserved.
+    #[inline(always)]
+    pub fn rebound(&self, primary: T, particle: T, relative: T) -> Rebound<T> {
+        let (r, one) = (self.restitution, T::splat(1.0));
+        Rebound {
+            primary: primary - self.primary_share * relative,
+            particle: particle + self.particle_share * relative,
+            relative: -r * relative,
+            dissipated: self.half_relative_mass * ((one - r) * (one + r)) * (relative * relative),
+        }
+    }
+}
+
+impl<const N: usize> ImpactLaw<Lanes<N>> {
+    /// Several laws abreast.
+    pub(crate) fn abreast(laws: [&ImpactLaw; N]) -> Self {
+        let all = |f: fn(&ImpactLaw) -> f64| Lanes(laws.map(f));
+        Self {
+            restitution: all(|law| law.restitution),
+            primary_share: all(|law| law.primary_share),
+            particle_share: all(|law| law.particle_share),
+            particle_fraction: all(|law| law.particle_fraction),
+            half_relative_mass: all(|law| law.half_relative_mass),
+        }
     }
 }
 

@@ -24,17 +24,31 @@ impl Plant {
         duration: f64,
         tell: impl FnMut(Event),
     ) -> Outcome {
-        if drive != self.base.drive || !self.under_way {
-            self.take(drive);
-        }
+        self.adopt(drive);
         let outcome = if self.course.strides(duration) {
             self.here = self.course.stride(&self.here, &mut self.base);
             Outcome::default()
         } else {
-            self.meet(duration, tell)
+            self.meet(self.course.lag.plus(duration), duration, tell)
         };
         self.time += duration;
         outcome
+    }
+
+    /// Goes on to the end of an advance of which so much is left.
+    #[cfg(feature = "batch")]
+    pub(crate) fn finish(&mut self, left: Span, duration: f64) -> Outcome {
+        let outcome = self.meet(left, duration, |_| {});
+        self.time += duration;
+        outcome
+    }
+
+    /// Makes `drive` the one in use.
+    #[inline]
+    pub(crate) fn adopt(&mut self, drive: Drive) {
+        if drive != self.base.drive || !self.under_way {
+            self.take(drive);
+        }
     }
 
     /// Takes over a new drive and the jump of the base that it brings.
@@ -96,9 +110,8 @@ impl Plant {
         self.course.face(&mut self.here, phase);
     }
 
-    /// A step that an event may fall into.
-    fn meet(&mut self, duration: f64, mut tell: impl FnMut(Event)) -> Outcome {
-        let until = self.course.lag.plus(duration);
+    /// A step that an event may fall into; `until` is its end as seen from the origin.
+    fn meet(&mut self, until: Span, duration: f64, mut tell: impl FnMut(Event)) -> Outcome {
         if until.seconds() < self.course.clear {
             self.course.lag = until;
             if self.course.repeats(duration) {
