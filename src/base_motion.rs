@@ -93,7 +93,15 @@ pub struct Phase(f64, f64);
 impl Phase {
     /// The phase, rad, in [0, 2π).
     pub fn radians(self) -> f64 {
-        self.0
+        let sum = self.0 + self.1;
+        // At the seam the small part may carry it across.
+        if sum < 0.0 {
+            0.0
+        } else if sum >= TAU.0 {
+            sum - TAU.0
+        } else {
+            sum
+        }
     }
 
     /// The phase and what rounding has kept out of it.
@@ -156,21 +164,14 @@ fn shift([u0, u1, u2, u3]: [f64; 4], t: f64) -> [f64; 4] {
 /// [`Phase::turned`] for the parts of a phase, or of several abreast.
 #[inline(always)]
 pub(crate) fn turned<T: Lane>(phase: (T, T), angle: (T, T), more: T) -> (T, T) {
-    let n = T::splat;
-    let (sum, missed) = two_sum(phase.0, angle.0);
-    let missed = missed + (phase.1 + angle.1 + more);
-    let around = sum.below(n(TAU.0));
-    let rest = T::choose(around, sum, sum - n(TAU.0));
-    let missed = T::choose(around, missed, missed - n(TAU.1));
-    let (rest, missed) = two_sum(rest, missed);
-    // At the seam the small parts may have carried it across.
-    let under = rest.below(n(0.0));
-    let rest = T::choose(under, rest + n(TAU.0), rest);
-    let missed = T::choose(under, missed + n(TAU.1), missed);
-    let within = rest.below(n(TAU.0));
+    let turn = angle.0 + more;
+    let (sum, missed) = two_sum(phase.0, turn);
+    let missed = missed + (phase.1 + angle.1 + (more - (turn - angle.0)));
+    // `more` is small: a turn of less than none, or of more than two, is not to be had.
+    let around = sum.below(T::splat(TAU.0));
     (
-        T::choose(within, rest, n(0.0)),
-        T::choose(within, missed, n(0.0)),
+        T::choose(around, sum, sum - T::splat(TAU.0)),
+        T::choose(around, missed, missed - T::splat(TAU.1)),
     )
 }
 

@@ -8,6 +8,7 @@
 use crate::base_motion::Drive;
 use crate::plant::abreast::Run;
 use crate::plant::{Outcome, Plant};
+use pulp::NullaryFnOnce;
 use rayon::prelude::*;
 
 /// So many plants go abreast.
@@ -84,7 +85,7 @@ fn advance(members: &mut [Member], duration: f64) {
     for row in abreast.chunks_mut(WIDTH) {
         if let Ok(row) = <&mut [&mut Member; WIDTH]>::try_from(&mut *row) {
             let plants = row.each_mut().map(|member| &mut member.plant);
-            let runs = arch.dispatch(|| Plant::cross_abreast(plants, duration));
+            let runs = arch.dispatch(Row { plants, duration });
             for (member, run) in row.iter_mut().zip(runs) {
                 member.finish(&run, duration);
             }
@@ -93,6 +94,21 @@ fn advance(members: &mut [Member], duration: f64) {
                 member.outcome = member.plant.advance(member.drive, duration);
             }
         }
+    }
+}
+
+/// Plants that go abreast: compiled anew for each set of vector instructions that a machine may have.
+struct Row<'a> {
+    plants: [&'a mut Plant; WIDTH],
+    duration: f64,
+}
+
+impl NullaryFnOnce for Row<'_> {
+    type Output = [Run; WIDTH];
+
+    #[inline(always)]
+    fn call(self) -> [Run; WIDTH] {
+        Plant::cross_abreast(self.plants, self.duration)
     }
 }
 

@@ -165,9 +165,7 @@ impl<const N: usize> Lane for Lanes<N> {
 
     #[inline(always)]
     fn choose(mask: [u64; N], a: Self, b: Self) -> Self {
-        Self(from_fn(|n| {
-            f64::from_bits((a.0[n].to_bits() & mask[n]) | (b.0[n].to_bits() & !mask[n]))
-        }))
+        Self(from_fn(|n| if mask[n] != 0 { a.0[n] } else { b.0[n] }))
     }
 }
 

@@ -4,7 +4,7 @@ use crate::base_motion::two_sum;
 use crate::lane::Lane;
 use serde::{Deserialize, Serialize};
 
-/// A time, s: the nearest number, and what it misses.
+/// A time, s: a number, and a small one that is to be added.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Span(f64, f64);
 
@@ -15,8 +15,9 @@ impl Span {
     }
 
     /// Its length, s.
+    #[inline]
     pub fn seconds(self) -> f64 {
-        self.0
+        self.0 + self.1
     }
 
     /// The span of these parts.
@@ -24,7 +25,7 @@ impl Span {
         Self(seconds, missed)
     }
 
-    /// Its length, s, and what that misses.
+    /// The number and the small one.
     pub(crate) fn parts(self) -> (f64, f64) {
         (self.0, self.1)
     }
@@ -37,8 +38,9 @@ impl Span {
 
     /// Shorter by another span.
     #[must_use]
+    #[inline]
     pub fn less(self, other: Self) -> Self {
-        self.plus(-other.0).plus(-other.1)
+        Self::of_parts(shorter(self.parts(), other.parts()))
     }
 }
 
@@ -46,7 +48,15 @@ impl Span {
 #[inline(always)]
 pub(crate) fn longer<T: Lane>(span: (T, T), t: T) -> (T, T) {
     let (sum, missed) = two_sum(span.0, t);
-    two_sum(sum, missed + span.1)
+    (sum, span.1 + missed)
+}
+
+/// A span shorter by a time and a small part of it.
+#[inline(always)]
+pub(crate) fn shorter<T: Lane>(span: (T, T), (t, more): (T, T)) -> (T, T) {
+    let whole = t + more;
+    let (left, missed) = longer(span, -whole);
+    (left, missed - (more - (whole - t)))
 }
 
 #[cfg(test)]

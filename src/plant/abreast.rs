@@ -7,7 +7,7 @@ use super::{Contact, MOST_IMPACTS, Plant};
 use crate::base_motion::{Phase, turned};
 use crate::crossing::{Anchor, Free, Origin, Wave};
 use crate::lane::{Lane, Lanes};
-use crate::span::{Span, longer};
+use crate::span::{Span, shorter};
 use crate::wall::ImpactLaw;
 
 /// How far one plant has come abreast of the others.
@@ -97,14 +97,15 @@ impl<const N: usize> Row<N> {
         let ahead = Wave::ahead(&start);
         let distance = self.wave.half_width - ahead * start.w;
         // The primary mass is slower than the particle: they close in at less than twice its speed.
-        let late = (Lanes::splat(2.0) * start.particle.abs() * self.left.0).below(distance);
+        let late = (Lanes::splat(2.0) * start.particle.abs() * (self.left.0 + self.left.1))
+            .below(distance);
         let (arrival, near) = self.wave.arrival(&start, &free, &self.anchor);
-        let (at, at_missed) = longer((self.anchor.t, zero), arrival.beyond);
-        let left = longer(longer(self.left, -at), -at_missed);
-        let beyond_end = self.left.0.below(at);
+        let seconds_left = self.left.0 + self.left.1;
+        let left = shorter(self.left, (self.anchor.t, arrival.beyond));
+        let beyond_end = seconds_left.below(self.anchor.t + arrival.beyond);
         let on_the_way = Lanes::both(
             Lanes::both(zero.below(self.going), crosses),
-            Lanes::both(zero.below(self.left.0), Lanes::<N>::not(late)),
+            Lanes::both(zero.below(seconds_left), Lanes::<N>::not(late)),
         );
         let lands = Lanes::both(on_the_way, Lanes::both(near, Lanes::<N>::not(beyond_end)));
 
@@ -161,7 +162,8 @@ impl<const N: usize> Row<N> {
     /// Works `e^{i phase}` of a lane out anew.
     #[inline(never)]
     fn face(&mut self, lane: usize) {
-        let (sin, cos) = libm::sincos(self.phase.0.0[lane]);
+        let (sin, cos) =
+            libm::sincos(Phase::of_parts((self.phase.0.0[lane], self.phase.1.0[lane])).radians());
         self.state.turn.0.0[lane] = cos;
         self.state.turn.1.0[lane] = sin;
         self.turns.0[lane] = 0.0;

@@ -77,7 +77,7 @@ impl Plant {
                     }
                     guesses = 0;
                     let landing = Landing {
-                        at: Span::of(anchor.t).plus(arrival.beyond),
+                        at: Span::of_parts((anchor.t, arrival.beyond)),
                         phase: phase.turned(anchor.angle, wave.omega * arrival.beyond),
                         arrival,
                         wall: if ahead > 0.0 { Wall::Plus } else { Wall::Minus },
