@@ -12,9 +12,9 @@ use pulp::NullaryFnOnce;
 use rayon::prelude::*;
 
 /// So many plants go abreast.
-pub const WIDTH: usize = 8;
+pub const WIDTH: usize = 16;
 /// Plants that one core takes at a time.
-const PORTION: usize = 8 * WIDTH;
+const PORTION: usize = 4 * WIDTH;
 
 /// Many plants, each with a drive of its own.
 #[derive(Clone, Debug, Default)]
