@@ -43,6 +43,8 @@ const NEAR: f64 = 1e-4;
 /// Steps below [`TINY`] times the fastest rate's time that are tolerated in a row.
 const MOST_TINY_STEPS: usize = 20;
 const TINY: f64 = 1e-9;
+/// So many windows are tried for a bound, each at most three times shorter than the last.
+const MOST_WINDOWS: usize = 40;
 
 /// The first closure of any of `N` gaps in `[from, limit]`.
 ///
@@ -110,20 +112,15 @@ impl Gap {
     /// The longest `h <= window` found for which the gap is certainly open on `[0, h)`; `jerk(h)` bounds the third
     /// derivative over `[0, h]`.
     pub fn certainly_open(&self, window: f64, jerk: impl Fn(f64) -> f64) -> f64 {
-        let bound = jerk(window);
-        let mut safe = self.open_within(window, bound);
-        if safe >= window {
-            return window;
-        }
-        if self.acceleration < 0.0 {
-            // As long as the gap certainly opens at half the rate it opens at now.
-            let closer = window.min(-1.5 * self.acceleration / bound);
-            safe = safe.max(self.open_within(closer, bound));
-        }
-        // A shorter window has a smaller remainder: two more looks, just past what is known to be safe.
-        for _ in 0..2 {
-            let closer = window.min(1.5 * safe);
-            safe = safe.max(self.open_within(closer, jerk(closer)));
+        let mut safe = 0.0f64;
+        let mut window = window;
+        // A shorter window has a smaller remainder: down to the one that the answer itself asks for.
+        for _ in 0..MOST_WINDOWS {
+            safe = safe.max(self.open_within(window, jerk(window)));
+            if safe * 1.5 >= window {
+                break;
+            }
+            window = (safe * 1.5).max(window / 3.0);
         }
         safe
     }

@@ -6,6 +6,7 @@ mod advance;
 mod contact;
 mod course;
 mod cross;
+mod hop;
 
 use crate::base_motion::{BaseMotion, Drive};
 use crate::crossing::Origin;

@@ -187,7 +187,10 @@ impl Plant {
                 break;
             }
             if left.seconds() > 0.0 {
-                (left, dw) = self.search(dw, left, moment, &mut tell);
+                (left, dw) = match self.hop(dw, left, moment, &mut tell) {
+                    Some(landed) => landed,
+                    None => self.search(dw, left, moment, &mut tell),
+                };
             }
         }
         outcome.cut_short = left.seconds() > 0.0;
@@ -195,7 +198,7 @@ impl Plant {
     }
 
     /// The state has been reached by the general way: nothing is known of what lies ahead.
-    fn afresh(&mut self) {
+    pub(super) fn afresh(&mut self) {
         self.course.leave();
         self.course.face(&mut self.here, self.base.phase);
     }
