@@ -82,11 +82,6 @@ fn too_long(step: f64, rate: f64) -> Refusal {
     ))
 }
 
-/// The rate that bounds what a second of simulation costs.
-fn fastest(p: &Parameters) -> f64 {
-    (p.natural_frequency()).max(p.damping / p.primary_mass)
-}
-
 #[derive(Clone, Copy, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
 enum Progress {
     /// It is not yet made of the values set.
@@ -217,7 +212,7 @@ impl LoViNes {
             }
         }
         self.parameters = parameters;
-        self.fastest = fastest(&parameters);
+        self.fastest = parameters.fastest_rate();
         Ok(())
     }
 }
@@ -287,7 +282,7 @@ impl Component for LoViNes {
             }
         }
         self.epsilon = self.parameters.mass_ratio();
-        self.fastest = fastest(&self.parameters);
+        self.fastest = self.parameters.fastest_rate();
         self.progress = Progress::Initialised;
         self.inputs_set = false;
         self.base = unknown();
