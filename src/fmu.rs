@@ -155,7 +155,11 @@ impl LoViNes {
 
     #[inline(never)]
     fn look_at_base(&self, plant: &Plant) -> f64 {
-        let base = self.base_motion(plant).displacement();
+        let base = if self.inputs_set {
+            self.base_motion(plant).displacement()
+        } else {
+            plant.base_displacement()
+        };
         self.base.set(base);
         base
     }
@@ -165,7 +169,7 @@ impl LoViNes {
         if self.inputs_set {
             plant.base().with(self.drive)
         } else {
-            *plant.base()
+            plant.base()
         }
     }
 
@@ -308,6 +312,8 @@ impl Component for LoViNes {
         } else {
             plant.advance(self.drive, step)
         };
+        // Masters read outputs after every step.
+        plant.settle();
         // The signal stays where its polynomial has led.
         self.drive.signal = [plant.base().drive.signal[0], 0.0, 0.0, 0.0];
         self.progress = Progress::UnderWay;
