@@ -52,9 +52,9 @@ enum Rig {
     Equations(Hybrid),
 }
 
-/// The longest step that is taken, in radians of the fastest rate: sixteen million periods. Even where nothing hits, the
+/// The longest step that is taken, in radians of the fastest rate: more than a million periods. Even where nothing hits, the
 /// search for the first contact looks at the motion once in every two radians or so, and a call is to end.
-const LONGEST_STEP: f64 = 1e8;
+const LONGEST_STEP: f64 = 1e7;
 
 /// Why a step could not be finished.
 #[cold]
