@@ -113,7 +113,10 @@ impl Gap {
     /// derivative over `[0, h]`.
     pub fn certainly_open(&self, window: f64, jerk: impl Fn(f64) -> f64) -> f64 {
         let mut safe = 0.0f64;
-        let mut window = window;
+        let limit = window;
+        // No bound reaches beyond where the gap would close with no jerk at all.
+        let mut window = first_root(self.gap, self.closing, self.acceleration)
+            .map_or(limit, |root| limit.min(1.5 * root));
         // A shorter window has a smaller remainder: down to the one that the answer itself asks for.
         for _ in 0..MOST_WINDOWS {
             safe = safe.max(self.open_within(window, jerk(window)));

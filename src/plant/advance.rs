@@ -7,6 +7,10 @@ use crate::crossing::Origin;
 use crate::flight::Flight;
 use crate::span::Span;
 
+/// An advance ends before its time when the particle has come to rest so often: values so absurd that rounding tears it
+/// off its wall again and again are to end, too.
+const MOST_PARTINGS: u64 = 2_000_000;
+
 impl Plant {
     /// Advances by `duration` seconds (0 or above) under `drive`, whose values are finite.
     ///
@@ -141,8 +145,10 @@ impl Plant {
             dw = self.touch(wall, dw, moment(left), &mut tell);
         }
         let last_impact = self.tally.impacts + MOST_IMPACTS;
-        while left.seconds() > 0.0 && self.tally.impacts < last_impact {
+        let mut partings = 0;
+        while left.seconds() > 0.0 && self.tally.impacts < last_impact && partings < MOST_PARTINGS {
             if let Contact::Stuck(wall) = self.contact {
+                partings += 1;
                 let (t, released) = self.stay(wall, left.seconds());
                 left = left.plus(-t);
                 self.afresh();
