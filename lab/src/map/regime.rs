@@ -77,7 +77,7 @@ pub(super) struct Pattern {
 }
 
 /// Longest pattern looked for, impacts.
-const LONGEST: usize = 32;
+const LONGEST: usize = 96;
 /// Two impacts are the same within this, rad and relative velocity: far above what is left of a transient.
 const SAME: f64 = 2e-3;
 /// Intervals differ from half a period by less than this, rad, in a symmetric motion.

@@ -80,7 +80,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         "regime map",
         "one start per cell".into(),
         "Where several regimes are stable the start decides. Cells at a border may still be in a transient, \
-         and what repeats only after more than 32 impacts counts as not repeating.",
+         and chaos that ends only after thousands of periods is taken for lasting.",
     );
     section.attach("regimes.csv", csv(map.cells.iter().map(map_row))?);
     Ok(section)
