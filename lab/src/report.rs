@@ -125,6 +125,7 @@ struct MapRow {
     impacts_per_period: f64,
     impacts: usize,
     periods: u32,
+    synchrony: f64,
     growth: Option<f64>,
     theory_stable: bool,
 }
@@ -135,6 +136,7 @@ fn map_row(cell: &Cell) -> MapRow {
         impacts_per_period,
         impacts,
         periods,
+        synchrony,
         growth,
     } = cell.point;
     MapRow {
@@ -145,6 +147,7 @@ fn map_row(cell: &Cell) -> MapRow {
         impacts_per_period,
         impacts,
         periods,
+        synchrony,
         growth,
         theory_stable: cell.theory_stable,
     }

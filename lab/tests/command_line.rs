@@ -175,11 +175,9 @@ fn a_map_is_written_as_table_and_pictures() {
     );
     let rows = std::fs::read_to_string(folder.path().join("map.csv")).unwrap();
     assert_eq!(rows.lines().count(), 1 + 12);
-    assert!(
-        rows.starts_with(
-            "sigma,G,r,regime,impacts_per_period,impacts,periods,growth,theory_stable"
-        )
-    );
+    assert!(rows.starts_with(
+        "sigma,G,r,regime,impacts_per_period,impacts,periods,synchrony,growth,theory_stable"
+    ));
 }
 
 #[test]
