@@ -98,6 +98,9 @@ pub struct Config {
     /// rig that is handed `omega` from the first sample on keeps step by itself and has none; held samples of `drive` are
     /// late by half a sample.
     pub delay: f64,
+    /// By how much a drive amplitude of 1 m makes the response amplitude grow in 1 s at phase resonance, 1/s: half the
+    /// natural frequency (rad/s) for an oscillator shaken through its base. Only [`PhaseLock::hold_response`] uses it.
+    pub response_gain: f64,
     /// When the loop counts as locked.
     pub lock: LockCriterion,
     /// Reading of the response sensor above which the drive is taken away, m; 0 for none.
@@ -130,6 +133,7 @@ impl Config {
             bandwidth: 0.1 * omega,
             damping_rate: 0.0,
             delay: 0.0,
+            response_gain: 0.5 * omega,
             lock: LockCriterion::default(),
             response_max: 0.0,
             acquire_timeout: 0.0,
@@ -191,6 +195,7 @@ impl Config {
         Quantity::new("bandwidth", self.bandwidth, "rad/s").positive()?;
         Quantity::new("damping_rate", self.damping_rate, "rad/s").not_negative()?;
         Quantity::new("delay", self.delay, "s").not_negative()?;
+        Quantity::new("response_gain", self.response_gain, "1/s").positive()?;
         if let Detector::Adaptive { harmonics, .. } = self.detector {
             Quantity::new("harmonics", harmonics.into(), "")
                 .check((1..=MAX_HARMONICS).contains(&harmonics.into()), "1 to 8")?;

@@ -5,14 +5,18 @@ mod sense;
 use crate::config::Config;
 use crate::detector::{Detector, Estimate};
 use crate::drive::{Drive, Level};
-use crate::error::ConfigError;
+use crate::error::{ConfigError, Quantity};
 use crate::gains::Gains;
 use crate::loop_filter::{Frequency, LoopFilter};
 use crate::oscillator::Oscillator;
+use crate::response_loop::{Hold, Move, ResponseLoop};
 use crate::signals::{Input, Output};
 use crate::stationarity::{Dwell, Reading, Stationarity};
 use crate::supervisor::{Fault, Phase, Signs};
 use sense::Sense;
+
+/// Phase error, rad, up to which more drive reliably means more response.
+const PHASE_RANGE: f64 = core::f64::consts::FRAC_PI_3;
 
 /// A checked configuration and its coefficients; immutable but for [`PhaseLock::retune`].
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,6 +26,7 @@ pub struct PhaseLock {
     detector: Detector,
     filter: LoopFilter,
     drive: Drive,
+    response_loop: ResponseLoop,
     stationarity: Stationarity,
 }
 
@@ -36,6 +41,8 @@ pub struct State {
     connected: bool,
     frequency: Frequency,
     level: Level,
+    /// Where the response amplitude is held rather than the drive's.
+    hold: Option<Hold>,
     dwell: Dwell,
     phase: Phase,
     fault: Option<Fault>,
@@ -58,10 +65,11 @@ impl PhaseLock {
                 f64::INFINITY
             }
         };
+        let gains = Gains::from_bandwidth(config.bandwidth, config.damping_rate);
         Self {
             detector: Detector::new(config.detector, config.bandwidth, config.sample_time),
             filter: LoopFilter {
-                gains: Gains::from_bandwidth(config.bandwidth, config.damping_rate),
+                gains,
                 omega_min: config.omega_min,
                 omega_max: config.omega_max,
                 max_change: if config.omega_rate > 0.0 {
@@ -77,6 +85,13 @@ impl PhaseLock {
                 release_step: per_sample(config.amplitude, config.release_time),
                 control_step: -libm::expm1(-config.base_bandwidth * config.sample_time),
             },
+            response_loop: ResponseLoop::new(
+                gains,
+                config.response_gain,
+                config.bandwidth,
+                config.amplitude_limit(),
+                config.sample_time,
+            ),
             stationarity: Stationarity {
                 phase_tolerance: config.lock.phase_tolerance,
                 unlock_tolerance: config.lock.unlock_tolerance,
@@ -110,6 +125,7 @@ impl PhaseLock {
             connected: false,
             frequency: Frequency::at(self.config.omega_start),
             level: Level::default(),
+            hold: None,
             dwell: Dwell::default(),
             phase: Phase::Idle,
             fault: None,
@@ -130,6 +146,7 @@ impl PhaseLock {
             drive: 0.0,
             phase_error: 0.0,
             response_amplitude: 0.0,
+            response_target: 0.0,
             reference_amplitude: 0.0,
             coherence: 0.0,
             frequency: omega,
@@ -156,6 +173,32 @@ impl PhaseLock {
         // A ramp keeps its rate: down to a small amplitude, or to none, it would otherwise take for ever.
         self.drive.ramp_step = self.drive.ramp_step.max(before.ramp_step);
         self.drive.release_step = self.drive.release_step.max(before.release_step);
+        Ok(())
+    }
+
+    /// Holds the amplitude of the response from now on and moves it as stated; the drive does what it must, within its limits.
+    /// The first move sets out from the amplitude that the response has. Taking `active` away, or a fault, ends it.
+    ///
+    /// # Errors
+    /// A move that makes no sense, a drive without a limit (`amplitude_max`), or a loop that is not closed; then nothing
+    /// is changed.
+    pub fn hold_response(&self, state: &mut State, to: Move) -> Result<(), ConfigError> {
+        Quantity::new("response", to.response, "m").positive()?;
+        Quantity::new("duration", to.duration, "s").not_negative()?;
+        Quantity::new("amplitude", to.amplitude, "m").check(true, "a finite number")?;
+        Quantity::new("omega", to.omega, "rad/s").check(true, "a finite number")?;
+        Quantity::new("amplitude_max", self.config.amplitude_max, "m").check(
+            self.config.amplitude_max > 0.0,
+            "above 0 where the response is to be held: the drive needs a limit",
+        )?;
+        Quantity::new("state", state.phase as u8 as f64, "").check(
+            state.phase.is_closed(),
+            "2 (acquiring) or 3 (locked): the response can be held only in a closed loop",
+        )?;
+        let (read, drive) = (state.response.amplitude(), state.level.amplitude);
+        let hold = state.hold.get_or_insert(Hold::at(read, drive));
+        hold.set_out(to, self.response_loop.sample_time());
+        state.dwell = Dwell::default();
         Ok(())
     }
 
@@ -217,6 +260,9 @@ impl PhaseLock {
             ..
         } = self.config;
         state.ready = false;
+        if !state.phase.is_closed() {
+            state.hold = None;
+        }
         match state.phase {
             Phase::Idle => {
                 filter.go_to(frequency, omega_start);
@@ -232,10 +278,19 @@ impl PhaseLock {
                 } else {
                     filter.hold(frequency);
                 }
-                if sense.qualified && sense.measured {
-                    drive.control(level, amplitude, sense.reference_amplitude);
+                if let Some(hold) = &mut state.hold {
+                    let read = state.response.amplitude();
+                    let near = sense.qualified && sense.error.abs() < PHASE_RANGE;
+                    let (driven, shift) = self.response_loop.follow(hold, near.then_some(read));
+                    level.amplitude = driven;
+                    filter.shift(frequency, shift);
+                    state.ready = hold.arrived();
+                } else {
+                    if sense.qualified && sense.measured {
+                        drive.control(level, amplitude, sense.reference_amplitude);
+                    }
+                    state.ready = drive.ramp(level, amplitude);
                 }
-                state.ready = drive.ramp(level, amplitude);
             }
             Phase::LockLost | Phase::Tripped => {
                 filter.hold(frequency);
@@ -281,6 +336,7 @@ impl PhaseLock {
             drive,
             phase_error: sense.error,
             response_amplitude,
+            response_target: state.hold.map_or(0.0, |hold| hold.wanted()),
             reference_amplitude: sense.reference_amplitude,
             coherence: state.response.coherence(),
             // The mean of values at a limit may round to beyond it.

@@ -50,6 +50,12 @@ impl LoopFilter {
         }
     }
 
+    /// Shifts the frequency by `shift`, rad/s, with the loop as it is.
+    pub fn shift(&self, frequency: &mut Frequency, shift: f64) {
+        let integral = frequency.integral + shift;
+        frequency.integral = integral.clamp(self.omega_min, self.omega_max);
+    }
+
     /// Opens the loop for one sample and moves towards `omega`, rad/s.
     pub fn go_to(&self, frequency: &mut Frequency, omega: f64) {
         *frequency = Frequency::at(self.limit(frequency.omega, omega));

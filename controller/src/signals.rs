@@ -30,6 +30,8 @@ pub struct Output {
     pub phase_error: f64,
     /// Amplitude of the response's fundamental, m.
     pub response_amplitude: f64,
+    /// Response amplitude that is held now, m; 0 where the drive amplitude is what is held.
+    pub response_target: f64,
     /// Amplitude of the reference's fundamental, m: measured, or the own drive's.
     pub reference_amplitude: f64,
     /// Power of the response's fundamental relative to itself and what the detector leaves unexplained, 0 to 1.

@@ -2,7 +2,7 @@
 
 mod rig;
 
-use phase_lock::{Config, Detector, Phase};
+use phase_lock::{Config, Detector, Move, Phase};
 use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, ZETA, config};
 
 fn relative(a: f64, b: f64) -> f64 {
@@ -246,4 +246,61 @@ fn a_ramp_goes_down_to_nothing_at_the_rate_it_came_up() {
     let samples = (1.05 / bench.controller.config().sample_time) as usize;
     let output = (0..samples).map(|_| bench.sample()).last().unwrap();
     assert_eq!(output.amplitude, 0.0);
+}
+
+#[test]
+fn the_response_is_held_at_an_amplitude_and_moved_to_another() {
+    let mut bench = Bench::new(Config {
+        amplitude_max: 4.0 * AMPLITUDE,
+        damping_rate: ZETA * OMEGA_0,
+        ..config()
+    });
+    bench.run_to_lock(2000).expect("a lock");
+    let before = AMPLITUDE / (2.0 * ZETA);
+    for (share, drive) in [(0.8, -0.2 * AMPLITUDE), (1.3, 0.0)] {
+        let to = Move {
+            response: share * before,
+            duration: 0.5,
+            amplitude: drive,
+            omega: 0.0,
+        };
+        bench
+            .controller
+            .hold_response(&mut bench.state, to)
+            .expect("a closed loop");
+        // Twenty periods, where the structure forgets by half.
+        let output = bench.run(30);
+        println!("{share}: {:.5}", output.response_amplitude / before);
+        assert!(relative(output.response_amplitude, share * before) < 0.02);
+        assert!(output.locked && output.response_target == share * before);
+        let output = bench.run(200);
+        assert!(relative(output.response_amplitude, share * before) < 1e-5);
+        assert!(relative(output.amplitude, share * AMPLITUDE) < 1e-5);
+        assert!(output.settled);
+    }
+    // Taking the drive away ends it.
+    bench.active = false;
+    assert_eq!(bench.sample().response_target, 0.0);
+}
+
+#[test]
+fn the_response_cannot_be_held_without_a_limit_of_the_drive_or_in_an_open_loop() {
+    let to = Move {
+        response: 0.01,
+        ..Move::default()
+    };
+    let mut bench = Bench::new(config());
+    bench.run(10);
+    let refusal = |bench: &mut Bench, to| {
+        let refused = bench.controller.hold_response(&mut bench.state, to);
+        refused.expect_err("must be refused").to_string()
+    };
+    assert!(refusal(&mut bench, to).starts_with("amplitude_max = 0 m is refused"));
+    let mut bench = Bench::new(Config {
+        amplitude_max: 1.0,
+        ..config()
+    });
+    assert!(refusal(&mut bench, to).starts_with("state = 0 is refused"));
+    bench.run(10);
+    assert!(refusal(&mut bench, Move::default()).starts_with("response = 0 m"));
 }

@@ -1,5 +1,6 @@
 //! The command line: one file per command.
 
+mod backbone;
 mod controller;
 mod door;
 mod failure;
@@ -26,6 +27,7 @@ use failure::Failure;
 const EXAMPLES: &str = "\
 Examples:
   vines identify                               the whole experiment on the default scene, results in out/
+  vines backbone                               the backbone level by level, with the loop closed
   vines orbit                                  exact orbits of the default scene
   vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
   vines orbit --response                       the exact frequency response, stable and unstable
@@ -48,6 +50,7 @@ struct Cli {
 #[derive(Debug, Subcommand)]
 enum Command {
     Identify(identify::Arguments),
+    Backbone(backbone::Arguments),
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Map(map::Arguments),
@@ -61,6 +64,7 @@ enum Command {
 pub fn run() -> ExitCode {
     let output = match Cli::parse().command {
         Command::Identify(arguments) => identify::run(&arguments),
+        Command::Backbone(arguments) => backbone::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),

@@ -4,6 +4,7 @@ mod decay;
 mod fit;
 mod lock;
 mod regime;
+mod response;
 
 use serde::Serialize;
 use thiserror::Error;
@@ -15,7 +16,9 @@ use crate::theory::{BackbonePoint, SlowFlow};
 
 pub use decay::DecayPoint;
 pub use lock::Lock;
+pub(crate) use regime::classify;
 pub use regime::{Impact, Regime, impacts};
+pub use response::regime_by_response;
 
 /// Amplitudes above which the decay is compared with theory, C.
 ///

@@ -7,6 +7,7 @@
 
 #![forbid(unsafe_code)]
 
+pub mod backbone;
 pub mod experiment;
 mod files;
 pub mod identification;

@@ -2,6 +2,7 @@
 //! drive. An experiment knows these two traits and nothing else, so that an FMU, a network peer or hardware can stand on
 //! either side.
 
+mod chain;
 mod error;
 mod fmu;
 mod fmu_controller;
@@ -9,6 +10,8 @@ mod fmu_rig;
 mod phase_lock;
 mod simulated;
 
+pub use ::phase_lock::Move;
+pub use chain::Chain;
 pub use error::{ControllerError, RigError};
 pub use fmu::{FmuError, Kind};
 pub use fmu_controller::FmuController;
@@ -65,6 +68,14 @@ pub trait Rig {
     /// As [`Rig::sense`].
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError>;
 
+    /// Holds the base at `displacement` (m) for one sample period of `step` seconds.
+    ///
+    /// # Errors
+    /// As [`Rig::sense`], and a rig whose base follows its own oscillator only.
+    fn hold(&mut self, _displacement: f64, _step: f64) -> Result<(), RigError> {
+        Err(RigError::NoHold)
+    }
+
     /// What happens inside, where the rig is a simulation.
     ///
     /// # Errors
@@ -92,4 +103,12 @@ pub trait Controller {
     /// # Errors
     /// The controller's own: a refused call, a lost connection.
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError>;
+
+    /// Holds the amplitude of the response from now on, and moves it as stated.
+    ///
+    /// # Errors
+    /// A controller that cannot do that, or not now.
+    fn hold_response(&mut self, _to: Move) -> Result<(), ControllerError> {
+        Err(ControllerError::NoResponseLoop)
+    }
 }

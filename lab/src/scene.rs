@@ -1,5 +1,7 @@
 //! Scenes: what is on the bench and what is done to it, read from TOML.
 
+mod backbone;
+mod chain;
 mod controller;
 mod dimensionless;
 mod error;
@@ -15,6 +17,8 @@ use std::path::Path;
 
 use serde::Serialize;
 
+pub use backbone::{Backbone, Feed};
+pub use chain::{Chain, RatioOf};
 pub use controller::Controller;
 pub use dimensionless::Dimensionless;
 pub use error::SceneError;
@@ -39,6 +43,10 @@ pub struct Scene {
     pub controller: Controller,
     /// How long to drive and to record, in periods.
     pub record: Record,
+    /// How the backbone is tracked, in units of b and in periods.
+    pub backbone: Backbone,
+    /// What lies between rig and controller.
+    pub chain: Chain,
 }
 
 impl Scene {

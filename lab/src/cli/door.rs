@@ -5,7 +5,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::Args;
 use vines::{
     net::{NetController, NetRig, Reach, resolve},
-    rig::{BuiltIn, Controller, FmuController, FmuRig, Rig, Simulated},
+    rig::{BuiltIn, Chain, Controller, FmuController, FmuRig, Rig, Simulated},
     scene::Scene,
 };
 
@@ -61,6 +61,11 @@ impl Door {
                 pace = rig.pace();
                 Box::new(rig)
             }
+        };
+        let rig = if scene.chain.is_on() {
+            Box::new(Chain::new(rig, scene))
+        } else {
+            rig
         };
         Ok(OpenRig { rig, pace })
     }

@@ -30,6 +30,9 @@ pub enum Regime {
     /// Anything else.
     #[serde(rename = "other")]
     Other,
+    /// Steady and off the linear mode, with its symmetry lost in noise: what a response alone can leave open.
+    #[serde(rename = "steady, symmetry unresolved")]
+    Unresolved,
     /// The rig does not tell its impacts.
     #[serde(rename = "unknown")]
     Unknown,
@@ -42,6 +45,7 @@ impl Display for Regime {
             Regime::Symmetric => "symmetric 1:1",
             Regime::Asymmetric => "asymmetric 1:1",
             Regime::Other => "irregular",
+            Regime::Unresolved => "steady and nonlinear (noise hides its symmetry)",
             Regime::Unknown => "unknown (the rig does not tell its impacts)",
         })
     }
@@ -67,7 +71,7 @@ pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
 }
 
 /// Impacts per period of `omega` (rad/s) over the samples, and the regime they make.
-pub(super) fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64, Regime) {
+pub(crate) fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64, Regime) {
     let mut witnesses = samples.iter().filter_map(|sample| sample.witness);
     let (Some(first), Some(last)) = (witnesses.next(), witnesses.next_back()) else {
         return (f64::NAN, Regime::Unknown);

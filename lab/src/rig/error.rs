@@ -1,5 +1,6 @@
 //! Why one side of the bench cannot go on.
 
+use phase_lock::ConfigError;
 use thiserror::Error;
 
 use super::FmuError;
@@ -14,6 +15,11 @@ pub enum RigError {
     /// The rig is at a network address, and the link failed.
     #[error("the rig: {0}")]
     Link(#[from] LinkError),
+    /// The rig cannot be driven by held samples.
+    #[error(
+        "the rig takes frequency and amplitude only, not samples of the base displacement as chain.hold asks"
+    )]
+    NoHold,
 }
 
 /// Why a controller cannot go on.
@@ -25,4 +31,10 @@ pub enum ControllerError {
     /// The controller is at a network address, and the link failed.
     #[error("the controller: {0}")]
     Link(#[from] LinkError),
+    /// The controller holds the drive only.
+    #[error("the controller cannot hold the amplitude of the response; the built-in one can")]
+    NoResponseLoop,
+    /// The controller refused a value.
+    #[error("the controller: {0}")]
+    Refused(#[from] ConfigError),
 }

@@ -10,12 +10,14 @@ use crate::scene::Scene;
 
 /// A plant FMU, stepped sample by sample.
 ///
-/// It needs the inputs `omega` and `E` and the output `v`. Where it has `base`, that is the reference sensor; where it has
+/// It needs the inputs `omega` and `E` and the output `v`; with the input `e` it can be driven by held samples, too. Where it has `base`, that is the reference sensor; where it has
 /// `impacts`, `impact_time`, `impact_velocity` and `der(q2)`, it tells its impacts. The parameters `M`, `k`, `c`, `m`, `b`, `r`
 /// and the start `q1`, `der(q1)`, `q2`, `der(q2)` are those of the scene, as far as the FMU has them.
 pub struct FmuRig {
     fmu: Fmu,
     inputs: [Reference; 2],
+    /// `e`, for held samples of the base displacement.
+    held: Option<Reference>,
     response: Reference,
     reference: Option<Reference>,
     inside: Option<Inside>,
@@ -58,6 +60,7 @@ impl FmuRig {
         fmu.start(&start_values(scene).map(|(name, value)| (name, Value::Real(value))))?;
         Ok(Self {
             inputs,
+            held: fmu.find(Kind::Real, "e"),
             response,
             reference: fmu.find(Kind::Real, "base"),
             inside: Inside::of(&fmu),
@@ -100,6 +103,15 @@ impl Rig for FmuRig {
         let references = self.inputs;
         self.fmu.ask("take a drive", |i| {
             i.set_real(&references, &[drive.omega, drive.amplitude])
+        })?;
+        Ok(self.fmu.step(step)?)
+    }
+
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        let held = self.held.ok_or(RigError::NoHold)?;
+        let [_, amplitude] = self.inputs;
+        self.fmu.ask("take a sample of the base", |i| {
+            i.set_real(&[held, amplitude], &[displacement, 0.0])
         })?;
         Ok(self.fmu.step(step)?)
     }

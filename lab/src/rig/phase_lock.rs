@@ -1,6 +1,6 @@
 //! The built-in phase-locked loop as a controller of the bench.
 
-use phase_lock::{Config, ConfigError, Input, LockCriterion, PhaseLock, State};
+use phase_lock::{Config, ConfigError, Input, LockCriterion, Move, PhaseLock, State};
 
 use super::{Command, Controller, ControllerError, Drive, Sensors};
 use crate::scene::Scene;
@@ -24,6 +24,24 @@ impl BuiltIn {
             lock,
         })
     }
+
+    /// The same, ready to hold the response: its drive has the limit of the scene's `[backbone]`.
+    ///
+    /// # Errors
+    /// As [`BuiltIn::new`].
+    pub fn for_backbone(scene: &Scene) -> Result<Self, ConfigError> {
+        let d = scene.dimensionless();
+        let lock = Config {
+            amplitude_max: scene.backbone.g_max * d.b * d.epsilon,
+            bandwidth: scene.backbone.bandwidth * d.omega0,
+            ..configuration(scene)
+        }
+        .build()?;
+        Ok(Self {
+            state: lock.start(),
+            lock,
+        })
+    }
 }
 
 /// The scene's controller settings in SI units.
@@ -40,6 +58,7 @@ pub(crate) fn configuration(scene: &Scene) -> Config {
         bandwidth: c.bandwidth * omega0,
         damping_rate: 0.5 * scene.plant.damping / scene.plant.mass,
         phase_target: c.phase_target_radians(),
+        delay: scene.chain.stated_delay(omega0 * scene.sample_time()) / omega0,
         lock: LockCriterion {
             phase_tolerance: c.phase_tolerance.to_radians(),
             frequency_drift: c.frequency_drift,
@@ -70,5 +89,9 @@ impl Controller for BuiltIn {
             phase_error: output.phase_error,
             settled: output.settled,
         })
+    }
+
+    fn hold_response(&mut self, to: Move) -> Result<(), ControllerError> {
+        Ok(self.lock.hold_response(&mut self.state, to)?)
     }
 }

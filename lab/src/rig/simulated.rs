@@ -52,6 +52,11 @@ impl Rig for Simulated {
         Ok(())
     }
 
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        self.plant.advance(lovines::Drive::held(displacement), step);
+        Ok(())
+    }
+
     fn witness(&mut self) -> Result<Option<Witness>, RigError> {
         let tally = self.plant.tally();
         Ok(Some(Witness {

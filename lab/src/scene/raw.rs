@@ -3,7 +3,8 @@
 use serde::Deserialize;
 
 use super::{
-    Controller, Record, Scene, SceneError, Start, excitation::RawExcitation, plant::RawPlant,
+    Backbone, Chain, Controller, Record, Scene, SceneError, Start, excitation::RawExcitation,
+    plant::RawPlant,
 };
 
 /// The file's sections; those left out count as empty.
@@ -20,6 +21,10 @@ pub(super) struct Raw {
     controller: Controller,
     #[serde(default)]
     record: Record,
+    #[serde(default)]
+    backbone: Backbone,
+    #[serde(default)]
+    chain: Chain,
 }
 
 impl Raw {
@@ -33,12 +38,16 @@ impl Raw {
         let amplitude = self.excitation.resolve(origin, &plant)?;
         self.controller.check()?;
         self.record.check(&self.controller)?;
+        self.backbone.check(&self.controller)?;
+        self.chain.check(&self.controller)?;
         Ok(Scene {
             plant,
             start: self.start,
             amplitude,
             controller: self.controller,
             record: self.record,
+            backbone: self.backbone,
+            chain: self.chain,
         })
     }
 }

@@ -1,0 +1,73 @@
+//! One period of the drive, reduced to a few numbers.
+
+use nalgebra::{Complex, SMatrix, SVector};
+
+use crate::experiment::Sample;
+
+/// What the sensors said over one period of the drive.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Cycle {
+    /// Mean frequency of the drive, rad/s.
+    pub omega: f64,
+    /// Harmonics 1 to 3 of the response relative to the drive's phase, m: `Im Σ a_h exp(i h phase)`.
+    pub response: [Complex<f64>; 3],
+    /// Fundamental of the base, m: as measured where a sensor reads it, as commanded elsewhere.
+    pub base: Complex<f64>,
+    /// Phase error, rad: response less base less target.
+    pub phase_error: f64,
+}
+
+/// Offset, and sine and cosine of three harmonics.
+const TERMS: usize = 7;
+
+impl Cycle {
+    /// The samples of one period; `phase` (rad) is that of the drive at the first, `target` (rad) that of the response to the
+    /// base. `None` for too few samples.
+    #[must_use]
+    pub fn of(samples: &[Sample], sample_time: f64, phase: f64, target: f64) -> Option<Self> {
+        if samples.len() <= TERMS {
+            return None;
+        }
+        let mut normal = SMatrix::<f64, TERMS, TERMS>::zeros();
+        let mut right = [SVector::<f64, TERMS>::zeros(); 2];
+        let mut turned = phase;
+        for sample in samples {
+            let mut row = SVector::<f64, TERMS>::zeros();
+            row[0] = 1.0;
+            for harmonic in 1..=3 {
+                let (sin, cos) = (harmonic as f64 * turned).sin_cos();
+                row[2 * harmonic - 1] = sin;
+                row[2 * harmonic] = cos;
+            }
+            normal += row * row.transpose();
+            right[0] += row * sample.sensors.response;
+            right[1] += row * sample.sensors.reference.unwrap_or(0.0);
+            turned += sample.command.drive.omega * sample_time;
+        }
+        let factors = normal.cholesky()?;
+        let [response, base] = right.map(|right| factors.solve(&right));
+        let harmonic = |c: &SVector<f64, TERMS>, h: usize| Complex::new(c[2 * h - 1], c[2 * h]);
+        let mean = |value: fn(&Sample) -> f64| {
+            samples.iter().map(value).sum::<f64>() / samples.len() as f64
+        };
+        let measured = samples.iter().all(|s| s.sensors.reference.is_some());
+        let base = if measured {
+            harmonic(&base, 1)
+        } else {
+            Complex::new(mean(|s| s.command.drive.amplitude), 0.0)
+        };
+        let response = [1, 2, 3].map(|h| harmonic(&response, h));
+        let phase_error = if measured {
+            (response[0] * base.conj() * Complex::from_polar(1.0, -target)).arg()
+        } else {
+            // The controller knows of delays.
+            mean(|s| s.command.phase_error)
+        };
+        Some(Self {
+            omega: mean(|s| s.command.drive.omega),
+            response,
+            base,
+            phase_error,
+        })
+    }
+}

@@ -1,0 +1,87 @@
+//! `vines backbone`: the backbone, tracked with the loop closed.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use indicatif::ProgressBar;
+use vines::{
+    backbone::{Report, track},
+    rig::BuiltIn,
+};
+
+use super::{
+    door::{Door, OpenRig, ReachArguments},
+    failure::Failure,
+    scene_arguments::SceneArguments,
+};
+
+const HELP: &str = "\
+The response is held at one level after another, and the drive and the frequency that this takes are measured:
+  C         amplitude of the first harmonic of the centre of mass, over b
+  sigma     detuning (Omega - 1)/epsilon at which the response lags the base by a quarter turn
+  G         base amplitude over b epsilon
+  averaged  periods of the last part of the dwell that the point is made from
+  distance  from the exact backbone: the largest of the differences in C, sigma and G
+
+Examples:
+  vines backbone                                          29 levels from C = 0.7 down to 0.14
+  vines backbone --set backbone.C_to=0.2 --set backbone.points=11
+  vines backbone --set chain.snr=40 --set chain.seed=7    with sensor noise
+  vines backbone --set backbone.feed='\"theory\"'           with theory for a forecast
+  vines backbone --rig LoViNes.fmu --out out/fmu          another rig: an FMU, or udp://HOST:PORT
+
+Writes tracked.json, tracked.csv and tracked.svg.";
+
+/// Track the backbone level by level, with the response held by the loop
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    /// Folder for the results; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+
+    /// What is shaken: `built-in`, an FMU, or udp://HOST:PORT
+    #[arg(long, value_name = "DOOR", default_value = "built-in")]
+    rig: Door,
+
+    #[command(flatten)]
+    reach: ReachArguments,
+
+    /// Print tracked.json instead of the table
+    #[arg(long)]
+    json: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+    let scene = arguments.scene.load()?;
+    env_logger::Builder::new()
+        .filter_level(log::LevelFilter::Warn)
+        .format_timestamp(None)
+        .init();
+    let mut controller = BuiltIn::for_backbone(&scene).map_err(Failure::input)?;
+    let OpenRig { mut rig, .. } = arguments.rig.rig(&scene, arguments.reach.reach())?;
+    let bar = ProgressBar::new(scene.backbone.points.into());
+    let tracked = track(rig.as_mut(), &mut controller, &scene, |done, _| {
+        bar.set_position(done as u64);
+    });
+    bar.finish_and_clear();
+    // A rig across the network is told that this is all.
+    drop(rig);
+    let report = Report::new(&tracked.map_err(Failure::run)?, &scene);
+    let written = report.write(&arguments.out).map_err(Failure::run)?;
+    if arguments.json {
+        return Ok(serde_json::to_string_pretty(&report)? + "\n");
+    }
+    let files: Vec<String> = written
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    Ok(format!(
+        "{}\nWritten: {}\n",
+        report.table(),
+        files.join(", ")
+    ))
+}

@@ -1,0 +1,85 @@
+//! The anti-alias filter.
+
+use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
+
+/// A Butterworth low pass of second order, `y'' + sqrt(2) wc y' + wc^2 y = wc^2 u`, exact for a signal that goes straight
+/// from sample to sample.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LowPass {
+    cut_off: f64,
+    /// Last sample of the signal.
+    input: f64,
+    output: f64,
+    slope: f64,
+}
+
+impl LowPass {
+    /// With the cut-off `cut_off`, rad/s, at rest.
+    pub fn new(cut_off: f64) -> Self {
+        Self {
+            cut_off,
+            input: 0.0,
+            output: 0.0,
+            slope: 0.0,
+        }
+    }
+
+    /// The output `elapsed` seconds after the last sample, when the signal is `input`.
+    pub fn pass(&mut self, input: f64, elapsed: f64) -> f64 {
+        if elapsed > 0.0 {
+            let rise = (input - self.input) / elapsed;
+            let rate = FRAC_1_SQRT_2 * self.cut_off;
+            // On a ramp the output follows late by sqrt(2)/wc; what is left of the start rings off.
+            let lag = SQRT_2 / self.cut_off * rise;
+            let cosine = self.output - (self.input - lag);
+            let sine = (self.slope - rise) / rate + cosine;
+            let (sin, cos) = (rate * elapsed).sin_cos();
+            let decay = (-rate * elapsed).exp();
+            let (ringing, quadrature) = (
+                decay * (cosine * cos + sine * sin),
+                decay * (sine * cos - cosine * sin),
+            );
+            self.output = input - lag + ringing;
+            self.slope = rise + rate * (quadrature - ringing);
+        }
+        self.input = input;
+        self.output
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Amplitude and lag of the output for a sine of frequency 1.
+    fn response(cut_off: f64) -> (f64, f64) {
+        let mut filter = LowPass::new(cut_off);
+        let dt = std::f64::consts::TAU / 1000.0;
+        let (mut sine, mut cosine) = (0.0, 0.0);
+        for n in 0..20_000 {
+            let t = f64::from(n) * dt;
+            let output = filter.pass(t.sin(), dt);
+            if n >= 19_000 {
+                sine += output * t.sin() / 500.0;
+                cosine += output * t.cos() / 500.0;
+            }
+        }
+        (sine.hypot(cosine), -cosine.atan2(sine))
+    }
+
+    #[test]
+    fn a_sine_passes_as_the_transfer_function_says() {
+        for cut_off in [0.5, 1.0, 3.0, 20.0] {
+            let (amplitude, lag) = response(cut_off);
+            let x: f64 = 1.0 / cut_off;
+            assert!(
+                (amplitude - 1.0 / (1.0 + x.powi(4)).sqrt()).abs() < 1e-4,
+                "{cut_off}"
+            );
+            assert!(
+                (lag - (SQRT_2 * x).atan2(1.0 - x * x)).abs() < 1e-4,
+                "{cut_off}: {lag}"
+            );
+        }
+    }
+}

@@ -1,0 +1,142 @@
+//! The `[chain]` section: the measurement chain between rig and controller, off by default.
+
+use serde::{Deserialize, Serialize};
+
+use super::{Controller, SceneError, validate::Quantity};
+
+/// What a signal-to-noise ratio is relative to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum RatioOf {
+    /// The signal as it is: the noise follows its power.
+    Signal,
+    /// A sine that fills the range of the channel: the noise is the same at every level.
+    Range,
+}
+
+/// What stands between the rig and the controller, as far as it is switched on.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Chain {
+    /// Resolution of the inputs, bits; 0 for an ideal one.
+    pub adc_bits: u32,
+    /// Resolution of the output, bits; 0 for an ideal one. Needs `hold`.
+    pub dac_bits: u32,
+    /// Range of the response channel, ± so much, over b; beyond it is cut off.
+    pub response_range: f64,
+    /// Range of the base channel and of the output, ± so much, over `b epsilon`.
+    pub base_range: f64,
+    /// The base follows held samples instead of an oscillator in the rig.
+    pub hold: bool,
+    /// Signal-to-noise ratio of the sensors, dB; none without it.
+    pub snr: Option<f64>,
+    /// What that is relative to.
+    pub snr_of: RatioOf,
+    /// Seed of noise and jitter.
+    pub seed: u64,
+    /// Cut-off of the anti-alias filter (Butterworth, second order), in units of omega0; 0 for none.
+    pub filter: f64,
+    /// Standard deviation of the sampling instants, in samples.
+    pub jitter: f64,
+    /// Delay from the sensors to the controller, samples.
+    pub delay: u32,
+    /// Whether a sensor reads the base.
+    pub reference: bool,
+    /// Whether the controller is told the delay from the drive to the sensors. It uses that where no sensor reads the base.
+    pub compensate: bool,
+}
+
+impl Default for Chain {
+    fn default() -> Self {
+        Self {
+            adc_bits: 0,
+            dac_bits: 0,
+            response_range: 2.0,
+            base_range: 4.0,
+            hold: false,
+            snr: None,
+            snr_of: RatioOf::Signal,
+            seed: 1,
+            filter: 0.0,
+            jitter: 0.0,
+            delay: 0,
+            reference: true,
+            compensate: true,
+        }
+    }
+}
+
+impl Chain {
+    /// Whether anything is switched on.
+    #[must_use]
+    pub fn is_on(&self) -> bool {
+        let Self {
+            adc_bits,
+            dac_bits,
+            hold,
+            snr,
+            filter,
+            jitter,
+            delay,
+            reference,
+            ..
+        } = *self;
+        adc_bits > 0
+            || dac_bits > 0
+            || hold
+            || snr.is_some()
+            || filter > 0.0
+            || jitter > 0.0
+            || delay > 0
+            || !reference
+    }
+
+    /// What the controller is told of the delay from the drive to the sensors, in units of 1/omega0, for samples
+    /// `step` apart: a held sample is late by half a sample in the mean.
+    #[must_use]
+    pub fn stated_delay(&self, step: f64) -> f64 {
+        if !self.compensate {
+            return 0.0;
+        }
+        let held = if self.hold { 0.5 } else { 0.0 };
+        (f64::from(self.delay) + held) * step + self.filter_delay()
+    }
+
+    /// Phase of the filter at omega0, as a delay in units of 1/omega0.
+    fn filter_delay(&self) -> f64 {
+        if self.filter == 0.0 {
+            return 0.0;
+        }
+        let x = 1.0 / self.filter;
+        (std::f64::consts::SQRT_2 * x).atan2(1.0 - x * x)
+    }
+
+    pub(super) fn check(&self, controller: &Controller) -> Result<(), SceneError> {
+        for (key, bits) in [
+            ("chain.adc_bits", self.adc_bits),
+            ("chain.dac_bits", self.dac_bits),
+        ] {
+            Quantity::new(key, bits.into(), "bits")
+                .check(bits <= 32, "must be from 0 (ideal) to 32")?;
+        }
+        Quantity::new("chain.dac_bits", self.dac_bits.into(), "bits").check(
+            self.dac_bits == 0 || self.hold,
+            "needs chain.hold = true: only samples of the drive can be quantised",
+        )?;
+        Quantity::new("chain.response_range", self.response_range, "(over b)").positive()?;
+        Quantity::new("chain.base_range", self.base_range, "(over b epsilon)").positive()?;
+        if let Some(snr) = self.snr {
+            Quantity::new("chain.snr", snr, "dB")
+                .check((-40.0..=300.0).contains(&snr), "must be from -40 to 300")?;
+        }
+        let nyquist = 0.5 * controller.samples_per_period;
+        Quantity::new("chain.filter", self.filter, "(omega0)").check(
+            self.filter == 0.0 || (2.0..=nyquist).contains(&self.filter),
+            format!("must be 0 (none) or from 2 to {nyquist} (half the sampling frequency)"),
+        )?;
+        Quantity::new("chain.jitter", self.jitter, "samples")
+            .check((0.0..=0.1).contains(&self.jitter), "must be from 0 to 0.1")?;
+        Quantity::new("chain.delay", self.delay.into(), "samples")
+            .check(self.delay <= 1000, "must be from 0 to 1000")
+    }
+}

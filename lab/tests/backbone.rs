@@ -1,0 +1,172 @@
+//! The backbone, tracked with the response held by the loop.
+
+use vines::backbone::{Report, TrackError, track};
+use vines::identification::Regime;
+use vines::rig::{
+    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated,
+};
+use vines::scene::{Override, Scene};
+
+fn scene(settings: &[&str]) -> Scene {
+    let overrides: Vec<Override> = settings.iter().map(|s| s.parse().unwrap()).collect();
+    let text = include_str!("../../scenes/dimensionless.toml");
+    Scene::parse("dimensionless.toml", text, &overrides).unwrap()
+}
+
+fn tracked(settings: &[&str]) -> Report {
+    let scene = scene(settings);
+    let mut rig = Chain::new(Box::new(Simulated::new(&scene).unwrap()), &scene);
+    let mut controller = BuiltIn::for_backbone(&scene).unwrap();
+    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
+    let report = Report::new(&tracked, &scene);
+    println!(
+        "{settings:?}: {:.1} periods per point, at most {:.1e} from the exact backbone",
+        report.periods_per_point(),
+        report.worst().unwrap()
+    );
+    report
+}
+
+#[test]
+fn clean_points_lie_within_1e_3_of_the_exact_orbits_at_25_periods_each() {
+    let report = tracked(&[]);
+    assert!(report.worst().unwrap() <= 1e-3);
+    assert!(report.periods_per_point() <= 25.0);
+    for one in &report.points {
+        assert!(one.point.settled);
+        assert_eq!(one.point.regime, Regime::Symmetric);
+        assert_eq!(one.point.regime_by_impacts, Some(Regime::Symmetric));
+        // The level asked for is the level held.
+        assert!((one.point.c - one.point.level).abs() < 1e-3, "{one:?}");
+    }
+}
+
+#[test]
+fn another_plant_is_tracked_as_closely() {
+    let report = tracked(&[
+        "plant.r=0.8",
+        "plant.epsilon=0.0042",
+        "backbone.C_from=0.65",
+        "backbone.C_to=0.45",
+        "backbone.points=5",
+    ]);
+    assert!(report.worst().unwrap() <= 1e-3);
+}
+
+#[test]
+fn through_40_db_of_sensor_noise_points_lie_within_5e_3() {
+    {
+        let report = tracked(&["chain.snr=40"]);
+        assert!(report.worst().unwrap() <= 5e-3);
+        assert!(report.periods_per_point() <= 25.0);
+        // Forty decibels hide harmonics of 3e-4, but nothing else is told instead.
+        for one in &report.points {
+            let regime = one.point.regime;
+            assert!(
+                matches!(regime, Regime::Symmetric | Regime::Unresolved),
+                "{regime}"
+            );
+        }
+    }
+}
+
+#[test]
+fn theory_can_make_the_forecast_and_a_loop_without_any_needs_longer() {
+    let feed = |feed: &str| {
+        let feed = format!("backbone.feed=\"{feed}\"");
+        let report = tracked(&["backbone.C_to=0.4", "backbone.points=7", &feed]);
+        assert!(report.worst().unwrap() <= 1e-3);
+        report.periods_per_point()
+    };
+    let (theory, none) = (feed("theory"), feed("none"));
+    assert!(theory < none, "{theory} {none}");
+}
+
+#[test]
+fn beyond_symmetry_breaking_both_ways_of_telling_the_regime_say_so() {
+    let report = tracked(&[
+        "backbone.C_from=0.6",
+        "backbone.C_to=0.8",
+        "backbone.points=3",
+    ]);
+    let regimes: Vec<_> = report
+        .points
+        .iter()
+        .map(|one| (one.point.regime, one.point.regime_by_impacts))
+        .collect();
+    let twice = |regime| (regime, Some(regime));
+    assert_eq!(regimes[0], twice(Regime::Symmetric));
+    assert_eq!(regimes[2], twice(Regime::Asymmetric));
+    assert!(report.points[2].exact.unwrap().nearest > 0.01);
+}
+
+#[test]
+fn the_linear_mode_is_told_from_the_impacting_one_by_the_response() {
+    let report = tracked(&[
+        "start.dq2=0",
+        "backbone.C_from=0.6",
+        "backbone.C_to=0.5",
+        "backbone.points=2",
+    ]);
+    for one in &report.points {
+        assert_eq!(one.point.regime, Regime::Silent);
+        assert_eq!(one.point.regime_by_impacts, Some(Regime::Silent));
+    }
+}
+
+#[test]
+fn below_the_fold_the_motion_is_told_to_be_irregular_and_not_settled() {
+    let report = tracked(&[
+        "backbone.C_from=0.5",
+        "backbone.C_to=0.11",
+        "backbone.points=4",
+    ]);
+    let last = report.points[3].point;
+    assert!(!last.settled);
+    assert_eq!(
+        (last.regime, last.regime_by_impacts),
+        (Regime::Other, Some(Regime::Other))
+    );
+}
+
+/// A controller that only ever holds a drive.
+struct Steady;
+
+impl Controller for Steady {
+    fn sample(&mut self, _: Sensors, _: bool) -> Result<Command, ControllerError> {
+        Ok(Command {
+            drive: Drive {
+                omega: 1.0,
+                amplitude: 0.01,
+                displacement: 0.0,
+            },
+            ..Command::default()
+        })
+    }
+}
+
+/// A rig whose response lags its base by a quarter turn, whatever happens.
+struct Obedient(f64);
+
+impl Rig for Obedient {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        Ok(Sensors {
+            response: -self.0.cos(),
+            reference: Some(0.01 * self.0.sin()),
+        })
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.0 += drive.omega * step;
+        Ok(())
+    }
+}
+
+#[test]
+fn a_controller_that_cannot_hold_the_response_is_refused() {
+    let outcome = track(&mut Obedient(0.0), &mut Steady, &scene(&[]), |_, _| {});
+    assert!(matches!(
+        outcome,
+        Err(TrackError::Controller(ControllerError::NoResponseLoop))
+    ));
+}
