@@ -15,6 +15,7 @@ mod sections;
 mod study;
 mod table;
 mod theme;
+mod tracked;
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};

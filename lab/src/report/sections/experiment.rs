@@ -6,17 +6,17 @@ use super::Subject;
 use crate::experiment::{self, Plan, Stage};
 use crate::identification::{COMPARED_ABOVE, Identification, identify};
 use crate::report::{backbone, csv, history, manifold, section::Section};
-use crate::rig::{BuiltIn, Simulated};
+use crate::rig::BuiltIn;
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, String> {
     let mut section = Section::new("The experiment");
     let scene = &subject.scene;
     let refused = |error: &dyn std::fmt::Display| error.to_string();
-    let mut rig = Simulated::new(scene).map_err(|error| refused(&error))?;
+    let mut rig = subject.rig()?;
     let mut controller = BuiltIn::new(scene).map_err(|error| refused(&error))?;
     let plan = Plan::of(scene);
     let told = Cell::new(0.0);
-    let record = experiment::run(&mut rig, &mut controller, &plan, |stage, at, of| {
+    let record = experiment::run(rig.as_mut(), &mut controller, &plan, |stage, at, of| {
         let part = at as f64 / of.max(1) as f64;
         // Most locks come long before the last moment allowed.
         let part = match stage {
