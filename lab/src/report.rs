@@ -1,5 +1,6 @@
 //! What a person and a program get to see: files, pictures, a short table.
 
+mod approach;
 mod backbone;
 mod backbones;
 mod chart;

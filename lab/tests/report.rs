@@ -60,6 +60,7 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
     for name in [
         "history",
         "tracked-backbone",
+        "approach",
         "decay-on-sim",
         "identified-backbone",
         "backbones",
@@ -71,7 +72,7 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
             assert!(folder.path().join(&file).is_file(), "{file}");
         }
     }
-    assert_eq!(html.matches("<figure>").count(), 9);
+    assert_eq!(html.matches("<figure>").count(), 10);
     for words in [
         "What was found",
         "symmetric 1:1",
@@ -107,7 +108,7 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
         return;
     };
     assert!(!console.contains("CONSOLE"), "{console}");
-    assert_eq!(seen.matches("<figcaption>").count(), 9);
+    assert_eq!(seen.matches("<figcaption>").count(), 10);
     let print = folder.path().join("report.pdf");
     let (console, _) = browser(
         &page,
