@@ -160,12 +160,13 @@ impl ResponseLoop {
     pub fn follow(&self, hold: &mut Hold, before: f64, read: Option<f64>) -> (f64, f64) {
         let (gone, growth) = hold.go_on();
         hold.expected += self.detector_step * (hold.wanted - hold.expected);
-        hold.integral += gone * hold.course.amplitude;
+        let foreseen = hold.integral + gone * hold.course.amplitude;
+        hold.integral = foreseen.clamp(0.0, self.amplitude_max);
         let error = read.map_or(0.0, |read| hold.expected - read);
         let asked = hold.integral + self.carry * growth + self.proportional * error;
         let least = LEAST_SHARE * hold.integral;
         let granted = asked
-            .clamp(least, self.amplitude_max.max(least))
+            .clamp(least, self.amplitude_max)
             .clamp(before - self.max_change, before + self.max_change);
         // The integral moves unless a limit already withholds what it would ask more of.
         if (asked - granted) * error <= 0.0 {
