@@ -94,6 +94,33 @@ impl Phase {
         self.0
     }
 
+    /// The phase and what rounding has kept out of it.
+    pub(crate) fn parts(self) -> (f64, f64) {
+        (self.0, self.1)
+    }
+
+    /// The phase after a turn by `angle` (reduced to one turn, and what rounding has kept out of it) and a little more.
+    pub(crate) fn turned(self, angle: (f64, f64), more: f64) -> Self {
+        let (sum, missed) = two_sum(self.0, angle.0);
+        let mut missed = missed + (self.1 + angle.1 + more);
+        let mut rest = sum;
+        if sum >= TAU.0 {
+            rest -= TAU.0;
+            missed -= TAU.1;
+        }
+        let (mut rest, mut missed) = two_sum(rest, missed);
+        if rest < 0.0 || rest >= TAU.0 {
+            // At the seam the small parts have carried it across.
+            let turn = if rest < 0.0 { 1.0 } else { -1.0 };
+            let (turned, lost) = two_sum(rest, turn * TAU.0);
+            (rest, missed) = two_sum(turned, missed + lost + turn * TAU.1);
+            if !(0.0..TAU.0).contains(&rest) {
+                (rest, missed) = (0.0, 0.0);
+            }
+        }
+        Self(rest, missed)
+    }
+
     /// The phase `t` seconds later at `omega`, brought back to [0, 2π) without losing digits to the number of turns.
     pub fn advanced(self, omega: f64, t: f64) -> Self {
         let (turned, turned_missed) = product(omega, t);

@@ -40,16 +40,18 @@ pub struct Closure {
 /// A contact nearer than this fraction of the fastest rate's time is solved on the local Taylor polynomial, whose first
 /// term left out is then below 1e-16/24 of the motion's amplitude.
 const NEAR: f64 = 1e-4;
-/// Steps below this fraction of the fastest rate's time that are tolerated in a row.
-const MOST_TINY_STEPS: usize = 200;
+/// Steps below [`TINY`] times the fastest rate's time that are tolerated in a row.
+const MOST_TINY_STEPS: usize = 20;
+const TINY: f64 = 1e-9;
 
 /// The first closure of any of `N` gaps in `[from, limit]`.
 ///
 /// `look` tells the gaps at a time and the derivatives of the motion there; `jerk` bounds the third derivative of the
-/// gaps over the next so many seconds, given those derivatives; `fastest` is the fastest rate of the motion, 1/s.
+/// gaps over the next so many seconds, given those derivatives; `fastest` is the fastest rate of the motion, 1/s;
+/// `resolution` is what is lost in the gaps' rounding.
 pub fn first_closure<const N: usize>(
     (from, limit): (f64, f64),
-    fastest: f64,
+    (fastest, resolution): (f64, f64),
     look: impl Fn(f64) -> ([Gap; N], Derivatives),
     jerk: impl Fn(&Derivatives, f64) -> f64,
 ) -> Option<Closure> {
@@ -81,18 +83,24 @@ pub fn first_closure<const N: usize>(
                 derivatives,
             });
         }
-        // A gap of a few units in the last place that neither closes nor opens would hold the march for ever: move on by
-        // a time in which nothing representable happens.
-        tiny_steps = if step * fastest < 1e-9 {
+        tiny_steps = if step * fastest < TINY {
             tiny_steps + 1
         } else {
             0
         };
-        let least = if tiny_steps > MOST_TINY_STEPS {
-            1e-8 / fastest
-        } else {
-            t * f64::EPSILON
-        };
+        let mut least = t * f64::EPSILON;
+        if tiny_steps > MOST_TINY_STEPS {
+            // A gap that has no digits left, and neither closes nor opens, would hold the march for ever: move on by a time
+            // in which nothing that can be told happens.
+            let blurred = gaps.map(|gap| {
+                let gap = Gap {
+                    gap: gap.gap + resolution,
+                    ..gap
+                };
+                gap.certainly_open(window, |h| jerk(&derivatives, h))
+            });
+            least = blurred.into_iter().fold(window, f64::min).max(least);
+        }
         t += step.max(least);
     }
     None

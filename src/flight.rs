@@ -4,6 +4,9 @@ use crate::clearance::{Gap, clear_after_release, first_closure};
 use crate::motion::{Derivatives, Motion, Series, nearby, velocity_change};
 use crate::wall::Wall;
 
+/// A gap smaller than this fraction of the half-width cannot be told from none.
+const RESOLUTION: f64 = 1.0 / (1u64 << 60) as f64;
+
 /// One flight: the primary mass's motion, and where the particle is relative to it at the start.
 #[derive(Clone, Copy, Debug)]
 pub struct Flight<'a> {
@@ -48,7 +51,8 @@ impl<'a> Flight<'a> {
             (Wall::BOTH.map(|wall| self.gap(wall, change, &d)), d)
         };
         let jerk = |d: &Derivatives, h: f64| self.motion.third_derivative_bound(d, h);
-        match first_closure((from, limit), self.motion.fastest(), look, jerk) {
+        let scale = (self.motion.fastest(), RESOLUTION * self.half_width);
+        match first_closure((from, limit), scale, look, jerk) {
             Some(closure) => {
                 let wall = Wall::BOTH[closure.which];
                 let d = &closure.derivatives;

@@ -8,8 +8,9 @@ mod log;
 
 use crate::hybrid::Hybrid;
 use crate::plant::MOST_IMPACTS;
-use crate::{Drive, InvalidValue, Parameters, Plant, State};
+use crate::{BaseMotion, Drive, InvalidValue, Parameters, Plant, State};
 use fmi2_component::{Archive, Component, Log, Refusal};
+use std::cell::Cell;
 use variables::{Integer, Model, Real, category};
 
 mod variables {
@@ -21,19 +22,26 @@ fmi2_component::export!(LoViNes, model_exchange);
 /// What a master has set, and the rig that came of it.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct LoViNes {
-    parameters: Parameters,
-    start: State,
-    /// Base displacement and its first three derivatives; the derivatives hold for one step.
-    e: [f64; 4],
-    amplitude: f64,
-    omega: f64,
     rig: Rig,
-    /// How far the rig has come.
-    progress: Progress,
-    /// The fastest rate of the motion but for that of the drive, rad/s.
-    fastest: f64,
+    /// What moves the base; the derivatives of its signal hold for one step.
+    drive: Drive,
     /// Whether an input was set since the last step: the base is where they say, not where the step ended.
     inputs_set: bool,
+    /// How far the rig has come.
+    progress: Progress,
+    /// The displacement of the base, once somebody has asked for it: there is a sine in it. NaN before.
+    #[serde(skip, default = "unknown")]
+    base: Cell<f64>,
+    /// The mass ratio m/M.
+    epsilon: f64,
+    /// The fastest rate of the motion but for that of the drive, rad/s.
+    fastest: f64,
+    parameters: Parameters,
+    start: State,
+}
+
+fn unknown() -> Cell<f64> {
+    Cell::new(f64::NAN)
 }
 
 /// The rig as the master's choice of interface wants it.
@@ -44,8 +52,9 @@ enum Rig {
     Equations(Hybrid),
 }
 
-/// The longest step that is taken, in radians of the fastest rate: more than ten thousand periods.
-const LONGEST_STEP: f64 = 1e5;
+/// The longest step that is taken, in radians of the fastest rate: sixteen million periods. Even where nothing hits, the
+/// search for the first contact looks at the motion once in every two radians or so, and a call is to end.
+const LONGEST_STEP: f64 = 1e8;
 
 /// Why a step could not be finished.
 #[cold]
@@ -63,6 +72,16 @@ fn lost(finite: bool, time: f64, step: f64) -> Refusal {
     })
 }
 
+/// Why a step is not begun.
+#[cold]
+fn too_long(step: f64, rate: f64) -> Refusal {
+    let longest = LONGEST_STEP / rate;
+    Refusal::error(format!(
+        "communicationStepSize = {step} s is refused; allowed are at most {longest} s, which is {LONGEST_STEP} rad of \
+         the fastest rate"
+    ))
+}
+
 /// The rate that bounds what a second of simulation costs.
 fn fastest(p: &Parameters) -> f64 {
     (p.natural_frequency()).max(p.damping / p.primary_mass)
@@ -78,16 +97,25 @@ enum Progress {
 }
 
 impl LoViNes {
-    fn drive(&self) -> Drive {
-        let [e, d1, d2, d3] = self.e;
-        Drive {
-            signal: [e, d1, d2 / 2.0, d3 / 6.0],
-            amplitude: self.amplitude,
-            omega: self.omega,
-        }
+    /// A parameter or an input, as it was set.
+    fn setting(&self, variable: Real) -> Option<f64> {
+        let p = &self.parameters;
+        Some(match variable {
+            Real::M => p.primary_mass,
+            Real::k => p.stiffness,
+            Real::c => p.damping,
+            Real::m => p.particle_mass,
+            Real::b => p.half_width,
+            Real::r => p.restitution,
+            Real::e => self.drive.signal[0],
+            Real::E => self.drive.amplitude,
+            Real::omega => self.drive.omega,
+            _ => return None,
+        })
     }
 
     /// A value that follows from the plant's state.
+    #[inline(always)]
     fn of_plant(&self, plant: &Plant, variable: Real) -> f64 {
         let state = || match self.progress {
             Progress::UnderWay => plant.state(),
@@ -98,7 +126,10 @@ impl LoViNes {
             Real::der_q1 => state().dq1,
             Real::q2 => state().q2,
             Real::der_q2 => state().dq2,
-            Real::v => plant.centre(),
+            Real::v => {
+                let state = plant.state();
+                state.q1 + self.epsilon * state.q2
+            }
             Real::w => plant.relative_displacement(),
             Real::der_w => plant.relative_velocity(),
             Real::base => self.base(plant),
@@ -107,92 +138,61 @@ impl LoViNes {
             Real::impact_velocity => plant.tally().impact_velocity,
             Real::energy => plant.energy(self.base(plant)),
             Real::dissipated => plant.tally().dissipated,
-            _ => derivatives::of_instant(&self.instant(plant), variable),
+            _ => self.of_instant(plant, variable),
         }
     }
 
+    /// What nobody asks for in every step.
+    #[cold]
+    fn of_instant(&self, plant: &Plant, variable: Real) -> f64 {
+        self.setting(variable)
+            .unwrap_or_else(|| derivatives::of_instant(&self.instant(plant), variable))
+    }
+
+    #[inline]
     fn base(&self, plant: &Plant) -> f64 {
-        if self.inputs_set {
-            plant.base().with(self.drive()).displacement()
+        let mut base = self.base.get();
+        if base.is_nan() {
+            base = self.look_at_base(plant);
+        }
+        base
+    }
+
+    #[inline(never)]
+    fn look_at_base(&self, plant: &Plant) -> f64 {
+        let base = if self.inputs_set {
+            self.base_motion(plant).displacement()
         } else {
-            plant.base().displacement()
+            plant.base_displacement()
+        };
+        self.base.set(base);
+        base
+    }
+
+    /// The base as it stands, with the inputs as they are set now.
+    fn base_motion(&self, plant: &Plant) -> BaseMotion {
+        if self.inputs_set {
+            plant.base().with(self.drive)
+        } else {
+            plant.base()
         }
     }
 
     /// Tells the rig of changed inputs.
+    #[inline]
     fn input(&mut self) {
         self.inputs_set = true;
-        let drive = self.drive();
+        self.base.set(f64::NAN);
         if let Rig::Equations(hybrid) = &mut self.rig {
-            hybrid.drive = drive;
+            hybrid.drive = self.drive;
         }
     }
 
-    /// Tells the rig of changed parameters.
-    fn retune(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
-        if self.progress != Progress::None {
-            match &mut self.rig {
-                Rig::Steps(plant) => plant.retune(parameters)?,
-                Rig::Equations(hybrid) => hybrid.retune(parameters)?,
-            }
-        }
-        self.parameters = parameters;
-        self.fastest = fastest(&parameters);
-        Ok(())
-    }
-}
-
-impl Component for LoViNes {
-    type Model = Model;
-
-    fn new() -> Self {
-        // The shell overwrites all of this with the start values of the table.
-        let parameters = Parameters::dimensionless(1.0, 0.0, 1.0);
-        let start = State::default();
-        Self {
-            parameters,
-            start,
-            e: [0.0; 4],
-            amplitude: 0.0,
-            omega: 0.0,
-            rig: Rig::Steps(Plant::new(parameters, start).expect("unit parameters make sense")),
-            progress: Progress::None,
-            fastest: 0.0,
-            inputs_set: false,
-        }
-    }
-
-    fn get_real(&self, variable: Real) -> f64 {
-        let Self { parameters: p, .. } = self;
-        match variable {
-            Real::M => p.primary_mass,
-            Real::k => p.stiffness,
-            Real::c => p.damping,
-            Real::m => p.particle_mass,
-            Real::b => p.half_width,
-            Real::r => p.restitution,
-            Real::e => self.e[0],
-            Real::E => self.amplitude,
-            Real::omega => self.omega,
-            _ => match &self.rig {
-                Rig::Steps(plant) => self.of_plant(plant, variable),
-                Rig::Equations(hybrid) => exchange::of_hybrid(hybrid, variable),
-            },
-        }
-    }
-
-    fn set_real(&mut self, variable: Real, value: f64) -> Result<(), Refusal> {
+    /// Sets a parameter or a start value.
+    #[cold]
+    fn configure(&mut self, variable: Real, value: f64) -> Result<(), Refusal> {
         let mut parameters = self.parameters;
         let slot = match variable {
-            Real::e | Real::E | Real::omega => {
-                match variable {
-                    Real::e => self.e[0] = value,
-                    Real::E => self.amplitude = value,
-                    _ => self.omega = value,
-                }
-                self.input();
-                return Ok(());
-            }
             Real::q1 => &mut self.start.q1,
             Real::der_q1 => &mut self.start.dq1,
             Real::q2 => &mut self.start.q2,
@@ -212,6 +212,62 @@ impl Component for LoViNes {
         Ok(())
     }
 
+    /// Tells the rig of changed parameters.
+    fn retune(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
+        if self.progress != Progress::None {
+            match &mut self.rig {
+                Rig::Steps(plant) => plant.retune(parameters)?,
+                Rig::Equations(hybrid) => hybrid.retune(parameters)?,
+            }
+        }
+        self.parameters = parameters;
+        self.fastest = fastest(&parameters);
+        Ok(())
+    }
+}
+
+impl Component for LoViNes {
+    type Model = Model;
+
+    const TAKES_EVERY_INPUT: bool = true;
+
+    fn new() -> Self {
+        // The shell overwrites all of this with the start values of the table.
+        let parameters = Parameters::dimensionless(1.0, 0.0, 1.0);
+        let start = State::default();
+        Self {
+            rig: Rig::Steps(Plant::new(parameters, start).expect("unit parameters make sense")),
+            drive: Drive::default(),
+            inputs_set: false,
+            progress: Progress::None,
+            base: unknown(),
+            epsilon: 1.0,
+            fastest: 0.0,
+            parameters,
+            start,
+        }
+    }
+
+    #[inline(always)]
+    fn get_real(&self, variable: Real) -> f64 {
+        match &self.rig {
+            Rig::Steps(plant) => self.of_plant(plant, variable),
+            Rig::Equations(hybrid) => self.of_equations(hybrid, variable),
+        }
+    }
+
+    #[inline]
+    fn set_real(&mut self, variable: Real, value: f64) -> Result<(), Refusal> {
+        match variable {
+            Real::e => self.drive.signal[0] = value,
+            Real::E => self.drive.amplitude = value,
+            Real::omega => self.drive.omega = value,
+            _ => return self.configure(variable, value),
+        }
+        self.input();
+        Ok(())
+    }
+
     fn get_integer(&self, variable: Integer) -> i32 {
         let (tally, contact) = match &self.rig {
             Rig::Steps(plant) => (plant.tally(), plant.contact()),
@@ -224,48 +280,50 @@ impl Component for LoViNes {
     }
 
     fn initialise(&mut self, start_time: f64, _log: &Log) -> Result<(), Refusal> {
-        let drive = self.drive();
         match &mut self.rig {
             Rig::Steps(plant) => {
                 *plant = Plant::new(self.parameters, self.start)?;
                 plant.set_time(start_time);
-                plant.begin(drive);
+                plant.begin(self.drive);
             }
-            Rig::Equations(hybrid) => *hybrid = Hybrid::new(self.parameters, self.start, drive)?,
+            Rig::Equations(hybrid) => {
+                *hybrid = Hybrid::new(self.parameters, self.start, self.drive)?;
+            }
         }
+        self.epsilon = self.parameters.mass_ratio();
         self.fastest = fastest(&self.parameters);
         self.progress = Progress::Initialised;
         self.inputs_set = false;
+        self.base = unknown();
         Ok(())
     }
 
+    #[inline]
     fn accept_step(&self, step: f64) -> Result<(), Refusal> {
-        let rate = self.fastest.max(self.omega.abs());
-        if step * rate <= LONGEST_STEP {
+        if step * self.fastest <= LONGEST_STEP && step * self.drive.omega.abs() <= LONGEST_STEP {
             return Ok(());
         }
-        let longest = LONGEST_STEP / rate;
-        Err(Refusal::error(format!(
-            "communicationStepSize = {step} s is refused; allowed are at most {longest} s, which is {LONGEST_STEP} rad \
-             of the fastest rate"
-        )))
+        Err(too_long(step, self.fastest.max(self.drive.omega.abs())))
     }
 
+    #[inline]
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
-        let drive = self.drive();
         let Rig::Steps(plant) = &mut self.rig else {
             return Err(Refusal::error("a step is of co-simulation"));
         };
         plant.set_time(time);
         let outcome = if log.wants(category::logEvents) || log.wants(category::logImpacts) {
-            plant.advance_with(drive, step, |event| log::tell(log, time, event))
+            plant.advance_with(self.drive, step, |event| log::tell(log, time, event))
         } else {
-            plant.advance(drive, step)
+            plant.advance(self.drive, step)
         };
+        // Masters read outputs after every step.
+        plant.settle();
         // The signal stays where its polynomial has led.
-        self.e = [plant.base().drive.signal[0], 0.0, 0.0, 0.0];
+        self.drive.signal = [plant.base().drive.signal[0], 0.0, 0.0, 0.0];
         self.progress = Progress::UnderWay;
         self.inputs_set = false;
+        self.base.set(f64::NAN);
         let state = plant.state();
         let finite = (state.q1 + state.dq1 + state.dq2).is_finite()
             && plant.relative_displacement().abs() <= self.parameters.half_width;
@@ -281,18 +339,24 @@ impl Component for LoViNes {
         order: u32,
         value: f64,
     ) -> Result<(), Refusal> {
+        // The coefficients of a Taylor polynomial.
+        let signal = &mut self.drive.signal;
         match (variable, order) {
-            (Real::e, 1..=3) => {
-                self.e[order as usize] = value;
-                Ok(())
+            (Real::e, 1) => signal[1] = value,
+            (Real::e, 2) => signal[2] = value / 2.0,
+            (Real::e, 3) => signal[3] = value / 6.0,
+            (Real::e, _) => {
+                return Err(Refusal::error(format!(
+                    "derivative {order} of e is refused; allowed are orders 1 to 3"
+                )));
             }
-            (Real::e, _) => Err(Refusal::error(format!(
-                "derivative {order} of e is refused; allowed are orders 1 to 3"
-            ))),
-            _ => Err(Refusal::error(
-                "input derivatives are refused but for e; E and omega are held between samples",
-            )),
+            _ => {
+                return Err(Refusal::error(
+                    "input derivatives are refused but for e; E and omega are held between samples",
+                ));
+            }
         }
+        Ok(())
     }
 
     fn get_real_output_derivative(&self, variable: Real, order: u32) -> Result<f64, Refusal> {

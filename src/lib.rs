@@ -3,17 +3,20 @@
 
 pub mod base_motion;
 pub mod clearance;
+pub mod crossing;
 pub mod equations;
 pub mod flight;
 #[cfg(feature = "fmu")]
 mod fmu;
 pub mod forcing;
 pub mod hybrid;
+pub mod lane;
 pub mod motion;
 pub mod oscillator;
 pub mod parameters;
 pub mod plant;
 pub mod rates;
+pub mod span;
 pub mod sticking;
 pub mod wall;
 

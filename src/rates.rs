@@ -23,7 +23,7 @@ impl Movement {
     /// The movement of `plant` as it stands at the end of an advance.
     pub fn of(plant: &Plant) -> Self {
         let (p, state) = (plant.parameters(), plant.state());
-        let base = rates_of(plant.base());
+        let base = rates_of(&plant.base());
         let stuck = plant.contact().is_some();
         let moved = p.primary_mass + if stuck { p.particle_mass } else { 0.0 };
         let mut primary = [state.q1, state.dq1, 0.0, 0.0, 0.0];

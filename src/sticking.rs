@@ -38,7 +38,7 @@ pub fn until_released(motion: &Motion, wall: Wall, limit: f64, noise: f64) -> Pa
         ([push], d)
     };
     let jerk = |d: &Derivatives, h: f64| motion.fifth_derivative_bound(d, h);
-    match first_closure((0.0, limit), motion.fastest(), look, jerk) {
+    match first_closure((0.0, limit), (motion.fastest(), noise), look, jerk) {
         Some(closure) => Parting {
             t: closure.t + closure.h,
             released: true,

@@ -24,6 +24,10 @@ pub trait Component: Clone + Send + 'static {
     /// The type `Model` that the build step generates.
     type Model: Model;
 
+    /// Whether the setters take every finite value of an input. A component that says so is spared the copy of itself by
+    /// which the shell undoes a call of which a later value is refused; for components in a fast loop.
+    const TAKES_EVERY_INPUT: bool = false;
+
     /// A component without any start value: the shell sets those of the variable table right after, by the setters.
     fn new() -> Self;
 
@@ -52,6 +56,9 @@ pub trait Component: Clone + Send + 'static {
     }
 
     /// Sets a real variable to a finite value. Called only for variables that may be set in the present state.
+    ///
+    /// Where one of several values set by one call is refused, none of them counts: the shell goes back to a copy of the
+    /// component made before.
     ///
     /// # Errors
     /// A value that makes no sense whatever the others are; values that depend on each other are checked in

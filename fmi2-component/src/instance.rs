@@ -6,6 +6,7 @@ use crate::component::{Component, RealOf};
 use crate::life_cycle::{Interface, State};
 use crate::log::Log;
 use crate::model::Key;
+use crate::occasion::Occasions;
 use crate::refusal::{Refusal, Severity};
 use crate::session::{Select, Session};
 use crate::snapshots::Snapshots;
@@ -81,35 +82,46 @@ impl<C: Component> Instance<C> {
         Ok(())
     }
 
-    /// Whether a variable may be set now, in a state where setting is legal at all.
-    pub fn check_settable<K: Key>(&self, key: K) -> Result<(), Refusal> {
-        let variable = key.variable();
-        let settable = match self.session.state {
-            State::Instantiated => variable.settable_at_start(false),
-            State::InitializationMode => variable.settable_at_start(true),
-            State::ContinuousTimeMode => variable.settable_in_continuous_time(),
-            _ => variable.settable_between_steps(),
-        };
-        if settable {
-            return Ok(());
+    /// Whether a variable may be set now, in a state where setting is legal at all; answers when else.
+    #[inline]
+    pub fn check_settable<K: Key>(&self, key: K) -> Result<Occasions, Refusal> {
+        let occasions = K::OCCASIONS[key.index()];
+        if occasions.meets(Occasions::now(self.session.state)) {
+            return Ok(occasions);
         }
-        Err(not_settable(variable, self.session.state))
+        Err(not_settable(key.variable(), self.session.state))
     }
 
     /// Says that values are about to be set: what was initialised from the old ones is out of date.
+    #[inline]
     pub fn values_change(&mut self) {
-        let start = [State::Instantiated, State::InitializationMode];
-        self.session.stale |= start.contains(&self.session.state);
+        let start = State::InitializationMode as u8;
+        self.session.stale |= self.session.state as u8 <= start;
     }
 
+    /// Sets values, all or none: where `set` is refused, the component is what it was before.
+    #[cold]
+    #[inline(never)]
+    pub fn change(
+        &mut self,
+        set: impl FnOnce(&mut C) -> Result<(), Refusal>,
+    ) -> Result<(), Refusal> {
+        let mut changed = self.session.component.clone();
+        set(&mut changed)?;
+        self.session.component = changed;
+        Ok(())
+    }
+
+    #[inline]
     pub fn check_finite(key: RealOf<C>, value: f64) -> Result<(), Refusal> {
         if value.is_finite() {
             Ok(())
         } else {
-            Err(key.variable().refuse(value, "a finite number"))
+            Err(not_finite(key.variable(), value))
         }
     }
 
+    #[inline]
     pub fn do_step(&mut self, time: f64, step: f64) -> Result<(), Refusal> {
         self.check_step(time, step)?;
         let session = &mut self.session;
@@ -128,30 +140,46 @@ impl<C: Component> Instance<C> {
         Ok(())
     }
 
+    #[inline]
     fn check_step(&self, time: f64, step: f64) -> Result<(), Refusal> {
         let &Session {
             time: own,
             stop_time,
             ..
         } = &self.session;
-        if !(step.is_finite() && step >= 0.0) {
-            return Err(Refusal::error(format!(
-                "communicationStepSize = {step} s is refused; allowed is a finite number of at least 0"
-            )));
-        }
-        let tolerance = CLOCK_TOLERANCE * own.abs().max(step);
-        if !(time + step).is_finite() || (time - own).abs() > tolerance {
-            return Err(Refusal::error(format!(
-                "currentCommunicationPoint = {time} s is refused; the last step has ended at {own} s"
-            )));
-        }
-        if time > stop_time + tolerance {
-            return Err(Refusal::error(format!(
-                "a step at {time} s is refused; the experiment was set up to end at stopTime = {stop_time} s"
-            )));
+        let size = if own.abs() > step { own.abs() } else { step };
+        let tolerance = CLOCK_TOLERANCE * size;
+        let in_order = (time - own).abs() <= tolerance && time <= stop_time + tolerance;
+        let sane = (0.0..=f64::MAX).contains(&step) && (time + step).is_finite();
+        if !(sane && in_order) {
+            return Err(out_of_order((time, step), own, stop_time));
         }
         self.session.component.accept_step(step)
     }
+}
+
+/// Why a step cannot be made.
+#[cold]
+fn out_of_order((time, step): (f64, f64), own: f64, stop_time: f64) -> Refusal {
+    let tolerance = CLOCK_TOLERANCE * own.abs().max(step);
+    Refusal::error(if !(0.0..=f64::MAX).contains(&step) {
+        format!(
+            "communicationStepSize = {step} s is refused; allowed is a finite number of at least 0"
+        )
+    } else if time > stop_time + tolerance && (time - own).abs() <= tolerance {
+        format!(
+            "a step at {time} s is refused; the experiment was set up to end at stopTime = {stop_time} s"
+        )
+    } else {
+        format!(
+            "currentCommunicationPoint = {time} s is refused; the last step has ended at {own} s"
+        )
+    })
+}
+
+#[cold]
+fn not_finite(variable: &Variable<f64>, value: f64) -> Refusal {
+    variable.refuse(value, "a finite number")
 }
 
 #[cold]

@@ -38,7 +38,14 @@
 //! in `ModelStructure`, once; `src/fmu/exchange.rs` of the plant `lovines` is an example.
 //!
 //! The FMU is a zip of the description, as `fmi2_component_build::describe` completes it, and of the library as
-//! `binaries/linux64/<modelIdentifier>.so` (or the platform's equivalent).
+//! `binaries/linux64/<modelIdentifier>.so` (or the platform's equivalent). The example program `pack` of
+//! `fmi2-component-build` makes it:
+//!
+//! ```sh
+//! cargo build --release -p fmi2-example-tank
+//! cargo run -p fmi2-component-build --example pack -- \
+//!     fmi2-component/example/modelDescription.xml target/release/libfmi2_example_tank.so .
+//! ```
 //!
 //! # What a component can rely on
 //!
@@ -73,6 +80,7 @@
 //! | model exchange | all functions, where the component is [`ModelExchange`]; else refused with a reason |
 //! | real, integer, enumeration, Boolean, string variables | yes; no aliases (two variables with one value reference) |
 //! | tunable parameters | between steps |
+//! | several values in one call | all are set or none, whoever refuses one |
 //! | FMU states: get, set, free | yes, by [`Clone`]; those that a master forgets are freed with the instance |
 //! | FMU states: serialise | by [`Component::archive`]; blobs of another model, another version or damaged ones are refused |
 //! | input and output derivatives, directional derivatives | where the component provides them |
@@ -91,6 +99,7 @@ mod life_cycle;
 mod log;
 mod model;
 mod model_exchange;
+mod occasion;
 mod refusal;
 mod serial;
 mod session;
@@ -103,6 +112,7 @@ pub use component::{BooleanOf, Component, IntegerOf, RealOf, StringOf};
 pub use log::{Category, Log, Logger};
 pub use model::{Key, Model};
 pub use model_exchange::{Discrete, ModelExchange};
+pub use occasion::Occasions;
 pub use refusal::{Refusal, Severity};
 pub use status::Status;
 pub use variable::{Causality, Initial, Variability, Variable};

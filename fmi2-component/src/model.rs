@@ -1,5 +1,6 @@
 //! The shape of what the build step generates from `modelDescription.xml`.
 
+use crate::occasion::Occasions;
 use crate::variable::Variable;
 
 /// A model's identity and its variables; implemented by the generated type `Model`.
@@ -38,6 +39,8 @@ pub trait Key: Copy + 'static {
     const VARIABLES: &'static [Variable<Self::Value>];
     /// All of them, in the same order.
     const ALL: &'static [Self];
+    /// When each of them may be set: [`Occasions::table`] of `VARIABLES`.
+    const OCCASIONS: &'static [Occasions];
 
     /// The variable with that value reference.
     fn find(value_reference: u32) -> Option<Self>;

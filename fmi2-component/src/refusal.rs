@@ -19,11 +19,10 @@ pub enum Severity {
 ///
 /// Any error type converts into a refusal of severity [`Severity::Error`], so that `?` works on a component's own
 /// errors. (For that blanket conversion a refusal is not itself a `std::error::Error`.)
+///
+/// It is as small as a pointer: every call that succeeds hands on that there is none.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Refusal {
-    severity: Severity,
-    message: Box<str>,
-}
+pub struct Refusal(Box<(Severity, String)>);
 
 impl Refusal {
     /// The call could not be done, and changed nothing.
@@ -41,25 +40,23 @@ impl Refusal {
         Self::new(Severity::Fatal, message)
     }
 
+    #[cold]
     fn new(severity: Severity, message: impl Into<String>) -> Self {
-        Self {
-            severity,
-            message: message.into().into(),
-        }
+        Self(Box::new((severity, message.into())))
     }
 
     /// How bad it is.
     pub fn severity(&self) -> Severity {
-        self.severity
+        self.0.0
     }
 
     /// What, where, and what was expected.
     pub fn message(&self) -> &str {
-        &self.message
+        &self.0.1
     }
 
     pub(crate) fn status(&self) -> Status {
-        match self.severity {
+        match self.severity() {
             Severity::Discard => Status::Discard,
             Severity::Error => Status::Error,
             Severity::Fatal => Status::Fatal,

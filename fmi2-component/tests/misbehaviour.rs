@@ -7,7 +7,8 @@ use std::ptr::null_mut;
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 
 use fmi2_component::{
-    Causality, Component, Initial, Key, Log, Model, Refusal, Status, Variability, Variable,
+    Causality, Component, Initial, Key, Log, Model, Occasions, Refusal, Status, Variability,
+    Variable,
 };
 use master::*;
 
@@ -43,6 +44,7 @@ impl<T: 'static> Key for Nothing<T> {
     type Value = T;
     const VARIABLES: &'static [Variable<T>] = &[];
     const ALL: &'static [Self] = &[];
+    const OCCASIONS: &'static [Occasions] = &[];
 
     fn find(_: u32) -> Option<Self> {
         None
@@ -73,6 +75,7 @@ impl Key for Mood {
         description: "",
     }];
     const ALL: &'static [Self] = &[Self];
+    const OCCASIONS: &'static [Occasions] = &Occasions::table::<_, 1>(Self::VARIABLES);
 
     fn find(value_reference: u32) -> Option<Self> {
         (value_reference == 0).then_some(Self)

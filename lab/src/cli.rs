@@ -6,8 +6,10 @@ mod controller;
 mod door;
 mod failure;
 mod identify;
+mod map;
 mod orbit;
 mod pack;
+mod report;
 mod rig;
 mod scene_arguments;
 mod serving;
@@ -31,6 +33,8 @@ Examples:
   vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
   vines orbit --response                       the exact frequency response, stable and unstable
   vines theory --scene scenes/dimensionless.toml --set plant.epsilon=0.0042
+  vines map                                    which regime where, over sigma and G
+  vines report --out report                    all of it on one page, with pictures
   vines pack --out fmus                        write LoViNes.fmu and PhaseLock.fmu
   vines rig --listen 127.0.0.1:5510            serve the plant in real time, for identify --rig udp://127.0.0.1:5510
 
@@ -51,6 +55,8 @@ enum Command {
     Chain(chain::Arguments),
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
+    Map(map::Arguments),
+    Report(report::Arguments),
     Pack(pack::Arguments),
     Rig(rig::Arguments),
     Controller(controller::Arguments),
@@ -64,6 +70,8 @@ pub fn run() -> ExitCode {
         Command::Chain(arguments) => chain::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
+        Command::Map(arguments) => map::run(&arguments),
+        Command::Report(arguments) => report::run(&arguments),
         Command::Pack(arguments) => pack::run(&arguments),
         Command::Rig(arguments) => rig::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),

@@ -11,6 +11,7 @@ pub mod backbone;
 pub mod experiment;
 mod files;
 pub mod identification;
+pub mod map;
 pub mod net;
 pub mod orbit;
 pub mod pack;

@@ -1,19 +1,36 @@
 //! What a person and a program get to see: files, pictures, a short table.
 
 mod backbone;
+mod backbones;
 mod chart;
+mod history;
+mod lines;
 mod manifold;
+mod map;
+mod page;
+mod period;
+mod responses;
+mod section;
+mod sections;
+mod study;
 mod table;
+mod theme;
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
+use serde::Serialize;
 use thiserror::Error;
 
 use crate::files::temporary;
 use crate::identification::Identification;
+use crate::map::{Cell, Map, Point};
 
+pub use section::{Attachment, Block, Budget, Section};
+pub use sections::{Maker, SECTIONS, Subject};
+pub use study::{Progress, Report, write_report};
 pub use table::table;
+pub use theme::dark;
 
 /// Why a report could not be written.
 #[derive(Debug, Error)]
@@ -43,18 +60,43 @@ pub enum ReportError {
 /// # Errors
 /// A folder or file that cannot be written.
 pub fn write(found: &Identification, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let format = |name| move |message: String| ReportError::Format { name, message };
     let json = serde_json::to_string_pretty(found)
         .map_err(|error| format("identification.json")(error.to_string()))?;
     let files = [
         ("identification.json", json + "\n"),
-        ("backbone.csv", csv(found).map_err(format("backbone.csv"))?),
+        (
+            "backbone.csv",
+            csv(&found.decay).map_err(format("backbone.csv"))?,
+        ),
         (
             "backbone.svg",
             backbone::draw(found).map_err(format("backbone.svg"))?,
         ),
         ("sim.svg", manifold::draw(found).map_err(format("sim.svg"))?),
     ];
+    write_files(out, &files)
+}
+
+/// Writes `map.csv`, `map.svg` and `map-dark.svg` into `out` and returns their paths, as [`write()`] does.
+///
+/// # Errors
+/// A folder or file that cannot be written.
+pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
+    let rows = map.cells.iter().map(map_row);
+    let picture = map::draw(map).map_err(format("map.svg"))?;
+    let files = [
+        ("map.csv", csv(rows).map_err(format("map.csv"))?),
+        ("map-dark.svg", dark(&picture)),
+        ("map.svg", picture),
+    ];
+    write_files(out, &files)
+}
+
+fn format(name: &'static str) -> impl Fn(String) -> ReportError {
+    move |message| ReportError::Format { name, message }
+}
+
+fn write_files(out: &Path, files: &[(&str, String)]) -> Result<Vec<PathBuf>, ReportError> {
     let refused = |path: &Path| {
         let path = path.to_path_buf();
         move |source| ReportError::Write { path, source }
@@ -72,11 +114,47 @@ pub fn write(found: &Identification, out: &Path) -> Result<Vec<PathBuf>, ReportE
     Ok(written)
 }
 
-/// The decay as a table, one row a point.
-fn csv(found: &Identification) -> Result<String, String> {
+/// One row of the map's table.
+#[derive(Serialize)]
+struct MapRow {
+    sigma: f64,
+    #[serde(rename = "G")]
+    g: f64,
+    r: f64,
+    regime: &'static str,
+    impacts_per_period: f64,
+    impacts: usize,
+    periods: u32,
+    growth: Option<f64>,
+    theory_stable: bool,
+}
+
+fn map_row(cell: &Cell) -> MapRow {
+    let Point {
+        regime,
+        impacts_per_period,
+        impacts,
+        periods,
+        growth,
+    } = cell.point;
+    MapRow {
+        sigma: cell.sigma,
+        g: cell.g,
+        r: cell.r,
+        regime: regime.name(),
+        impacts_per_period,
+        impacts,
+        periods,
+        growth,
+        theory_stable: cell.theory_stable,
+    }
+}
+
+/// A table, one row an item.
+fn csv<T: Serialize>(rows: impl IntoIterator<Item = T>) -> Result<String, String> {
     let mut writer = csv::Writer::from_writer(Vec::new());
-    for point in &found.decay {
-        writer.serialize(point).map_err(|error| error.to_string())?;
+    for row in rows {
+        writer.serialize(row).map_err(|error| error.to_string())?;
     }
     let bytes = writer.into_inner().map_err(|error| error.to_string())?;
     String::from_utf8(bytes).map_err(|error| error.to_string())

@@ -95,6 +95,19 @@ impl Scene {
         }
     }
 
+    /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
+    #[must_use]
+    pub fn dimensionless_start(&self) -> [f64; 4] {
+        let (length, rate) = (self.plant.half_width, self.plant.omega0());
+        let Start { q1, dq1, q2, dq2 } = self.start;
+        [
+            q1 / length,
+            dq1 / (length * rate),
+            q2 / length,
+            dq2 / (length * rate),
+        ]
+    }
+
     /// The controller's sample time, s.
     #[must_use]
     pub fn sample_time(&self) -> f64 {

@@ -106,3 +106,85 @@ fn packing_refuses_what_it_cannot_pack_before_it_writes() {
     fails(&pack(&["--portable"]), 2, "--portable cannot be done");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
+
+#[test]
+fn curves_and_settled_orbits_come_as_json_too() {
+    let backbone = json(&["orbit", "--backbone", "--json"]);
+    assert!(backbone["points"].as_array().map_or(0, Vec::len) > 100);
+    let response = json(&["orbit", "--response", "--json", "--set", "excitation.G=1.6"]);
+    assert!(
+        response["symmetric"]["special"]
+            .as_array()
+            .map_or(0, Vec::len)
+            >= 3
+    );
+    assert_eq!(response["asymmetric"].as_array().map(Vec::len), Some(1));
+    let settled = json(&[
+        "orbit",
+        "--sigma=-0.6",
+        "--json",
+        "--set",
+        "excitation.G=2.2",
+    ]);
+    assert_eq!(settled["bounces"].as_array().map(Vec::len), Some(6));
+    let study = json(&["orbit", "--convergence", "--json"]);
+    assert!((study["slopes"][0].as_f64().unwrap() - 1.0).abs() < 0.05);
+    let theory = json(&["theory", "--sigma=-1", "--json"]);
+    assert_eq!(theory["equilibria"].as_array().map(Vec::len), Some(2));
+}
+
+#[test]
+fn a_map_is_written_as_table_and_pictures() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let output = vines(&[
+        "map",
+        "--x",
+        "sigma=-2:1:4",
+        "--y",
+        "G=1:1.4:3",
+        "--settle",
+        "200",
+        "--out",
+        out,
+    ]);
+    assert!(output.status.success(), "{output:?}");
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    assert!(
+        text.contains("symmetric 1:1") && text.contains("map-dark.svg"),
+        "{text}"
+    );
+    let rows = std::fs::read_to_string(folder.path().join("map.csv")).unwrap();
+    assert_eq!(rows.lines().count(), 1 + 12);
+    assert!(
+        rows.starts_with(
+            "sigma,G,r,regime,impacts_per_period,impacts,periods,growth,theory_stable"
+        )
+    );
+}
+
+#[test]
+fn absurd_curves_and_maps_are_refused() {
+    fails(&["orbit", "--sigma=-1000"], 2, "above 0");
+    fails(
+        &["orbit", "--sigma=-1", "--set", "excitation.G=0.6"],
+        1,
+        "vines map",
+    );
+    fails(
+        &["orbit", "--response", "--set", "excitation.G=0.1"],
+        1,
+        "G = 0.1",
+    );
+    fails(&["theory", "--sigma=nan"], 2, "finite");
+    fails(
+        &["map", "--x", "G=1:2:3", "--y", "G=1:2:3"],
+        2,
+        "both axes are G",
+    );
+    fails(
+        &["report", "--x", "r=0.5:1:3", "--y", "r=0.5:1:3"],
+        2,
+        "both r",
+    );
+}

@@ -88,16 +88,7 @@ fn response(g: f64) -> (Dimensionless, Branch) {
 /// The plant, started on the motion, for so many periods: the largest distance from its own start after each.
 fn distance_of_plant(scene: &Dimensionless, motion: &Periodic, periods: u32) -> f64 {
     let [q1, dq1, q2, dq2] = motion.start(scene).expect("a state at phase zero");
-    let parameters = lovines::Parameters {
-        primary_mass: 1.0,
-        stiffness: 1.0,
-        damping: scene.epsilon * scene.lambda,
-        particle_mass: scene.epsilon,
-        half_width: 1.0,
-        restitution: scene.r,
-    };
-    let start = lovines::State { q1, dq1, q2, dq2 };
-    let mut plant = lovines::Plant::new(parameters, start).unwrap();
+    let mut plant = scene.plant([q1, dq1, q2, dq2]).unwrap();
     let omega = 1.0 + scene.epsilon * motion.sigma;
     let drive = lovines::Drive::harmonic(scene.epsilon * motion.g, omega);
     let whole = motion.shape.periods();
@@ -254,7 +245,6 @@ fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
 
 #[test]
 fn motions_with_more_impacts_are_found_where_they_settle() {
-    let start = from_theory(&scene(1.1), 0.88).unwrap().bounces[0];
     let mut patterns = Vec::new();
     for (g, sigma) in [
         (1.1, -1.14),
@@ -265,7 +255,7 @@ fn motions_with_more_impacts_are_found_where_they_settle() {
         (8.0, 2.0),
     ] {
         let scene = scene(g);
-        if let Some(motion) = settle(&scene, sigma, &start, 3000) {
+        if let Some(motion) = settle(&scene, sigma, [0.0, 0.0, 0.0, 0.9], 800).unwrap() {
             assert!(motion.stable && distance_of_plant(&scene, &motion, 3) < 1e-9);
             patterns.push((
                 motion.shape.impacts(),
@@ -277,6 +267,35 @@ fn motions_with_more_impacts_are_found_where_they_settle() {
     println!("impacts, periods, mirrored: {patterns:?}");
     assert!(patterns.contains(&(2, 1, true)));
     assert!(patterns.iter().any(|(impacts, ..)| *impacts > 2));
+}
+
+#[test]
+fn a_motion_with_more_impacts_is_followed_like_any_other() {
+    let scene = scene(2.2);
+    let motion = settle(&scene, -0.6, [0.0, 0.0, 0.0, 0.9], 800)
+        .unwrap()
+        .expect("a pattern");
+    assert!(motion.shape.impacts() > 2);
+    let limits = Limits {
+        points: 40,
+        ..Limits::default()
+    };
+    let branch = continue_both_ways(&scene, &motion, Condition::Excitation(2.2), &limits);
+    let kinds: Vec<_> = branch
+        .special
+        .iter()
+        .map(|one| (one.kind, one.motion.sigma))
+        .collect();
+    println!(
+        "{} impacts in {} periods, followed through {} motions: {kinds:?}",
+        motion.shape.impacts(),
+        motion.shape.periods(),
+        branch.points.len()
+    );
+    assert!(branch.points.len() > 20);
+    for motion in branch.points.iter().step_by(7) {
+        assert!(distance_of_plant(&scene, motion, 1) < 1e-9);
+    }
 }
 
 #[test]

@@ -36,11 +36,7 @@ impl LoViNes {
     /// The plant as it stands, with the inputs as they are set now.
     pub(super) fn instant(&self, plant: &Plant) -> Instant<f64> {
         let (p, state) = (&self.parameters, plant.state());
-        let base = if self.inputs_set {
-            plant.base().with(self.drive())
-        } else {
-            *plant.base()
-        };
+        let base = self.base_motion(plant);
         Instant {
             primary_mass: p.primary_mass,
             stiffness: p.stiffness,

@@ -7,22 +7,25 @@ use crate::hybrid::Hybrid;
 use crate::{Drive, Parameters, State};
 use fmi2_component::{Discrete, Log, ModelExchange, Refusal};
 
-/// A value that follows from the equations' state.
-pub(super) fn of_hybrid(hybrid: &Hybrid, variable: Real) -> f64 {
-    match variable {
-        Real::q1 => hybrid.states.q1,
-        Real::q2 => hybrid.states.q2,
-        Real::phase => hybrid.states.phase,
-        Real::u1 => hybrid.states.u1,
-        Real::u2 => hybrid.states.u2,
-        Real::impact_time => hybrid.tally().impact_time,
-        Real::impact_velocity => hybrid.tally().impact_velocity,
-        Real::dissipated => hybrid.tally().dissipated,
-        _ => of_instant(&hybrid.instant(), variable),
-    }
-}
-
 impl LoViNes {
+    /// A value that was set, or that follows from the equations' state.
+    #[inline(never)]
+    pub(super) fn of_equations(&self, hybrid: &Hybrid, variable: Real) -> f64 {
+        match variable {
+            Real::q1 => hybrid.states.q1,
+            Real::q2 => hybrid.states.q2,
+            Real::phase => hybrid.states.phase,
+            Real::u1 => hybrid.states.u1,
+            Real::u2 => hybrid.states.u2,
+            Real::impact_time => hybrid.tally().impact_time,
+            Real::impact_velocity => hybrid.tally().impact_velocity,
+            Real::dissipated => hybrid.tally().dissipated,
+            _ => {
+                (self.setting(variable)).unwrap_or_else(|| of_instant(&hybrid.instant(), variable))
+            }
+        }
+    }
+
     fn hybrid(&self) -> &Hybrid {
         match &self.rig {
             Rig::Equations(hybrid) => hybrid,

@@ -1,7 +1,7 @@
 """What the FMUs say of themselves."""
 
 import pytest
-from fmpy import supported_platforms
+from fmpy import simulate_fmu, supported_platforms
 from fmpy.validation import validate_fmu
 
 PLANT = {
@@ -99,3 +99,24 @@ def test_amplitude_and_phase_target_can_be_tuned_while_it_runs(fmus):
     for name in ("amplitude", "phase_target"):
         assert fmus["PhaseLock"].variable(name).variability == "tunable"
     assert float(fmus["PhaseLock"].variable("phase_target").start) == pytest.approx(-1.5707963267948966)
+
+
+@pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
+def test_every_real_variable_has_a_unit_and_says_of_what_kind_and_size_it_is(fmus, name):
+    for variable in fmus[name].description.modelVariables:
+        if variable.type == "Real":
+            declared = variable.declaredType
+            assert variable.unit, variable.name
+            assert declared is not None or variable.quantity or variable.unit == "1", variable.name
+            bounds = [one for one in (variable, declared) if one is not None]
+            said = [one.min or one.max or one.nominal for one in bounds]
+            assert any(said) or variable.quantity in ("Angle", "Time"), variable.name
+
+
+def test_the_default_experiment_shows_impacts(fmus):
+    default = fmus["LoViNes"].description.defaultExperiment
+    assert float(default.startTime) == 0
+    found = simulate_fmu(str(fmus["LoViNes"].path), output=["impacts", "impact_time"])
+    assert found["time"][-1] == float(default.stopTime)
+    assert found["impacts"][-1] > 1
+    assert found["impact_time"][found["impacts"] > 0][0] == pytest.approx(0.01 / 0.015, rel=1e-9)

@@ -63,8 +63,9 @@ impl Fmu {
         // SAFETY: it is ours, and loading it runs no code of its own.
         let library = unsafe { Library::new(&path) };
         let library = library.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
-        // SAFETY: an FMI 2.0 library, which is leaked.
-        let functions = unsafe { Functions::load(Box::leak(Box::new(library))) };
+        // SAFETY: an FMI 2.0 library, which stays loaded since nobody drops it.
+        let functions = unsafe { Functions::load(&library) };
+        std::mem::forget(library);
         Self {
             name,
             functions: functions.unwrap_or_else(|error| panic!("{}: {error}", path.display())),

@@ -167,6 +167,18 @@ impl Master {
         value
     }
 
+    /// The plant's count of impacts.
+    ///
+    /// # Panics
+    /// If it cannot be read.
+    #[must_use]
+    pub fn impacts(&self) -> i32 {
+        let mut value = -1;
+        // SAFETY: one reference, one place.
+        self.well(unsafe { (self.f.fmi2GetInteger)(self.c, &18, 1, &mut value) });
+        value
+    }
+
     /// Sets a real variable.
     #[must_use]
     pub fn set_real(&self, vr: u32, value: f64) -> Status {

@@ -78,6 +78,42 @@ fn unknown_references_are_refused_before_anything_is_set() {
 }
 
 #[test]
+fn where_one_of_several_values_is_refused_none_is_set() {
+    // Stiffness and restitution are tunable: the first value is fine, the second is refused by the component itself.
+    refused("at most 1", |m| {
+        let (vr, values) = ([1, E, 5], [9000.0, 0.5, 1.5]);
+        unsafe { (m.f.fmi2SetReal)(m.c, vr.as_ptr(), 3, values.as_ptr()) }
+    });
+    refused("finite", |m| {
+        let (vr, values) = ([E, OMEGA], [0.5, f64::NAN]);
+        unsafe { (m.f.fmi2SetReal)(m.c, vr.as_ptr(), 2, values.as_ptr()) }
+    });
+    refused("cannot be set", |m| {
+        let (vr, values) = ([E, Q1], [0.5, 0.5]);
+        unsafe { (m.f.fmi2SetReal)(m.c, vr.as_ptr(), 2, values.as_ptr()) }
+    });
+    refused("orders 1 to 3", |m| {
+        let (vr, orders, values) = ([E, E], [1, 4], [0.5, 0.5]);
+        let f = m.f.fmi2SetRealInputDerivatives;
+        unsafe { f(m.c, vr.as_ptr(), 2, orders.as_ptr(), values.as_ptr()) }
+    });
+}
+
+#[test]
+fn a_controller_tuned_to_nonsense_takes_no_part_of_it() {
+    let m = Master::ready(&Fmu::controller());
+    m.well(m.step(0.0, 0.1));
+    let before = m.bytes();
+    // amplitude is fine, phase_target is not.
+    let (vr, values) = ([5, 10], [1e-5, 7.0]);
+    // SAFETY: arrays of two.
+    let status = unsafe { (m.f.fmi2SetReal)(m.c, vr.as_ptr(), 2, values.as_ptr()) };
+    assert_eq!(status, Status::Error);
+    assert!(m.heard()[0].text.contains("between -pi and pi"));
+    assert_eq!(m.bytes(), before);
+}
+
+#[test]
 fn a_reference_of_another_type_is_refused() {
     refused("type i32", |m| unsafe {
         (m.f.fmi2GetInteger)(m.c, &Q1, 1, &mut 0)

@@ -108,19 +108,12 @@ impl ::fmi2_component::Key for {kind:?} {{
         out,
         "    ];
     const ALL: &'static [Self] = &[{}];
-
-    #[inline]
-    fn find(value_reference: u32) -> ::core::option::Option<Self> {{
-        match value_reference {{",
-        all.join(", ")
+    const OCCASIONS: &'static [::fmi2_component::Occasions] = &::fmi2_component::Occasions::table::<_, {}>(Self::VARIABLES);
+",
+        all.join(", "),
+        all.len()
     )?;
-    for (variable, variant) in variables.iter().zip(&variants) {
-        writeln!(
-            out,
-            "            {} => ::core::option::Option::Some(Self::{variant}),",
-            variable.value_reference
-        )?;
-    }
+    find(out, kind, variables, &variants)?;
     // An enum without variants has no number.
     let index = if variables.is_empty() {
         "match self {}"
@@ -129,10 +122,7 @@ impl ::fmi2_component::Key for {kind:?} {{
     };
     writeln!(
         out,
-        "            _ => ::core::option::Option::None,
-        }}
-    }}
-
+        "
     #[inline]
     fn index(self) -> usize {{
         {index}
@@ -140,6 +130,51 @@ impl ::fmi2_component::Key for {kind:?} {{
 }}
 "
     )
+}
+
+/// How a variable is found by its value reference: by its place in a table, unless that would be mostly holes.
+fn find(
+    out: &mut String,
+    kind: Kind,
+    variables: &[&Variable],
+    variants: &[String],
+) -> std::fmt::Result {
+    let named = || variables.iter().map(|v| v.value_reference).zip(variants);
+    let places = variables.iter().map(|v| v.value_reference as usize + 1);
+    let places = places.max().unwrap_or(0);
+    writeln!(
+        out,
+        "    #[inline]
+    fn find(value_reference: u32) -> ::core::option::Option<Self> {{"
+    )?;
+    if places <= 4 * variables.len() + 64 {
+        let mut table = vec!["::core::option::Option::None".to_owned(); places];
+        for (reference, variant) in named() {
+            table[reference as usize] =
+                format!("::core::option::Option::Some({kind:?}::{variant})");
+        }
+        let entries = table.join(", ");
+        writeln!(
+            out,
+            "        const TABLE: [::core::option::Option<{kind:?}>; {places}] = [{entries}];
+        TABLE.get(value_reference as usize).copied().flatten()
+    }}"
+        )
+    } else {
+        writeln!(out, "        match value_reference {{")?;
+        for (reference, variant) in named() {
+            writeln!(
+                out,
+                "            {reference} => ::core::option::Option::Some(Self::{variant}),"
+            )?;
+        }
+        writeln!(
+            out,
+            "            _ => ::core::option::Option::None,
+        }}
+    }}"
+        )
+    }
 }
 
 fn doc(v: &Variable) -> String {

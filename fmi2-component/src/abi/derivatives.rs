@@ -36,12 +36,14 @@ pub unsafe fn set_real_input_derivatives<C: Component>(
             check(key, order, Causality::Input, "an input")?;
             Instance::<C>::check_finite(key, value)?;
         }
+        instance.change(|component| {
+            for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
+                let (key, order) = (find(reference)?, order.unsigned_abs());
+                component.set_real_input_derivative(key, order, value)?;
+            }
+            Ok(())
+        })?;
         instance.values_change();
-        for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
-            let (key, order) = (find(reference)?, order.unsigned_abs());
-            let component = &mut instance.session.component;
-            component.set_real_input_derivative(key, order, value)?;
-        }
         Ok(())
     };
     let function = Function::SetRealInputDerivatives;

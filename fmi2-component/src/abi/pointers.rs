@@ -39,6 +39,46 @@ pub(super) unsafe fn output<'a, T>(
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), count) })
 }
 
+/// The elements of two arrays that belong together, to be read.
+#[inline]
+pub(super) unsafe fn inputs<'a, T, U>(
+    (first, second): (*const T, *const U),
+    count: usize,
+    what: &[&str; 2],
+) -> Result<(&'a [T], &'a [U]), Refusal> {
+    if count == 0 {
+        return Ok((&[], &[]));
+    }
+    check_both((first, second), count, what)?;
+    // SAFETY: neither is NULL, both are aligned, of a sane size, and by the contract of `abi` as long as the count says.
+    Ok(unsafe {
+        (
+            std::slice::from_raw_parts(first, count),
+            std::slice::from_raw_parts(second, count),
+        )
+    })
+}
+
+/// The elements of an array that is read, and the places of one that is written.
+#[inline]
+pub(super) unsafe fn input_and_output<'a, T, U>(
+    (first, second): (*const T, *mut U),
+    count: usize,
+    what: &[&str; 2],
+) -> Result<(&'a [T], &'a mut [MaybeUninit<U>]), Refusal> {
+    if count == 0 {
+        return Ok((&[], &mut []));
+    }
+    check_both((first, second.cast_const()), count, what)?;
+    // SAFETY: as above; what the master's memory holds now is not looked at.
+    Ok(unsafe {
+        (
+            std::slice::from_raw_parts(first, count),
+            std::slice::from_raw_parts_mut(second.cast(), count),
+        )
+    })
+}
+
 /// The place of a single answer.
 #[inline]
 pub(super) unsafe fn place<'a, T>(
@@ -64,6 +104,32 @@ fn check<T>(pointer: *const T, count: usize, what: &str) -> Result<(), Refusal> 
         return Err(refuse(pointer.is_null(), count, what));
     }
     Ok(())
+}
+
+#[inline]
+fn check_both<T, U>(
+    (first, second): (*const T, *const U),
+    count: usize,
+    what: &[&str; 2],
+) -> Result<(), Refusal> {
+    let aligned = first.is_aligned() & second.is_aligned();
+    if !aligned | first.is_null() | second.is_null() | (count > MOST) {
+        return Err(refuse_one((first, second), count, what));
+    }
+    Ok(())
+}
+
+#[cold]
+#[inline(never)]
+fn refuse_one<T, U>(
+    (first, second): (*const T, *const U),
+    count: usize,
+    what: &[&str; 2],
+) -> Refusal {
+    match check(first, count, what[0]) {
+        Err(refusal) => refusal,
+        Ok(()) => refuse(second.is_null(), count, what[1]),
+    }
 }
 
 #[cold]

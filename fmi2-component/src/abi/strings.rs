@@ -69,10 +69,13 @@ pub unsafe fn set_string<C: Component>(
             })?;
             settings.push((key, value));
         }
+        instance.change(|component| {
+            for (key, value) in settings {
+                component.set_string(key, &value)?;
+            }
+            Ok(())
+        })?;
         instance.values_change();
-        for (key, value) in settings {
-            instance.session.component.set_string(key, &value)?;
-        }
         Ok(())
     };
     // SAFETY: the contract is passed on.

@@ -3,12 +3,13 @@
 use std::ffi::c_int;
 
 use super::entry::enter;
-use super::pointers::{input, output};
+use super::pointers::{input_and_output, inputs};
 use super::types::{CBoolean, CComponent, CValueReference};
 use crate::component::Component;
 use crate::instance::Instance;
 use crate::life_cycle::Function;
 use crate::model::Key;
+use crate::occasion::Occasions;
 use crate::refusal::Refusal;
 use crate::status::Status;
 
@@ -97,12 +98,8 @@ unsafe fn get<C: Component, K: Key, T>(
 ) -> Status {
     let body = |instance: &mut Instance<C>| {
         // SAFETY: the arrays are as long as their count, by contract.
-        let (references, values) = unsafe {
-            (
-                input(references, count, "vr")?,
-                output(values, count, "value")?,
-            )
-        };
+        let (references, values) =
+            unsafe { input_and_output((references, values), count, &["vr", "value"]) }?;
         if instance.session.stale {
             refresh_for::<C, K>(instance, references)?;
         }
@@ -128,26 +125,38 @@ unsafe fn set<C: Component, K: Key, T>(
 ) -> Status {
     let body = |instance: &mut Instance<C>| {
         // SAFETY: the arrays are as long as their count, by contract.
-        let (references, values) = unsafe {
-            (
-                input(references, count, "vr")?,
-                input(values, count, "value")?,
-            )
-        };
+        let (references, values) =
+            unsafe { inputs((references, values), count, &["vr", "value"]) }?;
         // All are checked before the first is set.
+        let mut common = Occasions::ALL;
         for (&reference, value) in references.iter().zip(values) {
             let key = find::<K>(reference)?;
-            instance.check_settable(key)?;
+            common = common.and(instance.check_settable(key)?);
             check(key, value)?;
         }
-        instance.values_change();
-        for (&reference, value) in references.iter().zip(values) {
-            write(&mut instance.session.component, find(reference)?, value)?;
+        if count <= 1 || C::TAKES_EVERY_INPUT && common.is_input() {
+            set_each(&mut instance.session.component, references, values, &write)?;
+        } else {
+            instance.change(|component| set_each(component, references, values, &write))?;
         }
+        instance.values_change();
         Ok(())
     };
     // SAFETY: the contract is passed on.
     unsafe { enter(component, function, name, body) }
+}
+
+#[inline]
+fn set_each<C, K: Key, T>(
+    component: &mut C,
+    references: &[CValueReference],
+    values: &[T],
+    write: &impl Fn(&mut C, K, &T) -> Result<(), Refusal>,
+) -> Result<(), Refusal> {
+    for (&reference, value) in references.iter().zip(values) {
+        write(component, find(reference)?, value)?;
+    }
+    Ok(())
 }
 
 /// Makes computed values right in Initialization Mode; reading back what was set needs no more than that.

@@ -5,8 +5,8 @@ use std::fmt::Write;
 use clap::Args;
 use vines::{
     orbit::{
-        Bifurcation, Branch, Limits, Orbit, Periodic, backbone, convergence, phase_resonant,
-        response,
+        Bifurcation, Branch, Condition, Limits, Orbit, Periodic, backbone, continue_both_ways,
+        convergence, phase_resonant, response, settle,
     },
     scene::Dimensionless,
 };
@@ -29,6 +29,7 @@ ones alike; --json prints all of them.
 Examples:
   vines orbit
   vines orbit --response --set excitation.G=1.6
+  vines orbit --sigma=-0.6 --set excitation.G=2.2   whatever settles there, here six impacts in two periods
   vines orbit --convergence                   how theory approaches the exact orbit
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
   vines orbit --scene scenes/dimensionless.toml --json";
@@ -39,6 +40,10 @@ Examples:
 pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
+
+    /// The orbit of any pattern that the scene's start settles into at this detuning; with --response, its response is followed
+    #[arg(long, value_name = "SIGMA", allow_negative_numbers = true, conflicts_with_all = ["backbone", "convergence"])]
+    sigma: Option<f64>,
 
     /// Follow the exact backbone through the scene's phase-resonant orbit
     #[arg(long, group = "what")]
@@ -58,7 +63,11 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?.dimensionless();
+    let loaded = arguments.scene.load()?;
+    let scene = loaded.dimensionless();
+    if let Some(sigma) = arguments.sigma {
+        return settled(arguments, &scene, sigma, loaded.dimensionless_start());
+    }
     let none = || {
         Failure::run(format!(
             "there is no phase-resonant orbit to start from at G = {} (dimensionless); see `vines orbit`",
@@ -125,6 +134,77 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         parameters(&scene),
         listing(&scene, &orbits)
     ))
+}
+
+/// Periods that the motion is given to settle.
+const SETTLE: usize = 1000;
+
+/// The motion that the start leads to at one detuning, of whatever pattern, or its frequency response.
+fn settled(
+    arguments: &Arguments,
+    scene: &Dimensionless,
+    sigma: f64,
+    start: [f64; 4],
+) -> Result<String, Failure> {
+    if !(1.0 + scene.epsilon * sigma > 0.0 && sigma.is_finite()) {
+        return Err(Failure::input(format!(
+            "--sigma = {sigma} (dimensionless): it must be finite, and 1 + epsilon sigma above 0"
+        )));
+    }
+    let motion = settle(scene, sigma, start, SETTLE).map_err(Failure::input)?;
+    let motion = motion.ok_or_else(|| {
+        Failure::run(format!(
+            "from the scene's start nothing settles at sigma = {sigma} (dimensionless) within {SETTLE} periods that repeats with \
+             impacts; see `vines map`"
+        ))
+    })?;
+    let pattern = format!(
+        "{} impacts in {} period{}{}",
+        motion.shape.impacts(),
+        motion.shape.periods(),
+        if motion.shape.periods() == 1 { "" } else { "s" },
+        if motion.shape.mirrored {
+            ", mirrored"
+        } else {
+            ""
+        }
+    );
+    if arguments.response {
+        let condition = Condition::Excitation(scene.g);
+        let branch = continue_both_ways(scene, &motion, condition, &Limits::default());
+        return shown(
+            scene,
+            "Exact frequency response",
+            &branch,
+            arguments.json,
+            || curve(&pattern, &branch),
+        );
+    }
+    shown(scene, "Exact orbit", &motion, arguments.json, || {
+        let Periodic {
+            sigma, c, b, gamma, ..
+        } = motion;
+        let multipliers = motion
+            .multipliers
+            .map(|[re, im]| format!("{re:.5}{im:+.5}i"));
+        let rows: Vec<_> = motion
+            .bounces
+            .iter()
+            .map(|one| {
+                let phase = one.phase.to_degrees().rem_euclid(360.0);
+                let mut cells = vec![format!("{:+}", one.wall)];
+                cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
+                cells
+            })
+            .collect();
+        let headings = ["wall", "phase, degrees", "q1", "q1' after", "q2' after"];
+        format!(
+            "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
+            gamma.to_degrees(),
+            multipliers.join(", "),
+            table(&headings, &rows)
+        )
+    })
 }
 
 /// Halvings of epsilon in the convergence study.

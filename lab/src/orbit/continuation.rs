@@ -1,4 +1,4 @@
-//! Continuation of periodic motions by pseudo-arclength: through folds, stable and unstable parts alike.
+//! Continuation of periodic motions by pseudo-arclength: through folds, stable and unstable parts alike (docs/theory.md, eq. 27).
 //!
 //! The unknowns are the state after an impact, sigma and G; four equations close the motion and one more chooses the curve:
 //! fixed G for a frequency response, phase resonance for the backbone. The step follows the tangent and shrinks where the

@@ -1,4 +1,4 @@
-//! The impact map: from the state just after an impact to that just after the next, with its derivatives.
+//! The impact map: from the state just after an impact to that just after the next, with its derivatives (docs/theory.md, eqs. 24 and 25).
 //!
 //! Between impacts the motion is closed form. The next contact is found by steps that a bound of `|w''|` proves free of
 //! contact; they turn into Newton's as the wall comes near, so none is missed and the last is found to the last bits.
@@ -114,16 +114,26 @@ impl ImpactMap {
     /// impacts accumulate.
     #[must_use]
     pub fn next(&self, from: &Bounce) -> Option<Bounce> {
-        let flight = Flight::new(self, from);
+        self.landed(&Flight::new(self, from))
+    }
+
+    /// The state just after the first impact that follows from (q1, q1', q2, q2') at a phase of the base, rad, with the
+    /// particle inside its cavity; None as for [`Self::next`].
+    #[must_use]
+    pub fn first(&self, phase: f64, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
+        self.landed(&Flight::between(self, phase, [q1, dq1, q2, dq2], q1 - q2))
+    }
+
+    fn landed(&self, flight: &Flight) -> Option<Bounce> {
         let (duration, wall) = flight.contact()?;
         let [q1, dq1] = flight.primary(duration).into();
-        let dw = dq1 - from.dq2;
+        let dw = dq1 - flight.dq2;
         let particle = (1.0 + self.r) / (1.0 + self.epsilon);
         Some(Bounce {
-            phase: from.phase + self.omega * duration,
+            phase: flight.phase + self.omega * duration,
             q1,
             dq1: dq1 - self.epsilon * particle * dw,
-            dq2: from.dq2 + particle * dw,
+            dq2: flight.dq2 + particle * dw,
             wall,
         })
     }
@@ -225,10 +235,15 @@ impl ImpactMap {
     }
 }
 
-/// The flight that begins with one bounce.
+/// A flight of the particle.
 struct Flight<'a> {
     map: &'a ImpactMap,
-    from: &'a Bounce,
+    /// Where it begins: phase of the base, particle, and relative displacement and velocity.
+    phase: f64,
+    q2: f64,
+    dq2: f64,
+    w: f64,
+    dw: f64,
     /// State of the free part of the oscillator's motion at the start.
     free: Vector2<f64>,
     /// Bound of `|w''|`.
@@ -236,14 +251,25 @@ struct Flight<'a> {
 }
 
 impl<'a> Flight<'a> {
-    fn new(map: &'a ImpactMap, from: &'a Bounce) -> Self {
-        let free = Vector2::new(from.q1, from.dq1) - map.harmonic(from.phase);
+    /// The flight after a bounce.
+    fn new(map: &'a ImpactMap, from: &Bounce) -> Self {
+        let state = [from.q1, from.dq1, from.q2(), from.dq2];
+        Self::between(map, from.phase, state, from.wall)
+    }
+
+    /// The flight from a state with the relative displacement `w`.
+    fn between(map: &'a ImpactMap, phase: f64, [q1, dq1, q2, dq2]: State, w: f64) -> Self {
+        let free = Vector2::new(q1, dq1) - map.harmonic(phase);
         // Of the free motion q^2 + q'^2 never grows.
         let driven = (map.unit[0] * map.g).norm() * map.omega * map.omega;
         let driven = if map.g == 0.0 { 0.0 } else { driven };
         Self {
             map,
-            from,
+            phase,
+            q2,
+            dq2,
+            w,
+            dw: dq1 - dq2,
             free,
             curvature: driven + free.norm() * (1.0 + 2.0 * map.zeta),
         }
@@ -252,12 +278,11 @@ impl<'a> Flight<'a> {
     /// (q1, q1') at the time `t`.
     fn primary(&self, t: f64) -> Vector2<f64> {
         let propagator: Matrix2<f64> = self.map.oscillator.propagator(t);
-        propagator * self.free + self.map.harmonic(self.from.phase + self.map.omega * t)
+        propagator * self.free + self.map.harmonic(self.phase + self.map.omega * t)
     }
 
     /// Time and wall of the first contact.
     fn contact(&self) -> Option<(f64, f64)> {
-        let Bounce { q1, dq2, wall, .. } = *self.from;
         let horizon = LONGEST * std::f64::consts::TAU / self.map.omega;
         let k = self.curvature;
         if !k.is_finite() || k <= 0.0 {
@@ -272,8 +297,8 @@ impl<'a> Flight<'a> {
                 (root - speed) / k
             }
         };
-        let (mut t, mut w, mut dw) = (0.0, wall, self.from.dq1 - dq2);
-        if wall * dw >= 0.0 {
+        let (mut t, mut w, mut dw) = (0.0, self.w, self.dw);
+        if w.abs() >= 1.0 && w * dw >= 0.0 {
             return None;
         }
         for _ in 0..STEPS {
@@ -283,8 +308,8 @@ impl<'a> Flight<'a> {
                 return None;
             }
             let primary = self.primary(t);
-            w = primary[0] - (q1 - wall) - dq2 * t;
-            dw = primary[1] - dq2;
+            w = primary[0] - self.q2 - self.dq2 * t;
+            dw = primary[1] - self.dq2;
             let side = dw.signum();
             let gap = 1.0 - side * w;
             if gap <= 1e-15 || step <= 1e-16 * (1.0 + t) {

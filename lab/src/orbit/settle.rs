@@ -1,4 +1,9 @@
-//! Where the motion settles: impacts are followed until their pattern repeats, and the motion is polished.
+//! Where the motion settles: the plant is driven past its transient, the impacts that follow are followed until their pattern
+//! repeats, and the motion is polished.
+
+use std::f64::consts::TAU;
+
+use lovines::{Drive, InvalidValue, State};
 
 use super::{
     impact_map::{Bounce, ImpactMap},
@@ -10,38 +15,43 @@ use crate::scene::Dimensionless;
 /// Two states this close count as the same before polishing.
 const SAME: f64 = 1e-6;
 /// Longest pattern looked for, impacts.
-const LONGEST: usize = 24;
+const LONGEST: usize = 32;
 
-/// The stable periodic motion that `start` leads to at the detuning `sigma` and the scene's G, within `impacts`
-/// impacts; None where there is none, or where impacts cease or accumulate.
-#[must_use]
+/// The stable periodic motion that `start` = (q1, q1', q2, q2') has led to after so many periods at the detuning `sigma` and
+/// the scene's G; None where nothing repeats, nothing hits, or the particle sticks.
+///
+/// # Errors
+/// Parameters or a start that make no sense.
 pub fn settle(
     scene: &Dimensionless,
     sigma: f64,
-    start: &Bounce,
-    impacts: usize,
-) -> Option<Periodic> {
-    let map = ImpactMap::new(scene, 1.0 + scene.epsilon * sigma, scene.g);
-    let mut recent = Vec::new();
-    let mut at = *start;
-    for n in 0..impacts + 2 * LONGEST {
-        if n >= impacts {
-            recent.push(at);
-        }
-        at = map.next(&at)?;
-        // The phase is kept small: what it has turned by is no part of the state.
-        if at.phase > 1e3 * std::f64::consts::TAU && n + 1 == impacts {
-            at.phase = super::shape::wrapped(at.phase);
-        }
+    start: [f64; 4],
+    periods: usize,
+) -> Result<Option<Periodic>, InvalidValue> {
+    let mut plant = scene.plant(start)?;
+    let omega = 1.0 + scene.epsilon * sigma;
+    let drive = Drive::harmonic(scene.epsilon * scene.g, omega);
+    for _ in 0..periods {
+        plant.advance(drive, TAU / omega);
     }
-    let shape = pattern(&recent)?;
+    let State { q1, dq1, q2, dq2 } = plant.state();
+    Ok(settled(scene, sigma, [q1, dq1, q2, dq2]))
+}
+
+fn settled(scene: &Dimensionless, sigma: f64, state: [f64; 4]) -> Option<Periodic> {
+    let map = ImpactMap::new(scene, 1.0 + scene.epsilon * sigma, scene.g);
+    let first = map.first(0.0, state)?;
+    let bounces: Vec<Bounce> = std::iter::successors(Some(first), |from| map.next(from))
+        .take(2 * LONGEST)
+        .collect();
+    let shape = pattern(&bounces)?;
     let Bounce {
         phase,
         q1,
         dq1,
         dq2,
         ..
-    } = recent[0];
+    } = first;
     let guess = Unknowns::from([phase, q1, dq1, dq2, sigma, scene.g]);
     let conditions = [Condition::Sigma(sigma), Condition::Excitation(scene.g)];
     Periodic::find(scene, &shape, &guess, conditions)

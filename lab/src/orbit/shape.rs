@@ -1,4 +1,4 @@
-//! A pattern of impacts, and what closing it asks for: the return map, its derivative, and the first harmonic of v.
+//! A pattern of impacts, and what closing it asks for: the return map, its derivative, and the first harmonic of v (docs/theory.md, eq. 26).
 
 use std::f64::consts::{PI, TAU};
 

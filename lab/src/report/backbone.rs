@@ -3,18 +3,17 @@
 use plotters::chart::SeriesLabelPosition;
 
 use super::chart::{
-    DECAY_LABEL, EXACT, THEORY, THINNED, UNSTABLE, curve, decay_points, legend, line, locked_point,
-    plane, svg,
+    DECAY_LABEL, THINNED, caption, decay_points, legend, line, locked_point, plane, svg,
 };
+use super::lines::{Marked, clipped, pieces, thinned};
+use super::theme::{EXACT, FAINT, THEORY, UNSTABLE};
 use crate::identification::Identification;
-use crate::orbit;
-use crate::theory::{BackbonePoint, SlowFlow};
+use crate::orbit::{self, Limits};
+use crate::theory::SlowFlow;
 
 /// Amplitude drawn up to at least this, C.
 const TOP: f64 = 0.8;
-/// Frequencies at which the exact curve is computed: many, for it turns back sharply, ...
-const EXACT_POINTS: usize = 4000;
-/// ... of which those are drawn that lie this far apart, as a fraction of the picture.
+/// Distance of drawn points of the exact curve, as a fraction of the picture.
 const APART: f64 = 0.004;
 
 pub(super) fn draw(found: &Identification) -> Result<String, String> {
@@ -42,32 +41,30 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
     svg(|area| {
         let mut chart = plane(
             area,
-            "Backbone: phase resonance of the centre of mass",
-            found,
+            Some((
+                "Backbone: phase resonance of the centre of mass",
+                &caption(&found.parameters, found.lock.g),
+            )),
             ((low, high), "detuning σ = (ω/ω₀ − 1)/ε"),
             ((0.0, top), "amplitude C of v, over b"),
         )?;
-        let solid = line(THEORY, 20);
-        let label = "first-order theory, stable";
-        for (n, run) in runs(&theory, BackbonePoint::stable).into_iter().enumerate() {
-            let points = run.iter().map(|point| (point.sigma, point.c)).collect();
-            curve(&mut chart, points, solid, false, (n == 0).then_some(label))?;
+        let styles = [line(THEORY, 20), line(UNSTABLE, 20)];
+        let mut labels = [
+            Some("first-order theory, stable"),
+            Some("first-order theory, unstable"),
+        ];
+        let points: Vec<Marked> = theory
+            .iter()
+            .map(|point| ((point.sigma, point.c), point.stable()))
+            .collect();
+        pieces(&mut chart, &points, styles, &mut labels)?;
+        let styles = [line(EXACT, 16), line(FAINT, 16)];
+        let mut labels = [Some("exact orbits, stable"), Some("exact orbits, unstable")];
+        let ranges = ((low, high), (0.0, top));
+        for piece in clipped(&exact_curve(found, &slow_flow), ranges.0, ranges.1) {
+            let points = thinned(&piece, ranges.0, ranges.1, APART);
+            pieces(&mut chart, &points, styles, &mut labels)?;
         }
-        let label = "first-order theory, unstable";
-        let unstable = runs(&theory, |point| !point.stable());
-        for (n, run) in unstable.into_iter().enumerate() {
-            let points = run.iter().map(|point| (point.sigma, point.c)).collect();
-            let style = line(UNSTABLE, 20);
-            curve(&mut chart, points, style, true, (n == 0).then_some(label))?;
-        }
-        let exact = exact_curve(found, &slow_flow, (low, high), top);
-        curve(
-            &mut chart,
-            exact,
-            line(EXACT, 14),
-            false,
-            Some("exact orbits"),
-        )?;
         let decay = found.decay.iter().step_by(THINNED);
         let decay = decay.map(|point| (point.sigma, point.c));
         let inside = decay.filter(|(sigma, _)| (low..=high).contains(sigma));
@@ -77,55 +74,15 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
     })
 }
 
-/// Consecutive points for which `wanted` holds, each run with the point after it so that the curve has no holes.
-fn runs(
-    points: &[BackbonePoint],
-    wanted: impl Fn(&BackbonePoint) -> bool,
-) -> Vec<&[BackbonePoint]> {
-    let mut runs = Vec::new();
-    let mut start = None;
-    for (n, point) in points.iter().enumerate() {
-        match (wanted(point), start) {
-            (true, None) => start = Some(n),
-            (false, Some(from)) => {
-                runs.push(&points[from..=n]);
-                start = None;
-            }
-            _ => {}
-        }
-    }
-    if let Some(from) = start {
-        runs.push(&points[from..]);
-    }
-    runs
-}
-
-/// The exact backbone beyond the fold, by amplitude.
-fn exact_curve(
-    found: &Identification,
-    slow_flow: &SlowFlow,
-    (low, high): (f64, f64),
-    top: f64,
-) -> Vec<(f64, f64)> {
+/// The exact backbone beyond the fold, with its stability.
+fn exact_curve(found: &Identification, slow_flow: &SlowFlow) -> Vec<Marked> {
     let fold = slow_flow.manifold.b_min();
-    let mut points: Vec<(f64, f64)> = (0..=EXACT_POINTS)
-        .map(|n| low + (high - low) * n as f64 / EXACT_POINTS as f64)
-        .flat_map(|sigma| {
-            let omega = 1.0 + found.parameters.epsilon * sigma;
-            orbit::exact_backbone(&found.parameters, omega)
-        })
-        .filter(|orbit| orbit.b >= fold && orbit.c <= top)
-        .map(|orbit| (orbit.sigma, orbit.c))
-        .collect();
-    points.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let mut drawn: Vec<(f64, f64)> = Vec::new();
-    for point in points {
-        let far = |last: &(f64, f64)| {
-            ((point.0 - last.0) / (high - low)).hypot((point.1 - last.1) / top) >= APART
-        };
-        if drawn.last().is_none_or(far) {
-            drawn.push(point);
-        }
-    }
-    drawn
+    let branch = orbit::backbone(&found.parameters, &Limits::default());
+    branch
+        .map(|branch| branch.points)
+        .unwrap_or_default()
+        .iter()
+        .filter(|motion| motion.b >= fold)
+        .map(|motion| ((motion.sigma, motion.c), motion.stable))
+        .collect()
 }

@@ -1,38 +1,32 @@
-//! What both pictures share: size, colours, axes, caption, legend.
-//!
-//! The colours are told apart in grey as well, and every kind of line and mark differs in shape too.
+//! What the pictures share: size, axes, caption, legend, lines and marks. Their colours are in [`super::theme`].
 
 use plotters::chart::{ChartBuilder, ChartContext, SeriesLabelPosition};
 use plotters::coord::{Shift, types::RangedCoordf64};
 use plotters::prelude::*;
 
-use crate::identification::Identification;
+use super::theme::{DECAY, LOCK};
+use crate::scene::Dimensionless;
 
 pub type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 pub type Plane<'a, 'b> =
     ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
 
 /// Size of the picture, px.
-const SIZE: (u32, u32) = (860, 600);
+pub const SIZE: (u32, u32) = (860, 600);
 /// plotters rounds to whole units: drawn this many times larger, curves are smooth.
 const FINE: u32 = 8;
-pub const THEORY: RGBColor = RGBColor(40, 40, 40);
-pub const UNSTABLE: RGBColor = RGBColor(150, 150, 150);
-pub const EXACT: RGBColor = RGBColor(0, 114, 178);
-pub const DECAY: RGBColor = RGBColor(213, 94, 0);
-pub const LOCK: RGBColor = RGBColor(0, 0, 0);
 /// Of the points along the decay every so many-th is drawn.
 pub const THINNED: usize = 4;
 pub const DECAY_LABEL: &str = "free decay, identified";
-const FONT: &str = "Helvetica, Arial, sans-serif";
+pub const FONT: &str = "Helvetica, Arial, sans-serif";
 
 /// Units of the drawing for `px` pixels of the picture.
-const fn px(px: u32) -> u32 {
+pub const fn px(px: u32) -> u32 {
     px * FINE
 }
 
 /// The same, as a place.
-const fn at(px: i32) -> i32 {
+pub const fn at(px: i32) -> i32 {
     px * FINE as i32
 }
 
@@ -41,46 +35,58 @@ pub fn line(colour: RGBColor, tenths: u32) -> ShapeStyle {
     colour.stroke_width(tenths * FINE / 10)
 }
 
-/// Draws into a string; plotters reports its own errors.
+/// Draws into a string, a picture of the usual size; plotters reports its own errors.
 pub fn svg(
+    draw: impl FnOnce(&Area) -> Result<(), Box<dyn std::error::Error>>,
+) -> Result<String, String> {
+    svg_of(SIZE, draw)
+}
+
+/// The same at another size, px.
+pub fn svg_of(
+    size: (u32, u32),
     draw: impl FnOnce(&Area) -> Result<(), Box<dyn std::error::Error>>,
 ) -> Result<String, String> {
     let mut text = String::new();
     {
-        let area = SVGBackend::with_string(&mut text, (px(SIZE.0), px(SIZE.1))).into_drawing_area();
+        let area = SVGBackend::with_string(&mut text, (px(size.0), px(size.1))).into_drawing_area();
         area.fill(&WHITE).map_err(|error| error.to_string())?;
         draw(&area).map_err(|error| error.to_string())?;
         area.present().map_err(|error| error.to_string())?;
     }
     // The drawing keeps its units (the viewBox); the picture has its size.
-    let drawn = format!("width=\"{}\" height=\"{}\"", px(SIZE.0), px(SIZE.1));
-    let shown = format!("width=\"{}\" height=\"{}\"", SIZE.0, SIZE.1);
+    let drawn = format!("width=\"{}\" height=\"{}\"", px(size.0), px(size.1));
+    let shown = format!("width=\"{}\" height=\"{}\"", size.0, size.1);
     Ok(text.replacen(&drawn, &shown, 1))
 }
 
-/// Title, caption with the parameters, and labelled axes over the ranges given.
+/// The caption of a picture that belongs to a scene.
+pub fn caption(p: &Dimensionless, g: f64) -> String {
+    format!(
+        "ε = {:.5}, λ = {:.3}, r = {}, G = {g:.3}; lengths over b, times over 1/ω₀",
+        p.epsilon, p.lambda, p.r
+    )
+}
+
+/// Title and caption where there are any, and labelled axes over the ranges given.
 pub fn plane<'a, 'b>(
     area: &'a Area<'b>,
-    title: &str,
-    found: &Identification,
+    heading: Option<(&str, &str)>,
     (x, x_label): ((f64, f64), &str),
     (y, y_label): ((f64, f64), &str),
 ) -> Result<Plane<'a, 'b>, Box<dyn std::error::Error>> {
-    let p = &found.parameters;
-    let caption = format!(
-        "ε = {:.5}, λ = {:.3}, r = {}, G = {:.3}; lengths over b, times over 1/ω₀",
-        p.epsilon, p.lambda, p.r, found.lock.g
-    );
-    area.draw_text(
-        title,
-        &(FONT, px(22)).into_text_style(area),
-        (at(70), at(14)),
-    )?;
-    let grey = BLACK.mix(0.7);
-    let small = (FONT, px(14)).into_text_style(area).color(&grey);
-    area.draw_text(&caption, &small, (at(70), at(42)))?;
+    if let Some((title, caption)) = heading {
+        area.draw_text(
+            title,
+            &(FONT, px(22)).into_text_style(area),
+            (at(70), at(14)),
+        )?;
+        let grey = BLACK.mix(0.7);
+        let small = (FONT, px(14)).into_text_style(area).color(&grey);
+        area.draw_text(caption, &small, (at(70), at(42)))?;
+    }
     let mut chart = ChartBuilder::on(area)
-        .margin_top(px(66))
+        .margin_top(px(if heading.is_some() { 66 } else { 12 }))
         .margin_right(px(24))
         .margin_bottom(px(10))
         .margin_left(px(10))
@@ -99,8 +105,16 @@ pub fn plane<'a, 'b>(
         .set_all_tick_mark_size(px(4))
         .x_labels(9)
         .y_labels(8)
+        .x_label_formatter(&tick)
+        .y_label_formatter(&tick)
         .draw()?;
     Ok(chart)
+}
+
+/// A number at an axis, without zeros that say nothing.
+fn tick(value: &f64) -> String {
+    let rounded = (value * 1e6).round() / 1e6;
+    format!("{}", rounded + 0.0).replace('-', "−")
 }
 
 /// A curve, dashed where it is unstable.

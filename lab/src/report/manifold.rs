@@ -3,9 +3,9 @@
 use plotters::chart::SeriesLabelPosition;
 
 use super::chart::{
-    DECAY_LABEL, THEORY, THINNED, UNSTABLE, curve, decay_points, legend, line, locked_point, plane,
-    svg,
+    DECAY_LABEL, THINNED, caption, curve, decay_points, legend, line, locked_point, plane, svg,
 };
+use super::theme::{THEORY, UNSTABLE};
 use crate::identification::Identification;
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 
@@ -25,8 +25,10 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
     svg(|area| {
         let mut chart = plane(
             area,
-            "Slow invariant manifold and the free decay on it",
-            found,
+            Some((
+                "Slow invariant manifold and the free decay on it",
+                &caption(&found.parameters, found.lock.g),
+            )),
             ((0.0, right), "amplitude C of v, over b"),
             ((0.0, top), "particle speed B, over b ω₀"),
         )?;

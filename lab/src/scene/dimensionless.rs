@@ -1,5 +1,6 @@
 //! The dimensionless numbers of a scene.
 
+use lovines::{InvalidValue, Parameters, Plant, State};
 use serde::Serialize;
 
 /// What is left of a scene when lengths are measured in b and times in 1/omega0.
@@ -44,5 +45,21 @@ impl Dimensionless {
     #[must_use]
     pub fn omega(&self, sigma: f64) -> f64 {
         self.omega0 * (1.0 + self.epsilon * sigma)
+    }
+
+    /// The plant of these numbers in dimensionless form, M = k = b = 1, at (q1, q1', q2, q2').
+    ///
+    /// # Errors
+    /// Parameters or a start that make no sense.
+    pub fn plant(&self, [q1, dq1, q2, dq2]: [f64; 4]) -> Result<Plant, InvalidValue> {
+        let parameters = Parameters {
+            primary_mass: 1.0,
+            stiffness: 1.0,
+            damping: self.epsilon * self.lambda,
+            particle_mass: self.epsilon,
+            half_width: 1.0,
+            restitution: self.r,
+        };
+        Plant::new(parameters, State { q1, dq1, q2, dq2 })
     }
 }

@@ -1,4 +1,4 @@
-//! The backbone: phase resonance `gamma = -pi/2` along the manifold.
+//! The backbone: phase resonance `gamma = -pi/2` along the manifold (docs/theory.md, eqs. 16 to 18).
 
 use std::f64::consts::FRAC_2_PI;
 
@@ -52,7 +52,7 @@ impl SlowFlow {
         }
     }
 
-    /// Slope dG/dC of the excitation along the backbone.
+    /// Slope dG/dC of the excitation along the backbone (eq. 18).
     #[must_use]
     pub fn excitation_slope(&self, b: f64) -> f64 {
         let r = self.manifold.dissipation;
@@ -69,7 +69,7 @@ impl SlowFlow {
 
     /// All phase-resonant solutions at the excitation `g`, on both branches, by rising B.
     ///
-    /// `(G C)^2 = (lambda C^2 + (4/pi) R B^2)^2` is a quartic in B.
+    /// `(G C)^2 = (lambda C^2 + (4/pi) R B^2)^2` (eq. 17) is a quartic in B.
     #[must_use]
     pub fn phase_resonant(&self, g: f64) -> Vec<BackbonePoint> {
         self.equilibrium_speeds(g, None)

@@ -1,4 +1,4 @@
-//! The free decay along the manifold, in closed form.
+//! The free decay along the manifold, in closed form (docs/theory.md, eqs. 20 and 21).
 
 use std::f64::consts::{FRAC_2_PI, PI};
 

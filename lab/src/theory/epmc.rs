@@ -1,4 +1,4 @@
-//! The extended periodic motion concept: negative damping instead of a drive keeps the motion periodic.
+//! The extended periodic motion concept: negative damping instead of a drive keeps the motion periodic (docs/theory.md, eq. 23).
 
 use serde::Serialize;
 

@@ -1,4 +1,4 @@
-//! Equilibria of the slow flow at any excitation and detuning: frequency responses.
+//! Equilibria of the slow flow at any excitation and detuning (docs/theory.md, eqs. 12 and 14).
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
@@ -30,7 +30,7 @@ pub struct Equilibrium {
 impl SlowFlow {
     /// All equilibria at the excitation `g` and the detuning `sigma`, on both branches, by rising B.
     ///
-    /// The squares of the two equilibrium conditions add up to a quartic in B.
+    /// The squares of the two equilibrium conditions (eq. 12) add up to a quartic in B (eq. 14).
     #[must_use]
     pub fn equilibria(&self, g: f64, sigma: f64) -> Vec<Equilibrium> {
         self.equilibrium_speeds(g, Some(sigma))

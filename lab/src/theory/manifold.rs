@@ -1,10 +1,10 @@
-//! The slow invariant manifold (SIM): the relation between C and B that impacts enforce.
+//! The slow invariant manifold (SIM): the relation between C and B that impacts enforce (docs/theory.md, eqs. 4 to 6).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use serde::Serialize;
 
-/// The manifold `C^2 = R^2 B^2 + (1 - pi B/2)^2` with `R = (1 - r)/(1 + r)`.
+/// The manifold `C^2 = R^2 B^2 + (1 - pi B/2)^2` with `R = (1 - r)/(1 + r)` (eq. 4).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Manifold {
     /// `R = (1 - r)/(1 + r)`: 0 for elastic impacts.
@@ -35,13 +35,13 @@ impl Manifold {
         self.dissipation * self.dissipation + FRAC_PI_2 * FRAC_PI_2
     }
 
-    /// Particle speed at the fold, `Bmin = (pi/2)/(R^2 + pi^2/4)`.
+    /// Particle speed at the fold, `Bmin = (pi/2)/(R^2 + pi^2/4)` (eq. 5).
     #[must_use]
     pub fn b_min(&self) -> f64 {
         FRAC_PI_2 / self.curvature()
     }
 
-    /// Smallest amplitude, at the fold: `Cmin = R/sqrt(R^2 + pi^2/4)`.
+    /// Smallest amplitude, at the fold: `Cmin = R/sqrt(R^2 + pi^2/4)` (eq. 5).
     #[must_use]
     pub fn c_min(&self) -> f64 {
         self.dissipation / self.curvature().sqrt()
@@ -55,7 +55,7 @@ impl Manifold {
 
     /// Particle speed `B = Bmin ± sqrt((2/pi) Bmin (C^2 - Cmin^2))` on a branch; None below the fold, and where B < 0.
     ///
-    /// The published text prints pi/2 in that root; 2/pi follows from the manifold.
+    /// Eq. 6; the published text prints pi/2 in that root, but 2/pi follows from the manifold.
     #[must_use]
     pub fn b(&self, c: f64, side: BranchSide) -> Option<f64> {
         let (b_min, c_min) = (self.b_min(), self.c_min());

@@ -1,4 +1,4 @@
-//! The slow flow on the manifold, and its coefficients in the published form.
+//! The slow flow on the manifold, and its coefficients in the published form (docs/theory.md, eqs. 11 to 13).
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI};
 
@@ -38,20 +38,20 @@ impl SlowFlow {
         }
     }
 
-    /// `lambda C^2 + (4/pi) R B^2`: what damping and impacts take from C^2 per unit of tau1.
+    /// `lambda C^2 + (4/pi) R B^2`: what damping and impacts take from C^2 per unit of tau1 (eq. 11).
     #[must_use]
     pub fn loss(&self, b: f64) -> f64 {
         self.lambda * self.manifold.c(b).powi(2)
             + 2.0 * FRAC_2_PI * self.manifold.dissipation * b * b
     }
 
-    /// `(2/pi) B (1 - pi B/2)/C^2`: the detuning at which the motion rotates by itself.
+    /// `(2/pi) B (1 - pi B/2)/C^2`: the detuning at which the motion rotates by itself (eq. 11).
     #[must_use]
     pub fn free_detuning(&self, b: f64) -> f64 {
         FRAC_2_PI * b * (1.0 - FRAC_PI_2 * b) / self.manifold.c(b).powi(2)
     }
 
-    /// `(D1 C~, D1 gamma)` at the particle speed `b` and the phase `gamma`, rad.
+    /// `(D1 C~, D1 gamma)` at the particle speed `b` and the phase `gamma`, rad (eq. 11).
     #[must_use]
     pub fn rates(&self, g: f64, sigma: f64, b: f64, gamma: f64) -> [f64; 2] {
         let c = self.manifold.c(b);
@@ -61,7 +61,7 @@ impl SlowFlow {
         ]
     }
 
-    /// k1…k6 at the detuning `sigma`.
+    /// k1…k6 at the detuning `sigma` (eq. 13).
     #[must_use]
     pub fn coefficients(&self, sigma: f64) -> Coefficients {
         let r = self.manifold.dissipation;

@@ -1,0 +1,157 @@
+//! `vines map`: the regime map.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use vines::{
+    map::{Axis, Map, Plan, Range, Regime},
+    orbit::phase_resonant,
+    report,
+    scene::Scene,
+};
+
+use super::{
+    failure::Failure,
+    scene_arguments::SceneArguments,
+    table::{parameters, table},
+};
+
+const HELP: &str = "\
+Every cell is one plant, driven at a fixed frequency from the scene's start; after its transient, its impacts are classified:
+  no impacts      the linear response
+  symmetric 1:1   two impacts per period, half a period apart; asymmetric 1:1: at uneven intervals
+  n impacts       any other pattern that repeats
+  modulated       nothing repeats, but disturbances do not grow;  chaotic: they do
+  sticking        impacts accumulate, and the particle rests on a wall for a while
+
+Where several regimes are stable the start decides; a particle at rest may stay so where a moving one does not.
+
+Examples:
+  vines map                                               sigma and G, in out/
+  vines map --x r=0.3:1:71 --y G=0.2:3:57 --sigma=-1.1
+  vines map --x sigma=-2:1:61 --y G=0.5:2:61 --set start.dq2=0 --set start.q2=0.005
+
+Writes map.csv, map.svg and map-dark.svg.";
+
+/// Map the regimes of the response over two of sigma, G and r
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    /// Horizontal axis: sigma, G or r, its first and last value, and how many
+    #[arg(
+        long,
+        value_name = "AXIS=FIRST:LAST:POINTS",
+        default_value = "sigma=-5:5:101"
+    )]
+    x: Range,
+
+    /// Vertical axis, likewise
+    #[arg(
+        long,
+        value_name = "AXIS=FIRST:LAST:POINTS",
+        default_value = "G=0.1:3:59"
+    )]
+    y: Range,
+
+    /// Detuning where it is on no axis; without it, that of the scene's stable phase-resonant orbit, or 0
+    #[arg(long, value_name = "SIGMA", allow_negative_numbers = true)]
+    sigma: Option<f64>,
+
+    /// Periods that pass before the record
+    #[arg(long, value_name = "PERIODS", default_value_t = 400)]
+    settle: usize,
+
+    /// Periods recorded; at least 20
+    #[arg(long, value_name = "PERIODS", default_value_t = 100)]
+    record: usize,
+
+    /// Folder for the results; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "out")]
+    out: PathBuf,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+    let scene = arguments.scene.load()?;
+    let plan = plan(arguments, &scene)?;
+    let style = ProgressStyle::with_template("mapping regimes [{wide_bar}] {pos}/{len} cells")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(plan.cells() as u64).with_style(style);
+    let map = plan.run(|| bar.inc(1)).map_err(Failure::input)?;
+    bar.finish_and_clear();
+    let written = report::write_map(&map, &arguments.out).map_err(Failure::run)?;
+    let files: Vec<String> = written
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    Ok(format!(
+        "{}\nWritten: {}\n",
+        summary(&map),
+        files.join(", ")
+    ))
+}
+
+fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
+    if let Some(sigma) = arguments.sigma.filter(|sigma| !sigma.is_finite()) {
+        return Err(Failure::input(format!(
+            "--sigma = {sigma} (dimensionless) is not a finite number"
+        )));
+    }
+    let numbers = scene.dimensionless();
+    let needed = arguments.x.axis != Axis::Sigma && arguments.y.axis != Axis::Sigma;
+    let resonant = || {
+        let orbits = phase_resonant(&numbers);
+        let stable = orbits.iter().find(|orbit| orbit.stable);
+        stable.map_or(0.0, |orbit| orbit.sigma)
+    };
+    let sigma = match arguments.sigma {
+        Some(sigma) => sigma,
+        None if needed => resonant(),
+        None => 0.0,
+    };
+    Ok(Plan {
+        scene: numbers,
+        sigma,
+        start: scene.dimensionless_start(),
+        x: arguments.x,
+        y: arguments.y,
+        settle: arguments.settle,
+        record: arguments.record,
+    })
+}
+
+fn summary(map: &Map) -> String {
+    let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
+    let share = |count: usize, of: usize| match of {
+        0 => "-".into(),
+        _ => format!("{:.1} %", 100.0 * count as f64 / of as f64),
+    };
+    let rows: Vec<Vec<String>> = Regime::ALL
+        .into_iter()
+        .map(|regime| {
+            let (all, here) = map.count(regime);
+            vec![
+                regime.name().into(),
+                all.to_string(),
+                share(all, map.cells.len()),
+                share(here, inside),
+            ]
+        })
+        .collect();
+    let headings = [
+        "regime",
+        "cells",
+        "share",
+        "inside the theory's stable island",
+    ];
+    format!(
+        "Regimes over {} and {}\n  {}\n\n{}",
+        map.plan.x,
+        map.plan.y,
+        parameters(&map.plan.scene),
+        table(&headings, &rows)
+    )
+}

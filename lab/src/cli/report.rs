@@ -1,0 +1,115 @@
+//! `vines report`: everything about a scene on one page.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use vines::{
+    map::Range,
+    report::{Subject, write_report},
+    rig::BuiltIn,
+};
+
+use super::{failure::Failure, scene_arguments::SceneArguments};
+
+const HELP: &str = "\
+Runs the experiment, the convergence study, the exact curves and the regime map, and writes report.html: one file that opens
+offline in any browser and prints well, in words, with all pictures and tables, the scene, and what the numbers are worth. Beside
+it lie the pictures (SVG, for light and dark backgrounds) and tables.
+
+What an earlier run has left in the folder is taken over where scene, version and axes are the same.
+
+Examples:
+  vines report --out report
+  vines report --out r07 --set plant.r=0.7
+  vines report --out report --x sigma=-2:1:121 --y G=0.8:1.8:101    a finer map; the rest is taken over";
+
+/// Write a report on a scene: everything that the lab can find out, as one page
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    /// Folder for the report; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "report")]
+    out: PathBuf,
+
+    /// Horizontal axis of the regime map, as in `vines map`
+    #[arg(
+        long,
+        value_name = "AXIS=FIRST:LAST:POINTS",
+        default_value = "sigma=-5:5:101"
+    )]
+    x: Range,
+
+    /// Vertical axis of the regime map
+    #[arg(
+        long,
+        value_name = "AXIS=FIRST:LAST:POINTS",
+        default_value = "G=0.1:3:59"
+    )]
+    y: Range,
+
+    /// Take nothing over from an earlier run
+    #[arg(long)]
+    fresh: bool,
+
+    /// Picture of run time against error to include, if it is there
+    #[arg(long, value_name = "SVG", default_value = "docs/work-precision.svg")]
+    work_precision: PathBuf,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+    let scene = arguments.scene.load()?;
+    // Settings are refused before anything is run or written.
+    BuiltIn::new(&scene).map_err(Failure::input)?;
+    if arguments.x.axis == arguments.y.axis {
+        return Err(Failure::input(format!(
+            "--x and --y are both {}: take two of sigma, G and r",
+            arguments.x.axis
+        )));
+    }
+    let subject = Subject {
+        scene,
+        map: [arguments.x, arguments.y],
+    };
+    let style = ProgressStyle::with_template("{msg:10} [{wide_bar}] {percent} %")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(1000).with_style(style);
+    let precision = std::fs::read_to_string(&arguments.work_precision).ok();
+    let report = write_report(
+        &subject,
+        &arguments.out,
+        arguments.fresh,
+        precision.as_deref(),
+        &|progress| {
+            if bar.message() != progress.section {
+                bar.set_message(progress.section.to_string());
+            }
+            bar.set_position((1000.0 * progress.done) as u64);
+        },
+    )
+    .map_err(Failure::run)?;
+    bar.finish_and_clear();
+    let mut text: String = report
+        .findings
+        .iter()
+        .map(|finding| format!("- {finding}\n"))
+        .collect();
+    if !report.kept.is_empty() {
+        text += &format!(
+            "\nTaken over from an earlier run: {}\n",
+            report.kept.join(", ")
+        );
+    }
+    let page = report
+        .written
+        .first()
+        .map(|page| page.display().to_string());
+    Ok(format!(
+        "{text}\nWritten: {} and {} pictures and tables\n",
+        page.unwrap_or_default(),
+        report.written.len() - 1
+    ))
+}

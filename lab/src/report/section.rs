@@ -1,0 +1,107 @@
+//! What a report is made of: sections of words, pictures and tables, with one finding and a few lines of the error budget each.
+
+use serde::{Deserialize, Serialize};
+
+/// One part of a section.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub enum Block {
+    /// A paragraph.
+    Words(String),
+    /// A picture, as SVG for white paper.
+    Picture {
+        /// Name of its files, without ending.
+        name: String,
+        /// What it shows.
+        caption: String,
+        /// The drawing.
+        svg: String,
+    },
+    /// A table.
+    Table {
+        /// What it shows.
+        caption: String,
+        /// Its columns.
+        headings: Vec<String>,
+        /// Its rows.
+        rows: Vec<Vec<String>>,
+    },
+}
+
+/// A file beside the page.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Attachment {
+    /// Its name.
+    pub name: String,
+    /// What is in it.
+    pub text: String,
+}
+
+/// One line of the error budget.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Budget {
+    /// What is uncertain.
+    pub what: String,
+    /// By how much.
+    pub size: String,
+    /// Where that figure is from, and what it means.
+    pub why: String,
+}
+
+/// A section.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Section {
+    /// Its heading.
+    pub title: String,
+    /// What was found, in a sentence or two.
+    pub finding: String,
+    /// Its body.
+    pub blocks: Vec<Block>,
+    /// Its lines of the error budget.
+    pub budget: Vec<Budget>,
+    /// Tables for programs.
+    pub attachments: Vec<Attachment>,
+}
+
+impl Section {
+    pub(super) fn new(title: &str) -> Self {
+        Self {
+            title: title.into(),
+            ..Self::default()
+        }
+    }
+
+    pub(super) fn words(&mut self, text: impl Into<String>) {
+        self.blocks.push(Block::Words(text.into()));
+    }
+
+    pub(super) fn picture(&mut self, name: &str, caption: impl Into<String>, svg: String) {
+        self.blocks.push(Block::Picture {
+            name: name.into(),
+            caption: caption.into(),
+            svg,
+        });
+    }
+
+    pub(super) fn table(&mut self, caption: &str, headings: &[&str], rows: Vec<Vec<String>>) {
+        self.blocks.push(Block::Table {
+            caption: caption.into(),
+            headings: headings.iter().map(|one| (*one).into()).collect(),
+            rows,
+        });
+    }
+
+    pub(super) fn budget(&mut self, what: &str, size: String, why: &str) {
+        self.budget.push(Budget {
+            what: what.into(),
+            size,
+            why: why.into(),
+        });
+    }
+
+    pub(super) fn attach(&mut self, name: &str, text: String) {
+        self.attachments.push(Attachment {
+            name: name.into(),
+            text,
+        });
+    }
+}

@@ -1,0 +1,168 @@
+//! Exact frequency responses and backbone, and one period of the locked motion.
+
+use serde::Serialize;
+
+use super::Subject;
+use crate::orbit::{Bifurcation, Branch, Limits, Periodic, Response, backbone, response};
+use crate::report::{csv, period, responses, section::Section};
+use crate::scene::Dimensionless;
+use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};
+
+/// One row of the table of curves.
+#[derive(Serialize)]
+struct Row {
+    curve: String,
+    sigma: f64,
+    #[serde(rename = "G")]
+    g: f64,
+    #[serde(rename = "C")]
+    c: f64,
+    gamma: f64,
+    #[serde(rename = "B")]
+    b: f64,
+    largest_multiplier: f64,
+    stable: bool,
+}
+
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, String> {
+    let mut section = Section::new("Exact periodic motions");
+    let p = subject.scene.dimensionless();
+    let limits = Limits::default();
+    let excitations = excitations(&p);
+    let mut found: Vec<Response> = Vec::new();
+    for (n, g) in excitations.iter().enumerate() {
+        found.extend(response(&Dimensionless { g: *g, ..p }, &limits));
+        done((n + 1) as f64 / (excitations.len() + 1) as f64);
+    }
+    let Some(curve) = backbone(&p, &limits) else {
+        section.finding = "There is no exact phase-resonant 1:1 motion at this excitation.".into();
+        section.words(section.finding.clone());
+        return Ok(section);
+    };
+    let special: Vec<String> = curve
+        .special
+        .iter()
+        .map(|one| {
+            format!(
+                "{} at σ = {:.4}, C = {:.4}, G = {:.4}",
+                name(one.kind),
+                one.motion.sigma,
+                one.motion.c,
+                one.motion.g
+            )
+        })
+        .collect();
+    section.finding = format!(
+        "The exact backbone was followed through {} motions; its stability changes {} times.",
+        curve.points.len(),
+        special.len()
+    );
+    section.words(
+        "These motions are exact: periodic orbits of the full equations, found by shooting on the impact map and followed by \
+         pseudo-arclength through folds and symmetry breaking, stable and unstable alike. No first-order approximation is made.",
+    );
+    section.words(format!(
+        "Along the exact backbone, stability changes here: {}. Theory expects the breaking of symmetry at B = {B_SYMMETRY_BREAKING:.4} whatever r.",
+        if special.is_empty() { "nowhere".into() } else { special.join("; ") }
+    ));
+    if !found.is_empty() {
+        section.picture(
+            "responses",
+            "Frequency responses at several excitations: exact, first-order, and the backbone of theory through their maxima. \
+             Where a response loses its symmetry the asymmetric motions (blue, beside the dashed curve) take over.",
+            responses::draw(&p, &found)?,
+        );
+    }
+    let rows: Vec<Vec<String>> = found
+        .iter()
+        .flat_map(|one| {
+            one.symmetric
+                .special
+                .iter()
+                .map(move |special| (one.g, special))
+        })
+        .map(|(g, special)| {
+            let Periodic { sigma, c, b, .. } = special.motion;
+            let mut cells = vec![format!("{g:.4}"), name(special.kind).into()];
+            cells.extend([sigma, c, b].map(|one| format!("{one:.5}")));
+            cells
+        })
+        .collect();
+    if !rows.is_empty() {
+        section.table(
+            "Where the symmetric motions on the exact frequency responses change stability.",
+            &["G", "what", "σ", "C", "B"],
+            rows,
+        );
+    }
+    let flow = SlowFlow::new(p.lambda, p.r);
+    let theory = flow
+        .phase_resonant(p.g)
+        .into_iter()
+        .find(|one| one.stable());
+    let resonant =
+        |one: &&Periodic| (one.g - p.g).abs() + (one.gamma + std::f64::consts::FRAC_PI_2).abs();
+    let own = found.iter().find(|one| one.g == p.g).and_then(|one| {
+        let stable = one.symmetric.points.iter().filter(|one| one.stable);
+        stable.min_by(|a, b| resonant(a).total_cmp(&resonant(b)))
+    });
+    if let Some(motion) = own {
+        section.picture(
+            "period",
+            "One period of the motion that the loop locks. Above: primary mass with its walls, and the particle between them; circles \
+             mark the impacts. Below: centre of mass and relative displacement, exact and as first-order theory reconstructs them.",
+            period::draw(&p, motion, theory.as_ref())?,
+        );
+    }
+    section.attach("curves.csv", csv(table(&curve, &found))?);
+    Ok(section)
+}
+
+/// The scene's excitation, and some about it: from just above where stable motions begin to beyond symmetry breaking.
+fn excitations(p: &Dimensionless) -> Vec<f64> {
+    let flow = SlowFlow::new(p.lambda, p.r);
+    let breaking = flow.backbone_at(B_SYMMETRY_BREAKING).g;
+    let mut list = vec![p.g, 1.12 * breaking];
+    if p.g < 0.85 * breaking {
+        list.push(0.5 * (p.g + breaking));
+    }
+    list.sort_by(f64::total_cmp);
+    list.dedup_by(|one, other| (*one - *other).abs() < 0.03 * breaking);
+    list
+}
+
+fn name(kind: Bifurcation) -> &'static str {
+    match kind {
+        Bifurcation::Fold => "fold",
+        Bifurcation::SymmetryBreaking => "symmetry breaking",
+        Bifurcation::PeriodDoubling => "period doubling",
+        Bifurcation::Torus => "torus (modulation begins)",
+    }
+}
+
+fn table(backbone: &Branch, responses: &[Response]) -> Vec<Row> {
+    let rows = |curve: String, branch: &Branch| -> Vec<Row> {
+        let row = |one: &Periodic| Row {
+            curve: curve.clone(),
+            sigma: one.sigma,
+            g: one.g,
+            c: one.c,
+            gamma: one.gamma,
+            b: one.b,
+            largest_multiplier: one.moduli()[3],
+            stable: one.stable,
+        };
+        branch.points.iter().map(row).collect()
+    };
+    let mut all = rows("backbone".into(), backbone);
+    for response in responses {
+        all.extend(rows(
+            format!("response G={:.4}", response.g),
+            &response.symmetric,
+        ));
+        for branch in &response.asymmetric {
+            all.extend(rows(format!("asymmetric G={:.4}", response.g), branch));
+        }
+    }
+    all
+}

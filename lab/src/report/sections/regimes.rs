@@ -1,0 +1,87 @@
+//! The regime map.
+
+use std::sync::atomic::{AtomicUsize, Ordering};
+
+use super::Subject;
+use crate::map::{Axis, Plan, Regime};
+use crate::orbit::phase_resonant;
+use crate::report::{csv, map, map_row, section::Section};
+
+/// Periods that pass, and periods recorded.
+const PERIODS: (usize, usize) = (400, 100);
+
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, String> {
+    let mut section = Section::new("Regimes of the driven response");
+    let scene = subject.scene.dimensionless();
+    let [x, y] = subject.map;
+    let held = x.axis != Axis::Sigma && y.axis != Axis::Sigma;
+    let orbits = if held {
+        phase_resonant(&scene)
+    } else {
+        Vec::new()
+    };
+    let plan = Plan {
+        scene,
+        sigma: orbits
+            .iter()
+            .find(|one| one.stable)
+            .map_or(0.0, |one| one.sigma),
+        start: subject.scene.dimensionless_start(),
+        x,
+        y,
+        settle: PERIODS.0,
+        record: PERIODS.1,
+    };
+    let (count, all) = (AtomicUsize::new(0), plan.cells());
+    let map = plan
+        .run(|| {
+            let n = count.fetch_add(1, Ordering::Relaxed) + 1;
+            done(n as f64 / all as f64);
+        })
+        .map_err(|error| error.to_string())?;
+    let inside = map.cells.iter().filter(|one| one.theory_stable).count();
+    let (_, agree) = map.count(Regime::Symmetric);
+    let percent = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
+    section.finding = format!(
+        "Of {all} cells of the map, {inside} lie where theory has a stable symmetric 1:1 motion; {:.0} % of these show it.",
+        percent(agree, inside)
+    );
+    section.words(format!(
+        "Each cell of the map over {x} and {y} is one plant, driven from the scene's start at a fixed frequency. After {} periods \
+         the impacts of the next {} are classified: by the pattern that repeats, and where none does, by whether a small disturbance grows.",
+        PERIODS.0, PERIODS.1
+    ));
+    let rows = Regime::ALL.into_iter().map(|regime| {
+        let (cells, here) = map.count(regime);
+        vec![
+            regime.name().into(),
+            cells.to_string(),
+            format!("{:.1} %", percent(cells, all)),
+            format!("{:.1} %", percent(here, inside)),
+        ]
+    });
+    section.table(
+        "How often each regime occurs.",
+        &[
+            "regime",
+            "cells",
+            "share",
+            "share inside the theory's island",
+        ],
+        rows.collect(),
+    );
+    section.words(section.finding.clone());
+    section.picture(
+        "regimes",
+        "The regime map. The line is the border of the island where first-order theory has a stable symmetric 1:1 motion.",
+        map::draw(&map)?,
+    );
+    section.budget(
+        "regime map",
+        "one start per cell".into(),
+        "Where several regimes are stable the start decides. Cells at a border may still be in a transient, \
+         and what repeats only after more than 32 impacts counts as not repeating.",
+    );
+    section.attach("regimes.csv", csv(map.cells.iter().map(map_row))?);
+    Ok(section)
+}

@@ -1,0 +1,119 @@
+//! The whole report: makes the sections that are not there yet, and the page and files from all of them.
+
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+use sha2::{Digest, Sha256};
+
+use super::page::page;
+use super::section::{Block, Section};
+use super::sections::{SECTIONS, Subject};
+use super::{ReportError, dark, write_files};
+
+/// Folder of what is kept from run to run, inside the report's folder.
+const KEPT: &str = ".vines";
+
+/// A section as it is kept, with what it was made from.
+#[derive(Serialize, Deserialize)]
+struct Kept {
+    key: String,
+    section: Section,
+}
+
+/// How far the report is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Progress<'a> {
+    /// The section being made.
+    pub section: &'a str,
+    /// How much of all is done, from 0 to 1.
+    pub done: f64,
+}
+
+/// The finished report.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// Files written; the page is the first.
+    pub written: Vec<PathBuf>,
+    /// Sections taken over from an earlier run.
+    pub kept: Vec<&'static str>,
+    /// What was found, one sentence a section.
+    pub findings: Vec<String>,
+}
+
+/// Writes the report on `subject` into `out`: `report.html`, each picture for light and dark backgrounds, and tables. Sections
+/// made by an earlier run are taken over unless scene, version or axes have changed, or `fresh` asks for all anew.
+///
+/// # Errors
+/// A run that fails, or a file that cannot be written.
+pub fn write_report(
+    subject: &Subject,
+    out: &Path,
+    fresh: bool,
+    work_precision: Option<&str>,
+    progress: &(dyn Fn(Progress) + Sync),
+) -> Result<Report, ReportError> {
+    let (mut sections, mut kept) = (Vec::new(), Vec::new());
+    for (n, (name, make)) in SECTIONS.into_iter().enumerate() {
+        let key = key(subject, name);
+        let at = |part: f64| Progress {
+            section: name,
+            done: (n as f64 + part) / SECTIONS.len() as f64,
+        };
+        progress(at(0.0));
+        let file = format!("{name}.json");
+        if let Some(section) = found(&out.join(KEPT).join(&file), &key).filter(|_| !fresh) {
+            kept.push(name);
+            sections.push(section);
+            continue;
+        }
+        let message = |message| ReportError::Format { name, message };
+        let section = make(subject, &|part| progress(at(part))).map_err(message)?;
+        let entry = Kept { key, section };
+        let text = serde_json::to_string(&entry).map_err(|error| message(error.to_string()))?;
+        write_files(&out.join(KEPT), &[(file.as_str(), text)])?;
+        sections.push(entry.section);
+    }
+    let mut files = vec![(
+        "report.html".to_string(),
+        page(&subject.scene, &sections, work_precision),
+    )];
+    for section in &sections {
+        for block in &section.blocks {
+            if let Block::Picture { name, svg, .. } = block {
+                files.push((format!("{name}.svg"), svg.clone()));
+                files.push((format!("{name}-dark.svg"), dark(svg)));
+            }
+        }
+        let attachments = section.attachments.iter();
+        files.extend(attachments.map(|one| (one.name.clone(), one.text.clone())));
+    }
+    let files: Vec<(&str, String)> = files
+        .iter()
+        .map(|(name, text)| (name.as_str(), text.clone()))
+        .collect();
+    Ok(Report {
+        written: write_files(out, &files)?,
+        kept,
+        findings: sections.into_iter().map(|one| one.finding).collect(),
+    })
+}
+
+/// The section kept in a file, if it was made from the same.
+fn found(file: &Path, key: &str) -> Option<Section> {
+    let text = std::fs::read_to_string(file).ok()?;
+    let kept: Kept = serde_json::from_str(&text).ok()?;
+    (kept.key == key).then_some(kept.section)
+}
+
+/// A hash of everything that a section depends on.
+fn key(subject: &Subject, section: &str) -> String {
+    let axes = if section == "regimes" {
+        format!("{} {}", subject.map[0], subject.map[1])
+    } else {
+        String::new()
+    };
+    let scene = serde_json::to_string(&subject.scene).unwrap_or_default();
+    let version = env!("CARGO_PKG_VERSION");
+    let hash = Sha256::digest(format!("{section}\n{version}\n{axes}\n{scene}"));
+    hash.iter().map(|byte| format!("{byte:02x}")).collect()
+}

@@ -1,0 +1,106 @@
+//! Colours: what they are on white paper, and what becomes of them on a dark screen.
+//!
+//! Those that lie beside each other differ in lightness, so that they are told apart in grey; every kind of line and mark differs
+//! in shape as well.
+
+use plotters::style::RGBColor;
+
+use crate::map::Regime;
+
+pub const THEORY: RGBColor = RGBColor(40, 40, 40);
+pub const UNSTABLE: RGBColor = RGBColor(150, 150, 150);
+pub const EXACT: RGBColor = RGBColor(0, 114, 178);
+/// The unstable part of what is drawn in [`EXACT`].
+pub const FAINT: RGBColor = RGBColor(120, 170, 210);
+pub const DECAY: RGBColor = RGBColor(213, 94, 0);
+pub const LOCK: RGBColor = RGBColor(0, 0, 0);
+
+/// The colour of a regime in the map: the darker, the less orderly its impacts.
+pub fn regime(regime: Regime) -> RGBColor {
+    match regime {
+        Regime::NoImpacts => RGBColor(246, 246, 244),
+        Regime::Symmetric => RGBColor(178, 217, 241),
+        Regime::Asymmetric => RGBColor(240, 180, 70),
+        Regime::Several => RGBColor(90, 174, 110),
+        Regime::Modulated => RGBColor(190, 88, 60),
+        Regime::Chaotic => RGBColor(106, 52, 128),
+        Regime::Sticking => RGBColor(30, 32, 40),
+    }
+}
+
+/// The colour of a letter on it; what stays as it is on a dark screen needs a letter that stays, too.
+pub fn on_regime(regime: Regime) -> RGBColor {
+    match regime {
+        Regime::NoImpacts => RGBColor(0, 0, 0),
+        Regime::Sticking => RGBColor(255, 255, 255),
+        Regime::Modulated | Regime::Chaotic => RGBColor(254, 254, 254),
+        _ => RGBColor(10, 10, 10),
+    }
+}
+
+/// Colours on white paper, and on a dark screen.
+const DARK: [(&str, &str); 9] = [
+    ("#FFFFFF", "#14171A"),
+    ("#000000", "#ECECEC"),
+    ("#282828", "#DADADA"),
+    ("#969696", "#868C93"),
+    ("#0072B2", "#56B4E9"),
+    ("#78AAD2", "#3F7099"),
+    ("#D55E00", "#F28C40"),
+    // No impacts is like the paper in both, sticking like the ink.
+    ("#F6F6F4", "#23272B"),
+    ("#1E2028", "#F2F2EE"),
+];
+
+/// A picture for dark screens.
+#[must_use]
+pub fn dark(svg: &str) -> String {
+    // Every colour stands in quotes, once changed it is not looked at again.
+    svg.split('"')
+        .map(|part| {
+            let pair = DARK.iter().find(|(light, _)| *light == part);
+            pair.map_or(part, |(_, dark)| dark)
+        })
+        .collect::<Vec<_>>()
+        .join("\"")
+}
+
+/// Style rules that do the same to pictures inside a page.
+#[must_use]
+pub fn dark_rules() -> String {
+    DARK.iter()
+        .flat_map(|(light, dark)| {
+            ["fill", "stroke"].map(|what| format!("svg [{what}=\"{light}\"]{{{what}:{dark}}}"))
+        })
+        .collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn regimes_differ_in_lightness() {
+        let mut lightness: Vec<f64> = Regime::ALL
+            .iter()
+            .map(|one| {
+                let RGBColor(r, g, b) = regime(*one);
+                0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
+            })
+            .collect();
+        lightness.sort_by(f64::total_cmp);
+        for pair in lightness.windows(2) {
+            assert!(pair[1] - pair[0] > 15.0, "{lightness:?}");
+        }
+    }
+
+    #[test]
+    fn colours_are_changed_once_each() {
+        let light = r##"<g fill="#000000" stroke="#FFFFFF" x="3"/>"##;
+        assert_eq!(
+            dark(light),
+            r##"<g fill="#ECECEC" stroke="#14171A" x="3"/>"##
+        );
+        assert!(dark_rules().contains(r##"svg [fill="#000000"]{fill:#ECECEC}"##));
+    }
+}

@@ -1,0 +1,141 @@
+//! The report: complete, self-contained, the same bytes from the same input, and readable by a browser.
+
+use std::path::Path;
+use std::process::Command;
+
+use vines::{
+    report::{Block, Report, SECTIONS, Subject, write_report},
+    scene::{Override, Scene},
+};
+
+fn subject(settings: &[&str]) -> Subject {
+    // An early lock is good enough here.
+    let early = [
+        "controller.amplitude_drift=1e-3",
+        "controller.dwell_periods=5",
+    ];
+    let settings = early.iter().chain(settings);
+    let overrides: Vec<Override> = settings.map(|s| s.parse().unwrap()).collect();
+    let text = include_str!("../../scenes/dimensionless.toml");
+    Subject {
+        scene: Scene::parse("dimensionless.toml", text, &overrides).unwrap(),
+        map: ["sigma=-2:1:7", "G=0.8:1.8:6"].map(|range| range.parse().unwrap()),
+    }
+}
+
+fn write(subject: &Subject, out: &Path) -> Report {
+    let precision = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\"><rect width=\"9\" height=\"9\"/></svg>";
+    write_report(subject, out, false, Some(precision), &|_| {}).unwrap()
+}
+
+/// Debian's Chromium, if it is here, on a page: what it says on the console, and what it makes of the page.
+fn browser(page: &Path, arguments: &[&str]) -> Option<(String, String)> {
+    let profile = tempfile::tempdir().unwrap();
+    let output = Command::new("chromium")
+        .args([
+            "--headless",
+            "--no-sandbox",
+            "--disable-gpu",
+            "--enable-logging=stderr",
+            "--virtual-time-budget=2000",
+        ])
+        .arg(format!("--user-data-dir={}", profile.path().display()))
+        .args(arguments)
+        .arg(format!("file://{}", page.display()))
+        .output()
+        .ok()?;
+    assert!(output.status.success(), "{output:?}");
+    let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
+    Some((text(&output.stderr), text(&output.stdout)))
+}
+
+#[test]
+fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
+    let folder = tempfile::tempdir().unwrap();
+    let subject = subject(&[]);
+    let first = write(&subject, folder.path());
+    assert!(first.kept.is_empty());
+    let page = folder.path().join("report.html");
+    let html = std::fs::read_to_string(&page).unwrap();
+    for name in [
+        "history",
+        "decay-on-sim",
+        "identified-backbone",
+        "backbones",
+        "responses",
+        "period",
+        "regimes",
+    ] {
+        for file in [format!("{name}.svg"), format!("{name}-dark.svg")] {
+            assert!(folder.path().join(&file).is_file(), "{file}");
+        }
+    }
+    assert_eq!(html.matches("<figure>").count(), 8);
+    for words in [
+        "What was found",
+        "symmetric 1:1",
+        "What the numbers are worth",
+        "published rig",
+    ] {
+        assert!(html.contains(words), "{words}");
+    }
+    // Nothing is fetched: no address but the names of XML's vocabularies.
+    let fetched = html.replace("http://www.w3.org/2000/svg", "");
+    assert!(
+        !fetched.contains("http://")
+            && !fetched.contains("https://")
+            && !fetched.contains("<script")
+    );
+
+    // A second run takes everything over, and a changed map only what it does not concern.
+    let second = write(&subject, folder.path());
+    assert_eq!(second.kept.len(), SECTIONS.len());
+    assert_eq!(std::fs::read_to_string(&page).unwrap(), html);
+    let mut finer = subject.clone();
+    finer.map[0] = "sigma=-2:1:5".parse().unwrap();
+    assert_eq!(
+        write(&finer, folder.path()).kept,
+        ["experiment", "theory", "curves"]
+    );
+    // What is made anew has the same bytes.
+    write(&subject, folder.path());
+    assert_eq!(std::fs::read_to_string(&page).unwrap(), html);
+
+    let Some((console, seen)) = browser(&page, &["--dump-dom"]) else {
+        eprintln!("skipped: chromium is not installed, so the page was opened by no browser");
+        return;
+    };
+    assert!(!console.contains("CONSOLE"), "{console}");
+    assert_eq!(seen.matches("<figcaption>").count(), 8);
+    let print = folder.path().join("report.pdf");
+    let (console, _) = browser(
+        &page,
+        &[
+            &format!("--print-to-pdf={}", print.display()),
+            "--no-pdf-header-footer",
+        ],
+    )
+    .unwrap();
+    assert!(!console.contains("CONSOLE"), "{console}");
+    assert!(std::fs::read(&print).unwrap().starts_with(b"%PDF"));
+}
+
+#[test]
+fn a_scene_that_locks_nothing_gets_an_honest_report() {
+    // From rest, nothing ever hits: the loop locks the linear mode.
+    let subject = subject(&["start.dq2=0"]);
+    let (name, make) = SECTIONS[0];
+    assert_eq!(name, "experiment");
+    let section = make(&subject, &|_| {}).unwrap();
+    assert!(
+        section.finding.contains("no backbone") && section.finding.contains("not symmetric 1:1"),
+        "{}",
+        section.finding
+    );
+    assert!(
+        section
+            .blocks
+            .iter()
+            .all(|block| matches!(block, Block::Words(_)))
+    );
+}

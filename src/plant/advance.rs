@@ -1,0 +1,219 @@
+//! From event to event.
+
+use super::contact::Moment;
+use super::{Contact, Event, MOST_IMPACTS, Outcome, Plant};
+use crate::base_motion::{Drive, Phase};
+use crate::crossing::Origin;
+use crate::flight::Flight;
+use crate::span::Span;
+
+impl Plant {
+    /// Advances by `duration` seconds (0 or above) under `drive`, whose values are finite.
+    ///
+    /// A jump of the base displacement against the end of the last advance gives the primary mass the velocity jump
+    /// `c Δe/M` that the equation of motion implies.
+    pub fn advance(&mut self, drive: Drive, duration: f64) -> Outcome {
+        self.advance_with(drive, duration, |_| {})
+    }
+
+    /// As [`Self::advance`], and tells every event as it happens.
+    #[inline]
+    pub fn advance_with(
+        &mut self,
+        drive: Drive,
+        duration: f64,
+        tell: impl FnMut(Event),
+    ) -> Outcome {
+        if drive != self.base.drive || !self.under_way {
+            self.take(drive);
+        }
+        let outcome = if self.course.strides(duration) {
+            self.here = self.course.stride(&self.here, &mut self.base);
+            Outcome::default()
+        } else {
+            self.meet(duration, tell)
+        };
+        self.time += duration;
+        outcome
+    }
+
+    /// Takes over a new drive and the jump of the base that it brings.
+    fn take(&mut self, drive: Drive) {
+        self.settle();
+        let jumps = drive.signal[0] != self.base.drive.signal[0]
+            || drive.amplitude != self.base.drive.amplitude;
+        if self.under_way && jumps {
+            let jump = self.base.with(drive).displacement() - self.base.displacement();
+            if jump != 0.0 {
+                self.here.v += self.parameters.damping / self.parameters.primary_mass * jump;
+                // The impulse acts on the primary mass alone; what that means for a particle at the wall is decided anew.
+                self.contact = Contact::Free;
+            }
+        }
+        self.base.drive = drive;
+        self.under_way = true;
+        self.renew_course();
+    }
+
+    pub(super) fn renew_course(&mut self) {
+        let known = self.course.wave().is_some();
+        self.course.renew(&self.base.drive);
+        if !known {
+            self.course.face(&mut self.here, self.base.phase);
+        }
+    }
+
+    /// The state now and the base's phase: as held, or worked out from there.
+    #[inline]
+    pub(super) fn now(&self) -> (Origin<f64>, Phase) {
+        match self.course.wave() {
+            Some(wave) if self.course.lag != Span::default() => {
+                let gone = self.course.gone(wave);
+                let mut now = wave.stride(&self.here, &gone);
+                let b = self.parameters.half_width;
+                now.w = now.w.clamp(-b, b);
+                (now, self.base.phase.turned(gone.angle, 0.0))
+            }
+            _ => (self.here, self.base.phase),
+        }
+    }
+
+    /// Brings the state that the plant holds up to date. Nothing that can be asked for changes; asking costs less
+    /// afterwards.
+    #[inline]
+    pub fn settle(&mut self) {
+        if self.course.lag != Span::default() {
+            self.catch_up();
+        }
+    }
+
+    #[cold]
+    fn catch_up(&mut self) {
+        let phase;
+        (self.here, phase) = self.now();
+        self.base.phase = phase;
+        self.course.catch_up();
+        self.course.face(&mut self.here, phase);
+    }
+
+    /// A step that an event may fall into.
+    fn meet(&mut self, duration: f64, mut tell: impl FnMut(Event)) -> Outcome {
+        let until = self.course.lag.plus(duration);
+        if until.seconds() < self.course.clear {
+            self.course.lag = until;
+            if self.course.repeats(duration) {
+                self.settle();
+            }
+            return Outcome::default();
+        }
+        let mut outcome = Outcome::default();
+        let mut tell = |event: Event| {
+            match event {
+                Event::Impact { .. } => outcome.impacts += 1,
+                Event::Stuck { .. } => outcome.stuck += 1,
+                Event::Released { .. } => outcome.released += 1,
+            }
+            tell(event);
+        };
+        let mut left = until;
+        let moment = |left: Span| Moment {
+            now: Span::of(duration).less(left).seconds(),
+            left: left.seconds(),
+        };
+        let mut dw = self.here.relative_velocity();
+        if self.course.lag == Span::default()
+            && self.contact == Contact::Free
+            && let Some(wall) = self.wall_touched()
+        {
+            dw = self.touch(wall, dw, moment(left), &mut tell);
+        }
+        let last_impact = self.tally.impacts + MOST_IMPACTS;
+        while left.seconds() > 0.0 && self.tally.impacts < last_impact {
+            if let Contact::Stuck(wall) = self.contact {
+                let (t, released) = self.stay(wall, left.seconds());
+                left = left.plus(-t);
+                self.afresh();
+                if released {
+                    let t = moment(left).now;
+                    tell(Event::Released { t, wall });
+                }
+                dw = 0.0;
+                continue;
+            }
+            if self.course.landing.is_none() && self.course.lag != Span::default() {
+                left = left.less(self.course.lag);
+                self.settle();
+                dw = self.here.relative_velocity();
+            }
+            if self.contact == Contact::Free {
+                let crossed = self.cross(duration, left, &mut tell);
+                if let Some(wall) = crossed.resting {
+                    dw = self.touch(
+                        wall,
+                        self.here.relative_velocity(),
+                        moment(crossed.left),
+                        &mut tell,
+                    );
+                    left = crossed.left;
+                    continue;
+                }
+                if crossed.left != left {
+                    left = crossed.left;
+                    dw = self.here.relative_velocity();
+                }
+                if self.course.clear == 0.0 {
+                    self.course.look_out(&self.here);
+                }
+            }
+            if left.seconds() < self.course.clear {
+                self.course.lag = left;
+                if left == Span::of(duration) && self.course.repeats(duration) {
+                    self.settle();
+                }
+                left = Span::default();
+                break;
+            }
+            if left.seconds() > 0.0 {
+                (left, dw) = self.search(dw, left, moment, &mut tell);
+            }
+        }
+        outcome.cut_short = left.seconds() > 0.0;
+        outcome
+    }
+
+    /// The state has been reached by the general way: nothing is known of what lies ahead.
+    fn afresh(&mut self) {
+        self.course.leave();
+        self.course.face(&mut self.here, self.base.phase);
+    }
+
+    /// Follows the flight to its first contact by the general search, for at most `left`; returns what is left after it,
+    /// and the relative velocity then.
+    fn search(
+        &mut self,
+        dw: f64,
+        left: Span,
+        moment: impl Fn(Span) -> Moment,
+        tell: &mut impl FnMut(Event),
+    ) -> (Span, f64) {
+        let released = match self.contact {
+            Contact::Released(wall) => Some(wall),
+            _ => None,
+        };
+        let motion = self.alone.motion(&self.base, self.here.primary());
+        let landing = Flight::new(motion, (self.here.w, dw), self.parameters.half_width)
+            .first_contact(left.seconds(), released);
+        let left = left.plus(-landing.t);
+        self.base = self.base.after(landing.t);
+        (self.here.x, self.here.v) = landing.primary;
+        self.here.w = landing.relative.0;
+        self.contact = Contact::Free;
+        self.afresh();
+        let dw = landing.relative.1;
+        let dw = match landing.wall {
+            Some(wall) => self.touch(wall, dw, moment(left), tell),
+            None => dw,
+        };
+        (left, dw)
+    }
+}
