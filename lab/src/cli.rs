@@ -1,6 +1,7 @@
 //! The command line: one file per command.
 
 mod backbone;
+mod chain;
 mod controller;
 mod door;
 mod failure;
@@ -51,6 +52,7 @@ struct Cli {
 enum Command {
     Identify(identify::Arguments),
     Backbone(backbone::Arguments),
+    Chain(chain::Arguments),
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Map(map::Arguments),
@@ -65,6 +67,7 @@ pub fn run() -> ExitCode {
     let output = match Cli::parse().command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Backbone(arguments) => backbone::run(&arguments),
+        Command::Chain(arguments) => chain::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),

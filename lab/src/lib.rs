@@ -18,4 +18,5 @@ pub mod pack;
 pub mod report;
 pub mod rig;
 pub mod scene;
+pub mod stages;
 pub mod theory;
