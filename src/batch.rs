@@ -2,8 +2,8 @@
 //!
 //! Plants that cross their cavities from wall to wall go abreast ([`crate::plant`]'s loop with masks in place of branches);
 //! whatever else one meets, it meets alone. The vector instructions are those of the machine it runs on, found out at run
-//! time. No fused operation is used, so that every plant gets the same bits as alone, whatever the width, the machine and
-//! the number of cores.
+//! time. No fused operation is used, so that a batch gives the same bits whatever the machine and the number of cores; a
+//! plant that crosses gets those it would get alone, and others agree to rounding.
 
 use crate::base_motion::Drive;
 use crate::plant::abreast::Run;

@@ -1,5 +1,5 @@
 //! Several plants cross their cavities side by side, one in each lane: the loop of [`super::cross`], with masks in place of
-//! branches and the same operations in the same order, so that every plant gets the same bits as alone.
+//! branches and the same operations in the same order, so that a plant that crosses gets the same bits as alone.
 
 use super::course::TURNS_KEPT;
 use super::cross::MOST_GUESSES;
@@ -41,9 +41,11 @@ impl Plant {
     /// Whether the plant can go abreast of others: it crosses, and nothing is under way that it would do otherwise alone.
     pub(crate) fn can_go_abreast(&self) -> bool {
         let free = self.contact == Contact::Free && self.course.wave().is_some();
-        // A start on the wall is looked at alone: the particle may be at rest.
-        let settled = self.course.lag == Span::default() && self.wall_touched().is_none();
-        free && (self.course.landing.is_some() || settled)
+        free && match &self.course.landing {
+            Some(landing) => landing.fresh,
+            // A start on the wall is looked at alone: the particle may be at rest.
+            None => self.course.lag == Span::default() && self.wall_touched().is_none(),
+        }
     }
 
     /// Crosses abreast for at most `duration` seconds; every plant can go abreast.

@@ -162,6 +162,8 @@ impl Plant {
             if self.course.landing.is_none() && self.course.lag != Span::default() {
                 left = left.less(self.course.lag);
                 self.settle();
+                // The time it was known to be clear for is over.
+                self.course.clear = 0.0;
                 dw = self.here.relative_velocity();
             }
             if self.contact == Contact::Free {

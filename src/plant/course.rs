@@ -15,6 +15,8 @@ pub(super) const TURNS_KEPT: u32 = 16;
 pub(super) struct Landing {
     /// Since the origin.
     pub at: Span,
+    /// Whether the origin is still the state that it was found from.
+    pub fresh: bool,
     /// State just before the impact.
     pub arrival: Arrival<f64>,
     /// Phase of the base then.
@@ -79,9 +81,10 @@ impl Course {
     /// The state has come to where the plant stands.
     pub fn catch_up(&mut self) {
         let lag = core::mem::take(&mut self.lag);
-        self.clear -= lag.seconds();
+        self.clear = (self.clear - lag.seconds()).max(0.0);
         if let Some(landing) = &mut self.landing {
             landing.at = landing.at.less(lag);
+            landing.fresh = false;
         }
     }
 
@@ -140,6 +143,7 @@ impl Course {
         self.clear -= self.stride.t;
         if let Some(landing) = &mut self.landing {
             landing.at = landing.at.plus(-self.stride.t);
+            landing.fresh = false;
         }
         if self.turns >= TURNS_KEPT {
             self.face(&mut end, base.phase);

@@ -78,6 +78,7 @@ impl Plant {
                     guesses = 0;
                     let landing = Landing {
                         at: Span::of_parts((anchor.t, arrival.beyond)),
+                        fresh: true,
                         phase: phase.turned(anchor.angle, wave.omega * arrival.beyond),
                         arrival,
                         wall: if ahead > 0.0 { Wall::Plus } else { Wall::Minus },
@@ -95,6 +96,8 @@ impl Plant {
             } = landing;
             left = left.less(at);
             phase = landing.phase;
+            // What was known of the flight before holds no longer.
+            *clear = 0.0;
             *turns += 1;
             let velocity = arrival.v - start.particle;
             let after = self.law.rebound(arrival.v, start.particle, velocity);
