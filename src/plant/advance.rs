@@ -167,6 +167,7 @@ impl Plant {
                 dw = self.here.relative_velocity();
             }
             if self.contact == Contact::Free {
+                let before = self.tally.impacts;
                 let crossed = self.cross(duration, left, &mut tell);
                 if let Some(wall) = crossed.resting {
                     dw = self.touch(
@@ -178,7 +179,7 @@ impl Plant {
                     left = crossed.left;
                     continue;
                 }
-                if crossed.left != left {
+                if self.tally.impacts != before {
                     left = crossed.left;
                     dw = self.here.relative_velocity();
                 }
