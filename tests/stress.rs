@@ -1,4 +1,4 @@
-//! Hard scenes by the thousand, as a table: `scripts/stress` runs the long form (`SCENES=100000`), the test suite a short one.
+//! Hard scenes by the thousand, as a table: `scripts/stress --plant` runs the long form (`SCENES=100000`), the test suite a short one.
 
 mod common;
 
@@ -29,7 +29,6 @@ struct Worst {
     growth: f64,
     /// What energy and dissipated energy miss of that at the start, without damping.
     missing: f64,
-    /// Momentum lost at an impact, relative to the velocities there.
     impacts_per_period: f64,
     impacts: u64,
 }
@@ -127,7 +126,8 @@ fn elastic(impacts: u64) {
         println!(
             "| r = 1, c = 0, mass ratio {epsilon}, {impacts} impacts | energy drifts by {drift:.1e} |"
         );
-        assert!(drift <= 1e-12);
+        // The bound is per 10^5 impacts: what an anchor's own rounding brings in grows with their number.
+        assert!(drift <= 1e-12 * (impacts as f64 / 1e5));
     }
 }
 

@@ -112,7 +112,7 @@ impl<const N: usize> Row<N> {
         let lands = Lanes::both(on_the_way, Lanes::both(near, Lanes::<N>::not(beyond_end)));
 
         let velocity = arrival.v - start.particle;
-        let after = self.law.rebound(arrival.v, start.particle, velocity);
+        let after = self.law.rebound(arrival.v, velocity);
         let phase = turned(
             self.phase,
             self.anchor.angle,

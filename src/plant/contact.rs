@@ -42,7 +42,7 @@ impl Plant {
         let mut dw = dw;
         self.here.w = s * self.parameters.half_width;
         if s * dw > 0.0 {
-            let after = self.law.rebound(self.here.v, self.here.particle, dw);
+            let after = self.law.rebound(self.here.v, dw);
             let t = moment.now;
             self.tally.impacts += 1;
             self.tally.impact_time = self.time + t;

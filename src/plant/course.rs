@@ -10,6 +10,9 @@ use serde::{Deserialize, Serialize};
 
 /// So many turns by a rounded `e^{i angle}` before it is worked out anew from the phase.
 pub(super) const TURNS_KEPT: u32 = 16;
+/// Shortest step that the state is moved on by, in units of `1/omega0`, squared.
+const SHORTEST_STRIDE: f64 = 1e-6;
+
 /// An arrival, and when it is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Landing {
@@ -99,7 +102,10 @@ impl Course {
 
     /// Notes the length of a step that meets nothing. Whether it came before, so that it pays to work it out for good.
     pub fn repeats(&mut self, duration: f64) -> bool {
-        let again = duration == self.last_duration && duration > 0.0 && self.quick;
+        // Tiny steps would add up their roundings: the state is left where it is, and worked out from there when asked for.
+        let worth_it = (self.rig.as_ref())
+            .is_some_and(|wave| duration * duration * wave.omega0_squared > SHORTEST_STRIDE);
+        let again = duration == self.last_duration && worth_it && self.quick;
         self.last_duration = duration;
         if let (true, Some(wave)) = (again, &self.rig) {
             self.stride = if self.stride.t == duration {

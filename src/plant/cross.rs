@@ -100,7 +100,7 @@ impl Plant {
             *clear = 0.0;
             *turns += 1;
             let velocity = arrival.v - start.particle;
-            let after = self.law.rebound(arrival.v, start.particle, velocity);
+            let after = self.law.rebound(arrival.v, velocity);
             start = Origin {
                 x: arrival.x,
                 v: after.primary,
