@@ -1,5 +1,6 @@
 //! What a record says: the locked point, its regime, and the backbone along the free decay.
 
+mod crossings;
 mod decay;
 mod fit;
 mod lock;
@@ -15,6 +16,7 @@ use crate::scene::{Dimensionless, Scene};
 use crate::theory::{BackbonePoint, SlowFlow};
 
 pub use decay::DecayPoint;
+pub(crate) use decay::points as decay_points;
 pub use lock::Lock;
 pub(crate) use regime::classify;
 pub use regime::{Impact, Regime, impacts};

@@ -190,7 +190,11 @@ impl Controller for OpenLoop {
 
 #[test]
 fn an_experiment_takes_any_controller_and_records_every_stage() {
-    let scene = scene(&["record.hold_periods=3", "record.decay_periods=2"]);
+    let scene = scene(&[
+        "record.hold_periods=3",
+        "record.decay_periods=2",
+        "record.window_periods=1.5",
+    ]);
     let mut rig = Simulated::new(&scene).unwrap();
     let drive = Drive {
         omega: 1.0,
