@@ -79,7 +79,8 @@ pub struct Identification {
 pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, IdentificationError> {
     let parameters = scene.dimensionless();
     let lock = lock::measure(record, scene);
-    if lock.regime != Regime::Symmetric {
+    // Where noise hides the symmetry, a motion that is steady and off the linear mode is taken as it is, and said to be that.
+    if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
         return Err(IdentificationError::Regime {
             regime: lock.regime,
             sigma: lock.sigma,

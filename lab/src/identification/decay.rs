@@ -64,7 +64,14 @@ pub(crate) fn points(record: &Record, scene: &Scene, slow_flow: &SlowFlow) -> Ve
             })
             .collect(),
     };
-    let within = |piece: &Piece| decay[piece.samples.end - 1].time <= end;
+    // Without impacts to go by, the decay ends where the backbone does: at the fold.
+    let least = if first.witness.is_some() {
+        0.0
+    } else {
+        slow_flow.manifold.c_min() * d.b
+    };
+    let within =
+        |piece: &Piece| decay[piece.samples.end - 1].time <= end && piece.amplitude >= least;
     pieces
         .into_iter()
         .take_while(within)
