@@ -231,3 +231,28 @@ fn an_experiment_takes_any_controller_and_records_every_stage() {
             .all(|sample| sample.command.drive == Drive::default())
     );
 }
+
+#[test]
+fn limits_of_a_scene_reach_the_controller() {
+    let run = |settings: &[&str]| {
+        let scene = scene(settings);
+        let mut rig = Simulated::new(&scene).unwrap();
+        let mut controller = BuiltIn::new(&scene)?;
+        let mut drives = Vec::new();
+        for _ in 0..4000 {
+            let command = controller.sample(rig.sense().unwrap(), true).unwrap();
+            drives.push(command.drive.amplitude);
+            rig.advance(command.drive, scene.sample_time()).unwrap();
+        }
+        Ok::<_, phase_lock::ConfigError>((scene.amplitude, drives))
+    };
+    let (amplitude, drives) = run(&["controller.ramp_periods=10"]).unwrap();
+    assert!((drives[500] / amplitude - 0.5).abs() < 0.01);
+    // A response too large takes the drive away for good.
+    let (_, drives) = run(&["controller.C_max=0.2"]).unwrap();
+    assert!(drives[0] > 0.0 && drives[3999] == 0.0);
+    let (_, drives) = run(&["controller.acquire_periods=20"]).unwrap();
+    assert!(drives[1900] > 0.0 && drives[3999] == 0.0);
+    let refused = run(&["controller.G_max=1.0"]).unwrap_err().to_string();
+    assert!(refused.starts_with("amplitude"), "{refused}");
+}
