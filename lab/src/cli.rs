@@ -3,6 +3,7 @@
 mod backbone;
 mod chain;
 mod controller;
+mod decay;
 mod door;
 mod failure;
 mod identify;
@@ -53,6 +54,7 @@ enum Command {
     Identify(identify::Arguments),
     Backbone(backbone::Arguments),
     Chain(chain::Arguments),
+    Decay(decay::Arguments),
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Map(map::Arguments),
@@ -68,6 +70,7 @@ pub fn run() -> ExitCode {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Backbone(arguments) => backbone::run(&arguments),
         Command::Chain(arguments) => chain::run(&arguments),
+        Command::Decay(arguments) => decay::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),

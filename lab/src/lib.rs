@@ -8,6 +8,7 @@
 #![forbid(unsafe_code)]
 
 pub mod backbone;
+pub mod estimators;
 pub mod experiment;
 mod files;
 pub mod identification;
