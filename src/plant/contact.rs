@@ -15,6 +15,9 @@ const SHORTEST_RIDE: f64 = 1e-6;
 /// Relative rounding of an acceleration put together from a few terms.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 
+/// An acceleration so small against `omega0² b` is none.
+const NOTHING: f64 = 1e-200;
+
 /// When something happens within an advance, and how much of the advance is left then, s.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Moment {
@@ -124,7 +127,9 @@ impl Plant {
 
     /// Rounding of an acceleration here, m/s².
     fn acceleration_noise(&self) -> f64 {
-        ROUNDING * self.acceleration_bound()
+        // Motion that has died out to where numbers end has no digits at all.
+        let nothing = NOTHING * self.parameters.half_width * self.alone.oscillator.omega0_squared;
+        ROUNDING * self.acceleration_bound() + nothing
     }
 
     /// Both masses move as one for at most `left` seconds, until the wall ceases to push. Returns the time passed, s, and
