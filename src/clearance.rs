@@ -43,6 +43,8 @@ const NEAR: f64 = 1e-4;
 /// Steps below [`TINY`] times the fastest rate's time that are tolerated in a row.
 const MOST_TINY_STEPS: usize = 20;
 const TINY: f64 = 1e-9;
+/// Below this a sum of squares has lost digits.
+const UNDERFLOW: f64 = 1e-290;
 /// So many windows are tried for a bound, each at most three times shorter than the last.
 const MOST_WINDOWS: usize = 40;
 
@@ -150,10 +152,16 @@ impl Gap {
 /// The first `h >= 0` at which `gap - closing h - acceleration h²/2` reaches 0 coming from above (`gap >= 0`).
 fn first_root(gap: f64, closing: f64, acceleration: f64) -> Option<f64> {
     let discriminant = closing * closing + 2.0 * acceleration * gap;
+    let root = if discriminant.abs() < UNDERFLOW && acceleration >= 0.0 {
+        // The squares of very small numbers are none, but their root is not.
+        libm::hypot(closing, libm::sqrt(2.0 * acceleration) * libm::sqrt(gap))
+    } else {
+        libm::sqrt(discriminant)
+    };
     if closing > 0.0 {
-        (discriminant >= 0.0).then(|| 2.0 * gap / (closing + libm::sqrt(discriminant)))
+        (root >= 0.0).then(|| 2.0 * gap / (closing + root))
     } else if acceleration > 0.0 {
-        Some((libm::sqrt(discriminant) - closing) / acceleration)
+        Some((root - closing) / acceleration)
     } else {
         None
     }
