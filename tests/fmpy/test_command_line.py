@@ -77,7 +77,8 @@ def test_identify_writes_its_results_and_they_keep_their_limits(call, tmp_path, 
 
 
 def check_decay(points):
-    assert len(points) > 100
+    # A point per window's step over some 100 periods of decay, less the length of a window.
+    assert len(points) > 80
     for point in points:
         assert point.keys() >= {"tau", "C", "B", "sigma", "sigma_theory"}
         assert all(isfinite(point[key]) for key in ("tau", "C", "B", "sigma"))
