@@ -1,0 +1,51 @@
+"""A program that answers requests, a line of JSON each, and is killed when it does not."""
+
+import json
+import select
+import subprocess
+
+
+class Missing(Exception):
+    """A peer that cannot be started, and why."""
+
+
+class Worker:
+    """One side of the comparison; `hello` is the line that it begins with, if it does."""
+
+    def __init__(self, command, greets):
+        self.command, self.greets = [str(part) for part in command], greets
+        self.process = None
+        self.hello = {}
+        self.start()
+
+    def start(self):
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
+        self.process = subprocess.Popen(self.command, text=True, bufsize=1, **pipes)
+        if self.greets:
+            line = self.process.stdout.readline()
+            if not line:
+                error = self.process.stderr.read().strip().splitlines() or ["it ended without a word"]
+                raise Missing(error[-1])
+            self.hello = json.loads(line)
+
+    def ask(self, request, limit):
+        """The answer, or None after `limit` seconds; the program is then started anew."""
+        try:
+            self.process.stdin.write(json.dumps(request) + "\n")
+            self.process.stdin.flush()
+            ready, _, _ = select.select([self.process.stdout], [], [], limit)
+            line = self.process.stdout.readline() if ready else None
+        except BrokenPipeError:
+            line = ""
+        if line:
+            return json.loads(line)
+        self.process.kill()
+        _, error = self.process.communicate()
+        self.start()
+        if line is None:
+            return None
+        return {"ns": [], "failure": "crashed: " + (error.strip().splitlines() or ["without a word"])[-1]}
+
+    def end(self):
+        self.process.kill()
+        self.process.communicate()

@@ -1,0 +1,99 @@
+//! The Rust side of scripts/bench: reads a request a line (JSON) from standard input, and answers a line each.
+//!
+//! ```text
+//! {"scene": "steady", "method": "plant", "setting": 0, "checks": [10, 20], "budget": 0.1, "limit": 10}
+//! {"growth": "periods", "budget": 0.1}
+//! {"record": 20}
+//! ```
+
+#![forbid(unsafe_code)]
+
+mod closed_loop;
+mod growth;
+mod method;
+mod methods;
+mod scene;
+
+use std::io::{BufRead, Write};
+use std::path::Path;
+use std::time::Duration;
+
+use scene::Scene;
+use serde::Deserialize;
+use serde_json::json;
+
+#[derive(Deserialize)]
+#[serde(untagged)]
+enum Request {
+    Run {
+        scene: String,
+        method: String,
+        setting: f64,
+        checks: Vec<usize>,
+        budget: f64,
+        limit: f64,
+    },
+    Growth {
+        growth: String,
+        budget: f64,
+        most: f64,
+    },
+    Record {
+        record: usize,
+    },
+    Loop {
+        closed_loop: usize,
+        budget: f64,
+    },
+    Methods {
+        methods: bool,
+    },
+}
+
+fn answer(folder: &Path, request: &str) -> Result<serde_json::Value, String> {
+    let wrong = |e: serde_json::Error| e.to_string();
+    match serde_json::from_str(request).map_err(wrong)? {
+        Request::Run {
+            scene,
+            method,
+            setting,
+            checks,
+            budget,
+            limit,
+        } => {
+            let scene = Scene::load(folder, &scene)?;
+            let (budget, limit) = (
+                Duration::from_secs_f64(budget),
+                Duration::from_secs_f64(limit),
+            );
+            let answer = methods::measure_named(&method, &scene, setting, &checks, budget, limit)?;
+            serde_json::to_value(answer).map_err(wrong)
+        }
+        Request::Growth {
+            growth,
+            budget,
+            most,
+        } => growth::measure(folder, &growth, budget, most),
+        Request::Record { record } => Ok(json!({"drives": closed_loop::record(record)})),
+        Request::Loop {
+            closed_loop,
+            budget,
+        } => Ok(closed_loop::measure(closed_loop, budget)),
+        Request::Methods { methods } => Ok(json!(methods.then_some(methods::NAMES))),
+    }
+}
+
+fn main() -> std::io::Result<()> {
+    let folder = std::env::args_os()
+        .nth(1)
+        .unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
+    for line in std::io::stdin().lock().lines() {
+        let line = line?;
+        let answer =
+            answer(Path::new(&folder), &line).unwrap_or_else(|error| json!({"error": error}));
+        let mut out = std::io::stdout().lock();
+        writeln!(out, "{answer}")?;
+        out.flush()?;
+    }
+    Ok(())
+}

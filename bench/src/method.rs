@@ -1,0 +1,111 @@
+//! What every method can do, and how it is timed.
+
+use std::time::{Duration, Instant};
+
+use serde::Serialize;
+
+use crate::scene::{Scene, Step};
+
+/// How a method failed.
+#[derive(Clone, Debug)]
+pub struct Failure(pub String);
+
+/// A way to follow a scene.
+pub trait Method: Sized {
+    /// At the scene's start. `setting` is a tolerance or a number of steps: what the method's accuracy hangs on.
+    ///
+    /// # Errors
+    /// A scene that this method is not made for.
+    fn start(scene: &Scene, setting: f64) -> Result<Self, Failure>;
+
+    /// One step of the scene.
+    ///
+    /// # Errors
+    /// A step that the method could not finish.
+    fn step(&mut self, step: &Step) -> Result<(), Failure>;
+
+    /// q1, q1', q2, q2' now.
+    fn state(&self) -> [f64; 4];
+
+    /// Impacts so far, as this method counts them.
+    fn impacts(&self) -> u64;
+
+    /// Makes of the scene's steps those that this method takes.
+    fn steps(steps: &[Step]) -> Vec<Step> {
+        steps.to_vec()
+    }
+}
+
+/// What came of a few runs of one method on one scene.
+#[derive(Debug, Default, Serialize)]
+pub struct Answer {
+    /// Wall times, ns, without the setting up.
+    pub ns: Vec<f64>,
+    /// States after the steps that were asked for.
+    pub states: Vec<[f64; 4]>,
+    /// Impacts in the whole run.
+    pub impacts: u64,
+    /// How it failed, if it did.
+    pub failure: Option<String>,
+}
+
+/// Runs the scene for about `budget`, once at least; a run that lasts longer than `limit` is given up. `checks` are the steps,
+/// counted from 1, after which the state is kept.
+pub fn measure<M: Method>(
+    scene: &Scene,
+    setting: f64,
+    checks: &[usize],
+    budget: Duration,
+    limit: Duration,
+) -> Answer {
+    let mut answer = Answer::default();
+    let began = Instant::now();
+    while answer.ns.is_empty() || (began.elapsed() < budget && answer.ns.len() < 1000) {
+        answer.states.clear();
+        match run::<M>(scene, setting, checks, limit, &mut answer.states) {
+            Ok((ns, impacts)) => {
+                answer.ns.push(ns);
+                answer.impacts = impacts;
+            }
+            Err(Failure(how)) => {
+                answer.failure = Some(how);
+                break;
+            }
+        }
+    }
+    answer
+}
+
+fn run<M: Method>(
+    scene: &Scene,
+    setting: f64,
+    checks: &[usize],
+    limit: Duration,
+    states: &mut Vec<[f64; 4]>,
+) -> Result<(f64, u64), Failure> {
+    let steps = M::steps(&scene.steps);
+    let mut checks = checks.iter().copied().peekable();
+    // The clock is asked now and then only: it costs as much as a step without impact.
+    let asked_every = (steps.len() / 1000).max(1);
+    let mut method = M::start(scene, setting)?;
+    let began = Instant::now();
+    for (n, step) in steps.iter().enumerate() {
+        method.step(step)?;
+        let state = std::hint::black_box(method.state());
+        if checks.next_if_eq(&(n + 1)).is_some() {
+            states.push(state);
+        }
+        if n % asked_every == 0 && began.elapsed() > limit {
+            return Err(Failure(format!(
+                "time limit: {:.0} % done after {:.0} s",
+                100.0 * (n + 1) as f64 / steps.len() as f64,
+                limit.as_secs_f64()
+            )));
+        }
+    }
+    let ns = began.elapsed().as_nanos() as f64;
+    if states.is_empty() {
+        states.push(method.state());
+    }
+    Ok((ns, method.impacts()))
+}

@@ -1,0 +1,45 @@
+//! The closed form with Brent's method: the baseline of benches/.
+
+#[path = "../../../benches/baseline/mod.rs"]
+mod baseline;
+
+use baseline::{Baseline, Rig};
+
+use crate::method::{Failure, Method};
+use crate::scene::{Scene, Step};
+
+/// The baseline; its setting is the tolerance of the root search, s.
+pub struct Brent(Baseline);
+
+impl Method for Brent {
+    fn start(scene: &Scene, setting: f64) -> Result<Self, Failure> {
+        let p = scene.parameters;
+        let rig = Rig {
+            primary_mass: p.primary_mass,
+            stiffness: p.stiffness,
+            damping: p.damping,
+            particle_mass: p.particle_mass,
+            half_width: p.half_width,
+            restitution: p.restitution,
+        };
+        Ok(Self(Baseline::new(rig, scene.start, setting)))
+    }
+
+    fn step(&mut self, step: &Step) -> Result<(), Failure> {
+        let ended = self.0.advance(step.amplitude, step.omega, step.duration);
+        ended.map_err(|_| {
+            let (t, n) = (self.0.elapsed, self.0.impacts);
+            Failure(format!(
+                "stalled in the step from t = {t:.3} on, after {n} impacts"
+            ))
+        })
+    }
+
+    fn state(&self) -> [f64; 4] {
+        [self.0.q1, self.0.dq1, self.0.q2, self.0.dq2]
+    }
+
+    fn impacts(&self) -> u64 {
+        self.0.impacts
+    }
+}

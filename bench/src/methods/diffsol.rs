@@ -1,0 +1,146 @@
+//! The solver library diffsol: stopped by its root functions, restarted after every impact and at the end of every step.
+
+use diffsol::{NalgebraLU, NalgebraMat, OdeBuilder, OdeSolverMethod, OdeSolverStopReason};
+use lovines::Parameters;
+
+use super::impact::{acceleration, rebound};
+use crate::method::{Failure, Method};
+use crate::scene::{Scene, Step};
+
+type Matrix = NalgebraMat<f64>;
+
+/// So many impacts within one step are a stall.
+const MOST_IMPACTS: usize = 1000;
+
+struct Flight {
+    p: Parameters,
+    tolerance: f64,
+    y: [f64; 4],
+    angle: f64,
+    time: f64,
+    impacts: u64,
+}
+
+impl Flight {
+    fn new(scene: &Scene, tolerance: f64) -> Self {
+        Self {
+            p: scene.parameters,
+            tolerance,
+            y: scene.start,
+            angle: 0.0,
+            time: 0.0,
+            impacts: 0,
+        }
+    }
+}
+
+macro_rules! method {
+    ($(#[$meta:meta])* $name:ident, $solver:ident $(, $linear:ty)?) => {
+        $(#[$meta])*
+        pub struct $name(Flight);
+
+        impl Method for $name {
+            fn start(scene: &Scene, setting: f64) -> Result<Self, Failure> {
+                Ok(Self(Flight::new(scene, setting)))
+            }
+
+            fn step(&mut self, step: &Step) -> Result<(), Failure> {
+                let flight = &mut self.0;
+                let (p, y0, angle) = (flight.p, flight.y, flight.angle);
+                let wrong = |e: diffsol::error::DiffsolError| Failure(e.to_string());
+                let problem = OdeBuilder::<Matrix>::new()
+                    .rtol(flight.tolerance)
+                    .atol([flight.tolerance])
+                    .h0(0.01 * step.duration.min(1.0))
+                    .rhs_implicit(
+                        |x, _p, t, y| {
+                            let angle = angle + step.omega * t;
+                            y[0] = x[1];
+                            y[1] = acceleration(&p, step.amplitude, step.omega, angle, x[0], x[1]);
+                            y[2] = x[3];
+                            y[3] = 0.0;
+                        },
+                        |_x, _p, _t, v, y| {
+                            y[0] = v[1];
+                            y[1] = -(p.stiffness * v[0] + p.damping * v[1]) / p.primary_mass;
+                            y[2] = v[3];
+                            y[3] = 0.0;
+                        },
+                    )
+                    .init(
+                        |_p, _t, y| {
+                            for (n, value) in y0.into_iter().enumerate() {
+                                y[n] = value;
+                            }
+                        },
+                        4,
+                    )
+                    .root(
+                        |x, _p, _t, g| {
+                            g[0] = p.half_width - (x[0] - x[2]);
+                            g[1] = p.half_width + (x[0] - x[2]);
+                        },
+                        2,
+                    )
+                    .build()
+                    .map_err(wrong)?;
+                let mut solver = problem.$solver$(::<$linear>)?().map_err(wrong)?;
+                solver.set_stop_time(step.duration).map_err(wrong)?;
+                let mut impacts = 0;
+                loop {
+                    match solver.step().map_err(wrong)? {
+                        OdeSolverStopReason::InternalTimestep => {}
+                        OdeSolverStopReason::TstopReached => break,
+                        OdeSolverStopReason::RootFound(t, _) => {
+                            solver.state_mut_back(t).map_err(wrong)?;
+                            let state = solver.state_mut();
+                            let y = &mut *state.y;
+                            // A root that the particle leaves is the one that this flight began at.
+                            if (y[0] - y[2]) * (y[1] - y[3]) > 0.0 {
+                                (y[1], y[3]) = rebound(&p, y[1], y[3]);
+                                flight.impacts += 1;
+                                impacts += 1;
+                            }
+                            let (q1, v1, v3) = (y[0], y[1], y[3]);
+                            let dy = &mut *state.dy;
+                            dy[0] = v1;
+                            dy[1] = acceleration(&p, step.amplitude, step.omega, angle + step.omega * t, q1, v1);
+                            dy[2] = v3;
+                            dy[3] = 0.0;
+                            if impacts > MOST_IMPACTS {
+                                let at = flight.time + t;
+                                return Err(Failure(format!("stalled at t = {at:.3} after {} impacts", flight.impacts)));
+                            }
+                            if t >= step.duration {
+                                break;
+                            }
+                            solver.set_stop_time(step.duration).map_err(wrong)?;
+                        }
+                    }
+                }
+                let y = solver.state().y;
+                flight.y = [y[0], y[1], y[2], y[3]];
+                flight.time += step.duration;
+                flight.angle = (angle + step.omega * step.duration) % core::f64::consts::TAU;
+                Ok(())
+            }
+
+            fn state(&self) -> [f64; 4] {
+                self.0.y
+            }
+
+            fn impacts(&self) -> u64 {
+                self.0.impacts
+            }
+        }
+    };
+}
+
+method!(
+    /// The explicit Runge-Kutta method of order 5.
+    Tsit45, tsit45
+);
+method!(
+    /// The backward differentiation formulae.
+    Bdf, bdf, NalgebraLU<f64>
+);

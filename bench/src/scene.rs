@@ -1,0 +1,103 @@
+//! The scenes, as scenes.json and loop.json have them.
+
+use std::path::Path;
+
+use lovines::{Parameters, State};
+use serde::Deserialize;
+
+/// What the base does during one step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Step {
+    /// Amplitude of the base motion, m.
+    pub amplitude: f64,
+    /// Its frequency, rad/s.
+    pub omega: f64,
+    /// Length of the step, s.
+    pub duration: f64,
+}
+
+#[derive(Deserialize)]
+struct Written {
+    #[serde(rename = "M")]
+    primary_mass: f64,
+    k: f64,
+    c: f64,
+    m: f64,
+    b: f64,
+    r: f64,
+    start: [f64; 4],
+    amplitude: f64,
+    omega: f64,
+    step: f64,
+    steps: usize,
+    #[serde(default)]
+    drives: Option<String>,
+}
+
+/// A rig, its start, and the steps that it is asked for.
+#[derive(Clone, Debug)]
+pub struct Scene {
+    /// The rig.
+    pub parameters: Parameters,
+    /// q1, q1', q2, q2' at the start, SI units.
+    pub start: [f64; 4],
+    /// One after the other.
+    pub steps: Vec<Step>,
+}
+
+impl Scene {
+    /// The scene of that name in the folder's scenes.json.
+    ///
+    /// # Errors
+    /// A file that cannot be read, or a scene that is not in it.
+    pub fn load(folder: &Path, name: &str) -> Result<Self, String> {
+        let read = |file: &str| {
+            let path = folder.join(file);
+            std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))
+        };
+        let wrong = |e: serde_json::Error| format!("{name}: {e}");
+        let all: serde_json::Value = serde_json::from_str(&read("scenes.json")?).map_err(wrong)?;
+        let written = all
+            .get(name)
+            .ok_or_else(|| format!("there is no scene {name}"))?;
+        let scene: Written = serde_json::from_value(written.clone()).map_err(wrong)?;
+        let steps = match &scene.drives {
+            None => {
+                let step = Step {
+                    amplitude: scene.amplitude,
+                    omega: scene.omega,
+                    duration: scene.step,
+                };
+                vec![step; scene.steps]
+            }
+            Some(file) => {
+                let drives: Vec<[f64; 2]> = serde_json::from_str(&read(file)?).map_err(wrong)?;
+                let step = |[amplitude, omega]: [f64; 2]| Step {
+                    amplitude,
+                    omega,
+                    duration: scene.step,
+                };
+                drives.into_iter().map(step).collect()
+            }
+        };
+        Ok(Self {
+            parameters: Parameters {
+                primary_mass: scene.primary_mass,
+                stiffness: scene.k,
+                damping: scene.c,
+                particle_mass: scene.m,
+                half_width: scene.b,
+                restitution: scene.r,
+            },
+            start: scene.start,
+            steps,
+        })
+    }
+
+    /// The start as the plant takes it.
+    #[must_use]
+    pub fn state(&self) -> State {
+        let [q1, dq1, q2, dq2] = self.start;
+        State { q1, dq1, q2, dq2 }
+    }
+}

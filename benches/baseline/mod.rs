@@ -1,0 +1,265 @@
+//! What a careful user would write in an afternoon: the closed form between impacts, walls looked for on a grid, and the
+//! instant of an impact by Brent's method (crate `roots`). The measure that this project's speed is told in.
+//!
+//! It shares no code with the plant, carries the phase from step to step, and knows no sticking: at the end of a chatter it stalls, and a
+//! contact that begins and ends between two points of the grid it does not see.
+
+use roots::{SimpleConvergency, find_root_brent};
+
+/// Points of the grid per radian of the faster of drive and free oscillation: 24 per period.
+const POINTS_PER_RADIAN: f64 = 24.0 / core::f64::consts::TAU;
+/// So many impacts between two points of the grid are a stall.
+const MOST_IMPACTS: u32 = 1000;
+
+/// Rig and drive, SI units: `M q1'' + c q1' + k q1 = k e + c e'` with `e = amplitude sin(omega t + phase)`.
+#[derive(Clone, Copy, Debug)]
+pub struct Rig {
+    pub primary_mass: f64,
+    pub stiffness: f64,
+    pub damping: f64,
+    pub particle_mass: f64,
+    pub half_width: f64,
+    pub restitution: f64,
+}
+
+/// The end of a chatter: impacts without end in no time.
+#[derive(Clone, Copy, Debug)]
+pub struct Stalled;
+
+/// The free oscillation about the particular solution: two amplitudes, by the sign of `zeta - 1`.
+#[derive(Clone, Copy, Debug)]
+enum Free {
+    Under {
+        delta: f64,
+        omega: f64,
+        a: f64,
+        b: f64,
+    },
+    Over {
+        first: f64,
+        second: f64,
+        a: f64,
+        b: f64,
+    },
+}
+
+/// The motion of the primary mass from an instant on.
+#[derive(Clone, Copy, Debug)]
+struct Motion {
+    from: f64,
+    free: Free,
+    /// Particular solution `p sin + q cos` of `omega t + phase`; times `t` at an undamped resonance.
+    p: f64,
+    q: f64,
+    secular: bool,
+    omega: f64,
+    phase: f64,
+}
+
+impl Motion {
+    fn particular(&self, t: f64) -> (f64, f64) {
+        let (sin, cos) = (self.omega * t + self.phase).sin_cos();
+        let x = self.p * sin + self.q * cos;
+        let v = self.omega * (self.p * cos - self.q * sin);
+        if self.secular {
+            (x * t, v * t + x)
+        } else {
+            (x, v)
+        }
+    }
+
+    fn new(rig: &Rig, amplitude: f64, omega: f64, phase: f64, from: f64, x: f64, v: f64) -> Self {
+        let Rig {
+            primary_mass: m,
+            stiffness: k,
+            damping: c,
+            ..
+        } = *rig;
+        let (detuning, damping) = (k - m * omega * omega, c * omega);
+        let square = detuning * detuning + damping * damping;
+        let secular = square == 0.0 && amplitude != 0.0;
+        let (p, q) = if amplitude == 0.0 {
+            (0.0, 0.0)
+        } else if secular {
+            (0.0, -amplitude * k / (2.0 * m * omega))
+        } else {
+            (
+                amplitude * (k * detuning + damping * damping) / square,
+                amplitude * (damping * detuning - k * damping) / square,
+            )
+        };
+        let delta = 0.5 * c / m;
+        let mut motion = Self {
+            from,
+            free: Free::Under {
+                delta,
+                omega: 0.0,
+                a: 0.0,
+                b: 0.0,
+            },
+            p,
+            q,
+            secular,
+            omega,
+            phase,
+        };
+        let (xp, vp) = motion.particular(from);
+        let (y, dy) = (x - xp, v - vp);
+        let square = k / m - delta * delta;
+        motion.free = if square > 0.0 {
+            let omega = square.sqrt();
+            Free::Under {
+                delta,
+                omega,
+                a: y,
+                b: (dy + delta * y) / omega,
+            }
+        } else {
+            let root = (-square).sqrt();
+            let first = -delta - root;
+            let second = k / m / first;
+            let a = (dy - second * y) / (first - second);
+            Free::Over {
+                first,
+                second,
+                a,
+                b: y - a,
+            }
+        };
+        motion
+    }
+
+    /// Position and velocity `h` after it.
+    fn at(&self, h: f64) -> (f64, f64) {
+        let (x, v) = self.particular(self.from + h);
+        let (y, dy) = match self.free {
+            Free::Under { delta, omega, a, b } => {
+                let decay = (-delta * h).exp();
+                let (sin, cos) = (omega * h).sin_cos();
+                let y = decay * (a * cos + b * sin);
+                (y, decay * omega * (b * cos - a * sin) - delta * y)
+            }
+            Free::Over {
+                first,
+                second,
+                a,
+                b,
+            } => {
+                let (fast, slow) = (a * (first * h).exp(), b * (second * h).exp());
+                (fast + slow, first * fast + second * slow)
+            }
+        };
+        (x + y, v + dy)
+    }
+}
+
+/// The method under way.
+#[derive(Clone, Copy, Debug)]
+pub struct Baseline {
+    rig: Rig,
+    tolerance: f64,
+    pub q1: f64,
+    pub dq1: f64,
+    pub q2: f64,
+    pub dq2: f64,
+    /// Time since the start, s.
+    pub elapsed: f64,
+    pub impacts: u64,
+    /// Time since the step began, s.
+    time: f64,
+    drive: (f64, f64),
+    phase: f64,
+}
+
+impl Baseline {
+    /// At `start` (q1, q1', q2, q2'); impact instants are found to `tolerance` seconds.
+    pub fn new(rig: Rig, start: [f64; 4], tolerance: f64) -> Self {
+        let [q1, dq1, q2, dq2] = start;
+        Self {
+            rig,
+            tolerance,
+            q1,
+            dq1,
+            q2,
+            dq2,
+            elapsed: 0.0,
+            impacts: 0,
+            time: 0.0,
+            drive: (0.0, 0.0),
+            phase: 0.0,
+        }
+    }
+
+    /// Advances by `duration` seconds under `e = amplitude sin(omega t + phase)`, the phase going on.
+    pub fn advance(&mut self, amplitude: f64, omega: f64, duration: f64) -> Result<(), Stalled> {
+        self.drive = (amplitude, omega);
+        let end = duration;
+        let natural = (self.rig.stiffness / self.rig.primary_mass).sqrt();
+        let grid = 1.0 / (POINTS_PER_RADIAN * natural.max(omega));
+        let b = self.rig.half_width;
+        let mut motion = self.motion();
+        // Time since the flight's start, on a grid.
+        let (mut h, mut stalled) = (0.0, 0);
+        while h < end - self.time {
+            let after = (h + grid).min(end - self.time);
+            let (q2, dq2) = (self.q2, self.dq2);
+            let w = |h: f64| motion.at(h).0 - (q2 + dq2 * h);
+            let reached = w(after);
+            if reached.abs() < b {
+                h = after;
+                stalled = 0;
+                continue;
+            }
+            let wall = b.copysign(reached);
+            // A flight begins on a wall: the root there is not looked for again.
+            let low = if h == 0.0 { 1e-9 * grid } else { h };
+            let mut convergency = SimpleConvergency {
+                eps: self.tolerance,
+                max_iter: 100,
+            };
+            let Ok(hit) = find_root_brent(low, after, |h| w(h) - wall, &mut convergency) else {
+                return Err(Stalled);
+            };
+            let (x, v) = motion.at(hit);
+            self.impact(self.time + hit, x, v, wall);
+            motion = self.motion();
+            h = 0.0;
+            stalled += 1;
+            if stalled > MOST_IMPACTS {
+                return Err(Stalled);
+            }
+        }
+        let gone = end - self.time;
+        (self.q1, self.dq1) = motion.at(gone);
+        self.q2 += self.dq2 * gone;
+        self.time = 0.0;
+        self.elapsed += duration;
+        self.phase = (self.phase + omega * duration) % core::f64::consts::TAU;
+        Ok(())
+    }
+
+    fn motion(&self) -> Motion {
+        let (amplitude, omega) = self.drive;
+        Motion::new(
+            &self.rig, amplitude, omega, self.phase, self.time, self.q1, self.dq1,
+        )
+    }
+
+    fn impact(&mut self, time: f64, x: f64, v: f64, wall: f64) {
+        let Rig {
+            primary_mass,
+            particle_mass,
+            restitution,
+            ..
+        } = self.rig;
+        let momentum = primary_mass * v + particle_mass * self.dq2;
+        let total = primary_mass + particle_mass;
+        let separation = -restitution * (v - self.dq2);
+        self.q1 = x;
+        self.q2 = x - wall;
+        self.dq1 = (momentum + particle_mass * separation) / total;
+        self.dq2 = self.dq1 - separation;
+        self.time = time;
+        self.impacts += 1;
+    }
+}
