@@ -5,6 +5,7 @@ Started by scripts/bench, which builds and installs what is needed.
 
 import argparse
 import json
+import os
 import random
 import statistics
 import sys
@@ -102,6 +103,7 @@ class Bench:
         self.budget = 0.05 if options.quick else 0.1
         self.workers, self.missing, self.versions = {}, {}, []
         self.rows = []
+        self.load = os.getloadavg()[0]
 
     def say(self, text, end="\n"):
         if end == "\n" or sys.stderr.isatty():
