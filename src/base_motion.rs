@@ -3,7 +3,9 @@
 //! `e(t) = u0 + u1 t + u2 t² + u3 t³ + E sin(phase + omega t)`, with `t` counted from now. The phase is carried
 //! instead of absolute time, so that a run of any length costs no accuracy.
 
+use crate::lane::Lane;
 use serde::{Deserialize, Serialize};
+
 /// 2π split in two: the nearest double, and what it misses.
 const TAU: (f64, f64) = (core::f64::consts::TAU, 2.449_293_598_294_706_5e-16);
 
@@ -91,7 +93,15 @@ pub struct Phase(f64, f64);
 impl Phase {
     /// The phase, rad, in [0, 2π).
     pub fn radians(self) -> f64 {
-        self.0
+        let sum = self.0 + self.1;
+        // At the seam the small part may carry it across.
+        if sum < 0.0 {
+            0.0
+        } else if sum >= TAU.0 {
+            sum - TAU.0
+        } else {
+            sum
+        }
     }
 
     /// The phase and what rounding has kept out of it.
@@ -99,26 +109,15 @@ impl Phase {
         (self.0, self.1)
     }
 
+    /// The phase of these parts.
+    pub(crate) fn of_parts(parts: (f64, f64)) -> Self {
+        Self(parts.0, parts.1)
+    }
+
     /// The phase after a turn by `angle` (reduced to one turn, and what rounding has kept out of it) and a little more.
+    #[inline]
     pub(crate) fn turned(self, angle: (f64, f64), more: f64) -> Self {
-        let (sum, missed) = two_sum(self.0, angle.0);
-        let mut missed = missed + (self.1 + angle.1 + more);
-        let mut rest = sum;
-        if sum >= TAU.0 {
-            rest -= TAU.0;
-            missed -= TAU.1;
-        }
-        let (mut rest, mut missed) = two_sum(rest, missed);
-        if rest < 0.0 || rest >= TAU.0 {
-            // At the seam the small parts have carried it across.
-            let turn = if rest < 0.0 { 1.0 } else { -1.0 };
-            let (turned, lost) = two_sum(rest, turn * TAU.0);
-            (rest, missed) = two_sum(turned, missed + lost + turn * TAU.1);
-            if !(0.0..TAU.0).contains(&rest) {
-                (rest, missed) = (0.0, 0.0);
-            }
-        }
-        Self(rest, missed)
+        Self::of_parts(turned(self.parts(), angle, more))
     }
 
     /// The phase `t` seconds later at `omega`, brought back to [0, 2π) without losing digits to the number of turns.
@@ -162,8 +161,23 @@ fn shift([u0, u1, u2, u3]: [f64; 4], t: f64) -> [f64; 4] {
     ]
 }
 
+/// [`Phase::turned`] for the parts of a phase, or of several abreast.
+#[inline(always)]
+pub(crate) fn turned<T: Lane>(phase: (T, T), angle: (T, T), more: T) -> (T, T) {
+    let turn = angle.0 + more;
+    let (sum, missed) = two_sum(phase.0, turn);
+    let missed = missed + (phase.1 + angle.1 + (more - (turn - angle.0)));
+    // `more` is small: a turn of less than none, or of more than two, is not to be had.
+    let around = sum.below(T::splat(TAU.0));
+    (
+        T::choose(around, sum, sum - T::splat(TAU.0)),
+        T::choose(around, missed, missed - T::splat(TAU.1)),
+    )
+}
+
 /// `a + b` as a rounded sum and its rounding error (Knuth).
-pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
+#[inline(always)]
+pub(crate) fn two_sum<T: Lane>(a: T, b: T) -> (T, T) {
     let sum = a + b;
     let part = sum - a;
     (sum, (a - (sum - part)) + (b - part))

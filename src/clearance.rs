@@ -43,6 +43,10 @@ const NEAR: f64 = 1e-4;
 /// Steps below [`TINY`] times the fastest rate's time that are tolerated in a row.
 const MOST_TINY_STEPS: usize = 20;
 const TINY: f64 = 1e-9;
+/// Below this a sum of squares has lost digits.
+const UNDERFLOW: f64 = 1e-290;
+/// So many windows are tried for a bound, each at most three times shorter than the last.
+const MOST_WINDOWS: usize = 40;
 
 /// The first closure of any of `N` gaps in `[from, limit]`.
 ///
@@ -110,20 +114,18 @@ impl Gap {
     /// The longest `h <= window` found for which the gap is certainly open on `[0, h)`; `jerk(h)` bounds the third
     /// derivative over `[0, h]`.
     pub fn certainly_open(&self, window: f64, jerk: impl Fn(f64) -> f64) -> f64 {
-        let bound = jerk(window);
-        let mut safe = self.open_within(window, bound);
-        if safe >= window {
-            return window;
-        }
-        if self.acceleration < 0.0 {
-            // As long as the gap certainly opens at half the rate it opens at now.
-            let closer = window.min(-1.5 * self.acceleration / bound);
-            safe = safe.max(self.open_within(closer, bound));
-        }
-        // A shorter window has a smaller remainder: two more looks, just past what is known to be safe.
-        for _ in 0..2 {
-            let closer = window.min(1.5 * safe);
-            safe = safe.max(self.open_within(closer, jerk(closer)));
+        let mut safe = 0.0f64;
+        let limit = window;
+        // No bound reaches beyond where the gap would close with no jerk at all.
+        let mut window = first_root(self.gap, self.closing, self.acceleration)
+            .map_or(limit, |root| limit.min(1.5 * root));
+        // A shorter window has a smaller remainder: down to the one that the answer itself asks for.
+        for _ in 0..MOST_WINDOWS {
+            safe = safe.max(self.open_within(window, jerk(window)));
+            if safe * 1.5 >= window {
+                break;
+            }
+            window = (safe * 1.5).max(window / 3.0);
         }
         safe
     }
@@ -150,10 +152,16 @@ impl Gap {
 /// The first `h >= 0` at which `gap - closing h - acceleration h²/2` reaches 0 coming from above (`gap >= 0`).
 fn first_root(gap: f64, closing: f64, acceleration: f64) -> Option<f64> {
     let discriminant = closing * closing + 2.0 * acceleration * gap;
+    let root = if discriminant.abs() < UNDERFLOW && acceleration >= 0.0 {
+        // The squares of very small numbers are none, but their root is not.
+        libm::hypot(closing, libm::sqrt(2.0 * acceleration) * libm::sqrt(gap))
+    } else {
+        libm::sqrt(discriminant)
+    };
     if closing > 0.0 {
-        (discriminant >= 0.0).then(|| 2.0 * gap / (closing + libm::sqrt(discriminant)))
+        (root >= 0.0).then(|| 2.0 * gap / (closing + root))
     } else if acceleration > 0.0 {
-        Some((libm::sqrt(discriminant) - closing) / acceleration)
+        Some((root - closing) / acceleration)
     } else {
         None
     }

@@ -18,9 +18,10 @@
 //! not large against the cavity. What lies outside is followed by [`crate::flight`], which is slower and knows no limits.
 
 use crate::base_motion::{Drive, Phase, sincos_of_product};
-use crate::lane::Lane;
+use crate::lane::{Lane, Lanes};
 use crate::oscillator::{Oscillator, Regime};
 use crate::plant::UNRESOLVED;
+use core::array::from_fn;
 use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
@@ -247,6 +248,25 @@ impl Wave<f64> {
         })
     }
 
+    /// The next anchor for a crossing that is not near the last one.
+    #[cold]
+    pub(crate) fn next_anchor(
+        &self,
+        start: &Origin<f64>,
+        free: &Free<f64>,
+        anchor: &Anchor<f64>,
+        beyond: f64,
+    ) -> Anchor<f64> {
+        let speed = start.particle.abs();
+        let distance = self.half_width - Wave::ahead(start) * start.w;
+        let primary = self.speed + libm::sqrt(free.speed_squared);
+        let (soonest, latest) = (distance / (speed + primary), distance / (speed - primary));
+        let guess = anchor.t + beyond;
+        // Far from the anchor the series may lead anywhere.
+        let possible = anchor.t > 0.0 && guess >= soonest && guess <= latest;
+        self.anchor(if possible { guess } else { distance / speed })
+    }
+
     /// The same instant at the frequency that this wave has.
     pub fn turned(&self, anchor: &Anchor<f64>) -> Anchor<f64> {
         let (sin, cos) = sincos_of_product(self.omega, anchor.t);
@@ -401,5 +421,96 @@ impl Wave<f64> {
             by_speed.max(by_room)
         };
         until(1.0).min(until(-1.0)) * (1.0 - 1e-9)
+    }
+}
+
+impl<const N: usize> Wave<Lanes<N>> {
+    /// Several waves abreast.
+    pub(crate) fn abreast(waves: [&Wave<f64>; N]) -> Self {
+        let all = |f: fn(&Wave<f64>) -> f64| Lanes(waves.map(f));
+        Self {
+            half_width: all(|wave| wave.half_width),
+            delta: all(|wave| wave.delta),
+            omega_d: all(|wave| wave.omega_d),
+            inverse_omega_d: all(|wave| wave.inverse_omega_d),
+            omega0_squared: all(|wave| wave.omega0_squared),
+            omega: all(|wave| wave.omega),
+            steady: (all(|wave| wave.steady.0), all(|wave| wave.steady.1)),
+            reach: all(|wave| wave.reach),
+            speed: all(|wave| wave.speed),
+            offset: all(|wave| wave.offset),
+            widest: all(|wave| wave.widest),
+            near: all(|wave| wave.near),
+            restless: all(|wave| wave.restless),
+            free: from_fn(|n| {
+                (
+                    Lanes(waves.map(|wave| wave.free[n].0)),
+                    Lanes(waves.map(|wave| wave.free[n].1)),
+                )
+            }),
+            forced: from_fn(|n| Lanes(waves.map(|wave| wave.forced[n]))),
+        }
+    }
+}
+
+impl<const N: usize> Anchor<Lanes<N>> {
+    /// Several anchors abreast.
+    pub(crate) fn abreast(anchors: [&Anchor<f64>; N]) -> Self {
+        let all = |f: fn(&Anchor<f64>) -> f64| Lanes(anchors.map(f));
+        Self {
+            t: all(|anchor| anchor.t),
+            angle: (all(|anchor| anchor.angle.0), all(|anchor| anchor.angle.1)),
+            turned: (all(|anchor| anchor.turned.0), all(|anchor| anchor.turned.1)),
+            decayed: (
+                all(|anchor| anchor.decayed.0),
+                all(|anchor| anchor.decayed.1),
+            ),
+        }
+    }
+
+    /// One of them.
+    pub(crate) fn of_lane(&self, lane: usize) -> Anchor<f64> {
+        Anchor {
+            t: self.t.0[lane],
+            angle: (self.angle.0.0[lane], self.angle.1.0[lane]),
+            turned: (self.turned.0.0[lane], self.turned.1.0[lane]),
+            decayed: (self.decayed.0.0[lane], self.decayed.1.0[lane]),
+        }
+    }
+
+    /// Replaces one of them.
+    pub(crate) fn put(&mut self, lane: usize, anchor: &Anchor<f64>) {
+        self.t.0[lane] = anchor.t;
+        self.angle.0.0[lane] = anchor.angle.0;
+        self.angle.1.0[lane] = anchor.angle.1;
+        self.turned.0.0[lane] = anchor.turned.0;
+        self.turned.1.0[lane] = anchor.turned.1;
+        self.decayed.0.0[lane] = anchor.decayed.0;
+        self.decayed.1.0[lane] = anchor.decayed.1;
+    }
+}
+
+impl<const N: usize> Origin<Lanes<N>> {
+    /// Several states abreast.
+    pub(crate) fn abreast(states: [&Origin<f64>; N]) -> Self {
+        let all = |f: fn(&Origin<f64>) -> f64| Lanes(states.map(f));
+        Self {
+            x: all(|state| state.x),
+            v: all(|state| state.v),
+            w: all(|state| state.w),
+            particle: all(|state| state.particle),
+            turn: (all(|state| state.turn.0), all(|state| state.turn.1)),
+        }
+    }
+
+    /// One of them.
+    pub(crate) fn of_lane(&self, lane: usize) -> Origin<f64> {
+        Origin {
+            x: self.x.0[lane],
+            v: self.v.0[lane],
+            w: self.w.0[lane],
+            particle: self.particle.0[lane],
+            turn: (self.turn.0.0[lane], self.turn.1.0[lane]),
+        }
     }
 }

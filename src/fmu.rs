@@ -52,9 +52,9 @@ enum Rig {
     Equations(Hybrid),
 }
 
-/// The longest step that is taken, in radians of the fastest rate: sixteen million periods. Even where nothing hits, the
+/// The longest step that is taken, in radians of the fastest rate: more than a million periods. Even where nothing hits, the
 /// search for the first contact looks at the motion once in every two radians or so, and a call is to end.
-const LONGEST_STEP: f64 = 1e8;
+const LONGEST_STEP: f64 = 1e7;
 
 /// Why a step could not be finished.
 #[cold]
@@ -80,11 +80,6 @@ fn too_long(step: f64, rate: f64) -> Refusal {
         "communicationStepSize = {step} s is refused; allowed are at most {longest} s, which is {LONGEST_STEP} rad of \
          the fastest rate"
     ))
-}
-
-/// The rate that bounds what a second of simulation costs.
-fn fastest(p: &Parameters) -> f64 {
-    (p.natural_frequency()).max(p.damping / p.primary_mass)
 }
 
 #[derive(Clone, Copy, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
@@ -221,7 +216,7 @@ impl LoViNes {
             }
         }
         self.parameters = parameters;
-        self.fastest = fastest(&parameters);
+        self.fastest = parameters.fastest_rate();
         Ok(())
     }
 }
@@ -291,7 +286,7 @@ impl Component for LoViNes {
             }
         }
         self.epsilon = self.parameters.mass_ratio();
-        self.fastest = fastest(&self.parameters);
+        self.fastest = self.parameters.fastest_rate();
         self.progress = Progress::Initialised;
         self.inputs_set = false;
         self.base = unknown();

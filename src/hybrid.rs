@@ -229,7 +229,7 @@ impl Hybrid {
         } = self.instant();
         if s * (dq1 - dq2) > 0.0 {
             let velocity = dq1 - dq2;
-            let after = law.rebound(dq1, dq2, velocity);
+            let after = law.rebound(dq1, velocity);
             self.tally.impacts += 1;
             self.tally.impact_time = time;
             self.tally.impact_velocity = velocity;

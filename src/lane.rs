@@ -25,6 +25,8 @@ pub trait Lane:
     fn below(self, other: Self) -> Self::Mask;
     /// Both.
     fn both(a: Self::Mask, b: Self::Mask) -> Self::Mask;
+    /// The other way round.
+    fn not(mask: Self::Mask) -> Self::Mask;
     /// `a` where the mask says yes, else `b`.
     fn choose(mask: Self::Mask, a: Self, b: Self) -> Self;
 }
@@ -60,6 +62,11 @@ impl Lane for f64 {
     #[inline(always)]
     fn both(a: bool, b: bool) -> bool {
         a & b
+    }
+
+    #[inline(always)]
+    fn not(mask: bool) -> bool {
+        !mask
     }
 
     #[inline(always)]
@@ -118,7 +125,8 @@ impl<const N: usize> Neg for Lanes<N> {
 }
 
 impl<const N: usize> Lane for Lanes<N> {
-    type Mask = [bool; N];
+    /// All bits of a lane, or none: what vector instructions compare and choose by.
+    type Mask = [u64; N];
 
     #[inline(always)]
     fn splat(value: f64) -> Self {
@@ -141,17 +149,44 @@ impl<const N: usize> Lane for Lanes<N> {
     }
 
     #[inline(always)]
-    fn below(self, other: Self) -> [bool; N] {
-        from_fn(|n| self.0[n] < other.0[n])
+    fn below(self, other: Self) -> [u64; N] {
+        from_fn(|n| u64::from(self.0[n] < other.0[n]).wrapping_neg())
     }
 
     #[inline(always)]
-    fn both(a: [bool; N], b: [bool; N]) -> [bool; N] {
+    fn both(a: [u64; N], b: [u64; N]) -> [u64; N] {
         from_fn(|n| a[n] & b[n])
     }
 
     #[inline(always)]
-    fn choose(mask: [bool; N], a: Self, b: Self) -> Self {
-        Self(from_fn(|n| if mask[n] { a.0[n] } else { b.0[n] }))
+    fn not(mask: [u64; N]) -> [u64; N] {
+        mask.map(|bits| !bits)
+    }
+
+    #[inline(always)]
+    fn choose(mask: [u64; N], a: Self, b: Self) -> Self {
+        Self(from_fn(|n| if mask[n] != 0 { a.0[n] } else { b.0[n] }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn lanes_do_what_single_numbers_do() {
+        let (a, b) = ([1.5, -2.0, 0.1, -0.0], [0.3, -2.0, 7.0, 1.0]);
+        let (x, y) = (Lanes(a), Lanes(b));
+        let sum = x * y - x + y.inverse() * x.abs() + -x.sign();
+        let chosen = Lane::choose(Lanes::both(x.below(y), x.below(Lanes::splat(0.05))), x, y);
+        for n in 0..4 {
+            let single = a[n] * b[n] - a[n] + b[n].inverse() * a[n].abs() + -a[n].sign();
+            assert_eq!(sum.0[n].to_bits(), single.to_bits());
+            let yes = f64::both(a[n].below(b[n]), a[n].below(0.05));
+            assert_eq!(
+                chosen.0[n].to_bits(),
+                f64::choose(yes, a[n], b[n]).to_bits()
+            );
+        }
     }
 }

@@ -2,6 +2,8 @@
 #![forbid(unsafe_code)]
 
 pub mod base_motion;
+#[cfg(feature = "batch")]
+pub mod batch;
 pub mod clearance;
 pub mod crossing;
 pub mod equations;

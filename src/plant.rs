@@ -1,9 +1,12 @@
 //! The rig: linear oscillator, particle and walls, advanced from event to event in closed form.
 
+#[cfg(feature = "batch")]
+pub(crate) mod abreast;
 mod advance;
 mod contact;
 mod course;
 mod cross;
+mod hop;
 
 use crate::base_motion::{BaseMotion, Drive};
 use crate::crossing::Origin;

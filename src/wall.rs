@@ -1,5 +1,7 @@
 //! The two walls of the cavity, and what happens at an impact.
 
+use crate::base_motion::{product, two_sum};
+use crate::lane::{Lane, Lanes};
 use crate::parameters::Parameters;
 use serde::{Deserialize, Serialize};
 
@@ -35,52 +37,47 @@ impl Wall {
 
 /// Coefficients of Newton's impact law, derived once.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct ImpactLaw {
-    restitution: f64,
-    /// Velocity taken from the primary mass per unit of approach: `(1 + r) m/(M + m)`.
-    primary_share: f64,
-    /// Velocity given to the particle per unit of approach: `(1 + r) M/(M + m)`.
-    particle_share: f64,
+pub struct ImpactLaw<T = f64> {
+    restitution: T,
+    /// Velocity taken from the primary mass per unit of approach: `(1 + r) m/(M + m)`, and what rounding has kept out of it.
+    ///
+    /// That rounding has the same sign at every impact: without the second part a million elastic ones would gain energy.
+    primary_share: (T, T),
     /// `m/(M + m)`.
-    particle_fraction: f64,
+    particle_fraction: T,
     /// Half the effective mass, kg.
-    half_relative_mass: f64,
+    half_relative_mass: T,
 }
 
 /// Velocities right after an impact, m/s, and what it dissipated, J.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rebound {
+pub struct Rebound<T = f64> {
     /// Velocity of the primary mass.
-    pub primary: f64,
+    pub primary: T,
     /// Velocity of the particle.
-    pub particle: f64,
+    pub particle: T,
     /// Relative velocity `w'`.
-    pub relative: f64,
+    pub relative: T,
     /// Energy dissipated.
-    pub dissipated: f64,
+    pub dissipated: T,
 }
 
 impl ImpactLaw {
     /// The law for these masses and this coefficient of restitution.
     pub fn new(p: &Parameters) -> Self {
-        let total = p.primary_mass + p.particle_mass;
+        let (total, total_missed) = two_sum(p.primary_mass, p.particle_mass);
+        let (factor, factor_missed) = two_sum(1.0, p.restitution);
+        let share = factor * (p.particle_mass / total);
+        // `factor m - share total`, to first order in what has been lost.
+        let (wanted, wanted_missed) = product(factor, p.particle_mass);
+        let (got, got_missed) = product(share, total);
+        let lost = (wanted - got)
+            + (wanted_missed - got_missed + factor_missed * p.particle_mass - share * total_missed);
         Self {
             restitution: p.restitution,
-            primary_share: (1.0 + p.restitution) * (p.particle_mass / total),
-            particle_share: (1.0 + p.restitution) * (p.primary_mass / total),
+            primary_share: (share, lost / total),
             particle_fraction: p.particle_mass / total,
             half_relative_mass: 0.5 * p.relative_mass(),
-        }
-    }
-
-    /// Newton's law: the relative velocity turns round and shrinks by `r`, momentum is conserved.
-    pub fn rebound(&self, primary: f64, particle: f64, relative: f64) -> Rebound {
-        let r = self.restitution;
-        Rebound {
-            primary: primary - self.primary_share * relative,
-            particle: particle + self.particle_share * relative,
-            relative: -r * relative,
-            dissipated: self.half_relative_mass * ((1.0 - r) * (1.0 + r)) * (relative * relative),
         }
     }
 
@@ -99,6 +96,39 @@ impl ImpactLaw {
     }
 }
 
+impl<T: Lane> ImpactLaw<T> {
+    /// Newton's law: the relative velocity turns round and shrinks by `r`, momentum is conserved.
+    #[inline(always)]
+    pub fn rebound(&self, primary: T, relative: T) -> Rebound<T> {
+        let (r, one) = (self.restitution, T::splat(1.0));
+        let (share, missed) = self.primary_share;
+        let primary = primary - (share * relative + missed * relative);
+        let after = -r * relative;
+        Rebound {
+            primary,
+            particle: primary - after,
+            relative: after,
+            dissipated: self.half_relative_mass * ((one - r) * (one + r)) * (relative * relative),
+        }
+    }
+}
+
+impl<const N: usize> ImpactLaw<Lanes<N>> {
+    /// Several laws abreast.
+    pub(crate) fn abreast(laws: [&ImpactLaw; N]) -> Self {
+        let all = |f: fn(&ImpactLaw) -> f64| Lanes(laws.map(f));
+        Self {
+            restitution: all(|law| law.restitution),
+            primary_share: (
+                all(|law| law.primary_share.0),
+                all(|law| law.primary_share.1),
+            ),
+            particle_fraction: all(|law| law.particle_fraction),
+            half_relative_mass: all(|law| law.half_relative_mass),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -110,7 +140,7 @@ mod tests {
             epsilon in 1e-6..1.0f64, r in 1e-3..=1.0f64, v1 in -2.0..2.0f64, v2 in -2.0..2.0f64,
         ) {
             let p = Parameters::dimensionless(epsilon, 1.0, r);
-            let after = ImpactLaw::new(&p).rebound(v1, v2, v1 - v2);
+            let after = ImpactLaw::new(&p).rebound(v1, v1 - v2);
             prop_assert!((after.primary + epsilon * after.particle - v1 - epsilon * v2).abs() < 4e-15);
             prop_assert!((after.primary - after.particle - after.relative).abs() < 4e-15);
             let energy = |v1: f64, v2: f64| 0.5 * (v1 * v1 + epsilon * v2 * v2);

@@ -78,7 +78,8 @@ pub struct Config {
     pub amplitude: f64,
     /// Largest drive amplitude allowed, m; 0 for none.
     pub amplitude_max: f64,
-    /// Time of a ramp of the drive from 0 to `amplitude`, s, also down after a fault; 0 to jump.
+    /// Time of a ramp of the drive from 0 to `amplitude`, s, also down after a fault; 0 to jump. While the response is held
+    /// the drive changes no faster either.
     pub ramp_time: f64,
     /// Time of a ramp of the drive from `amplitude` to 0 where `active` is taken away, s; 0 to switch off at once, which
     /// is what a free decay wants.

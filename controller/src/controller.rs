@@ -66,6 +66,12 @@ impl PhaseLock {
             }
         };
         let gains = Gains::from_bandwidth(config.bandwidth, config.damping_rate);
+        let drive = Drive {
+            amplitude_max: config.amplitude_limit(),
+            ramp_step: per_sample(config.amplitude, config.ramp_time),
+            release_step: per_sample(config.amplitude, config.release_time),
+            control_step: -libm::expm1(-config.base_bandwidth * config.sample_time),
+        };
         Self {
             detector: Detector::new(config.detector, config.bandwidth, config.sample_time),
             filter: LoopFilter {
@@ -79,19 +85,8 @@ impl PhaseLock {
                 },
                 sample_time: config.sample_time,
             },
-            drive: Drive {
-                amplitude_max: config.amplitude_limit(),
-                ramp_step: per_sample(config.amplitude, config.ramp_time),
-                release_step: per_sample(config.amplitude, config.release_time),
-                control_step: -libm::expm1(-config.base_bandwidth * config.sample_time),
-            },
-            response_loop: ResponseLoop::new(
-                gains,
-                config.response_gain,
-                config.bandwidth,
-                config.amplitude_limit(),
-                config.sample_time,
-            ),
+            drive,
+            response_loop: ResponseLoop::new(&config, gains, &drive),
             stationarity: Stationarity {
                 phase_tolerance: config.lock.phase_tolerance,
                 unlock_tolerance: config.lock.unlock_tolerance,
@@ -173,6 +168,7 @@ impl PhaseLock {
         // A ramp keeps its rate: down to a small amplitude, or to none, it would otherwise take for ever.
         self.drive.ramp_step = self.drive.ramp_step.max(before.ramp_step);
         self.drive.release_step = self.drive.release_step.max(before.release_step);
+        self.response_loop = ResponseLoop::new(&self.config, self.filter.gains, &self.drive);
         Ok(())
     }
 
@@ -281,7 +277,9 @@ impl PhaseLock {
                 if let Some(hold) = &mut state.hold {
                     let read = state.response.amplitude();
                     let near = sense.qualified && sense.error.abs() < PHASE_RANGE;
-                    let (driven, shift) = self.response_loop.follow(hold, near.then_some(read));
+                    let (driven, shift) =
+                        self.response_loop
+                            .follow(hold, level.amplitude, near.then_some(read));
                     level.amplitude = driven;
                     filter.shift(frequency, shift);
                     state.ready = hold.arrived();

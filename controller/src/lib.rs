@@ -6,6 +6,7 @@
 //! | order | 3: detector low pass, loop filter, and the phase of the lightly damped structure |
 //! | gains | from one knob, the detector's `bandwidth` (usefully 0.02 to 0.5 times the resonance frequency); see [`Gains`] |
 //! | sign | both gains are positive. The response of an oscillator lags more the higher the frequency, so too great a lag is a negative phase error, and lowers the frequency |
+//! | response | may be held instead of the drive ([`PhaseLock::hold_response`]): a loop of type 1 and order 3 on the response's amplitude, its gains positive and from the same knob |
 //! | sampling | one call of [`PhaseLock::process`] every `sample_time`; nothing else keeps time |
 //!
 //! The phase error is `wrap(arg response - arg reference - phase_target)`, both phases being those of the

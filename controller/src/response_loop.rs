@@ -8,13 +8,16 @@
 //!
 //! A move to another amplitude takes a stated time along a smooth course. What it needs is fed forward: the stated
 //! change of the drive, and `A'/g` to carry the amplitude along. The loop compares what the detector reads with what it should read on
-//! that course, lag included, and so only mends what was not foreseen.
+//! that course, lag included, and so only mends what was not foreseen. The drive keeps to its limit and to the rate of its ramp, and
+//! never goes below a fifth of what holds the response: without a drive there is no phase to hold.
 
 use core::f64::consts::TAU;
 
+use crate::config::Config;
+use crate::drive::Drive;
 use crate::gains::Gains;
 
-/// Share of its integral part below which the drive never goes: without a drive there is no phase to hold.
+/// Share of its integral part below which the drive never goes.
 const LEAST_SHARE: f64 = 0.2;
 
 /// Coefficients of the loop.
@@ -31,6 +34,8 @@ pub struct ResponseLoop {
     detector_step: f64,
     /// Largest drive amplitude, m.
     amplitude_max: f64,
+    /// Largest change of it in a sample, m.
+    max_change: f64,
     /// s
     sample_time: f64,
 }
@@ -130,20 +135,16 @@ fn smooth(x: f64) -> f64 {
 }
 
 impl ResponseLoop {
-    /// A loop behind a detector of that `bandwidth`, rad/s.
-    pub fn new(
-        gains: Gains,
-        gain: f64,
-        bandwidth: f64,
-        amplitude_max: f64,
-        sample_time: f64,
-    ) -> Self {
+    /// The loop of a configuration.
+    pub fn new(config: &Config, gains: Gains, drive: &Drive) -> Self {
+        let (gain, sample_time) = (config.response_gain, config.sample_time);
         Self {
             proportional: gains.proportional / gain,
             integral: gains.integral * sample_time / gain,
             carry: 1.0 / (gain * sample_time),
-            detector_step: -libm::expm1(-bandwidth * sample_time),
-            amplitude_max,
+            detector_step: -libm::expm1(-config.bandwidth * sample_time),
+            amplitude_max: drive.amplitude_max,
+            max_change: drive.ramp_step,
             sample_time,
         }
     }
@@ -153,16 +154,20 @@ impl ResponseLoop {
         self.sample_time
     }
 
-    /// One sample: from the amplitude read, m, to the drive amplitude, m, and by how much the frequency is to be shifted,
-    /// rad/s. `None` for a reading that cannot be believed: then only what was foreseen is done.
-    pub fn follow(&self, hold: &mut Hold, read: Option<f64>) -> (f64, f64) {
+    /// One sample: from the amplitude read, m, to the drive amplitude, m, which differs from that `before` by no more than its
+    /// rate allows, and by how much the frequency is to be shifted, rad/s. `None` for a reading that cannot be believed: then
+    /// only what was foreseen is done.
+    pub fn follow(&self, hold: &mut Hold, before: f64, read: Option<f64>) -> (f64, f64) {
         let (gone, growth) = hold.go_on();
         hold.expected += self.detector_step * (hold.wanted - hold.expected);
-        hold.integral += gone * hold.course.amplitude;
+        let foreseen = hold.integral + gone * hold.course.amplitude;
+        hold.integral = foreseen.clamp(0.0, self.amplitude_max);
         let error = read.map_or(0.0, |read| hold.expected - read);
         let asked = hold.integral + self.carry * growth + self.proportional * error;
         let least = LEAST_SHARE * hold.integral;
-        let granted = asked.clamp(least, self.amplitude_max.max(least));
+        let granted = asked
+            .clamp(least, self.amplitude_max)
+            .clamp(before - self.max_change, before + self.max_change);
         // The integral moves unless a limit already withholds what it would ask more of.
         if (asked - granted) * error <= 0.0 {
             let integral = hold.integral + self.integral * error;
@@ -187,8 +192,19 @@ mod tests {
     const BANDWIDTH: f64 = 0.3;
 
     fn response_loop(amplitude_max: f64) -> ResponseLoop {
-        let gains = Gains::from_bandwidth(BANDWIDTH, DELTA);
-        ResponseLoop::new(gains, GAIN, BANDWIDTH, amplitude_max, DT)
+        let config = Config {
+            bandwidth: BANDWIDTH,
+            response_gain: GAIN,
+            sample_time: DT,
+            ..Config::for_resonance(1.0, 0.0)
+        };
+        let drive = Drive {
+            amplitude_max,
+            ramp_step: f64::INFINITY,
+            release_step: f64::INFINITY,
+            control_step: 0.0,
+        };
+        ResponseLoop::new(&config, Gains::from_bandwidth(BANDWIDTH, DELTA), &drive)
     }
 
     impl Structure {
@@ -210,7 +226,7 @@ mod tests {
         hold.set_out(course, DT);
         let mut worst = 0.0_f64;
         for n in 0..40_000 {
-            let (drive, _) = control.follow(&mut hold, Some(structure.read));
+            let (drive, _) = control.follow(&mut hold, 0.0, Some(structure.read));
             structure.advance(drive);
             if n >= skipped {
                 worst = worst.max((structure.a - hold.wanted()).abs());
@@ -265,7 +281,7 @@ mod tests {
                 DT,
             );
             for _ in 0..samples {
-                let (drive, _) = control.follow(&mut hold, Some(structure.read));
+                let (drive, _) = control.follow(&mut hold, 0.0, Some(structure.read));
                 assert!((0.0..=0.1).contains(&drive));
                 structure.advance(drive);
             }
@@ -290,7 +306,7 @@ mod tests {
             DT,
         );
         let shifted: f64 = (0..400)
-            .map(|_| control.follow(&mut hold, Some(1.0)).1)
+            .map(|_| control.follow(&mut hold, 0.0, Some(1.0)).1)
             .sum();
         assert!((shifted + 0.7).abs() < 1e-12);
     }

@@ -2,7 +2,7 @@
 
 mod rig;
 
-use phase_lock::{Config, Input, Phase};
+use phase_lock::{Config, Input, Move, Phase};
 use proptest::prelude::*;
 use rig::{Bench, OMEGA_0, config};
 
@@ -118,6 +118,7 @@ proptest! {
         ramp_time in prop_oneof![Just(0.0), 0.01..1.0_f64],
         base_bandwidth in 0.0..0.02_f64,
         demodulate: bool,
+        hold: bool,
     ) {
         let mut config = Config {
             bandwidth: bandwidth * OMEGA_0,
@@ -128,9 +129,17 @@ proptest! {
         if demodulate {
             config.detector = phase_lock::Detector::Demodulator;
         }
+        if hold {
+            config.amplitude_max = 3.0 * config.amplitude;
+        }
         let controller = config.build().unwrap();
         let mut state = controller.start();
-        for (response, reference, active) in readings {
+        for (n, (response, reference, active)) in readings.into_iter().enumerate() {
+            if hold && n % 50 == 40 {
+                // Refused where the loop is open; what it does elsewhere must keep to the limits.
+                let to = Move { response: 0.01, duration: 0.1, amplitude: 1.0, omega: -500.0 };
+                let _ = controller.hold_response(&mut state, to);
+            }
             let output = controller.process(&mut state, Input { response, reference, active });
             prop_assert!((config.omega_min..=config.omega_max).contains(&output.omega));
             prop_assert!((config.omega_min..=config.omega_max).contains(&output.frequency));

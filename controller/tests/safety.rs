@@ -2,7 +2,7 @@
 
 mod rig;
 
-use phase_lock::{Config, Fault, LockCriterion, Phase};
+use phase_lock::{Config, Fault, LockCriterion, Move, Phase};
 use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, config};
 
 #[test]
@@ -175,4 +175,62 @@ fn the_drive_is_switched_off_at_once_or_gradually_as_configured() {
             "the frequency stays"
         );
     }
+}
+
+/// A bench that holds its response at half of what it was, with a limited drive.
+fn holding(config: Config) -> Bench {
+    let mut bench = Bench::new(Config {
+        amplitude_max: 2.0 * AMPLITUDE,
+        ..config
+    });
+    bench.run_to_lock(2000).expect("a lock");
+    let to = Move {
+        response: 0.5 * bench.sample().response_amplitude,
+        duration: 1.0,
+        amplitude: -0.5 * AMPLITUDE,
+        omega: 0.0,
+    };
+    bench
+        .controller
+        .hold_response(&mut bench.state, to)
+        .expect("a closed loop");
+    bench.run(200);
+    bench
+}
+
+#[test]
+fn a_sensor_that_fails_while_the_response_is_held_takes_the_drive_away_gradually() {
+    let mut bench = holding(Config {
+        ramp_time: 1.0,
+        ..config()
+    });
+    let before = bench.sample();
+    assert!(before.locked && before.response_target > 0.0);
+    let output = bench.sample_reading(f64::NAN, None);
+    assert_eq!(
+        (output.state, output.fault, output.response_target),
+        (Phase::Tripped, Some(Fault::Sensor), 0.0)
+    );
+    assert!(output.amplitude < before.amplitude && output.amplitude > 0.9 * before.amplitude);
+    assert_eq!(bench.run(50).amplitude, 0.0);
+}
+
+#[test]
+fn a_dead_response_does_not_make_the_held_drive_exceed_its_limit_or_its_rate() {
+    let mut bench = holding(Config {
+        ramp_time: 1.0,
+        ..config()
+    });
+    let step = bench.controller.config().sample_time * AMPLITUDE;
+    let mut before = bench.sample().amplitude;
+    for n in 0..20_000 {
+        // The sensor fades to nothing.
+        let fading = bench.resonator.q * 0.999_f64.powi(n);
+        let base = bench.resonator.base;
+        let output = bench.sample_reading(fading, Some(base));
+        assert!((0.0..=2.0 * AMPLITUDE).contains(&output.amplitude));
+        assert!((output.amplitude - before).abs() <= step * (1.0 + 1e-9));
+        before = output.amplitude;
+    }
+    assert_eq!(bench.sample().state, Phase::LockLost);
 }

@@ -1,7 +1,9 @@
 //! The command line: one file per command.
 
 mod backbone;
+mod chain;
 mod controller;
+mod decay;
 mod door;
 mod failure;
 mod identify;
@@ -51,6 +53,8 @@ struct Cli {
 enum Command {
     Identify(identify::Arguments),
     Backbone(backbone::Arguments),
+    Chain(chain::Arguments),
+    Decay(decay::Arguments),
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Map(map::Arguments),
@@ -65,6 +69,8 @@ pub fn run() -> ExitCode {
     let output = match Cli::parse().command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Backbone(arguments) => backbone::run(&arguments),
+        Command::Chain(arguments) => chain::run(&arguments),
+        Command::Decay(arguments) => decay::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),

@@ -1,5 +1,6 @@
 //! What a record says: the locked point, its regime, and the backbone along the free decay.
 
+mod crossings;
 mod decay;
 mod fit;
 mod lock;
@@ -15,6 +16,7 @@ use crate::scene::{Dimensionless, Scene};
 use crate::theory::{BackbonePoint, SlowFlow};
 
 pub use decay::DecayPoint;
+pub(crate) use decay::points as decay_points;
 pub use lock::Lock;
 pub(crate) use regime::classify;
 pub use regime::{Impact, Regime, impacts};
@@ -77,7 +79,8 @@ pub struct Identification {
 pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, IdentificationError> {
     let parameters = scene.dimensionless();
     let lock = lock::measure(record, scene);
-    if lock.regime != Regime::Symmetric {
+    // Where noise hides the symmetry, a motion that is steady and off the linear mode is taken as it is, and said to be that.
+    if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
         return Err(IdentificationError::Regime {
             regime: lock.regime,
             sigma: lock.sigma,

@@ -8,6 +8,7 @@
 #![forbid(unsafe_code)]
 
 pub mod backbone;
+pub mod estimators;
 pub mod experiment;
 mod files;
 pub mod identification;
@@ -18,4 +19,5 @@ pub mod pack;
 pub mod report;
 pub mod rig;
 pub mod scene;
+pub mod stages;
 pub mod theory;

@@ -1,5 +1,6 @@
 //! What a person and a program get to see: files, pictures, a short table.
 
+mod approach;
 mod backbone;
 mod backbones;
 mod chart;
@@ -15,6 +16,7 @@ mod sections;
 mod study;
 mod table;
 mod theme;
+mod tracked;
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -125,6 +127,7 @@ struct MapRow {
     impacts_per_period: f64,
     impacts: usize,
     periods: u32,
+    synchrony: f64,
     growth: Option<f64>,
     theory_stable: bool,
 }
@@ -135,6 +138,7 @@ fn map_row(cell: &Cell) -> MapRow {
         impacts_per_period,
         impacts,
         periods,
+        synchrony,
         growth,
     } = cell.point;
     MapRow {
@@ -145,6 +149,7 @@ fn map_row(cell: &Cell) -> MapRow {
         impacts_per_period,
         impacts,
         periods,
+        synchrony,
         growth,
         theory_stable: cell.theory_stable,
     }

@@ -12,6 +12,7 @@ mod simulated;
 
 pub use ::phase_lock::Move;
 pub use chain::Chain;
+pub(crate) use chain::Gauss;
 pub use error::{ControllerError, RigError};
 pub use fmu::{FmuError, Kind};
 pub use fmu_controller::FmuController;

@@ -24,7 +24,7 @@ pub use dimensionless::Dimensionless;
 pub use error::SceneError;
 pub use overrides::Override;
 pub use plant::Plant;
-pub use record::Record;
+pub use record::{Estimator, Record};
 pub use start::Start;
 
 /// The default scene, embedded so that the program works from any folder.

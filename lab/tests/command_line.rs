@@ -111,6 +111,25 @@ fn packing_refuses_what_it_cannot_pack_before_it_writes() {
 fn curves_and_settled_orbits_come_as_json_too() {
     let backbone = json(&["orbit", "--backbone", "--json"]);
     assert!(backbone["points"].as_array().map_or(0, Vec::len) > 100);
+    let mode = [
+        "orbit",
+        "--backbone",
+        "--json",
+        "--set",
+        "plant.c=0.0",
+        "--set",
+        "plant.r=1.0",
+        "--set",
+        "excitation.G=0",
+    ];
+    let mode = json(&mode);
+    let points = mode["points"].as_array().unwrap();
+    assert!(
+        points.len() > 100
+            && points
+                .iter()
+                .all(|one| one["G"].as_f64().unwrap().abs() < 1e-9)
+    );
     let response = json(&["orbit", "--response", "--json", "--set", "excitation.G=1.6"]);
     assert!(
         response["symmetric"]["special"]
@@ -156,11 +175,9 @@ fn a_map_is_written_as_table_and_pictures() {
     );
     let rows = std::fs::read_to_string(folder.path().join("map.csv")).unwrap();
     assert_eq!(rows.lines().count(), 1 + 12);
-    assert!(
-        rows.starts_with(
-            "sigma,G,r,regime,impacts_per_period,impacts,periods,growth,theory_stable"
-        )
-    );
+    assert!(rows.starts_with(
+        "sigma,G,r,regime,impacts_per_period,impacts,periods,synchrony,growth,theory_stable"
+    ));
 }
 
 #[test]

@@ -118,21 +118,40 @@ impl Rig for Mute {
     }
 }
 
-#[test]
-fn a_rig_that_does_not_tell_its_impacts_has_an_unknown_regime() {
-    let scene = scene(&[]);
+/// What is identified on a rig that does not tell its impacts.
+fn identified_mute(settings: &[&str]) -> Result<Identification, IdentificationError> {
+    let scene = scene(settings);
     let mut rig = Mute(Simulated::new(&scene).unwrap());
     assert_eq!(rig.witness().unwrap(), None::<Witness>);
     let mut controller = BuiltIn::new(&scene).unwrap();
     let record = experiment::run(&mut rig, &mut controller, &plan(&scene), |_, _, _| {}).unwrap();
-    let refusal = identify(&record, &scene).unwrap_err();
-    assert!(matches!(
-        refusal,
-        IdentificationError::Regime {
-            regime: Regime::Unknown,
-            ..
-        }
-    ));
+    identify(&record, &scene)
+}
+
+#[test]
+fn a_rig_that_does_not_tell_its_impacts_is_identified_from_its_response() {
+    let (mute, telling) = (identified_mute(&[]).unwrap(), identified(&[]));
+    assert_eq!(mute.lock.regime, Regime::Symmetric);
+    assert!(mute.lock.impacts_per_period.is_nan());
+    assert_eq!(mute.lock.sigma, telling.lock.sigma);
+    // The decay ends at the fold, and is the same until there.
+    let fold = 0.134;
+    assert!(mute.decay.iter().all(|point| point.c > fold));
+    assert_eq!(mute.rms_sigma_error, telling.rms_sigma_error);
+    let table = vines::report::table(&mute);
+    assert!(
+        table.contains("symmetric 1:1, told from the response alone"),
+        "{table}"
+    );
+}
+
+#[test]
+fn the_linear_mode_of_a_rig_that_does_not_tell_its_impacts_is_refused() {
+    let refusal = identified_mute(&["start.dq2=0"]).unwrap_err();
+    let IdentificationError::Regime { regime, .. } = refusal else {
+        panic!("{refusal}");
+    };
+    assert_eq!(regime, Regime::Silent);
 }
 
 /// A controller that drives for a while, then fails.
@@ -190,7 +209,11 @@ impl Controller for OpenLoop {
 
 #[test]
 fn an_experiment_takes_any_controller_and_records_every_stage() {
-    let scene = scene(&["record.hold_periods=3", "record.decay_periods=2"]);
+    let scene = scene(&[
+        "record.hold_periods=3",
+        "record.decay_periods=2",
+        "record.window_periods=1.5",
+    ]);
     let mut rig = Simulated::new(&scene).unwrap();
     let drive = Drive {
         omega: 1.0,
@@ -207,4 +230,29 @@ fn an_experiment_takes_any_controller_and_records_every_stage() {
             .iter()
             .all(|sample| sample.command.drive == Drive::default())
     );
+}
+
+#[test]
+fn limits_of_a_scene_reach_the_controller() {
+    let run = |settings: &[&str]| {
+        let scene = scene(settings);
+        let mut rig = Simulated::new(&scene).unwrap();
+        let mut controller = BuiltIn::new(&scene)?;
+        let mut drives = Vec::new();
+        for _ in 0..4000 {
+            let command = controller.sample(rig.sense().unwrap(), true).unwrap();
+            drives.push(command.drive.amplitude);
+            rig.advance(command.drive, scene.sample_time()).unwrap();
+        }
+        Ok::<_, phase_lock::ConfigError>((scene.amplitude, drives))
+    };
+    let (amplitude, drives) = run(&["controller.ramp_periods=10"]).unwrap();
+    assert!((drives[500] / amplitude - 0.5).abs() < 0.01);
+    // A response too large takes the drive away for good.
+    let (_, drives) = run(&["controller.C_max=0.2"]).unwrap();
+    assert!(drives[0] > 0.0 && drives[3999] == 0.0);
+    let (_, drives) = run(&["controller.acquire_periods=20"]).unwrap();
+    assert!(drives[1900] > 0.0 && drives[3999] == 0.0);
+    let refused = run(&["controller.G_max=1.0"]).unwrap_err().to_string();
+    assert!(refused.starts_with("amplitude"), "{refused}");
 }

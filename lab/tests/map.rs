@@ -34,11 +34,22 @@ fn each_regime_is_found_where_it_is_known_to_be() {
     // Beyond the exact symmetry breaking at B = 1.05, on the stable asymmetric branch.
     let uneven = at(1.6, -0.9, MOVING);
     assert_eq!((uneven.regime, uneven.impacts), (Regime::Asymmetric, 2));
-    // Far above that, more impacts per period; far below the fold, irregular ones.
+    // Far above that, more impacts per period, and in the end no order.
     assert_eq!(at(2.2, -0.6, MOVING).regime, Regime::Several);
-    let irregular = at(0.6, -1.0, MOVING);
+    let irregular = at(2.7, -0.8, MOVING);
     assert_eq!(irregular.regime, Regime::Chaotic);
     assert!(irregular.growth.unwrap() > 0.05);
+}
+
+#[test]
+fn just_below_the_fold_resonance_is_captured_and_lost() {
+    let point = at(0.9, -1.1, MOVING);
+    println!(
+        "{:.0} % of the impacts are captured",
+        100.0 * point.synchrony
+    );
+    assert_eq!(point.regime, Regime::Modulated);
+    assert!(point.synchrony > 0.2 && point.impacts == 0);
 }
 
 #[test]

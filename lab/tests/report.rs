@@ -59,6 +59,8 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
     let html = std::fs::read_to_string(&page).unwrap();
     for name in [
         "history",
+        "tracked-backbone",
+        "approach",
         "decay-on-sim",
         "identified-backbone",
         "backbones",
@@ -70,7 +72,7 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
             assert!(folder.path().join(&file).is_file(), "{file}");
         }
     }
-    assert_eq!(html.matches("<figure>").count(), 8);
+    assert_eq!(html.matches("<figure>").count(), 10);
     for words in [
         "What was found",
         "symmetric 1:1",
@@ -95,7 +97,7 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
     finer.map[0] = "sigma=-2:1:5".parse().unwrap();
     assert_eq!(
         write(&finer, folder.path()).kept,
-        ["experiment", "theory", "curves"]
+        ["experiment", "tracking", "theory", "curves"]
     );
     // What is made anew has the same bytes.
     write(&subject, folder.path());
@@ -106,7 +108,7 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
         return;
     };
     assert!(!console.contains("CONSOLE"), "{console}");
-    assert_eq!(seen.matches("<figcaption>").count(), 8);
+    assert_eq!(seen.matches("<figcaption>").count(), 10);
     let print = folder.path().join("report.pdf");
     let (console, _) = browser(
         &page,

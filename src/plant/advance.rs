@@ -7,6 +7,10 @@ use crate::crossing::Origin;
 use crate::flight::Flight;
 use crate::span::Span;
 
+/// An advance ends before its time when the particle has come to rest so often: values so absurd that rounding tears it
+/// off its wall again and again are to end, too.
+const MOST_PARTINGS: u64 = 2_000_000;
+
 impl Plant {
     /// Advances by `duration` seconds (0 or above) under `drive`, whose values are finite.
     ///
@@ -24,17 +28,31 @@ impl Plant {
         duration: f64,
         tell: impl FnMut(Event),
     ) -> Outcome {
-        if drive != self.base.drive || !self.under_way {
-            self.take(drive);
-        }
+        self.adopt(drive);
         let outcome = if self.course.strides(duration) {
             self.here = self.course.stride(&self.here, &mut self.base);
             Outcome::default()
         } else {
-            self.meet(duration, tell)
+            self.meet(self.course.lag.plus(duration), duration, tell)
         };
         self.time += duration;
         outcome
+    }
+
+    /// Goes on to the end of an advance of which so much is left.
+    #[cfg(feature = "batch")]
+    pub(crate) fn finish(&mut self, left: Span, duration: f64) -> Outcome {
+        let outcome = self.meet(left, duration, |_| {});
+        self.time += duration;
+        outcome
+    }
+
+    /// Makes `drive` the one in use.
+    #[inline]
+    pub(crate) fn adopt(&mut self, drive: Drive) {
+        if drive != self.base.drive || !self.under_way {
+            self.take(drive);
+        }
     }
 
     /// Takes over a new drive and the jump of the base that it brings.
@@ -96,9 +114,8 @@ impl Plant {
         self.course.face(&mut self.here, phase);
     }
 
-    /// A step that an event may fall into.
-    fn meet(&mut self, duration: f64, mut tell: impl FnMut(Event)) -> Outcome {
-        let until = self.course.lag.plus(duration);
+    /// A step that an event may fall into; `until` is its end as seen from the origin.
+    fn meet(&mut self, until: Span, duration: f64, mut tell: impl FnMut(Event)) -> Outcome {
         if until.seconds() < self.course.clear {
             self.course.lag = until;
             if self.course.repeats(duration) {
@@ -128,8 +145,10 @@ impl Plant {
             dw = self.touch(wall, dw, moment(left), &mut tell);
         }
         let last_impact = self.tally.impacts + MOST_IMPACTS;
-        while left.seconds() > 0.0 && self.tally.impacts < last_impact {
+        let mut partings = 0;
+        while left.seconds() > 0.0 && self.tally.impacts < last_impact && partings < MOST_PARTINGS {
             if let Contact::Stuck(wall) = self.contact {
+                partings += 1;
                 let (t, released) = self.stay(wall, left.seconds());
                 left = left.plus(-t);
                 self.afresh();
@@ -143,9 +162,12 @@ impl Plant {
             if self.course.landing.is_none() && self.course.lag != Span::default() {
                 left = left.less(self.course.lag);
                 self.settle();
+                // The time it was known to be clear for is over.
+                self.course.clear = 0.0;
                 dw = self.here.relative_velocity();
             }
             if self.contact == Contact::Free {
+                let before = self.tally.impacts;
                 let crossed = self.cross(duration, left, &mut tell);
                 if let Some(wall) = crossed.resting {
                     dw = self.touch(
@@ -157,7 +179,7 @@ impl Plant {
                     left = crossed.left;
                     continue;
                 }
-                if crossed.left != left {
+                if self.tally.impacts != before {
                     left = crossed.left;
                     dw = self.here.relative_velocity();
                 }
@@ -174,7 +196,10 @@ impl Plant {
                 break;
             }
             if left.seconds() > 0.0 {
-                (left, dw) = self.search(dw, left, moment, &mut tell);
+                (left, dw) = match self.hop(dw, left, moment, &mut tell) {
+                    Some(landed) => landed,
+                    None => self.search(dw, left, moment, &mut tell),
+                };
             }
         }
         outcome.cut_short = left.seconds() > 0.0;
@@ -182,7 +207,7 @@ impl Plant {
     }
 
     /// The state has been reached by the general way: nothing is known of what lies ahead.
-    fn afresh(&mut self) {
+    pub(super) fn afresh(&mut self) {
         self.course.leave();
         self.course.face(&mut self.here, self.base.phase);
     }

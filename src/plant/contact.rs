@@ -7,8 +7,16 @@ use crate::wall::Wall;
 
 /// Rebounds that last less than this fraction of the fastest rate's time are not followed one by one.
 const SHORTEST_HOP: f64 = 1e-9;
+/// Above this coefficient of restitution a chatter has too many hops to be followed to its end.
+const LIVELY: f64 = 0.999;
+/// Such a particle stays on the wall once its hops last less than this fraction of the fastest rate's time: its position is
+/// then known to 1.3e-13 and its velocity to 5e-7, in units of the wall's acceleration and that time.
+const SHORTEST_RIDE: f64 = 1e-6;
 /// Relative rounding of an acceleration put together from a few terms.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
+
+/// An acceleration so small against `omega0² b` is none.
+const NOTHING: f64 = 1e-200;
 
 /// When something happens within an advance, and how much of the advance is left then, s.
 #[derive(Clone, Copy, Debug)]
@@ -37,7 +45,7 @@ impl Plant {
         let mut dw = dw;
         self.here.w = s * self.parameters.half_width;
         if s * dw > 0.0 {
-            let after = self.law.rebound(self.here.v, self.here.particle, dw);
+            let after = self.law.rebound(self.here.v, dw);
             let t = moment.now;
             self.tally.impacts += 1;
             self.tally.impact_time = self.time + t;
@@ -72,12 +80,20 @@ impl Plant {
     /// Its hops are then below resolution (height `u²/(2a)`), and they die out within `2u/(a (1 - r))`. Letting both masses
     /// move as one from now on conserves momentum exactly; what is neglected is the stiffness force on a gap of at most
     /// that height for that time, which is of third order in `u` (docs/accuracy.md).
+    ///
+    /// With hardly any loss they would never die out: such a particle *rides* on the wall once its hops are shorter than
+    /// [`SHORTEST_RIDE`].
     fn rests(&mut self, wall: Wall, dw: f64, left: f64) -> bool {
         let s = wall.sign();
         let speed = -s * dw;
+        let fastest = self.alone.oscillator.fastest;
+        let lively = self.parameters.restitution > LIVELY;
         let lowest = UNRESOLVED * self.parameters.half_width;
         // Far from rest, whatever the acceleration: no need to work it out.
-        if speed * speed > 2.0 * lowest * self.acceleration_bound() {
+        let most = self.acceleration_bound();
+        if speed * speed > 2.0 * lowest * most
+            && !(lively && 2.0 * speed * fastest <= SHORTEST_RIDE * most)
+        {
             return false;
         }
         let motion = self.alone.motion(&self.base, self.here.primary());
@@ -85,11 +101,14 @@ impl Plant {
         if speed == 0.0 {
             return pressing >= -self.acceleration_noise();
         }
+        if pressing <= 0.0 {
+            return false;
+        }
         let height = 0.5 * speed * speed / pressing;
-        pressing > 0.0
-            && height <= lowest
+        let dies_out = height <= lowest
             && (self.law.chatter_duration(speed, pressing) <= left
-                || speed * self.alone.oscillator.fastest <= SHORTEST_HOP * pressing)
+                || speed * fastest <= SHORTEST_HOP * pressing);
+        dies_out || (lively && 2.0 * speed * fastest <= SHORTEST_RIDE * pressing)
     }
 
     /// The acceleration of the primary mass is certainly not above this, m/s²: the sum of its terms.
@@ -108,7 +127,9 @@ impl Plant {
 
     /// Rounding of an acceleration here, m/s².
     fn acceleration_noise(&self) -> f64 {
-        ROUNDING * self.acceleration_bound()
+        // Motion that has died out to where numbers end has no digits at all.
+        let nothing = NOTHING * self.parameters.half_width * self.alone.oscillator.omega0_squared;
+        ROUNDING * self.acceleration_bound() + nothing
     }
 
     /// Both masses move as one for at most `left` seconds, until the wall ceases to push. Returns the time passed, s, and

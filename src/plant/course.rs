@@ -10,11 +10,16 @@ use serde::{Deserialize, Serialize};
 
 /// So many turns by a rounded `e^{i angle}` before it is worked out anew from the phase.
 pub(super) const TURNS_KEPT: u32 = 16;
+/// Shortest step that the state is moved on by, in units of `1/omega0`, squared.
+const SHORTEST_STRIDE: f64 = 1e-6;
+
 /// An arrival, and when it is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Landing {
     /// Since the origin.
     pub at: Span,
+    /// Whether the origin is still the state that it was found from.
+    pub fresh: bool,
     /// State just before the impact.
     pub arrival: Arrival<f64>,
     /// Phase of the base then.
@@ -79,9 +84,10 @@ impl Course {
     /// The state has come to where the plant stands.
     pub fn catch_up(&mut self) {
         let lag = core::mem::take(&mut self.lag);
-        self.clear -= lag.seconds();
+        self.clear = (self.clear - lag.seconds()).max(0.0);
         if let Some(landing) = &mut self.landing {
             landing.at = landing.at.less(lag);
+            landing.fresh = false;
         }
     }
 
@@ -96,7 +102,10 @@ impl Course {
 
     /// Notes the length of a step that meets nothing. Whether it came before, so that it pays to work it out for good.
     pub fn repeats(&mut self, duration: f64) -> bool {
-        let again = duration == self.last_duration && duration > 0.0 && self.quick;
+        // Tiny steps would add up their roundings: the state is left where it is, and worked out from there when asked for.
+        let worth_it = (self.rig.as_ref())
+            .is_some_and(|wave| duration * duration * wave.omega0_squared > SHORTEST_STRIDE);
+        let again = duration == self.last_duration && worth_it && self.quick;
         self.last_duration = duration;
         if let (true, Some(wave)) = (again, &self.rig) {
             self.stride = if self.stride.t == duration {
@@ -140,6 +149,7 @@ impl Course {
         self.clear -= self.stride.t;
         if let Some(landing) = &mut self.landing {
             landing.at = landing.at.plus(-self.stride.t);
+            landing.fresh = false;
         }
         if self.turns >= TURNS_KEPT {
             self.face(&mut end, base.phase);

@@ -2,12 +2,12 @@
 
 use super::course::{Course, Landing, TURNS_KEPT};
 use super::{Event, MOST_IMPACTS, Plant};
-use crate::crossing::{Anchor, Arrival, Free, Origin, Wave};
+use crate::crossing::{Origin, Wave};
 use crate::span::Span;
 use crate::wall::Wall;
 
 /// So many guesses at an arrival before the general search is asked.
-const MOST_GUESSES: usize = 8;
+pub(super) const MOST_GUESSES: usize = 8;
 
 /// How a run of crossings ended.
 pub(super) struct Crossed {
@@ -48,7 +48,8 @@ impl Plant {
             };
         };
         let (mut left, mut phase) = (left, self.base.phase);
-        let (mut impacts, mut dissipated, mut last, mut rest) = (0, 0.0, None, None);
+        let (mut impacts, mut last, mut rest) = (0, None, None);
+        let mut dissipated = self.tally.dissipated;
         let mut guesses = 0;
         while impacts < MOST_IMPACTS && left.seconds() > 0.0 {
             let landing = match known.take() {
@@ -71,12 +72,13 @@ impl Plant {
                         if guesses > MOST_GUESSES {
                             break;
                         }
-                        *anchor = guess(wave, &start, &free, anchor, &arrival);
+                        *anchor = wave.next_anchor(&start, &free, anchor, arrival.beyond);
                         continue;
                     }
                     guesses = 0;
                     let landing = Landing {
-                        at: Span::of(anchor.t).plus(arrival.beyond),
+                        at: Span::of_parts((anchor.t, arrival.beyond)),
+                        fresh: true,
                         phase: phase.turned(anchor.angle, wave.omega * arrival.beyond),
                         arrival,
                         wall: if ahead > 0.0 { Wall::Plus } else { Wall::Minus },
@@ -94,9 +96,11 @@ impl Plant {
             } = landing;
             left = left.less(at);
             phase = landing.phase;
+            // What was known of the flight before holds no longer.
+            *clear = 0.0;
             *turns += 1;
             let velocity = arrival.v - start.particle;
-            let after = self.law.rebound(arrival.v, start.particle, velocity);
+            let after = self.law.rebound(arrival.v, velocity);
             start = Origin {
                 x: arrival.x,
                 v: after.primary,
@@ -128,30 +132,11 @@ impl Plant {
             self.tally.impacts += impacts;
             self.tally.impact_time = self.time + Span::of(duration).less(left).seconds();
             self.tally.impact_velocity = velocity;
-            self.tally.dissipated += dissipated;
+            self.tally.dissipated = dissipated;
         }
         Crossed {
             left,
             resting: rest,
         }
     }
-}
-
-/// The next anchor for a crossing that is not near the last one.
-#[cold]
-fn guess(
-    wave: &Wave<f64>,
-    start: &Origin<f64>,
-    free: &Free<f64>,
-    anchor: &Anchor<f64>,
-    arrival: &Arrival<f64>,
-) -> Anchor<f64> {
-    let speed = start.particle.abs();
-    let distance = wave.half_width - Wave::ahead(start) * start.w;
-    let primary = wave.speed + libm::sqrt(free.speed_squared);
-    let (soonest, latest) = (distance / (speed + primary), distance / (speed - primary));
-    let guess = anchor.t + arrival.beyond;
-    // Far from the anchor the series may lead anywhere.
-    let possible = anchor.t > 0.0 && guess >= soonest && guess <= latest;
-    wave.anchor(if possible { guess } else { distance / speed })
 }

@@ -77,7 +77,7 @@ def play(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str, str, Bench]
         path = tmp_path_factory.mktemp("tape") / "tape.json"
         command = [python, MASTERS / f"{client}_master.py", bench.folder, variant, path]
         libraries = {"LD_LIBRARY_PATH": str(python.parents[1] / "lib")}
-        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | libraries, timeout=120)
+        done = subprocess.run(command, capture_output=True, text=True, env=os.environ | libraries, timeout=600)
         missing = re.search(r"OSError: (lib\S+): cannot open shared object file", done.stderr)
         if missing:
             pytest.skip(f"{client} needs the system library {missing[1]}")

@@ -87,6 +87,50 @@ fn a_reset_instance_equals_a_fresh_one() {
 }
 
 #[test]
+fn a_reset_instance_for_model_exchange_equals_a_fresh_one() {
+    let new = || Master::new(&Fmu::plant(), Interface::ModelExchange);
+    let (used, fresh) = (new(), new());
+    used.well(used.set_real(12, 0.3));
+    used.start();
+    // SAFETY: the instance is alive; so below.
+    unsafe {
+        used.well((used.f.fmi2NewDiscreteStates)(
+            used.c,
+            &mut Default::default(),
+        ));
+        used.well((used.f.fmi2Reset)(used.c));
+    }
+    assert_eq!(used.bytes(), fresh.bytes());
+}
+
+#[test]
+fn a_parameter_tuned_between_steps_holds_from_the_next_step_on() {
+    let rig = |stiffness, restitution, state: [f64; 4]| {
+        let m = Master::new(&Fmu::plant(), Interface::CoSimulation);
+        for (vr, value) in [(1, stiffness), (5, restitution)] {
+            m.well(m.set_real(vr, value));
+        }
+        for (vr, value) in (9..).zip(state) {
+            m.well(m.set_real(vr, value));
+        }
+        m.start();
+        m
+    };
+    let state = |m: &Master| [9, 10, 11, 12].map(|vr| m.real(vr));
+    let tuned = rig(11_680.0, 0.65, [0.005, 0.1, 0.0, 0.3]);
+    steps(&tuned, 0, 100);
+    tuned.well(tuned.set_real(1, 9_000.0));
+    tuned.well(tuned.set_real(5, 0.8));
+    let fresh = rig(9_000.0, 0.8, state(&tuned));
+    steps(&tuned, 100, 100);
+    steps(&fresh, 0, 100);
+    assert!(fresh.impacts() > 0);
+    for (one, other) in state(&tuned).into_iter().zip(state(&fresh)) {
+        assert!((one - other).abs() < 1e-12, "{one} is not {other}");
+    }
+}
+
+#[test]
 fn states_are_small() {
     for (fmu, most) in [(Fmu::plant(), 1200), (Fmu::controller(), 6000)] {
         let m = Master::ready(&fmu);

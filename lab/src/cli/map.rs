@@ -22,7 +22,8 @@ Every cell is one plant, driven at a fixed frequency from the scene's start; aft
   no impacts      the linear response
   symmetric 1:1   two impacts per period, half a period apart; asymmetric 1:1: at uneven intervals
   n impacts       any other pattern that repeats
-  modulated       nothing repeats, but disturbances do not grow;  chaotic: they do
+  modulated       nothing repeats: captured into 1:1 resonance and lost again, or at least disturbances do not grow
+  chaotic         nothing repeats, disturbances grow, and there are hardly any captures
   sticking        impacts accumulate, and the particle rests on a wall for a while
 
 Where several regimes are stable the start decides; a particle at rest may stay so where a moving one does not.

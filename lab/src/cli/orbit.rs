@@ -29,6 +29,7 @@ ones alike; --json prints all of them.
 Examples:
   vines orbit
   vines orbit --response --set excitation.G=1.6
+  vines orbit --backbone --set plant.c=0 --set plant.r=1 --set excitation.G=0
   vines orbit --sigma=-0.6 --set excitation.G=2.2   whatever settles there, here six impacts in two periods
   vines orbit --convergence                   how theory approaches the exact orbit
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
@@ -45,7 +46,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SIGMA", allow_negative_numbers = true, conflicts_with_all = ["backbone", "convergence"])]
     sigma: Option<f64>,
 
-    /// Follow the exact backbone through the scene's phase-resonant orbit
+    /// Follow the exact backbone; without damping and with r = 1 it is the conservative nonlinear mode
     #[arg(long, group = "what")]
     backbone: bool,
 

@@ -13,9 +13,9 @@ use vines::{
 use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
-Runs the experiment, the convergence study, the exact curves and the regime map, and writes report.html: one file that opens
-offline in any browser and prints well, in words, with all pictures and tables, the scene, and what the numbers are worth. Beside
-it lie the pictures (SVG, for light and dark backgrounds) and tables.
+Runs the experiment, tracks the backbone, follows the exact curves, studies the convergence, maps the regimes, and writes
+report.html: one file that opens offline in any browser and prints well, in words, with all pictures and tables, the scene, and what
+the numbers are worth. Beside it lie the pictures (SVG, for light and dark backgrounds) and tables.
 
 What an earlier run has left in the folder is taken over where scene, version and axes are the same.
 

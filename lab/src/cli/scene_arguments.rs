@@ -18,6 +18,12 @@ pub(super) struct SceneArguments {
 
 impl SceneArguments {
     pub(super) fn load(&self) -> Result<Scene, SceneError> {
-        Scene::load(self.scene.as_deref(), &self.set)
+        self.load_with(&[])
+    }
+
+    /// The scene with further values replaced.
+    pub(super) fn load_with(&self, further: &[Override]) -> Result<Scene, SceneError> {
+        let set = [&self.set, further].concat();
+        Scene::load(self.scene.as_deref(), &set)
     }
 }

@@ -1,12 +1,16 @@
 //! The backbone along the free decay: a window slides from the release to the loss of synchrony.
 
+use std::f64::consts::TAU;
+use std::ops::Range;
+
 use serde::Serialize;
 
 use super::COMPARED_ABOVE;
+use super::crossings;
 use super::fit::{harmonic, mean_at_middle};
 use super::regime::{end_of_synchrony, impacts};
 use crate::experiment::Record;
-use crate::scene::Scene;
+use crate::scene::{Estimator, Scene};
 use crate::theory::{BranchSide, SlowFlow};
 
 /// One point along the decay; dimensionless.
@@ -29,7 +33,7 @@ pub struct DecayPoint {
 /// Points per period along the decay.
 const PER_PERIOD: f64 = 8.0;
 
-pub(super) fn points(record: &Record, scene: &Scene, slow_flow: &SlowFlow) -> Vec<DecayPoint> {
+pub(crate) fn points(record: &Record, scene: &Scene, slow_flow: &SlowFlow) -> Vec<DecayPoint> {
     let d = scene.dimensionless();
     let decay = record.decay();
     let dt = record.sample_time;
@@ -37,7 +41,7 @@ pub(super) fn points(record: &Record, scene: &Scene, slow_flow: &SlowFlow) -> Ve
         return Vec::new();
     };
     // The command of the last held sample: the frequency to start from.
-    let mut omega = record
+    let omega = record
         .hold()
         .last()
         .map_or(d.omega0, |s| s.command.drive.omega);
@@ -47,32 +51,74 @@ pub(super) fn points(record: &Record, scene: &Scene, slow_flow: &SlowFlow) -> Ve
     } else {
         f64::INFINITY
     };
-    let window = (scene.record.window_periods * 2.0 * half_period / dt).round() as usize + 1;
-    let step = ((2.0 * half_period / dt / PER_PERIOD).round() as usize).max(1);
-    let mut points = Vec::new();
-    for samples in decay.windows(window).step_by(step) {
-        if samples.last().is_none_or(|last| last.time > end) {
-            break;
-        }
-        let values: Vec<f64> = samples.iter().map(|s| s.sensors.response).collect();
-        let Some(v) = harmonic(&values, dt, omega) else {
+    let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
+    let pieces = match scene.record.estimator {
+        Estimator::Fit => fitted(&values, dt, omega, scene.record.window_periods),
+        Estimator::Crossings => crossings::periods(&values, dt)
+            .into_iter()
+            .map(|period| Piece {
+                time: period.middle * dt,
+                amplitude: period.amplitude,
+                omega: period.omega,
+                samples: period.samples,
+            })
+            .collect(),
+    };
+    // Without impacts to go by, the decay ends where the backbone does: at the fold.
+    let least = if first.witness.is_some() {
+        0.0
+    } else {
+        slow_flow.manifold.c_min() * d.b
+    };
+    let within =
+        |piece: &Piece| decay[piece.samples.end - 1].time <= end && piece.amplitude >= least;
+    pieces
+        .into_iter()
+        .take_while(within)
+        .map(|piece| {
+            let speeds: Option<Vec<f64>> = decay[piece.samples]
+                .iter()
+                .map(|s| s.witness.map(|w| w.particle_velocity.abs()))
+                .collect();
+            let c = piece.amplitude / d.b;
+            DecayPoint {
+                tau: d.omega0 * piece.time,
+                c,
+                b: speeds.map(|speeds| mean_at_middle(speeds.into_iter()) / (d.b * d.omega0)),
+                sigma: d.sigma(piece.omega),
+                sigma_theory: slow_flow.backbone_sigma(c, BranchSide::Right),
+            }
+        })
+        .collect()
+}
+
+/// What an estimator makes of some samples: amplitude (m) and frequency (rad/s) at a time (s) since the release.
+struct Piece {
+    samples: Range<usize>,
+    time: f64,
+    amplitude: f64,
+    omega: f64,
+}
+
+/// A window of so many periods slides along; each starts from the frequency of the one before, the first from `omega`.
+fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<Piece> {
+    let period = TAU / omega / dt;
+    let window = (periods * period).round() as usize + 1;
+    let step = ((period / PER_PERIOD).round() as usize).max(1);
+    let mut pieces = Vec::new();
+    for (n, values) in values.windows(window).enumerate().step_by(step) {
+        let Some(v) = harmonic(values, dt, omega) else {
             break;
         };
         omega = v.omega;
-        let speeds: Option<Vec<f64>> = samples
-            .iter()
-            .map(|s| s.witness.map(|w| w.particle_velocity.abs()))
-            .collect();
-        let c = v.amplitude / d.b;
-        points.push(DecayPoint {
-            tau: d.omega0 * (0.5 * (samples[0].time + samples[window - 1].time) - first.time),
-            c,
-            b: speeds.map(|speeds| mean_at_middle(speeds.into_iter()) / (d.b * d.omega0)),
-            sigma: d.sigma(omega),
-            sigma_theory: slow_flow.backbone_sigma(c, BranchSide::Right),
+        pieces.push(Piece {
+            samples: n..n + window,
+            time: (n as f64 + 0.5 * (window - 1) as f64) * dt,
+            amplitude: v.amplitude,
+            omega,
         });
     }
-    points
+    pieces
 }
 
 /// RMS of sigma less theory over the points above [`COMPARED_ABOVE`]; `None` where there is none.

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::fit::{harmonic, mean_at_middle};
 use super::regime::{Regime, classify};
+use super::response::regime_by_response;
 use crate::experiment::Record;
 use crate::scene::Scene;
 
@@ -25,10 +26,22 @@ pub struct Lock {
     pub phase_error_deg: f64,
     /// From the start to the settled lock, in periods of the locked motion.
     pub periods_to_lock: f64,
-    /// Impacts per period.
+    /// Impacts per period; no number where the rig does not tell them.
     pub impacts_per_period: f64,
-    /// What the particle does.
+    /// What the particle does: by its impacts, or by the response alone where the rig does not tell them.
     pub regime: Regime,
+}
+
+impl Lock {
+    /// How many impacts there are per period, or that the regime was told without them.
+    #[must_use]
+    pub fn impacts(&self) -> String {
+        if self.impacts_per_period.is_nan() {
+            "told from the response alone".into()
+        } else {
+            format!("{:.3} impacts per period", self.impacts_per_period)
+        }
+    }
 }
 
 pub(super) fn measure(record: &Record, scene: &Scene) -> Lock {
@@ -54,7 +67,10 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Lock {
         .iter()
         .map(|s| s.witness.map(|w| w.particle_velocity.abs()))
         .collect();
-    let (impacts_per_period, regime) = classify(hold, dt, omega);
+    let (impacts_per_period, regime) = match classify(hold, dt, omega) {
+        (count, Regime::Unknown) => (count, regime_by_response(hold, scene)),
+        told => told,
+    };
     let amplitude = base.map_or(command.drive.amplitude, |base| base.amplitude);
     Lock {
         g: amplitude / (d.b * d.epsilon),

@@ -19,10 +19,11 @@ pub enum Regime {
     /// Another pattern that repeats.
     #[serde(rename = "n impacts")]
     Several,
-    /// Nothing repeats, but disturbances do not grow: the amplitude is modulated.
+    /// Nothing repeats: the motion is captured into 1:1 resonance and lost again (strongly modulated response), or at least
+    /// disturbances do not grow.
     #[serde(rename = "modulated")]
     Modulated,
-    /// Nothing repeats, and disturbances grow.
+    /// Nothing repeats, disturbances grow, and there are hardly any captures.
     #[serde(rename = "chaotic")]
     Chaotic,
     /// Impacts accumulate, and the particle rests on a wall for a while.
@@ -77,7 +78,7 @@ pub(super) struct Pattern {
 }
 
 /// Longest pattern looked for, impacts.
-const LONGEST: usize = 32;
+const LONGEST: usize = 96;
 /// Two impacts are the same within this, rad and relative velocity: far above what is left of a transient.
 const SAME: f64 = 2e-3;
 /// Intervals differ from half a period by less than this, rad, in a symmetric motion.
@@ -101,6 +102,25 @@ pub(super) fn pattern(hits: &[Hit]) -> Option<Pattern> {
     })
 }
 
+/// Impacts in a row, on alternating walls, that make a capture into 1:1 resonance.
+const CAPTURED: usize = 8;
+/// Deviation of an interval from half a period, rad, that still is in step.
+const IN_STEP: f64 = 0.15 * PI;
+
+/// Share of the impacts that belong to captures into 1:1 resonance: at least eight in a row, on alternating walls, half a
+/// period apart within 15 %.
+pub(super) fn synchrony(hits: &[Hit]) -> f64 {
+    let in_step = |one: &Hit, other: &Hit| {
+        one.wall != other.wall && (other.phase - one.phase - PI).abs() < IN_STEP
+    };
+    let captured: usize = hits
+        .chunk_by(in_step)
+        .map(<[Hit]>::len)
+        .filter(|length| *length >= CAPTURED)
+        .sum();
+    captured as f64 / hits.len().max(1) as f64
+}
+
 fn regime(hits: &[Hit], impacts: usize, periods: f64) -> Regime {
     if impacts != 2 || periods != 1.0 || hits[0].wall == hits[1].wall {
         return Regime::Several;
@@ -115,6 +135,21 @@ fn regime(hits: &[Hit], impacts: usize, periods: f64) -> Regime {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn captures_are_long_runs_in_step() {
+        let even = hits(&[(0.3, 1.0), (0.3 + PI, -1.0)], 1, 10);
+        assert_eq!(synchrony(&even), 1.0);
+        // Of twelve impacts in step and eight on the same wall, the first count.
+        let mut mixed = hits(&[(0.3, 1.0), (0.3 + PI, -1.0)], 1, 6);
+        mixed.extend((0..8).map(|n| Hit {
+            phase: 40.0 + 0.7 * f64::from(n),
+            wall: 1.0,
+            velocity: 0.2,
+        }));
+        assert!((synchrony(&mixed) - 0.6).abs() < 1e-12);
+        assert_eq!(synchrony(&[]), 0.0);
+    }
 
     fn hits(pattern: &[(f64, f64)], periods: usize, repeats: usize) -> Vec<Hit> {
         (0..repeats)

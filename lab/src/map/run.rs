@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
 
-use super::regime::{Hit, Pattern, Regime, pattern};
+use super::regime::{Hit, Pattern, Regime, pattern, synchrony};
 use crate::scene::Dimensionless;
 
 /// What was found at one point.
@@ -15,23 +15,29 @@ pub struct Point {
     pub regime: Regime,
     /// Impacts per period of the base.
     pub impacts_per_period: f64,
-    /// Impacts of the pattern that repeats; 0 where none does.
+    /// Impacts of the pattern that repeats; 0 where none was seen.
     pub impacts: usize,
-    /// Periods of the base that it takes; 0 where none repeats.
+    /// Periods of the base that it takes; 0 likewise.
     pub periods: u32,
-    /// Growth of a small disturbance per period, as a natural logarithm; absent where the motion repeats or sticks.
+    /// Share of the impacts that belong to captures into 1:1 resonance: at least eight in a row on alternating walls, half a
+    /// period apart within 15 %.
+    pub synchrony: f64,
+    /// Growth of a small disturbance per period, as a natural logarithm; absent where a pattern was seen, or the particle sticks.
     pub growth: Option<f64>,
 }
 
 /// Growth per period, as a natural logarithm, above which a motion is chaotic: a disturbance grows e-fold within 20 periods.
 /// Over the periods that it is measured for, a growth that is only linear in time stays below.
 const CHAOS: f64 = 0.05;
-/// A disturbance that shrinks this fast has not settled yet: the motion is given more time, ...
-const TRANSIENT: f64 = -0.005;
-/// ... so many times at most.
+/// A motion without growth that does not repeat may not have settled yet: it is given more time, so many times at most.
 const ROUNDS: usize = 6;
+/// Where a disturbance still shrinks this fast then, the motion repeats, but in a pattern longer than those looked for.
+const SHRINKING: f64 = -0.005;
 /// The particle sticks where it comes to rest once in so many periods or more; now and then it does so in chaos, too.
 const STICKING: usize = 10;
+/// From this share of captured impacts on a motion is modulated, whether or not disturbances grow. On the default map, irregular
+/// cells have either less than a tenth or, in one connected region below and beside the island, mostly a third and more.
+const CAPTURES: f64 = 0.2;
 /// Size of the disturbance that is followed, dimensionless.
 const DISTURBANCE: f64 = 1e-8;
 /// Periods over which it is followed.
@@ -63,6 +69,7 @@ pub fn observe(
             impacts_per_period: hits.len() as f64 / record as f64,
             impacts: pattern.map_or(0, |one| one.impacts),
             periods: pattern.map_or(0, |one| one.periods),
+            synchrony: synchrony(&hits),
             growth,
         };
         if rests * STICKING >= record {
@@ -76,11 +83,14 @@ pub fn observe(
         }
         let growth = growth(scene, drive, &plant);
         round += 1;
-        if growth < TRANSIENT && round < ROUNDS {
-            continue;
-        }
-        let regime = if growth > CHAOS {
+        let regime = if growth > CHAOS && synchrony(&hits) < CAPTURES {
             Regime::Chaotic
+        } else if growth > CHAOS {
+            Regime::Modulated
+        } else if round < ROUNDS {
+            continue;
+        } else if growth < SHRINKING {
+            Regime::Several
         } else {
             Regime::Modulated
         };

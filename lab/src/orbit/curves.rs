@@ -4,9 +4,10 @@ use serde::Serialize;
 
 use super::{
     Bifurcation, Branch, Condition, Limits, Orbit, Periodic, Shape, asymmetric_branch,
-    continue_both_ways, phase_resonant,
+    continue_both_ways, exact_backbone, phase_resonant,
 };
 use crate::scene::Dimensionless;
+use crate::theory::Manifold;
 
 /// The exact frequency response at one excitation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -28,10 +29,29 @@ fn right_branch(scene: &Dimensionless) -> Option<Periodic> {
     Periodic::find(scene, &Shape::symmetric(), &orbit.unknowns(), conditions)
 }
 
-/// The exact backbone through the scene's phase-resonant motion; None where it has none.
+/// Detunings at which the backbone is met where no motion of it belongs to the scene's G.
+const MET_AT: [f64; 6] = [-1.0, -0.7, -1.4, -0.5, -2.0, 0.0];
+
+/// A phase-resonant motion on the right branch, whatever G it needs: none without damping and losses.
+fn at_any_excitation(scene: &Dimensionless) -> Option<Periodic> {
+    let right = Manifold::new(scene.r).b_min();
+    MET_AT.into_iter().find_map(|sigma| {
+        let fastest = |one: &Orbit, other: &Orbit| one.b.total_cmp(&other.b);
+        let met = exact_backbone(scene, 1.0 + scene.epsilon * sigma);
+        let orbit = met
+            .into_iter()
+            .max_by(fastest)
+            .filter(|one| one.b > right)?;
+        let conditions = [Condition::Sigma(sigma), Condition::PhaseResonance];
+        Periodic::find(scene, &Shape::symmetric(), &orbit.unknowns(), conditions)
+    })
+}
+
+/// The exact backbone: through the scene's phase-resonant motion, or where it has none through another. Without damping and with
+/// r = 1 it is the conservative nonlinear mode.
 #[must_use]
 pub fn backbone(scene: &Dimensionless, limits: &Limits) -> Option<Branch> {
-    let start = right_branch(scene)?;
+    let start = right_branch(scene).or_else(|| at_any_excitation(scene))?;
     Some(continue_both_ways(
         scene,
         &start,

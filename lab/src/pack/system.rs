@@ -10,8 +10,8 @@ use parameters::parameter_set;
 /// The structure, but for the end of the default experiment.
 const STRUCTURE: &str = include_str!("system/SystemStructure.ssd");
 
-/// The end of the default experiment, natural periods: the default scene has been locked for 50 by then.
-const PERIODS: f64 = 300.0;
+/// The end of the default experiment, natural periods: the default scene has been locked for nearly a hundred by then.
+const PERIODS: f64 = 400.0;
 
 /// The system file of the FMUs, with the parameters of the scene.
 pub(super) fn file(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {

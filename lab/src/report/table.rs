@@ -12,8 +12,11 @@ pub fn table(found: &Identification) -> String {
             p.epsilon, p.lambda, p.r, lock.g
         ),
         format!(
-            "Locked after {:.0} periods: {}, {:.3} impacts per period, phase error {:.1e} degrees",
-            lock.periods_to_lock, lock.regime, lock.impacts_per_period, lock.phase_error_deg
+            "Locked after {:.0} periods: {}, {}, phase error {:.1e} degrees",
+            lock.periods_to_lock,
+            lock.regime,
+            lock.impacts(),
+            lock.phase_error_deg
         ),
         String::new(),
         format!("  {:<24}{:>12}{:>12}{:>12}", "", "sigma", "C", "B"),
@@ -40,10 +43,15 @@ pub fn table(found: &Identification) -> String {
     lines.push(String::new());
     if let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) {
         lines.push(format!(
-            "Free decay: {} points from C = {:.4} down to {:.4}, where the impacts lose synchrony",
+            "Free decay: {} points from C = {:.4} down to {:.4}, {}",
             found.decay.len(),
             first.c,
-            last.c
+            last.c,
+            if lock.impacts_per_period.is_nan() {
+                "where the backbone folds"
+            } else {
+                "where the impacts lose synchrony"
+            }
         ));
     }
     lines.push(match found.rms_sigma_error {

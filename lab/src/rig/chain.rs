@@ -12,7 +12,8 @@ use std::collections::VecDeque;
 
 use converter::Converter;
 use filter::LowPass;
-use noise::{Gauss, Sensor};
+pub(crate) use noise::Gauss;
+use noise::Sensor;
 
 use super::{Drive, Rig, RigError, Sensors, Witness};
 use crate::scene::Scene;

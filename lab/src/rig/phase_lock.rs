@@ -31,8 +31,10 @@ impl BuiltIn {
     /// As [`BuiltIn::new`].
     pub fn for_backbone(scene: &Scene) -> Result<Self, ConfigError> {
         let d = scene.dimensionless();
+        let limits = [scene.backbone.g_max, scene.controller.g_max];
+        let g_max = limits.into_iter().filter(|limit| *limit > 0.0);
         let lock = Config {
-            amplitude_max: scene.backbone.g_max * d.b * d.epsilon,
+            amplitude_max: g_max.fold(f64::INFINITY, f64::min) * d.b * d.epsilon,
             bandwidth: scene.backbone.bandwidth * d.omega0,
             ..configuration(scene)
         }
@@ -49,6 +51,9 @@ pub(crate) fn configuration(scene: &Scene) -> Config {
     let omega0 = scene.plant.omega0();
     let c = &scene.controller;
     let amplitude = scene.amplitude;
+    let period = scene.plant.natural_period();
+    // What G = 1 is in metres.
+    let unit = scene.plant.half_width * scene.plant.epsilon();
     let defaults = Config::for_resonance(omega0, amplitude);
     Config {
         sample_time: scene.sample_time(),
@@ -58,7 +63,14 @@ pub(crate) fn configuration(scene: &Scene) -> Config {
         bandwidth: c.bandwidth * omega0,
         damping_rate: 0.5 * scene.plant.damping / scene.plant.mass,
         phase_target: c.phase_target_radians(),
-        delay: scene.chain.stated_delay(omega0 * scene.sample_time()) / omega0,
+        delay: scene.chain.stated_delay(omega0 * scene.sample_time()) / omega0
+            + c.delay * scene.sample_time(),
+        amplitude_max: c.g_max * unit,
+        response_max: c.c_max * scene.plant.half_width,
+        ramp_time: c.ramp_periods * period,
+        release_time: c.release_periods * period,
+        omega_rate: c.omega_rate * omega0 / period,
+        acquire_timeout: c.acquire_periods * period,
         lock: LockCriterion {
             phase_tolerance: c.phase_tolerance.to_radians(),
             frequency_drift: c.frequency_drift,

@@ -42,13 +42,15 @@ impl Rig for Simulated {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         Ok(Sensors {
             response: self.plant.centre(),
-            reference: Some(self.plant.base().displacement()),
+            reference: Some(self.plant.base_displacement()),
         })
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         let drive = lovines::Drive::harmonic(drive.amplitude, drive.omega);
         self.plant.advance(drive, step);
+        // The sensors are read after every step.
+        self.plant.settle();
         Ok(())
     }
 

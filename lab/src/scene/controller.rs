@@ -28,6 +28,22 @@ pub struct Controller {
     pub amplitude_drift: f64,
     /// How long all of this must hold, periods.
     pub dwell_periods: u32,
+    /// Largest drive allowed, base amplitude over `b epsilon`; 0 for none.
+    #[serde(rename = "G_max")]
+    pub g_max: f64,
+    /// Reading of the response above which the drive is taken away, over b; 0 for none.
+    #[serde(rename = "C_max")]
+    pub c_max: f64,
+    /// Time of a ramp of the drive to its amplitude, also down after a fault, natural periods; 0 to jump.
+    pub ramp_periods: f64,
+    /// Time of a ramp of the drive down to nothing at the release, natural periods; 0 to switch off at once.
+    pub release_periods: f64,
+    /// Largest change of the frequency in a natural period, in units of omega0; 0 for none.
+    pub omega_rate: f64,
+    /// Longest time from the end of the ramp to the lock, natural periods; 0 for ever.
+    pub acquire_periods: f64,
+    /// Delay of the rig from the drive to the sensors, samples, beside that of `[chain]`; used where no sensor reads the base.
+    pub delay: f64,
 }
 
 impl Default for Controller {
@@ -43,6 +59,13 @@ impl Default for Controller {
             frequency_drift: 1e-6,
             amplitude_drift: 1e-5,
             dwell_periods: 20,
+            g_max: 0.0,
+            c_max: 0.0,
+            ramp_periods: 0.0,
+            release_periods: 0.0,
+            omega_rate: 0.0,
+            acquire_periods: 0.0,
+            delay: 0.0,
         }
     }
 }
@@ -55,6 +78,7 @@ impl Controller {
     }
 
     pub(super) fn check(&self) -> Result<(), SceneError> {
+        self.check_limits()?;
         let samples = self.samples_per_period;
         // The detector follows the fifth harmonic, which takes more than two samples in its period.
         let fewest = (10.0 * self.omega_max).floor() + 1.0;
@@ -101,5 +125,36 @@ impl Controller {
         let dwell = self.dwell_periods;
         Quantity::new("controller.dwell_periods", dwell.into(), "(periods)")
             .check((4..=400).contains(&dwell), "must be from 4 to 400")
+    }
+
+    fn check_limits(&self) -> Result<(), SceneError> {
+        for (key, value, unit) in [
+            ("controller.G_max", self.g_max, "(over b epsilon)"),
+            ("controller.C_max", self.c_max, "(over b)"),
+            (
+                "controller.ramp_periods",
+                self.ramp_periods,
+                "(natural periods)",
+            ),
+            (
+                "controller.release_periods",
+                self.release_periods,
+                "(natural periods)",
+            ),
+            (
+                "controller.omega_rate",
+                self.omega_rate,
+                "(omega0 per natural period)",
+            ),
+            (
+                "controller.acquire_periods",
+                self.acquire_periods,
+                "(natural periods)",
+            ),
+            ("controller.delay", self.delay, "samples"),
+        ] {
+            Quantity::new(key, value, unit).not_negative()?;
+        }
+        Ok(())
     }
 }

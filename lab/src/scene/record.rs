@@ -4,6 +4,16 @@ use serde::{Deserialize, Serialize};
 
 use super::{Controller, SceneError, validate::Quantity};
 
+/// How frequency and amplitude along the decay are found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Estimator {
+    /// Least squares over a sliding window: a fundamental and its third harmonic, their amplitudes and phases drifting linearly.
+    Fit,
+    /// Zero crossings, a period each: for clean data.
+    Crossings,
+}
+
 /// Durations of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -14,8 +24,10 @@ pub struct Record {
     pub hold_periods: f64,
     /// Length of the recorded decay, natural periods.
     pub decay_periods: f64,
-    /// Analysis window along the decay, periods of the motion.
+    /// Window of the fit along the decay, periods of the motion.
     pub window_periods: f64,
+    /// How frequency and amplitude along the decay are found.
+    pub estimator: Estimator,
 }
 
 impl Default for Record {
@@ -24,7 +36,8 @@ impl Default for Record {
             lock_periods: 2000.0,
             hold_periods: 20.0,
             decay_periods: 50.0,
-            window_periods: 1.5,
+            window_periods: 2.5,
+            estimator: Estimator::Fit,
         }
     }
 }

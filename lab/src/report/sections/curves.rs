@@ -53,9 +53,10 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         })
         .collect();
     section.finding = format!(
-        "The exact backbone was followed through {} motions; its stability changes {} times.",
+        "The exact backbone was followed through {} motions; its stability changes in {} place{}.",
         curve.points.len(),
-        special.len()
+        special.len(),
+        if special.len() == 1 { "" } else { "s" }
     );
     section.words(
         "These motions are exact: periodic orbits of the full equations, found by shooting on the impact map and followed by \

@@ -6,17 +6,17 @@ use super::Subject;
 use crate::experiment::{self, Plan, Stage};
 use crate::identification::{COMPARED_ABOVE, Identification, identify};
 use crate::report::{backbone, csv, history, manifold, section::Section};
-use crate::rig::{BuiltIn, Simulated};
+use crate::rig::BuiltIn;
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, String> {
     let mut section = Section::new("The experiment");
     let scene = &subject.scene;
     let refused = |error: &dyn std::fmt::Display| error.to_string();
-    let mut rig = Simulated::new(scene).map_err(|error| refused(&error))?;
+    let mut rig = subject.rig()?;
     let mut controller = BuiltIn::new(scene).map_err(|error| refused(&error))?;
     let plan = Plan::of(scene);
     let told = Cell::new(0.0);
-    let record = experiment::run(&mut rig, &mut controller, &plan, |stage, at, of| {
+    let record = experiment::run(rig.as_mut(), &mut controller, &plan, |stage, at, of| {
         let part = at as f64 / of.max(1) as f64;
         // Most locks come long before the last moment allowed.
         let part = match stage {
@@ -43,7 +43,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
             return Ok(section);
         }
     };
-    describe(&mut section, &found);
+    describe(&mut section, &found, scene.controller.phase_target);
     section.picture(
         "history",
         "Amplitude and frequency over time. Left: the loop seeks phase resonance and holds it; measured once a period. Right: the \
@@ -67,18 +67,20 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     Ok(section)
 }
 
-fn describe(section: &mut Section, found: &Identification) {
+fn describe(section: &mut Section, found: &Identification, target: f64) {
     let lock = &found.lock;
     section.finding = format!(
         "The loop locked after {:.0} periods at σ = {:.4}, C = {:.4}, in the regime {}.",
         lock.periods_to_lock, lock.sigma, lock.c, lock.regime
     );
     section.words(format!(
-        "A sampled phase-locked loop drove the base at G = {:.4} and sought the frequency at which the centre of mass lags it by a \
-         quarter of a period. It settled after {:.0} periods with {:.3} impacts per period and a phase error of {:.1e} degrees. A \
+        "A sampled phase-locked loop drove the base at G = {:.4} and sought the frequency at which the centre of mass {} it by {} degrees. It settled after {:.0} periods with {:.3} impacts per period and a phase error of {:.1e} degrees. A \
          phase lock alone proves nothing, for the linear mode locks just as well: the impacts alternate between the walls at even \
          intervals, so this is the symmetric 1:1 regime.",
-        lock.g, lock.periods_to_lock, lock.impacts_per_period, lock.phase_error_deg
+        lock.g,
+        if target <= 0.0 { "lags" } else { "leads" },
+        target.abs(),
+        lock.periods_to_lock, lock.impacts_per_period, lock.phase_error_deg
     ));
     let cells = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
         let b = b.map_or("–".into(), |b| format!("{b:.6}"));

@@ -48,7 +48,8 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     );
     section.words(format!(
         "Each cell of the map over {x} and {y} is one plant, driven from the scene's start at a fixed frequency. After {} periods \
-         the impacts of the next {} are classified: by the pattern that repeats, and where none does, by whether a small disturbance grows.",
+         the impacts of the next {} are classified: by the pattern that repeats; where none does, the response is modulated if it is captured \
+         into 1:1 resonance and lost again, or if a small disturbance does not grow, and chaotic otherwise.",
         PERIODS.0, PERIODS.1
     ));
     let rows = Regime::ALL.into_iter().map(|regime| {
@@ -80,7 +81,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         "regime map",
         "one start per cell".into(),
         "Where several regimes are stable the start decides. Cells at a border may still be in a transient, \
-         and what repeats only after more than 32 impacts counts as not repeating.",
+         and chaos that ends only after thousands of periods is taken for lasting.",
     );
     section.attach("regimes.csv", csv(map.cells.iter().map(map_row))?);
     Ok(section)

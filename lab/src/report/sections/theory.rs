@@ -2,7 +2,7 @@
 
 use super::Subject;
 use crate::orbit::convergence;
-use crate::report::{backbones, csv, section::Section};
+use crate::report::{approach, backbones, csv, section::Section};
 use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 
 /// Halvings of epsilon in the convergence study.
@@ -35,6 +35,16 @@ pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Sectio
          reaches the wall. A stable 1:1 motion needs less: {reached}, for a particle that is already moving.",
         activation.from_rest
     ));
+    if let Some(point) = &stable {
+        section.picture(
+            "approach",
+            "The modulation of theory off the manifold, one dot an impact. Driven at phase resonance, motions that start off the \
+             manifold fall onto it within a few impacts and move along it to the locked point (square); without drive the motion moves \
+             down to the fold, and loses its synchrony there. It runs a little below the manifold, as the measured decay does: its way \
+             is not infinitely slow against the approach.",
+            approach::draw(&p, point)?,
+        );
+    }
     section.picture(
         "backbones",
         "Backbones of first-order theory. They do not depend on λ; which part of them is stable does. The less is lost at the \

@@ -1,0 +1,27 @@
+//! The phase-lock controller for C: the same core, with plain structures at its edge.
+//!
+//! Nothing is allocated and nothing is global: a [`PhaseLockController`] is storage that the caller provides, and a copy of
+//! it is a copy of the controller. The header is `include/phase_lock.h`; `docs/firmware.md` tells how to build and use it.
+#![cfg_attr(not(feature = "std"), no_std)]
+#![warn(missing_docs)]
+
+mod controller;
+mod message;
+mod types;
+
+pub use controller::{
+    phase_lock_config_for_resonance, phase_lock_hold_response, phase_lock_init, phase_lock_reset,
+    phase_lock_retune, phase_lock_sample,
+};
+pub use types::{
+    PhaseLockConfig, PhaseLockController, PhaseLockFault, PhaseLockInput, PhaseLockMove,
+    PhaseLockOutput, PhaseLockStage,
+};
+
+#[cfg(not(feature = "std"))]
+#[panic_handler]
+fn halt(_: &core::panic::PanicInfo) -> ! {
+    loop {
+        core::hint::spin_loop();
+    }
+}

@@ -1,0 +1,123 @@
+//! A C program with the static library, against the Rust core.
+
+use std::fmt::Write;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+use phase_lock::{Config, Input, Move, Output};
+
+/// Runs a command; its output.
+fn run(command: &mut Command) -> String {
+    let output = command
+        .output()
+        .unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    let said = String::from_utf8_lossy(&output.stderr);
+    assert!(output.status.success(), "{command:?}: {said}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// Builds the static library as firmware takes it, without the standard library, in a folder of its own.
+fn static_library(folder: &Path) -> PathBuf {
+    run(Command::new(env!("CARGO"))
+        .args([
+            "rustc",
+            "--locked",
+            "--quiet",
+            "--release",
+            "--lib",
+            "--no-default-features",
+        ])
+        .args(["--crate-type", "staticlib", "--target-dir"])
+        .arg(folder)
+        .args([
+            "--config",
+            "profile.release.panic=\"abort\"",
+            "--config",
+            "profile.release.lto=false",
+        ])
+        .current_dir(env!("CARGO_MANIFEST_DIR")));
+    folder.join("release/libphase_lock_c.a")
+}
+
+/// What tests/resonator.c prints, from the Rust core.
+fn by_the_core() -> String {
+    let (omega_0, zeta, amplitude) = (55.39, 0.005, 1e-4);
+    let config = Config {
+        amplitude_max: 4.0 * amplitude,
+        response_max: 0.1,
+        omega_start: 0.98 * omega_0,
+        ..Config::for_resonance(omega_0, amplitude)
+    };
+    let controller = config.build().unwrap();
+    let mut state = controller.start();
+    let mut text = String::new();
+    let (mut q, mut v, mut drive, mut response) = (0.0_f64, 0.0_f64, 0.0, 0.0);
+    for n in 0..60_000 {
+        if n == 50_000 {
+            let to = Move {
+                response: 0.5 * response,
+                duration: 1.0,
+                amplitude: -0.5 * amplitude,
+                omega: 0.0,
+            };
+            controller.hold_response(&mut state, to).unwrap();
+        }
+        let input = Input {
+            response: q,
+            reference: Some(drive),
+            active: true,
+        };
+        let output: Output = controller.process(&mut state, input);
+        (drive, response) = (output.drive, output.response_amplitude);
+        let h = config.sample_time;
+        v += h * (omega_0 * omega_0 * (drive - q) - 2.0 * zeta * omega_0 * v);
+        q += h * v;
+        if n % 500 == 499 {
+            writeln!(
+                text,
+                "{n} {:016x} {:016x} {:016x} {}",
+                output.omega.to_bits(),
+                output.amplitude.to_bits(),
+                output.phase_error.to_bits(),
+                output.state as u8
+            )
+            .unwrap();
+        }
+    }
+    text + "5 1\n"
+        + "1 omega_max = 66.468 rad/s is refused; allowed is a finite number above omega_min\n"
+        + "-1\n"
+}
+
+#[test]
+fn a_c_program_locks_a_resonator_with_the_bits_of_the_core() {
+    let folder = tempfile::tempdir().unwrap();
+    let library = static_library(&folder.path().join("target"));
+    let program = folder.path().join("resonator");
+    let here = Path::new(env!("CARGO_MANIFEST_DIR"));
+    run(Command::new("cc")
+        .args([
+            "-std=c99",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-O2",
+            "-ffp-contract=off",
+        ])
+        .arg("-I")
+        .arg(here.join("include"))
+        .arg(here.join("tests/resonator.c"))
+        .arg(library)
+        .args(["-lm", "-Wl,--gc-sections"])
+        .arg("-o")
+        .arg(&program));
+    let printed = run(&mut Command::new(program));
+    let expected = by_the_core();
+    for (c, core) in printed.lines().zip(expected.lines()) {
+        assert_eq!(c, core);
+    }
+    assert_eq!(printed.lines().count(), expected.lines().count());
+    // It did lock, and held its response at half.
+    let locked = printed.lines().filter(|line| line.ends_with(" 3")).count();
+    assert!(locked > 40, "{locked}");
+}

@@ -1,0 +1,80 @@
+//! The backbone tracked with the loop closed, level by level.
+
+use serde::Serialize;
+
+use super::Subject;
+use crate::backbone::{Compared, Report, track};
+use crate::identification::Regime;
+use crate::report::{csv, section::Section, tracked};
+use crate::rig::BuiltIn;
+
+/// One row of the table of points.
+#[derive(Serialize)]
+struct Row {
+    #[serde(rename = "C")]
+    c: f64,
+    sigma: f64,
+    #[serde(rename = "G")]
+    g: f64,
+    periods: f64,
+    settled: bool,
+    distance: Option<f64>,
+}
+
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, String> {
+    let mut section = Section::new("The backbone, tracked with the loop closed");
+    let scene = &subject.scene;
+    let mut controller = BuiltIn::for_backbone(scene).map_err(|error| error.to_string())?;
+    let mut rig = subject.rig()?;
+    let found = track(rig.as_mut(), &mut controller, scene, |at, of| {
+        done(at as f64 / of.max(1) as f64);
+    });
+    let tracked = match found {
+        Ok(found) if !found.points.is_empty() => Report::new(&found, scene),
+        Ok(_) => {
+            section.finding = "Tracking gave no point.".into();
+            section.words(section.finding.clone());
+            return Ok(section);
+        }
+        Err(error) => {
+            section.finding = format!("Tracking gave no backbone: {error}.");
+            section.words(section.finding.clone());
+            return Ok(section);
+        }
+    };
+    let symmetric = |one: &&Compared| one.point.regime_by_impacts == Some(Regime::Symmetric);
+    let in_regime = tracked.points.iter().filter(symmetric).count();
+    section.finding = format!(
+        "Tracked with the loop closed, the backbone took {} points in {:.0} periods, {:.1} a point.",
+        tracked.points.len(),
+        tracked.periods,
+        tracked.periods_per_point()
+    );
+    section.words(format!(
+        "A decay is not a steady motion, and its points lie off the backbone for that. Here the loop holds the response at one level \
+         after another and waits until it is still; the drive does what it must. {} Of these points {in_regime} are in the symmetric 1:1 regime.",
+        section.finding
+    ));
+    section.picture(
+        "tracked-backbone",
+        "The backbone as tracked with the loop closed, with the exact curve and first-order theory.",
+        tracked::draw(&tracked)?,
+    );
+    if let Some(worst) = tracked.worst() {
+        section.budget(
+            "tracked backbone against the exact one",
+            format!("at most {worst:.1e} in C, σ and G"),
+            "Largest of the three differences, to the place on the exact curve where that is least, over all points.",
+        );
+    }
+    let rows = tracked.points.iter().map(|one| Row {
+        c: one.point.c,
+        sigma: one.point.sigma,
+        g: one.point.g,
+        periods: one.point.periods,
+        settled: one.point.settled,
+        distance: one.exact.map(|exact| exact.nearest),
+    });
+    section.attach("tracked.csv", csv(rows)?);
+    Ok(section)
+}
