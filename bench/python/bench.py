@@ -5,6 +5,7 @@ Started by scripts/bench, which builds and installs what is needed.
 
 import argparse
 import json
+import os
 import random
 import statistics
 import sys
@@ -98,10 +99,11 @@ class Bench:
         self.options = options
         self.scenes = load(HERE / "scenes.json")
         self.truth = json.loads((HERE / "truth.json").read_text())
-        self.limit = 0.5 if options.quick else 8.0
-        self.budget = 0.02 if options.quick else 0.1
+        self.limit = 1.5 if options.quick else 8.0
+        self.budget = 0.05 if options.quick else 0.1
         self.workers, self.missing, self.versions = {}, {}, []
         self.rows = []
+        self.load = os.getloadavg()[0]
 
     def say(self, text, end="\n"):
         if end == "\n" or sys.stderr.isatty():
@@ -157,7 +159,7 @@ class Bench:
         answer = self.workers[row.name].ask(request | {"budget": self.budget, "limit": self.limit}, 4 * self.limit + 30)
         row.asked += 1
         if answer is None:
-            row.failure = f"hung: killed after {4 * self.limit + 30:.0f} s"
+            row.failure = f"hung: killed after {4 * self.limit + 30:g} s"
         elif answer.get("error") or answer.get("failure"):
             row.failure = answer.get("error") or answer["failure"]
         else:

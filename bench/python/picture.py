@@ -68,14 +68,14 @@ def write(bench, file):
         if failed:
             ax.text(
                 0.98,
-                0.98,
-                "no end: " + ",\n".join(sorted(failed)),
+                0.03,
+                "no end at some setting or all:\n" + ",\n".join(sorted(failed)),
                 transform=ax.transAxes,
                 ha="right",
-                va="top",
+                va="bottom",
                 fontsize=5.5,
             )
-        ax.set_ylim(LEAST / 2, 1e4)
+        ax.set_ylim(LEAST / 1e3, 1e2)
         ax.grid(True, color="#dddddd", linewidth=0.5)
         ax.set_xlabel("ns per impact")
     for ax in list(axes.flat)[len(scenes) :]:

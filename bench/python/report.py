@@ -129,6 +129,7 @@ def growths(curves):
 
 def notes(bench):
     yield f"{date.today().isoformat()}, {machine()}; " + ("quick run" if bench.options.quick else "full run") + "."
+    yield f"Other programs kept {bench.load:.1f} cores busy when it began; least times are what to compare."
     yield "Peers: " + ", ".join(dict.fromkeys(bench.versions)) + "; diffsol and roots as Cargo.lock has them."
     yield (
         "Every method is asked for the state after each step of the scene, on one thread; just-in-time compilation "

@@ -97,7 +97,7 @@ fn run<M: Method>(
         }
         if n % asked_every == 0 && began.elapsed() > limit {
             return Err(Failure(format!(
-                "time limit: {:.0} % done after {:.0} s",
+                "time limit: {:.0} % done after {} s",
                 100.0 * (n + 1) as f64 / steps.len() as f64,
                 limit.as_secs_f64()
             )));

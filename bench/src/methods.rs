@@ -64,3 +64,48 @@ pub fn measure_named(
     };
     Ok(measure(scene, setting, checks, budget, limit))
 }
+
+#[cfg(test)]
+mod tests {
+    use std::path::Path;
+
+    use super::*;
+
+    /// Largest error of a method at the end of a scene.
+    fn error_at_the_end(scene: &str, method: &str, setting: f64) -> f64 {
+        let folder = Path::new(env!("CARGO_MANIFEST_DIR"));
+        let text = std::fs::read_to_string(folder.join("truth.json")).expect("the truth");
+        let truth: serde_json::Value = serde_json::from_str(&text).expect("JSON");
+        let last = truth[scene]["rows"].as_array().and_then(|rows| rows.last());
+        let last = last.expect("a last row");
+        let loaded = Scene::load(folder, scene).expect("a scene");
+        let (once, limit) = (Duration::ZERO, Duration::from_secs(60));
+        let answer = measure_named(method, &loaded, setting, &[], once, limit).expect("a method");
+        assert_eq!(answer.failure, None, "{method} in {scene}");
+        let states = answer.states.last().expect("the state at the end");
+        let error = |(n, x): (usize, &f64)| {
+            let truth: f64 = last[n + 1]
+                .as_str()
+                .and_then(|x| x.parse().ok())
+                .expect("a number");
+            (x - truth).abs()
+        };
+        states.iter().enumerate().map(error).fold(0.0, f64::max)
+    }
+
+    #[test]
+    fn the_methods_lead_where_40_digit_arithmetic_does() {
+        for scene in ["decay", "grazing", "damped", "resonance"] {
+            assert!(
+                error_at_the_end(scene, "plant", 0.0) < 1e-11,
+                "{scene}: plant"
+            );
+            assert!(
+                error_at_the_end(scene, "brent", 1e-12) < 1e-9,
+                "{scene}: closed form"
+            );
+        }
+        assert!(error_at_the_end("decay", "rk4", 1000.0) < 1e-7);
+        assert!(error_at_the_end("chatter", "moreau", 10_000.0) < 1e-2);
+    }
+}

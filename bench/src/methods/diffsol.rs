@@ -9,8 +9,8 @@ use crate::scene::{Scene, Step};
 
 type Matrix = NalgebraMat<f64>;
 
-/// So many impacts within one step are a stall.
-const MOST_IMPACTS: usize = 1000;
+/// So many impacts within a radian of the natural frequency are a stall.
+const MOST_IMPACTS: f64 = 1000.0;
 
 struct Flight {
     p: Parameters,
@@ -86,7 +86,8 @@ macro_rules! method {
                     .map_err(wrong)?;
                 let mut solver = problem.$solver$(::<$linear>)?().map_err(wrong)?;
                 solver.set_stop_time(step.duration).map_err(wrong)?;
-                let mut impacts = 0;
+                let most = MOST_IMPACTS * (1.0 + step.duration * p.natural_frequency());
+                let mut impacts = 0.0;
                 loop {
                     match solver.step().map_err(wrong)? {
                         OdeSolverStopReason::InternalTimestep => {}
@@ -99,7 +100,7 @@ macro_rules! method {
                             if (y[0] - y[2]) * (y[1] - y[3]) > 0.0 {
                                 (y[1], y[3]) = rebound(&p, y[1], y[3]);
                                 flight.impacts += 1;
-                                impacts += 1;
+                                impacts += 1.0;
                             }
                             let (q1, v1, v3) = (y[0], y[1], y[3]);
                             let dy = &mut *state.dy;
@@ -107,7 +108,7 @@ macro_rules! method {
                             dy[1] = acceleration(&p, step.amplitude, step.omega, angle + step.omega * t, q1, v1);
                             dy[2] = v3;
                             dy[3] = 0.0;
-                            if impacts > MOST_IMPACTS {
+                            if impacts > most {
                                 let at = flight.time + t;
                                 return Err(Failure(format!("stalled at t = {at:.3} after {} impacts", flight.impacts)));
                             }
