@@ -10,19 +10,18 @@
 //! ```
 //!
 //! The instant is found from an *anchor*: a time near it (the last flight's) at which the closed form has been worked out,
-//! so that `e^{i omega t}` and `e^{lambda t}` need not be computed again while flights stay alike. From the anchor on the
+//! so that `e^{i omega t}` and the free motion's transition need not be computed again while flights stay alike. From the anchor on the
 //! motion is its Taylor polynomial, and the root the polynomial's reversed series (P. Henrici, "Applied and Computational
 //! Complex Analysis" I, Wiley 1974, section 1.7).
 //!
-//! All this is for light damping, away from an undamped resonance, a harmonic or held base and displacements that are
-//! not large against the cavity. What lies outside is followed by [`crate::flight`], which is slower and knows no limits.
+//! All this is away from an undamped resonance, for a harmonic or held base and displacements that are not large against
+//! the cavity. What lies outside is followed by [`crate::flight`], which is slower and knows no limits.
 
 use crate::base_motion::{Drive, Phase, sincos_of_product};
 use crate::lane::{Lane, Lanes};
-use crate::oscillator::{Oscillator, Regime};
+use crate::oscillator::{Oscillator, Transition};
 use crate::plant::UNRESOLVED;
 use core::array::from_fn;
-use num_complex::Complex64;
 use serde::{Deserialize, Serialize};
 
 /// Farthest arrival from its anchor, in units of the fastest rate's time: what the series leave out is of the fifth order
@@ -30,8 +29,6 @@ use serde::{Deserialize, Serialize};
 const NEAR: f64 = 1.0 / 4096.0;
 /// Largest displacements, in half-widths: the digits of `w` are those of `q1`.
 const WIDEST: f64 = 64.0;
-/// Largest damping ratio.
-const LIGHT_DAMPING: f64 = 0.5;
 /// Degree of the Taylor polynomial about the anchor.
 const DEGREE: usize = 5;
 
@@ -44,8 +41,8 @@ pub struct Wave<T> {
     pub half_width: T,
     /// Decay rate, 1/s.
     delta: T,
-    omega_d: T,
-    inverse_omega_d: T,
+    /// The fastest rate of the free motion, 1/s.
+    fastest: T,
     /// Natural frequency squared, 1/s².
     pub omega0_squared: T,
     /// Driving frequency, rad/s.
@@ -64,7 +61,7 @@ pub struct Wave<T> {
     near: T,
     /// A rebound faster than this is no rest, squared, (m/s)².
     pub restless: T,
-    /// `lambda^n/n!`, n from 2 on.
+    /// `y^(n)/n!` of the free motion per `y` and per `y'`, n from 2 on.
     free: [Pair<T>; DEGREE - 1],
     /// `±omega^n/n!`, n from 2 on, with the sign that the derivative brings.
     forced: [T; DEGREE - 1],
@@ -79,8 +76,8 @@ pub struct Anchor<T> {
     pub angle: Pair<T>,
     /// `e^{i omega t}`.
     pub turned: Pair<T>,
-    /// `e^{lambda t}`.
-    pub decayed: Pair<T>,
+    /// What the free motion does in that time, and what rounding has kept out of that.
+    pub free: (Transition<T>, Transition<T>),
 }
 
 impl Default for Anchor<f64> {
@@ -89,7 +86,7 @@ impl Default for Anchor<f64> {
             t: 0.0,
             angle: (0.0, 0.0),
             turned: (1.0, 0.0),
-            decayed: (1.0, 0.0),
+            free: (Transition::NONE, Transition::default()),
         }
     }
 }
@@ -108,6 +105,17 @@ pub struct Origin<T> {
     pub particle: T,
     /// `e^{i phase}` of the base.
     pub turn: Pair<T>,
+}
+
+impl<T: Lane> Anchor<T> {
+    /// The free motion moved on to the anchor: displacement and velocity.
+    #[inline(always)]
+    pub fn moved(&self, (y, dy): Pair<T>) -> Pair<T> {
+        let (whole, missed) = &self.free;
+        let (more_y, more_dy) = missed.of(y, dy);
+        let (y, dy) = whole.of(y, dy);
+        (y + more_y, dy + more_dy)
+    }
 }
 
 impl<T: Lane> Origin<T> {
@@ -147,39 +155,37 @@ pub struct Free<T> {
     pub speed_squared: T,
 }
 
+/// The product of two complex numbers.
 #[inline(always)]
-fn times<T: Lane>(a: Pair<T>, b: Pair<T>) -> Pair<T> {
+pub(crate) fn times<T: Lane>(a: Pair<T>, b: Pair<T>) -> Pair<T> {
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
 
 impl Wave<f64> {
-    /// Coefficients for an oscillator in a cavity of this half-width (m), not driven; `None` where damping is not light.
-    pub fn new(oscillator: &Oscillator, half_width: f64) -> Option<Self> {
+    /// Coefficients for an oscillator in a cavity of this half-width (m), not driven.
+    pub fn new(oscillator: &Oscillator, half_width: f64) -> Self {
         let Oscillator {
             delta,
             omega0_squared,
-            omega0,
+            fastest,
             ..
         } = *oscillator;
-        let Regime::Oscillating { omega_d } = oscillator.regime else {
-            return None;
-        };
-        if delta >= LIGHT_DAMPING * omega0 {
-            return None;
-        }
-        let lambda = Complex64::new(-delta, omega_d);
         let mut free = [(0.0, 0.0); DEGREE - 1];
-        let mut power = lambda;
-        for n in 2..=DEGREE {
-            power = power * lambda * (1.0 / n as f64);
-            free[n - 2] = (power.re, power.im);
+        let mut power = (0.0, 1.0);
+        for (free, n) in free.iter_mut().zip(2..) {
+            let n = f64::from(n);
+            // `y'' = -omega0² y - 2 delta y'`, once more at every order.
+            power = (
+                -omega0_squared * power.1 / n,
+                (power.0 - 2.0 * delta * power.1) / n,
+            );
+            *free = power;
         }
         let within = WIDEST * half_width;
-        Some(Self {
+        Self {
             half_width,
             delta,
-            omega_d,
-            inverse_omega_d: 1.0 / omega_d,
+            fastest,
             omega0_squared,
             omega: 0.0,
             steady: (0.0, 0.0),
@@ -187,11 +193,11 @@ impl Wave<f64> {
             speed: 0.0,
             offset: 0.0,
             widest: (within * within) * omega0_squared,
-            near: NEAR / omega0,
+            near: NEAR / fastest,
             restless: 0.0,
             free,
             forced: [0.0; DEGREE - 1],
-        })
+        }
     }
 
     /// Takes over a drive; false where it is none of those that this way is for.
@@ -224,7 +230,7 @@ impl Wave<f64> {
             square * square * (1.0 / 24.0),
             square * square * omega * (1.0 / 120.0),
         ];
-        self.near = NEAR / omega0.max(omega);
+        self.near = NEAR / self.fastest.max(omega);
         // Displacements and velocities are at most so large while the particle crosses.
         let velocity = within * (omega0 + 2.0 * omega);
         let acceleration = omega0_squared * (4.0 * within) + 2.0 * delta * velocity;
@@ -237,13 +243,20 @@ impl Wave<f64> {
             && self.reach <= within
     }
 
-    /// The closed form at `t` seconds.
-    pub fn anchor(&self, t: f64) -> Anchor<f64> {
-        let (sin, cos) = sincos_of_product(self.omega_d, t);
-        let decay = libm::exp(-self.delta * t);
+    /// The closed form of `oscillator`, to which this wave belongs, at `t` seconds: worked out for once.
+    pub fn anchor(&self, oscillator: &Oscillator, t: f64) -> Anchor<f64> {
+        self.anchor_of(t, (oscillator.transition(t), Transition::default()))
+    }
+
+    /// The same for a time that is to come again and again.
+    pub fn kept_anchor(&self, oscillator: &Oscillator, t: f64) -> Anchor<f64> {
+        self.anchor_of(t, oscillator.kept_transition(t))
+    }
+
+    fn anchor_of(&self, t: f64, free: (Transition, Transition)) -> Anchor<f64> {
         self.turned(&Anchor {
             t,
-            decayed: (decay * cos, decay * sin),
+            free,
             ..Anchor::default()
         })
     }
@@ -252,10 +265,10 @@ impl Wave<f64> {
     #[cold]
     pub(crate) fn next_anchor(
         &self,
+        oscillator: &Oscillator,
         start: &Origin<f64>,
         free: &Free<f64>,
-        anchor: &Anchor<f64>,
-        beyond: f64,
+        (anchor, beyond): (&Anchor<f64>, f64),
     ) -> Anchor<f64> {
         let speed = start.particle.abs();
         let distance = self.half_width - Wave::ahead(start) * start.w;
@@ -264,7 +277,7 @@ impl Wave<f64> {
         let guess = anchor.t + beyond;
         // Far from the anchor the series may lead anywhere.
         let possible = anchor.t > 0.0 && guess >= soonest && guess <= latest;
-        self.anchor(if possible { guess } else { distance / speed })
+        self.kept_anchor(oscillator, if possible { guess } else { distance / speed })
     }
 
     /// The same instant at the frequency that this wave has.
@@ -323,19 +336,14 @@ impl<T: Lane> Wave<T> {
         anchor: &Anchor<T>,
     ) -> (Arrival<T>, T::Mask) {
         let n = T::splat;
-        // `y = Im(A e^{lambda t})`.
-        let at_start = (
-            (free.dy + self.delta * free.y) * self.inverse_omega_d,
-            free.y,
-        );
-        let a = times(at_start, anchor.decayed);
+        let (y, dy) = anchor.moved((free.y, free.dy));
         let turn = times(start.turn, anchor.turned);
         let s = times(self.steady, turn);
-        let x = self.offset + a.1 + s.1;
-        let v = self.omega_d * a.0 - self.delta * a.1 + self.omega * s.0;
+        let x = self.offset + y + s.1;
+        let v = dy + self.omega * s.0;
         let term = |n: usize, s: T| {
-            let (re, im) = self.free[n - 2];
-            re * a.1 + im * a.0 + self.forced[n - 2] * s
+            let (per_y, per_dy) = self.free[n - 2];
+            per_y * y + per_dy * dy + self.forced[n - 2] * s
         };
         let (c2, c3, c4, c5) = (term(2, s.1), term(3, s.0), term(4, s.1), term(5, s.0));
 
@@ -368,22 +376,23 @@ impl<T: Lane> Wave<T> {
         (arrival, near)
     }
 
-    /// The start moved on by the anchor's time, as long as no wall is met; the particle flies straight on.
+    /// The start moved on by the anchor's time, as long as no wall is met.
     #[inline(always)]
-    pub fn stride(&self, start: &Origin<T>, anchor: &Anchor<T>) -> Origin<T> {
+    pub fn after(&self, start: &Origin<T>, anchor: &Anchor<T>) -> Origin<T> {
         let free = self.free_motion(start);
-        let at_start = (
-            (free.dy + self.delta * free.y) * self.inverse_omega_d,
-            free.y,
-        );
-        let a = times(at_start, anchor.decayed);
         let turn = times(start.turn, anchor.turned);
+        self.state(start, anchor.moved((free.y, free.dy)), turn, anchor.t)
+    }
+
+    /// The state `t` seconds after the start, where free motion and `e^{i phase}` are those; the particle flies straight on.
+    #[inline(always)]
+    pub fn state(&self, start: &Origin<T>, (y, dy): Pair<T>, turn: Pair<T>, t: T) -> Origin<T> {
         let s = times(self.steady, turn);
-        let x = self.offset + a.1 + s.1;
+        let x = self.offset + y + s.1;
         Origin {
             x,
-            v: self.omega_d * a.0 - self.delta * a.1 + self.omega * s.0,
-            w: start.w + ((x - start.x) - start.particle * anchor.t),
+            v: dy + self.omega * s.0,
+            w: start.w + ((x - start.x) - start.particle * t),
             particle: start.particle,
             turn,
         }
@@ -431,8 +440,7 @@ impl<const N: usize> Wave<Lanes<N>> {
         Self {
             half_width: all(|wave| wave.half_width),
             delta: all(|wave| wave.delta),
-            omega_d: all(|wave| wave.omega_d),
-            inverse_omega_d: all(|wave| wave.inverse_omega_d),
+            fastest: all(|wave| wave.fastest),
             omega0_squared: all(|wave| wave.omega0_squared),
             omega: all(|wave| wave.omega),
             steady: (all(|wave| wave.steady.0), all(|wave| wave.steady.1)),
@@ -461,9 +469,9 @@ impl<const N: usize> Anchor<Lanes<N>> {
             t: all(|anchor| anchor.t),
             angle: (all(|anchor| anchor.angle.0), all(|anchor| anchor.angle.1)),
             turned: (all(|anchor| anchor.turned.0), all(|anchor| anchor.turned.1)),
-            decayed: (
-                all(|anchor| anchor.decayed.0),
-                all(|anchor| anchor.decayed.1),
+            free: (
+                Transition::abreast(anchors.map(|anchor| &anchor.free.0)),
+                Transition::abreast(anchors.map(|anchor| &anchor.free.1)),
             ),
         }
     }
@@ -474,7 +482,7 @@ impl<const N: usize> Anchor<Lanes<N>> {
             t: self.t.0[lane],
             angle: (self.angle.0.0[lane], self.angle.1.0[lane]),
             turned: (self.turned.0.0[lane], self.turned.1.0[lane]),
-            decayed: (self.decayed.0.0[lane], self.decayed.1.0[lane]),
+            free: (self.free.0.of_lane(lane), self.free.1.of_lane(lane)),
         }
     }
 
@@ -485,8 +493,8 @@ impl<const N: usize> Anchor<Lanes<N>> {
         self.angle.1.0[lane] = anchor.angle.1;
         self.turned.0.0[lane] = anchor.turned.0;
         self.turned.1.0[lane] = anchor.turned.1;
-        self.decayed.0.0[lane] = anchor.decayed.0;
-        self.decayed.1.0[lane] = anchor.decayed.1;
+        self.free.0.put(lane, &anchor.free.0);
+        self.free.1.put(lane, &anchor.free.1);
     }
 }
 
