@@ -76,7 +76,7 @@ pub struct Anchor<T> {
     pub angle: Pair<T>,
     /// `e^{i omega t}`.
     pub turned: Pair<T>,
-    /// What the free motion does in that time, and what rounding has kept out of that.
+    /// What the free motion does in that time: the sum of both.
     pub free: (Transition<T>, Transition<T>),
 }
 
@@ -111,9 +111,9 @@ impl<T: Lane> Anchor<T> {
     /// The free motion moved on to the anchor: displacement and velocity.
     #[inline(always)]
     pub fn moved(&self, (y, dy): Pair<T>) -> Pair<T> {
-        let (whole, missed) = &self.free;
-        let (more_y, more_dy) = missed.of(y, dy);
-        let (y, dy) = whole.of(y, dy);
+        let (head, tail) = &self.free;
+        let (more_y, more_dy) = tail.of(y, dy);
+        let (y, dy) = head.of(y, dy);
         (y + more_y, dy + more_dy)
     }
 }
@@ -360,14 +360,16 @@ impl<T: Lane> Wave<T> {
         let h2 = h * h;
         let quickened =
             h * ((n(2.0) * c2 + h * (n(3.0) * c3)) + h2 * (n(4.0) * c4 + h * (n(5.0) * c5)));
+        let bent = h2 * ((c2 + h * c3) + h2 * (c4 + h * c5));
         let angle = self.omega * h;
         let angle2 = angle * angle;
         let sin = angle - angle * (angle2 * n(1.0 / 6.0));
         let cos = n(1.0) - angle2 * (n(0.5) - angle2 * n(1.0 / 24.0));
         let arrival = Arrival {
             beyond: h,
-            // At the wall the primary mass is where the particle is, and that flies straight on.
-            x: ((start.x - start.w) + start.particle * anchor.t) + (target + start.particle * h),
+            // As its own motion has it: where the particle is would serve as well, but bring the rounding of the instant into
+            // the spring's energy.
+            x: x + (h * v + bent),
             v: v + quickened,
             turn: times(turn, (cos, sin)),
         };

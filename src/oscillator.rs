@@ -3,7 +3,7 @@
 //! `x'' + 2 delta x' + omega0² x = 0`. Position and velocity after `t` are a linear map of those now; the map's four
 //! entries are written so that none loses digits at any damping ratio, however near to critical.
 
-use crate::base_motion::{product, two_sum};
+use crate::base_motion::{evenly, product, two_sum};
 use crate::lane::{Lane, Lanes};
 use serde::{Deserialize, Serialize};
 
@@ -176,11 +176,11 @@ impl Oscillator {
         }
     }
 
-    /// The free motion over `t` seconds, and what rounding has kept out of it: for a transition that is used again and again.
+    /// The free motion over `t` seconds as the sum of two maps: for a transition that is used again and again.
     ///
-    /// The rounded one alone would turn the same small error of the energy into a steady source or sink. What is left is
-    /// an error of the frequency, of which energy knows nothing. Where the motion does not swing, it dies out too fast for that,
-    /// and nothing is kept.
+    /// A rounded one would be a steady source or sink of energy, small as it is. What is left here is an error of the
+    /// frequency, of which energy knows nothing. Where the motion does not swing, it dies out too fast for that, and the second
+    /// map is none.
     pub fn kept_transition(&self, t: f64) -> (Transition, Transition) {
         let Regime::Oscillating { omega_d } = self.regime else {
             return (self.transition(t), Transition::default());
@@ -205,7 +205,8 @@ impl Oscillator {
             s,
             (-pull.0, -pull.1),
             plus(cos, (-leaning.0, -leaning.1)),
-        ];
+        ]
+        .map(|(entry, missed)| evenly(entry, missed));
         let part = |f: fn(&Two) -> f64| {
             let [xx, xv, vx, vv] = entries.each_ref().map(f);
             Transition { xx, xv, vx, vv }
