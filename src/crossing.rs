@@ -243,22 +243,21 @@ impl Wave<f64> {
             && self.reach <= within
     }
 
-    /// The closed form of `oscillator`, to which this wave belongs, at `t` seconds: worked out for once.
+    /// The closed form of `oscillator`, to which this wave belongs, at `t` seconds.
     pub fn anchor(&self, oscillator: &Oscillator, t: f64) -> Anchor<f64> {
-        self.anchor_of(t, (oscillator.transition(t), Transition::default()))
-    }
-
-    /// The same for a time that is to come again and again.
-    pub fn kept_anchor(&self, oscillator: &Oscillator, t: f64) -> Anchor<f64> {
-        self.anchor_of(t, oscillator.kept_transition(t))
-    }
-
-    fn anchor_of(&self, t: f64, free: (Transition, Transition)) -> Anchor<f64> {
         self.turned(&Anchor {
             t,
-            free,
+            free: oscillator.kept_transition(t),
             ..Anchor::default()
         })
+    }
+
+    /// The state `t` seconds after the start, as long as no wall is met.
+    pub fn after(&self, oscillator: &Oscillator, start: &Origin<f64>, t: f64) -> Origin<f64> {
+        let free = self.free_motion(start);
+        let (sin, cos) = sincos_of_product(self.omega, t);
+        let turn = times(start.turn, (cos, sin));
+        self.state(start, oscillator.transition(t).of(free.y, free.dy), turn, t)
     }
 
     /// The next anchor for a crossing that is not near the last one.
@@ -277,7 +276,7 @@ impl Wave<f64> {
         let guess = anchor.t + beyond;
         // Far from the anchor the series may lead anywhere.
         let possible = anchor.t > 0.0 && guess >= soonest && guess <= latest;
-        self.kept_anchor(oscillator, if possible { guess } else { distance / speed })
+        self.anchor(oscillator, if possible { guess } else { distance / speed })
     }
 
     /// The same instant at the frequency that this wave has.
@@ -376,14 +375,6 @@ impl<T: Lane> Wave<T> {
         // Far from the anchor, or where the approach is slow and bent, the reversed series means nothing.
         let near = T::both(y.abs().below(self.near), bend.abs().below(T::splat(NEAR)));
         (arrival, near)
-    }
-
-    /// The start moved on by the anchor's time, as long as no wall is met.
-    #[inline(always)]
-    pub fn after(&self, start: &Origin<T>, anchor: &Anchor<T>) -> Origin<T> {
-        let free = self.free_motion(start);
-        let turn = times(start.turn, anchor.turned);
-        self.state(start, anchor.moved((free.y, free.dy)), turn, anchor.t)
     }
 
     /// The state `t` seconds after the start, where free motion and `e^{i phase}` are those; the particle flies straight on.

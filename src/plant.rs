@@ -272,7 +272,7 @@ impl Plant {
     /// Displacement of the base now, m.
     #[inline]
     pub fn base_displacement(&self) -> f64 {
-        if self.course.wave().is_some() {
+        if self.course.quick {
             self.base.drive.signal[0] + self.base.drive.amplitude * self.now().turn.1
         } else {
             self.base.displacement()

@@ -100,7 +100,7 @@ impl Plant {
     }
 
     /// The state now: as held, or worked out from there.
-    #[inline]
+    #[inline(always)]
     pub(super) fn now(&self) -> Origin<f64> {
         self.course.now(&self.alone.oscillator, &self.here)
     }

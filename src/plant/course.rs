@@ -109,28 +109,24 @@ impl Course {
     }
 
     /// The state now, seen from the origin, which was `here`.
-    #[inline]
+    #[inline(always)]
     pub fn now(&self, oscillator: &Oscillator, here: &Origin<f64>) -> Origin<f64> {
-        if !self.quick {
-            return *here;
-        }
-        let wave = &self.rig;
         let mut now = if self.strides.under_way() {
-            self.strides.now(wave, here)
+            self.strides.now(&self.rig, here)
         } else if self.lag == Span::default() {
             return *here;
         } else {
             self.worked_out(oscillator, here)
         };
-        now.w = now.w.clamp(-wave.half_width, wave.half_width);
+        let b = self.rig.half_width;
+        now.w = now.w.max(-b).min(b);
         now
     }
 
     /// The state after the lag. Not inlined: whoever takes strides never comes here.
     #[inline(never)]
     fn worked_out(&self, oscillator: &Oscillator, here: &Origin<f64>) -> Origin<f64> {
-        let wave = &self.rig;
-        wave.after(here, &wave.anchor(oscillator, self.lag.seconds()))
+        self.rig.after(oscillator, here, self.lag.seconds())
     }
 
     /// The phase of the base now, which was `phase` at the origin.

@@ -38,7 +38,7 @@ impl Strides {
     /// Gets strides of this length ready.
     pub fn prepare(&mut self, wave: &Wave<f64>, oscillator: &Oscillator, duration: f64) {
         if self.one.t != duration {
-            self.one = wave.kept_anchor(oscillator, duration);
+            self.one = wave.anchor(oscillator, duration);
         } else if !self.ready {
             // A drive that changes at every step, as a controller's does, leaves the free motion's part as it is.
             self.one = wave.turned(&self.one);
@@ -75,7 +75,7 @@ impl Strides {
     }
 
     /// Takes one more of this length, if that is all there is to do.
-    #[inline]
+    #[inline(always)]
     pub fn stride(&mut self, duration: f64) -> bool {
         if self.taken >= self.most || duration != self.one.t {
             return false;
@@ -103,7 +103,7 @@ impl Strides {
     }
 
     /// The state now; `here` is the origin.
-    #[inline]
+    #[inline(always)]
     pub fn now(&self, wave: &Wave<f64>, here: &Origin<f64>) -> Origin<f64> {
         wave.state(
             here,
