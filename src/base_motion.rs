@@ -197,9 +197,11 @@ pub(crate) fn product(a: f64, b: f64) -> (f64, f64) {
     (rounded, if error.is_finite() { error } else { 0.0 })
 }
 
-/// Sine and cosine of `omega t`, exact to the last digits even after millions of turns.
-pub(crate) fn sincos_of_product(omega: f64, t: f64) -> (f64, f64) {
+/// Sine and cosine of `omega t`, exact to the last digits even after millions of turns; `omega` is a frequency and what
+/// rounding has kept out of it.
+pub(crate) fn sincos_of_product((omega, omega_missed): (f64, f64), t: f64) -> (f64, f64) {
     let (angle, missed) = product(omega, t);
+    let missed = missed + omega_missed * t;
     let (sin, cos) = libm::sincos(angle);
     (sin + missed * cos, cos - missed * sin)
 }

@@ -32,6 +32,9 @@ const NEAR: f64 = 1.0 / 4096.0;
 const WIDEST: f64 = 64.0;
 /// Largest damping ratio.
 const LIGHT_DAMPING: f64 = 0.5;
+/// Largest steady amplitude, in amplitudes of the base: near an undamped resonance a large steady motion and a large free
+/// one would cancel, and their rounding be left.
+const STEEPEST: f64 = 1024.0;
 /// Degree of the Taylor polynomial about the anchor.
 const DEGREE: usize = 5;
 
@@ -235,11 +238,12 @@ impl Wave<f64> {
             && offset.abs() <= within
             && amplitude.abs() <= within
             && self.reach <= within
+            && self.reach <= STEEPEST * amplitude.abs()
     }
 
     /// The closed form at `t` seconds.
     pub fn anchor(&self, t: f64) -> Anchor<f64> {
-        let (sin, cos) = sincos_of_product(self.omega_d, t);
+        let (sin, cos) = sincos_of_product((self.omega_d, 0.0), t);
         let decay = libm::exp(-self.delta * t);
         self.turned(&Anchor {
             t,
@@ -269,7 +273,7 @@ impl Wave<f64> {
 
     /// The same instant at the frequency that this wave has.
     pub fn turned(&self, anchor: &Anchor<f64>) -> Anchor<f64> {
-        let (sin, cos) = sincos_of_product(self.omega, anchor.t);
+        let (sin, cos) = sincos_of_product((self.omega, 0.0), anchor.t);
         Anchor {
             angle: Phase::default().advanced(self.omega, anchor.t).parts(),
             turned: (cos, sin),
