@@ -197,7 +197,12 @@ pub(crate) fn halves(x: f64) -> (f64, f64) {
 /// The first part is short, so that the second is large enough to count.
 pub(crate) fn evenly(coefficient: f64, missed: f64) -> (f64, f64) {
     let (head, rest) = halves(coefficient);
-    (head, rest + missed)
+    if head.is_finite() {
+        (head, rest + missed)
+    } else {
+        // Beyond 1e300 the splitting overflows.
+        (coefficient, 0.0)
+    }
 }
 
 /// `a b` as a rounded product and its rounding error (Dekker, with Veltkamp's splitting: no FMA instruction needed).
@@ -209,9 +214,11 @@ pub(crate) fn product(a: f64, b: f64) -> (f64, f64) {
     (rounded, if error.is_finite() { error } else { 0.0 })
 }
 
-/// Sine and cosine of `omega t`, exact to the last digits even after millions of turns.
-pub(crate) fn sincos_of_product(omega: f64, t: f64) -> (f64, f64) {
+/// Sine and cosine of `omega t`, exact to the last digits even after millions of turns; `omega` is a frequency and what
+/// rounding has kept out of it.
+pub(crate) fn sincos_of_product((omega, omega_missed): (f64, f64), t: f64) -> (f64, f64) {
     let (angle, missed) = product(omega, t);
+    let missed = missed + omega_missed * t;
     let (sin, cos) = libm::sincos(angle);
     (sin + missed * cos, cos - missed * sin)
 }

@@ -17,11 +17,14 @@
 //! All this is away from an undamped resonance, for a harmonic or held base and displacements that are not large against
 //! the cavity. What lies outside is followed by [`crate::flight`], which is slower and knows no limits.
 
-use crate::base_motion::{Drive, Phase, sincos_of_product};
-use crate::lane::{Lane, Lanes};
-use crate::oscillator::{Oscillator, Transition};
+mod lanes;
+mod near;
+
+use crate::base_motion::{Drive, sincos_of_product};
+use crate::lane::Lane;
+use crate::oscillator::Oscillator;
 use crate::plant::UNRESOLVED;
-use core::array::from_fn;
+pub use near::{Anchor, Arrival};
 use serde::{Deserialize, Serialize};
 
 /// Farthest arrival from its anchor, in units of the fastest rate's time: what the series leave out is of the fifth order
@@ -29,6 +32,9 @@ use serde::{Deserialize, Serialize};
 const NEAR: f64 = 1.0 / 4096.0;
 /// Largest displacements, in half-widths: the digits of `w` are those of `q1`.
 const WIDEST: f64 = 64.0;
+/// Largest steady amplitude, in amplitudes of the base: near an undamped resonance a large steady motion and a large free
+/// one would cancel, and their rounding be left.
+const STEEPEST: f64 = 1024.0;
 /// Degree of the Taylor polynomial about the anchor.
 const DEGREE: usize = 5;
 
@@ -67,30 +73,6 @@ pub struct Wave<T> {
     forced: [T; DEGREE - 1],
 }
 
-/// A time at which the closed form has been worked out; that is no time at all by default.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub struct Anchor<T> {
-    /// Seconds since the start of a flight.
-    pub t: T,
-    /// `omega t` reduced to one turn, rad, and what rounding has kept out of it.
-    pub angle: Pair<T>,
-    /// `e^{i omega t}`.
-    pub turned: Pair<T>,
-    /// What the free motion does in that time: the sum of both.
-    pub free: (Transition<T>, Transition<T>),
-}
-
-impl Default for Anchor<f64> {
-    fn default() -> Self {
-        Self {
-            t: 0.0,
-            angle: (0.0, 0.0),
-            turned: (1.0, 0.0),
-            free: (Transition::NONE, Transition::default()),
-        }
-    }
-}
-
 /// The start of a flight.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Origin<T> {
@@ -107,17 +89,6 @@ pub struct Origin<T> {
     pub turn: Pair<T>,
 }
 
-impl<T: Lane> Anchor<T> {
-    /// The free motion moved on to the anchor: displacement and velocity.
-    #[inline(always)]
-    pub fn moved(&self, (y, dy): Pair<T>) -> Pair<T> {
-        let (head, tail) = &self.free;
-        let (more_y, more_dy) = tail.of(y, dy);
-        let (y, dy) = head.of(y, dy);
-        (y + more_y, dy + more_dy)
-    }
-}
-
 impl<T: Lane> Origin<T> {
     /// Relative velocity `w'`.
     #[inline(always)]
@@ -129,19 +100,6 @@ impl<T: Lane> Origin<T> {
     pub fn primary(&self) -> (T, T) {
         (self.x, self.v)
     }
-}
-
-/// The end of a crossing, just before the impact.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Arrival<T> {
-    /// Seconds after the anchor.
-    pub beyond: T,
-    /// Position of the primary mass, m.
-    pub x: T,
-    /// Its velocity, m/s.
-    pub v: T,
-    /// `e^{i phase}` of the base.
-    pub turn: Pair<T>,
 }
 
 /// Where the free motion stands: displacement and velocity.
@@ -241,52 +199,15 @@ impl Wave<f64> {
             && offset.abs() <= within
             && amplitude.abs() <= within
             && self.reach <= within
-    }
-
-    /// The closed form of `oscillator`, to which this wave belongs, at `t` seconds.
-    pub fn anchor(&self, oscillator: &Oscillator, t: f64) -> Anchor<f64> {
-        self.turned(&Anchor {
-            t,
-            free: oscillator.kept_transition(t),
-            ..Anchor::default()
-        })
+            && self.reach <= STEEPEST * amplitude.abs()
     }
 
     /// The state `t` seconds after the start, as long as no wall is met.
     pub fn after(&self, oscillator: &Oscillator, start: &Origin<f64>, t: f64) -> Origin<f64> {
         let free = self.free_motion(start);
-        let (sin, cos) = sincos_of_product(self.omega, t);
+        let (sin, cos) = sincos_of_product((self.omega, 0.0), t);
         let turn = times(start.turn, (cos, sin));
         self.state(start, oscillator.transition(t).of(free.y, free.dy), turn, t)
-    }
-
-    /// The next anchor for a crossing that is not near the last one.
-    #[cold]
-    pub(crate) fn next_anchor(
-        &self,
-        oscillator: &Oscillator,
-        start: &Origin<f64>,
-        free: &Free<f64>,
-        (anchor, beyond): (&Anchor<f64>, f64),
-    ) -> Anchor<f64> {
-        let speed = start.particle.abs();
-        let distance = self.half_width - Wave::ahead(start) * start.w;
-        let primary = self.speed + libm::sqrt(free.speed_squared);
-        let (soonest, latest) = (distance / (speed + primary), distance / (speed - primary));
-        let guess = anchor.t + beyond;
-        // Far from the anchor the series may lead anywhere.
-        let possible = anchor.t > 0.0 && guess >= soonest && guess <= latest;
-        self.anchor(oscillator, if possible { guess } else { distance / speed })
-    }
-
-    /// The same instant at the frequency that this wave has.
-    pub fn turned(&self, anchor: &Anchor<f64>) -> Anchor<f64> {
-        let (sin, cos) = sincos_of_product(self.omega, anchor.t);
-        Anchor {
-            angle: Phase::default().advanced(self.omega, anchor.t).parts(),
-            turned: (cos, sin),
-            ..*anchor
-        }
     }
 }
 
@@ -323,58 +244,6 @@ impl<T: Lane> Wave<T> {
     #[inline(always)]
     pub fn ahead(start: &Origin<T>) -> T {
         -start.particle.sign()
-    }
-
-    /// The arrival at the wall ahead, and whether it is near enough to the anchor for its digits to be trusted. If not,
-    /// `beyond` is still a better guess.
-    #[inline(always)]
-    pub fn arrival(
-        &self,
-        start: &Origin<T>,
-        free: &Free<T>,
-        anchor: &Anchor<T>,
-    ) -> (Arrival<T>, T::Mask) {
-        let n = T::splat;
-        let (y, dy) = anchor.moved((free.y, free.dy));
-        let turn = times(start.turn, anchor.turned);
-        let s = times(self.steady, turn);
-        let x = self.offset + y + s.1;
-        let v = dy + self.omega * s.0;
-        let term = |n: usize, s: T| {
-            let (per_y, per_dy) = self.free[n - 2];
-            per_y * y + per_dy * dy + self.forced[n - 2] * s
-        };
-        let (c2, c3, c4, c5) = (term(2, s.1), term(3, s.0), term(4, s.1), term(5, s.0));
-
-        let w = start.w + ((x - start.x) - start.particle * anchor.t);
-        let target = Self::ahead(start) * self.half_width;
-        let slowness = (v - start.particle).inverse();
-        let y = (target - w) * slowness;
-        let (a2, a3, a4) = (c2 * slowness, c3 * slowness, c4 * slowness);
-        let (bend, a22, y2) = (a2 * y, a2 * a2, y * y);
-        let third = (a22 + a22) - a3;
-        let fourth = n(5.0) * (a2 * (a3 - a22)) - a4;
-        let h = y * ((n(1.0) - bend) + y2 * (third + y * fourth));
-
-        let h2 = h * h;
-        let quickened =
-            h * ((n(2.0) * c2 + h * (n(3.0) * c3)) + h2 * (n(4.0) * c4 + h * (n(5.0) * c5)));
-        let bent = h2 * ((c2 + h * c3) + h2 * (c4 + h * c5));
-        let angle = self.omega * h;
-        let angle2 = angle * angle;
-        let sin = angle - angle * (angle2 * n(1.0 / 6.0));
-        let cos = n(1.0) - angle2 * (n(0.5) - angle2 * n(1.0 / 24.0));
-        let arrival = Arrival {
-            beyond: h,
-            // As its own motion has it: where the particle is would serve as well, but bring the rounding of the instant into
-            // the spring's energy.
-            x: x + (h * v + bent),
-            v: v + quickened,
-            turn: times(turn, (cos, sin)),
-        };
-        // Far from the anchor, or where the approach is slow and bent, the reversed series means nothing.
-        let near = T::both(y.abs().below(self.near), bend.abs().below(T::splat(NEAR)));
-        (arrival, near)
     }
 
     /// The state `t` seconds after the start, where free motion and `e^{i phase}` are those; the particle flies straight on.
@@ -423,95 +292,5 @@ impl Wave<f64> {
             by_speed.max(by_room)
         };
         until(1.0).min(until(-1.0)) * (1.0 - 1e-9)
-    }
-}
-
-impl<const N: usize> Wave<Lanes<N>> {
-    /// Several waves abreast.
-    pub(crate) fn abreast(waves: [&Wave<f64>; N]) -> Self {
-        let all = |f: fn(&Wave<f64>) -> f64| Lanes(waves.map(f));
-        Self {
-            half_width: all(|wave| wave.half_width),
-            delta: all(|wave| wave.delta),
-            fastest: all(|wave| wave.fastest),
-            omega0_squared: all(|wave| wave.omega0_squared),
-            omega: all(|wave| wave.omega),
-            steady: (all(|wave| wave.steady.0), all(|wave| wave.steady.1)),
-            reach: all(|wave| wave.reach),
-            speed: all(|wave| wave.speed),
-            offset: all(|wave| wave.offset),
-            widest: all(|wave| wave.widest),
-            near: all(|wave| wave.near),
-            restless: all(|wave| wave.restless),
-            free: from_fn(|n| {
-                (
-                    Lanes(waves.map(|wave| wave.free[n].0)),
-                    Lanes(waves.map(|wave| wave.free[n].1)),
-                )
-            }),
-            forced: from_fn(|n| Lanes(waves.map(|wave| wave.forced[n]))),
-        }
-    }
-}
-
-impl<const N: usize> Anchor<Lanes<N>> {
-    /// Several anchors abreast.
-    pub(crate) fn abreast(anchors: [&Anchor<f64>; N]) -> Self {
-        let all = |f: fn(&Anchor<f64>) -> f64| Lanes(anchors.map(f));
-        Self {
-            t: all(|anchor| anchor.t),
-            angle: (all(|anchor| anchor.angle.0), all(|anchor| anchor.angle.1)),
-            turned: (all(|anchor| anchor.turned.0), all(|anchor| anchor.turned.1)),
-            free: (
-                Transition::abreast(anchors.map(|anchor| &anchor.free.0)),
-                Transition::abreast(anchors.map(|anchor| &anchor.free.1)),
-            ),
-        }
-    }
-
-    /// One of them.
-    pub(crate) fn of_lane(&self, lane: usize) -> Anchor<f64> {
-        Anchor {
-            t: self.t.0[lane],
-            angle: (self.angle.0.0[lane], self.angle.1.0[lane]),
-            turned: (self.turned.0.0[lane], self.turned.1.0[lane]),
-            free: (self.free.0.of_lane(lane), self.free.1.of_lane(lane)),
-        }
-    }
-
-    /// Replaces one of them.
-    pub(crate) fn put(&mut self, lane: usize, anchor: &Anchor<f64>) {
-        self.t.0[lane] = anchor.t;
-        self.angle.0.0[lane] = anchor.angle.0;
-        self.angle.1.0[lane] = anchor.angle.1;
-        self.turned.0.0[lane] = anchor.turned.0;
-        self.turned.1.0[lane] = anchor.turned.1;
-        self.free.0.put(lane, &anchor.free.0);
-        self.free.1.put(lane, &anchor.free.1);
-    }
-}
-
-impl<const N: usize> Origin<Lanes<N>> {
-    /// Several states abreast.
-    pub(crate) fn abreast(states: [&Origin<f64>; N]) -> Self {
-        let all = |f: fn(&Origin<f64>) -> f64| Lanes(states.map(f));
-        Self {
-            x: all(|state| state.x),
-            v: all(|state| state.v),
-            w: all(|state| state.w),
-            particle: all(|state| state.particle),
-            turn: (all(|state| state.turn.0), all(|state| state.turn.1)),
-        }
-    }
-
-    /// One of them.
-    pub(crate) fn of_lane(&self, lane: usize) -> Origin<f64> {
-        Origin {
-            x: self.x.0[lane],
-            v: self.v.0[lane],
-            w: self.w.0[lane],
-            particle: self.particle.0[lane],
-            turn: (self.turn.0.0[lane], self.turn.1.0[lane]),
-        }
     }
 }

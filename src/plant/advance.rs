@@ -216,7 +216,7 @@ impl Plant {
         if repeats && whole && self.strides(duration) {
             return;
         }
-        self.course.wait(until);
+        self.course.wait(&self.alone.oscillator, until);
         if repeats {
             self.catch_up();
         }

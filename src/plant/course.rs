@@ -45,8 +45,11 @@ pub(super) struct Course {
     pub turns: u32,
     /// Near the last arrival.
     pub anchor: Anchor<f64>,
+    /// Near the last lag, where it was the same as the one before.
+    stop: Anchor<f64>,
     pub strides: Strides,
     last_duration: f64,
+    last_lag: f64,
 }
 
 impl Course {
@@ -60,8 +63,10 @@ impl Course {
             landing: None,
             turns: 0,
             anchor: Anchor::default(),
+            stop: Anchor::default(),
             strides: Strides::default(),
             last_duration: 0.0,
+            last_lag: 0.0,
         }
     }
 
@@ -75,6 +80,7 @@ impl Course {
     pub fn renew(&mut self, drive: &Drive) {
         self.quick = self.rig.take(drive);
         self.anchor = Anchor::default();
+        self.stop = Anchor::default();
         self.strides.forget();
         self.leave();
     }
@@ -104,7 +110,14 @@ impl Course {
     }
 
     /// The plant has come so far since the origin, and nothing was met.
-    pub fn wait(&mut self, until: Span) {
+    pub fn wait(&mut self, oscillator: &Oscillator, until: Span) {
+        let lag = until.seconds();
+        // A steady motion stops at the same point of its flight again and again.
+        let again = self.rig.are_near(lag, self.last_lag);
+        if again && self.quick && !self.rig.are_near(lag, self.stop.t) {
+            self.stop = self.rig.anchor(oscillator, lag);
+        }
+        self.last_lag = lag;
         self.lag = until;
     }
 
@@ -126,7 +139,12 @@ impl Course {
     /// The state after the lag. Not inlined: whoever takes strides never comes here.
     #[inline(never)]
     fn worked_out(&self, oscillator: &Oscillator, here: &Origin<f64>) -> Origin<f64> {
-        self.rig.after(oscillator, here, self.lag.seconds())
+        let lag = self.lag.seconds();
+        if self.rig.are_near(lag, self.stop.t) {
+            self.rig.shortly(here, &self.stop, lag)
+        } else {
+            self.rig.after(oscillator, here, lag)
+        }
     }
 
     /// The phase of the base now, which was `phase` at the origin.
