@@ -7,9 +7,9 @@ use crate::{BaseMotion, Plant};
 use std::cell::Cell;
 
 /// How many outputs are kept.
-const KEPT: usize = 10;
+const KEPT: usize = 11;
 
-/// Where an output is kept; `KEPT` for what is not.
+/// Where an output is kept, in the order of the variable table, so that this is a subtraction; `KEPT` for what is not.
 #[inline]
 const fn place(variable: Real) -> usize {
     match variable {
@@ -21,8 +21,9 @@ const fn place(variable: Real) -> usize {
         Real::w => 5,
         Real::der_w => 6,
         Real::base => BASE,
-        Real::impact_time => 8,
-        Real::impact_velocity => 9,
+        Real::phase => 8,
+        Real::impact_time => 9,
+        Real::impact_velocity => 10,
         _ => KEPT,
     }
 }
@@ -74,6 +75,7 @@ impl LoViNes {
             w,
             state.dq1 - state.dq2,
             now.base.unwrap_or(f64::NAN),
+            f64::NAN,
             tally.impact_time,
             tally.impact_velocity,
         ]
