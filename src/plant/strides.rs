@@ -102,6 +102,11 @@ impl Strides {
         self.taken
     }
 
+    /// The phase of the base after a single one.
+    pub fn after_one(&self, phase: Phase) -> Phase {
+        phase.turned(self.one.angle, 0.0)
+    }
+
     /// Time since the origin.
     pub fn span(&self) -> Span {
         Span::of_parts(product(self.one.t, f64::from(self.taken)))
