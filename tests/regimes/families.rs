@@ -12,7 +12,7 @@ const AT_REST: (f64, f64) = (0.0, 0.0);
 const MOVING: (f64, f64) = (0.7, -0.4);
 
 /// Damping ratios: none, hardly any, light, across critical damping, far above it.
-fn damping_ratios() -> Vec<f64> {
+pub fn damping_ratios() -> Vec<f64> {
     let near = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 2.3e-16];
     let below = near.iter().map(|d| 1.0 - d);
     let above = near.iter().rev().map(|d| 1.0 + d);
@@ -41,7 +41,7 @@ fn near_zero() -> impl Iterator<Item = f64> {
 }
 
 /// The oscillator of unit mass and stiffness.
-fn unit(zeta: f64, drive: Drive, start: (f64, f64)) -> Case {
+pub fn unit(zeta: f64, drive: Drive, start: (f64, f64)) -> Case {
     Case {
         mass: 1.0,
         stiffness: 1.0,

@@ -5,6 +5,7 @@
 //! ```
 
 mod families;
+mod impacts;
 mod scan;
 mod truth;
 
@@ -31,4 +32,11 @@ fn no_regime_loses_digits() {
         }
     }
     assert!(failed.is_empty(), "{failed:?}");
+}
+
+#[test]
+fn impacts_are_met_in_every_regime() {
+    let (worst, cases, impacts) = impacts::worst();
+    println!("{cases} cases with {impacts} impacts: worst error of any state {worst:.1e}");
+    assert!(impacts > 1000 && worst < LIMIT);
 }

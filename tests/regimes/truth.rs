@@ -64,7 +64,12 @@ impl System {
 
     /// What `t` seconds do to the state.
     pub fn flow(&self, t: f64) -> Matrix {
-        let doublings = (8.0 * self.fastest * t).log2().ceil().max(0.0) as i32;
+        self.flow_precise(t.into())
+    }
+
+    /// The same for a time of 32 digits.
+    pub fn flow_precise(&self, t: TwoFloat) -> Matrix {
+        let doublings = (8.0 * self.fastest * t.hi()).log2().ceil().max(0.0) as i32;
         let h = t * 0.5f64.powi(doublings);
         let mut term = [[zero(); SIZE]; SIZE];
         for (n, row) in term.iter_mut().enumerate() {
@@ -72,7 +77,7 @@ impl System {
         }
         let mut flow = term;
         for n in 1..=TERMS {
-            let scale = TwoFloat::new_div(h, n as f64);
+            let scale = h / n as f64;
             term = product(&self.rates, &term).map(|row| row.map(|x| x * scale));
             for (row, more) in flow.iter_mut().zip(&term) {
                 for (x, more) in row.iter_mut().zip(more) {
