@@ -38,6 +38,7 @@ struct LoViNes {
     epsilon: f64,
     /// The fastest rate of the motion but for that of the drive, rad/s.
     fastest: f64,
+    #[serde(skip)]
     reach: Reach,
     parameters: Parameters,
     start: State,
@@ -332,6 +333,8 @@ impl Component for LoViNes {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
-        archive.whole(self)
+        archive.whole(self)?;
+        self.reach = Reach::of(&self.parameters);
+        Ok(())
     }
 }

@@ -7,7 +7,7 @@ use crate::{Drive, InvalidValue, Parameters, State};
 const RESOLUTION: f64 = 1.0 / f64::EPSILON;
 
 /// The largest displacements and velocities that make sense with a cavity.
-#[derive(Clone, Copy, Default, serde::Serialize, serde::Deserialize)]
+#[derive(Clone, Copy, Default)]
 pub(super) struct Reach {
     /// m.
     displacement: f64,
