@@ -6,12 +6,14 @@ mod derivatives;
 mod exchange;
 mod log;
 mod outputs;
+mod reach;
 
 use crate::hybrid::Hybrid;
 use crate::plant::MOST_IMPACTS;
 use crate::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
 use fmi2_component::{Archive, Component, Log, Refusal};
 use outputs::Outputs;
+use reach::Reach;
 use variables::{Integer, Model, Real, category};
 
 mod variables {
@@ -36,6 +38,8 @@ struct LoViNes {
     epsilon: f64,
     /// The fastest rate of the motion but for that of the drive, rad/s.
     fastest: f64,
+    #[serde(skip)]
+    reach: Reach,
     parameters: Parameters,
     start: State,
 }
@@ -61,18 +65,28 @@ fn telling(plant: &mut Plant, drive: Drive, step: f64, tell: impl FnMut(Event)) 
 
 /// Why a step could not be finished.
 #[cold]
-fn lost(finite: bool, time: f64, step: f64) -> Refusal {
-    Refusal::error(if finite {
+fn lost(resolved: bool, time: f64, step: f64) -> Refusal {
+    Refusal::error(if resolved {
         format!(
             "there are more than {MOST_IMPACTS} impacts within the step of {step} s at t = {time} s; expected are \
              velocities and a half-width of the cavity that make sense together, or a shorter step"
         )
     } else {
         format!(
-            "displacements and velocities have left the range of numbers in the step at t = {time} s; expected are \
-             start values and inputs of a sensible size"
+            "displacements have become so large in the step at t = {time} s that their rounding is wider than the cavity; \
+             expected are start values and inputs of a sensible size"
         )
     })
+}
+
+/// Why a step is not begun.
+#[cold]
+fn too_far(drive: &Drive) -> Refusal {
+    Refusal::error(format!(
+        "the base would go further than 2^52 half-widths of the cavity, where the rounding of displacements is wider than it \
+         (e = {} m and its derivatives, E = {} m); expected are inputs of a sensible size",
+        drive.signal[0], drive.amplitude
+    ))
 }
 
 /// Why a step is not begun.
@@ -157,6 +171,7 @@ impl LoViNes {
         }
         self.parameters = parameters;
         self.fastest = parameters.fastest_rate();
+        self.reach = Reach::of(&parameters);
         Ok(())
     }
 }
@@ -178,6 +193,7 @@ impl Component for LoViNes {
             outputs: Outputs::default(),
             epsilon: 1.0,
             fastest: 0.0,
+            reach: Reach::default(),
             parameters,
             start,
         }
@@ -224,6 +240,7 @@ impl Component for LoViNes {
         match &mut self.rig {
             Rig::Steps(plant) => {
                 *plant = Plant::new(self.parameters, self.start)?;
+                Reach::of(&self.parameters).check(&self.start)?;
                 plant.set_time(start_time);
                 plant.begin(self.drive);
             }
@@ -233,6 +250,7 @@ impl Component for LoViNes {
         }
         self.epsilon = self.parameters.mass_ratio();
         self.fastest = self.parameters.fastest_rate();
+        self.reach = Reach::of(&self.parameters);
         self.progress = Progress::Initialised;
         self.inputs_set = false;
         self.outputs = Outputs::default();
@@ -243,10 +261,13 @@ impl Component for LoViNes {
     fn accept_step(&self, step: f64) -> Result<(), Refusal> {
         let (own, omega) = (self.fastest, self.drive.omega.abs());
         let rate = if own > omega { own } else { omega };
-        if step * rate <= LONGEST_STEP {
-            return Ok(());
+        if step * rate > LONGEST_STEP {
+            return Err(too_long(step, rate));
         }
-        Err(too_long(step, rate))
+        if !self.reach.holds_base(&self.drive, step) {
+            return Err(too_far(&self.drive));
+        }
+        Ok(())
     }
 
     #[inline]
@@ -267,10 +288,10 @@ impl Component for LoViNes {
         }
         self.progress = Progress::UnderWay;
         self.inputs_set = false;
-        let sane = self.keep_outputs();
-        if outcome.cut_short || !sane {
+        let resolved = self.keep_outputs();
+        if outcome.cut_short || !resolved {
             self.outputs = Outputs::default();
-            return Err(lost(sane, time, step));
+            return Err(lost(resolved, time, step));
         }
         Ok(())
     }
@@ -310,6 +331,8 @@ impl Component for LoViNes {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
-        archive.whole(self)
+        archive.whole(self)?;
+        self.reach = Reach::of(&self.parameters);
+        Ok(())
     }
 }

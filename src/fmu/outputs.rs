@@ -58,7 +58,7 @@ impl Outputs {
 }
 
 impl LoViNes {
-    /// Keeps what masters read after a step; whether it is of a plant that still makes sense.
+    /// Keeps what masters read after a step; whether displacements are such that a cavity can be told.
     #[inline]
     pub(super) fn keep_outputs(&mut self) -> bool {
         let Rig::Steps(plant) = &self.rig else {
@@ -80,9 +80,7 @@ impl LoViNes {
             tally.impact_velocity,
         ]
         .map(Cell::new);
-        // Not a number, or infinite: so is the sum.
-        (state.q1 + state.dq1 + state.dq2).abs() <= f64::MAX
-            && w.abs() <= self.parameters.half_width
+        self.reach.holds(&state) && w.abs() <= self.parameters.half_width
     }
 
     /// A value that is not kept.
