@@ -283,7 +283,7 @@ def run(peer, scene, setting, checks, limit):
             method.step(amplitude, omega, duration)
         except Failed as failure:
             done = 100 * (n - 1) / len(scene["drives"])
-            how = f"time limit: {done:.0f} % done after {limit:g} s" if "time limit" in str(failure) else str(failure)
+            how = f"time limit: {done:.2f} % done after {limit:g} s" if "time limit" in str(failure) else str(failure)
             raise Failed(how) from None
         if n in wanted:
             states.append([float(x) for x in method.y])
