@@ -20,7 +20,7 @@
 mod lanes;
 mod near;
 
-use crate::base_motion::{Drive, sincos_of_product};
+use crate::base_motion::{Drive, product, sincos_of_product};
 use crate::lane::Lane;
 use crate::oscillator::Oscillator;
 use crate::plant::UNRESOLVED;
@@ -47,8 +47,12 @@ pub struct Wave<T> {
     pub half_width: T,
     /// Decay rate, 1/s.
     delta: T,
+    /// Natural frequency, 1/s.
+    omega0: T,
     /// The fastest rate of the free motion, 1/s.
     fastest: T,
+    /// Farthest arrival from its anchor without a drive, s.
+    nearest: T,
     /// Natural frequency squared, 1/s².
     pub omega0_squared: T,
     /// Driving frequency, rad/s.
@@ -124,6 +128,7 @@ impl Wave<f64> {
     pub fn new(oscillator: &Oscillator, half_width: f64) -> Self {
         let Oscillator {
             delta,
+            omega0,
             omega0_squared,
             fastest,
             ..
@@ -143,7 +148,9 @@ impl Wave<f64> {
         Self {
             half_width,
             delta,
+            omega0,
             fastest,
+            nearest: NEAR / fastest,
             omega0_squared,
             omega: 0.0,
             steady: (0.0, 0.0),
@@ -163,14 +170,16 @@ impl Wave<f64> {
         let [offset, slopes @ ..] = drive.signal;
         let (omega, amplitude) = (drive.omega, drive.amplitude);
         let (delta, omega0_squared) = (self.delta, self.omega0_squared);
-        let omega0 = libm::sqrt(omega0_squared);
         let within = WIDEST * self.half_width;
         self.offset = offset;
         self.omega = omega;
         self.steady = (0.0, 0.0);
         self.reach = 0.0;
+        let (square, square_missed) = product(omega, omega);
         if amplitude != 0.0 {
-            let (detuning, damping) = ((omega0 - omega) * (omega0 + omega), 2.0 * delta * omega);
+            // With all the digits that `omega0²` has, however near the resonance.
+            let detuning = (omega0_squared - square) - square_missed;
+            let damping = 2.0 * delta * omega;
             let scale = amplitude / (detuning * detuning + damping * damping);
             // `H E = E (omega0² + i damping)/(detuning + i damping)`.
             self.steady = (
@@ -181,16 +190,19 @@ impl Wave<f64> {
             self.reach = libm::sqrt(re * re + im * im);
         }
         self.speed = omega * self.reach;
-        let square = omega * omega;
         self.forced = [
             -square * (1.0 / 2.0),
             -square * omega * (1.0 / 6.0),
             square * square * (1.0 / 24.0),
             square * square * omega * (1.0 / 120.0),
         ];
-        self.near = NEAR / self.fastest.max(omega);
+        self.near = if omega > self.fastest {
+            NEAR / omega
+        } else {
+            self.nearest
+        };
         // Displacements and velocities are at most so large while the particle crosses.
-        let velocity = within * (omega0 + 2.0 * omega);
+        let velocity = within * (self.omega0 + 2.0 * omega);
         let acceleration = omega0_squared * (4.0 * within) + 2.0 * delta * velocity;
         self.restless = 2.0 * UNRESOLVED * self.half_width * acceleration;
         // False also for an undamped resonance, where the reach is not a number.
@@ -200,6 +212,18 @@ impl Wave<f64> {
             && amplitude.abs() <= within
             && self.reach <= within
             && self.reach <= STEEPEST * amplitude.abs()
+    }
+
+    /// Whether both walls are certainly out of reach for `t` seconds: the first bound of [`Self::clear`] alone, without
+    /// working out for how long it holds.
+    pub fn is_clear(&self, start: &Origin<f64>, free: &Free<f64>, t: f64) -> bool {
+        // Displacements are within so many half-widths: see below.
+        let rounding = 1e-12 * (3.0 * WIDEST + 1.0) * self.half_width;
+        let room = |s: f64| self.half_width - s * start.w - rounding + s * start.particle * t;
+        let room = room(1.0).min(room(-1.0)) - self.speed * t;
+        room > 0.0
+            && free.speed_squared * (t * t) < room * room * (1.0 - 1e-9)
+            && free.speed_squared < self.widest
     }
 
     /// The state `t` seconds after the start, as long as no wall is met.

@@ -12,7 +12,9 @@ impl<const N: usize> Wave<Lanes<N>> {
         Self {
             half_width: all(|wave| wave.half_width),
             delta: all(|wave| wave.delta),
+            omega0: all(|wave| wave.omega0),
             fastest: all(|wave| wave.fastest),
+            nearest: all(|wave| wave.nearest),
             omega0_squared: all(|wave| wave.omega0_squared),
             omega: all(|wave| wave.omega),
             steady: (all(|wave| wave.steady.0), all(|wave| wave.steady.1)),

@@ -1,9 +1,10 @@
 //! Motion near an anchor: a time at which the closed form has been worked out.
 
 use super::{Free, NEAR, Origin, Pair, Wave, times};
-use crate::base_motion::{Phase, sincos_of_product};
+use crate::base_motion::{Phase, product};
 use crate::lane::Lane;
 use crate::oscillator::{Oscillator, Transition};
+use core::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
 /// A time at which the closed form has been worked out; that is no time at all by default.
@@ -118,10 +119,15 @@ impl Wave<f64> {
 
     /// The same instant at the frequency that this wave has.
     pub fn turned(&self, anchor: &Anchor<f64>) -> Anchor<f64> {
-        let (sin, cos) = sincos_of_product((self.omega, 0.0), anchor.t);
+        let (angle, missed) = product(self.omega, anchor.t);
+        let (sin, cos) = libm::sincos(angle);
         Anchor {
-            angle: Phase::default().advanced(self.omega, anchor.t).parts(),
-            turned: (cos, sin),
+            angle: if angle < TAU {
+                (angle, missed)
+            } else {
+                Phase::default().advanced(self.omega, anchor.t).parts()
+            },
+            turned: (cos - missed * sin, sin + missed * cos),
             ..*anchor
         }
     }

@@ -56,6 +56,12 @@ impl Plant {
         plants: [&mut Plant; N],
         duration: f64,
     ) -> [Run; N] {
+        let plants = plants.map(|plant| {
+            if plant.course.stale {
+                plant.course.freshen();
+            }
+            plant
+        });
         let mut row = Row::new(&plants, duration);
         while row.pass() {}
         row.leave(plants, duration)

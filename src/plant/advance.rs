@@ -70,6 +70,8 @@ impl Plant {
     pub(crate) fn adopt(&mut self, drive: Drive) {
         if drive != self.base.drive || !self.under_way {
             self.take(drive);
+        } else {
+            self.course.restless_drive = false;
         }
     }
 
@@ -180,7 +182,7 @@ impl Plant {
                     dw = self.here.relative_velocity();
                 }
                 if self.course.clear == 0.0 {
-                    self.course.look_out(&self.here);
+                    self.course.look_out(&self.here, left.seconds());
                 }
             }
             if left.seconds() < self.course.clear {

@@ -45,6 +45,10 @@ pub(super) struct Course {
     pub turns: u32,
     /// Near the last arrival.
     pub anchor: Anchor<f64>,
+    /// Whether the drive has changed since that was worked out.
+    pub stale: bool,
+    /// Whether the drive has changed with this very step, as it does at every step of a controller's.
+    pub restless_drive: bool,
     /// Near the last lag, where it was the same as the one before.
     stop: Anchor<f64>,
     pub strides: Strides,
@@ -63,6 +67,8 @@ impl Course {
             landing: None,
             turns: 0,
             anchor: Anchor::default(),
+            stale: false,
+            restless_drive: false,
             stop: Anchor::default(),
             strides: Strides::default(),
             last_duration: 0.0,
@@ -79,10 +85,18 @@ impl Course {
     /// Forgets what depends on the drive, and begins anew under another one.
     pub fn renew(&mut self, drive: &Drive) {
         self.quick = self.rig.take(drive);
-        self.anchor = Anchor::default();
-        self.stop = Anchor::default();
+        self.stale = true;
+        self.restless_drive = true;
+        self.stop.t = f64::NAN;
         self.strides.forget();
         self.leave();
+    }
+
+    /// Makes the anchor one of the present drive: of the free motion it knows all it needs.
+    #[cold]
+    pub fn freshen(&mut self) {
+        self.anchor = self.rig.turned(&self.anchor);
+        self.stale = false;
     }
 
     /// Forgets what depends on the state.
@@ -212,10 +226,15 @@ impl Course {
     }
 
     /// How long the walls are certainly out of reach of `start`, which has no lag and does not cross; 0 if that is not
-    /// known.
-    pub fn look_out(&mut self, start: &Origin<f64>) {
-        self.clear = self
-            .wave()
-            .map_or(0.0, |wave| wave.clear(start, &wave.free_motion(start)));
+    /// known. Where there will be another drive after the `left` seconds of this step, only whether they are for so long.
+    pub fn look_out(&mut self, start: &Origin<f64>, left: f64) {
+        self.clear = self.wave().map_or(0.0, |wave| {
+            let free = wave.free_motion(start);
+            if self.restless_drive && wave.is_clear(start, &free, 2.0 * left) {
+                2.0 * left
+            } else {
+                wave.clear(start, &free)
+            }
+        });
     }
 }

@@ -36,6 +36,7 @@ impl Plant {
             rig: wave,
             quick: true,
             anchor,
+            stale,
             landing: noted,
             clear,
             turns,
@@ -65,6 +66,10 @@ impl Plant {
                     if 2.0 * start.particle.abs() * left.seconds() < distance {
                         *clear = 0.5 * distance / start.particle.abs();
                         break;
+                    }
+                    if *stale {
+                        *anchor = wave.turned(anchor);
+                        *stale = false;
                     }
                     let (arrival, near) = wave.arrival(&start, &free, anchor);
                     if !near {
