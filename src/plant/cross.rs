@@ -33,7 +33,7 @@ impl Plant {
             self.course.leave();
         }
         let Course {
-            rig: Some(wave),
+            rig: wave,
             quick: true,
             anchor,
             landing: noted,
@@ -72,7 +72,12 @@ impl Plant {
                         if guesses > MOST_GUESSES {
                             break;
                         }
-                        *anchor = wave.next_anchor(&start, &free, anchor, arrival.beyond);
+                        *anchor = wave.next_anchor(
+                            &self.alone.oscillator,
+                            &start,
+                            &free,
+                            (anchor, arrival.beyond),
+                        );
                         continue;
                     }
                     guesses = 0;
