@@ -90,8 +90,7 @@ pub fn drift(impacts: u64, table: &mut Table) {
             &format!("r = 1, c = 0, mass ratio {epsilon}: energy drifts by, relative"),
             &format!("{impacts} impacts"),
             drift,
-            // What an anchor's own rounding brings in grows with their number.
-            1e-12 * (impacts as f64 / 1e5),
+            1e-12,
         );
     }
     table.progress("elastic impacts");

@@ -18,7 +18,7 @@ fn hard_scenes_are_survived() {
     let mut table = Table::begin();
     lot::scenes(n, &mut table);
     elastic::one_by_one(n, &mut table);
-    elastic::drift(if n > 10_000 { 1_000_000 } else { 100_000 }, &mut table);
+    elastic::drift(1_000_000, &mut table);
     graze::both_ways(n / 10, &mut table);
     steps::long(&mut table);
     if n > 10_000 {
