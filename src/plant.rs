@@ -7,6 +7,7 @@ mod contact;
 mod course;
 mod cross;
 mod hop;
+mod reading;
 mod strides;
 
 use crate::base_motion::{BaseMotion, Drive};
@@ -17,6 +18,7 @@ use crate::oscillator::Oscillator;
 use crate::parameters::{InvalidValue, Parameters};
 use crate::wall::{ImpactLaw, Wall};
 use course::Course;
+pub use reading::Reading;
 use serde::{Deserialize, Serialize};
 
 /// A rebound that would lift the particle less than this fraction of the half-width off its wall cannot be told from

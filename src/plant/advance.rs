@@ -105,15 +105,6 @@ impl Plant {
         self.course.now(&self.alone.oscillator, &self.here)
     }
 
-    /// Brings the state that the plant holds up to date, where that makes it cheaper to ask for it. Nothing that can be asked
-    /// for changes.
-    #[inline]
-    pub fn settle(&mut self) {
-        if self.course.lags() && !self.course.strides.under_way() {
-            self.catch_up();
-        }
-    }
-
     /// Brings the state that the plant holds up to date.
     pub(super) fn catch_up(&mut self) {
         if self.course.lags() {

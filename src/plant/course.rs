@@ -149,6 +149,9 @@ impl Course {
 
     /// The phase of the base now, which was `phase` at the origin.
     pub fn phase(&self, phase: Phase) -> Phase {
+        if self.strides.taken() == 1 {
+            return self.strides.after_one(phase);
+        }
         let (whole, missed) = self.lag().parts();
         if whole == 0.0 {
             return phase;

@@ -12,6 +12,9 @@ use serde::{Deserialize, Serialize};
 /// So many strides before `e^{i phase}` is worked out anew.
 const MOST: u32 = 32;
 
+/// A free motion that has died out so far, m and m/s, is none.
+const NOTHING: f64 = 1e-280;
+
 /// A stride, and how far a run of them has come.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Strides {
@@ -59,7 +62,9 @@ impl Strides {
         }
         self.most = self.fitting(clear);
         let free = wave.free_motion(here);
-        self.free = (free.y, free.dy);
+        // Where numbers end, each operation takes a hundred times as long.
+        let gone = free.y.abs() < NOTHING && free.dy.abs() < NOTHING;
+        self.free = if gone { (0.0, 0.0) } else { (free.y, free.dy) };
         self.turn = here.turn;
         self.most > 0
     }
@@ -95,6 +100,11 @@ impl Strides {
     /// How many have been taken since the origin.
     pub fn taken(&self) -> u32 {
         self.taken
+    }
+
+    /// The phase of the base after a single one.
+    pub fn after_one(&self, phase: Phase) -> Phase {
+        phase.turned(self.one.angle, 0.0)
     }
 
     /// Time since the origin.
