@@ -18,6 +18,7 @@ const MOST_IMPACTS_PER_PERIOD: f64 = 1e7;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Worst {
     pub scenes: u64,
+    pub panics: u64,
     pub impacts: u64,
     pub stuck: u64,
     pub cut_short: u64,
@@ -40,10 +41,20 @@ pub struct Worst {
 }
 
 impl Worst {
+    /// A scene that panicked.
+    pub fn panicked() -> Self {
+        Self {
+            scenes: 1,
+            panics: 1,
+            ..Self::default()
+        }
+    }
+
     pub fn and(self, other: Self) -> Self {
         let more = |a: (f64, usize), b: (f64, usize)| if b.0 > a.0 { b } else { a };
         Self {
             scenes: self.scenes + other.scenes,
+            panics: self.panics + other.panics,
             impacts: self.impacts + other.impacts,
             stuck: self.stuck + other.stuck,
             cut_short: self.cut_short + other.cut_short,
@@ -74,7 +85,7 @@ impl Worst {
             self.missing,
             1e-12,
         );
-        row("panics", 0.0, 0.0);
+        row("panics", self.panics as f64, 0.0);
         row("states that are not numbers", self.not_a_number as f64, 0.0);
         row(
             "impacts from behind a wall or not counted",
