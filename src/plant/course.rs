@@ -132,7 +132,12 @@ impl Course {
             self.worked_out(oscillator, here)
         };
         let b = self.rig.half_width;
-        now.w = now.w.max(-b).min(b);
+        // Branches that are never taken cost less than a minimum and a maximum.
+        if now.w > b {
+            now.w = b;
+        } else if now.w < -b {
+            now.w = -b;
+        }
         now
     }
 
