@@ -2,6 +2,7 @@
 
 use crate::common::Scene;
 use crate::table::Table;
+use lovines::plant::MOST_IMPACTS;
 use lovines::{Event, Plant, State};
 use std::f64::consts::TAU;
 use std::time::Instant;
@@ -17,9 +18,12 @@ const MOST_IMPACTS_PER_PERIOD: f64 = 1e7;
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Worst {
     pub scenes: u64,
+    pub panics: u64,
     pub impacts: u64,
     pub stuck: u64,
     pub cut_short: u64,
+    /// Of these, those that had not met as many impacts as that takes.
+    pub cut_short_early: u64,
     pub not_a_number: u64,
     pub other_bits: u64,
     /// Rigs that were at rest with nothing to move them, and moved.
@@ -37,13 +41,24 @@ pub struct Worst {
 }
 
 impl Worst {
+    /// A scene that panicked.
+    pub fn panicked() -> Self {
+        Self {
+            scenes: 1,
+            panics: 1,
+            ..Self::default()
+        }
+    }
+
     pub fn and(self, other: Self) -> Self {
         let more = |a: (f64, usize), b: (f64, usize)| if b.0 > a.0 { b } else { a };
         Self {
             scenes: self.scenes + other.scenes,
+            panics: self.panics + other.panics,
             impacts: self.impacts + other.impacts,
             stuck: self.stuck + other.stuck,
             cut_short: self.cut_short + other.cut_short,
+            cut_short_early: self.cut_short_early + other.cut_short_early,
             not_a_number: self.not_a_number + other.not_a_number,
             other_bits: self.other_bits + other.other_bits,
             stirred: self.stirred + other.stirred,
@@ -70,7 +85,7 @@ impl Worst {
             self.missing,
             1e-12,
         );
-        row("panics", 0.0, 0.0);
+        row("panics", self.panics as f64, 0.0);
         row("states that are not numbers", self.not_a_number as f64, 0.0);
         row(
             "impacts from behind a wall or not counted",
@@ -87,7 +102,16 @@ impl Worst {
             self.impacts_per_period.0,
             MOST_IMPACTS_PER_PERIOD,
         );
-        row("advances cut short", self.cut_short as f64, 0.0);
+        row(
+            "advances cut short before their 10^7 impacts",
+            self.cut_short_early as f64,
+            0.0,
+        );
+        row(
+            "advances that end at 10^7 impacts, and say so",
+            self.cut_short as f64,
+            f64::INFINITY,
+        );
         row(
             "runs with other bits the second time",
             self.other_bits as f64,
@@ -128,7 +152,9 @@ fn once(s: &Scene, number: usize) -> (Worst, [u64; 4]) {
         worst.miscounted += backwards + outcome.impacts.abs_diff(impacts);
         worst.impacts += impacts;
         worst.stuck += outcome.stuck;
+        let early = outcome.cut_short && impacts < MOST_IMPACTS;
         worst.cut_short += u64::from(outcome.cut_short);
+        worst.cut_short_early += u64::from(early);
         let State { q1, dq1, q2, dq2 } = plant.state();
         worst.not_a_number += u64::from(![q1, dq1, q2, dq2].iter().all(|x| x.is_finite()));
         let w = plant.relative_displacement().abs() / s.parameters.half_width;

@@ -107,7 +107,10 @@ pub fn scenes(n: usize, table: &mut Table) {
                         let scene = draw(strategy, number);
                         match catch_unwind(|| follow(&scene, number)) {
                             Ok(worst) => worst,
-                            Err(_) => panic!("{kind} scene {number}: {scene:?}"),
+                            Err(_) => {
+                                eprintln!("{kind} scene {number} panics: {scene:?}");
+                                Worst::panicked()
+                            }
                         }
                     },
                 )

@@ -20,7 +20,9 @@ impl Table {
     /// A figure and the most that it may be.
     pub fn row(&mut self, what: &str, among: &str, figure: f64, allowed: f64) {
         let short = |x: f64| {
-            if x == 0.0 || (1.0..1e7).contains(&x) {
+            if x.is_infinite() {
+                "any".to_owned()
+            } else if x == 0.0 || (1.0..1e7).contains(&x) {
                 format!("{x:.0}")
             } else {
                 format!("{x:.1e}")
