@@ -41,7 +41,7 @@ const DEGREE: usize = 5;
 type Pair<T> = (T, T);
 
 /// What follows from rig and drive.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Wave<T> {
     /// Half-width of the cavity, m.
     pub half_width: T,

@@ -48,7 +48,7 @@ pub enum Regime {
 }
 
 /// Position and velocity after a time, as a linear map of those before it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Transition<T = f64> {
     /// Position per position.
     pub xx: T,

@@ -9,6 +9,7 @@ mod cross;
 mod hop;
 mod reading;
 mod strides;
+mod written;
 
 use crate::base_motion::{BaseMotion, Drive};
 use crate::crossing::Origin;
@@ -20,6 +21,7 @@ use crate::wall::{ImpactLaw, Wall};
 use course::Course;
 pub use reading::Reading;
 use serde::{Deserialize, Serialize};
+use written::Written;
 
 /// A rebound that would lift the particle less than this fraction of the half-width off its wall cannot be told from
 /// contact in double precision.
@@ -104,7 +106,7 @@ enum Contact {
 }
 
 /// An oscillator and its answer to the frequency in use: coefficients are kept while the frequency stays.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug)]
 struct Driven {
     oscillator: Oscillator,
     forcing: Forcing,
@@ -130,6 +132,7 @@ impl Driven {
 
 /// The plant: parameters, what follows from them, and the state.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(into = "Written", from = "Written")]
 pub struct Plant {
     parameters: Parameters,
     mass_ratio: f64,

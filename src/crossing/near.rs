@@ -8,7 +8,7 @@ use core::f64::consts::TAU;
 use serde::{Deserialize, Serialize};
 
 /// A time at which the closed form has been worked out; that is no time at all by default.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Anchor<T> {
     /// Seconds since the start of a flight.
     pub t: T,

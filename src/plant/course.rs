@@ -14,6 +14,23 @@ pub(super) const TURNS_KEPT: u32 = 16;
 /// Shortest step that the state is moved on by, in units of `1/omega0`, squared.
 const SHORTEST_STRIDE: f64 = 1e-6;
 
+/// Anchors are written out as their time: the rest follows from it.
+pub(super) mod by_time {
+    use crate::crossing::Anchor;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<S: Serializer>(anchor: &Anchor<f64>, s: S) -> Result<S::Ok, S::Error> {
+        anchor.t.serialize(s)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<Anchor<f64>, D::Error> {
+        Ok(Anchor {
+            t: f64::deserialize(d)?,
+            ..Anchor::default()
+        })
+    }
+}
+
 /// An arrival, and when it is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub(super) struct Landing {
@@ -33,6 +50,7 @@ pub(super) struct Landing {
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Course {
     /// Coefficients of rig and drive.
+    #[serde(skip)]
     pub rig: Wave<f64>,
     /// Whether they allow the quick way.
     pub quick: bool,
@@ -44,12 +62,14 @@ pub(super) struct Course {
     /// How often `e^{i phase}` has been turned since it was worked out.
     pub turns: u32,
     /// Near the last arrival.
+    #[serde(with = "by_time")]
     pub anchor: Anchor<f64>,
     /// Whether the drive has changed since that was worked out.
     pub stale: bool,
     /// Whether the drive has changed with this very step, as it does at every step of a controller's.
     pub restless_drive: bool,
     /// Near the last lag, where it was the same as the one before.
+    #[serde(with = "by_time")]
     stop: Anchor<f64>,
     pub strides: Strides,
     last_duration: f64,
@@ -74,6 +94,36 @@ impl Course {
             last_duration: 0.0,
             last_lag: 0.0,
         }
+    }
+
+    /// Works out again what is not written out.
+    pub fn work_out_again(&mut self, oscillator: &Oscillator, half_width: f64, drive: &Drive) {
+        self.rig = Wave::new(oscillator, half_width);
+        if self.quick {
+            self.rig.take(drive);
+        }
+        for anchor in [&mut self.anchor, &mut self.stop, self.strides.one()] {
+            if anchor.t != 0.0 {
+                *anchor = self.rig.anchor(oscillator, anchor.t);
+            }
+        }
+    }
+
+    /// As it comes back from being written out.
+    #[cfg(test)]
+    pub fn bare(self) -> Self {
+        let only_time = |anchor: Anchor<f64>| Anchor {
+            t: anchor.t,
+            ..Anchor::default()
+        };
+        let mut bare = Self {
+            rig: Wave::default(),
+            anchor: only_time(self.anchor),
+            stop: only_time(self.stop),
+            ..self
+        };
+        *bare.strides.one() = only_time(*bare.strides.one());
+        bare
     }
 
     /// The coefficients, where rig and drive allow the quick way.

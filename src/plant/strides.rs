@@ -19,6 +19,7 @@ const NOTHING: f64 = 1e-280;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub(super) struct Strides {
     /// One of them.
+    #[serde(with = "super::course::by_time")]
     one: Anchor<f64>,
     /// Whether it has been worked out for the present drive.
     ready: bool,
@@ -33,6 +34,11 @@ pub(super) struct Strides {
 }
 
 impl Strides {
+    /// One of them, to be worked out again.
+    pub fn one(&mut self) -> &mut Anchor<f64> {
+        &mut self.one
+    }
+
     /// The drive is another one: the stride is no longer ready.
     pub fn forget(&mut self) {
         self.ready = false;
