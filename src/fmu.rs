@@ -14,6 +14,7 @@ use crate::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
 use fmi2_component::{Archive, Component, Log, Refusal};
 use outputs::Outputs;
 use reach::Reach;
+use std::cell::Cell;
 use variables::{Integer, Model, Real, category};
 
 mod variables {
@@ -40,8 +41,15 @@ struct LoViNes {
     fastest: f64,
     #[serde(skip)]
     reach: Reach,
+    /// The longest step that has been found acceptable with these parameters and inputs, s; NaN before.
+    #[serde(skip, default = "unknown")]
+    longest: Cell<f64>,
     parameters: Parameters,
     start: State,
+}
+
+fn unknown() -> Cell<f64> {
+    Cell::new(f64::NAN)
 }
 
 /// The rig as the master's choice of interface wants it.
@@ -126,11 +134,26 @@ impl LoViNes {
         })
     }
 
+    /// Whether a step can be done at all; steps up to that length need not be looked at again.
+    #[inline(never)]
+    fn judge(&self, step: f64) -> Result<(), Refusal> {
+        let rate = self.fastest.max(self.drive.omega.abs());
+        if step * rate > LONGEST_STEP {
+            return Err(too_long(step, rate));
+        }
+        if !self.reach.holds_base(&self.drive, step) {
+            return Err(too_far(&self.drive));
+        }
+        self.longest.set(step);
+        Ok(())
+    }
+
     /// Tells the rig of changed inputs.
     #[inline]
     fn input(&mut self) {
         self.inputs_set = true;
         self.outputs.forget_base();
+        self.longest = unknown();
         if let Rig::Equations(hybrid) = &mut self.rig {
             hybrid.drive = self.drive;
         }
@@ -172,6 +195,7 @@ impl LoViNes {
         self.parameters = parameters;
         self.fastest = parameters.fastest_rate();
         self.reach = Reach::of(&parameters);
+        self.longest = unknown();
         Ok(())
     }
 }
@@ -194,6 +218,7 @@ impl Component for LoViNes {
             epsilon: 1.0,
             fastest: 0.0,
             reach: Reach::default(),
+            longest: unknown(),
             parameters,
             start,
         }
@@ -251,6 +276,7 @@ impl Component for LoViNes {
         self.epsilon = self.parameters.mass_ratio();
         self.fastest = self.parameters.fastest_rate();
         self.reach = Reach::of(&self.parameters);
+        self.longest = unknown();
         self.progress = Progress::Initialised;
         self.inputs_set = false;
         self.outputs = Outputs::default();
@@ -259,15 +285,10 @@ impl Component for LoViNes {
 
     #[inline]
     fn accept_step(&self, step: f64) -> Result<(), Refusal> {
-        let (own, omega) = (self.fastest, self.drive.omega.abs());
-        let rate = if own > omega { own } else { omega };
-        if step * rate > LONGEST_STEP {
-            return Err(too_long(step, rate));
+        if step <= self.longest.get() {
+            return Ok(());
         }
-        if !self.reach.holds_base(&self.drive, step) {
-            return Err(too_far(&self.drive));
-        }
-        Ok(())
+        self.judge(step)
     }
 
     #[inline]
@@ -285,6 +306,7 @@ impl Component for LoViNes {
         if derivatives != [0.0; 3] {
             // The signal stays where its polynomial has led.
             self.drive.signal = [plant.base().drive.signal[0], 0.0, 0.0, 0.0];
+            self.longest = unknown();
         }
         self.progress = Progress::UnderWay;
         self.inputs_set = false;
@@ -302,6 +324,7 @@ impl Component for LoViNes {
         order: u32,
         value: f64,
     ) -> Result<(), Refusal> {
+        self.longest = unknown();
         // The coefficients of a Taylor polynomial.
         let signal = &mut self.drive.signal;
         match (variable, order) {
