@@ -220,12 +220,14 @@ class Bench:
 
     def growth(self):
         """What grows: points of size, ns, units of work; and ns per sample of plant and controller."""
-        curves = {}
-        for what, (most, quick) in GROWTH.items():
-            self.progress(f"growth: {what}")
-            request = {"growth": what, "budget": 0.05, "most": quick if self.options.quick else most}
-            answer = self.rust.ask(request, 200)
-            curves[what] = answer["points"] if answer and "points" in answer else []
+        curves = {what: [] for what in GROWTH}
+        for turn in range(1, 4):
+            for what, (most, quick) in GROWTH.items():
+                self.progress(f"growth, round {turn}: {what}")
+                request = {"growth": what, "budget": 0.02, "most": quick if self.options.quick else most}
+                answer = self.rust.ask(request, 200) or {}
+                old, new = curves[what], answer.get("points", [])
+                curves[what] = [min(pair, key=lambda point: point[1]) for pair in zip(old, new, strict=False)] or new
         loop = self.rust.ask({"closed_loop": LOOP_PERIODS, "budget": 0.2 if self.options.quick else 2.0}, 60)
         return curves, loop["ns"]
 

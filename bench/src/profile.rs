@@ -13,8 +13,8 @@ use crate::scene::Scene;
 pub fn of(scene: &Scene) -> Result<Value, String> {
     let mut plant = begin(scene).map_err(|failure| failure.0)?;
     let (mut empty, mut at_rest, mut whole) = (0u64, 0.0, 0.0);
-    // Since when, in this step, the particle has been on a wall.
     for step in &scene.steps {
+        // Since when, in this step, the particle has been on a wall.
         let mut since = plant.contact().map(|_| 0.0);
         let outcome = plant.advance_with(step.drive(), step.duration, |event| match event {
             Event::Stuck { t, .. } => since = Some(t),
