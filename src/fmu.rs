@@ -5,11 +5,15 @@
 mod derivatives;
 mod exchange;
 mod log;
+mod outputs;
+mod reach;
 
 use crate::hybrid::Hybrid;
 use crate::plant::MOST_IMPACTS;
-use crate::{BaseMotion, Drive, InvalidValue, Parameters, Plant, State};
+use crate::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
 use fmi2_component::{Archive, Component, Log, Refusal};
+use outputs::Outputs;
+use reach::Reach;
 use std::cell::Cell;
 use variables::{Integer, Model, Real, category};
 
@@ -29,13 +33,17 @@ struct LoViNes {
     inputs_set: bool,
     /// How far the rig has come.
     progress: Progress,
-    /// The displacement of the base, once somebody has asked for it: there is a sine in it. NaN before.
-    #[serde(skip, default = "unknown")]
-    base: Cell<f64>,
+    #[serde(skip)]
+    outputs: Outputs,
     /// The mass ratio m/M.
     epsilon: f64,
     /// The fastest rate of the motion but for that of the drive, rad/s.
     fastest: f64,
+    #[serde(skip)]
+    reach: Reach,
+    /// The longest step that has been found acceptable with these parameters and inputs, s; NaN before.
+    #[serde(skip, default = "unknown")]
+    longest: Cell<f64>,
     parameters: Parameters,
     start: State,
 }
@@ -56,20 +64,37 @@ enum Rig {
 /// search for the first contact looks at the motion once in every two radians or so, and a call is to end.
 const LONGEST_STEP: f64 = 1e7;
 
+/// An advance with every event told.
+#[cold]
+#[inline(never)]
+fn telling(plant: &mut Plant, drive: Drive, step: f64, tell: impl FnMut(Event)) -> Outcome {
+    plant.advance_with(drive, step, tell)
+}
+
 /// Why a step could not be finished.
 #[cold]
-fn lost(finite: bool, time: f64, step: f64) -> Refusal {
-    Refusal::error(if finite {
+fn lost(resolved: bool, time: f64, step: f64) -> Refusal {
+    Refusal::error(if resolved {
         format!(
             "there are more than {MOST_IMPACTS} impacts within the step of {step} s at t = {time} s; expected are \
              velocities and a half-width of the cavity that make sense together, or a shorter step"
         )
     } else {
         format!(
-            "displacements and velocities have left the range of numbers in the step at t = {time} s; expected are \
-             start values and inputs of a sensible size"
+            "displacements have become so large in the step at t = {time} s that their rounding is wider than the cavity; \
+             expected are start values and inputs of a sensible size"
         )
     })
+}
+
+/// Why a step is not begun.
+#[cold]
+fn too_far(drive: &Drive) -> Refusal {
+    Refusal::error(format!(
+        "the base would go further than 2^52 half-widths of the cavity, where the rounding of displacements is wider than it \
+         (e = {} m and its derivatives, E = {} m); expected are inputs of a sensible size",
+        drive.signal[0], drive.amplitude
+    ))
 }
 
 /// Why a step is not begun.
@@ -109,75 +134,26 @@ impl LoViNes {
         })
     }
 
-    /// A value that follows from the plant's state.
-    #[inline(always)]
-    fn of_plant(&self, plant: &Plant, variable: Real) -> f64 {
-        let state = || match self.progress {
-            Progress::UnderWay => plant.state(),
-            _ => self.start,
-        };
-        match variable {
-            Real::q1 => state().q1,
-            Real::der_q1 => state().dq1,
-            Real::q2 => state().q2,
-            Real::der_q2 => state().dq2,
-            Real::v => {
-                let state = plant.state();
-                state.q1 + self.epsilon * state.q2
-            }
-            Real::w => plant.relative_displacement(),
-            Real::der_w => plant.relative_velocity(),
-            Real::base => self.base(plant),
-            Real::phase => plant.base().phase.radians(),
-            Real::impact_time => plant.tally().impact_time,
-            Real::impact_velocity => plant.tally().impact_velocity,
-            Real::energy => plant.energy(self.base(plant)),
-            Real::dissipated => plant.tally().dissipated,
-            _ => self.of_instant(plant, variable),
-        }
-    }
-
-    /// What nobody asks for in every step.
-    #[cold]
-    fn of_instant(&self, plant: &Plant, variable: Real) -> f64 {
-        self.setting(variable)
-            .unwrap_or_else(|| derivatives::of_instant(&self.instant(plant), variable))
-    }
-
-    #[inline]
-    fn base(&self, plant: &Plant) -> f64 {
-        let mut base = self.base.get();
-        if base.is_nan() {
-            base = self.look_at_base(plant);
-        }
-        base
-    }
-
+    /// Whether a step can be done at all; steps up to that length need not be looked at again.
     #[inline(never)]
-    fn look_at_base(&self, plant: &Plant) -> f64 {
-        let base = if self.inputs_set {
-            self.base_motion(plant).displacement()
-        } else {
-            plant.base_displacement()
-        };
-        self.base.set(base);
-        base
-    }
-
-    /// The base as it stands, with the inputs as they are set now.
-    fn base_motion(&self, plant: &Plant) -> BaseMotion {
-        if self.inputs_set {
-            plant.base().with(self.drive)
-        } else {
-            plant.base()
+    fn judge(&self, step: f64) -> Result<(), Refusal> {
+        let rate = self.fastest.max(self.drive.omega.abs());
+        if step * rate > LONGEST_STEP {
+            return Err(too_long(step, rate));
         }
+        if !self.reach.holds_base(&self.drive, step) {
+            return Err(too_far(&self.drive));
+        }
+        self.longest.set(step);
+        Ok(())
     }
 
     /// Tells the rig of changed inputs.
     #[inline]
     fn input(&mut self) {
         self.inputs_set = true;
-        self.base.set(f64::NAN);
+        self.outputs.forget_base();
+        self.longest = unknown();
         if let Rig::Equations(hybrid) = &mut self.rig {
             hybrid.drive = self.drive;
         }
@@ -201,6 +177,7 @@ impl LoViNes {
             _ => return Err(Refusal::error("this variable is computed, not set")),
         };
         *slot = value;
+        self.outputs = Outputs::default();
         if matches!(variable, Real::k | Real::c | Real::r) {
             self.retune(parameters)?;
         }
@@ -217,6 +194,8 @@ impl LoViNes {
         }
         self.parameters = parameters;
         self.fastest = parameters.fastest_rate();
+        self.reach = Reach::of(&parameters);
+        self.longest = unknown();
         Ok(())
     }
 }
@@ -235,9 +214,11 @@ impl Component for LoViNes {
             drive: Drive::default(),
             inputs_set: false,
             progress: Progress::None,
-            base: unknown(),
+            outputs: Outputs::default(),
             epsilon: 1.0,
             fastest: 0.0,
+            reach: Reach::default(),
+            longest: unknown(),
             parameters,
             start,
         }
@@ -245,21 +226,27 @@ impl Component for LoViNes {
 
     #[inline(always)]
     fn get_real(&self, variable: Real) -> f64 {
-        match &self.rig {
-            Rig::Steps(plant) => self.of_plant(plant, variable),
-            Rig::Equations(hybrid) => self.of_equations(hybrid, variable),
+        let kept = self.outputs.get(variable);
+        if kept.is_nan() {
+            self.work_out(variable)
+        } else {
+            kept
         }
     }
 
     #[inline]
     fn set_real(&mut self, variable: Real, value: f64) -> Result<(), Refusal> {
-        match variable {
-            Real::e => self.drive.signal[0] = value,
-            Real::E => self.drive.amplitude = value,
-            Real::omega => self.drive.omega = value,
+        let input = match variable {
+            Real::e => &mut self.drive.signal[0],
+            Real::E => &mut self.drive.amplitude,
+            Real::omega => &mut self.drive.omega,
             _ => return self.configure(variable, value),
+        };
+        // Masters set all inputs before every step, whether they have changed or not.
+        if input.to_bits() != value.to_bits() {
+            *input = value;
+            self.input();
         }
-        self.input();
         Ok(())
     }
 
@@ -278,6 +265,7 @@ impl Component for LoViNes {
         match &mut self.rig {
             Rig::Steps(plant) => {
                 *plant = Plant::new(self.parameters, self.start)?;
+                Reach::of(&self.parameters).check(&self.start)?;
                 plant.set_time(start_time);
                 plant.begin(self.drive);
             }
@@ -287,18 +275,20 @@ impl Component for LoViNes {
         }
         self.epsilon = self.parameters.mass_ratio();
         self.fastest = self.parameters.fastest_rate();
+        self.reach = Reach::of(&self.parameters);
+        self.longest = unknown();
         self.progress = Progress::Initialised;
         self.inputs_set = false;
-        self.base = unknown();
+        self.outputs = Outputs::default();
         Ok(())
     }
 
     #[inline]
     fn accept_step(&self, step: f64) -> Result<(), Refusal> {
-        if step * self.fastest <= LONGEST_STEP && step * self.drive.omega.abs() <= LONGEST_STEP {
+        if step <= self.longest.get() {
             return Ok(());
         }
-        Err(too_long(step, self.fastest.max(self.drive.omega.abs())))
+        self.judge(step)
     }
 
     #[inline]
@@ -308,22 +298,22 @@ impl Component for LoViNes {
         };
         plant.set_time(time);
         let outcome = if log.wants(category::logEvents) || log.wants(category::logImpacts) {
-            plant.advance_with(self.drive, step, |event| log::tell(log, time, event))
+            telling(plant, self.drive, step, |event| log::tell(log, time, event))
         } else {
-            plant.advance(self.drive, step)
+            plant.advance_with(self.drive, step, |_| {})
         };
-        // Masters read outputs after every step.
-        plant.settle();
-        // The signal stays where its polynomial has led.
-        self.drive.signal = [plant.base().drive.signal[0], 0.0, 0.0, 0.0];
+        let [_, derivatives @ ..] = self.drive.signal;
+        if derivatives != [0.0; 3] {
+            // The signal stays where its polynomial has led.
+            self.drive.signal = [plant.base().drive.signal[0], 0.0, 0.0, 0.0];
+            self.longest = unknown();
+        }
         self.progress = Progress::UnderWay;
         self.inputs_set = false;
-        self.base.set(f64::NAN);
-        let state = plant.state();
-        let finite = (state.q1 + state.dq1 + state.dq2).is_finite()
-            && plant.relative_displacement().abs() <= self.parameters.half_width;
-        if outcome.cut_short || !finite {
-            return Err(lost(finite, time, step));
+        let resolved = self.keep_outputs();
+        if outcome.cut_short || !resolved {
+            self.outputs = Outputs::default();
+            return Err(lost(resolved, time, step));
         }
         Ok(())
     }
@@ -334,6 +324,7 @@ impl Component for LoViNes {
         order: u32,
         value: f64,
     ) -> Result<(), Refusal> {
+        self.longest = unknown();
         // The coefficients of a Taylor polynomial.
         let signal = &mut self.drive.signal;
         match (variable, order) {
@@ -363,6 +354,8 @@ impl Component for LoViNes {
     }
 
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
-        archive.whole(self)
+        archive.whole(self)?;
+        self.reach = Reach::of(&self.parameters);
+        Ok(())
     }
 }

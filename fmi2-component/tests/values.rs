@@ -14,6 +14,8 @@ const HEIGHT: u32 = 1;
 const INFLOW: u32 = 2;
 const LEVEL: u32 = 3;
 const RATE: u32 = 4;
+const VALVE: u32 = 0;
+const FULL: u32 = 1;
 
 #[test]
 fn start_values_come_from_the_description() {
@@ -115,6 +117,58 @@ fn nothing_is_set_where_one_of_several_is_wrong() {
         );
         assert_eq!(master.bytes(), before);
     }
+}
+
+#[test]
+fn nothing_is_set_where_the_component_refuses_a_later_value() {
+    let master = Master::new(GUID);
+    let before = master.bytes();
+    let (vr, values) = ([HEIGHT, AREA], [5.0, -1.0]);
+    let status = unsafe { fmi2SetReal(master.c, vr.as_ptr(), 2, values.as_ptr()) };
+    assert_eq!(status, Error);
+    master.heard_one(&["area = -1 m2 is refused"]);
+    assert_eq!(master.bytes(), before);
+}
+
+#[test]
+fn all_truth_values_of_a_call_are_set_or_none() {
+    let master = Master::ready(GUID);
+    let before = master.bytes();
+    for (vr, reason) in [
+        ([VALVE, 99], "value reference 99 is unknown"),
+        ([VALVE, FULL], "full cannot be set"),
+    ] {
+        let values = [0, 0];
+        let status = unsafe { fmi2SetBoolean(master.c, vr.as_ptr(), 2, values.as_ptr()) };
+        assert_eq!(status, Error);
+        master.heard_one(&[reason]);
+        assert_eq!(master.bytes(), before);
+    }
+    let (vr, values) = ([VALVE, VALVE], [1, 0]);
+    let status = unsafe { fmi2SetBoolean(master.c, vr.as_ptr(), 2, values.as_ptr()) };
+    assert_eq!(status, Ok);
+    assert_ne!(master.bytes(), before);
+}
+
+#[test]
+fn all_strings_of_a_call_are_set_or_none() {
+    let master = Master::new(GUID);
+    let before = master.bytes();
+    let new = c"another".as_ptr();
+    for (vr, second, reason) in [
+        ([0, 99], new, "value reference 99 is unknown"),
+        ([0, 0], null(), "label = NULL"),
+        ([0, 0], c"".as_ptr(), "label = \"\" is refused"),
+    ] {
+        let values = [new, second];
+        let status = unsafe { fmi2SetString(master.c, vr.as_ptr(), 2, values.as_ptr()) };
+        assert_eq!(status, Error);
+        master.heard_one(&[reason]);
+        assert_eq!(master.bytes(), before);
+    }
+    let status = unsafe { fmi2SetString(master.c, [0, 0].as_ptr(), 2, [new, new].as_ptr()) };
+    assert_eq!(status, Ok);
+    assert_ne!(master.bytes(), before);
 }
 
 #[test]

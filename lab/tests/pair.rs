@@ -16,8 +16,8 @@ use vines::pack::pack_bench;
 use vines::rig::{BuiltIn, Simulated};
 use vines::scene::Scene;
 
-/// The periods that are driven: the default scene has been locked for 50 by the end of them.
-const PERIODS: f64 = 300.0;
+/// The periods that are driven: the default scene locks after 304.
+const PERIODS: f64 = 330.0;
 const HOLD_PERIODS: f64 = 20.0;
 
 /// The libraries of this build; cargo makes one of the two only where it is asked for.
@@ -140,6 +140,11 @@ fn the_pair_coupled_through_the_fmi_crate_locks_where_the_own_loop_does() {
         plant.advance(driven, command, time, step);
     }
     plant.instance.get_integer(&impacts, &mut after).unwrap();
+
+    let mut locked = [0];
+    let flag = [controller.find("locked")];
+    controller.instance.get_boolean(&flag, &mut locked).unwrap();
+    assert_eq!(locked, [1]);
 
     let sigma = scene.dimensionless().sigma(omega);
     let off = sigma - own_sigma(&scene);

@@ -30,8 +30,8 @@ fn timed(m: &Master, what: &str, step: f64) -> Status {
 
 #[test]
 fn a_step_of_absurdly_many_impacts_ends_with_an_error_and_a_reset_helps() {
-    let m = with(&[(4, 1e-9), (5, 1.0), (12, 1e9)]);
-    let what = "a step of 1 s at 1e9 m/s in a gap of 1e-9 m";
+    let m = with(&[(4, 1e-9), (5, 1.0), (12, 1e8)]);
+    let what = "a step of 1 s at 1e8 m/s in a gap of 1e-9 m";
     assert_eq!(timed(&m, what, 1.0), Status::Error);
     assert!(m.heard()[0].text.contains("more than 10000000 impacts"));
     // SAFETY: the instance is alive.
@@ -42,8 +42,8 @@ fn a_step_of_absurdly_many_impacts_ends_with_an_error_and_a_reset_helps() {
 
 #[test]
 fn with_losses_the_same_ends_in_contact() {
-    let m = with(&[(4, 1e-9), (12, 1e9)]);
-    let what = "a step of 1 s at 1e9 m/s in a gap of 1e-9 m, r = 0.65";
+    let m = with(&[(4, 1e-9), (12, 1e8)]);
+    let what = "a step of 1 s at 1e8 m/s in a gap of 1e-9 m, r = 0.65";
     assert_eq!(timed(&m, what, 1.0), Status::Ok);
 }
 
@@ -65,4 +65,40 @@ fn a_step_that_could_not_end_is_not_begun() {
         assert_eq!(m.bytes(), before);
     }
     m.well(m.step(0.0, 1.0));
+}
+
+#[test]
+fn a_base_so_far_away_that_the_cavity_is_lost_in_rounding_is_not_followed() {
+    let m = with(&[]);
+    for (vr, value) in [(6, 1e300), (6, -1e14), (7, -1e300), (7, 5e13)] {
+        m.well(m.set_real(vr, value));
+        let before = m.bytes();
+        assert_eq!(timed(&m, "a base far away", 1e-3), Status::Error);
+        assert!(m.heard()[0].text.contains("2^52 half-widths"));
+        assert_eq!(m.bytes(), before);
+        m.well(m.set_real(vr, 0.0));
+    }
+    // SAFETY: one reference, order and value.
+    m.well(unsafe { (m.f.fmi2SetRealInputDerivatives)(m.c, &6, 1, &3, &1e30) });
+    assert_eq!(timed(&m, "a base on its way there", 1.0), Status::Error);
+    assert!(m.heard()[0].text.contains("2^52 half-widths"));
+    m.well(m.step(0.0, 1e-6));
+}
+
+#[test]
+fn a_start_so_far_away_is_refused() {
+    for (vr, value) in [(10, 1e300), (12, -1e300)] {
+        let m = Master::new(&Fmu::plant(), Interface::CoSimulation);
+        m.well(m.set_real(vr, value));
+        // SAFETY: the instance is alive.
+        unsafe {
+            m.well((m.f.fmi2EnterInitializationMode)(m.c));
+            assert_eq!((m.f.fmi2ExitInitializationMode)(m.c), Status::Error);
+        }
+        let heard = &m.heard()[0].text;
+        assert!(
+            heard.contains("der(q") && heard.contains("2^52 half-widths"),
+            "{heard}"
+        );
+    }
 }

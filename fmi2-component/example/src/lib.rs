@@ -84,7 +84,10 @@ impl Component for Tank {
         &self.label
     }
 
-    fn set_string(&mut self, String::label: String, value: &str) -> Result<(), Refusal> {
+    fn set_string(&mut self, variable: String, value: &str) -> Result<(), Refusal> {
+        if value.is_empty() {
+            return Err(variable.variable().refuse("\"\"", "text that is not empty"));
+        }
         self.label = value.into();
         Ok(())
     }

@@ -109,8 +109,23 @@ fn experiment(root: Node) -> String {
         "{} s to {} s in steps of {} s",
         escape(said("startTime")),
         escape(said("stopTime")),
-        escape(said("stepSize"))
+        escape(&rounded(said("stepSize")))
     )
+}
+
+/// A number as a reader wants it: no more than six digits. The description has them all.
+fn rounded(text: &str) -> String {
+    match text.parse::<f64>() {
+        Ok(number) if text.len() > 8 => {
+            let six: f64 = format!("{number:.5e}").parse().unwrap_or(number);
+            if (1e-3..1e6).contains(&six.abs()) {
+                format!("{six}")
+            } else {
+                format!("{six:e}")
+            }
+        }
+        _ => text.to_owned(),
+    }
 }
 
 fn table(out: &mut String, root: Node, causality: &str, heading: &str) {
@@ -134,6 +149,9 @@ fn row(variable: Node) -> String {
     let said = |name| escape(variable.attribute(name).unwrap_or_default());
     let content = variable.children().find(Node::is_element);
     let value = |name| escape(content.and_then(|c| c.attribute(name)).unwrap_or_default());
+    let start = content
+        .and_then(|c| c.attribute("start"))
+        .unwrap_or_default();
     let unit = match value("unit").as_str() {
         "1" => String::new(),
         unit => unit.to_owned(),
@@ -141,7 +159,7 @@ fn row(variable: Node) -> String {
     format!(
         "<tr><td><code>{}</code></td><td>{}</td><td>{unit}</td><td>{}</td><td>{}</td></tr>\n",
         said("name"),
-        value("start"),
+        escape(&rounded(start)),
         said("variability"),
         said("description"),
     )
@@ -176,6 +194,21 @@ mod tests {
                 assert!(page.contains(&description), "{name}");
             }
             assert!(page.contains("<svg") && files[1].1.starts_with(b"\x89PNG"));
+        }
+    }
+
+    #[test]
+    fn numbers_have_no_more_digits_than_a_reader_wants() {
+        for (exact, shown) in [
+            ("0.0011343573395537938", "0.00113436"),
+            ("9.246125558182298e-05", "9.24613e-5"),
+            ("-1.5707963267948966", "-1.5708"),
+            ("11680", "11680"),
+            ("1e-6", "1e-6"),
+            ("true", "true"),
+            ("", ""),
+        ] {
+            assert_eq!(rounded(exact), shown);
         }
     }
 

@@ -62,12 +62,12 @@ class Bench:
         connections = self.structure.iter(f"{SSP}Description}}Connection")
         return [Wire(*(connection.get(name) for name in names)) for connection in connections]
 
-    @property
+    @cached_property
     def step(self) -> float:
         """The communication step: the controller's sample time."""
         return self.values("controller")["sample_time"]
 
-    @property
+    @cached_property
     def steps(self) -> int:
         """Steps in the default experiment."""
         (experiment,) = self.structure.iter(f"{SSP}Description}}DefaultExperiment")

@@ -1,0 +1,146 @@
+//! What a master reads of the plant: worked out once after a step, and looked up when asked for.
+
+use super::derivatives;
+use super::variables::Real;
+use super::{LoViNes, Progress, Rig};
+use crate::{BaseMotion, Plant};
+use std::cell::Cell;
+
+/// How many outputs are kept.
+const KEPT: usize = 11;
+
+/// Where an output is kept, in the order of the variable table, so that this is a subtraction; `KEPT` for what is not.
+#[inline]
+const fn place(variable: Real) -> usize {
+    match variable {
+        Real::q1 => 0,
+        Real::der_q1 => 1,
+        Real::q2 => 2,
+        Real::der_q2 => 3,
+        Real::v => 4,
+        Real::w => 5,
+        Real::der_w => 6,
+        Real::base => BASE,
+        Real::phase => 8,
+        Real::impact_time => 9,
+        Real::impact_velocity => 10,
+        _ => KEPT,
+    }
+}
+
+const BASE: usize = 7;
+
+/// Outputs as they were at the end of the last step; NaN where one is to be worked out.
+#[derive(Clone, Debug)]
+pub(super) struct Outputs([Cell<f64>; KEPT]);
+
+impl Default for Outputs {
+    fn default() -> Self {
+        Self([const { Cell::new(f64::NAN) }; KEPT])
+    }
+}
+
+impl Outputs {
+    /// The value, or NaN.
+    #[inline(always)]
+    pub fn get(&self, variable: Real) -> f64 {
+        match self.0.get(place(variable)) {
+            Some(kept) => kept.get(),
+            None => f64::NAN,
+        }
+    }
+
+    /// The inputs have changed, and with them where the base is.
+    #[inline]
+    pub fn forget_base(&self) {
+        self.0[BASE].set(f64::NAN);
+    }
+}
+
+impl LoViNes {
+    /// Keeps what masters read after a step; whether displacements are such that a cavity can be told.
+    #[inline]
+    pub(super) fn keep_outputs(&mut self) -> bool {
+        let Rig::Steps(plant) = &self.rig else {
+            return false;
+        };
+        let (now, tally) = (plant.reading(), plant.tally());
+        let (state, w) = (now.state, now.relative_displacement);
+        self.outputs.0 = [
+            state.q1,
+            state.dq1,
+            state.q2,
+            state.dq2,
+            state.q1 + self.epsilon * state.q2,
+            w,
+            state.dq1 - state.dq2,
+            now.base.unwrap_or(f64::NAN),
+            f64::NAN,
+            tally.impact_time,
+            tally.impact_velocity,
+        ]
+        .map(Cell::new);
+        self.reach.holds(&state) && w.abs() <= self.parameters.half_width
+    }
+
+    /// A value that is not kept.
+    #[cold]
+    #[inline(never)]
+    pub(super) fn work_out(&self, variable: Real) -> f64 {
+        match &self.rig {
+            Rig::Steps(plant) => self.of_plant(plant, variable),
+            Rig::Equations(hybrid) => self.of_equations(hybrid, variable),
+        }
+    }
+
+    /// A value that follows from the plant's state.
+    fn of_plant(&self, plant: &Plant, variable: Real) -> f64 {
+        let state = match self.progress {
+            Progress::UnderWay => plant.state(),
+            _ => self.start,
+        };
+        match variable {
+            Real::q1 => state.q1,
+            Real::der_q1 => state.dq1,
+            Real::q2 => state.q2,
+            Real::der_q2 => state.dq2,
+            Real::v => {
+                let state = plant.state();
+                state.q1 + self.epsilon * state.q2
+            }
+            Real::w => plant.relative_displacement(),
+            Real::der_w => plant.relative_velocity(),
+            Real::base => self.base(plant),
+            Real::phase => plant.base().phase.radians(),
+            Real::impact_time => plant.tally().impact_time,
+            Real::impact_velocity => plant.tally().impact_velocity,
+            Real::energy => plant.energy(self.base(plant)),
+            Real::dissipated => plant.tally().dissipated,
+            _ => self
+                .setting(variable)
+                .unwrap_or_else(|| derivatives::of_instant(&self.instant(plant), variable)),
+        }
+    }
+
+    /// The displacement of the base with the inputs as they are set now; worked out once, for there is a sine in it.
+    fn base(&self, plant: &Plant) -> f64 {
+        let kept = &self.outputs.0[BASE];
+        if kept.get().is_nan() {
+            kept.set(if self.inputs_set {
+                self.base_motion(plant).displacement()
+            } else {
+                plant.base_displacement()
+            });
+        }
+        kept.get()
+    }
+
+    /// The base as it stands, with the inputs as they are set now.
+    pub(super) fn base_motion(&self, plant: &Plant) -> BaseMotion {
+        if self.inputs_set {
+            plant.base().with(self.drive)
+        } else {
+            plant.base()
+        }
+    }
+}

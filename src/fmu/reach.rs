@@ -1,0 +1,59 @@
+//! How far displacements may go: where rounding is as wide as the cavity, nothing can be said of contacts any more, and
+//! finding that out takes seconds.
+
+use crate::{Drive, InvalidValue, Parameters, State};
+
+/// So many half-widths: there the next number is one half-width away.
+const RESOLUTION: f64 = 1.0 / f64::EPSILON;
+
+/// The largest displacements and velocities that make sense with a cavity.
+#[derive(Clone, Copy, Default)]
+pub(super) struct Reach {
+    /// m.
+    displacement: f64,
+    /// m/s: it leads to no more than that displacement.
+    velocity: f64,
+}
+
+impl Reach {
+    pub fn of(parameters: &Parameters) -> Self {
+        let displacement = parameters.half_width * RESOLUTION;
+        Self {
+            displacement,
+            velocity: displacement * parameters.fastest_rate(),
+        }
+    }
+
+    /// Whether a state is within; one that is not a number is not.
+    #[inline]
+    pub fn holds(&self, state: &State) -> bool {
+        state.q1.abs() <= self.displacement && state.dq1.abs() + state.dq2.abs() <= self.velocity
+    }
+
+    /// Whether the base stays within for so long under `drive`.
+    #[inline]
+    pub fn holds_base(&self, drive: &Drive, step: f64) -> bool {
+        let [u0, derivatives @ ..] = drive.signal;
+        let moved = if derivatives == [0.0; 3] {
+            0.0
+        } else {
+            let [u1, u2, u3] = derivatives.map(f64::abs);
+            step * (u1 + step * (u2 + step * u3))
+        };
+        u0.abs() + drive.amplitude.abs() + moved <= self.displacement
+    }
+
+    /// Refuses a start that is not within.
+    pub fn check(&self, start: &State) -> Result<(), InvalidValue> {
+        let (far, fast) = (self.displacement, self.velocity);
+        let near = "at most 2^52 half-widths: beyond, the rounding of displacements is wider than the cavity";
+        let slow = "a velocity that leads no further than 2^52 half-widths: beyond, the rounding of displacements is wider \
+                    than the cavity";
+        let name = "q1 (displacement of the primary mass)";
+        InvalidValue::unless(start.q1.abs() <= far, name, start.q1, "m", near)?;
+        let name = "der(q1) (velocity of the primary mass)";
+        InvalidValue::unless(start.dq1.abs() <= fast, name, start.dq1, "m/s", slow)?;
+        let name = "der(q2) (velocity of the particle)";
+        InvalidValue::unless(start.dq2.abs() <= fast, name, start.dq2, "m/s", slow)
+    }
+}
