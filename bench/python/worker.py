@@ -1,6 +1,7 @@
 """A program that answers requests, a line of JSON each, and is killed when it does not."""
 
 import json
+import os
 import select
 import subprocess
 
@@ -20,7 +21,10 @@ class Worker:
 
     def start(self):
         pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE}
-        self.process = subprocess.Popen(self.command, text=True, bufsize=1, **pipes)
+        # The libraries are built. A program that has cargo see to that once more would have them made anew, with the
+        # features that they have alone: in the middle of the run, and at the next one back again.
+        environment = os.environ | {"CARGO": "true"}
+        self.process = subprocess.Popen(self.command, text=True, bufsize=1, env=environment, **pipes)
         if self.greets:
             line = self.process.stdout.readline()
             if not line:
