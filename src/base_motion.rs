@@ -183,13 +183,30 @@ pub(crate) fn two_sum<T: Lane>(a: T, b: T) -> (T, T) {
     (sum, (a - (sum - part)) + (b - part))
 }
 
+/// The leading half of the digits, and the rest (Veltkamp).
+pub(crate) fn halves(x: f64) -> (f64, f64) {
+    let scaled = 134_217_729.0 * x; // 2^27 + 1
+    let high = scaled - (scaled - x);
+    (high, x - high)
+}
+
+/// A coefficient that is used again and again, given with what rounding has kept out of it, in two parts: the product with
+/// both has no error that is the same every time.
+///
+/// Added to a product that has been rounded already, so small a number as the rounding error would be lost at every turn.
+/// The first part is short, so that the second is large enough to count.
+pub(crate) fn evenly(coefficient: f64, missed: f64) -> (f64, f64) {
+    let (head, rest) = halves(coefficient);
+    if head.is_finite() {
+        (head, rest + missed)
+    } else {
+        // Beyond 1e300 the splitting overflows.
+        (coefficient, 0.0)
+    }
+}
+
 /// `a b` as a rounded product and its rounding error (Dekker, with Veltkamp's splitting: no FMA instruction needed).
 pub(crate) fn product(a: f64, b: f64) -> (f64, f64) {
-    let halves = |x: f64| {
-        let scaled = 134_217_729.0 * x; // 2^27 + 1
-        let high = scaled - (scaled - x);
-        (high, x - high)
-    };
     let rounded = a * b;
     let ((a1, a2), (b1, b2)) = (halves(a), halves(b));
     let error = ((a1 * b1 - rounded) + a1 * b2 + a2 * b1) + a2 * b2;
@@ -197,9 +214,11 @@ pub(crate) fn product(a: f64, b: f64) -> (f64, f64) {
     (rounded, if error.is_finite() { error } else { 0.0 })
 }
 
-/// Sine and cosine of `omega t`, exact to the last digits even after millions of turns.
-pub(crate) fn sincos_of_product(omega: f64, t: f64) -> (f64, f64) {
+/// Sine and cosine of `omega t`, exact to the last digits even after millions of turns; `omega` is a frequency and what
+/// rounding has kept out of it.
+pub(crate) fn sincos_of_product((omega, omega_missed): (f64, f64), t: f64) -> (f64, f64) {
     let (angle, missed) = product(omega, t);
+    let missed = missed + omega_missed * t;
     let (sin, cos) = libm::sincos(angle);
     (sin + missed * cos, cos - missed * sin)
 }

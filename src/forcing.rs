@@ -61,7 +61,7 @@ impl Forcing {
                 lambda: Complex64::new(-delta, omega_d),
                 omega_d,
                 gain: f / Complex64::new(0.0, 2.0 * omega_d),
-                near: Complex64::new(delta, omega - omega_d),
+                near: Complex64::new(delta, oscillator.detuning(omega, omega_d)),
                 far: Complex64::new(delta, omega + omega_d).inv(),
             },
             _ => Answer::Steady(

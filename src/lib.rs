@@ -5,6 +5,7 @@ pub mod base_motion;
 #[cfg(feature = "batch")]
 pub mod batch;
 pub mod clearance;
+mod creep;
 pub mod crossing;
 pub mod equations;
 pub mod flight;

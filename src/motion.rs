@@ -6,6 +6,7 @@
 //! changed since the start, which is what a particle hopping on its wall is made of.
 
 use crate::base_motion::{BaseMotion, sincos_of_product};
+use crate::creep::Creep;
 use crate::forcing::{Answer, Forcing, divided_difference};
 use crate::oscillator::{Oscillator, Transition};
 use num_complex::Complex64;
@@ -27,6 +28,8 @@ pub struct Motion<'a> {
     phasor: Option<Complex64>,
     /// What follows the signal: position polynomial.
     follower: [f64; 4],
+    /// Where that is the signal itself: what its curvature and jerk do to the departure from it, m/s² and m/s³.
+    pushed: Option<(Creep, [f64; 2])>,
     x0: f64,
     v0: f64,
     /// Position and velocity less those of the follower (and of a steady answer).
@@ -41,7 +44,12 @@ impl<'a> Motion<'a> {
         base: BaseMotion,
         (x0, v0): (f64, f64),
     ) -> Self {
-        let follower = follower(oscillator, base.drive.signal);
+        let pushed = push(oscillator, base.drive.signal);
+        let follower = if pushed.is_some() {
+            base.drive.signal
+        } else {
+            follower(oscillator, base.drive.signal)
+        };
         let mut free = (x0 - follower[0], v0 - follower[1]);
         let phasor = phasor(&base);
         if let (Some(z), Answer::Steady(h)) = (phasor, forcing.answer) {
@@ -55,6 +63,7 @@ impl<'a> Motion<'a> {
             base,
             phasor,
             follower,
+            pushed,
             x0,
             v0,
             free,
@@ -81,6 +90,11 @@ impl<'a> Motion<'a> {
         let p = &self.follower;
         let mut x = p[0] + t * (p[1] + t * (p[2] + t * p[3]));
         let mut v = p[1] + t * (2.0 * p[2] + t * 3.0 * p[3]);
+        if let Some((creep, [steady, growing])) = self.pushed {
+            let ((once, twice), m) = (creep.pushed(t), self.oscillator.transition(t));
+            x += steady * once + growing * twice;
+            v += steady * m.xv + growing * once;
+        }
         let (y, dy) = self.free;
         let apply = |m: &Transition| (m.xx * y + m.xv * dy, m.vx * y + m.vv * dy);
         let Some(z) = self.phasor else {
@@ -96,7 +110,8 @@ impl<'a> Motion<'a> {
                 near,
                 far,
             } => {
-                let decayed = turn(omega_d, t) * libm::exp(lambda.re * t);
+                let (sin, cos) = self.oscillator.turned(omega_d, t);
+                let decayed = Complex64::new(cos, sin) * libm::exp(lambda.re * t);
                 let m = self.oscillator.oscillating(omega_d, decayed.im, decayed.re);
                 let (free, dfree) = apply(&m);
                 let first = divided_difference(near, t, turned, decayed);
@@ -281,7 +296,7 @@ impl Series {
 
 /// `e^{i omega t}`.
 fn turn(omega: f64, t: f64) -> Complex64 {
-    let (sin, cos) = sincos_of_product(omega, t);
+    let (sin, cos) = sincos_of_product((omega, 0.0), t);
     Complex64::new(cos, sin)
 }
 
@@ -301,6 +316,15 @@ fn phasor(base: &BaseMotion) -> Option<Complex64> {
 
 fn power<const N: usize>(x: f64) -> f64 {
     (0..N).fold(1.0, |product, _| product * x)
+}
+
+/// `-u''` of a bent signal `u` and what it grows by, where the oscillator creeps: the departure from the signal obeys
+/// `z'' + 2 delta z' + omega0² z = -u''`.
+fn push(oscillator: &Oscillator, [_, _, u2, u3]: [f64; 4]) -> Option<(Creep, [f64; 2])> {
+    if u2 == 0.0 && u3 == 0.0 {
+        return None;
+    }
+    Some((Creep::of(oscillator)?, [-2.0 * u2, -6.0 * u3]))
 }
 
 /// The polynomial motion that follows a polynomial base signal `u`: `u + s` with `s'' + 2 delta s' + omega0² s = -u''`.

@@ -8,6 +8,8 @@ mod course;
 mod cross;
 mod hop;
 mod reading;
+mod strides;
+mod written;
 
 use crate::base_motion::{BaseMotion, Drive};
 use crate::crossing::Origin;
@@ -19,6 +21,7 @@ use crate::wall::{ImpactLaw, Wall};
 use course::Course;
 pub use reading::Reading;
 use serde::{Deserialize, Serialize};
+use written::Written;
 
 /// A rebound that would lift the particle less than this fraction of the half-width off its wall cannot be told from
 /// contact in double precision.
@@ -103,7 +106,7 @@ enum Contact {
 }
 
 /// An oscillator and its answer to the frequency in use: coefficients are kept while the frequency stays.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug)]
 struct Driven {
     oscillator: Oscillator,
     forcing: Forcing,
@@ -129,6 +132,7 @@ impl Driven {
 
 /// The plant: parameters, what follows from them, and the state.
 #[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[serde(into = "Written", from = "Written")]
 pub struct Plant {
     parameters: Parameters,
     mass_ratio: f64,
@@ -206,7 +210,7 @@ impl Plant {
     /// Parameters that make no sense; the old ones stay.
     pub fn retune(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         parameters.validate()?;
-        self.settle();
+        self.catch_up();
         let joint = parameters.primary_mass + parameters.particle_mass;
         self.mass_ratio = parameters.mass_ratio();
         self.law = ImpactLaw::new(&parameters);
@@ -236,7 +240,7 @@ impl Plant {
     /// Positions and velocities now.
     #[inline]
     pub fn state(&self) -> State {
-        let (now, _) = self.now();
+        let now = self.now();
         State {
             q1: now.x,
             dq1: now.v,
@@ -247,25 +251,25 @@ impl Plant {
 
     /// Relative displacement `w = q1 - q2`, m.
     pub fn relative_displacement(&self) -> f64 {
-        self.now().0.w
+        self.now().w
     }
 
     /// Relative velocity `w'`, m/s.
     pub fn relative_velocity(&self) -> f64 {
-        self.now().0.relative_velocity()
+        self.now().relative_velocity()
     }
 
     /// `v = q1 + epsilon q2`, m: the displacement of the centre of mass times `1 + epsilon`.
     #[inline]
     pub fn centre(&self) -> f64 {
-        let (now, _) = self.now();
+        let now = self.now();
         now.x + self.mass_ratio * (now.x - now.w)
     }
 
     /// The base motion as it stands: drive, and the phase its oscillator has reached.
     pub fn base(&self) -> BaseMotion {
         BaseMotion {
-            phase: self.now().1,
+            phase: self.course.phase(self.base.phase),
             ..self.base
         }
     }
@@ -273,8 +277,8 @@ impl Plant {
     /// Displacement of the base now, m.
     #[inline]
     pub fn base_displacement(&self) -> f64 {
-        if self.course.wave().is_some() {
-            self.base.drive.signal[0] + self.base.drive.amplitude * self.now().0.turn.1
+        if self.course.quick {
+            self.base.drive.signal[0] + self.base.drive.amplitude * self.now().turn.1
         } else {
             self.base.displacement()
         }
@@ -297,7 +301,7 @@ impl Plant {
     /// `displacement`, m.
     pub fn energy(&self, displacement: f64) -> f64 {
         let p = &self.parameters;
-        let (now, _) = self.now();
+        let now = self.now();
         let stretch = now.x - displacement;
         0.5 * (p.primary_mass * now.v * now.v
             + p.particle_mass * now.particle * now.particle

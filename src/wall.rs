@@ -1,6 +1,6 @@
 //! The two walls of the cavity, and what happens at an impact.
 
-use crate::base_motion::{product, two_sum};
+use crate::base_motion::{evenly, product, two_sum};
 use crate::lane::{Lane, Lanes};
 use crate::parameters::Parameters;
 use serde::{Deserialize, Serialize};
@@ -39,9 +39,9 @@ impl Wall {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ImpactLaw<T = f64> {
     restitution: T,
-    /// Velocity taken from the primary mass per unit of approach: `(1 + r) m/(M + m)`, and what rounding has kept out of it.
+    /// Velocity taken from the primary mass per unit of approach, `(1 + r) m/(M + m)`, as the sum of two numbers.
     ///
-    /// That rounding has the same sign at every impact: without the second part a million elastic ones would gain energy.
+    /// Its rounding has the same sign at every impact: as one number, a million elastic ones would gain energy by it.
     primary_share: (T, T),
     /// `m/(M + m)`.
     particle_fraction: T,
@@ -75,7 +75,7 @@ impl ImpactLaw {
             + (wanted_missed - got_missed + factor_missed * p.particle_mass - share * total_missed);
         Self {
             restitution: p.restitution,
-            primary_share: (share, lost / total),
+            primary_share: evenly(share, lost / total),
             particle_fraction: p.particle_mass / total,
             half_relative_mass: 0.5 * p.relative_mass(),
         }
@@ -101,8 +101,8 @@ impl<T: Lane> ImpactLaw<T> {
     #[inline(always)]
     pub fn rebound(&self, primary: T, relative: T) -> Rebound<T> {
         let (r, one) = (self.restitution, T::splat(1.0));
-        let (share, missed) = self.primary_share;
-        let primary = primary - (share * relative + missed * relative);
+        let (head, tail) = self.primary_share;
+        let primary = primary - (head * relative + tail * relative);
         let after = -r * relative;
         Rebound {
             primary,

@@ -8,19 +8,20 @@ import json
 import os
 import random
 import statistics
+import subprocess
 import sys
 import time
 from dataclasses import dataclass, field
-from decimal import Decimal
 from pathlib import Path
 
-import picture
 import report
-from scenes import LOOP_PERIODS, load
+from judge import judge
+from scenes import LOOP_PERIODS, fingerprint, load
 from worker import Missing, Worker
 
-HERE = Path(__file__).parent.parent
+HERE = Path(__file__).resolve().parent.parent
 TOLERANCES = (1e-6, 1e-9, 1e-12)
+COARSE = (1e-4, 1e-6, 1e-9)
 STEPS = (100, 1000, 10000)
 
 # Name in the tables, side, name there, settings, those of a quick run.
@@ -29,20 +30,32 @@ METHODS = [
     ("plant, one step in all", "rust", "plant-one-step", (0,), (0,)),
     ("plant, 100 times the steps", "rust", "plant-100", (0,), ()),
     ("plant, general search only", "rust", "plant-general", (0,), (0,)),
+    ("plant, batch", "rust", "batch", (0,), (0,)),
+    ("plant, batch on all cores", "rust", "batch-all-cores", (0,), (0,)),
+    ("plant, batch, one step in all", "rust", "batch-one-step", (0,), (0,)),
     ("plant, C interface", "rust", "c-interface", (0,), (0,)),
     ("plant, FMPy", "python", "fmpy", (0,), (0,)),
-    ("closed form + Brent", "rust", "brent", TOLERANCES, (1e-12,)),
-    ("heyoka", "python", "heyoka", (1e-9, 1e-12, 1e-15), (1e-15,)),
-    ("diffsol, Tsit45", "rust", "diffsol-tsit45", TOLERANCES, (1e-9,)),
-    ("diffsol, BDF", "rust", "diffsol-bdf", (1e-6, 1e-9), ()),
+    ("closed form + Brent", "rust", "brent", TOLERANCES, (1e-9, 1e-12)),
+    ("heyoka", "python", "heyoka", (1e-9, 1e-12, 1e-15), (1e-9, 1e-15)),
+    ("diffsol, Tsit45", "rust", "diffsol-tsit45", TOLERANCES, (1e-6, 1e-9)),
+    ("diffsol, BDF", "rust", "diffsol-bdf", COARSE, ()),
     ("CVODE, Adams", "python", "cvode", TOLERANCES, (1e-9,)),
     ("scipy DOP853", "python", "scipy-dop853", TOLERANCES, (1e-9,)),
-    ("scipy LSODA", "python", "scipy-lsoda", TOLERANCES, ()),
-    ("scipy Radau", "python", "scipy-radau", (1e-6, 1e-9), ()),
-    ("RK4 + bisection", "rust", "rk4", STEPS, (1000,)),
-    ("Moreau time-stepping", "rust", "moreau", STEPS, (1000,)),
+    ("scipy LSODA", "python", "scipy-lsoda", TOLERANCES, (1e-9,)),
+    ("scipy Radau", "python", "scipy-radau", COARSE, ()),
+    ("RK4 + bisection", "rust", "rk4", STEPS, (100, 1000)),
+    ("Moreau time-stepping", "rust", "moreau", STEPS, (100, 1000)),
 ]
 QUICK = ("steady", "grazing", "chatter", "loop")
+# Scenes whose truth takes longer to work out than a run of this program should: a quick run takes all from the file.
+KEPT_TRUTH = ("long",)
+GROWTH = {
+    "periods": (1e6, 1e4),
+    "impacts": (1e7, 1e5),
+    "samples per period": (1e4, 1e3),
+    "plants in a batch, one core": (1e5, 1e4),
+    "plants in a batch, all cores": (1e5, 1e4),
+}
 
 
 @dataclass
@@ -55,10 +68,10 @@ class Row:
     name: str
     setting: float
     times: list = field(default_factory=list)
+    rounds: int = 0
     error: float | None = None
     impacts: int = 0
     failure: str | None = None
-    asked: int = 0
 
     @property
     def median(self):
@@ -72,24 +85,11 @@ class Row:
         low, _, high = statistics.quantiles(self.times, n=4, method="inclusive")
         return 0.5 * (high - low) / self.median
 
-
-def judge(row, scene, truth, answer, checks):
-    """Sets error, impacts, and what is wrong with the answer, if something is."""
-    row.impacts = answer["impacts"]
-    wanted = {entry[0]: entry[1:5] for entry in truth["rows"]}
-    error, widest = Decimal(0), 0.0
-    for n, state in zip(checks, answer["states"], strict=True):
-        error = max(error, *(abs(Decimal(x) - Decimal(y)) for x, y in zip(state, wanted[n], strict=True)))
-        widest = max(widest, abs(state[0] - state[2]) / scene["b"])
-    row.error = float(error)
-    if row.error != row.error or widest > 1.01:
-        row.failure = f"tunnelled through the wall: |w| = {widest:.3g} b"
-    elif row.name in ("rk4", "moreau") and row.error < 0.1 * scene["b"] and row.impacts == truth["impacts"]:
-        return
-    elif row.impacts < truth["impacts"] and not truth["events"] and row.error > 1e-7:
-        row.failure = f"missed impacts: {row.impacts} of {truth['impacts']}, error {row.error:.0e}"
-    elif row.error > 0.1 * scene["b"]:
-        row.failure = f"lost the trajectory: error {row.error:.1g}"
+    def enough(self):
+        """Whether it is left out of a round: what came to no end would not again; three are enough of a slow one."""
+        if not self.times:
+            return self.rounds > 0
+        return self.rounds >= (3 if self.median > 0.5e9 else 5 if self.median > 0.05e9 else 12)
 
 
 class Bench:
@@ -100,23 +100,51 @@ class Bench:
         self.scenes = load(HERE / "scenes.json")
         self.truth = json.loads((HERE / "truth.json").read_text())
         self.limit = 1.5 if options.quick else 8.0
-        self.budget = 0.05 if options.quick else 0.1
-        self.workers, self.missing, self.versions = {}, {}, []
-        self.rows = []
+        self.budget = 0.03 if options.quick else 0.1
+        self.workers, self.missing, self.versions, self.unasked = {}, {}, [], []
+        self.rows, self.truth_notes = [], []
         self.load = os.getloadavg()[0]
+        self.told = time.monotonic()
 
-    def say(self, text, end="\n"):
-        if end == "\n" or sys.stderr.isatty():
-            print(text, end=end, file=sys.stderr, flush=True)
+    def say(self, text):
+        print(text, file=sys.stderr, flush=True)
+
+    def progress(self, text):
+        """In one line where somebody watches; else a line every ten seconds."""
+        if sys.stderr.isatty():
+            print(f"\r{text:100.100}", end="", file=sys.stderr, flush=True)
+        elif time.monotonic() - self.told > 10:
+            self.told = time.monotonic()
+            self.say(text)
+
+    def check_truth(self):
+        """That the truth is of these scenes, that its script leads where the reference trajectories do, and, but for a
+        quick run, that it comes out again."""
+        for name, scene in self.scenes.items():
+            if self.truth.get(name, {}).get("of") != fingerprint(scene):
+                sys.exit(f"error: bench/truth.json is not of the scene {name}: scripts/bench --truth works it out anew")
+        script = [sys.executable, HERE / "python/truth.py", "--check", HERE.parent / "tests/reference/trajectories"]
+        if not self.options.quick:
+            again = [name for name in self.scenes if name not in KEPT_TRUTH]
+            script += [HERE / "scenes.json", "--compare", HERE / "truth.json", "--only", *again]
+        self.say("Checking the truth ...")
+        done = subprocess.run([str(part) for part in script], capture_output=True, text=True, check=False)
+        if done.returncode:
+            sys.exit(f"error: the truth does not hold: {done.stdout}{done.stderr}")
+        self.truth_notes = done.stdout.strip().splitlines()
+        for line in self.truth_notes:
+            self.say(f"  {line}")
 
     def start(self):
         rust = Worker([self.options.worker, HERE], greets=False)
         known = rust.ask({"methods": True}, 60)
-        scenes = [s for s in self.scenes if s in self.truth and (not self.options.quick or s in QUICK)]
+        self.rust = rust
+        scenes = [s for s in self.scenes if not self.options.quick or s in QUICK]
         for method, side, name, settings, quick in METHODS:
             if self.options.quick:
                 settings = quick
             if not settings:
+                self.unasked.append(method)
                 continue
             if side == "rust":
                 if name not in known:
@@ -132,103 +160,129 @@ class Bench:
                     continue
                 self.versions.append(self.workers[name].hello["version"])
             self.rows += [Row(scene, method, side, name, setting) for scene in scenes for setting in settings]
-        self.rehearse()
         for method, why in self.missing.items():
             self.say(f"warning: {method} is left out: {why}")
+        self.rehearse()
 
     def rehearse(self):
         """Loads and compiles what will be needed: that is not in the times."""
-        for name in ("c-interface", "heyoka"):
-            for row in [row for row in self.rows if row.name == name]:
-                self.say(f"\rpreparing {name}: {row.scene}        ", end="")
-                request = {"scene": row.scene, "method": name, "setting": row.setting, "checks": [1]}
-                self.workers[name].ask(request | {"budget": 0.0, "limit": 0.01}, 600)
-        self.say("")
+        for row in self.rows:
+            if row.name in ("c-interface", "heyoka"):
+                self.progress(f"preparing {row.name}: {row.scene}")
+                request = {"scene": row.scene, "method": row.name, "setting": row.setting, "checks": [1]}
+                self.workers[row.name].ask(request | {"budget": 0.0, "limit": 0.01}, 600)
 
     def run(self, row):
         scene = self.scenes[row.scene]
         checks = scene["checks"]
-        if row.name == "plant-one-step":
+        row.rounds += 1
+        if row.name.endswith("one-step"):
             if row.scene == "loop":
                 row.failure = "not asked: the drive changes with every sample"
                 return
             checks = checks[-1:]
         request = {"scene": row.scene, "method": row.name, "setting": row.setting, "checks": checks}
-        if row.name == "plant-one-step":
+        if row.name.endswith("one-step"):
             request["checks"] = []
-        answer = self.workers[row.name].ask(request | {"budget": self.budget, "limit": self.limit}, 4 * self.limit + 30)
-        row.asked += 1
+        patience = 4 * self.limit + 30
+        answer = self.workers[row.name].ask(request | {"budget": self.budget, "limit": self.limit}, patience)
+        ended = answer and not answer.get("error") and not answer.get("failure")
+        if row.times and not ended:
+            return  # It has come to an end before; this time something else kept the machine busy.
         if answer is None:
-            row.failure = f"hung: killed after {4 * self.limit + 30:g} s"
-        elif answer.get("error") or answer.get("failure"):
+            row.failure = f"hung: killed after {patience:g} s"
+        elif not ended:
             row.failure = answer.get("error") or answer["failure"]
         else:
             row.times += answer["ns"]
             if row.error is None:
-                judge(row, scene, self.truth[row.scene], answer, checks)
+                row.impacts = answer["impacts"]
+                row.error, row.failure = judge(row.name, scene, self.truth[row.scene], answer, checks)
 
     def measure(self):
-        """Round after round, in an order drawn anew each time, until the time is over."""
+        """Round after round, in an order drawn anew each time."""
         began = time.monotonic()
-        total = self.options.seconds or (60 if self.options.quick else 1000)
+        total = self.options.seconds or (45 if self.options.quick else 1200)
         dice = random.Random(1)
-        rounds = 0
-        while rounds < 3 or (rounds < 12 and time.monotonic() - began < 0.7 * total):
-            order = [row for row in self.rows if row.failure is None or row.asked == 0]
+        for turn in range(1, 13):
+            order = [row for row in self.rows if not row.enough()]
             dice.shuffle(order)
-            for n, row in enumerate(order):
+            for n, row in enumerate(order, 1):
                 gone = time.monotonic() - began
-                self.say(
-                    f"\rround {rounds + 1}: {n + 1} of {len(order)}, {gone:.0f} s, {row.scene}: {row.method:28}", end=""
+                if turn > 3 and gone > total:
+                    break
+                self.progress(
+                    f"round {turn}: {n} of {len(order)}, {gone:.0f} s, {row.scene}: {row.method} {row.setting:g}"
                 )
-                slow = row.times and row.median > 0.25e9
-                if rounds and (gone > total or (slow and rounds > 2) or (slow and gone > 0.6 * total)):
-                    continue
                 self.run(row)
-            rounds += 1
-            self.say(f"\nround {rounds} done after {time.monotonic() - began:.0f} s")
-            if time.monotonic() - began > total:
-                break
+        self.progress("")
+        self.say(f"Measured for {time.monotonic() - began:.0f} s")
 
     def growth(self):
-        """What grows: points of size and ns."""
-        rust = next(iter(self.workers.values()))
-        most = {"periods": 1e6, "impacts": 1e7, "samples per period": 1e4}
-        if self.options.quick:
-            most = {"periods": 1e4, "impacts": 1e5, "samples per period": 1e3}
-        curves = {}
-        for what, end in most.items():
-            answer = rust.ask({"growth": what, "budget": 0.05, "most": end}, 120)
-            curves[what] = answer["points"] if answer else []
-        loop = rust.ask({"closed_loop": LOOP_PERIODS, "budget": 0.2 if self.options.quick else 2.0}, 60)
+        """What grows: points of size, ns, units of work; and ns per sample of plant and controller."""
+        curves = {what: [] for what in GROWTH}
+        for turn in range(1, 4):
+            for what, (most, quick) in GROWTH.items():
+                self.progress(f"growth, round {turn}: {what}")
+                request = {"growth": what, "budget": 0.02, "most": quick if self.options.quick else most}
+                answer = self.rust.ask(request, 200) or {}
+                old, new = curves[what], answer.get("points", [])
+                curves[what] = [min(pair, key=lambda point: point[1]) for pair in zip(old, new, strict=False)] or new
+        loop = self.rust.ask({"closed_loop": LOOP_PERIODS, "budget": 0.2 if self.options.quick else 2.0}, 60)
         return curves, loop["ns"]
+
+    def profiles(self):
+        """What each scene asks of the plant, counted."""
+        return {scene: self.rust.ask({"profile": scene}, 60) for scene in dict.fromkeys(row.scene for row in self.rows)}
 
 
 def main():
     parser = argparse.ArgumentParser(
-        prog="scripts/bench", description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+        prog="scripts/bench",
+        description=__doc__,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="scripts/bench --truth works bench/truth.json out anew, in a quarter of an hour.",
     )
     parser.add_argument(
-        "--quick", action="store_true", help="four scenes, one setting for most methods; under two minutes"
+        "--quick",
+        action="store_true",
+        help=f"four scenes ({', '.join(QUICK)}), one or two settings of a method; under two minutes",
+    )
+    parser.add_argument(
+        "--keep", action="store_true", help="renew docs/performance.*, docs/work-precision.svg and the README's ratios"
     )
     parser.add_argument(
         "--out", type=Path, default=Path("out/bench"), help="folder for tables and picture (default %(default)s)"
     )
-    parser.add_argument("--seconds", type=float, help="about how long to measure")
-    parser.add_argument("--worker", required=True, help=argparse.SUPPRESS)
-    parser.add_argument("--fmu", required=True, help=argparse.SUPPRESS)
+    parser.add_argument("--seconds", type=float, help="about how long to measure; every row gets three rounds")
+    parser.add_argument("--worker", help=argparse.SUPPRESS)
+    parser.add_argument("--fmu", help=argparse.SUPPRESS)
     options = parser.parse_args()
+    if options.keep and options.quick:
+        parser.error("--keep is for a full run: it renews what docs/ says of all scenes")
+    if options.keep:
+        options.out = HERE.parent / "docs"
+    began = time.monotonic()
     bench = Bench(options)
+    bench.check_truth()
     bench.start()
     bench.measure()
     growth, loop = bench.growth()
+    profiles = bench.profiles()
     for worker in set(bench.workers.values()):
         worker.end()
+    import picture  # Here, so that --help needs nothing installed.
+
     options.out.mkdir(parents=True, exist_ok=True)
-    text = report.write(bench, growth, loop, options.out)
+    text = report.write(bench, growth, loop, profiles, options.out)
     picture.write(bench, options.out / "work-precision.svg")
+    if options.keep:
+        report.renew(HERE.parent / "README.md", bench)
     print(text)
-    bench.say(f"Written: {options.out}/performance.txt, .csv, .md and work-precision.svg")
+    bench.say(
+        f"Written: {options.out}/performance.txt, .csv, .md and work-precision.svg"
+        f"{', and the README' if options.keep else ''}, after {time.monotonic() - began:.0f} s"
+    )
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ chatter is part of what is measured.
 import json
 import sys
 import time
-from importlib.metadata import version
+from importlib.metadata import PackageNotFoundError, version
 from math import cos, pi, sin
 from pathlib import Path
 
@@ -283,7 +283,7 @@ def run(peer, scene, setting, checks, limit):
             method.step(amplitude, omega, duration)
         except Failed as failure:
             done = 100 * (n - 1) / len(scene["drives"])
-            how = f"time limit: {done:.0f} % done after {limit:g} s" if "time limit" in str(failure) else str(failure)
+            how = f"time limit: {done:.2f} % done after {limit:g} s" if "time limit" in str(failure) else str(failure)
             raise Failed(how) from None
         if n in wanted:
             states.append([float(x) for x in method.y])
@@ -312,7 +312,11 @@ def answer(peer, scenes, request):
 def main():
     peer = PEERS[sys.argv[1]]
     scenes = load(Path(sys.argv[2]))
-    print(json.dumps({"version": f"{peer.package} {version(peer.package)}"}), flush=True)
+    try:
+        found = version(peer.package)
+    except PackageNotFoundError:
+        sys.exit(f"the package {peer.package} is not installed")
+    print(json.dumps({"version": f"{peer.package} {found}"}), flush=True)
     for line in sys.stdin:
         print(json.dumps(answer(peer, scenes, json.loads(line))), flush=True)
 

@@ -4,29 +4,29 @@ import csv
 import io
 import os
 import platform
+import re
 import statistics
 from datetime import date
 from math import log
 from pathlib import Path
 
+from judge import short, time_at_the_limit
+
 # Where there is nothing to be said.
 NONE = "\N{EN DASH}"
-
-SKIPPED = {
-    "steady": "the general search: while the particle is faster than the primary mass can ever be, the wall ahead is "
-    "met once, and the other one is left behind",
-    "decay": "the general search, and the forced terms: nothing drives",
-    "grazing": "little: a contact this close to none is left to the general search",
-    "chatter": "rebounds below the resolution of doubles; while stuck, the search for impacts",
-    "long": "as in the steady scene; a step holds 1000 periods, and nothing is worked out between them",
-    "damped": "nothing: heavy damping is not for the quick way",
-    "resonance": "nothing: an undamped resonance is not for the quick way",
-    "loop": "the search in samples that no wall is within reach of; but each sample brings another frequency",
-}
 
 
 def number(x, digits=3):
     return NONE if x is None else f"{x:.{digits}g}"
+
+
+def ratio(x):
+    """A ratio to two digits."""
+    if x is None:
+        return NONE
+    if x < 100:
+        return f"{x:.2g}"
+    return f"{float(f'{x:.2g}'):.0f}" if x < 10000 else f"{x:.0e}".replace("e+0", "e")
 
 
 def machine():
@@ -49,10 +49,14 @@ def least_per_impact(row, bench):
 def cells(row, bench):
     """What a row shows, in the order of HEAD."""
     setting = {0: NONE}.get(row.setting, f"{row.setting:g}" if row.setting >= 1 else f"{row.setting:.0e}")
-    if not row.times:
-        return [row.method, setting, NONE, NONE, NONE, str(row.asked), NONE, NONE, row.failure or "not run"]
     plant = next((r for r in bench.rows if r.scene == row.scene and r.name == "plant" and r.times), None)
-    ratio = number(min(row.times) / min(plant.times)) if plant else NONE
+    if not row.times:
+        rough = time_at_the_limit(row.failure, bench.limit, bench.truth[row.scene]["impacts"])
+        pace = "~" + number(rough, 2) if rough else NONE
+        times = "~" + number(rough / least_per_impact(plant, bench), 2) if rough and plant else NONE
+        how = re.sub(r"[\d.]+(?= %)", lambda done: f"{float(done[0]):.2g}", row.failure or "not run")
+        return [row.method, setting, pace, NONE, NONE, NONE, NONE, times, how]
+    compared = number(min(row.times) / min(plant.times)) if plant else NONE
     spread = NONE if row.spread is None else f"±{100 * row.spread:.0f} %"
     verdict = row.failure or "ok"
     return [
@@ -63,7 +67,7 @@ def cells(row, bench):
         number(least_per_impact(row, bench)),
         str(len(row.times)),
         f"{row.error:.0e}",
-        ratio,
+        compared,
         verdict,
     ]
 
@@ -89,67 +93,180 @@ def markdown_table(head, rows):
     return "\n".join("| " + " | ".join(row) + " |" for row in [head, align, *rows])
 
 
-def savings(bench):
-    """Per scene: what the plant skipped, and how much longer it takes with the general search only."""
+def savings(bench, profiles):
+    """Per scene: what the plant skipped, counted and timed."""
     rows = []
     for scene in dict.fromkeys(row.scene for row in bench.rows):
         times = {row.name: min(row.times) for row in bench.rows if row.scene == scene and row.times}
-        saved = number(times["plant-general"] / times["plant"]) if {"plant", "plant-general"} <= times.keys() else NONE
-        once = number(times["plant"] / times["plant-one-step"]) if {"plant", "plant-one-step"} <= times.keys() else NONE
-        rows.append([scene, saved, once, SKIPPED[scene]])
-    return ["scene", "general search only / plant", "a step at a time / one step in all", "what the plant skips"], rows
+
+        def over(slow, quick, times=times):
+            return times[slow] / times[quick] if {slow, quick} <= times.keys() else None
+
+        general, once = over("plant-general", "plant"), over("plant", "plant-one-step")
+        abreast = ratio(over("plant", "batch")) + "; " + ratio(over("plant-one-step", "batch-one-step"))
+        rows.append([scene, ratio(general), ratio(once), abreast, skipped(profiles[scene], general)])
+    head = ["scene", "by its search", "by not stopping", "by going abreast", "what the plant skips"]
+    return head, rows
+
+
+def skipped(profile, general):
+    """In words, with the counts and what leaving it out was measured to save."""
+    words = []
+    if general is not None:
+        if general > 1.5:
+            words.append(
+                "the general search: a particle faster than the primary mass can be meets the wall ahead once, and "
+                "what is known of a drive that stays is kept"
+            )
+        else:
+            words.append("little of the general search, which meets most contacts here")
+    empty = profile["empty"] / profile["steps"]
+    if empty > 0.01:
+        words.append(f"a search within {100 * empty:.3g} % of the steps, in which nothing is met")
+    if profile["at_rest"] > 0:
+        words.append(
+            f"impacts too low for doubles (it follows {profile['impacts']}), and any search during the "
+            f"{100 * profile['at_rest']:.0f} % of the time at rest on a wall"
+        )
+    return "; ".join(words)
 
 
 def exponent(points):
     """Slope of the least-squares line through the upper half of the points, log against log."""
     upper = points[len(points) // 2 :]
-    xs, ys = [log(x) for x, _ in upper], [log(y) for _, y in upper]
-    return statistics.linear_regression(xs, ys)
+    xs, ys = [log(point[0]) for point in upper], [log(point[1]) for point in upper]
+    return statistics.linear_regression(xs, ys).slope
+
+
+UNITS = {"periods": "period", "impacts": "impact", "samples per period": "sample"}
+
+
+def seconds(x):
+    """A time that somebody waits for."""
+    for unit, name in ((86400, "days"), (3600, "h"), (60, "min")):
+        if x >= 2 * unit:
+            return f"{x / unit:.2g} {name}"
+    return f"{x:.2g} s"
 
 
 def growths(curves):
     rows = []
     for what, points in curves.items():
         if len(points) < 4:
+            rows.append([what, "not measured: no answer in time", NONE, NONE, NONE])
             continue
-        slope, _ = exponent(points)
-        size, ns = points[-1]
+        slope = exponent(points)
+        size, ns, work = points[-1]
+        unit = UNITS.get(what, "plant and period")
         rows.append(
             [
                 what,
                 f"{points[0][0]:.0f} to {size:.0f}",
                 f"{slope:.3f}",
-                f"{ns / size:.3g} ns",
-                f"{1e-9 * ns * 1000**slope:.3g} s",
+                f"{ns / work:.3g} ns per {unit}",
+                f"{1000 * size:.0e}: {seconds(1e-9 * ns * 1000**slope)}".replace("e+0", "e").replace("e+", "e"),
             ]
         )
-    rows.append(["plants in a batch", "not measured: no batch interface yet", NONE, NONE, NONE])
-    return ["what grows", "range", "exponent", "each, at the end", "a thousand times that"], rows
+    return ["what grows", "range", "exponent", "at the end of it", "extrapolated"], rows
+
+
+GROWTH_NOTE = (
+    "Steady 1:1 motion. Periods: a step each; impacts: all in one step; samples: over 100 periods; batches: plants of "
+    "which no two are equal, 100 periods in one step. The exponent is that of the upper half of the range, in "
+    "logarithms; the last column goes a thousand times further by it."
+)
+SAVINGS_NOTE = (
+    "Measured, as ratios of run times. By its search: every contact by the general search, over the plant as it is. By "
+    "not stopping: the plant as asked, over everything in one step. By going abreast: the plant alone, over one of a "
+    "batch on one core, a step at a time; and the same with everything in one step."
+)
 
 
 def notes(bench):
     yield f"{date.today().isoformat()}, {machine()}; " + ("quick run" if bench.options.quick else "full run") + "."
     yield f"Other programs kept {bench.load:.1f} cores busy when it began; least times are what to compare."
     yield "Peers: " + ", ".join(dict.fromkeys(bench.versions)) + "; diffsol and roots as Cargo.lock has them."
+    if bench.missing:
+        yield "Left out: " + "; ".join(f"{method} ({why})" for method, why in bench.missing.items()) + "."
+    if bench.unasked:
+        yield "Not in a quick run: " + ", ".join(bench.unasked) + "; other scenes and settings."
+    yield "Truth, checked in this run: " + "; ".join(bench.truth_notes) + "."
     yield (
-        "Every method is asked for the state after each step of the scene, on one thread; just-in-time compilation "
-        "(heyoka) and setting up are not in the times. Runs take turns in an order drawn anew each round."
+        "Every method is asked for the state after each step of the scene, and stops there as a co-simulation master "
+        "has it. It runs on one thread, but for the batch on all cores. A batch is of equal plants; its times are of "
+        "one of them. Just-in-time compilation (heyoka) and setting up are not in the times. Runs take turns in an "
+        "order drawn anew each round. In the loop, all methods get the drive recorded from controller and plant."
     )
     yield (
         "ns/impact: median of the wall time of a run over the true number of impacts; spread: half the distance of the "
         "quartiles; least: the quickest run, which other programs on the machine disturb least, and which time/plant "
         "compares. Error: the largest difference of any displacement or velocity from 40-digit arithmetic, over up to "
-        "50 instants (half-width of the cavity 1, natural frequency 1). The verdict says how a method failed."
+        "50 instants (half-width of the cavity 1, natural frequency 1). The verdict says how a method failed: an error "
+        "above 0.1 is a lost trajectory, a particle more than 0.01 beyond its wall (Moreau's scheme: 0.1) at one of "
+        "these instants has tunnelled; a gap width is twice the half-width."
     )
     yield (
         "Setting: tolerance, or for RK4 and Moreau steps per period. The time limit of a run is "
-        + f"{bench.limit:g} s."
+        + f"{bench.limit:g} s; ~ before a time says that the run was given up then, and what it would have come to."
     )
-    if bench.missing:
-        yield "Left out: " + "; ".join(f"{method} ({why})" for method, why in bench.missing.items()) + "."
 
 
-def write(bench, growth, loop, folder):
+# Methods in the table at a glance, and how they are called there.
+SHOWN = {
+    "plant": "plant: error",
+    "brent": "closed form + Brent",
+    "heyoka": "heyoka",
+    "diffsol-tsit45": "diffsol",
+    "cvode": "CVODE",
+    "scipy-dop853": "scipy DOP853",
+    "rk4": "RK4",
+    "moreau": "Moreau",
+}
+MATRIX_NOTE = (
+    "Run time over the plant's (Rust interface, a step at a time), and error, of each method at its most accurate "
+    "setting that came to an end; or how it failed at all of them."
+)
+
+
+def glance(bench, scene, name):
+    """A cell of the table at a glance."""
+    rows = [row for row in bench.rows if (row.scene, row.name) == (scene, name)]
+    plant = next(row for row in bench.rows if (row.scene, row.name) == (scene, "plant"))
+    good = [row for row in rows if row.times and row.failure is None]
+    if good:
+        best = min(good, key=lambda row: row.error)
+        if name == "plant":
+            return f"{best.error:.0e}"
+        return f"{ratio(min(best.times) / min(plant.times))}; {best.error:.0e}"
+    return ", ".join(dict.fromkeys(short(row.failure) for row in rows if row.failure)) or NONE
+
+
+def matrix(bench):
+    scenes = list(dict.fromkeys(row.scene for row in bench.rows))
+    shown = {name: title for name, title in SHOWN.items() if any(row.name == name for row in bench.rows)}
+    return ["scene", *shown.values()], [[scene, *(glance(bench, scene, name) for name in shown)] for scene in scenes]
+
+
+BEGIN, END = "<!-- ratios: scripts/bench --keep writes what is between these marks -->", "<!-- /ratios -->"
+
+
+def renew(readme, bench):
+    """Puts the table at a glance into the README, between its marks."""
+    text = readme.read_text()
+    before, rest = text.split(BEGIN)
+    after = rest.split(END)[1]
+    table = markdown_table(*matrix(bench))
+    replace(readme, f"{before}{BEGIN}\n{MATRIX_NOTE}\n\n{table}\n{END}{after}")
+
+
+def replace(file, text):
+    """Writes a file as a whole or not at all."""
+    part = file.with_suffix(".part")
+    part.write_text(text)
+    part.replace(file)
+
+
+def write(bench, growth, loop, profiles, folder):
     """Writes performance.txt, .csv and .md; returns the text."""
     scenes = list(dict.fromkeys(row.scene for row in bench.rows))
     text, mark = ["Run time against error", ""], ["# Run time against error", ""]
@@ -157,13 +274,17 @@ def write(bench, growth, loop, folder):
         text += [note, ""]
         mark += [note, ""]
     mark += [
-        "`scripts/bench --out docs` writes this page; the picture's numbers are in [performance.csv](performance.csv).",
+        "`scripts/bench --keep` writes this page; the picture's numbers are in [performance.csv](performance.csv).",
         "",
     ]
     mark += ["![Error against time, scene by scene](work-precision.svg)", ""]
+    head, rows = matrix(bench)
+    mark += ["## At a glance", "", MATRIX_NOTE, "", markdown_table(head, rows), ""]
+    text += ["At a glance", MATRIX_NOTE, text_table(head, rows), ""]
     for scene in scenes:
         title = bench.scenes[scene]["title"]
-        count = f"{bench.truth[scene]['impacts']} impacts"
+        impacts = bench.truth[scene]["impacts"]
+        count = f"{impacts} impact{'s' if impacts != 1 else ''}"
         rows = [cells(row, bench) for row in bench.rows if row.scene == scene]
         text += [f"{scene}: {title} ({count})", text_table(HEAD, rows), ""]
         mark += [
@@ -175,18 +296,18 @@ def write(bench, growth, loop, folder):
             "",
         ]
     sections = [
-        ("What the plant skips, and what that saves", *savings(bench)),
-        ("Cost as work grows", *growths(growth)),
+        ("What the plant skips, and what that saves", SAVINGS_NOTE, *savings(bench, profiles)),
+        ("Cost as work grows", GROWTH_NOTE, *growths(growth)),
     ]
-    for title, head, rows in sections:
-        text += [title, text_table(head, rows), ""]
-        mark += [f"## {title}", "", markdown_table(head, rows), ""]
+    for title, note, head, rows in sections:
+        text += [title, note, text_table(head, rows), ""]
+        mark += [f"## {title}", "", note, "", markdown_table(head, rows), ""]
     sample = f"{min(loop):.3g} ns per sample (least), {statistics.median(loop):.3g} (median)"
     pair = f"Plant and controller in the loop: {sample}."
     text += [pair]
     mark += [pair, ""]
-    (folder / "performance.txt").write_text("\n".join(text) + "\n")
-    (folder / "performance.md").write_text("\n".join(mark).rstrip() + "\n")
+    replace(folder / "performance.txt", "\n".join(text) + "\n")
+    replace(folder / "performance.md", "\n".join(mark).rstrip() + "\n")
     table = io.StringIO()
     sheet = csv.writer(table, lineterminator="\n")
     sheet.writerow(
@@ -211,5 +332,5 @@ def write(bench, growth, loop, folder):
         sheet.writerow(
             [row.scene, row.method, row.setting, *timed, len(row.times), truth, row.impacts, error, row.failure or ""]
         )
-    (folder / "performance.csv").write_text(table.getvalue())
+    replace(folder / "performance.csv", table.getvalue())
     return "\n".join(text)

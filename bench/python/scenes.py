@@ -6,6 +6,7 @@ All numbers are doubles, and mean exactly that: the truth is worked out for the 
 """
 
 import argparse
+import hashlib
 import json
 import subprocess
 from math import pi
@@ -96,6 +97,12 @@ def checks(steps):
     """Up to 50 steps after which the state is compared, the last among them."""
     every = max(1, -(-steps // 50))
     return sorted({*range(every, steps + 1, every), steps})
+
+
+def fingerprint(scene):
+    """What the truth of a scene hangs on."""
+    kept = {key: scene[key] for key in ("M", "k", "c", "m", "b", "r", "start", "drives", "checks")}
+    return hashlib.sha256(json.dumps(kept).encode()).hexdigest()[:16]
 
 
 def load(file):

@@ -329,22 +329,39 @@ def check(folder):
             sys.exit(f"{file.stem}: more than 1e-18")
 
 
+def compare(scenes, truth, only):
+    """Works scenes out again, and fails where they differ."""
+    from scenes import load
+
+    for name, scene in load(scenes).items():
+        if name in only:
+            digits = DIGITS_IN_CHATTER if scene["sticks"] else DIGITS
+            rows, rig = trajectory(scene, scene["drives"], digits)
+            if (rows, rig.events, rig.impacts) != tuple(truth[name][key] for key in ("rows", "events", "impacts")):
+                sys.exit(f"{name}: not what the file says")
+            print(f"{name}: {rig.impacts} impacts, the same again")
+
+
 def main():
     parser = argparse.ArgumentParser(description="The scenes in 40-digit arithmetic.")
     parser.add_argument("scenes", nargs="?", type=Path)
     parser.add_argument("-o", dest="out", type=Path)
-    parser.add_argument("--only", help="one scene alone; the others stay as they are in the file")
+    parser.add_argument("--only", nargs="+", help="these scenes alone; the others stay as they are in the file")
+    parser.add_argument("--compare", type=Path, help="a file of truths that should come out again; nothing is written")
     parser.add_argument("--check", type=Path, help="a folder of trajectories to be checked against")
     options = parser.parse_args()
     if options.check:
         check(options.check)
     if not options.scenes:
         return
-    from scenes import load
+    from scenes import fingerprint, load
 
+    if options.compare:
+        compare(options.scenes, json.loads(options.compare.read_text()), options.only)
+        return
     truth = json.loads(options.out.read_text()) if options.out.exists() else {}
     for name, scene in load(options.scenes).items():
-        if options.only and name != options.only:
+        if options.only and name not in options.only:
             continue
         digits = DIGITS_IN_CHATTER if scene["sticks"] else DIGITS
         total = len(scene["drives"])
@@ -366,6 +383,7 @@ def main():
             )
             sensitivity = float(mp.nstr(change / mpf("1e-13"), 3))
         truth[name] = {"impacts": rig.impacts, "events": rig.events, "sensitivity": sensitivity, "rows": rows}
+        truth[name] = {"of": fingerprint(scene)} | truth[name]
         print(f"{name}: {rig.impacts} impacts, sensitivity {sensitivity}, {rig.events[:4]}")
         part = options.out.with_suffix(".part")
         part.write_text(json.dumps(truth, indent=0) + "\n")

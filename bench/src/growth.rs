@@ -1,12 +1,16 @@
-//! How the plant's run time grows with the work: periods, impacts, samples per period.
+//! How the plant's run time grows with the work: periods, impacts, samples per period, plants in a batch.
 
 use std::path::Path;
 use std::time::Instant;
 
-use lovines::{Drive, Plant};
+use lovines::batch::Batch;
+use lovines::{Drive, Plant, State};
 use serde_json::{Value, json};
 
 use crate::scene::Scene;
+
+/// Periods that samples and batches are followed for.
+const PERIODS: usize = 100;
 
 /// Least wall time, ns, of repetitions for about `budget` seconds; at least two.
 fn least(budget: f64, mut run: impl FnMut() -> u64) -> (f64, u64) {
@@ -21,50 +25,103 @@ fn least(budget: f64, mut run: impl FnMut() -> u64) -> (f64, u64) {
     (best, work)
 }
 
-/// Points `[work, ns]` up to `most` of what grows.
+/// The steady scene, from where a set of runs can begin.
+struct Steady {
+    plant: Plant,
+    drive: Drive,
+    period: f64,
+}
+
+impl Steady {
+    fn load(folder: &Path) -> Result<Self, String> {
+        let scene = Scene::load(folder, "steady")?;
+        let first = scene.steps[0];
+        Ok(Self {
+            plant: Plant::new(scene.parameters, scene.state()).map_err(|e| e.to_string())?,
+            drive: first.drive(),
+            period: first.duration,
+        })
+    }
+
+    fn step_by_step(&self, steps: usize, duration: f64) -> u64 {
+        let mut plant = self.plant;
+        for _ in 0..steps {
+            plant.advance(self.drive, duration);
+            std::hint::black_box((plant.centre(), plant.base_displacement()));
+        }
+        steps as u64
+    }
+
+    fn in_one_step(&self, impacts: f64) -> u64 {
+        let mut plant = self.plant;
+        plant.advance(self.drive, 0.5 * impacts * self.period);
+        plant.tally().impacts
+    }
+
+    /// Plants of which no two are equal: each has a drive and a start of its own, all near the 1:1 motion.
+    fn batch(&self, size: usize) -> Result<Batch, String> {
+        let start = self.plant.state();
+        let members = (0..size).map(|n| {
+            let shade = 1.0 + 1e-3 * ((n as f64 * 0.618_033_988_749_895).fract() - 0.5);
+            let state = State {
+                dq2: start.dq2 * shade,
+                ..start
+            };
+            let drive = Drive::harmonic(self.drive.amplitude * shade, self.drive.omega * shade);
+            Plant::new(*self.plant.parameters(), state).map(|plant| (plant, drive))
+        });
+        let members: Result<Vec<_>, _> = members.collect();
+        Ok(Batch::new(members.map_err(|e| e.to_string())?))
+    }
+
+    /// A batch in one step, with the state of each plant read after it.
+    fn batch_in_one_step(&self, batch: &mut Batch, advance: fn(&mut Batch, f64)) -> u64 {
+        advance(batch, PERIODS as f64 * self.period);
+        for plant in batch.plants() {
+            std::hint::black_box(plant.state());
+        }
+        0
+    }
+}
+
+/// Points `[size, ns, units of work]` up to `most` of what grows.
 ///
 /// # Errors
 /// An unknown name of what grows, or a scene that cannot be read.
 pub fn measure(folder: &Path, what: &str, budget: f64, most: f64) -> Result<Value, String> {
-    let scene = Scene::load(folder, "steady")?;
-    let first = scene.steps[0];
-    let drive = Drive::harmonic(first.amplitude, first.omega);
-    let plant = Plant::new(scene.parameters, scene.state()).map_err(|e| e.to_string())?;
-    let step_by_step = |steps: usize, duration: f64| {
-        let mut plant = plant;
-        for _ in 0..steps {
-            plant.advance(drive, duration);
-            std::hint::black_box((plant.centre(), plant.base_displacement()));
-        }
-        plant.tally().impacts
-    };
+    let scene = Steady::load(folder)?;
     let mut points = Vec::new();
     let mut size = 10.0;
     while size <= most * 1.001 {
-        let (ns, impacts) = match what {
-            "periods" => least(budget, || step_by_step(size as usize, first.duration)),
-            "impacts" => least(budget, || {
-                let mut plant = plant;
-                plant.advance(drive, 0.5 * size * first.duration);
-                plant.tally().impacts
-            }),
+        let count = f64::round(size) as usize;
+        let (ns, work) = match what {
+            "periods" => least(budget, || scene.step_by_step(count, scene.period)),
+            "impacts" => least(budget, || scene.in_one_step(size)),
             "samples per period" => least(budget, || {
-                step_by_step(100 * size as usize, first.duration / size)
+                scene.step_by_step(PERIODS * count, scene.period / count as f64)
             }),
+            "plants in a batch, one core" | "plants in a batch, all cores" => {
+                let mut batch = scene.batch(count)?;
+                let advance = if what.ends_with("one core") {
+                    Batch::advance_on_one_core
+                } else {
+                    Batch::advance
+                };
+                let (ns, _) = least(budget, || scene.batch_in_one_step(&mut batch, advance));
+                (ns, (count * PERIODS) as u64)
+            }
             _ => {
                 return Err(format!(
-                    "{what}: there are periods, impacts, samples per period"
+                    "{what}: there are periods, impacts, samples per period, plants in a batch, one core (or: all cores)"
                 ));
             }
         };
-        points.push([
-            if what == "impacts" {
-                impacts as f64
-            } else {
-                size
-            },
-            ns,
-        ]);
+        let grown = if what == "impacts" {
+            work as f64
+        } else {
+            count as f64
+        };
+        points.push([grown, ns, work as f64]);
         size *= 10f64.sqrt();
     }
     Ok(json!({ "points": points }))

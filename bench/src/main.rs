@@ -2,7 +2,8 @@
 //!
 //! ```text
 //! {"scene": "steady", "method": "plant", "setting": 0, "checks": [10, 20], "budget": 0.1, "limit": 10}
-//! {"growth": "periods", "budget": 0.1}
+//! {"growth": "periods", "budget": 0.1, "most": 1e6}
+//! {"profile": "chatter"}
 //! {"record": 20}
 //! ```
 
@@ -12,6 +13,7 @@ mod closed_loop;
 mod growth;
 mod method;
 mod methods;
+mod profile;
 mod scene;
 
 use std::io::{BufRead, Write};
@@ -37,6 +39,9 @@ enum Request {
         growth: String,
         budget: f64,
         most: f64,
+    },
+    Profile {
+        profile: String,
     },
     Record {
         record: usize,
@@ -74,6 +79,7 @@ fn answer(folder: &Path, request: &str) -> Result<serde_json::Value, String> {
             budget,
             most,
         } => growth::measure(folder, &growth, budget, most),
+        Request::Profile { profile } => profile::of(&Scene::load(folder, &profile)?),
         Request::Record { record } => Ok(json!({"drives": closed_loop::record(record)})),
         Request::Loop {
             closed_loop,

@@ -30,6 +30,11 @@ pub trait Method: Sized {
     /// Impacts so far, as this method counts them.
     fn impacts(&self) -> u64;
 
+    /// How many of the scene's rigs go at once: what a run costs is shared among them.
+    fn at_once() -> usize {
+        1
+    }
+
     /// Makes of the scene's steps those that this method takes.
     fn steps(steps: &[Step]) -> Vec<Step> {
         steps.to_vec()
@@ -39,7 +44,7 @@ pub trait Method: Sized {
 /// What came of a few runs of one method on one scene.
 #[derive(Debug, Default, Serialize)]
 pub struct Answer {
-    /// Wall times, ns, without the setting up.
+    /// Wall times, ns, without the setting up; of one rig where several go at once.
     pub ns: Vec<f64>,
     /// States after the steps that were asked for.
     pub states: Vec<[f64; 4]>,
@@ -97,13 +102,13 @@ fn run<M: Method>(
         }
         if n % asked_every == 0 && began.elapsed() > limit {
             return Err(Failure(format!(
-                "time limit: {:.0} % done after {} s",
+                "time limit: {:.2} % done after {} s",
                 100.0 * (n + 1) as f64 / steps.len() as f64,
                 limit.as_secs_f64()
             )));
         }
     }
-    let ns = began.elapsed().as_nanos() as f64;
+    let ns = began.elapsed().as_nanos() as f64 / M::at_once() as f64;
     if states.is_empty() {
         states.push(method.state());
     }

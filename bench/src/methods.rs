@@ -1,5 +1,6 @@
 //! The methods, one a file.
 
+mod batch;
 mod brent;
 mod c_interface;
 #[cfg(feature = "diffsol")]
@@ -8,6 +9,8 @@ mod impact;
 mod moreau;
 mod plant;
 mod rk4;
+
+pub use plant::begin;
 
 use std::time::Duration;
 
@@ -20,6 +23,9 @@ pub const NAMES: &[&str] = &[
     "plant-one-step",
     "plant-100",
     "plant-general",
+    "batch",
+    "batch-all-cores",
+    "batch-one-step",
     "c-interface",
     "brent",
     "rk4",
@@ -47,6 +53,9 @@ pub fn measure_named(
         "plant-one-step" => measure::<plant::OneStep>,
         "plant-100" => measure::<plant::Sampled>,
         "plant-general" => measure::<plant::General>,
+        "batch" => measure::<batch::OneCore>,
+        "batch-one-step" => measure::<batch::InOneStep>,
+        "batch-all-cores" => measure::<batch::AllCores>,
         "c-interface" => measure::<c_interface::Shell>,
         "brent" => measure::<brent::Brent>,
         "rk4" => measure::<rk4::Rk4>,
@@ -99,6 +108,10 @@ mod tests {
             assert!(
                 error_at_the_end(scene, "plant", 0.0) < 1e-11,
                 "{scene}: plant"
+            );
+            assert!(
+                error_at_the_end(scene, "batch", 0.0) < 1e-11,
+                "{scene}: batch"
             );
             assert!(
                 error_at_the_end(scene, "brent", 1e-12) < 1e-9,

@@ -2,7 +2,7 @@
 
 use std::path::Path;
 
-use lovines::{Parameters, State};
+use lovines::{Drive, Parameters, State};
 use serde::Deserialize;
 
 /// What the base does during one step.
@@ -14,6 +14,14 @@ pub struct Step {
     pub omega: f64,
     /// Length of the step, s.
     pub duration: f64,
+}
+
+impl Step {
+    /// As the plant takes it.
+    #[must_use]
+    pub fn drive(&self) -> Drive {
+        Drive::harmonic(self.amplitude, self.omega)
+    }
 }
 
 #[derive(Deserialize)]

@@ -7,6 +7,7 @@ use super::{Contact, MOST_IMPACTS, Plant};
 use crate::base_motion::{Phase, turned};
 use crate::crossing::{Anchor, Free, Origin, Wave};
 use crate::lane::{Lane, Lanes};
+use crate::oscillator::Oscillator;
 use crate::span::{Span, shorter};
 use crate::wall::ImpactLaw;
 
@@ -22,6 +23,7 @@ pub(crate) struct Run {
 /// The plants in their lanes.
 struct Row<const N: usize> {
     waves: [Wave<f64>; N],
+    oscillators: [Oscillator; N],
     wave: Wave<Lanes<N>>,
     law: ImpactLaw<Lanes<N>>,
     anchor: Anchor<Lanes<N>>,
@@ -44,7 +46,7 @@ impl Plant {
         free && match &self.course.landing {
             Some(landing) => landing.fresh,
             // A start on the wall is looked at alone: the particle may be at rest.
-            None => self.course.lag == Span::default() && self.wall_touched().is_none(),
+            None => !self.course.lags() && self.wall_touched().is_none(),
         }
     }
 
@@ -54,6 +56,12 @@ impl Plant {
         plants: [&mut Plant; N],
         duration: f64,
     ) -> [Run; N] {
+        let plants = plants.map(|plant| {
+            if plant.course.stale {
+                plant.course.freshen();
+            }
+            plant
+        });
         let mut row = Row::new(&plants, duration);
         while row.pass() {}
         row.leave(plants, duration)
@@ -63,12 +71,12 @@ impl Plant {
 impl<const N: usize> Row<N> {
     fn new(plants: &[&mut Plant; N], duration: f64) -> Self {
         let all = |f: fn(&Plant) -> f64| Lanes(core::array::from_fn(|n| f(plants[n])));
-        let left: [Span; N] = core::array::from_fn(|n| plants[n].course.lag.plus(duration));
-        let wave = |plant: &Plant| plant.course.rig.expect("asked before");
-        let waves: [Wave<f64>; N] = core::array::from_fn(|n| wave(plants[n]));
+        let left: [Span; N] = core::array::from_fn(|n| plants[n].course.lag().plus(duration));
+        let waves: [Wave<f64>; N] = core::array::from_fn(|n| plants[n].course.rig);
         Self {
             wave: Wave::abreast(waves.each_ref()),
             waves,
+            oscillators: core::array::from_fn(|n| plants[n].alone.oscillator),
             law: ImpactLaw::abreast(core::array::from_fn(|n| &plants[n].law)),
             anchor: Anchor::abreast(core::array::from_fn(|n| &plants[n].course.anchor)),
             state: Origin::abreast(core::array::from_fn(|n| &plants[n].here)),
@@ -179,10 +187,10 @@ impl<const N: usize> Row<N> {
             speed_squared: free.speed_squared.0[lane],
         };
         let anchor = self.waves[lane].next_anchor(
+            &self.oscillators[lane],
             &self.state.of_lane(lane),
             &free,
-            &self.anchor.of_lane(lane),
-            beyond,
+            (&self.anchor.of_lane(lane), beyond),
         );
         self.anchor.put(lane, &anchor);
     }

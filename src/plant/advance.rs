@@ -2,7 +2,7 @@
 
 use super::contact::Moment;
 use super::{Contact, Event, MOST_IMPACTS, Outcome, Plant};
-use crate::base_motion::{Drive, Phase};
+use crate::base_motion::Drive;
 use crate::crossing::Origin;
 use crate::flight::Flight;
 use crate::span::Span;
@@ -28,15 +28,33 @@ impl Plant {
         duration: f64,
         tell: impl FnMut(Event),
     ) -> Outcome {
-        self.adopt(drive);
-        let outcome = if self.course.strides(duration) {
-            self.here = self.course.stride(&self.here, &mut self.base);
-            Outcome::default()
-        } else {
-            self.meet(self.course.lag.plus(duration), duration, tell)
-        };
+        let outcome =
+            if drive == self.base.drive && self.under_way && self.course.strides.stride(duration) {
+                Outcome::default()
+            } else {
+                self.adopt(drive);
+                self.go(duration, tell)
+            };
         self.time += duration;
         outcome
+    }
+
+    /// A step that is none of a run of strides, or the first of one.
+    fn go(&mut self, duration: f64, tell: impl FnMut(Event)) -> Outcome {
+        if self.course.strides.under_way() {
+            self.catch_up();
+        }
+        if !self.course.lags() && self.strides(duration) {
+            return Outcome::default();
+        }
+        self.meet(self.course.lag().plus(duration), duration, tell)
+    }
+
+    /// Begins a run of strides of this length with the first one, if they are ready and meet nothing.
+    fn strides(&mut self, duration: f64) -> bool {
+        let course = &mut self.course;
+        let strides = &mut course.strides;
+        strides.begin(&course.rig, &self.here, course.clear, duration) && strides.stride(duration)
     }
 
     /// Goes on to the end of an advance of which so much is left.
@@ -52,12 +70,14 @@ impl Plant {
     pub(crate) fn adopt(&mut self, drive: Drive) {
         if drive != self.base.drive || !self.under_way {
             self.take(drive);
+        } else {
+            self.course.restless_drive = false;
         }
     }
 
     /// Takes over a new drive and the jump of the base that it brings.
     fn take(&mut self, drive: Drive) {
-        self.settle();
+        self.catch_up();
         let jumps = drive.signal[0] != self.base.drive.signal[0]
             || drive.amplitude != self.base.drive.amplitude;
         if self.under_way && jumps {
@@ -81,46 +101,24 @@ impl Plant {
         }
     }
 
-    /// The state now and the base's phase: as held, or worked out from there.
-    #[inline]
-    pub(super) fn now(&self) -> (Origin<f64>, Phase) {
-        match self.course.wave() {
-            Some(wave) if self.course.lag != Span::default() => {
-                let gone = self.course.gone(wave);
-                let mut now = wave.stride(&self.here, &gone);
-                let b = self.parameters.half_width;
-                now.w = now.w.clamp(-b, b);
-                (now, self.base.phase.turned(gone.angle, 0.0))
-            }
-            _ => (self.here, self.base.phase),
-        }
+    /// The state now: as held, or worked out from there.
+    #[inline(always)]
+    pub(super) fn now(&self) -> Origin<f64> {
+        self.course.now(&self.alone.oscillator, &self.here)
     }
 
-    /// Brings the state that the plant holds up to date. Nothing that can be asked for changes; asking costs less
-    /// afterwards.
-    #[inline]
-    pub fn settle(&mut self) {
-        if self.course.lag != Span::default() {
-            self.catch_up();
+    /// Brings the state that the plant holds up to date.
+    pub(super) fn catch_up(&mut self) {
+        if self.course.lags() {
+            let oscillator = &self.alone.oscillator;
+            (self.course).catch_up(oscillator, &mut self.here, &mut self.base.phase);
         }
-    }
-
-    #[cold]
-    fn catch_up(&mut self) {
-        let phase;
-        (self.here, phase) = self.now();
-        self.base.phase = phase;
-        self.course.catch_up();
-        self.course.face(&mut self.here, phase);
     }
 
     /// A step that an event may fall into; `until` is its end as seen from the origin.
     fn meet(&mut self, until: Span, duration: f64, mut tell: impl FnMut(Event)) -> Outcome {
         if until.seconds() < self.course.clear {
-            self.course.lag = until;
-            if self.course.repeats(duration) {
-                self.settle();
-            }
+            self.wait(until, duration);
             return Outcome::default();
         }
         let mut outcome = Outcome::default();
@@ -138,7 +136,7 @@ impl Plant {
             left: left.seconds(),
         };
         let mut dw = self.here.relative_velocity();
-        if self.course.lag == Span::default()
+        if !self.course.lags()
             && self.contact == Contact::Free
             && let Some(wall) = self.wall_touched()
         {
@@ -159,9 +157,9 @@ impl Plant {
                 dw = 0.0;
                 continue;
             }
-            if self.course.landing.is_none() && self.course.lag != Span::default() {
-                left = left.less(self.course.lag);
-                self.settle();
+            if self.course.landing.is_none() && self.course.lags() {
+                left = left.less(self.course.lag());
+                self.catch_up();
                 // The time it was known to be clear for is over.
                 self.course.clear = 0.0;
                 dw = self.here.relative_velocity();
@@ -184,14 +182,11 @@ impl Plant {
                     dw = self.here.relative_velocity();
                 }
                 if self.course.clear == 0.0 {
-                    self.course.look_out(&self.here);
+                    self.course.look_out(&self.here, left.seconds());
                 }
             }
             if left.seconds() < self.course.clear {
-                self.course.lag = left;
-                if left == Span::of(duration) && self.course.repeats(duration) {
-                    self.settle();
-                }
+                self.wait(left, duration);
                 left = Span::default();
                 break;
             }
@@ -204,6 +199,20 @@ impl Plant {
         }
         outcome.cut_short = left.seconds() > 0.0;
         outcome
+    }
+
+    /// The advance ends `until` after the origin, and meets nothing more.
+    fn wait(&mut self, until: Span, duration: f64) {
+        let whole = until == Span::of(duration);
+        let repeats = (whole || self.course.lags())
+            && (self.course).repeats(&self.alone.oscillator, duration);
+        if repeats && whole && self.strides(duration) {
+            return;
+        }
+        self.course.wait(&self.alone.oscillator, until);
+        if repeats {
+            self.catch_up();
+        }
     }
 
     /// The state has been reached by the general way: nothing is known of what lies ahead.

@@ -1,7 +1,8 @@
-//! What is known of the flight under way: how long the walls are out of reach, where it will arrive, and a step that was
-//! worked out before. All of it only saves work.
+//! What is known of the flight under way: how long the walls are out of reach, where it will arrive, and how far the plant
+//! has come since. All of it only saves work.
 
-use crate::base_motion::{BaseMotion, Drive, Phase};
+use super::strides::Strides;
+use crate::base_motion::{Drive, Phase};
 use crate::crossing::{Anchor, Arrival, Origin, Wave};
 use crate::oscillator::Oscillator;
 use crate::span::Span;
@@ -12,6 +13,23 @@ use serde::{Deserialize, Serialize};
 pub(super) const TURNS_KEPT: u32 = 16;
 /// Shortest step that the state is moved on by, in units of `1/omega0`, squared.
 const SHORTEST_STRIDE: f64 = 1e-6;
+
+/// Anchors are written out as their time: the rest follows from it.
+pub(super) mod by_time {
+    use crate::crossing::Anchor;
+    use serde::{Deserialize, Deserializer, Serialize, Serializer};
+
+    pub fn serialize<S: Serializer>(anchor: &Anchor<f64>, s: S) -> Result<S::Ok, S::Error> {
+        anchor.t.serialize(s)
+    }
+
+    pub fn deserialize<'de, D: Deserializer<'de>>(d: D) -> Result<Anchor<f64>, D::Error> {
+        Ok(Anchor {
+            t: f64::deserialize(d)?,
+            ..Anchor::default()
+        })
+    }
+}
 
 /// An arrival, and when it is.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -29,26 +47,33 @@ pub(super) struct Landing {
 }
 
 /// The flight under way, seen from its *origin*: the state that the plant holds.
-#[derive(Clone, Copy, Debug, Default, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
 pub(super) struct Course {
-    /// Coefficients, where the rig allows the quick way.
-    pub rig: Option<Wave<f64>>,
-    /// Whether the drive allows it, too.
+    /// Coefficients of rig and drive.
+    #[serde(skip)]
+    pub rig: Wave<f64>,
+    /// Whether they allow the quick way.
     pub quick: bool,
-    /// How far the plant has come since the origin.
-    pub lag: Span,
+    /// How far the plant has come since the origin, but for the strides.
+    lag: Span,
     /// No wall is met until this time since the origin, s.
     pub clear: f64,
     pub landing: Option<Landing>,
     /// How often `e^{i phase}` has been turned since it was worked out.
     pub turns: u32,
     /// Near the last arrival.
+    #[serde(with = "by_time")]
     pub anchor: Anchor<f64>,
-    /// The step that was repeated last.
-    stride: Anchor<f64>,
-    /// Whether it has been worked out for the present drive.
-    worked_out: bool,
+    /// Whether the drive has changed since that was worked out.
+    pub stale: bool,
+    /// Whether the drive has changed with this very step, as it does at every step of a controller's.
+    pub restless_drive: bool,
+    /// Near the last lag, where it was the same as the one before.
+    #[serde(with = "by_time")]
+    stop: Anchor<f64>,
+    pub strides: Strides,
     last_duration: f64,
+    last_lag: f64,
 }
 
 impl Course {
@@ -56,34 +81,172 @@ impl Course {
     pub fn new(oscillator: &Oscillator, half_width: f64) -> Self {
         Self {
             rig: Wave::new(oscillator, half_width),
-            ..Self::default()
+            quick: false,
+            lag: Span::default(),
+            clear: 0.0,
+            landing: None,
+            turns: 0,
+            anchor: Anchor::default(),
+            stale: false,
+            restless_drive: false,
+            stop: Anchor::default(),
+            strides: Strides::default(),
+            last_duration: 0.0,
+            last_lag: 0.0,
         }
+    }
+
+    /// Works out again what is not written out.
+    pub fn work_out_again(&mut self, oscillator: &Oscillator, half_width: f64, drive: &Drive) {
+        self.rig = Wave::new(oscillator, half_width);
+        if self.quick {
+            self.rig.take(drive);
+        }
+        for anchor in [&mut self.anchor, &mut self.stop, self.strides.one()] {
+            if anchor.t != 0.0 {
+                *anchor = self.rig.anchor(oscillator, anchor.t);
+            }
+        }
+    }
+
+    /// As it comes back from being written out.
+    #[cfg(test)]
+    pub fn bare(self) -> Self {
+        let only_time = |anchor: Anchor<f64>| Anchor {
+            t: anchor.t,
+            ..Anchor::default()
+        };
+        let mut bare = Self {
+            rig: Wave::default(),
+            anchor: only_time(self.anchor),
+            stop: only_time(self.stop),
+            ..self
+        };
+        *bare.strides.one() = only_time(*bare.strides.one());
+        bare
     }
 
     /// The coefficients, where rig and drive allow the quick way.
     #[inline]
     pub fn wave(&self) -> Option<&Wave<f64>> {
-        if self.quick { self.rig.as_ref() } else { None }
+        if self.quick { Some(&self.rig) } else { None }
     }
 
     /// Forgets what depends on the drive, and begins anew under another one.
     pub fn renew(&mut self, drive: &Drive) {
-        self.quick = self.rig.as_mut().is_some_and(|wave| wave.take(drive));
-        self.anchor = Anchor::default();
-        self.worked_out = false;
+        self.quick = self.rig.take(drive);
+        self.stale = true;
+        self.restless_drive = true;
+        self.stop.t = f64::NAN;
+        self.strides.forget();
         self.leave();
+    }
+
+    /// Makes the anchor one of the present drive: of the free motion it knows all it needs.
+    #[cold]
+    pub fn freshen(&mut self) {
+        self.anchor = self.rig.turned(&self.anchor);
+        self.stale = false;
     }
 
     /// Forgets what depends on the state.
     pub fn leave(&mut self) {
         self.lag = Span::default();
+        self.strides.end();
         self.clear = 0.0;
         self.landing = None;
     }
 
+    /// How far the plant has come since the origin.
+    #[inline]
+    pub fn lag(&self) -> Span {
+        if self.strides.under_way() {
+            self.strides.span()
+        } else {
+            self.lag
+        }
+    }
+
+    /// Whether it has come any way since.
+    #[inline]
+    pub fn lags(&self) -> bool {
+        self.strides.under_way() || self.lag != Span::default()
+    }
+
+    /// The plant has come so far since the origin, and nothing was met.
+    pub fn wait(&mut self, oscillator: &Oscillator, until: Span) {
+        let lag = until.seconds();
+        // A steady motion stops at the same point of its flight again and again.
+        let again = self.rig.are_near(lag, self.last_lag);
+        if again && self.quick && !self.rig.are_near(lag, self.stop.t) {
+            self.stop = self.rig.anchor(oscillator, lag);
+        }
+        self.last_lag = lag;
+        self.lag = until;
+    }
+
+    /// The state now, seen from the origin, which was `here`.
+    #[inline(always)]
+    pub fn now(&self, oscillator: &Oscillator, here: &Origin<f64>) -> Origin<f64> {
+        let mut now = if self.strides.under_way() {
+            self.strides.now(&self.rig, here)
+        } else if self.lag == Span::default() {
+            return *here;
+        } else {
+            self.worked_out(oscillator, here)
+        };
+        let b = self.rig.half_width;
+        // Branches that are never taken cost less than a minimum and a maximum.
+        if now.w > b {
+            now.w = b;
+        } else if now.w < -b {
+            now.w = -b;
+        }
+        now
+    }
+
+    /// The state after the lag. Not inlined: whoever takes strides never comes here.
+    #[inline(never)]
+    fn worked_out(&self, oscillator: &Oscillator, here: &Origin<f64>) -> Origin<f64> {
+        let lag = self.lag.seconds();
+        if self.rig.are_near(lag, self.stop.t) {
+            self.rig.shortly(here, &self.stop, lag)
+        } else {
+            self.rig.after(oscillator, here, lag)
+        }
+    }
+
+    /// The phase of the base now, which was `phase` at the origin.
+    pub fn phase(&self, phase: Phase) -> Phase {
+        if self.strides.taken() == 1 {
+            return self.strides.after_one(phase);
+        }
+        let (whole, missed) = self.lag().parts();
+        if whole == 0.0 {
+            return phase;
+        }
+        let omega = self.rig.omega;
+        (phase.advanced(omega, whole)).turned((0.0, 0.0), omega * missed)
+    }
+
     /// The state has come to where the plant stands.
-    pub fn catch_up(&mut self) {
-        let lag = core::mem::take(&mut self.lag);
+    pub fn catch_up(&mut self, oscillator: &Oscillator, here: &mut Origin<f64>, phase: &mut Phase) {
+        let lag = self.lag();
+        *phase = self.phase(*phase);
+        if self.strides.under_way() {
+            self.turns += self.strides.taken();
+            if self.turns >= TURNS_KEPT {
+                // Before the state is seen by it: what turning has cost stays behind.
+                self.strides.face(*phase);
+                self.turns = 0;
+            }
+            *here = self.now(oscillator, here);
+        } else {
+            *here = self.now(oscillator, here);
+            self.face(here, *phase);
+        }
+        self.strides.end();
+        self.lag = Span::default();
         self.clear = (self.clear - lag.seconds()).max(0.0);
         if let Some(landing) = &mut self.landing {
             landing.at = landing.at.less(lag);
@@ -101,67 +264,27 @@ impl Course {
     }
 
     /// Notes the length of a step that meets nothing. Whether it came before, so that it pays to work it out for good.
-    pub fn repeats(&mut self, duration: f64) -> bool {
+    pub fn repeats(&mut self, oscillator: &Oscillator, duration: f64) -> bool {
         // Tiny steps would add up their roundings: the state is left where it is, and worked out from there when asked for.
-        let worth_it = (self.rig.as_ref())
-            .is_some_and(|wave| duration * duration * wave.omega0_squared > SHORTEST_STRIDE);
+        let worth_it = duration * duration * self.rig.omega0_squared > SHORTEST_STRIDE;
         let again = duration == self.last_duration && worth_it && self.quick;
         self.last_duration = duration;
-        if let (true, Some(wave)) = (again, &self.rig) {
-            self.stride = if self.stride.t == duration {
-                wave.turned(&self.stride)
-            } else {
-                wave.anchor(duration)
-            };
-            self.worked_out = true;
+        if again {
+            self.strides.prepare(&self.rig, oscillator, duration);
         }
         again
     }
 
-    /// Whether a step of this length has been worked out and meets nothing.
-    #[inline]
-    pub fn strides(&self, duration: f64) -> bool {
-        self.worked_out
-            && duration == self.stride.t
-            && duration < self.clear
-            && self.lag == Span::default()
-    }
-
-    /// What time does to the state while it lags behind: worked out before, or now.
-    pub fn gone(&self, wave: &Wave<f64>) -> Anchor<f64> {
-        let lag = self.lag.seconds();
-        if self.worked_out && self.stride.t == lag {
-            self.stride
-        } else {
-            wave.anchor(lag)
-        }
-    }
-
-    /// Such a step.
-    #[inline]
-    pub fn stride(&mut self, here: &Origin<f64>, base: &mut BaseMotion) -> Origin<f64> {
-        let Some(wave) = self.wave() else {
-            unreachable!("a stride is worked out from a wave");
-        };
-        let mut end = wave.stride(here, &self.stride);
-        base.phase = base.phase.turned(self.stride.angle, 0.0);
-        self.turns += 1;
-        self.clear -= self.stride.t;
-        if let Some(landing) = &mut self.landing {
-            landing.at = landing.at.plus(-self.stride.t);
-            landing.fresh = false;
-        }
-        if self.turns >= TURNS_KEPT {
-            self.face(&mut end, base.phase);
-        }
-        end
-    }
-
     /// How long the walls are certainly out of reach of `start`, which has no lag and does not cross; 0 if that is not
-    /// known.
-    pub fn look_out(&mut self, start: &Origin<f64>) {
-        self.clear = self
-            .wave()
-            .map_or(0.0, |wave| wave.clear(start, &wave.free_motion(start)));
+    /// known. Where there will be another drive after the `left` seconds of this step, only whether they are for so long.
+    pub fn look_out(&mut self, start: &Origin<f64>, left: f64) {
+        self.clear = self.wave().map_or(0.0, |wave| {
+            let free = wave.free_motion(start);
+            if self.restless_drive && wave.is_clear(start, &free, 2.0 * left) {
+                2.0 * left
+            } else {
+                wave.clear(start, &free)
+            }
+        });
     }
 }

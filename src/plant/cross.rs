@@ -33,9 +33,10 @@ impl Plant {
             self.course.leave();
         }
         let Course {
-            rig: Some(wave),
+            rig: wave,
             quick: true,
             anchor,
+            stale,
             landing: noted,
             clear,
             turns,
@@ -66,13 +67,22 @@ impl Plant {
                         *clear = 0.5 * distance / start.particle.abs();
                         break;
                     }
+                    if *stale {
+                        *anchor = wave.turned(anchor);
+                        *stale = false;
+                    }
                     let (arrival, near) = wave.arrival(&start, &free, anchor);
                     if !near {
                         guesses += 1;
                         if guesses > MOST_GUESSES {
                             break;
                         }
-                        *anchor = wave.next_anchor(&start, &free, anchor, arrival.beyond);
+                        *anchor = wave.next_anchor(
+                            &self.alone.oscillator,
+                            &start,
+                            &free,
+                            (anchor, arrival.beyond),
+                        );
                         continue;
                     }
                     guesses = 0;

@@ -18,7 +18,7 @@ impl Plant {
     /// [`Self::base_displacement`] one by one.
     #[inline]
     pub fn reading(&self) -> Reading {
-        let (now, _) = self.now();
+        let now = self.now();
         let drive = &self.base.drive;
         Reading {
             state: State {
@@ -28,7 +28,7 @@ impl Plant {
                 dq2: now.particle,
             },
             relative_displacement: now.w,
-            base: (self.course.wave()).map(|_| drive.signal[0] + drive.amplitude * now.turn.1),
+            base: (self.course.quick).then(|| drive.signal[0] + drive.amplitude * now.turn.1),
         }
     }
 }

@@ -1,15 +1,15 @@
 //! This project's plant, stepped in four ways.
 
-use lovines::{Drive, Plant};
+use lovines::Plant;
 
 use crate::method::{Failure, Method};
 use crate::scene::{Scene, Step};
 
-fn begin(scene: &Scene) -> Result<Plant, Failure> {
+pub fn begin(scene: &Scene) -> Result<Plant, Failure> {
     let mut plant =
         Plant::new(scene.parameters, scene.state()).map_err(|e| Failure(e.to_string()))?;
     if let Some(first) = scene.steps.first() {
-        plant.begin(Drive::harmonic(first.amplitude, first.omega));
+        plant.begin(first.drive());
     }
     Ok(plant)
 }
@@ -52,7 +52,7 @@ macro_rules! methods {
 }
 
 fn advance(plant: &mut Plant, step: &Step) {
-    plant.advance(Drive::harmonic(step.amplitude, step.omega), step.duration);
+    plant.advance(step.drive(), step.duration);
 }
 
 methods! {
@@ -72,14 +72,14 @@ methods! {
     ///
     /// A third derivative of the input of 5e-324 moves nothing, and is no harmonic drive: the quick way refuses it.
     General: |plant, step| {
-        let mut drive = Drive::harmonic(step.amplitude, step.omega);
+        let mut drive = step.drive();
         drive.signal[3] = f64::from_bits(1);
         plant.advance(drive, step.duration);
     }, <[Step]>::to_vec;
 }
 
 /// Equal drives in a single step. Its length is rounded once, and not at every addition.
-fn in_one(steps: &[Step]) -> Vec<Step> {
+pub fn in_one(steps: &[Step]) -> Vec<Step> {
     let equal = |a: &Step, b: &Step| a == b;
     let joined = |run: &[Step]| Step {
         duration: run[0].duration * run.len() as f64,

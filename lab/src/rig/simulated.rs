@@ -49,8 +49,6 @@ impl Rig for Simulated {
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         let drive = lovines::Drive::harmonic(drive.amplitude, drive.omega);
         self.plant.advance(drive, step);
-        // The sensors are read after every step.
-        self.plant.settle();
         Ok(())
     }
 

@@ -1,0 +1,335 @@
+//! What each skip saves, in instructions: the plant as it is, and the same work with the skip kept from happening.
+//!
+//! ```text
+//! cargo bench --bench savings
+//! ```
+//!
+//! Every case is run under valgrind for two lengths; the difference tells what one unit of work costs, without the start of
+//! the program. Instruction counts are the same in every run, however busy the machine is. docs/savings.md keeps the table.
+
+use core::f64::consts::TAU;
+use std::env::{args, current_exe};
+use std::hint::black_box;
+use std::process::{Command, ExitCode};
+
+use lovines::{Drive, Event, Parameters, Plant, State};
+
+const OMEGA: f64 = 0.990_417;
+const PERIOD: f64 = TAU / OMEGA;
+/// A hundred steps a period, as a sampled controller takes them.
+const STEP: f64 = PERIOD / 100.0;
+/// A jerk too small to move anything, which the quick way leaves to the general search.
+const NO_QUICK_WAY: f64 = 1e-300;
+
+fn drive() -> Drive {
+    Drive::harmonic(1e-3, OMEGA)
+}
+
+fn searched(drive: Drive) -> Drive {
+    Drive {
+        signal: [drive.signal[0], 0.0, 0.0, NO_QUICK_WAY],
+        ..drive
+    }
+}
+
+/// The default rig, dimensionless, with a particle so slow that it meets no wall.
+fn quiet() -> Plant {
+    let start = State {
+        dq2: 1e-6,
+        ..State::default()
+    };
+    Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), start).expect("a scene")
+}
+
+/// The same rig in its steady 1:1 motion.
+fn steady() -> Plant {
+    let start = State {
+        q1: -0.438_371_55,
+        dq1: 0.007_696_65,
+        q2: -1.003_854_15,
+        dq2: -0.878_123_25,
+    };
+    Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), start).expect("a scene")
+}
+
+/// So many steps of a plant under what `drive` tells for each, each followed by `read`.
+fn steps(mut plant: Plant, n: u32, step: impl Fn(u32) -> (Drive, f64), read: impl Fn(&Plant)) {
+    for k in 0..n {
+        let (drive, duration) = step(k);
+        plant.advance(black_box(drive), duration);
+        read(&plant);
+    }
+    black_box(plant.state());
+}
+
+fn nothing(_: &Plant) {}
+
+/// A particle under a base that accelerates steadily, so that the wall at `w = -b` pushes all the time.
+#[derive(Clone, Copy, PartialEq)]
+enum Accelerated {
+    Stuck,
+    /// On the wall without loss, in hops of 1/300 period.
+    Hopping,
+    /// Far from both walls.
+    Free,
+}
+
+/// So many steps of such a particle.
+fn accelerated(particle: Accelerated, n: u32, step: f64) {
+    let half_width = 1e3;
+    let hopping = particle == Accelerated::Hopping;
+    let parameters = Parameters {
+        half_width,
+        ..Parameters::dimensionless(0.0084, 1.43, if hopping { 1.0 } else { 0.65 })
+    };
+    let (acceleration, q1) = (-1e-3, 1e-3);
+    let start = State {
+        // Where the spring holds the mass at this acceleration.
+        q1,
+        q2: if particle == Accelerated::Free {
+            q1
+        } else {
+            q1 + half_width
+        },
+        dq2: if hopping {
+            -0.5 * acceleration * PERIOD / 300.0
+        } else {
+            0.0
+        },
+        ..State::default()
+    };
+    let mut plant = Plant::new(parameters, start).expect("a scene");
+    for k in 0..n {
+        let t = f64::from(k) * step;
+        let signal = [
+            0.5 * acceleration * t * t,
+            acceleration * t,
+            0.5 * acceleration,
+            0.0,
+        ];
+        plant.advance(
+            black_box(Drive {
+                signal,
+                ..Drive::default()
+            }),
+            step,
+        );
+    }
+    assert_eq!(plant.contact().is_some(), particle == Accelerated::Stuck);
+    assert_eq!(plant.tally().impacts > 0, hopping);
+}
+
+/// A run of so many units of work.
+type Run = fn(u32);
+
+/// A unit of which few are enough.
+const LONG: &str = "step of 100 periods";
+
+/// A skip, the unit of work, and that work with it and without it.
+const ROWS: &[(&str, &str, Run, Run)] = &[
+    (
+        "walls out of reach: no root search",
+        "step of 1/100 period",
+        |n| steps(quiet(), n, |_| (drive(), STEP), nothing),
+        |n| steps(quiet(), n, |_| (searched(drive()), STEP), nothing),
+    ),
+    (
+        "the same",
+        LONG,
+        |n| steps(quiet(), n, |_| (drive(), 100.0 * PERIOD), nothing),
+        |n| steps(quiet(), n, |_| (searched(drive()), 100.0 * PERIOD), nothing),
+    ),
+    (
+        "no excitation: no forced terms",
+        "step of the general search",
+        |n| {
+            steps(
+                quiet(),
+                n,
+                |_| (searched(Drive::harmonic(0.0, OMEGA)), STEP),
+                nothing,
+            )
+        },
+        |n| steps(quiet(), n, |_| (searched(drive()), STEP), nothing),
+    ),
+    (
+        "the same, quick way",
+        "step of 1/100 period, v and base read",
+        |n| steps(quiet(), n, |_| (Drive::harmonic(0.0, OMEGA), STEP), sensors),
+        |n| steps(quiet(), n, |_| (drive(), STEP), sensors),
+    ),
+    (
+        "particle stuck: joint motion only",
+        "step of 1/100 period",
+        |n| accelerated(Accelerated::Stuck, n, STEP),
+        |n| accelerated(Accelerated::Free, n, STEP),
+    ),
+    (
+        "the same, hops of 1/300 period not followed",
+        "step of 1/100 period",
+        |n| accelerated(Accelerated::Stuck, n, STEP),
+        |n| accelerated(Accelerated::Hopping, n, STEP),
+    ),
+    (
+        "drive unchanged: its coefficients reused",
+        "step of 1/100 period",
+        |n| steps(quiet(), n, |_| (drive(), STEP), nothing),
+        |n| {
+            steps(
+                quiet(),
+                n,
+                |k| (Drive::harmonic(1e-3, OMEGA + 1e-9 * f64::from(k)), STEP),
+                nothing,
+            )
+        },
+    ),
+    (
+        "the same, amplitude alone changed",
+        "step of 1/100 period",
+        |n| steps(quiet(), n, |_| (drive(), STEP), nothing),
+        |n| {
+            steps(
+                quiet(),
+                n,
+                |k| (Drive::harmonic(1e-3 + 1e-9 * f64::from(k), OMEGA), STEP),
+                nothing,
+            )
+        },
+    ),
+    (
+        "step length unchanged: its coefficients reused",
+        "step of 1/100 period, v and base read",
+        |n| steps(quiet(), n, |_| (drive(), STEP), sensors),
+        |n| {
+            steps(
+                quiet(),
+                n,
+                |k| (drive(), STEP + 1e-9 * f64::from(k)),
+                sensors,
+            )
+        },
+    ),
+    (
+        "outputs when asked for: none",
+        "step of 1/100 period",
+        |n| steps(quiet(), n, |_| (drive(), STEP), nothing),
+        |n| steps(quiet(), n, |_| (drive(), STEP), all),
+    ),
+    (
+        "outputs when asked for: v and base",
+        "step of 1/100 period",
+        |n| steps(quiet(), n, |_| (drive(), STEP), sensors),
+        |n| steps(quiet(), n, |_| (drive(), STEP), all),
+    ),
+    (
+        "impact records when wanted",
+        "impact",
+        |n| {
+            steps(
+                steady(),
+                1,
+                |_| {
+                    (
+                        Drive::harmonic(0.0084 * 1.1, OMEGA),
+                        f64::from(n / 2) * PERIOD,
+                    )
+                },
+                nothing,
+            )
+        },
+        |n| {
+            let mut impacts: Vec<Event> = Vec::new();
+            let duration = f64::from(n / 2) * PERIOD;
+            steady().advance_with(
+                black_box(Drive::harmonic(0.0084 * 1.1, OMEGA)),
+                duration,
+                |event| {
+                    impacts.push(event);
+                },
+            );
+            black_box(impacts);
+        },
+    ),
+];
+
+fn sensors(plant: &Plant) {
+    black_box((plant.centre(), plant.base_displacement()));
+}
+
+fn all(plant: &Plant) {
+    sensors(plant);
+    black_box((
+        plant.state(),
+        plant.relative_displacement(),
+        plant.relative_velocity(),
+    ));
+    black_box(plant.energy(plant.base_displacement()));
+}
+
+/// Instructions of a run, as valgrind counts them.
+fn counted(row: usize, without: bool, n: u32) -> Result<u64, String> {
+    let output = Command::new("valgrind")
+        .args([
+            "--tool=cachegrind",
+            "--cache-sim=no",
+            "--cachegrind-out-file=/dev/null",
+        ])
+        .arg(current_exe().map_err(|e| e.to_string())?)
+        .args([
+            "run",
+            &row.to_string(),
+            &without.to_string(),
+            &n.to_string(),
+        ])
+        .output()
+        .map_err(|e| format!("valgrind: {e}; install it"))?;
+    let text = String::from_utf8_lossy(&output.stderr);
+    let count = text.lines().find_map(|line| line.split_once("refs:"));
+    count
+        .and_then(|(_, count)| count.trim().replace(',', "").parse().ok())
+        .ok_or_else(|| format!("valgrind said no count of instructions but: {text}"))
+}
+
+fn per_unit(row: usize, without: bool) -> Result<f64, String> {
+    let few = if ROWS[row].1 == LONG { 20 } else { 2000 };
+    let many = 6 * few;
+    let difference = counted(row, without, many)? - counted(row, without, few)?;
+    Ok(difference as f64 / f64::from(many - few))
+}
+
+fn table() -> Result<(), String> {
+    println!("| skip | unit of work | instructions | without it | saved |\n|---|---|---|---|---|");
+    for (row, (skip, unit, ..)) in ROWS.iter().enumerate() {
+        let (with, without) = (per_unit(row, false)?, per_unit(row, true)?);
+        let saved = 100.0 * (1.0 - with / without);
+        println!("| {skip} | {unit} | {with:.0} | {without:.0} | {saved:.0} % |");
+    }
+    Ok(())
+}
+
+fn main() -> ExitCode {
+    let arguments: Vec<String> = args().collect();
+    if let [_, run, row, without, n] = &arguments[..]
+        && run == "run"
+    {
+        let number = |text: &str| text.parse().expect("a number");
+        let (_, _, with, skipless) = ROWS[number(row) as usize];
+        (if without == "true" { skipless } else { with })(number(n));
+        return ExitCode::SUCCESS;
+    }
+    // `cargo test --benches` only wants to see each run once.
+    if !arguments.iter().any(|argument| argument == "--bench") {
+        for (_, _, with, without) in ROWS {
+            with(100);
+            without(100);
+        }
+        return ExitCode::SUCCESS;
+    }
+    match table() {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(why) => {
+            eprintln!("{why}");
+            ExitCode::FAILURE
+        }
+    }
+}

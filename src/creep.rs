@@ -1,0 +1,78 @@
+//! What a steady push does to an oscillator that creeps, from rest.
+//!
+//! `x'' + 2 delta x' + omega0² x = 1` and `= t`: the integrals of `(e^{slow t} - e^{fast t})/(slow - fast)`, once and twice.
+//! With damping far above critical the position at which such a motion comes to rest at last lies far off, and taking it off
+//! at the start to add it again later would leave no digits of what happens in between.
+
+use crate::oscillator::{Oscillator, Regime};
+
+/// Below this part of the decay rate the two rates are too near each other to be told apart by subtraction.
+pub(crate) const APART: f64 = 0.1;
+
+/// Rates of a creeping oscillator whose two rates are far apart.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Creep {
+    slow: f64,
+    fast: f64,
+}
+
+impl Creep {
+    /// The rates of `oscillator`, if it creeps and they are far apart.
+    pub fn of(oscillator: &Oscillator) -> Option<Self> {
+        match oscillator.regime {
+            Regime::Creeping {
+                slow,
+                fast,
+                half_gap,
+            } if half_gap > APART * oscillator.delta => Some(Self { slow, fast }),
+            _ => None,
+        }
+    }
+
+    /// Positions after `t` seconds under a push of 1 and under one that grows as the time: s² and s³.
+    pub fn pushed(&self, t: f64) -> (f64, f64) {
+        let (slow, fast) = (integrals(self.slow, t), integrals(self.fast, t));
+        let gap = self.slow - self.fast;
+        ((slow.0 - fast.0) / gap, (slow.1 - fast.1) / gap)
+    }
+}
+
+/// The integral of `e^{rate t}` from 0 to `t`, and the integral of that, for a rate of 0 or below.
+fn integrals(rate: f64, t: f64) -> (f64, f64) {
+    let z = rate * t;
+    if z > -0.5 {
+        // `(e^z - 1 - z)/z²`; the first term left out is below 2^-14/16! = 3e-18.
+        let mut series = 1.0;
+        for n in (3..=15).rev() {
+            series = series * z / f64::from(n) + 1.0;
+        }
+        let twice = 0.5 * series;
+        (t * (1.0 + z * twice), t * t * twice)
+    } else {
+        let once = libm::expm1(z);
+        (once / rate, (once - z) / rate / rate)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_series_meets_the_quotient_where_they_change_over() {
+        let (below, above) = (integrals(-0.5 + 1e-15, 1.0), integrals(-0.5 - 1e-15, 1.0));
+        assert!((below.0 - above.0).abs() < 4e-15 && (below.1 - above.1).abs() < 4e-15);
+    }
+
+    #[test]
+    fn a_push_from_rest_obeys_the_equation_of_motion() {
+        let oscillator = Oscillator::new(1.0, 1.0, 6.0);
+        let creep = Creep::of(&oscillator).unwrap();
+        for t in [0.01, 0.3, 2.0, 30.0] {
+            let ((once, twice), m) = (creep.pushed(t), oscillator.transition(t));
+            // The integral of the equation of the velocity, once and twice.
+            assert!((m.vv + 6.0 * m.xv + once - 1.0).abs() < 1e-14);
+            assert!((m.xv + 6.0 * once + twice - t).abs() < 1e-14 * t.max(1.0));
+        }
+    }
+}

@@ -1,0 +1,186 @@
+//! One scene, and the worst that it shows.
+
+use crate::common::Scene;
+use crate::table::Table;
+use lovines::plant::MOST_IMPACTS;
+use lovines::{Event, Plant, State};
+use std::f64::consts::TAU;
+use std::time::Instant;
+
+/// Steps that each scene is followed for.
+const STEPS: usize = 30;
+/// A scene with so many impacts has shown what it is.
+const ENOUGH: u64 = 100_000;
+/// No scene may meet more impacts than this per period of its fastest rate; the hops of a lively particle are the most.
+const MOST_IMPACTS_PER_PERIOD: f64 = 1e7;
+
+/// The worst of one scene or of many, and which that was.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Worst {
+    pub scenes: u64,
+    pub panics: u64,
+    pub impacts: u64,
+    pub stuck: u64,
+    pub cut_short: u64,
+    /// Of these, those that had not met as many impacts as that takes.
+    pub cut_short_early: u64,
+    pub not_a_number: u64,
+    pub other_bits: u64,
+    /// Rigs that were at rest with nothing to move them, and moved.
+    pub stirred: u64,
+    /// Impacts from behind the wall, and events that the outcome does not count.
+    pub miscounted: u64,
+    /// `|w|/b - 1`.
+    pub outside: f64,
+    /// Growth of the energy without excitation within a step, relative to that at the start.
+    pub growth: f64,
+    /// What energy and dissipated energy miss of that at the start, without damping and excitation.
+    pub missing: f64,
+    pub impacts_per_period: (f64, usize),
+    pub slowest: (f64, usize),
+}
+
+impl Worst {
+    /// A scene that panicked.
+    pub fn panicked() -> Self {
+        Self {
+            scenes: 1,
+            panics: 1,
+            ..Self::default()
+        }
+    }
+
+    pub fn and(self, other: Self) -> Self {
+        let more = |a: (f64, usize), b: (f64, usize)| if b.0 > a.0 { b } else { a };
+        Self {
+            scenes: self.scenes + other.scenes,
+            panics: self.panics + other.panics,
+            impacts: self.impacts + other.impacts,
+            stuck: self.stuck + other.stuck,
+            cut_short: self.cut_short + other.cut_short,
+            cut_short_early: self.cut_short_early + other.cut_short_early,
+            not_a_number: self.not_a_number + other.not_a_number,
+            other_bits: self.other_bits + other.other_bits,
+            stirred: self.stirred + other.stirred,
+            miscounted: self.miscounted + other.miscounted,
+            outside: self.outside.max(other.outside),
+            growth: self.growth.max(other.growth),
+            missing: self.missing.max(other.missing),
+            impacts_per_period: more(self.impacts_per_period, other.impacts_per_period),
+            slowest: more(self.slowest, other.slowest),
+        }
+    }
+
+    pub fn rows(&self, table: &mut Table) {
+        let among = format!("all {} scenes", self.scenes);
+        let mut row =
+            |what: &str, figure: f64, allowed: f64| table.row(what, &among, figure, allowed);
+        row(
+            "energy grows without excitation by, relative",
+            self.growth,
+            1e-12,
+        );
+        row(
+            "energy and dissipated energy miss, undamped, relative",
+            self.missing,
+            1e-12,
+        );
+        row("panics", self.panics as f64, 0.0);
+        row("states that are not numbers", self.not_a_number as f64, 0.0);
+        row(
+            "impacts from behind a wall or not counted",
+            self.miscounted as f64,
+            0.0,
+        );
+        row(
+            "rigs at rest, particle at a wall, that move",
+            self.stirred as f64,
+            0.0,
+        );
+        row(
+            "impacts in a period, at most",
+            self.impacts_per_period.0,
+            MOST_IMPACTS_PER_PERIOD,
+        );
+        row(
+            "advances cut short before their 10^7 impacts",
+            self.cut_short_early as f64,
+            0.0,
+        );
+        row(
+            "advances that end at 10^7 impacts, and say so",
+            self.cut_short as f64,
+            f64::INFINITY,
+        );
+        row(
+            "runs with other bits the second time",
+            self.other_bits as f64,
+            0.0,
+        );
+    }
+}
+
+/// Follows a scene twice.
+pub fn follow(scene: &Scene, number: usize) -> Worst {
+    let began = Instant::now();
+    let (mut worst, bits) = once(scene, number);
+    worst.slowest = (began.elapsed().as_secs_f64(), number);
+    worst.other_bits = u64::from(once(scene, number).1 != bits);
+    worst
+}
+
+fn once(s: &Scene, number: usize) -> (Worst, [u64; 4]) {
+    let mut plant = Plant::new(s.parameters, s.start).expect("a scene that makes sense");
+    let mut worst = Worst {
+        scenes: 1,
+        ..Worst::default()
+    };
+    let free = s.drive.amplitude == 0.0 && s.drive.signal == [0.0; 4];
+    let at_start = plant.energy(0.0);
+    let mut before = at_start;
+    let mut drive = s.drive;
+    for _ in 0..STEPS {
+        let (mut impacts, mut backwards) = (0u64, 0);
+        let outcome = plant.advance_with(drive, s.step, |event| {
+            if let Event::Impact { wall, velocity, .. } = event {
+                backwards += u64::from(wall.sign() * velocity <= 0.0);
+                impacts += 1;
+            }
+        });
+        // The same signal seen from now.
+        drive = plant.base().drive;
+        worst.miscounted += backwards + outcome.impacts.abs_diff(impacts);
+        worst.impacts += impacts;
+        worst.stuck += outcome.stuck;
+        let early = outcome.cut_short && impacts < MOST_IMPACTS;
+        worst.cut_short += u64::from(outcome.cut_short);
+        worst.cut_short_early += u64::from(early);
+        let State { q1, dq1, q2, dq2 } = plant.state();
+        worst.not_a_number += u64::from(![q1, dq1, q2, dq2].iter().all(|x| x.is_finite()));
+        let w = plant.relative_displacement().abs() / s.parameters.half_width;
+        worst.outside = worst.outside.max(w - 1.0);
+        let fastest = s.parameters.fastest_rate().max(s.drive.omega.abs());
+        let periods = (s.step * fastest / TAU).max(1.0);
+        let busy = impacts as f64 / periods;
+        if busy > worst.impacts_per_period.0 {
+            worst.impacts_per_period = (busy, number);
+        }
+        if free && at_start > 0.0 {
+            let (now, dissipated) = (plant.energy(0.0), plant.tally().dissipated);
+            worst.growth = worst.growth.max((now - before) / at_start);
+            if s.parameters.damping == 0.0 {
+                let missing = (now + dissipated - at_start).abs() / at_start;
+                worst.missing = worst.missing.max(missing);
+            }
+            before = now;
+        }
+        if worst.impacts >= ENOUGH {
+            break;
+        }
+    }
+    let x = plant.state();
+    if free && at_start == 0.0 {
+        worst.stirred = u64::from(x != s.start);
+    }
+    (worst, [x.q1, x.dq1, x.q2, x.dq2].map(f64::to_bits))
+}

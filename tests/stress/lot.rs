@@ -1,0 +1,139 @@
+//! Scenes drawn by lot, on all cores. Each comes from a number of its own, which is told of the hardest ones.
+
+use crate::common::{Scene, scene};
+use crate::follow::{Worst, follow};
+use crate::table::Table;
+use lovines::Drive;
+use proptest::prelude::*;
+use proptest::strategy::ValueTree;
+use proptest::test_runner::{Config, RngAlgorithm, TestRng, TestRunner};
+use rayon::prelude::*;
+use std::panic::catch_unwind;
+
+/// Kinds of scenes, and how many of a thousand are drawn.
+const KINDS: &[(&str, usize)] = &[
+    ("free", 300),
+    ("driven", 300),
+    ("at rest on the wall", 150),
+    ("gap of 1e-6 to 1e3 amplitudes", 150),
+    ("signal of order 3", 100),
+];
+
+/// Scenes followed between two lines that tell how far the run has come.
+const PORTION: usize = 10_000;
+
+fn strategy(kind: &str) -> BoxedStrategy<Scene> {
+    let decades = |from: f64, to: f64| (from..to).prop_map(|x| 10f64.powf(x));
+    let lively = prop_oneof![
+        8 => Just(None),
+        1 => decades(-6.0, -2.0).prop_map(|x| Some(1.0 - x)),
+        1 => Just(Some(1.0)),
+        1 => decades(-3.0, 0.0).prop_map(Some),
+    ];
+    let with_any_loss = |driven| {
+        (scene(driven), lively.clone()).prop_map(|(mut s, r)| {
+            s.parameters.restitution = r.unwrap_or(s.parameters.restitution);
+            s
+        })
+    };
+    match kind {
+        "free" => with_any_loss(false).boxed(),
+        "driven" => with_any_loss(true).boxed(),
+        "at rest on the wall" => (with_any_loss(true), any::<bool>(), any::<bool>())
+            .prop_map(|(mut s, plus, still)| {
+                let b = s.parameters.half_width;
+                if still {
+                    s.drive = Drive::default();
+                    (s.start.q1, s.start.dq1) = (0.0, 0.0);
+                }
+                s.start.q2 = s.start.q1 - if plus { b } else { -b };
+                s.start.dq2 = s.start.dq1;
+                s
+            })
+            .boxed(),
+        "gap of 1e-6 to 1e3 amplitudes" => (with_any_loss(true), decades(-6.0, 3.0))
+            .prop_map(|(mut s, gap)| {
+                let w = s.start.q1 - s.start.q2;
+                let amplitude = s.start.q1.abs().max(s.drive.amplitude);
+                s.parameters.half_width = gap * amplitude;
+                // A narrow gap is crossed a million times a period.
+                s.step = s.step.min(1.0);
+                s.start.q2 = s.start.q1 - w.clamp(-1.0, 1.0) * s.parameters.half_width;
+                // The difference of two displacements carries their rounding.
+                let outside = (s.start.q1 - s.start.q2).abs() > s.parameters.half_width;
+                if outside {
+                    s.start.q2 = s.start.q1;
+                }
+                s
+            })
+            .boxed(),
+        _ => (
+            with_any_loss(true),
+            -1.0..1.0f64,
+            -1.0..1.0f64,
+            -1.0..1.0f64,
+        )
+            .prop_map(|(mut s, u1, u2, u3)| {
+                // Of the order of the half-width at the end of a step, or of the scene where that is long.
+                let t = s.step.max(1.0);
+                s.drive.signal[1..].copy_from_slice(&[u1 / t, u2 / (t * t), u3 / (t * t * t)]);
+                s
+            })
+            .boxed(),
+    }
+}
+
+/// Number `number` of what is drawn.
+pub fn draw<T: std::fmt::Debug>(strategy: &BoxedStrategy<T>, number: usize) -> T {
+    let mut seed = [7; 32];
+    seed[..8].copy_from_slice(&(number as u64).to_le_bytes());
+    let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
+    let mut runner = TestRunner::new_with_rng(Config::default(), rng);
+    strategy.new_tree(&mut runner).expect("a scene").current()
+}
+
+/// Follows so many scenes, each twice, and tells the worst of all.
+pub fn scenes(n: usize, table: &mut Table) {
+    let mut all = Worst::default();
+    for (kind, share) in KINDS {
+        let count = n * share / 1000;
+        let mut worst = Worst::default();
+        for begin in (0..count).step_by(PORTION) {
+            let portion: Vec<Worst> = (begin..count.min(begin + PORTION))
+                .into_par_iter()
+                .map_init(
+                    || strategy(kind),
+                    |strategy, number| {
+                        let scene = draw(strategy, number);
+                        match catch_unwind(|| follow(&scene, number)) {
+                            Ok(worst) => worst,
+                            Err(_) => {
+                                eprintln!("{kind} scene {number} panics: {scene:?}");
+                                Worst::panicked()
+                            }
+                        }
+                    },
+                )
+                .collect();
+            for one in portion {
+                worst = worst.and(one);
+            }
+            if count > PORTION {
+                table.progress(&format!(
+                    "{} of {count} scenes, {kind}",
+                    count.min(begin + PORTION)
+                ));
+            }
+        }
+        table.progress(&format!("{kind}: {worst:?}"));
+        let among = format!("{count} scenes, {} impacts", worst.impacts);
+        table.row(
+            &format!("{kind}: outside its cavity by, in half-widths"),
+            &among,
+            worst.outside,
+            1e-12,
+        );
+        all = all.and(worst);
+    }
+    all.rows(table);
+}

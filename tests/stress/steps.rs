@@ -1,0 +1,78 @@
+//! One step of a million periods, and steps of a billionth of one.
+
+use crate::table::Table;
+use lovines::plant::MOST_IMPACTS;
+use lovines::{Drive, Parameters, Plant, State};
+use std::f64::consts::TAU;
+
+const OMEGA: f64 = 0.990_417;
+
+/// The default rig near its steady 1:1 motion.
+fn steady() -> (Plant, Drive) {
+    let start = State {
+        q1: -0.42,
+        dq1: 0.01,
+        q2: -0.99,
+        dq2: -0.86,
+    };
+    let plant = Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), start).unwrap();
+    (plant, Drive::harmonic(0.0084 * 1.1, OMEGA))
+}
+
+pub fn long(table: &mut Table) {
+    let (mut plant, drive) = steady();
+    let outcome = plant.advance(drive, 1e6 * TAU / OMEGA);
+    assert!(!outcome.cut_short);
+    table.row(
+        "one step of 10^6 periods: impacts more or less than 2 a period",
+        &format!("{} impacts", outcome.impacts),
+        outcome.impacts.abs_diff(2_000_000) as f64,
+        2.0,
+    );
+}
+
+/// The same with a chatter in every period: it ends before its time, and says so.
+pub fn chatter(table: &mut Table) {
+    let start = State {
+        q1: 0.1,
+        q2: 0.1,
+        dq2: 0.3,
+        ..State::default()
+    };
+    let mut plant = Plant::new(Parameters::dimensionless(0.05, 1.0, 0.4), start).unwrap();
+    let outcome = plant.advance(Drive::harmonic(1.5, 0.6), 1e6 * TAU / 0.6);
+    table.row(
+        "one step of 10^6 periods with chatter and rest: impacts, at most",
+        if outcome.cut_short {
+            "cut short, and says so"
+        } else {
+            "to its end"
+        },
+        outcome.impacts as f64,
+        MOST_IMPACTS as f64,
+    );
+    table.progress("a million periods with chatter");
+}
+
+pub fn short(table: &mut Table) {
+    let (step, n) = (2f64.powi(-30), 100_000);
+    let (mut tiny, drive) = steady();
+    let mut one = tiny;
+    for _ in 0..n {
+        tiny.advance(drive, step);
+    }
+    one.advance(drive, step * f64::from(n));
+    table.row(
+        "steps of 1.5e-10 periods against one: states differ by",
+        &format!("{n} steps"),
+        distance(&tiny, &one),
+        1e-12,
+    );
+}
+
+fn distance(a: &Plant, b: &Plant) -> f64 {
+    let (a, b) = (a.state(), b.state());
+    [a.q1 - b.q1, a.dq1 - b.dq1, a.q2 - b.q2, a.dq2 - b.dq2]
+        .iter()
+        .fold(0.0f64, |worst, x| worst.max(x.abs()))
+}
