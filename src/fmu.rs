@@ -156,7 +156,11 @@ impl LoViNes {
         if step * rate > LONGEST_STEP {
             return Err(too_long(step, rate));
         }
-        if !self.reach.holds_base(&self.drive, step) {
+        // However short the step: slopes become forces.
+        if !self
+            .reach
+            .holds_base(&self.drive, step.max(1.0 / self.fastest))
+        {
             return Err(too_far(&self.drive));
         }
         self.longest.set(step);

@@ -94,6 +94,9 @@ fn a_base_so_far_away_that_the_cavity_is_lost_in_rounding_is_not_followed() {
     m.well(unsafe { (m.f.fmi2SetRealInputDerivatives)(m.c, &6, 1, &3, &1e30) });
     assert_eq!(timed(&m, "a base on its way there", 1.0), Status::Error);
     assert!(m.heard()[0].text.contains("2^52 half-widths"));
+    // Nor by a step in which it does not get there.
+    assert_eq!(timed(&m, "a base in a hurry", 1e-300), Status::Error);
+    m.well(unsafe { (m.f.fmi2SetRealInputDerivatives)(m.c, &6, 1, &3, &1.0) });
     m.well(m.step(0.0, 1e-6));
 }
 
