@@ -64,6 +64,10 @@ enum Rig {
 /// search for the first contact looks at the motion once in every two radians or so, and a call is to end.
 const LONGEST_STEP: f64 = 1e7;
 
+/// The fastest rate that is followed, rad/s: bounds of the motion are made of its powers, which are to be numbers, and a search
+/// with bounds that are none does not end.
+const FASTEST: f64 = 1e50;
+
 /// An advance with every event told.
 #[cold]
 #[inline(never)]
@@ -85,6 +89,14 @@ fn lost(resolved: bool, time: f64, step: f64) -> Refusal {
              expected are start values and inputs of a sensible size"
         )
     })
+}
+
+/// Why a step is not begun.
+#[cold]
+fn too_fast(rate: f64) -> Refusal {
+    Refusal::error(format!(
+        "a rate of {rate} rad/s is refused; allowed are at most {FASTEST} rad/s for omega, sqrt(k/M) and c/M"
+    ))
 }
 
 /// Why a step is not begun.
@@ -138,10 +150,17 @@ impl LoViNes {
     #[inline(never)]
     fn judge(&self, step: f64) -> Result<(), Refusal> {
         let rate = self.fastest.max(self.drive.omega.abs());
+        if rate > FASTEST {
+            return Err(too_fast(rate));
+        }
         if step * rate > LONGEST_STEP {
             return Err(too_long(step, rate));
         }
-        if !self.reach.holds_base(&self.drive, step) {
+        // However short the step: slopes become forces.
+        if !self
+            .reach
+            .holds_base(&self.drive, step.max(1.0 / self.fastest))
+        {
             return Err(too_far(&self.drive));
         }
         self.longest.set(step);

@@ -30,15 +30,15 @@ impl Reach {
         state.q1.abs() <= self.displacement && state.dq1.abs() + state.dq2.abs() <= self.velocity
     }
 
-    /// Whether the base stays within for so long under `drive`.
+    /// Whether the base stays within for so many seconds under `drive`.
     #[inline]
-    pub fn holds_base(&self, drive: &Drive, step: f64) -> bool {
+    pub fn holds_base(&self, drive: &Drive, span: f64) -> bool {
         let [u0, derivatives @ ..] = drive.signal;
         let moved = if derivatives == [0.0; 3] {
             0.0
         } else {
             let [u1, u2, u3] = derivatives.map(f64::abs);
-            step * (u1 + step * (u2 + step * u3))
+            span * (u1 + span * (u2 + span * u3))
         };
         u0.abs() + drive.amplitude.abs() + moved <= self.displacement
     }

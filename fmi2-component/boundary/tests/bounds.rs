@@ -68,6 +68,18 @@ fn a_step_that_could_not_end_is_not_begun() {
 }
 
 #[test]
+fn a_rate_whose_powers_are_no_numbers_is_not_followed() {
+    // k, c and omega, with a step that is short beside any of them.
+    for (vr, value) in [(1, 1e300), (2, 1e300), (8, -1e300)] {
+        let m = with(&[(vr, value)]);
+        assert_eq!(timed(&m, "an absurd rate", 1e-300), Status::Error);
+        assert!(m.heard()[0].text.contains("rad/s is refused"));
+    }
+    let m = with(&[(2, 1e50)]);
+    assert_eq!(timed(&m, "a rate that is just allowed", 1e-45), Status::Ok);
+}
+
+#[test]
 fn a_base_so_far_away_that_the_cavity_is_lost_in_rounding_is_not_followed() {
     let m = with(&[]);
     for (vr, value) in [(6, 1e300), (6, -1e14), (7, -1e300), (7, 5e13)] {
@@ -82,6 +94,9 @@ fn a_base_so_far_away_that_the_cavity_is_lost_in_rounding_is_not_followed() {
     m.well(unsafe { (m.f.fmi2SetRealInputDerivatives)(m.c, &6, 1, &3, &1e30) });
     assert_eq!(timed(&m, "a base on its way there", 1.0), Status::Error);
     assert!(m.heard()[0].text.contains("2^52 half-widths"));
+    // Nor by a step in which it does not get there.
+    assert_eq!(timed(&m, "a base in a hurry", 1e-300), Status::Error);
+    m.well(unsafe { (m.f.fmi2SetRealInputDerivatives)(m.c, &6, 1, &3, &1.0) });
     m.well(m.step(0.0, 1e-6));
 }
 

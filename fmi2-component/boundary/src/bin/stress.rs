@@ -1,8 +1,32 @@
 //! Many sequences of calls on both libraries: `stress [sequences] [seed]`.
 
-use std::time::Instant;
+use std::sync::atomic::{AtomicU64, Ordering};
+use std::thread;
+use std::time::{Duration, Instant};
 
 use fmi2_boundary::{Fmu, fuzz};
+
+/// The seed of the sequence under way.
+static SEED: AtomicU64 = AtomicU64::new(0);
+/// A sequence that takes longer hangs; under valgrind everything takes fifty times as long.
+const PATIENCE: Duration = Duration::from_secs(300);
+
+/// Ends the program, telling the seed, where a sequence does not end.
+fn watch() {
+    thread::spawn(|| {
+        let mut seen = (SEED.load(Ordering::Relaxed), Instant::now());
+        loop {
+            thread::sleep(Duration::from_secs(1));
+            let seed = SEED.load(Ordering::Relaxed);
+            if seed != seen.0 {
+                seen = (seed, Instant::now());
+            } else if seen.1.elapsed() > PATIENCE {
+                eprintln!("the sequence of seed {seed} does not end");
+                std::process::exit(1);
+            }
+        }
+    });
+}
 
 fn main() {
     let mut arguments = std::env::args().skip(1).map(|text| text.parse::<u64>());
@@ -19,10 +43,15 @@ fn main() {
     println!(
         "library    sequences     calls        ok  warning  discard     error  fatal  harmless  longest call  time"
     );
+    watch();
     for fmu in [Fmu::plant(), Fmu::controller()] {
         let began = Instant::now();
         let tally = (0..sequences)
-            .map(|n| fuzz::sequence(&fmu, seed.wrapping_mul(1 << 32).wrapping_add(n)))
+            .map(|n| {
+                let seed = seed.wrapping_mul(1 << 32).wrapping_add(n);
+                SEED.store(seed, Ordering::Relaxed);
+                fuzz::sequence(&fmu, seed)
+            })
             .fold(fuzz::Tally::default(), |sum, one| sum.and(&one));
         let [ok, warning, discard, error, fatal, _] = tally.statuses;
         println!(
