@@ -1,7 +1,7 @@
 //! Many independent plants at once: several abreast in the lanes of vector instructions, on all cores.
 //!
-//! Plants that cross their cavities from wall to wall go abreast ([`crate::plant`]'s loop with masks in place of branches);
-//! whatever else one meets, it meets alone. The vector instructions are those of the machine it runs on, found out at run
+//! Plants that cross their cavities from wall to wall go abreast ([`crate::plant`]'s loop with masks in place of branches),
+//! where the advance is long enough to pay for lining them up; whatever else one meets, it meets alone. The vector instructions are those of the machine it runs on, found out at run
 //! time. No fused operation is used, so that a batch gives the same bits whatever the machine and the number of cores; a
 //! plant that crosses gets those it would get alone, and others agree to rounding.
 
@@ -77,7 +77,7 @@ fn advance(members: &mut [Member], duration: f64) {
     }
     let (mut abreast, alone): (Vec<_>, Vec<_>) = members
         .iter_mut()
-        .partition(|member| member.plant.can_go_abreast());
+        .partition(|member| member.plant.gains_abreast(duration));
     for member in alone {
         member.outcome = member.plant.advance(member.drive, duration);
     }

@@ -39,9 +39,19 @@ struct Row<const N: usize> {
     guesses: [usize; N],
 }
 
+/// Impacts in an advance from which on lining up costs less than it gains.
+const WORTH_IT: f64 = 6.0;
+
 impl Plant {
+    /// Whether the plant can go abreast of others, and has so many impacts ahead at the speed of its particle that this is a
+    /// gain.
+    pub(crate) fn gains_abreast(&self, duration: f64) -> bool {
+        let way = self.here.particle.abs() * duration;
+        way > WORTH_IT * 2.0 * self.parameters.half_width && self.can_go_abreast()
+    }
+
     /// Whether the plant can go abreast of others: it crosses, and nothing is under way that it would do otherwise alone.
-    pub(crate) fn can_go_abreast(&self) -> bool {
+    fn can_go_abreast(&self) -> bool {
         let free = self.contact == Contact::Free && self.course.wave().is_some();
         free && match &self.course.landing {
             Some(landing) => landing.fresh,
