@@ -1,6 +1,7 @@
 //! Many sequences of calls on both libraries: `stress [sequences] [seed]`.
 
 use std::sync::atomic::{AtomicU64, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -11,21 +12,18 @@ static SEED: AtomicU64 = AtomicU64::new(0);
 /// A sequence that takes longer hangs; under valgrind everything takes fifty times as long.
 const PATIENCE: Duration = Duration::from_secs(300);
 
-/// Ends the program, telling the seed, where a sequence does not end.
-fn watch() {
-    thread::spawn(|| {
-        let mut seen = (SEED.load(Ordering::Relaxed), Instant::now());
-        loop {
-            thread::sleep(Duration::from_secs(1));
-            let seed = SEED.load(Ordering::Relaxed);
-            if seed != seen.0 {
-                seen = (seed, Instant::now());
-            } else if seen.1.elapsed() > PATIENCE {
-                eprintln!("the sequence of seed {seed} does not end");
-                std::process::exit(1);
-            }
+/// Ends the program, telling the seed, where a sequence does not end; goes when `done` does.
+fn watch(done: &Receiver<()>) {
+    let mut seen = (SEED.load(Ordering::Relaxed), Instant::now());
+    while done.recv_timeout(Duration::from_secs(1)) == Err(RecvTimeoutError::Timeout) {
+        let seed = SEED.load(Ordering::Relaxed);
+        if seed != seen.0 {
+            seen = (seed, Instant::now());
+        } else if seen.1.elapsed() > PATIENCE {
+            eprintln!("the sequence of seed {seed} does not end");
+            std::process::exit(1);
         }
-    });
+    }
 }
 
 fn main() {
@@ -43,7 +41,8 @@ fn main() {
     println!(
         "library    sequences     calls        ok  warning  discard     error  fatal  harmless  longest call  time"
     );
-    watch();
+    let (running, done) = channel();
+    let watchdog = thread::spawn(move || watch(&done));
     for fmu in [Fmu::plant(), Fmu::controller()] {
         let began = Instant::now();
         let tally = (0..sequences)
@@ -64,6 +63,8 @@ fn main() {
             began.elapsed().as_secs_f64(),
         );
     }
+    drop(running);
+    watchdog.join().expect("the watchdog does not panic");
     println!(
         "no crash, no panic, every error with its reason, no illegal call that changed anything"
     );
