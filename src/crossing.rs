@@ -17,6 +17,7 @@
 //! All this is away from an undamped resonance, for a harmonic or held base and displacements that are not large against
 //! the cavity. What lies outside is followed by [`crate::flight`], which is slower and knows no limits.
 
+#[cfg(feature = "batch")]
 mod lanes;
 mod near;
 

@@ -5,7 +5,9 @@
 
 use crate::base_motion::{evenly, product, sincos_of_product, two_sum};
 use crate::creep::APART;
-use crate::lane::{Lane, Lanes};
+use crate::lane::Lane;
+#[cfg(feature = "batch")]
+use crate::lane::Lanes;
 use serde::{Deserialize, Serialize};
 
 /// Coefficients of one oscillator, derived once from mass, stiffness and damping.
@@ -78,6 +80,7 @@ impl<T: Lane> Transition<T> {
     }
 }
 
+#[cfg(feature = "batch")]
 impl<const N: usize> Transition<Lanes<N>> {
     /// Several transitions abreast.
     pub(crate) fn abreast(transitions: [&Transition; N]) -> Self {

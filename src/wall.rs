@@ -1,7 +1,9 @@
 //! The two walls of the cavity, and what happens at an impact.
 
 use crate::base_motion::{evenly, product, two_sum};
-use crate::lane::{Lane, Lanes};
+use crate::lane::Lane;
+#[cfg(feature = "batch")]
+use crate::lane::Lanes;
 use crate::parameters::Parameters;
 use serde::{Deserialize, Serialize};
 
@@ -113,6 +115,7 @@ impl<T: Lane> ImpactLaw<T> {
     }
 }
 
+#[cfg(feature = "batch")]
 impl<const N: usize> ImpactLaw<Lanes<N>> {
     /// Several laws abreast.
     pub(crate) fn abreast(laws: [&ImpactLaw; N]) -> Self {

@@ -143,6 +143,7 @@ impl Course {
     }
 
     /// Makes the anchor one of the present drive: of the free motion it knows all it needs.
+    #[cfg(feature = "batch")]
     #[cold]
     pub fn freshen(&mut self) {
         self.anchor = self.rig.turned(&self.anchor);
