@@ -84,6 +84,7 @@ impl Scene {
             plant.advance(black_box(drive), step);
             read(&plant);
         }
+        states(&plant);
         plant.tally().impacts
     }
 
@@ -119,6 +120,12 @@ const CASES: &[Case] = &[
         2 * PERIODS as u64,
         "impact",
         || steady().compare(PERIODS, 1.0),
+    ),
+    (
+        "steady 1:1, a step per period, read at the end",
+        2 * PERIODS as u64,
+        "impact",
+        || steady().follow(PERIODS, 1.0, |_| {}),
     ),
     (
         "steady 1:1, a step per period",
