@@ -1,4 +1,5 @@
-//! Turns modelDescription.xml into the typed variable table that the binding uses.
+//! Turns modelDescription.xml into the typed variable table that the FMI binding uses.
 fn main() {
+    #[cfg(feature = "fmu")]
     fmi2_component_build::generate("modelDescription.xml");
 }

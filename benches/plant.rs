@@ -81,11 +81,11 @@ impl Scene {
         let drive = Drive::harmonic(self.amplitude, self.omega);
         let step = TAU / self.omega / steps;
         for _ in 0..(periods as f64 * steps) as usize {
-            plant.advance(black_box(drive), step);
+            plant.advance(black_box(drive), step).unwrap();
             read(&plant);
         }
         states(&plant);
-        plant.tally().impacts
+        plant.totals().impacts
     }
 
     /// The same by the baseline.

@@ -56,7 +56,7 @@ fn steady() -> Plant {
 fn steps(mut plant: Plant, n: u32, step: impl Fn(u32) -> (Drive, f64), read: impl Fn(&Plant)) {
     for k in 0..n {
         let (drive, duration) = step(k);
-        plant.advance(black_box(drive), duration);
+        plant.advance(black_box(drive), duration).unwrap();
         read(&plant);
     }
     black_box(plant.state());
@@ -113,10 +113,10 @@ fn accelerated(particle: Accelerated, n: u32, step: f64) {
                 ..Drive::default()
             }),
             step,
-        );
+        ).unwrap();
     }
     assert_eq!(plant.contact().is_some(), particle == Accelerated::Stuck);
-    assert_eq!(plant.tally().impacts > 0, hopping);
+    assert_eq!(plant.totals().impacts > 0, hopping);
 }
 
 /// A run of so many units of work.

@@ -9,7 +9,7 @@
 //! Sources: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems", PhD thesis, UC Berkeley 1996, chapter 2
 //! (conservative advancement); R. E. Moore, "Interval Analysis", Prentice-Hall 1966 (bounding by Taylor's remainder).
 
-use crate::motion::Derivatives;
+use crate::segment::Derivatives;
 
 /// A gap and how it closes now: `g(t+h) = gap - closing h - acceleration h²/2 - jerk h³/6 - ...`
 #[derive(Clone, Copy, Debug)]
@@ -37,6 +37,9 @@ pub struct Closure {
     pub derivatives: Derivatives,
 }
 
+/// The result of a search, and how often it evaluated the motion.
+pub type Found = (Option<Closure>, u64);
+
 /// A contact nearer than this fraction of the fastest rate's time is solved on the local Taylor polynomial, whose first
 /// term left out is then below 1e-16/24 of the motion's amplitude.
 const NEAR: f64 = 1e-4;
@@ -50,21 +53,23 @@ const MOST_WINDOWS: usize = 40;
 
 /// The first closure of any of `N` gaps in `[from, limit]`.
 ///
-/// `look` tells the gaps at a time and the derivatives of the motion there; `jerk` bounds the third derivative of the
+/// `look` returns the gaps at a time and the derivatives of the motion there; `jerk` bounds the third derivative of the
 /// gaps over the next so many seconds, given those derivatives; `fastest` is the fastest rate of the motion, 1/s;
-/// `resolution` is what is lost in the gaps' rounding.
+/// `resolution` is the rounding error of the gaps.
 pub fn first_closure<const N: usize>(
     (from, limit): (f64, f64),
     (fastest, resolution): (f64, f64),
     look: impl Fn(f64) -> ([Gap; N], Derivatives),
     jerk: impl Fn(&Derivatives, f64) -> f64,
-) -> Option<Closure> {
+) -> Found {
     let mut t = from;
+    let mut looks = 0;
     let mut tiny_steps = 0;
     while t < limit {
+        looks += 1;
         let (gaps, derivatives) = look(t);
         let left = limit - t;
-        let window = left.min(2.0 / fastest);
+        let window = left;
         let mut step = window;
         let mut nearest: Option<(f64, usize)> = None;
         for (which, gap) in gaps.iter().enumerate() {
@@ -80,12 +85,13 @@ pub fn first_closure<const N: usize>(
             step = step.min(open);
         }
         if let Some((h, which)) = nearest {
-            return Some(Closure {
+            let closure = Closure {
                 t,
                 h,
                 which,
                 derivatives,
-            });
+            };
+            return (Some(closure), looks);
         }
         tiny_steps = if step * fastest < TINY {
             tiny_steps + 1
@@ -107,7 +113,7 @@ pub fn first_closure<const N: usize>(
         }
         t += step.max(least);
     }
-    None
+    (None, looks)
 }
 
 impl Gap {

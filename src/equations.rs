@@ -15,7 +15,7 @@ mod dual;
 
 pub use dual::{Dual, Scalar};
 
-use crate::wall::Wall;
+use crate::contact::Wall;
 
 /// Everything that the rig is made of, at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -1,16 +1,16 @@
 //! The particle's free flight between the walls, up to the first instant it touches one.
 
 use crate::clearance::{Gap, clear_after_release, first_closure};
-use crate::motion::{Derivatives, Motion, Series, nearby, velocity_change};
-use crate::wall::Wall;
+use crate::segment::{Derivatives, Segment, Series, nearby, velocity_change};
+use crate::contact::Wall;
 
 /// A gap smaller than this fraction of the half-width cannot be told from none.
 const RESOLUTION: f64 = 1.0 / (1u64 << 60) as f64;
 
 /// One flight: the primary mass's motion, and where the particle is relative to it at the start.
 #[derive(Clone, Copy, Debug)]
-pub struct Flight<'a> {
-    motion: Motion<'a>,
+pub struct Flight {
+    motion: Segment,
     series: Series,
     /// `w = q1 - q2` at the start, m, and its velocity, m/s.
     start: (f64, f64),
@@ -28,11 +28,13 @@ pub struct Landing {
     pub primary: (f64, f64),
     /// Relative position `w` (m) and velocity (m/s).
     pub relative: (f64, f64),
+    /// Evaluations of the motion.
+    pub evaluations: u64,
 }
 
-impl<'a> Flight<'a> {
+impl Flight {
     /// A flight of a particle at `w` (m) with velocity `w'` (m/s) relative to the primary mass in `motion`.
-    pub fn new(motion: Motion<'a>, start: (f64, f64), half_width: f64) -> Self {
+    pub fn new(motion: Segment, start: (f64, f64), half_width: f64) -> Self {
         Self {
             series: motion.series(),
             motion,
@@ -52,7 +54,8 @@ impl<'a> Flight<'a> {
         };
         let jerk = |d: &Derivatives, h: f64| self.motion.third_derivative_bound(d, h);
         let scale = (self.motion.fastest(), RESOLUTION * self.half_width);
-        match first_closure((from, limit), scale, look, jerk) {
+        let (closure, looks) = first_closure((from, limit), scale, look, jerk);
+        match closure {
             Some(closure) => {
                 let wall = Wall::BOTH[closure.which];
                 let d = &closure.derivatives;
@@ -65,9 +68,13 @@ impl<'a> Flight<'a> {
                         wall.sign() * self.half_width,
                         self.start.1 + (dw_change + velocity_change(d, closure.h)),
                     ),
+                    evaluations: looks,
                 }
             }
-            None => self.unhindered(limit),
+            None => Landing {
+                evaluations: looks + 1,
+                ..self.unhindered(limit)
+            },
         }
     }
 
@@ -79,6 +86,7 @@ impl<'a> Flight<'a> {
             wall: None,
             primary: (d[0], d[1]),
             relative: (self.start.0 + w_change, self.start.1 + dw_change),
+            evaluations: 1,
         }
     }
 

@@ -1,40 +1,37 @@
-//! The oscillator's answer to the built-in base oscillator, from rest, in closed form.
+//! The response of the oscillator to the harmonic base motion, from rest, in closed form.
 //!
-//! `x'' + 2 delta x' + omega0² x = Im(F e^{i omega t})`, `F = omega0² + 2 i delta omega` (per unit base amplitude).
+//! `x'' + 2 delta x' + omega0² x = Im(F e^{i omega t})` with `F = omega0² + 2 i delta omega`, per unit base amplitude. The
+//! response from rest is `x = Im K(t)`, in one of two exact forms:
 //!
-//! Two exact forms, chosen by the damping ratio:
-//!
-//! - *Lightly damped*: the answer from rest, `x = Im K(t)` with
-//!   `K = F/(2 i omega_d) [ (e^{i omega t} - e^{lambda t})/(i omega - lambda) - (e^{i omega t} - e^{lambda* t})/(i omega - lambda*) ]`,
-//!   `lambda = -delta + i omega_d`. At an undamped resonance `i omega = lambda` and the first quotient is `t e^{lambda t}`
-//!   (secular growth); near it, it is `t e^{lambda t} phi((i omega - lambda) t)`, `phi(z) = (e^z - 1)/z`, taken from its
-//!   series. There is nothing to divide by zero and nothing that cancels.
-//! - *Heavily damped*: the steady answer `H e^{i omega t}`, `H = F/(omega0² - omega² + 2 i delta omega)`, whose
-//!   denominator is never small there; the free motion takes up the difference at the start.
+//! - *Away from an undamped resonance*, `K = H (e^{i omega t} - xx(t) - i omega xv(t))`: the steady response
+//!   `H = F/(omega0² - omega² + 2 i delta omega)` less the free motion that starts where it starts.
+//! - *Near it*, where steady response and free motion are large and cancel, divided differences
+//!   `K = F/(2 i omega_d) [ (e^{i omega t} - e^{lambda t})/(i omega - lambda) - (e^{i omega t} - e^{lambda* t})/(i omega - lambda*) ]`
+//!   with `lambda = -delta + i omega_d`. The first quotient is `t e^{lambda t} phi((i omega - lambda) t)`,
+//!   `phi(z) = (e^z - 1)/z`, which is a series for small `z`. At the resonance itself it is `t e^{lambda t}` (secular growth).
 
-use crate::oscillator::{Oscillator, Regime};
+use crate::arithmetic::{product, sincos_of_product};
+use crate::oscillator::{Oscillator, Regime, Transition};
 use num_complex::Complex64;
-use serde::{Deserialize, Serialize};
 
-/// Below this damping ratio the answer is taken from rest, above it as a steady answer.
-const LIGHT_DAMPING: f64 = 0.5;
+/// Largest `|H|` for which the first form is used: its rounding error is `|H|` times that of a unit amplitude.
+const LARGEST_STEADY: f64 = 64.0;
 
-/// Coefficients of the answer at one frequency.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Coefficients of the response at one frequency.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Forcing {
     /// Frequency, rad/s, 0 or above.
     pub omega: f64,
-    /// `|F|`, 1/s²: how strongly a unit base amplitude drives the oscillator.
-    pub strength: f64,
-    pub(crate) answer: Answer,
+    /// `F`, 1/s².
+    pub strength: Complex64,
+    form: Form,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-pub(crate) enum Answer {
-    /// From rest, by divided differences.
-    FromRest {
-        lambda: Complex64,
-        omega_d: f64,
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Form {
+    /// `H`.
+    Steady(Complex64),
+    DividedDifferences {
         /// `F/(2 i omega_d)`.
         gain: Complex64,
         /// `i omega - lambda`: small near resonance.
@@ -42,47 +39,93 @@ pub(crate) enum Answer {
         /// `1/(i omega - lambda*)`.
         far: Complex64,
     },
-    /// The steady answer per unit base amplitude.
-    Steady(Complex64),
+}
+
+impl Default for Form {
+    fn default() -> Self {
+        Self::Steady(Complex64::ZERO)
+    }
+}
+
+/// The response from rest after a time, per unit base amplitude, for a base phasor of 1 at the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Response {
+    /// `e^{i omega t}`: the base phasor now.
+    pub base: Complex64,
+    /// `K`: the displacement is `Im K`.
+    pub position: Complex64,
+    /// `K'`, 1/s: the velocity is `Im K'`.
+    pub velocity: Complex64,
 }
 
 impl Forcing {
-    /// Coefficients for `omega` >= 0.
+    /// Coefficients for `omega` (rad/s), 0 or above.
     pub fn new(oscillator: &Oscillator, omega: f64) -> Self {
         let Oscillator {
             delta,
-            omega0,
             omega0_squared,
             ..
         } = *oscillator;
-        let f = Complex64::new(omega0_squared, 2.0 * delta * omega);
-        let answer = match oscillator.regime {
-            Regime::Oscillating { omega_d } if delta < LIGHT_DAMPING * omega0 => Answer::FromRest {
-                lambda: Complex64::new(-delta, omega_d),
-                omega_d,
-                gain: f / Complex64::new(0.0, 2.0 * omega_d),
+        let strength = Complex64::new(omega0_squared, 2.0 * delta * omega);
+        let (square, error) = product(omega, omega);
+        let detuned = Complex64::new((omega0_squared - square) - error, strength.im);
+        let light = match oscillator.regime {
+            Regime::Oscillating { omega_d } => Some(omega_d),
+            Regime::Overdamped { .. } => None,
+        };
+        let limit = LARGEST_STEADY * LARGEST_STEADY * detuned.norm_sqr();
+        let form = match light {
+            Some(omega_d) if strength.norm_sqr() > limit => Form::DividedDifferences {
+                gain: strength / Complex64::new(0.0, 2.0 * omega_d),
                 near: Complex64::new(delta, oscillator.detuning(omega, omega_d)),
                 far: Complex64::new(delta, omega + omega_d).inv(),
             },
-            _ => Answer::Steady(
-                f / Complex64::new((omega0 - omega) * (omega0 + omega), 2.0 * delta * omega),
-            ),
+            _ => Form::Steady(strength / detuned),
         };
         Self {
             omega,
-            strength: libm::hypot(f.re, f.im),
-            answer,
+            strength,
+            form,
         }
+    }
+
+    /// The response after `t` seconds; `free` and `decayed` are the free motion's ([`Oscillator::flow`]) after that time.
+    pub(crate) fn response(&self, t: f64, free: &Transition, decayed: Complex64) -> Response {
+        let (sin, cos) = sincos_of_product((self.omega, 0.0), t);
+        let base = Complex64::new(cos, sin);
+        let position = match self.form {
+            Form::Steady(steady) => {
+                steady * (base - Complex64::new(free.xx, self.omega * free.xv))
+            }
+            Form::DividedDifferences {
+                gain,
+                near,
+                far,
+            } => {
+                let first = divided_difference(near, t, base, decayed);
+                let second = (base - decayed.conj()) * far;
+                gain * (first - second)
+            }
+        };
+        Response {
+            base,
+            position,
+            velocity: self.velocity(position, free.xv),
+        }
+    }
+
+    /// `K' = i omega K + F xv`: the response to the slope of the base motion, and to its jump from rest.
+    #[inline(always)]
+    pub(crate) fn velocity(&self, position: Complex64, per_velocity: f64) -> Complex64 {
+        Complex64::new(
+            self.strength.re * per_velocity - self.omega * position.im,
+            self.strength.im * per_velocity + self.omega * position.re,
+        )
     }
 }
 
 /// `(e^{i omega t} - e^{lambda t})/(i omega - lambda)`, whatever the distance between the two exponents.
-pub(crate) fn divided_difference(
-    near: Complex64,
-    t: f64,
-    turned: Complex64,
-    decayed: Complex64,
-) -> Complex64 {
+fn divided_difference(near: Complex64, t: f64, turned: Complex64, decayed: Complex64) -> Complex64 {
     let z = near * t;
     if z.norm_sqr() < 0.25 {
         decayed * t * phi(z)
@@ -91,10 +134,15 @@ pub(crate) fn divided_difference(
     }
 }
 
-/// `(e^z - 1)/z` for `|z| <= 1/2`, from its series: the first term left out is below 2^-16/17! = 4e-20.
+/// `(e^z - 1)/z` for `|z| <= 1/2`, from its series: the first term left out is below 1e-19.
 fn phi(z: Complex64) -> Complex64 {
+    let terms = match z.norm_sqr() {
+        tiny if tiny < 1e-6 => 6,
+        small if small < 1e-3 => 9,
+        _ => 16,
+    };
     let mut sum = Complex64::new(1.0, 0.0);
-    for n in (2..=16).rev() {
+    for n in (2..=terms).rev() {
         sum = sum * z * (1.0 / f64::from(n)) + 1.0;
     }
     sum
@@ -105,11 +153,13 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_series_of_phi_meets_the_quotient_where_they_change_over() {
+    fn the_series_of_phi_agrees_with_the_quotient() {
         for angle in 0..16 {
-            let z = Complex64::from_polar(0.5, f64::from(angle) * 0.4);
-            let quotient = (z.exp() - 1.0) / z;
-            assert!((phi(z) - quotient).norm() < 1e-15);
+            for (size, error) in [(0.5, 1e-15), (0.032, 1e-14), (0.031, 1e-14), (1e-3, 1e-12)] {
+                let z = Complex64::from_polar(size, f64::from(angle) * 0.4);
+                let quotient = (z.exp() - 1.0) / z;
+                assert!((phi(z) - quotient).norm() < error, "{size}");
+            }
         }
     }
 }

@@ -15,9 +15,8 @@
 use crate::base_motion::Drive;
 use crate::equations::Instant;
 use crate::parameters::{InvalidValue, Parameters};
-use crate::plant::{Event, Plant, State, Tally};
-use crate::wall::{ImpactLaw, Wall};
-use serde::{Deserialize, Serialize};
+use crate::plant::{Event, Plant, State, Totals};
+use crate::contact::{ImpactLaw, Wall};
 
 /// How far behind a wall a touch is told, as a fraction of the half-width.
 pub const DEPTH: f64 = 1e-12;
@@ -27,7 +26,8 @@ pub const LOWEST_HOP: f64 = 1e-10;
 pub const LONGEST_CHATTER: f64 = 1e-2;
 
 /// What is integrated.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct States {
     /// Displacement of the primary mass, m.
     pub q1: f64,
@@ -42,11 +42,12 @@ pub struct States {
 }
 
 /// The rig between two looks of an integrator.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Hybrid {
     parameters: Parameters,
     contact: Option<Wall>,
-    tally: Tally,
+    totals: Totals,
     /// Where the base was when the event began.
     base_before: Option<f64>,
     /// What moves the base now: set at any time.
@@ -65,7 +66,7 @@ impl Hybrid {
         let mut hybrid = Self {
             parameters,
             contact: None,
-            tally: Tally::default(),
+            totals: Totals::default(),
             base_before: None,
             drive,
             states: States {
@@ -113,8 +114,8 @@ impl Hybrid {
     }
 
     /// What has been counted since the start.
-    pub fn tally(&self) -> &Tally {
-        &self.tally
+    pub fn totals(&self) -> &Totals {
+        &self.totals
     }
 
     /// Typical sizes of displacements (m) and velocities (m/s).
@@ -173,7 +174,7 @@ impl Hybrid {
     ///
     /// # Errors
     /// Parameters that make no sense; the old ones stay.
-    pub fn retune(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
+    pub fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         parameters.validate()?;
         let Instant { dq1, dq2, .. } = self.instant();
         self.parameters = parameters;
@@ -230,10 +231,10 @@ impl Hybrid {
         if s * (dq1 - dq2) > 0.0 {
             let velocity = dq1 - dq2;
             let after = law.rebound(dq1, velocity);
-            self.tally.impacts += 1;
-            self.tally.impact_time = time;
-            self.tally.impact_velocity = velocity;
-            self.tally.dissipated += after.dissipated;
+            self.totals.impacts += 1;
+            self.totals.impact_time = time;
+            self.totals.impact_velocity = velocity;
+            self.totals.dissipated += after.dissipated;
             tell(Event::Impact {
                 t: 0.0,
                 wall,
@@ -245,7 +246,7 @@ impl Hybrid {
         self.set_velocities(dq1, dq2);
         if self.rests(wall, s * (dq2 - dq1)) {
             let (both, lost) = law.join(dq1, dq1 - dq2);
-            self.tally.dissipated += lost;
+            self.totals.dissipated += lost;
             self.contact = Some(wall);
             self.set_velocities(both, both);
             tell(Event::Stuck { t: 0.0, wall });

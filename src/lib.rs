@@ -1,29 +1,26 @@
 //! A linear oscillator with a vibro-impact nonlinear energy sink, exact between events.
 #![forbid(unsafe_code)]
 
+mod arithmetic;
 pub mod base_motion;
-#[cfg(feature = "batch")]
-pub mod batch;
 pub mod clearance;
-mod creep;
-pub mod crossing;
+pub mod contact;
 pub mod equations;
+mod fast;
 pub mod flight;
 #[cfg(feature = "fmu")]
 mod fmu;
 pub mod forcing;
 pub mod hybrid;
-pub mod lane;
-pub mod motion;
 pub mod oscillator;
+mod overdamped;
 pub mod parameters;
 pub mod plant;
 pub mod rates;
-pub mod span;
+pub mod segment;
 pub mod sticking;
-pub mod wall;
 
 pub use base_motion::{BaseMotion, Drive};
+pub use contact::Wall;
 pub use parameters::{InvalidValue, Parameters};
-pub use plant::{Event, Outcome, Plant, State, Tally};
-pub use wall::Wall;
+pub use plant::{Event, Outcome, Plant, State, Totals};

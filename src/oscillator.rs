@@ -3,15 +3,14 @@
 //! `x'' + 2 delta x' + omega0² x = 0`. Position and velocity after `t` are a linear map of those now; the map's four
 //! entries are written so that none loses digits at any damping ratio, however near to critical.
 
-use crate::base_motion::{evenly, product, sincos_of_product, two_sum};
-use crate::creep::APART;
-use crate::lane::Lane;
-#[cfg(feature = "batch")]
-use crate::lane::Lanes;
-use serde::{Deserialize, Serialize};
+use crate::arithmetic::{
+    divided, plus, product, quotient, sincos_of_product, split_coefficient, times, two_sum,
+};
+use crate::overdamped::APART;
+use num_complex::Complex64;
 
 /// Coefficients of one oscillator, derived once from mass, stiffness and damping.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Oscillator {
     /// Decay rate `delta = c/(2 mass)`, 1/s.
     pub delta: f64,
@@ -19,19 +18,21 @@ pub struct Oscillator {
     pub omega0_squared: f64,
     /// Natural frequency, 1/s.
     pub omega0: f64,
-    /// How the free motion goes.
+    /// Whether the free motion oscillates.
     pub regime: Regime,
-    /// What rounding has kept out of the damped natural frequency, rad/s: after a thousand periods it is six thousand
-    /// times as much of the phase.
-    omega_d_missed: f64,
+    /// Rounding error of the damped natural frequency, rad/s. After a thousand periods the error of the phase is six thousand
+    /// times as large.
+    omega_d_error: f64,
+    /// Rounding errors of `2 delta` (1/s) and `omega0²` (1/s²).
+    errors: (f64, f64),
     /// Longest a unit velocity can carry the free motion, s: `|x(t)| <= |x(0)| + reach |x'(0)|`.
     pub reach: f64,
     /// The fastest rate in the free motion, 1/s.
     pub fastest: f64,
 }
 
-/// How the free motion goes.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+/// Whether the free motion oscillates.
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Regime {
     /// Below critical damping, down to none: oscillation at `omega_d`, rad/s.
     Oscillating {
@@ -39,7 +40,7 @@ pub enum Regime {
         omega_d: f64,
     },
     /// Critical damping and above: two decaying exponentials whose rates differ by `2 half_gap`.
-    Creeping {
+    Overdamped {
         /// The slow rate, 1/s, at most 0.
         slow: f64,
         /// The fast rate, 1/s, below 0.
@@ -51,103 +52,48 @@ pub enum Regime {
 
 /// Position and velocity after a time, as a linear map of those before it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Transition<T = f64> {
+pub struct Transition {
     /// Position per position.
-    pub xx: T,
+    pub xx: f64,
     /// Position per velocity, s.
-    pub xv: T,
+    pub xv: f64,
     /// Velocity per position, 1/s.
-    pub vx: T,
+    pub vx: f64,
     /// Velocity per velocity.
-    pub vv: T,
+    pub vv: f64,
 }
 
 impl Transition {
-    /// The transition over no time at all.
-    pub const NONE: Self = Self {
-        xx: 1.0,
-        xv: 0.0,
-        vx: 0.0,
-        vv: 1.0,
-    };
-}
-
-impl<T: Lane> Transition<T> {
     /// Position and velocity after it.
     #[inline(always)]
-    pub fn of(&self, x: T, v: T) -> (T, T) {
+    pub fn of(&self, x: f64, v: f64) -> (f64, f64) {
         (self.xx * x + self.xv * v, self.vx * x + self.vv * v)
     }
-}
-
-#[cfg(feature = "batch")]
-impl<const N: usize> Transition<Lanes<N>> {
-    /// Several transitions abreast.
-    pub(crate) fn abreast(transitions: [&Transition; N]) -> Self {
-        let all = |f: fn(&Transition) -> f64| Lanes(transitions.map(f));
-        Self {
-            xx: all(|m| m.xx),
-            xv: all(|m| m.xv),
-            vx: all(|m| m.vx),
-            vv: all(|m| m.vv),
-        }
-    }
-
-    /// One of them.
-    pub(crate) fn of_lane(&self, lane: usize) -> Transition {
-        Transition {
-            xx: self.xx.0[lane],
-            xv: self.xv.0[lane],
-            vx: self.vx.0[lane],
-            vv: self.vv.0[lane],
-        }
-    }
-
-    /// Replaces one of them.
-    pub(crate) fn put(&mut self, lane: usize, m: &Transition) {
-        self.xx.0[lane] = m.xx;
-        self.xv.0[lane] = m.xv;
-        self.vx.0[lane] = m.vx;
-        self.vv.0[lane] = m.vv;
-    }
-}
-
-/// A number, and what rounding has kept out of it.
-type Two = (f64, f64);
-
-fn times(a: Two, b: Two) -> Two {
-    let (whole, missed) = product(a.0, b.0);
-    (whole, missed + (a.0 * b.1 + a.1 * b.0))
-}
-
-fn plus(a: Two, b: Two) -> Two {
-    let (whole, missed) = two_sum(a.0, b.0);
-    (whole, missed + (a.1 + b.1))
 }
 
 impl Oscillator {
     /// Coefficients of the oscillator of this mass (kg), stiffness (N/m) and damping (N·s/m).
     pub fn new(mass: f64, stiffness: f64, damping: f64) -> Self {
-        let (rate, rate_missed) = quotient(damping, mass);
+        let (rate, rate_error) = quotient(damping, mass);
         let delta = 0.5 * rate;
-        let (omega0_squared, stiffness_missed) = quotient(stiffness, mass);
+        let (omega0_squared, stiffness_error) = quotient(stiffness, mass);
         let omega0 = libm::sqrt(omega0_squared);
         // `omega0² - delta²` with what rounding keeps out of it, so that no digit is lost near critical damping.
-        let (square, square_missed) = product(delta, delta);
-        let (difference, missed) = two_sum(omega0_squared, -square);
-        let missed = missed + (stiffness_missed - square_missed - delta * rate_missed);
-        let discriminant = difference + missed;
-        let mut omega_d_missed = 0.0;
+        let (square, square_error) = product(delta, delta);
+        let (difference, error) = two_sum(omega0_squared, -square);
+        let error = error + (stiffness_error - square_error - delta * rate_error);
+        let discriminant = difference + error;
+        let mut omega_d_error = 0.0;
         let (regime, reach, fastest) = if discriminant > 0.0 {
             let omega_d = libm::sqrt(discriminant);
-            let (got, got_missed) = product(omega_d, omega_d);
-            omega_d_missed = ((difference - got) + (missed - got_missed)) / (2.0 * omega_d);
+            let (got, got_error) = product(omega_d, omega_d);
+            omega_d_error = ((difference - got) + (error - got_error)) / (2.0 * omega_d);
             (Regime::Oscillating { omega_d }, 1.0 / omega0, omega0)
         } else {
             let half_gap = libm::sqrt(-discriminant);
             let fast = -(delta + half_gap);
             let slow = omega0_squared / fast;
-            let regime = Regime::Creeping {
+            let regime = Regime::Overdamped {
                 slow,
                 fast,
                 half_gap,
@@ -159,7 +105,8 @@ impl Oscillator {
             omega0_squared,
             omega0,
             regime,
-            omega_d_missed,
+            omega_d_error,
+            errors: (rate_error, stiffness_error),
             reach,
             fastest,
         }
@@ -167,12 +114,12 @@ impl Oscillator {
 
     /// `omega` less the damped natural frequency `omega_d`, with all its digits.
     pub(crate) fn detuning(&self, omega: f64, omega_d: f64) -> f64 {
-        (omega - omega_d) - self.omega_d_missed
+        (omega - omega_d) - self.omega_d_error
     }
 
     /// Sine and cosine of `omega_d t`, for the `omega_d` of this oscillator.
-    pub(crate) fn turned(&self, omega_d: f64, t: f64) -> (f64, f64) {
-        sincos_of_product((omega_d, self.omega_d_missed), t)
+    pub(crate) fn sincos(&self, omega_d: f64, t: f64) -> (f64, f64) {
+        sincos_of_product((omega_d, self.omega_d_error), t)
     }
 
     /// A bound on `|y|` from now on, for a free motion that has `y` and `y'` now (each derivative of the motion obeys
@@ -181,60 +128,109 @@ impl Oscillator {
         let carried = self.reach * dy;
         match self.regime {
             Regime::Oscillating { .. } => libm::sqrt(y * y + carried * carried),
-            Regime::Creeping { .. } => libm::fabs(y) + libm::fabs(carried),
+            Regime::Overdamped { .. } => libm::fabs(y) + libm::fabs(carried),
         }
     }
 
     /// The free motion over `t` seconds.
     pub fn transition(&self, t: f64) -> Transition {
+        self.flow(t).0
+    }
+
+    /// The free motion over `t` seconds and, where it oscillates, `exp((-delta + i omega_d) t)`.
+    pub(crate) fn flow(&self, t: f64) -> (Transition, Complex64) {
         match self.regime {
             Regime::Oscillating { omega_d } => {
-                let (sin, cos) = self.turned(omega_d, t);
+                let (sin, cos) = self.sincos(omega_d, t);
                 let decay = libm::exp(-self.delta * t);
-                self.oscillating(omega_d, decay * sin, decay * cos)
+                let turned = Complex64::new(decay * cos, decay * sin);
+                (self.oscillating(omega_d, turned.im, turned.re), turned)
             }
-            Regime::Creeping {
+            Regime::Overdamped {
                 slow,
                 fast,
                 half_gap,
-            } => self.creeping(t, slow, fast, half_gap),
+            } => (self.overdamped(t, slow, fast, half_gap), Complex64::ZERO),
         }
     }
 
-    /// The free motion over `t` seconds as the sum of two maps: for a transition that is used again and again.
+    /// What the free motion over `t` seconds adds to position and velocity, as the sum of two maps: for a transition that is
+    /// used many times.
     ///
-    /// A rounded one would be a steady source or sink of energy, small as it is. What is left here is an error of the
-    /// frequency, of which energy knows nothing. Where the motion does not swing, it dies out too fast for that, and the second
-    /// map is none.
-    pub fn kept_transition(&self, t: f64) -> (Transition, Transition) {
+    /// A rounded transition would be a steady source or sink of energy, small as it is. What is left here is an error of the
+    /// frequency, which leaves the energy as it is. An overdamped motion dies out too fast for that to matter; its second map is
+    /// zero.
+    pub(crate) fn split_increment(&self, t: f64) -> (Transition, Transition) {
         let Regime::Oscillating { omega_d } = self.regime else {
-            return (self.transition(t), Transition::default());
+            let Transition { xx, xv, vx, vv } = self.transition(t);
+            let (xx, vv) = (xx - 1.0, vv - 1.0);
+            return (Transition { xx, xv, vx, vv }, Transition::default());
         };
-        let (sin, cos) = self.turned(omega_d, t);
+        let (sin, cos) = self.sincos(omega_d, t);
         // How far the rounded sine and cosine are off the unit circle.
         let (cos2, sin2) = (product(cos, cos), product(sin, sin));
-        let (sum, missed) = two_sum(cos2.0, sin2.0);
-        let outside = (sum - 1.0) + (missed + cos2.1 + sin2.1);
+        let (sum, error) = two_sum(cos2.0, sin2.0);
+        let outside = (sum - 1.0) + (error + cos2.1 + sin2.1);
         let decay = two_sum(1.0, libm::expm1(-self.delta * t));
         let radius = (decay.0, decay.1 - 0.5 * outside * decay.0);
         let (cos, sin) = (times((cos, 0.0), radius), times((sin, 0.0), radius));
         let quotient = sin.0 / omega_d;
-        let (got, got_missed) = product(quotient, omega_d);
-        let omega_d = (omega_d, self.omega_d_missed);
-        let lost = (sin.0 - got) - got_missed + sin.1 - quotient * omega_d.1;
+        let (got, got_error) = product(quotient, omega_d);
+        let omega_d = (omega_d, self.omega_d_error);
+        let lost = (sin.0 - got) - got_error + sin.1 - quotient * omega_d.1;
         let s = (quotient, lost / omega_d.0);
         let leaning = times((self.delta, 0.0), s);
-        // `omega0²` as it is for this very `omega_d`: it is what the transition keeps.
+        // `omega0²` for this very `omega_d`: that is what the transition keeps.
         let stiffness = plus(times(omega_d, omega_d), product(self.delta, self.delta));
         let pull = times(stiffness, s);
+        let change = plus(cos, (-1.0, 0.0));
         let entries = [
-            plus(cos, leaning),
+            plus(change, leaning),
             s,
             (-pull.0, -pull.1),
-            plus(cos, (-leaning.0, -leaning.1)),
+            plus(change, (-leaning.0, -leaning.1)),
         ]
-        .map(|(entry, missed)| evenly(entry, missed));
-        let part = |f: fn(&Two) -> f64| {
+        .map(split_coefficient);
+        let part = |f: fn(&(f64, f64)) -> f64| {
+            let [xx, xv, vx, vv] = entries.each_ref().map(f);
+            Transition { xx, xv, vx, vv }
+        };
+        (part(|e| e.0), part(|e| e.1))
+    }
+
+    /// As [`Self::split_increment`] for a time that is short against every rate (`fastest t <= 1/2`), with the relative
+    /// accuracy of each entry kept: equal steps add up neither rounding errors nor phase. A Taylor series in double-double
+    /// arithmetic.
+    pub(crate) fn split_short_increment(&self, t: f64) -> (Transition, Transition) {
+        const DEGREE: usize = 26;
+        let damping = times((2.0 * self.delta, self.errors.0), (t, 0.0));
+        let spring = times((self.omega0_squared, self.errors.1), product(t, t));
+        // Coefficients for the start (1, 0) or (0, t); the velocity is that of `t x'`.
+        let column = |first: [(f64, f64); 2]| {
+            let (mut c, mut x, mut v) = (first, (0.0, 0.0), (0.0, 0.0));
+            for n in 2..DEGREE {
+                let sum = plus(
+                    times(damping, times(c[1], ((n - 1) as f64, 0.0))),
+                    times(spring, c[0]),
+                );
+                let (next, error) = divided(sum, ((n - 1) * n) as f64);
+                c = [c[1], (-next, -error)];
+                x = plus(x, c[1]);
+                v = plus(v, times(c[1], (n as f64, 0.0)));
+            }
+            (x, v)
+        };
+        let (xx, vx) = column([(1.0, 0.0), (0.0, 0.0)]);
+        let (xv, vv) = column([(0.0, 0.0), (1.0, 0.0)]);
+        let (one, t2) = ((1.0, 0.0), (t, 0.0));
+        let entries = [
+            xx,
+            times(plus(one, xv), t2),
+            divided(vx, t),
+            vv,
+        ]
+        .map(split_coefficient);
+        let part = |f: fn(&(f64, f64)) -> f64| {
             let [xx, xv, vx, vv] = entries.each_ref().map(f);
             Transition { xx, xv, vx, vv }
         };
@@ -252,7 +248,7 @@ impl Oscillator {
         }
     }
 
-    fn creeping(&self, t: f64, slow: f64, fast: f64, half_gap: f64) -> Transition {
+    fn overdamped(&self, t: f64, slow: f64, fast: f64, half_gap: f64) -> Transition {
         let (e_slow, e_fast) = (libm::exp(slow * t), libm::exp(fast * t));
         let gap = 2.0 * half_gap;
         // (e_slow - e_fast)/gap without subtracting near-equals; its limit is t e_slow.
@@ -278,13 +274,6 @@ impl Oscillator {
             vv,
         }
     }
-}
-
-/// `a / b` as a rounded quotient and its rounding error.
-fn quotient(a: f64, b: f64) -> (f64, f64) {
-    let rounded = a / b;
-    let (got, got_missed) = product(rounded, b);
-    (rounded, ((a - got) - got_missed) / b)
 }
 
 #[cfg(test)]

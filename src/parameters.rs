@@ -1,10 +1,13 @@
 //! What the rig is made of, in SI units, validated once.
 
 use core::fmt;
-use serde::{Deserialize, Serialize};
+
+/// Fastest rate that is accepted, rad/s: bounds of the motion contain its powers.
+pub(crate) const FASTEST: f64 = 1e50;
 
 /// The physical parameters of the linear oscillator and its vibro-impact particle.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Parameters {
     /// Primary mass `M`, kg.
     pub primary_mass: f64,
@@ -54,20 +57,23 @@ impl Parameters {
         self.primary_mass * (self.particle_mass / (self.primary_mass + self.particle_mass))
     }
 
-    /// Says which value makes no sense, if one does.
+    /// Checks every value and the rates that follow from them.
+    ///
+    /// # Errors
+    /// The first invalid value, with its unit and the allowed range.
     pub fn validate(&self) -> Result<(), InvalidValue> {
         let positive = |name, value: f64, unit| {
-            let allowed = "a finite number above 0";
-            InvalidValue::unless(value.is_finite() && value > 0.0, name, value, unit, allowed)
+            let allowed = "a number from 1e-100 to 1e100";
+            InvalidValue::unless((1e-100..=1e100).contains(&value), name, value, unit, allowed)
         };
         positive("M (primary mass)", self.primary_mass, "kg")?;
         positive("k (stiffness)", self.stiffness, "N/m")?;
         InvalidValue::unless(
-            self.damping.is_finite() && self.damping >= 0.0,
+            (0.0..=1e100).contains(&self.damping),
             "c (damping)",
             self.damping,
             "N.s/m",
-            "a finite number, 0 or above",
+            "a number from 0 to 1e100",
         )?;
         positive("m (particle mass)", self.particle_mass, "kg")?;
         positive("b (half-width of the cavity)", self.half_width, "m")?;
@@ -77,11 +83,17 @@ impl Parameters {
             self.restitution,
             "",
             "a number above 0 and at most 1",
-        )
+        )?;
+        let rate = |name, value: f64| {
+            let allowed = "at most 1e50 rad/s";
+            InvalidValue::unless(value <= FASTEST, name, value, "rad/s", allowed)
+        };
+        rate("sqrt(k/M) (natural frequency)", self.natural_frequency())?;
+        rate("c/M (decay rate)", self.damping / self.primary_mass)
     }
 }
 
-/// A value that makes no sense: which, what it is, and what is allowed.
+/// An invalid value: its name, its unit, and what is allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct InvalidValue {
     /// Symbol and meaning of the quantity.
@@ -90,7 +102,7 @@ pub struct InvalidValue {
     pub value: f64,
     /// Its unit.
     pub unit: &'static str,
-    /// What would have been accepted.
+    /// What is allowed.
     pub allowed: &'static str,
 }
 
@@ -144,14 +156,24 @@ mod tests {
     }
 
     #[test]
-    fn a_value_that_makes_no_sense_is_named_with_its_unit_and_what_is_allowed() {
+    fn an_invalid_value_is_named_with_its_unit_and_what_is_allowed() {
         let message = refused(|p| p.particle_mass = -0.5);
         assert_eq!(
             message,
-            "m (particle mass) = -0.5 kg is refused; allowed is a finite number above 0"
+            "m (particle mass) = -0.5 kg is refused; allowed is a number from 1e-100 to 1e100"
         );
         assert!(refused(|p| p.restitution = 1.5).contains("at most 1"));
         assert!(refused(|p| p.damping = -1e-9).contains("N.s/m"));
+    }
+
+    #[test]
+    fn rates_beyond_double_precision_are_refused() {
+        assert!(refused(|p| p.damping = 1e300).contains("c (damping)"));
+        assert!(refused(|p| p.damping = 1e99).contains("decay rate"));
+        assert!(refused(|p| p.primary_mass = 1e-300).contains("primary mass"));
+        assert!(
+            refused(|p| (p.primary_mass, p.stiffness) = (1e-100, 1e100)).contains("natural frequency")
+        );
     }
 
     #[test]

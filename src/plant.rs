@@ -1,37 +1,26 @@
-//! The rig: linear oscillator, particle and walls, advanced from event to event in closed form.
+//! The plant: linear oscillator, particle and walls, advanced from event to event in closed form.
+//!
+//! [`advance`] holds the loop over events. What comes next is either found by the plain solver, a certified search along one
+//! [`crate::segment::Segment`], or predicted and verified by the fast path ([`crate::fast`]).
 
-#[cfg(feature = "batch")]
-pub(crate) mod abreast;
 mod advance;
-mod contact;
-mod course;
-mod cross;
-mod hop;
-mod reading;
-mod strides;
-mod written;
+mod at_wall;
+#[cfg(feature = "serde")]
+mod snapshot;
 
+use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive};
-use crate::crossing::Origin;
-use crate::forcing::Forcing;
-use crate::motion::Motion;
+use crate::contact::{Contact, ImpactLaw, Wall};
+use crate::fast::FastPath;
 use crate::oscillator::Oscillator;
 use crate::parameters::{InvalidValue, Parameters};
-use crate::wall::{ImpactLaw, Wall};
-use course::Course;
-pub use reading::Reading;
-use serde::{Deserialize, Serialize};
-use written::Written;
 
-/// A rebound that would lift the particle less than this fraction of the half-width off its wall cannot be told from
-/// contact in double precision.
-pub(crate) const UNRESOLVED: f64 = 1.0 / (1u64 << 56) as f64;
-
-/// An advance ends before its time at this many impacts, so that no value, however absurd, makes it endless.
+/// Largest number of impacts per step. Bounds the work of any input.
 pub const MOST_IMPACTS: u64 = 10_000_000;
 
 /// Positions (m) and velocities (m/s) of both masses.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct State {
     /// Displacement of the primary mass.
     pub q1: f64,
@@ -43,16 +32,16 @@ pub struct State {
     pub dq2: f64,
 }
 
-/// Something that happened while the plant advanced; times are in seconds since the advance began.
+/// An event of a step; times are in seconds since the step began.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Event {
-    /// The particle hit a wall; `velocity` is w' just before, m/s.
+    /// The particle hit a wall.
     Impact {
         /// When, s.
         t: f64,
         /// Which wall.
         wall: Wall,
-        /// Relative velocity just before, m/s.
+        /// Relative velocity `w'` just before, m/s.
         velocity: f64,
     },
     /// The particle came to rest on a wall.
@@ -62,7 +51,7 @@ pub enum Event {
         /// Which wall.
         wall: Wall,
     },
-    /// The wall ceased to push and let the particle go.
+    /// The wall ceased to push and released the particle.
     Released {
         /// When, s.
         t: f64,
@@ -71,98 +60,112 @@ pub enum Event {
     },
 }
 
-/// What an advance met on its way.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+/// The events of a step, counted, and how far the step came.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Outcome {
     /// Impacts followed one by one.
     pub impacts: u64,
     /// How often the particle came to rest on a wall.
     pub stuck: u64,
-    /// How often a wall let it go.
+    /// How often a wall released it.
     pub released: u64,
-    /// Whether it has ended before its time, at [`MOST_IMPACTS`].
+    /// Time by which the plant advanced, s: less than the step where it was cut short.
+    pub elapsed: f64,
+    /// Whether the step ended early, at [`MOST_IMPACTS`] or as many releases.
     pub cut_short: bool,
+    /// Evaluations of the motion (closed form, propagator or series).
+    pub evaluations: u64,
 }
 
-/// What has been counted since the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
-pub struct Tally {
+/// Totals since the start.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Totals {
     /// Impacts followed one by one. A chatter is followed until its hops can no longer be resolved.
     pub impacts: u64,
     /// Time of the last impact, s; 0 before the first.
     pub impact_time: f64,
-    /// Relative velocity w' just before the last impact, m/s; 0 before the first.
+    /// Relative velocity `w'` just before the last impact, m/s; 0 before the first.
     pub impact_velocity: f64,
     /// Energy dissipated by impacts, J.
     pub dissipated: f64,
 }
 
-#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
-enum Contact {
-    Free,
-    Stuck(Wall),
-    /// Free, and the wall has ceased to push at this very instant.
-    Released(Wall),
-}
-
-/// An oscillator and its answer to the frequency in use: coefficients are kept while the frequency stays.
+/// The parameters and what follows from them.
 #[derive(Clone, Copy, Debug)]
-struct Driven {
-    oscillator: Oscillator,
-    forcing: Forcing,
+pub(crate) struct Rig {
+    pub parameters: Parameters,
+    pub mass_ratio: f64,
+    pub law: ImpactLaw,
+    /// The primary mass alone, and with the particle stuck to it.
+    pub alone: Oscillator,
+    pub joint: Oscillator,
 }
 
-impl Driven {
-    fn new(mass: f64, p: &Parameters) -> Self {
-        let oscillator = Oscillator::new(mass, p.stiffness, p.damping);
+impl Rig {
+    fn new(p: &Parameters) -> Self {
+        let joint = p.primary_mass + p.particle_mass;
         Self {
-            forcing: Forcing::new(&oscillator, 0.0),
-            oscillator,
+            parameters: *p,
+            mass_ratio: p.mass_ratio(),
+            law: ImpactLaw::new(p),
+            alone: Oscillator::new(p.primary_mass, p.stiffness, p.damping),
+            joint: Oscillator::new(joint, p.stiffness, p.damping),
         }
     }
+}
 
-    fn motion(&mut self, base: &BaseMotion, start: (f64, f64)) -> Motion<'_> {
-        let omega = base.drive.omega.abs();
-        if self.forcing.omega != omega && base.drive.amplitude != 0.0 {
-            self.forcing = Forcing::new(&self.oscillator, omega);
-        }
-        Motion::new(&self.oscillator, &self.forcing, *base, start)
-    }
+/// Displacements and velocities of both masses.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Masses {
+    /// Displacement of the primary mass, m.
+    pub x: Sum,
+    /// Its velocity, m/s.
+    pub v: Sum,
+    /// Relative displacement `w = q1 - q2`, m. It is carried itself: in a narrow gap the difference of two large
+    /// displacements would have lost it.
+    pub w: Sum,
+    /// Relative velocity `w'`, m/s. After an impact it has more digits than the difference of two large velocities.
+    pub dw: f64,
+    /// Velocity of the particle, m/s.
+    pub particle: f64,
 }
 
 /// The plant: parameters, what follows from them, and the state.
-#[derive(Clone, Copy, Debug, Serialize, Deserialize)]
-#[serde(into = "Written", from = "Written")]
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(into = "snapshot::Snapshot", from = "snapshot::Snapshot"))]
 pub struct Plant {
-    parameters: Parameters,
-    mass_ratio: f64,
-    law: ImpactLaw,
-    /// The primary mass alone, and with the particle stuck to it.
-    alone: Driven,
-    joint: Driven,
+    rig: Rig,
     contact: Contact,
-    /// The state when the flight under way began, or a little later: see [`Course`].
-    here: Origin<f64>,
+    masses: Masses,
     base: BaseMotion,
-    /// Whether the plant has advanced since its start: a drive set before that is where the base is, not a jump.
-    under_way: bool,
+    /// Whether the base has a position: the first drive sets it, later ones may make it jump.
+    begun: bool,
     time: f64,
-    tally: Tally,
-    course: Course,
+    totals: Totals,
+    evaluations: u64,
+    fast: FastPath,
 }
 
 impl Plant {
-    /// A plant at `start`; refuses parameters that make no sense and a particle outside its cavity.
+    /// A plant at `start`.
+    ///
+    /// # Errors
+    /// Invalid parameters, a state that is not finite, a particle outside its cavity.
     pub fn new(parameters: Parameters, start: State) -> Result<Self, InvalidValue> {
         parameters.validate()?;
+        let b = parameters.half_width;
         let finite = |name, value: f64, unit| {
-            InvalidValue::unless(value.is_finite(), name, value, unit, "a finite number")
+            let allowed = "a finite number from -1e100 to 1e100";
+            InvalidValue::unless(value.abs() <= 1e100, name, value, unit, allowed)
         };
         finite("q1 (displacement of the primary mass)", start.q1, "m")?;
         finite("der(q1) (velocity of the primary mass)", start.dq1, "m/s")?;
         finite("q2 (displacement of the particle)", start.q2, "m")?;
         finite("der(q2) (velocity of the particle)", start.dq2, "m/s")?;
-        let (w, b) = (start.q1 - start.q2, parameters.half_width);
+        let w = start.q1 - start.q2;
         // The difference of two displacements carries their rounding; a start on the wall means on the wall.
         let slack = 4.0 * f64::EPSILON * (b + start.q1.abs().max(start.q2.abs()));
         InvalidValue::unless(
@@ -172,59 +175,58 @@ impl Plant {
             "m",
             "a number from -b to b",
         )?;
-        let alone = Driven::new(parameters.primary_mass, &parameters);
-        let joint = parameters.primary_mass + parameters.particle_mass;
         Ok(Self {
-            parameters,
-            mass_ratio: parameters.mass_ratio(),
-            law: ImpactLaw::new(&parameters),
-            joint: Driven::new(joint, &parameters),
+            rig: Rig::new(&parameters),
             contact: Contact::Free,
-            here: Origin {
-                x: start.q1,
-                v: start.dq1,
-                w: w.clamp(-b, b),
+            masses: Masses {
+                x: Sum::from(start.q1),
+                v: Sum::from(start.dq1),
+                w: Sum::from(w.clamp(-b, b)),
+                dw: start.dq1 - start.dq2,
                 particle: start.dq2,
-                turn: (1.0, 0.0),
             },
             base: BaseMotion::default(),
-            under_way: false,
+            begun: false,
             time: 0.0,
-            tally: Tally::default(),
-            course: Course::new(&alone.oscillator, b),
-            alone,
+            totals: Totals::default(),
+            evaluations: 0,
+            fast: FastPath::default(),
         })
     }
 
-    /// Says where the base is at the start: what drives it from the first advance on is compared with this.
-    pub fn begin(&mut self, drive: Drive) {
-        self.base.drive = drive;
-        self.under_way = true;
-        self.renew_course();
-    }
-
-    /// Takes over other parameters from now on; displacements, velocities and counts stay. The masses and the half-width
-    /// are meant to stay, too: nothing here says what their change would do.
+    /// Sets the base motion at the start: a drive that is set later is compared with it.
     ///
     /// # Errors
-    /// Parameters that make no sense; the old ones stay.
-    pub fn retune(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
+    /// An invalid drive.
+    pub fn begin(&mut self, drive: Drive) -> Result<(), InvalidValue> {
+        drive.validate()?;
+        self.base.drive = drive;
+        self.begun = true;
+        self.fast.state_changed(&self.base);
+        Ok(())
+    }
+
+    /// Switches the fast path on (default) or off. Without it every contact is found by the plain solver's certified search:
+    /// the test oracle of the fast path.
+    pub fn set_fast_path(&mut self, on: bool) {
+        self.fast.enabled = on;
+    }
+
+    /// Changes the parameters from now on; displacements, velocities and totals stay. A change of masses or half-width has
+    /// no physical meaning here.
+    ///
+    /// # Errors
+    /// Invalid parameters; the old ones stay.
+    pub fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         parameters.validate()?;
-        self.catch_up();
-        let joint = parameters.primary_mass + parameters.particle_mass;
-        self.mass_ratio = parameters.mass_ratio();
-        self.law = ImpactLaw::new(&parameters);
-        self.alone = Driven::new(parameters.primary_mass, &parameters);
-        self.joint = Driven::new(joint, &parameters);
-        self.parameters = parameters;
-        self.course = Course::new(&self.alone.oscillator, parameters.half_width);
-        self.renew_course();
+        self.rig = Rig::new(&parameters);
+        self.fast.parameters_changed(&self.base);
         Ok(())
     }
 
     /// The parameters.
     pub fn parameters(&self) -> &Parameters {
-        &self.parameters
+        &self.rig.parameters
     }
 
     /// Time since the start, s, or as [`Self::set_time`] set it. Only impact times depend on it.
@@ -232,7 +234,7 @@ impl Plant {
         self.time
     }
 
-    /// Sets the clock that impact times are told by.
+    /// Sets the clock, s: impact times refer to it.
     pub fn set_time(&mut self, time: f64) {
         self.time = time;
     }
@@ -240,48 +242,45 @@ impl Plant {
     /// Positions and velocities now.
     #[inline]
     pub fn state(&self) -> State {
-        let now = self.now();
+        let masses = &self.masses;
+        let q1 = masses.x.value();
         State {
-            q1: now.x,
-            dq1: now.v,
-            q2: now.x - now.w,
-            dq2: now.particle,
+            q1,
+            dq1: masses.v.value(),
+            q2: q1 - masses.w.value(),
+            dq2: masses.particle,
         }
     }
 
     /// Relative displacement `w = q1 - q2`, m.
+    #[inline]
     pub fn relative_displacement(&self) -> f64 {
-        self.now().w
+        self.masses.w.value()
     }
 
     /// Relative velocity `w'`, m/s.
+    #[inline]
     pub fn relative_velocity(&self) -> f64 {
-        self.now().relative_velocity()
+        self.masses.dw
     }
 
     /// `v = q1 + epsilon q2`, m: the displacement of the centre of mass times `1 + epsilon`.
     #[inline]
     pub fn centre(&self) -> f64 {
-        let now = self.now();
-        now.x + self.mass_ratio * (now.x - now.w)
+        let q1 = self.masses.x.value();
+        q1 + self.rig.mass_ratio * (q1 - self.masses.w.value())
     }
 
-    /// The base motion as it stands: drive, and the phase its oscillator has reached.
+    /// The base motion now: drive, and the phase of its oscillator.
+    #[inline]
     pub fn base(&self) -> BaseMotion {
-        BaseMotion {
-            phase: self.course.phase(self.base.phase),
-            ..self.base
-        }
+        self.base
     }
 
     /// Displacement of the base now, m.
     #[inline]
     pub fn base_displacement(&self) -> f64 {
-        if self.course.quick {
-            self.base.drive.signal[0] + self.base.drive.amplitude * self.now().turn.1
-        } else {
-            self.base.displacement()
-        }
+        self.base.drive.signal[0] + self.base.drive.amplitude * self.fast.phasor().1
     }
 
     /// The wall the particle is stuck to, if it is.
@@ -292,19 +291,19 @@ impl Plant {
         }
     }
 
-    /// What has been counted since the start.
-    pub fn tally(&self) -> &Tally {
-        &self.tally
+    /// Totals since the start.
+    pub fn totals(&self) -> &Totals {
+        &self.totals
     }
 
     /// Mechanical energy, J: of both masses' motion, and of the spring between the primary mass and a base at
     /// `displacement`, m.
     pub fn energy(&self, displacement: f64) -> f64 {
-        let p = &self.parameters;
-        let now = self.now();
-        let stretch = now.x - displacement;
-        0.5 * (p.primary_mass * now.v * now.v
-            + p.particle_mass * now.particle * now.particle
+        let p = &self.rig.parameters;
+        let State { q1, dq1, dq2, .. } = self.state();
+        let stretch = q1 - displacement;
+        0.5 * (p.primary_mass * dq1 * dq1
+            + p.particle_mass * dq2 * dq2
             + p.stiffness * stretch * stretch)
     }
 }

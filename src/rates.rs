@@ -99,15 +99,15 @@ mod tests {
             ..Drive::harmonic(0.2, 1.3)
         };
         let mut plant = Plant::new(p, start).unwrap();
-        plant.begin(drive);
+        plant.begin(drive).unwrap();
         let ahead = |t: f64| {
             let mut ahead = plant;
-            ahead.advance(drive, t);
+            ahead.advance(drive, t).unwrap();
             Movement::of(&ahead)
         };
         let (h, at) = (1e-4, 0.2);
         let (before, now, after) = (ahead(at - h), ahead(at), ahead(at + h));
-        assert_eq!(plant.tally().impacts, 0);
+        assert_eq!(plant.totals().impacts, 0);
         let close = |a: f64, b: f64, n: usize| assert!((a - b).abs() < 1e-7, "{n}: {a} {b}");
         for n in 0..4 {
             let slope = |of: fn(&Movement) -> &Rates| (of(&after)[n] - of(&before)[n]) / (2.0 * h);

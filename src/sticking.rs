@@ -1,8 +1,8 @@
 //! Persistent contact: both masses move as one while the wall must push, and part at the instant it need not.
 
 use crate::clearance::{Gap, first_closure};
-use crate::motion::{Derivatives, Motion, nearby};
-use crate::wall::Wall;
+use crate::segment::{Derivatives, Segment, nearby};
+use crate::contact::Wall;
 
 /// How a stretch of sticking ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -13,6 +13,8 @@ pub struct Parting {
     pub released: bool,
     /// Position (m) and velocity (m/s) of the joint mass.
     pub joint: (f64, f64),
+    /// Evaluations of the motion.
+    pub evaluations: u64,
 }
 
 /// Follows both masses, stuck together at `wall`, until the wall ceases to push or for `limit` seconds.
@@ -20,7 +22,7 @@ pub struct Parting {
 /// The wall at `w = +b` pushes while the joint acceleration is positive, that at `w = -b` while it is negative.
 /// `noise` (m/s²) is the rounding of that acceleration: a push is said to have ceased only below `-noise`, so that two
 /// masses at rest do not part over a last digit.
-pub fn until_released(motion: &Motion, wall: Wall, limit: f64, noise: f64) -> Parting {
+pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> Parting {
     let s = wall.sign();
     let series = motion.series();
     let look = |t: f64| {
@@ -38,11 +40,14 @@ pub fn until_released(motion: &Motion, wall: Wall, limit: f64, noise: f64) -> Pa
         ([push], d)
     };
     let jerk = |d: &Derivatives, h: f64| motion.fifth_derivative_bound(d, h);
-    match first_closure((0.0, limit), (motion.fastest(), noise), look, jerk) {
+    let scale = (motion.fastest(), noise);
+    let (closure, evaluations) = first_closure((0.0, limit), scale, look, jerk);
+    match closure {
         Some(closure) => Parting {
             t: closure.t + closure.h,
             released: true,
             joint: nearby(&closure.derivatives, closure.h),
+            evaluations,
         },
         None => {
             let [x, v, ..] = motion.at(&series, limit).derivatives;
@@ -50,6 +55,7 @@ pub fn until_released(motion: &Motion, wall: Wall, limit: f64, noise: f64) -> Pa
                 t: limit,
                 released: false,
                 joint: (x, v),
+                evaluations: evaluations + 1,
             }
         }
     }

@@ -37,7 +37,7 @@ fn worst_error(scene: &str) -> f64 {
     let mut plant = Plant::new(parameters, start).unwrap();
     let mut worst = 0.0f64;
     for row in reference["rows"].as_array().unwrap() {
-        plant.advance(drive, at("step"));
+        plant.advance(drive, at("step")).unwrap();
         let s = plant.state();
         let mut error = 0.0f64;
         for (got, want) in [s.q1, s.dq1, s.q2, s.dq2]
@@ -50,7 +50,7 @@ fn worst_error(scene: &str) -> f64 {
         assert_eq!(stuck, row[6].as_f64().unwrap(), "{scene}: contact");
         if scene != "chatter" {
             assert_eq!(
-                plant.tally().impacts,
+                plant.totals().impacts,
                 row[5].as_u64().unwrap(),
                 "{scene}: impacts"
             );

@@ -1,253 +1,237 @@
-//! From event to event.
+//! The loop over events.
 
-use super::contact::Moment;
-use super::{Contact, Event, MOST_IMPACTS, Outcome, Plant};
+use super::{Event, MOST_IMPACTS, Outcome, Plant};
+use crate::arithmetic::Sum;
 use crate::base_motion::Drive;
-use crate::crossing::Origin;
+use crate::contact::{Contact, Wall};
+use crate::fast::{Arrival, Next};
 use crate::flight::Flight;
-use crate::span::Span;
+use crate::parameters::InvalidValue;
+use crate::segment::Segment;
+use crate::sticking::until_released;
 
-/// An advance ends before its time when the particle has come to rest so often: values so absurd that rounding tears it
-/// off its wall again and again are to end, too.
-const MOST_PARTINGS: u64 = 2_000_000;
+/// Largest number of releases per step: rounding can tear a particle off its wall again and again where values are extreme.
+const MOST_RELEASES: u64 = 2_000_000;
+
+/// A step under way.
+pub(super) struct Step<F> {
+    /// Its length, s.
+    pub duration: f64,
+    /// What is left of it, s.
+    pub left: Sum,
+    /// What has happened so far.
+    pub outcome: Outcome,
+    pub on_event: F,
+}
+
+impl<F: FnMut(Event)> Step<F> {
+    /// Time since the step began, s.
+    pub fn now(&self) -> f64 {
+        Sum::from(self.duration).minus(self.left).value()
+    }
+
+    pub fn released(&mut self, wall: Wall) {
+        self.outcome.released += 1;
+        let t = self.now();
+        (self.on_event)(Event::Released { t, wall });
+    }
+
+    /// Whether time is left and the step is not to be cut short.
+    fn goes_on(&self) -> bool {
+        let Outcome {
+            impacts, released, ..
+        } = self.outcome;
+        self.left.value() > 0.0 && impacts < MOST_IMPACTS && released < MOST_RELEASES
+    }
+}
 
 impl Plant {
-    /// Advances by `duration` seconds (0 or above) under `drive`, whose values are finite.
+    /// Advances by `duration` seconds under `drive`.
     ///
-    /// A jump of the base displacement against the end of the last advance gives the primary mass the velocity jump
+    /// A jump of the base displacement against the end of the last step gives the primary mass the velocity jump
     /// `c Δe/M` that the equation of motion implies.
-    pub fn advance(&mut self, drive: Drive, duration: f64) -> Outcome {
+    ///
+    /// # Errors
+    /// An invalid drive or duration; the plant stays as it is.
+    #[inline]
+    pub fn advance(&mut self, drive: Drive, duration: f64) -> Result<Outcome, InvalidValue> {
         self.advance_with(drive, duration, |_| {})
     }
 
-    /// As [`Self::advance`], and tells every event as it happens.
+    /// As [`Self::advance`]; calls `on_event` at every event.
+    ///
+    /// # Errors
+    /// As [`Self::advance`].
     #[inline]
     pub fn advance_with(
         &mut self,
         drive: Drive,
         duration: f64,
-        tell: impl FnMut(Event),
-    ) -> Outcome {
-        let outcome =
-            if drive == self.base.drive && self.under_way && self.course.strides.stride(duration) {
-                Outcome::default()
-            } else {
-                self.adopt(drive);
-                self.go(duration, tell)
-            };
-        self.time += duration;
-        outcome
-    }
-
-    /// A step that is none of a run of strides, or the first of one.
-    fn go(&mut self, duration: f64, tell: impl FnMut(Event)) -> Outcome {
-        if self.course.strides.under_way() {
-            self.catch_up();
+        on_event: impl FnMut(Event),
+    ) -> Result<Outcome, InvalidValue> {
+        if drive != self.base.drive || !self.begun {
+            drive.validate()?;
+            self.check_duration(duration)?;
+            self.set_drive(drive);
         }
-        if !self.course.lags() && self.strides(duration) {
-            return Outcome::default();
+        if self.contact == Contact::Free
+            && self
+                .fast
+                .step(&self.rig, &mut self.masses, &mut self.base, duration)
+        {
+            self.time += duration;
+            self.evaluations += 1;
+            return Ok(Outcome {
+                elapsed: duration,
+                evaluations: 1,
+                ..Outcome::default()
+            });
         }
-        self.meet(self.course.lag().plus(duration), duration, tell)
+        self.check_duration(duration)?;
+        let outcome = self.follow(duration, on_event);
+        self.time += outcome.elapsed;
+        Ok(outcome)
     }
 
-    /// Begins a run of strides of this length with the first one, if they are ready and meet nothing.
-    fn strides(&mut self, duration: f64) -> bool {
-        let course = &mut self.course;
-        let strides = &mut course.strides;
-        strides.begin(&course.rig, &self.here, course.clear, duration) && strides.stride(duration)
+    fn check_duration(&self, duration: f64) -> Result<(), InvalidValue> {
+        InvalidValue::unless(
+            (0.0..=1e100).contains(&duration),
+            "duration (length of the step)",
+            duration,
+            "s",
+            "a number from 0 to 1e100",
+        )
     }
 
-    /// Goes on to the end of an advance of which so much is left.
-    #[cfg(feature = "batch")]
-    pub(crate) fn finish(&mut self, left: Span, duration: f64) -> Outcome {
-        let outcome = self.meet(left, duration, |_| {});
-        self.time += duration;
-        outcome
-    }
-
-    /// Makes `drive` the one in use.
-    #[inline]
-    pub(crate) fn adopt(&mut self, drive: Drive) {
-        if drive != self.base.drive || !self.under_way {
-            self.take(drive);
-        } else {
-            self.course.restless_drive = false;
-        }
-    }
-
-    /// Takes over a new drive and the jump of the base that it brings.
-    fn take(&mut self, drive: Drive) {
-        self.catch_up();
-        let jumps = drive.signal[0] != self.base.drive.signal[0]
-            || drive.amplitude != self.base.drive.amplitude;
-        if self.under_way && jumps {
-            let jump = self.base.with(drive).displacement() - self.base.displacement();
+    /// Makes `drive` the current one; the base may jump.
+    fn set_drive(&mut self, drive: Drive) {
+        let before = &self.base.drive;
+        let jumps = drive.signal[0] != before.signal[0] || drive.amplitude != before.amplitude;
+        if self.begun && jumps {
+            let sin = self.fast.phasor().1;
+            let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
             if jump != 0.0 {
-                self.here.v += self.parameters.damping / self.parameters.primary_mass * jump;
-                // The impulse acts on the primary mass alone; what that means for a particle at the wall is decided anew.
+                let kick = self.rig.parameters.damping / self.rig.parameters.primary_mass * jump;
+                self.masses.v = self.masses.v.plus(kick);
+                self.masses.dw += kick;
+                // The impulse acts on the primary mass alone; contact is decided anew.
                 self.contact = Contact::Free;
             }
         }
         self.base.drive = drive;
-        self.under_way = true;
-        self.renew_course();
+        self.begun = true;
+        self.fast.drive_changed();
     }
 
-    pub(super) fn renew_course(&mut self) {
-        let known = self.course.wave().is_some();
-        self.course.renew(&self.base.drive);
-        if !known {
-            self.course.face(&mut self.here, self.base.phase);
-        }
-    }
-
-    /// The state now: as held, or worked out from there.
-    #[inline(always)]
-    pub(super) fn now(&self) -> Origin<f64> {
-        self.course.now(&self.alone.oscillator, &self.here)
-    }
-
-    /// Brings the state that the plant holds up to date.
-    pub(super) fn catch_up(&mut self) {
-        if self.course.lags() {
-            let oscillator = &self.alone.oscillator;
-            (self.course).catch_up(oscillator, &mut self.here, &mut self.base.phase);
-        }
-    }
-
-    /// A step that an event may fall into; `until` is its end as seen from the origin.
-    fn meet(&mut self, until: Span, duration: f64, mut tell: impl FnMut(Event)) -> Outcome {
-        if until.seconds() < self.course.clear {
-            self.wait(until, duration);
-            return Outcome::default();
-        }
-        let mut outcome = Outcome::default();
-        let mut tell = |event: Event| {
-            match event {
-                Event::Impact { .. } => outcome.impacts += 1,
-                Event::Stuck { .. } => outcome.stuck += 1,
-                Event::Released { .. } => outcome.released += 1,
-            }
-            tell(event);
+    /// Follows the motion from event to event to the end of the step.
+    fn follow(&mut self, duration: f64, on_event: impl FnMut(Event)) -> Outcome {
+        let evaluations = self.evaluations;
+        let mut step = Step {
+            duration,
+            left: Sum::from(duration),
+            outcome: Outcome::default(),
+            on_event,
         };
-        let mut left = until;
-        let moment = |left: Span| Moment {
-            now: Span::of(duration).less(left).seconds(),
-            left: left.seconds(),
-        };
-        let mut dw = self.here.relative_velocity();
-        if !self.course.lags()
-            && self.contact == Contact::Free
+        if self.contact == Contact::Free
             && let Some(wall) = self.wall_touched()
         {
-            dw = self.touch(wall, dw, moment(left), &mut tell);
+            self.touch(wall, &mut step);
         }
-        let last_impact = self.tally.impacts + MOST_IMPACTS;
-        let mut partings = 0;
-        while left.seconds() > 0.0 && self.tally.impacts < last_impact && partings < MOST_PARTINGS {
+        while step.goes_on() {
+            let left = step.left.value();
             if let Contact::Stuck(wall) = self.contact {
-                partings += 1;
-                let (t, released) = self.stay(wall, left.seconds());
-                left = left.plus(-t);
-                self.afresh();
-                if released {
-                    let t = moment(left).now;
-                    tell(Event::Released { t, wall });
-                }
-                dw = 0.0;
+                self.stay(wall, left, &mut step);
                 continue;
             }
-            if self.course.landing.is_none() && self.course.lags() {
-                left = left.less(self.course.lag());
-                self.catch_up();
-                // The time it was known to be clear for is over.
-                self.course.clear = 0.0;
-                dw = self.here.relative_velocity();
-            }
-            if self.contact == Contact::Free {
-                let before = self.tally.impacts;
-                let crossed = self.cross(duration, left, &mut tell);
-                if let Some(wall) = crossed.resting {
-                    dw = self.touch(
-                        wall,
-                        self.here.relative_velocity(),
-                        moment(crossed.left),
-                        &mut tell,
-                    );
-                    left = crossed.left;
-                    continue;
+            let next = match self.contact {
+                Contact::Free => self.fast.next(&self.rig, &self.masses, &self.base, left),
+                _ => Next::Search,
+            };
+            match next {
+                Next::ContactFree(t) => {
+                    (self.fast).coast(&self.rig, &mut self.masses, &mut self.base, t, duration);
+                    step.left = if t == left {
+                        Sum::default()
+                    } else {
+                        step.left.plus(-t)
+                    };
                 }
-                if self.tally.impacts != before {
-                    left = crossed.left;
-                    dw = self.here.relative_velocity();
-                }
-                if self.course.clear == 0.0 {
-                    self.course.look_out(&self.here, left.seconds());
-                }
+                Next::Impact(arrival) => self.land(&arrival, &mut step),
+                Next::Search => self.search(left, &mut step),
             }
-            if left.seconds() < self.course.clear {
-                self.wait(left, duration);
-                left = Span::default();
-                break;
-            }
-            if left.seconds() > 0.0 {
-                (left, dw) = match self.hop(dw, left, moment, &mut tell) {
-                    Some(landed) => landed,
-                    None => self.search(dw, left, moment, &mut tell),
-                };
-            }
+            self.evaluations += self.fast.evaluations();
         }
-        outcome.cut_short = left.seconds() > 0.0;
-        outcome
+        let left = step.left.value();
+        step.outcome.cut_short = left > 0.0;
+        step.outcome.elapsed = if left > 0.0 { step.now() } else { duration };
+        step.outcome.evaluations = self.evaluations - evaluations;
+        step.outcome
     }
 
-    /// The advance ends `until` after the origin, and meets nothing more.
-    fn wait(&mut self, until: Span, duration: f64) {
-        let whole = until == Span::of(duration);
-        let repeats = (whole || self.course.lags())
-            && (self.course).repeats(&self.alone.oscillator, duration);
-        if repeats && whole && self.strides(duration) {
-            return;
+    /// Moves on to a predicted and verified contact.
+    fn land(&mut self, arrival: &Arrival, step: &mut Step<impl FnMut(Event)>) {
+        let masses = &mut self.masses;
+        masses.x = arrival.x;
+        masses.v = arrival.v;
+        masses.dw = arrival.dw;
+        self.base.phase = arrival.phase;
+        if self.base.drive.signal[1] != 0.0 {
+            let t = arrival.t.value();
+            self.base.drive.signal[0] += self.base.drive.signal[1] * t;
         }
-        self.course.wait(&self.alone.oscillator, until);
-        if repeats {
-            self.catch_up();
-        }
+        self.fast.arrived(arrival);
+        step.left = step.left.minus(arrival.t);
+        self.touch(arrival.wall, step);
     }
 
-    /// The state has been reached by the general way: nothing is known of what lies ahead.
-    pub(super) fn afresh(&mut self) {
-        self.course.leave();
-        self.course.face(&mut self.here, self.base.phase);
-    }
-
-    /// Follows the flight to its first contact by the general search, for at most `left`; returns what is left after it,
-    /// and the relative velocity then.
-    fn search(
-        &mut self,
-        dw: f64,
-        left: Span,
-        moment: impl Fn(Span) -> Moment,
-        tell: &mut impl FnMut(Event),
-    ) -> (Span, f64) {
+    /// Follows the flight to its first contact by certified search, or to the end of the step.
+    #[inline(never)]
+    fn search(&mut self, left: f64, step: &mut Step<impl FnMut(Event)>) {
         let released = match self.contact {
             Contact::Released(wall) => Some(wall),
             _ => None,
         };
-        let motion = self.alone.motion(&self.base, self.here.primary());
-        let landing = Flight::new(motion, (self.here.w, dw), self.parameters.half_width)
-            .first_contact(left.seconds(), released);
-        let left = left.plus(-landing.t);
-        self.base = self.base.after(landing.t);
-        (self.here.x, self.here.v) = landing.primary;
-        self.here.w = landing.relative.0;
+        let masses = self.masses;
+        let start = (masses.x.value(), masses.v.value());
+        let motion = Segment::new(&self.rig.alone, self.base, start);
+        let half_width = self.rig.parameters.half_width;
+        let flight = Flight::new(motion, (masses.w.value(), masses.dw), half_width);
+        let landing = flight.first_contact(left, released);
+        self.evaluations += landing.evaluations;
+        self.masses.x = Sum::from(landing.primary.0);
+        self.masses.v = Sum::from(landing.primary.1);
+        self.masses.w = Sum::from(landing.relative.0.clamp(-half_width, half_width));
+        self.masses.dw = landing.relative.1;
         self.contact = Contact::Free;
-        self.afresh();
-        let dw = landing.relative.1;
-        let dw = match landing.wall {
-            Some(wall) => self.touch(wall, dw, moment(left), tell),
-            None => dw,
-        };
-        (left, dw)
+        self.base_moves(landing.t);
+        step.left = step.left.plus(-landing.t);
+        if let Some(wall) = landing.wall {
+            self.touch(wall, step);
+        }
+    }
+
+    /// Both masses move as one for at most `left` seconds, until the wall ceases to push.
+    fn stay(&mut self, wall: Wall, left: f64, step: &mut Step<impl FnMut(Event)>) {
+        let noise = self.acceleration_error();
+        let start = (self.masses.x.value(), self.masses.v.value());
+        let motion = Segment::new(&self.rig.joint, self.base, start);
+        let stay = until_released(&motion, wall, left, noise);
+        self.evaluations += stay.evaluations;
+        self.masses.x = Sum::from(stay.joint.0);
+        self.masses.v = Sum::from(stay.joint.1);
+        self.masses.particle = stay.joint.1;
+        self.masses.dw = 0.0;
+        self.base_moves(stay.t);
+        step.left = step.left.plus(-stay.t);
+        if stay.released {
+            self.contact = Contact::Released(wall);
+            step.released(wall);
+        }
+    }
+
+    /// The base has moved on by `t` seconds.
+    fn base_moves(&mut self, t: f64) {
+        self.base = self.base.after(t);
+        self.fast.state_changed(&self.base);
     }
 }

@@ -101,7 +101,7 @@ fn follow(case: &Case) -> (f64, u64) {
         slowest: f64::INFINITY,
     };
     let mut plant = Plant::new(parameters, at_start).expect("a case that makes sense");
-    plant.begin(case.drive);
+    plant.begin(case.drive).unwrap();
     let mut worst = 0.0f64;
     for _ in 0..STEPS {
         let before = truth.impacts;
@@ -111,8 +111,8 @@ fn follow(case: &Case) -> (f64, u64) {
             return (worst, before);
         }
         let drive = plant.base().drive;
-        plant.advance(drive, LOOK * LOOKS as f64);
-        assert_eq!(plant.tally().impacts, truth.impacts, "{case:?}");
+        plant.advance(drive, LOOK * LOOKS as f64).unwrap();
+        assert_eq!(plant.totals().impacts, truth.impacts, "{case:?}");
         let s = plant.state();
         let (q2, dq2) = truth.particle;
         let pairs = [

@@ -146,7 +146,7 @@ fn once(s: &Scene, number: usize) -> (Worst, [u64; 4]) {
                 backwards += u64::from(wall.sign() * velocity <= 0.0);
                 impacts += 1;
             }
-        });
+        }).unwrap();
         // The same signal seen from now.
         drive = plant.base().drive;
         worst.miscounted += backwards + outcome.impacts.abs_diff(impacts);
@@ -166,7 +166,7 @@ fn once(s: &Scene, number: usize) -> (Worst, [u64; 4]) {
             worst.impacts_per_period = (busy, number);
         }
         if free && at_start > 0.0 {
-            let (now, dissipated) = (plant.energy(0.0), plant.tally().dissipated);
+            let (now, dissipated) = (plant.energy(0.0), plant.totals().dissipated);
             worst.growth = worst.growth.max((now - before) / at_start);
             if s.parameters.damping == 0.0 {
                 let missing = (now + dissipated - at_start).abs() / at_start;

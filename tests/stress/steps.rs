@@ -21,7 +21,7 @@ fn steady() -> (Plant, Drive) {
 
 pub fn long(table: &mut Table) {
     let (mut plant, drive) = steady();
-    let outcome = plant.advance(drive, 1e6 * TAU / OMEGA);
+    let outcome = plant.advance(drive, 1e6 * TAU / OMEGA).unwrap();
     assert!(!outcome.cut_short);
     table.row(
         "one step of 10^6 periods: impacts more or less than 2 a period",
@@ -40,7 +40,7 @@ pub fn chatter(table: &mut Table) {
         ..State::default()
     };
     let mut plant = Plant::new(Parameters::dimensionless(0.05, 1.0, 0.4), start).unwrap();
-    let outcome = plant.advance(Drive::harmonic(1.5, 0.6), 1e6 * TAU / 0.6);
+    let outcome = plant.advance(Drive::harmonic(1.5, 0.6), 1e6 * TAU / 0.6).unwrap();
     table.row(
         "one step of 10^6 periods with chatter and rest: impacts, at most",
         if outcome.cut_short {
@@ -59,9 +59,9 @@ pub fn short(table: &mut Table) {
     let (mut tiny, drive) = steady();
     let mut one = tiny;
     for _ in 0..n {
-        tiny.advance(drive, step);
+        tiny.advance(drive, step).unwrap();
     }
-    one.advance(drive, step * f64::from(n));
+    one.advance(drive, step * f64::from(n)).unwrap();
     table.row(
         "steps of 1.5e-10 periods against one: states differ by",
         &format!("{n} steps"),

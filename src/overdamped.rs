@@ -1,4 +1,4 @@
-//! What a steady push does to an oscillator that creeps, from rest.
+//! What a steady push does to an oscillator that is overdamped, from rest.
 //!
 //! `x'' + 2 delta x' + omega0² x = 1` and `= t`: the integrals of `(e^{slow t} - e^{fast t})/(slow - fast)`, once and twice.
 //! With damping far above critical the position at which such a motion comes to rest at last lies far off, and taking it off
@@ -9,18 +9,18 @@ use crate::oscillator::{Oscillator, Regime};
 /// Below this part of the decay rate the two rates are too near each other to be told apart by subtraction.
 pub(crate) const APART: f64 = 0.1;
 
-/// Rates of a creeping oscillator whose two rates are far apart.
+/// Rates of a overdamped oscillator whose two rates are far apart.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Creep {
+pub(crate) struct OverdampedRates {
     slow: f64,
     fast: f64,
 }
 
-impl Creep {
-    /// The rates of `oscillator`, if it creeps and they are far apart.
+impl OverdampedRates {
+    /// The rates of `oscillator`, if it is overdamped and they are far apart.
     pub fn of(oscillator: &Oscillator) -> Option<Self> {
         match oscillator.regime {
-            Regime::Creeping {
+            Regime::Overdamped {
                 slow,
                 fast,
                 half_gap,
@@ -67,7 +67,7 @@ mod tests {
     #[test]
     fn a_push_from_rest_obeys_the_equation_of_motion() {
         let oscillator = Oscillator::new(1.0, 1.0, 6.0);
-        let creep = Creep::of(&oscillator).unwrap();
+        let creep = OverdampedRates::of(&oscillator).unwrap();
         for t in [0.01, 0.3, 2.0, 30.0] {
             let ((once, twice), m) = (creep.pushed(t), oscillator.transition(t));
             // The integral of the equation of the velocity, once and twice.

@@ -1,14 +1,14 @@
-//! The forced motion of one oscillator between two events, in closed form: no step, no step-size error.
+//! One trajectory of an oscillator between two events, in closed form: no step, no step-size error.
 //!
-//! `x = p + y + Im(Z K)`: `p` the polynomial that follows a polynomial base signal, `y` the free motion that meets the
-//! start, `Z K` the answer to the built-in oscillator ([`crate::forcing`]). For times short against every rate of the
-//! motion its Taylor series about the start is summed instead: it costs less and keeps the *relative* digits of what has
-//! changed since the start, which is what a particle hopping on its wall is made of.
+//! `x = p + y + E Im(z K)`: `p` the polynomial that follows a polynomial base signal, `y` the free motion from the start,
+//! `z K` the response to the harmonic base motion ([`crate::forcing`]). For times that are short against every rate of the
+//! motion its Taylor series about the start is summed instead. It keeps the *relative* digits of what has changed since the
+//! start, which is what a particle hopping on its wall is made of.
 
-use crate::base_motion::{BaseMotion, sincos_of_product};
-use crate::creep::Creep;
-use crate::forcing::{Answer, Forcing, divided_difference};
-use crate::oscillator::{Oscillator, Transition};
+use crate::base_motion::BaseMotion;
+use crate::forcing::Forcing;
+use crate::oscillator::Oscillator;
+use crate::overdamped::OverdampedRates;
 use num_complex::Complex64;
 
 /// The series is used while `fastest rate * t` is at most this; degree 15 then leaves out less than 1e-18.
@@ -18,47 +18,38 @@ const DEGREE: usize = 15;
 /// Position and its first six derivatives.
 pub type Derivatives = [f64; 7];
 
-/// One oscillator's motion from a start until the next event.
+/// The motion of one oscillator from a start until the next event.
 #[derive(Clone, Copy, Debug)]
-pub struct Motion<'a> {
-    oscillator: &'a Oscillator,
-    forcing: &'a Forcing,
+pub struct Segment {
+    oscillator: Oscillator,
+    forcing: Forcing,
     base: BaseMotion,
     /// `E e^{i phase}` at the start, for a frequency 0 or above; `None` where the oscillator is not driven.
     phasor: Option<Complex64>,
-    /// What follows the signal: position polynomial.
+    /// The polynomial that follows the signal.
     follower: [f64; 4],
-    /// Where that is the signal itself: what its curvature and jerk do to the departure from it, m/s² and m/s³.
-    pushed: Option<(Creep, [f64; 2])>,
+    /// Where the follower is the signal itself: the forcing by its curvature and jerk, m/s² and m/s³.
+    pushed: Option<(OverdampedRates, [f64; 2])>,
     x0: f64,
     v0: f64,
-    /// Position and velocity less those of the follower (and of a steady answer).
-    free: (f64, f64),
 }
 
-impl<'a> Motion<'a> {
-    /// The motion that starts at `x0` (m) with `v0` (m/s) under `base`; `forcing` is for `|base.drive.omega|`.
-    pub fn new(
-        oscillator: &'a Oscillator,
-        forcing: &'a Forcing,
-        base: BaseMotion,
-        (x0, v0): (f64, f64),
-    ) -> Self {
+impl Segment {
+    /// The motion that starts at `x0` (m) with `v0` (m/s) under `base`.
+    pub fn new(oscillator: &Oscillator, base: BaseMotion, (x0, v0): (f64, f64)) -> Self {
         let pushed = push(oscillator, base.drive.signal);
         let follower = if pushed.is_some() {
             base.drive.signal
         } else {
             follower(oscillator, base.drive.signal)
         };
-        let mut free = (x0 - follower[0], v0 - follower[1]);
         let phasor = phasor(&base);
-        if let (Some(z), Answer::Steady(h)) = (phasor, forcing.answer) {
-            let steady = z * h;
-            free.0 -= steady.im;
-            free.1 -= forcing.omega * steady.re;
-        }
+        let forcing = match phasor {
+            Some(_) => Forcing::new(oscillator, base.drive.omega.abs()),
+            None => Forcing::default(),
+        };
         Self {
-            oscillator,
+            oscillator: *oscillator,
             forcing,
             base,
             phasor,
@@ -66,68 +57,38 @@ impl<'a> Motion<'a> {
             pushed,
             x0,
             v0,
-            free,
         }
     }
 
     /// The oscillator that moves.
     pub fn oscillator(&self) -> &Oscillator {
-        self.oscillator
+        &self.oscillator
     }
 
     /// The fastest rate in the motion, 1/s.
     pub fn fastest(&self) -> f64 {
-        let driven = if self.phasor.is_some() {
-            self.forcing.omega
-        } else {
-            0.0
-        };
-        self.oscillator.fastest.max(driven)
+        self.oscillator.fastest.max(self.forcing.omega)
     }
 
     /// Position (m) and velocity (m/s) after `t` seconds, and the base oscillator's phasor then.
     fn closed_form(&self, t: f64) -> (f64, f64, Complex64) {
         let p = &self.follower;
-        let mut x = p[0] + t * (p[1] + t * (p[2] + t * p[3]));
-        let mut v = p[1] + t * (2.0 * p[2] + t * 3.0 * p[3]);
-        if let Some((creep, [steady, growing])) = self.pushed {
-            let ((once, twice), m) = (creep.pushed(t), self.oscillator.transition(t));
+        let (free, decayed) = self.oscillator.flow(t);
+        let (y, dy) = free.of(self.x0 - p[0], self.v0 - p[1]);
+        let mut x = p[0] + t * (p[1] + t * (p[2] + t * p[3])) + y;
+        let mut v = p[1] + t * (2.0 * p[2] + t * 3.0 * p[3]) + dy;
+        if let Some((rates, [steady, growing])) = self.pushed {
+            let (once, twice) = rates.pushed(t);
             x += steady * once + growing * twice;
-            v += steady * m.xv + growing * once;
+            v += steady * free.xv + growing * once;
         }
-        let (y, dy) = self.free;
-        let apply = |m: &Transition| (m.xx * y + m.xv * dy, m.vx * y + m.vv * dy);
         let Some(z) = self.phasor else {
-            let (free, dfree) = apply(&self.oscillator.transition(t));
-            return (x + free, v + dfree, Complex64::ZERO);
+            return (x, v, Complex64::ZERO);
         };
-        let turned = turn(self.forcing.omega, t);
-        match self.forcing.answer {
-            Answer::FromRest {
-                lambda,
-                omega_d,
-                gain,
-                near,
-                far,
-            } => {
-                let (sin, cos) = self.oscillator.turned(omega_d, t);
-                let decayed = Complex64::new(cos, sin) * libm::exp(lambda.re * t);
-                let m = self.oscillator.oscillating(omega_d, decayed.im, decayed.re);
-                let (free, dfree) = apply(&m);
-                let first = divided_difference(near, t, turned, decayed);
-                let second = (turned - decayed.conj()) * far;
-                let z_gain = z * gain;
-                x += free + (z_gain * (first - second)).im;
-                v += dfree + (z_gain * (lambda * first - lambda.conj() * second)).im;
-            }
-            Answer::Steady(h) => {
-                let (free, dfree) = apply(&self.oscillator.transition(t));
-                let steady = z * h * turned;
-                x += free + steady.im;
-                v += dfree + self.forcing.omega * steady.re;
-            }
-        }
-        (x, v, z * turned)
+        let response = self.forcing.response(t, &free, decayed);
+        x += (z * response.position).im;
+        v += (z * response.velocity).im;
+        (x, v, z * response.base)
     }
 
     /// Position and velocity after `t` seconds, by the closed form at any `t`.
@@ -153,7 +114,7 @@ impl<'a> Motion<'a> {
             delta,
             omega0_squared,
             ..
-        } = *self.oscillator;
+        } = self.oscillator;
         let [u0, u1, u2, u3] = self.base.drive.signal;
         let omega = self.forcing.omega;
         let omega2 = omega * omega;
@@ -188,11 +149,11 @@ impl<'a> Motion<'a> {
     /// Every derivative of the motion obeys the equation of motion with the forcing's derivative: the energy of the free
     /// part never grows, and the forcing adds at most its own integral (variation of constants).
     fn bound<const N: usize>(&self, d: &Derivatives, window: f64, signal: f64) -> f64 {
-        let oscillator = self.oscillator;
+        let oscillator = &self.oscillator;
         let mut forcing = signal;
         if let Some(z) = self.phasor {
             let amplitude = libm::fabs(z.re) + libm::fabs(z.im);
-            forcing += amplitude * self.forcing.strength * power::<N>(self.forcing.omega);
+            forcing += amplitude * self.forcing.strength.l1_norm() * power::<N>(self.forcing.omega);
         }
         // The last factor covers the rounding of this very bound.
         (oscillator.ceiling(d[N], d[N + 1]) + window * oscillator.reach * forcing) * (1.0 + 1e-12)
@@ -204,7 +165,7 @@ impl<'a> Motion<'a> {
             delta,
             omega0_squared,
             ..
-        } = *self.oscillator;
+        } = self.oscillator;
         let mut base = [0.0; DEGREE];
         base[..4].copy_from_slice(&self.base.drive.signal);
         if let Some(z) = self.phasor {
@@ -228,13 +189,18 @@ impl<'a> Motion<'a> {
         }
     }
 
+    /// `x - x0 - v0 t` (m) and `v - v0` (m/s) after `t` seconds.
+    pub fn departure(&self, t: f64) -> (f64, f64) {
+        self.at(&self.series(), t).departure
+    }
+
     /// What happens `t` seconds after the start; `series` is that of this motion.
     pub fn at(&self, series: &Series, t: f64) -> Instant {
         if t <= series.reach {
             let (dx, dv) = series.departure(t);
             let phasor = self
                 .phasor
-                .map_or(Complex64::ZERO, |z| z * turn(self.forcing.omega, t));
+                .map_or(Complex64::ZERO, |z| z * rotation(self.forcing.omega, t));
             let derivatives =
                 self.by_equation(self.x0 + (self.v0 * t + dx), self.v0 + dv, phasor, t);
             Instant {
@@ -295,8 +261,8 @@ impl Series {
 }
 
 /// `e^{i omega t}`.
-fn turn(omega: f64, t: f64) -> Complex64 {
-    let (sin, cos) = sincos_of_product((omega, 0.0), t);
+fn rotation(omega: f64, t: f64) -> Complex64 {
+    let (sin, cos) = crate::arithmetic::sincos_of_product((omega, 0.0), t);
     Complex64::new(cos, sin)
 }
 
@@ -318,13 +284,13 @@ fn power<const N: usize>(x: f64) -> f64 {
     (0..N).fold(1.0, |product, _| product * x)
 }
 
-/// `-u''` of a bent signal `u` and what it grows by, where the oscillator creeps: the departure from the signal obeys
+/// `-u''` of a curved signal `u` and its rate of change, for an overdamped oscillator: the departure from the signal obeys
 /// `z'' + 2 delta z' + omega0² z = -u''`.
-fn push(oscillator: &Oscillator, [_, _, u2, u3]: [f64; 4]) -> Option<(Creep, [f64; 2])> {
+fn push(oscillator: &Oscillator, [_, _, u2, u3]: [f64; 4]) -> Option<(OverdampedRates, [f64; 2])> {
     if u2 == 0.0 && u3 == 0.0 {
         return None;
     }
-    Some((Creep::of(oscillator)?, [-2.0 * u2, -6.0 * u3]))
+    Some((OverdampedRates::of(oscillator)?, [-2.0 * u2, -6.0 * u3]))
 }
 
 /// The polynomial motion that follows a polynomial base signal `u`: `u + s` with `s'' + 2 delta s' + omega0² s = -u''`.

@@ -1,0 +1,148 @@
+//! Sums and products that keep their rounding error.
+
+/// A sum of two numbers: a rounded value, and the rounding error it carries.
+///
+/// Adding many small increments to a plain number loses up to half a unit in its last place at every addition. Here the
+/// loss is kept and added again (compensated summation: Kahan, "Further remarks on reducing truncation errors", CACM 8
+/// (1965) 40; Knuth, "The Art of Computer Programming" 2, section 4.2.2).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Sum {
+    value: f64,
+    error: f64,
+}
+
+impl Sum {
+    /// The sum of `value` and a rounding error that is small against it.
+    pub fn new(value: f64, error: f64) -> Self {
+        Self { value, error }
+    }
+
+    /// The rounded value.
+    #[inline(always)]
+    pub fn value(self) -> f64 {
+        self.value + self.error
+    }
+
+
+    /// The sum of this and a number.
+    #[must_use]
+    #[inline(always)]
+    pub fn plus(self, number: f64) -> Self {
+        let (value, error) = two_sum(self.value, number);
+        Self {
+            value,
+            error: self.error + error,
+        }
+    }
+
+    /// This less another sum.
+    #[must_use]
+    #[inline(always)]
+    pub fn minus(self, other: Self) -> Self {
+        let (value, error) = two_sum(self.value, -other.value);
+        Self {
+            value,
+            error: (self.error - other.error) + error,
+        }
+    }
+}
+
+impl From<f64> for Sum {
+    fn from(value: f64) -> Self {
+        Self { value, error: 0.0 }
+    }
+}
+
+/// `a + b` as a rounded sum and its rounding error (Knuth).
+#[inline(always)]
+pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
+    let sum = a + b;
+    let part = sum - a;
+    (sum, (a - (sum - part)) + (b - part))
+}
+
+/// The leading half of the digits, and the rest (Veltkamp).
+#[inline(always)]
+fn halves(x: f64) -> (f64, f64) {
+    let scaled = 134_217_729.0 * x; // 2^27 + 1
+    let high = scaled - (scaled - x);
+    (high, x - high)
+}
+
+/// `a b` as a rounded product and its rounding error (Dekker, with Veltkamp's splitting: no FMA instruction needed).
+#[inline(always)]
+pub(crate) fn product(a: f64, b: f64) -> (f64, f64) {
+    let rounded = a * b;
+    let ((a1, a2), (b1, b2)) = (halves(a), halves(b));
+    let error = ((a1 * b1 - rounded) + a1 * b2 + a2 * b1) + a2 * b2;
+    // Above 1e300 the splitting overflows; such products are not physical.
+    (rounded, if error.is_finite() { error } else { 0.0 })
+}
+
+/// `a / b` as a rounded quotient and its rounding error.
+pub(crate) fn quotient(a: f64, b: f64) -> (f64, f64) {
+    let rounded = a / b;
+    let (got, got_error) = product(rounded, b);
+    (rounded, ((a - got) - got_error) / b)
+}
+
+/// A number with its rounding error, divided by a number.
+pub(crate) fn divided((value, error): (f64, f64), by: f64) -> (f64, f64) {
+    let (rounded, lost) = quotient(value, by);
+    (rounded, lost + error / by)
+}
+
+/// Splits a coefficient that is used many times, given with its rounding error, into two parts: the sum of the products with
+/// both parts has no error that is the same every time.
+///
+/// Added to a product that has been rounded already, a number as small as the rounding error would be lost each time.
+/// The first part is short, so that the second is large enough to count.
+pub(crate) fn split_coefficient((coefficient, error): (f64, f64)) -> (f64, f64) {
+    let (head, rest) = halves(coefficient);
+    if head.is_finite() {
+        (head, rest + error)
+    } else {
+        // Above 1e300 the splitting overflows.
+        (coefficient, 0.0)
+    }
+}
+
+/// Sine and cosine of `omega t`, exact to the last digits even after millions of turns; `omega` is a frequency and its
+/// rounding error.
+pub(crate) fn sincos_of_product((omega, omega_error): (f64, f64), t: f64) -> (f64, f64) {
+    let (angle, error) = product(omega, t);
+    let error = error + omega_error * t;
+    let (sin, cos) = libm::sincos(angle);
+    (sin + error * cos, cos - error * sin)
+}
+
+/// The product of two pairs, each a number and its rounding error.
+pub(crate) fn times(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
+    let (value, error) = product(a.0, b.0);
+    (value, error + (a.0 * b.1 + a.1 * b.0))
+}
+
+/// The sum of two pairs, each a number and its rounding error.
+pub(crate) fn plus(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
+    let (value, error) = two_sum(a.0, b.0);
+    (value, error + (a.1 + b.1))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_million_parts_added_and_taken_off_leave_nothing() {
+        let part = 0.1;
+        let mut sum = Sum::default();
+        for _ in 0..1_000_000 {
+            sum = sum.plus(part);
+        }
+        for _ in 0..1_000_000 {
+            sum = sum.minus(Sum::from(part));
+        }
+        assert!(sum.value().abs() < 1e-18, "{sum:?}");
+    }
+}

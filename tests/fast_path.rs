@@ -1,0 +1,74 @@
+//! The fast ways against the plain search, and against each other.
+
+mod common;
+
+use common::scene;
+use lovines::{Drive, Parameters, Plant, State};
+use proptest::prelude::*;
+use std::f64::consts::TAU;
+
+/// The same plant without its fast path.
+fn plain(plant: &Plant) -> Plant {
+    let mut plain = *plant;
+    plain.set_fast_path(false);
+    plain
+}
+
+fn distance(a: &Plant, b: &Plant) -> f64 {
+    let (a, b) = (a.state(), b.state());
+    [a.q1 - b.q1, a.dq1 - b.dq1, a.q2 - b.q2, a.dq2 - b.dq2]
+        .iter()
+        .fold(0.0f64, |worst, x| worst.max(x.abs()))
+}
+
+#[test]
+fn crossings_meet_the_impacts_of_the_plain_search() {
+    for (lambda, r, omega) in [
+        (1.43, 0.65, 0.990_417),
+        (0.8, 0.5, 0.994),
+        (2.0, 0.8, 0.985),
+    ] {
+        let parameters = Parameters::dimensionless(0.0084, lambda, r);
+        let start = State {
+            q1: -0.42,
+            dq1: 0.01,
+            q2: -0.99,
+            dq2: -0.86,
+        };
+        let drive = Drive::harmonic(0.0084 * 1.1, omega);
+        let mut fast = Plant::new(parameters, start).unwrap();
+        let mut searched = plain(&fast);
+        for _ in 0..200 {
+            fast.advance(drive, TAU / omega).unwrap();
+            searched.advance(drive, TAU / omega).unwrap();
+            let off = distance(&fast, &searched);
+            assert!(off < 1e-12, "{off:e} after {:?}", fast.totals());
+        }
+        assert_eq!(fast.totals().impacts, searched.totals().impacts);
+        assert!(fast.totals().impacts > 300);
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(1000) })]
+
+    #[test]
+    fn the_first_impacts_of_any_scene_are_those_of_the_plain_search(s in scene(true)) {
+        let mut fast = Plant::new(s.parameters, s.start).unwrap();
+        let mut searched = plain(&fast);
+        // Impacts drive neighbours apart: only while there are few does a small distance mean agreement.
+        let step = s.step.min(1.0);
+        for _ in 0..20 {
+            fast.advance(s.drive, step).unwrap();
+            searched.advance(s.drive, step).unwrap();
+            if fast.totals().impacts.max(searched.totals().impacts) > 3 {
+                break;
+            }
+            prop_assert_eq!(fast.totals().impacts, searched.totals().impacts);
+            let state = searched.state();
+            let size = 1.0 + [state.q1, state.dq1, state.q2, state.dq2].iter().fold(0.0f64, |a, x| a.max(x.abs()));
+            prop_assert!(distance(&fast, &searched) <= 1e-10 * size, "{:e}", distance(&fast, &searched));
+        }
+    }
+}
+
