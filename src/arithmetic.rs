@@ -1,10 +1,10 @@
 //! Sums and products that keep their rounding error.
 
-/// A sum of two numbers: a rounded value, and the rounding error it carries.
+/// A rounded value and its rounding error, which is smaller than half a unit in the last place of the value.
 ///
 /// Adding many small increments to a plain number loses up to half a unit in its last place at every addition. Here the
 /// loss is kept and added again (compensated summation: Kahan, "Further remarks on reducing truncation errors", CACM 8
-/// (1965) 40; Knuth, "The Art of Computer Programming" 2, section 4.2.2).
+/// (1965) 40).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sum {
@@ -13,26 +13,28 @@ pub struct Sum {
 }
 
 impl Sum {
-    /// The sum of `value` and a rounding error that is small against it.
-    pub fn new(value: f64, error: f64) -> Self {
+    /// The sum of two numbers.
+    #[inline(always)]
+    pub fn of(a: f64, b: f64) -> Self {
+        let (value, error) = two_sum(a, b);
         Self { value, error }
     }
 
     /// The rounded value.
     #[inline(always)]
     pub fn value(self) -> f64 {
-        self.value + self.error
+        self.value
     }
 
-
-    /// The sum of this and a number.
+    /// The sum of this and a number that is not much larger.
     #[must_use]
     #[inline(always)]
     pub fn plus(self, number: f64) -> Self {
-        let (value, error) = two_sum(self.value, number);
+        let number = number + self.error;
+        let value = self.value + number;
         Self {
             value,
-            error: self.error + error,
+            error: number - (value - self.value),
         }
     }
 
@@ -41,10 +43,7 @@ impl Sum {
     #[inline(always)]
     pub fn minus(self, other: Self) -> Self {
         let (value, error) = two_sum(self.value, -other.value);
-        Self {
-            value,
-            error: (self.error - other.error) + error,
-        }
+        Self::of(value, error + (self.error - other.error))
     }
 }
 

@@ -48,7 +48,19 @@ impl Drive {
     ///
     /// # Errors
     /// A value that is not finite or too large, with its unit and the allowed range.
+    #[inline]
     pub fn validate(&self) -> Result<(), InvalidValue> {
+        let [u0, u1, u2, u3] = self.signal.map(f64::abs);
+        // The sum is not a number if one of them is not.
+        let sum = (u0 + u1) + (u2 + u3) + self.amplitude.abs();
+        if sum <= LARGEST && self.omega.abs() <= FASTEST {
+            return Ok(());
+        }
+        self.explain()
+    }
+
+    #[cold]
+    fn explain(&self) -> Result<(), InvalidValue> {
         const NAMES: [(&str, &str); 4] = [
             ("e (base displacement signal)", "m"),
             ("der(e) (slope of the base signal)", "m/s"),

@@ -18,7 +18,7 @@ mod short_step;
 mod verify;
 
 use crate::arithmetic::Sum;
-use crate::base_motion::{BaseMotion, Phase};
+use crate::base_motion::{BaseMotion, Phase, shift};
 use crate::contact::Wall;
 use crate::plant::{Masses, Rig};
 use crate::segment::Segment;
@@ -36,28 +36,19 @@ const AHEAD: f64 = 4.0;
 
 /// What comes next.
 pub(crate) enum Next {
-    /// No contact for this time, s.
+    /// No contact for this time, s: the plant has moved on by it.
     ContactFree(f64),
-    /// A verified contact.
-    Impact(Arrival),
+    /// A verified contact after this time, s, with this wall: the plant has moved on to it.
+    Contact(Sum, Wall),
     /// Unknown: the plain solver has to search.
     Search,
 }
 
-/// The state just before a contact.
-pub(crate) struct Arrival {
-    /// Time until then, s.
-    pub t: Sum,
-    /// Displacement and velocity of the primary mass, m and m/s.
-    pub x: Sum,
-    pub v: Sum,
-    /// Relative velocity, m/s.
-    pub dw: f64,
-    /// The wall touched.
-    pub wall: Wall,
-    /// Phase of the base, and `e^{i phase}`.
-    pub phase: Phase,
-    phasor: (f64, f64),
+/// The parts of a plant that move, and the rig.
+pub(crate) struct Moving<'a> {
+    pub rig: &'a Rig,
+    pub masses: &'a mut Masses,
+    pub base: &'a mut BaseMotion,
 }
 
 /// Predictions, and what they are made from.
@@ -122,14 +113,6 @@ impl FastPath {
         self.contact_free = 0.0;
     }
 
-    /// The plant has moved on to this contact.
-    #[inline(always)]
-    pub fn arrived(&mut self, arrival: &Arrival) {
-        self.contact_free = 0.0;
-        self.phasor = arrival.phasor;
-        self.rotated(arrival.phase);
-    }
-
     #[inline(always)]
     fn rotated(&mut self, phase: Phase) {
         self.rotations += 1;
@@ -147,141 +130,111 @@ impl FastPath {
 
     /// Where the motion stands, relative to the line that follows the base signal.
     #[inline(always)]
-    fn point(&self, masses: &Masses, base: &BaseMotion) -> Point {
-        let [offset, slope, ..] = base.drive.signal;
+    fn point(&self, moving: &Moving) -> Point {
+        let [offset, slope, ..] = moving.base.drive.signal;
         Point {
-            y: masses.x.value() - offset,
-            dy: masses.v.value() - slope,
+            y: moving.masses.x.value() - offset,
+            dy: moving.masses.v.value() - slope,
             phasor: self.phasor,
         }
     }
 
     /// Takes a step whose propagator is cached, if it meets no contact. Returns whether it was taken.
     #[inline]
-    pub fn step(
-        &mut self,
-        rig: &Rig,
-        masses: &mut Masses,
-        base: &mut BaseMotion,
-        duration: f64,
-    ) -> bool {
+    pub fn step(&mut self, moving: &mut Moving, duration: f64) -> bool {
         if duration != self.cache.step.t || !self.enabled {
             return false;
         }
-        let start = self.point(masses, base);
-        if duration >= self.contact_free && !self.is_contact_free(rig, masses, base, &start, duration) {
+        let start = self.point(moving);
+        if duration >= self.contact_free && !self.is_contact_free(moving, &start, duration) {
             return false;
         }
-        self.take_step(rig, masses, base, &start);
+        self.take_step(moving, &start);
         true
     }
 
     #[inline(always)]
-    fn take_step(&mut self, rig: &Rig, masses: &mut Masses, base: &mut BaseMotion, start: &Point) {
+    fn take_step(&mut self, moving: &mut Moving, start: &Point) {
         let step = &mut self.cache.step;
-        let increment = step.increment(&rig.alone, &base.drive, start);
-        self.contact_free -= step.t;
+        let increment = step.increment(&moving.rig.alone, &moving.base.drive, start);
         let (t, angle) = (step.t, step.angle);
-        self.apply(masses, base, rig.parameters.half_width, &increment, t);
-        base.phase = base.phase.rotated(angle, 0.0);
-        self.rotated(base.phase);
+        let phase = moving.base.phase.rotated(angle, 0.0);
+        self.apply(moving, &increment, phase, t);
+        self.contact_free -= t;
     }
 
-    /// Adds an increment to displacements, velocities and signal.
+    /// Adds an increment to displacements, velocities and base.
     #[inline(always)]
-    fn apply(
-        &mut self,
-        masses: &mut Masses,
-        base: &mut BaseMotion,
-        half_width: f64,
-        increment: &Increment,
-        t: f64,
-    ) {
+    fn apply(&mut self, moving: &mut Moving, increment: &Increment, phase: Phase, t: f64) {
+        let Moving { rig, masses, base } = moving;
         let signal = &mut base.drive.signal;
         let dx = increment.y + signal[1] * t;
         if signal[1] != 0.0 || signal[2] != 0.0 || signal[3] != 0.0 {
-            *signal = crate::base_motion::shift(*signal, t);
+            *signal = shift(*signal, t);
         }
         masses.x = masses.x.plus(dx);
         masses.v = masses.v.plus(increment.dy);
         masses.dw += increment.dy;
         masses.w = masses.w.plus(dx - masses.particle * t);
-        let w = masses.w.value();
-        if w.abs() > half_width {
-            masses.w = Sum::from(half_width.copysign(w));
+        let (w, b) = (masses.w.value(), rig.parameters.half_width);
+        if w.abs() > b {
+            masses.w = Sum::from(b.copysign(w));
         }
+        base.phase = phase;
         self.phasor = increment.phasor;
+        self.rotations += 1;
+        if self.rotations >= ROTATIONS {
+            self.resynchronise(phase);
+        }
     }
 
     /// Whether a bound from the start alone shows that no wall is met within `t`; looks further ahead where that is as cheap.
     #[inline(always)]
-    fn is_contact_free(
-        &mut self,
-        rig: &Rig,
-        masses: &Masses,
-        base: &BaseMotion,
-        start: &Point,
-        t: f64,
-    ) -> bool {
-        let envelope = Envelope::new(&rig.alone, &base.drive, start, AHEAD * t);
-        let (w, dw, b) = (masses.w.value(), masses.dw, rig.parameters.half_width);
-        if envelope.open_from(b, w, dw, AHEAD * t) {
+    fn is_contact_free(&mut self, moving: &Moving, start: &Point, t: f64) -> bool {
+        let open = |t: f64| {
+            let envelope = Envelope::new(&moving.rig.alone, &moving.base.drive, start, t);
+            let (w, dw) = (moving.masses.w.value(), moving.masses.dw);
+            envelope.open_from(moving.rig.parameters.half_width, w, dw, t)
+        };
+        if open(AHEAD * t) {
             self.contact_free = AHEAD * t;
             return true;
         }
-        let envelope = Envelope::new(&rig.alone, &base.drive, start, t);
-        let open = envelope.open_from(b, w, dw, t);
-        if open {
-            self.contact_free = t;
-        }
-        open
+        open(t)
     }
 
     /// Moves on by `t` seconds, in which no wall is met; `duration` is the length of the whole step.
-    pub fn coast(
-        &mut self,
-        rig: &Rig,
-        masses: &mut Masses,
-        base: &mut BaseMotion,
-        t: f64,
-        duration: f64,
-    ) {
+    fn coast(&mut self, moving: &mut Moving, start: &Point, t: f64, duration: f64) -> Next {
         self.evaluations += 1;
-        let start = self.point(masses, base);
-        if t == duration && self.cache.repeats(&rig.alone, &base.drive, duration) {
-            self.take_step(rig, masses, base, &start);
-            return;
-        }
-        let free_after = self.contact_free - t;
-        let [_, _, u2, u3] = base.drive.signal;
-        let fastest = rig.alone.fastest.max(base.drive.omega.abs());
-        let half_width = rig.parameters.half_width;
-        if t * fastest <= short_step::LONGEST || u2 != 0.0 || u3 != 0.0 || base.drive.omega < 0.0 {
-            let origin = (masses.x.value(), masses.v.value());
-            let segment = Segment::new(&rig.alone, *base, origin);
-            let (departure, v) = segment.departure(t);
-            let [_, u1, ..] = base.drive.signal;
+        let (oscillator, drive) = (&moving.rig.alone, moving.base.drive);
+        let [_, u1, u2, u3] = drive.signal;
+        let fastest = oscillator.fastest.max(drive.omega.abs());
+        if t == duration && self.cache.repeats(oscillator, &drive, duration) {
+            self.take_step(moving, start);
+        } else if t * fastest <= short_step::LONGEST || u2 != 0.0 || u3 != 0.0 || drive.omega < 0.0 {
+            let (x, v) = (moving.masses.x.value(), moving.masses.v.value());
+            let segment = Segment::new(oscillator, *moving.base, (x, v));
+            let (dx, dv) = segment.departure(t);
+            let phase = moving.base.phase.advanced(drive.omega, t);
             let increment = Increment {
-                y: departure + (origin.1 - u1) * t,
-                dy: v,
+                y: dx + (v - u1) * t,
+                dy: dv,
                 phasor: self.phasor,
             };
-            let phase = base.phase.advanced(base.drive.omega, t);
-            self.apply(masses, base, half_width, &increment, t);
-            base.phase = phase;
-            self.state_changed(base);
+            self.apply(moving, &increment, phase, t);
+            self.resynchronise(phase);
+            self.contact_free -= t;
         } else {
-            self.coefficients.prepare(&rig.alone, base.drive.omega);
+            self.coefficients.prepare(oscillator, drive.omega);
             let coefficients = &self.coefficients;
-            let propagator = self.cache.near(&rig.alone, coefficients, t);
+            let propagator = self.cache.near(oscillator, coefficients, t);
             let h = t - propagator.t;
-            let increment = propagator.shortly(coefficients, base.drive.amplitude, &start, h);
-            let phase = base.phase.rotated(propagator.angle, coefficients.omega * h);
-            self.apply(masses, base, half_width, &increment, t);
-            base.phase = phase;
-            self.rotated(phase);
+            let increment = propagator.shortly(coefficients, drive.amplitude, start, h);
+            let phase = (moving.base.phase).rotated(propagator.angle, coefficients.omega * h);
+            self.apply(moving, &increment, phase, t);
+            self.contact_free -= t;
         }
-        self.contact_free = free_after.max(0.0);
+        Next::ContactFree(t)
     }
 
     /// The keys from which everything cached can be computed again.

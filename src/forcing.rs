@@ -15,7 +15,7 @@ use crate::oscillator::{Oscillator, Regime, Transition};
 use num_complex::Complex64;
 
 /// Largest `|H|` for which the first form is used: its rounding error is `|H|` times that of a unit amplitude.
-const LARGEST_STEADY: f64 = 64.0;
+const LARGEST_STEADY: f64 = 256.0;
 
 /// Coefficients of the response at one frequency.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

@@ -20,6 +20,8 @@ pub(super) struct Cache {
     /// Which followed which when they were last used.
     followers: [u8; FLIGHTS],
     last: u8,
+    /// Whether the last one was the follower of the one before: only then is the next one predicted.
+    regular: bool,
     /// The one to be replaced next.
     oldest: u8,
     /// Of stretches of a march: coarse and fine.
@@ -43,20 +45,18 @@ impl Cache {
         duration == self.step.t
     }
 
-    /// The propagator that followed the last one before, if there is one.
+    /// The propagator that followed the last one before, if flights have been regular.
     #[inline(always)]
     pub fn expected(
         &mut self,
         oscillator: &Oscillator,
         coefficients: &Coefficients,
     ) -> Option<&Propagator> {
-        let follower = self.followers[usize::from(self.last)];
-        let propagator = &mut self.flights[usize::from(follower)];
-        if propagator.t.is_nan() {
+        if !self.regular {
             return None;
         }
-        propagator.prepare(oscillator, coefficients);
-        Some(propagator)
+        let follower = self.followers[usize::from(self.last)];
+        Some(self.ready(oscillator, coefficients, follower))
     }
 
     /// The expected propagator was the right one.
@@ -75,19 +75,33 @@ impl Cache {
     ) -> &Propagator {
         let is_near = |n: u8| (self.flights[usize::from(n)].t - t).abs() < coefficients.near;
         let expected = self.followers[usize::from(self.last)];
-        let kept = if is_near(expected) {
-            Some(expected)
+        self.regular = is_near(expected);
+        let n = if self.regular {
+            expected
+        } else if let Some(n) = (0..FLIGHTS as u8).find(|&n| is_near(n)) {
+            n
         } else {
-            (0..FLIGHTS as u8).find(|&n| is_near(n))
-        };
-        let n = kept.unwrap_or_else(|| {
             self.oldest = (self.oldest + 1) % FLIGHTS as u8;
-            self.flights[usize::from(self.oldest)] = Propagator::new(oscillator, t);
+            self.flights[usize::from(self.oldest)] = Propagator::rounded(oscillator, t);
             self.oldest
-        });
+        };
+        let propagator = &mut self.flights[usize::from(n)];
+        if self.regular && !propagator.exact {
+            *propagator = Propagator::exact(oscillator, propagator.t);
+        }
         self.followers[usize::from(self.last)] = n;
         self.last = n;
-        let propagator = &mut self.flights[usize::from(n)];
+        self.ready(oscillator, coefficients, n)
+    }
+
+    #[inline(always)]
+    fn ready(
+        &mut self,
+        oscillator: &Oscillator,
+        coefficients: &Coefficients,
+        n: u8,
+    ) -> &Propagator {
+        let propagator = &mut self.flights[usize::from(n) % FLIGHTS];
         propagator.prepare(oscillator, coefficients);
         propagator
     }
@@ -98,7 +112,7 @@ impl Cache {
         let lengths = [coefficients.stretch, coefficients.stretch / FINE as f64];
         for (propagator, t) in self.march.iter_mut().zip(lengths) {
             if propagator.t != t {
-                *propagator = Propagator::new(oscillator, t);
+                *propagator = Propagator::exact(oscillator, t);
             }
             propagator.prepare(oscillator, coefficients);
         }
@@ -114,9 +128,10 @@ pub(crate) struct Keys {
     phasor: (f64, f64),
     rotations: u32,
     step: f64,
-    flights: [f64; FLIGHTS],
+    flights: [(f64, bool); FLIGHTS],
     followers: [u8; FLIGHTS],
     last: u8,
+    regular: bool,
     oldest: u8,
     last_duration: f64,
 }
@@ -132,9 +147,10 @@ impl Keys {
             phasor: fast.phasor,
             rotations: fast.rotations,
             step: cache.step.t,
-            flights: cache.flights.map(|propagator| propagator.t),
+            flights: cache.flights.map(|propagator| (propagator.t, propagator.exact)),
             followers: cache.followers,
             last: cache.last,
+            regular: cache.regular,
             oldest: cache.oldest,
             last_duration: cache.last_duration,
         }
@@ -151,15 +167,14 @@ impl Keys {
             ..Default::default()
         };
         fast.cache = Cache {
-            flights: self.flights.map(|t| {
-                if kept(t) {
-                    Propagator::new(oscillator, t)
-                } else {
-                    Propagator::default()
-                }
+            flights: self.flights.map(|(t, exact)| match (kept(t), exact) {
+                (false, _) => Propagator::default(),
+                (true, false) => Propagator::rounded(oscillator, t),
+                (true, true) => Propagator::exact(oscillator, t),
             }),
             followers: self.followers,
             last: self.last,
+            regular: self.regular,
             oldest: self.oldest,
             last_duration: self.last_duration,
             ..Cache::default()

@@ -5,7 +5,7 @@ use crate::oscillator::Oscillator;
 
 /// Farthest distance of an instant from that of a propagator, in units of the fastest rate's time: Taylor polynomials of degree
 /// 5 then leave out less than 1e-17.
-const NEAR: f64 = 1.0 / 4096.0;
+pub(super) const NEAR: f64 = 1.0 / 2048.0;
 /// Length of a stretch of a march, in the same unit.
 const STRETCH: f64 = 1.0;
 

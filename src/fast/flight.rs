@@ -1,11 +1,11 @@
 //! The next contact of a free flight: predicted, then verified.
 
-use super::coefficients::Coefficients;
-use super::propagator::{Nearby, Point, Propagator};
-use super::verify::{Envelope, Sample};
-use super::{Arrival, FastPath, Next};
+use super::coefficients::{Coefficients, NEAR};
+use super::propagator::{Increment, Nearby, Point, Propagator};
+use super::verify::{Envelope, Sample, is_monotone};
+use super::{FastPath, Moving, Next, ROTATIONS};
 use crate::arithmetic::Sum;
-use crate::base_motion::BaseMotion;
+use crate::base_motion::{BaseMotion, Phase, shift};
 use crate::contact::Wall;
 use crate::plant::{Masses, Rig};
 
@@ -17,23 +17,53 @@ const HEAVIEST: f64 = 0.5;
 const MOST_STRETCHES: u32 = 64;
 /// Fine stretches in a coarse one.
 pub(super) const FINE: usize = 4;
+/// Longest stretch before a predicted contact that one bound can verify, in stretches.
+const LONGEST_STRETCH: f64 = 2.0;
 /// Attempts to come near enough to an arrival.
 const MOST_ATTEMPTS: u32 = 4;
 
 /// The start of a flight.
-struct Start<'a> {
-    rig: &'a Rig,
-    base: &'a BaseMotion,
-    masses: &'a Masses,
-    point: Point,
-    sample: Sample,
+#[derive(Clone, Copy)]
+pub(super) struct Start<'a> {
+    pub rig: &'a Rig,
+    pub base: &'a BaseMotion,
+    pub masses: &'a Masses,
+    pub point: Point,
+    pub sample: Sample,
     /// Velocity of the base's line less that of the particle, m/s.
     drift: f64,
 }
 
-impl Start<'_> {
+impl<'a> Start<'a> {
+    #[inline(always)]
+    fn new(moving: &'a Moving, point: Point) -> Self {
+        let (masses, base) = (&*moving.masses, &*moving.base);
+        Self {
+            rig: moving.rig,
+            base,
+            masses,
+            point,
+            sample: Sample {
+                w: masses.w.value(),
+                dw: masses.dw,
+                ddw: 0.0,
+            },
+            drift: base.drive.signal[1] - masses.particle,
+        }
+    }
+
     fn half_width(&self) -> f64 {
         self.rig.parameters.half_width
+    }
+
+    /// The wall that the particle is approaching.
+    #[inline(always)]
+    fn wall_ahead(&self) -> Wall {
+        if self.sample.dw > 0.0 {
+            Wall::Plus
+        } else {
+            Wall::Minus
+        }
     }
 
     /// Relative motion at a point of the flight, `t` seconds on.
@@ -46,8 +76,9 @@ impl Start<'_> {
         }
     }
 
+    /// Relative acceleration at a point of the flight, m/s².
     #[inline(always)]
-    fn acceleration(&self, coefficients: &Coefficients, point: &Point) -> f64 {
+    pub(super) fn acceleration(&self, coefficients: &Coefficients, point: &Point) -> f64 {
         let oscillator = &self.rig.alone;
         let (f, _) = coefficients.forcing_at(point.phasor);
         self.base.drive.amplitude * f
@@ -58,6 +89,35 @@ impl Start<'_> {
     fn envelope(&self, point: &Point, t: f64) -> Envelope {
         Envelope::new(&self.rig.alone, &self.base.drive, point, t)
     }
+}
+
+/// The state just before a contact.
+#[derive(Clone, Copy)]
+pub(super) struct Arrival {
+    /// Time until then, s.
+    pub t: Sum,
+    /// Displacement and velocity of the primary mass, m and m/s.
+    pub x: Sum,
+    pub v: Sum,
+    /// Relative velocity, m/s.
+    pub dw: f64,
+    /// The wall touched.
+    pub wall: Wall,
+    /// Phase of the base, and `e^{i phase}`.
+    pub phase: Phase,
+    pub phasor: (f64, f64),
+}
+
+/// What a flight leads to.
+enum Found {
+    /// A verified contact, within the step or beyond its end.
+    Contact(Arrival),
+    /// No contact for this time, s.
+    Free(f64),
+    /// No contact to the end of the step: what that adds, and the phase of the base then.
+    FreeAsBefore(Increment, Phase),
+    /// Nothing could be verified.
+    Nothing,
 }
 
 /// A contact that was predicted, with the motion just before it.
@@ -83,86 +143,111 @@ enum Stretch {
 }
 
 impl FastPath {
-    /// What comes next within `left` seconds.
+    /// What comes next within `left` seconds of a step of `duration`.
     #[inline]
-    pub fn next(&mut self, rig: &Rig, masses: &Masses, base: &BaseMotion, left: f64) -> Next {
+    pub fn next(&mut self, moving: &mut Moving, left: f64, duration: f64) -> Next {
         if !self.enabled {
             return Next::Search;
         }
-        if left < self.contact_free {
-            return Next::ContactFree(left);
-        }
-        let point = self.point(masses, base);
-        let fastest = rig.alone.fastest.max(base.drive.omega.abs());
-        let soon = left * fastest <= 1.0;
-        if soon && self.is_contact_free(rig, masses, base, &point, left) {
-            return Next::ContactFree(left);
+        let point = self.point(moving);
+        let (rig, base) = (moving.rig, &*moving.base);
+        let soon = left * rig.alone.fastest.max(base.drive.omega.abs()) <= 1.0;
+        if left < self.contact_free || (soon && self.is_contact_free(moving, &point, left)) {
+            return self.coast(moving, &point, left, duration);
         }
         if !applies(rig, base, &point) {
             return Next::Search;
         }
         self.coefficients.prepare(&rig.alone, base.drive.omega);
-        let mut start = Start {
-            rig,
-            base,
-            masses,
-            point,
-            sample: Sample {
-                w: masses.w.value(),
-                dw: masses.dw,
-                ddw: 0.0,
-            },
-            drift: base.drive.signal[1] - masses.particle,
+        let mut start = Start::new(moving, point);
+        let found = match self.as_before(&mut start, left) {
+            Some(found) => found,
+            // A particle that is slow against the time left may never meet a wall.
+            None if start.sample.dw.abs() * left < start.half_width()
+                && self.is_contact_free(moving, &point, left) =>
+            {
+                Found::Free(left)
+            }
+            None => {
+                start.sample.ddw = start.acceleration(&self.coefficients, &point);
+                match self.hop(&start, left) {
+                    Some(hop) => Found::Contact(hop),
+                    None => self.march(&start, left, None),
+                }
+            }
         };
-        start.sample.ddw = start.acceleration(&self.coefficients, &point);
-        if !soon {
-            if let Some(next) = self.as_before(&start, left) {
-                return next;
+        match found {
+            Found::Contact(arrival) if arrival.t.value() <= left => self.land(moving, &arrival),
+            Found::Contact(arrival) => {
+                self.contact_free = arrival.t.value();
+                self.coast(moving, &point, left, duration)
             }
-            if self.is_contact_free(rig, masses, base, &point, left) {
-                return Next::ContactFree(left);
+            Found::Free(t) => {
+                self.contact_free = t;
+                self.coast(moving, &point, t.min(left), duration)
             }
+            Found::FreeAsBefore(increment, phase) => {
+                self.apply(moving, &increment, phase, left);
+                Next::ContactFree(left)
+            }
+            Found::Nothing => Next::Search,
         }
-        if let Some(hop) = self.hop(rig, masses, base, start.sample.ddw, left) {
-            return Next::Impact(hop);
-        }
-        self.march(&start, left)
     }
 
-    /// The flight that followed the last one before, if it lies ahead again.
+    /// Moves on to a verified contact.
     #[inline(always)]
-    fn as_before(&mut self, start: &Start, left: f64) -> Option<Next> {
-        let wall = if start.sample.dw > 0.0 {
-            Wall::Plus
-        } else {
-            Wall::Minus
-        };
+    fn land(&mut self, moving: &mut Moving, arrival: &Arrival) -> Next {
+        let Moving { masses, base, .. } = moving;
+        let signal = &mut base.drive.signal;
+        if signal[1] != 0.0 {
+            *signal = shift(*signal, arrival.t.value());
+        }
+        masses.x = arrival.x;
+        masses.v = arrival.v;
+        masses.dw = arrival.dw;
+        base.phase = arrival.phase;
+        self.phasor = arrival.phasor;
+        self.contact_free = 0.0;
+        self.rotations += 1;
+        if self.rotations >= ROTATIONS {
+            self.resynchronise(arrival.phase);
+        }
+        Next::Contact(arrival.t, arrival.wall)
+    }
+
+    /// The flight that followed the last one before, or the end of a step that did, if it lies ahead again.
+    #[inline(always)]
+    fn as_before(&mut self, start: &mut Start, left: f64) -> Option<Found> {
         let propagator = (self.cache).expected(&start.rig.alone, &self.coefficients)?;
         self.evaluations += 1;
-        let predicted = arrive(&self.coefficients, propagator, start, wall).ok()?;
-        if !verified(start, &start.point, &start.sample, (0.0, &predicted)) {
-            return None;
+        let (oscillator, drive) = (&start.rig.alone, &start.base.drive);
+        let (point, drift) = (start.point, start.drift);
+        let monotone = |t: f64| is_monotone(oscillator, drive, &point, (drift, t));
+        if (propagator.t - left).abs() < self.coefficients.near {
+            let coefficients = &self.coefficients;
+            let h = left - propagator.t;
+            let increment = propagator.shortly(coefficients, drive.amplitude, &start.point, h);
+            let w = start.sample.w + (increment.y + start.drift * left);
+            if w.abs() >= start.half_width() || !monotone(left) {
+                return None;
+            }
+            let phase = (start.base.phase).rotated(propagator.angle, coefficients.omega * h);
+            self.cache.confirm();
+            return Some(Found::FreeAsBefore(increment, phase));
+        }
+        let predicted = arrive(&self.coefficients, propagator, start, start.wall_ahead()).ok()?;
+        if !monotone(predicted.arrival.t.value()) {
+            start.sample.ddw = start.acceleration(&self.coefficients, &point);
+            return Some(self.march(start, left, Some(&predicted)));
         }
         self.cache.confirm();
-        Some(self.decide(predicted.arrival, left))
-    }
-
-    /// A verified contact lies within the step or beyond its end.
-    #[inline(always)]
-    fn decide(&mut self, arrival: Arrival, left: f64) -> Next {
-        let t = arrival.t.value();
-        if t <= left {
-            Next::Impact(arrival)
-        } else {
-            self.contact_free = t;
-            Next::ContactFree(left)
-        }
+        Some(Found::Contact(predicted.arrival))
     }
 
     /// Marches over the flight until a contact is found or `left` seconds are over. Where a stretch cannot be verified, it is
     /// divided once.
     #[inline(never)]
-    fn march(&mut self, start: &Start, left: f64) -> Next {
+    fn march(&mut self, start: &Start, left: f64, predicted: Option<&Predicted>) -> Found {
         self.cache.prepare_march(&start.rig.alone, &self.coefficients);
         let mut from = Mark {
             t: 0.0,
@@ -171,6 +256,13 @@ impl FastPath {
         };
         let mut fine = 0;
         for _ in 0..MOST_STRETCHES {
+            if let Some(predicted) = predicted
+                && predicted.arrival.t.value() - from.t <= LONGEST_STRETCH * self.coefficients.stretch
+                && verified(start, &from, predicted)
+            {
+                self.cache.confirm();
+                return Found::Contact(predicted.arrival);
+            }
             let to = self.mark(start, &from, usize::from(fine > 0));
             let found = match stretch(start, &from, &to) {
                 Stretch::Open => {
@@ -185,13 +277,12 @@ impl FastPath {
                 Stretch::Unknown => None,
             };
             match found {
-                Some(arrival) => return self.decide(arrival, left),
+                Some(arrival) => return Found::Contact(arrival),
                 None if fine == 0 => fine = FINE,
-                None => return Next::Search,
+                None => return Found::Nothing,
             }
         }
-        self.contact_free = from.t;
-        Next::ContactFree(from.t.min(left))
+        Found::Free(from.t)
     }
 
     /// The motion one stretch further on.
@@ -217,7 +308,7 @@ impl FastPath {
             self.evaluations += 1;
             match arrive(&self.coefficients, propagator, start, wall) {
                 Ok(predicted) => {
-                    let sure = verified(start, &from.point, &from.sample, (from.t, &predicted));
+                    let sure = verified(start, from, &predicted);
                     return sure.then_some(predicted.arrival);
                 }
                 Err(better) if (better - from.t).abs() < self.coefficients.stretch => t = better,
@@ -243,17 +334,12 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
         && slope.abs().max(point.dy.abs()) <= fastest
 }
 
-/// Whether no wall is met between an instant of the flight, `from` seconds after its start, and a predicted contact.
+/// Whether no wall is met between a mark and a predicted contact.
 #[inline(always)]
-fn verified(
-    start: &Start,
-    point: &Point,
-    sample: &Sample,
-    (from, predicted): (f64, &Predicted),
-) -> bool {
-    let t = predicted.arrival.t.value() - from;
-    let envelope = start.envelope(point, t);
-    t > 0.0 && envelope.open_between(start.half_width(), sample, &predicted.sample, t)
+fn verified(start: &Start, from: &Mark, predicted: &Predicted) -> bool {
+    let t = predicted.arrival.t.value() - from.t;
+    let envelope = start.envelope(&from.point, t);
+    t > 0.0 && envelope.open_between(start.half_width(), &from.sample, &predicted.sample, t)
 }
 
 /// What happens between two marks.
@@ -294,7 +380,7 @@ fn crossing(target: f64, from: &Sample, to: &Sample, t: f64) -> Option<f64> {
     let gap = target - from.w;
     // From behind, so that a start on this very wall is not found again.
     let mut s = if gap == 0.0 { 1.0 } else { gap / (to.w - from.w) };
-    for _ in 0..4 {
+    for _ in 0..3 {
         let value = s * (d0 + s * (a0 + s * (c3 + s * (c4 + s * c5)))) - gap;
         let slope = d0 + s * (2.0 * a0 + s * (3.0 * c3 + s * (4.0 * c4 + s * (5.0 * c5))));
         s -= value / slope;
@@ -330,11 +416,11 @@ fn arrive(
     let fourth = 5.0 * (a2 * (a3 - a22)) - a4;
     let h = first * ((1.0 - bend) + first2 * (third + first * fourth));
     // Far away, or where the approach is slow and curved, the reversed series is not accurate.
-    if !(first.abs() < coefficients.near && bend.abs() < 1.0 / 4096.0) {
+    if !(first.abs() < coefficients.near && bend.abs() < NEAR) {
         return Err(propagator.t + h);
     }
     let at = nearby.at(h);
-    let t = Sum::new(propagator.t, h);
+    let t = Sum::of(propagator.t, h);
     let dw = start.sample.dw + at.dy;
     let masses = start.masses;
     Ok(Predicted {

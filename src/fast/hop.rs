@@ -4,53 +4,44 @@
 //! with `u` the rebound speed. Divided by `h` this falls steadily while `|w'''| h` stays below `a/8`, so that the return is
 //! the first contact; the other wall is out of reach if the height `u²/(2a)` is below the half-width.
 
-use super::{Arrival, FastPath};
+use super::FastPath;
+use super::flight::{Arrival, Start};
 use crate::arithmetic::Sum;
-use crate::base_motion::BaseMotion;
 use crate::contact::Wall;
-use crate::plant::{Masses, Rig};
 use crate::segment::Segment;
 
 /// Longest hop, in units of the fastest rate's time: Taylor polynomials then leave out less than 1e-17.
 const LONGEST: f64 = 1.0 / 512.0;
 
 impl FastPath {
-    /// The return to the wall that the particle has just left, if it is a short hop that ends within `left` seconds; `ddw` is
-    /// the relative acceleration.
+    /// The return to the wall that the particle has just left, if it is a short hop that ends within `left` seconds.
     #[inline(always)]
-    pub(super) fn hop(
-        &mut self,
-        rig: &Rig,
-        masses: &Masses,
-        base: &BaseMotion,
-        ddw: f64,
-        left: f64,
-    ) -> Option<Arrival> {
-        let (w, b) = (masses.w.value(), rig.parameters.half_width);
+    pub(super) fn hop(&mut self, start: &Start, left: f64) -> Option<Arrival> {
+        let (w, b) = (start.masses.w.value(), start.rig.parameters.half_width);
+        if w.abs() != b {
+            return None;
+        }
         let s = 1f64.copysign(w);
-        let (speed, pressing) = (-s * masses.dw, s * ddw);
+        let (speed, pressing) = (-s * start.masses.dw, s * start.sample.ddw);
         let about = 2.0 * speed / pressing;
-        let fastest = rig.alone.fastest.max(base.drive.omega.abs());
-        let short = w.abs() == b
-            && speed > 0.0
+        let fastest = (start.rig.alone.fastest).max(start.base.drive.omega.abs());
+        let short = speed > 0.0
             && pressing > 0.0
             && about * fastest <= LONGEST
             && 1.25 * about < left
             && speed * speed < pressing * b;
-        if !short {
-            return None;
+        if short {
+            self.short_hop(start, about)
+        } else {
+            None
         }
-        self.short_hop(rig, masses, base, about)
     }
 
     #[inline(never)]
-    fn short_hop(
-        &mut self,
-        rig: &Rig,
-        masses: &Masses,
-        base: &BaseMotion,
-        about: f64,
-    ) -> Option<Arrival> {
+    fn short_hop(&mut self, start: &Start, about: f64) -> Option<Arrival> {
+        let Start {
+            rig, base, masses, ..
+        } = start;
         let wall = if masses.w.value() > 0.0 {
             Wall::Plus
         } else {
@@ -58,7 +49,7 @@ impl FastPath {
         };
         let s = wall.sign();
         let start = (masses.x.value(), masses.v.value());
-        let motion = Segment::new(&rig.alone, *base, start);
+        let motion = Segment::new(&rig.alone, **base, start);
         let d = motion.derivatives_at_start();
         let (speed, pressing) = (-s * masses.dw, s * d[2]);
         if motion.third_derivative_bound(&d, 1.25 * about) * about > 0.125 * pressing {

@@ -36,6 +36,8 @@ pub(super) struct Propagator {
     omega: f64,
     /// What the free motion adds: the sum of both.
     free: (Transition, Transition),
+    /// Whether that is exact beyond rounding: where a propagator is used many times, the same error would add up.
+    pub exact: bool,
     response: Response,
     /// `omega t` in [0, 2π), and its rounding error.
     pub angle: (f64, f64),
@@ -47,6 +49,7 @@ impl Default for Propagator {
             t: f64::NAN,
             omega: f64::NAN,
             free: Default::default(),
+            exact: false,
             response: Response::default(),
             angle: (0.0, 0.0),
         }
@@ -66,11 +69,23 @@ pub(super) fn forced(amplitude: f64, (cos, sin): (f64, f64), k: Complex64) -> f6
 }
 
 impl Propagator {
-    /// The propagator over `t` seconds.
-    pub fn new(oscillator: &Oscillator, t: f64) -> Self {
+    /// The propagator over `t` seconds, for a few uses.
+    pub fn rounded(oscillator: &Oscillator, t: f64) -> Self {
+        let Transition { xx, xv, vx, vv } = oscillator.transition(t);
+        let (xx, vv) = (xx - 1.0, vv - 1.0);
+        Self {
+            t,
+            free: (Transition { xx, xv, vx, vv }, Transition::default()),
+            ..Self::default()
+        }
+    }
+
+    /// The propagator over `t` seconds, for many uses.
+    pub fn exact(oscillator: &Oscillator, t: f64) -> Self {
         Self {
             t,
             free: oscillator.split_increment(t),
+            exact: true,
             ..Self::default()
         }
     }
@@ -177,13 +192,14 @@ impl Nearby {
         let (f, df) = coefficients.forcing_at(at_propagator.phasor);
         let (f, df) = (amplitude * f, amplitude * df);
         let (y, dy) = (start.y + at_propagator.y, start.dy + at_propagator.dy);
+        let term = |n: usize| {
+            let [per_y, per_dy, per_f, per_df] = coefficients.taylor[n];
+            (per_y * y + per_dy * dy) + (per_f * f + per_df * df)
+        };
         Self {
             at_propagator: *at_propagator,
             dy,
-            c: (coefficients.taylor)
-                .map(|[per_y, per_dy, per_f, per_df]| {
-                    (per_y * y + per_dy * dy) + (per_f * f + per_df * df)
-                }),
+            c: [term(0), term(1), term(2), term(3)],
             omega: coefficients.omega,
         }
     }

@@ -13,8 +13,8 @@ use super::propagator::Point;
 use crate::base_motion::Drive;
 use crate::oscillator::Oscillator;
 
-/// Relative rounding of a bound.
-const ROUNDING: f64 = 1e-12;
+/// Rounding error of a gap, in half-widths, and of a bound, relative.
+const ROUNDING: f64 = 1e-14;
 
 /// Bounds of the motion over a time.
 #[derive(Clone, Copy, Debug)]
@@ -25,14 +25,6 @@ pub(super) struct Envelope {
     pub jerk: f64,
 }
 
-/// A gap at an instant and how it opens: `gap + speed t + acceleration t²/2 + ...`.
-#[derive(Clone, Copy, Debug)]
-struct Gap {
-    gap: f64,
-    speed: f64,
-    acceleration: f64,
-}
-
 /// Relative motion at an instant.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sample {
@@ -40,6 +32,41 @@ pub(super) struct Sample {
     pub w: f64,
     pub dw: f64,
     pub ddw: f64,
+}
+
+/// `|f|` is at most this over the next `t` seconds, m/s².
+#[inline(always)]
+fn forcing(oscillator: &Oscillator, drive: &Drive, t: f64) -> f64 {
+    let damping = 2.0 * oscillator.delta;
+    let forcing = drive.amplitude.abs() * (oscillator.omega0_squared + damping * drive.omega.abs());
+    let [_, _, u2, u3] = drive.signal;
+    if u2 == 0.0 && u3 == 0.0 {
+        return forcing;
+    }
+    let (u2, u3) = (u2.abs(), u3.abs() * t);
+    forcing
+        + oscillator.omega0_squared * t * t * (u2 + u3)
+        + damping * t * (2.0 * u2 + 3.0 * u3)
+        + (2.0 * u2 + 6.0 * u3)
+}
+
+/// `R²` at an instant, (m/s)².
+#[inline(always)]
+fn speed_squared(oscillator: &Oscillator, at: &Point) -> f64 {
+    at.dy * at.dy + oscillator.omega0_squared * (at.y * at.y)
+}
+
+/// Whether `w'` certainly keeps its sign for `t` seconds: the particle drifts faster than the primary mass can move. Then the wall
+/// ahead is met once, and the other one is left behind.
+#[inline(always)]
+pub(super) fn is_monotone(
+    oscillator: &Oscillator,
+    drive: &Drive,
+    start: &Point,
+    (drift, t): (f64, f64),
+) -> bool {
+    let spare = drift.abs() - forcing(oscillator, drive, t) * t;
+    spare > 0.0 && spare * spare * (1.0 - 1e-9) > speed_squared(oscillator, start)
 }
 
 impl Envelope {
@@ -54,16 +81,8 @@ impl Envelope {
         } = *oscillator;
         let damping = 2.0 * delta;
         let omega = drive.omega.abs();
-        let mut forcing = drive.amplitude.abs() * (omega0_squared + damping * omega);
-        let [_, _, u2, u3] = drive.signal;
-        if u2 != 0.0 || u3 != 0.0 {
-            let (u2, u3) = (u2.abs(), u3.abs() * t);
-            forcing += omega0_squared * t * t * (u2 + u3)
-                + damping * t * (2.0 * u2 + 3.0 * u3)
-                + (2.0 * u2 + 6.0 * u3);
-        }
-        let speed = start.dy * start.dy + omega0_squared * (start.y * start.y);
-        let speed = speed.sqrt() + forcing * t;
+        let forcing = forcing(oscillator, drive, t);
+        let speed = speed_squared(oscillator, start).sqrt() + forcing * t;
         let acceleration = (omega0 + damping) * speed + forcing;
         Self {
             acceleration,
@@ -85,38 +104,28 @@ impl Envelope {
     #[inline(always)]
     pub fn open_between(&self, b: f64, from: &Sample, to: &Sample, t: f64) -> bool {
         let half = 0.5 * t;
-        let remainder = self.jerk * half * (1.0 / 3.0);
-        let forwards = |s: f64| Gap {
-            gap: b - s * from.w,
-            speed: -s * from.dw,
-            acceleration: -s * from.ddw - remainder,
-        };
-        let backwards = |s: f64| Gap {
-            gap: b - s * to.w,
-            speed: s * to.dw,
-            acceleration: -s * to.ddw - remainder,
-        };
-        let rounding = ROUNDING * 0.01 * b;
-        forwards(1.0).is_open(half, rounding)
-            && backwards(1.0).is_open(half, rounding)
-            && forwards(-1.0).is_open(half, rounding)
-            && backwards(-1.0).is_open(half, rounding)
+        let backwards = Sample { dw: -to.dw, ..*to };
+        from.is_open(b, self.jerk, half) && backwards.is_open(b, self.jerk, half)
     }
 }
 
-impl Gap {
-    /// Whether the parabola is above 0 up to time `t`, but for a start at 0.
+impl Sample {
+    /// Whether `|w| < b` up to time `t`, but for a start at a wall, for any motion with `|w'''| <= jerk`.
+    ///
+    /// The remainder `jerk h³/6` is at most `(jerk t/3) h²/2`, so that parabolas bound the gap to either wall from below. A concave
+    /// one is above 0 if it is at the end. Only that of the wall ahead can be convex and fall at first; its least value
+    /// is then in between.
     #[inline(always)]
-    fn is_open(&self, t: f64, rounding: f64) -> bool {
-        let Self {
-            gap,
-            speed,
-            acceleration,
-        } = *self;
-        let at_end = gap + t * (speed + 0.5 * t * acceleration) > rounding;
-        // A convex parabola that falls at first has its least value in between.
-        let dips = speed <= 0.0 && acceleration > 0.0 && -speed < acceleration * t;
-        at_end && gap >= 0.0 && (!dips || 0.5 * speed * speed < (gap - rounding) * acceleration)
+    pub fn is_open(&self, b: f64, jerk: f64, t: f64) -> bool {
+        let Self { w, dw, ddw } = *self;
+        let remainder = jerk * t * (1.0 / 3.0);
+        let half = 0.5 * t;
+        let inside = b - ROUNDING * b;
+        let end = (w + t * (dw + half * ddw)).abs() + half * t * remainder;
+        let s = 1f64.copysign(dw);
+        let slowing = -s * ddw - remainder;
+        let turns = slowing * t > dw.abs();
+        end < inside && (!turns || 0.5 * dw * dw < (inside - s * w) * slowing)
     }
 }
 
@@ -127,16 +136,26 @@ mod tests {
 
     proptest! {
         #[test]
-        fn a_gap_verified_as_open_is_open(
-            gap in 0.0..1.0f64, speed in -2.0..2.0f64, acceleration in -3.0..3.0f64, t in 0.01..3.0f64,
+        fn a_sample_verified_as_open_is_open(
+            w in -1.0..=1.0f64, dw in -2.0..2.0f64, ddw in -3.0..3.0f64, jerk in 0.0..2.0f64, t in 0.01..3.0f64,
         ) {
-            let open = Gap { gap, speed, acceleration }.is_open(t, 1e-14);
-            let least = (1..=400).map(|n| {
+            let open = Sample { w, dw, ddw }.is_open(1.0, jerk, t);
+            let farthest = (1..=400).map(|n| {
                 let h = t * f64::from(n) / 400.0;
-                gap + h * (speed + 0.5 * h * acceleration)
-            }).fold(f64::INFINITY, f64::min);
-            prop_assert!(!open || least > 0.0, "{least}");
-            prop_assert!(open || least < 1e-3, "{least}");
+                (w + h * (dw + 0.5 * h * ddw)).abs() + jerk * h * h * h / 6.0
+            }).fold(0.0, f64::max);
+            prop_assert!(!open || farthest < 1.0, "{farthest}");
+        }
+
+        #[test]
+        fn a_clear_sample_is_verified(w in -0.5..0.5f64, dw in -0.2..0.2f64, ddw in -0.1..0.1f64) {
+            prop_assert!(Sample { w, dw, ddw }.is_open(1.0, 0.1, 1.0));
+        }
+
+        #[test]
+        fn a_start_on_a_wall_is_open_only_if_it_leaves(dw in -2.0..2.0f64) {
+            let open = Sample { w: 1.0, dw, ddw: 0.0 }.is_open(1.0, 1e-3, 0.1);
+            prop_assert_eq!(open, dw < -1e-5);
         }
     }
 }

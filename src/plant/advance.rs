@@ -4,7 +4,7 @@ use super::{Event, MOST_IMPACTS, Outcome, Plant};
 use crate::arithmetic::Sum;
 use crate::base_motion::Drive;
 use crate::contact::{Contact, Wall};
-use crate::fast::{Arrival, Next};
+use crate::fast::{Moving, Next};
 use crate::flight::Flight;
 use crate::parameters::InvalidValue;
 use crate::segment::Segment;
@@ -74,11 +74,12 @@ impl Plant {
             self.check_duration(duration)?;
             self.set_drive(drive);
         }
-        if self.contact == Contact::Free
-            && self
-                .fast
-                .step(&self.rig, &mut self.masses, &mut self.base, duration)
-        {
+        let mut moving = Moving {
+            rig: &self.rig,
+            masses: &mut self.masses,
+            base: &mut self.base,
+        };
+        if self.contact == Contact::Free && self.fast.step(&mut moving, duration) {
             self.time += duration;
             self.evaluations += 1;
             return Ok(Outcome {
@@ -111,7 +112,7 @@ impl Plant {
             let sin = self.fast.phasor().1;
             let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
             if jump != 0.0 {
-                let kick = self.rig.parameters.damping / self.rig.parameters.primary_mass * jump;
+                let kick = 2.0 * self.rig.alone.delta * jump;
                 self.masses.v = self.masses.v.plus(kick);
                 self.masses.dw += kick;
                 // The impulse acts on the primary mass alone; contact is decided anew.
@@ -143,20 +144,22 @@ impl Plant {
                 self.stay(wall, left, &mut step);
                 continue;
             }
+            let mut moving = Moving {
+                rig: &self.rig,
+                masses: &mut self.masses,
+                base: &mut self.base,
+            };
             let next = match self.contact {
-                Contact::Free => self.fast.next(&self.rig, &self.masses, &self.base, left),
+                Contact::Free => self.fast.next(&mut moving, left, duration),
                 _ => Next::Search,
             };
             match next {
-                Next::ContactFree(t) => {
-                    (self.fast).coast(&self.rig, &mut self.masses, &mut self.base, t, duration);
-                    step.left = if t == left {
-                        Sum::default()
-                    } else {
-                        step.left.plus(-t)
-                    };
+                Next::ContactFree(t) if t == left => step.left = Sum::default(),
+                Next::ContactFree(t) => step.left = step.left.plus(-t),
+                Next::Contact(t, wall) => {
+                    step.left = step.left.minus(t);
+                    self.touch(wall, &mut step);
                 }
-                Next::Impact(arrival) => self.land(&arrival, &mut step),
                 Next::Search => self.search(left, &mut step),
             }
             self.evaluations += self.fast.evaluations();
@@ -166,22 +169,6 @@ impl Plant {
         step.outcome.elapsed = if left > 0.0 { step.now() } else { duration };
         step.outcome.evaluations = self.evaluations - evaluations;
         step.outcome
-    }
-
-    /// Moves on to a predicted and verified contact.
-    fn land(&mut self, arrival: &Arrival, step: &mut Step<impl FnMut(Event)>) {
-        let masses = &mut self.masses;
-        masses.x = arrival.x;
-        masses.v = arrival.v;
-        masses.dw = arrival.dw;
-        self.base.phase = arrival.phase;
-        if self.base.drive.signal[1] != 0.0 {
-            let t = arrival.t.value();
-            self.base.drive.signal[0] += self.base.drive.signal[1] * t;
-        }
-        self.fast.arrived(arrival);
-        step.left = step.left.minus(arrival.t);
-        self.touch(arrival.wall, step);
     }
 
     /// Follows the flight to its first contact by certified search, or to the end of the step.
