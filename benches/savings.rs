@@ -107,13 +107,15 @@ fn accelerated(particle: Accelerated, n: u32, step: f64) {
             0.5 * acceleration,
             0.0,
         ];
-        plant.advance(
-            black_box(Drive {
-                signal,
-                ..Drive::default()
-            }),
-            step,
-        ).unwrap();
+        plant
+            .advance(
+                black_box(Drive {
+                    signal,
+                    ..Drive::default()
+                }),
+                step,
+            )
+            .unwrap();
     }
     assert_eq!(plant.contact().is_some(), particle == Accelerated::Stuck);
     assert_eq!(plant.totals().impacts > 0, hopping);

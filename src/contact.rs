@@ -152,8 +152,7 @@ impl ImpactLaw {
         (fastest, half_width): (f64, f64),
     ) -> bool {
         speed * speed > 2.0 * LOWEST_HOP * half_width * largest
-            && (self.restitution <= LIVELY
-                || 2.0 * speed * fastest > SHORTEST_LIVELY_HOP * largest)
+            && (self.restitution <= LIVELY || 2.0 * speed * fastest > SHORTEST_LIVELY_HOP * largest)
     }
 
     /// Whether the particle is at rest on the wall it leaves.

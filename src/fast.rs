@@ -22,9 +22,9 @@ use crate::base_motion::{BaseMotion, Phase, shift};
 use crate::contact::Wall;
 use crate::plant::{Masses, Rig};
 use crate::segment::Segment;
+use cache::Cache;
 #[cfg(feature = "serde")]
 pub(crate) use cache::Keys;
-use cache::Cache;
 use coefficients::Coefficients;
 use propagator::{Increment, Point};
 use verify::Envelope;
@@ -113,8 +113,11 @@ impl FastPath {
         self.contact_free = 0.0;
     }
 
+    /// The phasor and the phase of the base have moved on.
     #[inline(always)]
-    fn rotated(&mut self, phase: Phase) {
+    fn turned(&mut self, base: &mut BaseMotion, phase: Phase, phasor: (f64, f64)) {
+        base.phase = phase;
+        self.phasor = phasor;
         self.rotations += 1;
         if self.rotations >= ROTATIONS {
             self.resynchronise(phase);
@@ -180,12 +183,7 @@ impl FastPath {
         if w.abs() > b {
             masses.w = Sum::from(b.copysign(w));
         }
-        base.phase = phase;
-        self.phasor = increment.phasor;
-        self.rotations += 1;
-        if self.rotations >= ROTATIONS {
-            self.resynchronise(phase);
-        }
+        self.turned(base, phase, increment.phasor);
     }
 
     /// Whether a bound from the start alone shows that no wall is met within `t`; looks further ahead where that is as cheap.
@@ -211,7 +209,8 @@ impl FastPath {
         let fastest = oscillator.fastest.max(drive.omega.abs());
         if t == duration && self.cache.repeats(oscillator, &drive, duration) {
             self.take_step(moving, start);
-        } else if t * fastest <= short_step::LONGEST || u2 != 0.0 || u3 != 0.0 || drive.omega < 0.0 {
+        } else if t * fastest <= short_step::LONGEST || u2 != 0.0 || u3 != 0.0 || drive.omega < 0.0
+        {
             let (x, v) = (moving.masses.x.value(), moving.masses.v.value());
             let segment = Segment::new(oscillator, *moving.base, (x, v));
             let (dx, dv) = segment.departure(t);

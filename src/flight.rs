@@ -1,8 +1,8 @@
 //! The particle's free flight between the walls, up to the first instant it touches one.
 
 use crate::clearance::{Gap, clear_after_release, first_closure};
-use crate::segment::{Derivatives, Segment, Series, nearby, velocity_change};
 use crate::contact::Wall;
+use crate::segment::{Derivatives, Segment, Series, nearby, velocity_change};
 
 /// A gap smaller than this fraction of the half-width cannot be told from none.
 const RESOLUTION: f64 = 1.0 / (1u64 << 60) as f64;

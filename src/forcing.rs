@@ -15,7 +15,7 @@ use crate::oscillator::{Oscillator, Regime, Transition};
 use num_complex::Complex64;
 
 /// Largest `|H|` for which the first form is used: its rounding error is `|H|` times that of a unit amplitude.
-const LARGEST_STEADY: f64 = 256.0;
+const LARGEST_STEADY: f64 = 64.0;
 
 /// Coefficients of the response at one frequency.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -94,14 +94,8 @@ impl Forcing {
         let (sin, cos) = sincos_of_product((self.omega, 0.0), t);
         let base = Complex64::new(cos, sin);
         let position = match self.form {
-            Form::Steady(steady) => {
-                steady * (base - Complex64::new(free.xx, self.omega * free.xv))
-            }
-            Form::DividedDifferences {
-                gain,
-                near,
-                far,
-            } => {
+            Form::Steady(steady) => steady * (base - Complex64::new(free.xx, self.omega * free.xv)),
+            Form::DividedDifferences { gain, near, far } => {
                 let first = divided_difference(near, t, base, decayed);
                 let second = (base - decayed.conj()) * far;
                 gain * (first - second)

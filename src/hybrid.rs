@@ -13,10 +13,10 @@
 //! held, that of a signal is not, and is taken for zero; the plant in closed form ([`crate::plant`]) has no such limit.
 
 use crate::base_motion::Drive;
+use crate::contact::{ImpactLaw, Wall};
 use crate::equations::Instant;
 use crate::parameters::{InvalidValue, Parameters};
 use crate::plant::{Event, Plant, State, Totals};
-use crate::contact::{ImpactLaw, Wall};
 
 /// How far behind a wall a touch is told, as a fraction of the half-width.
 pub const DEPTH: f64 = 1e-12;

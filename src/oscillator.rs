@@ -223,13 +223,7 @@ impl Oscillator {
         let (xx, vx) = column([(1.0, 0.0), (0.0, 0.0)]);
         let (xv, vv) = column([(0.0, 0.0), (1.0, 0.0)]);
         let (one, t2) = ((1.0, 0.0), (t, 0.0));
-        let entries = [
-            xx,
-            times(plus(one, xv), t2),
-            divided(vx, t),
-            vv,
-        ]
-        .map(split_coefficient);
+        let entries = [xx, times(plus(one, xv), t2), divided(vx, t), vv].map(split_coefficient);
         let part = |f: fn(&(f64, f64)) -> f64| {
             let [xx, xv, vx, vv] = entries.each_ref().map(f);
             Transition { xx, xv, vx, vv }

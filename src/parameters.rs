@@ -64,7 +64,13 @@ impl Parameters {
     pub fn validate(&self) -> Result<(), InvalidValue> {
         let positive = |name, value: f64, unit| {
             let allowed = "a number from 1e-100 to 1e100";
-            InvalidValue::unless((1e-100..=1e100).contains(&value), name, value, unit, allowed)
+            InvalidValue::unless(
+                (1e-100..=1e100).contains(&value),
+                name,
+                value,
+                unit,
+                allowed,
+            )
         };
         positive("M (primary mass)", self.primary_mass, "kg")?;
         positive("k (stiffness)", self.stiffness, "N/m")?;
@@ -172,7 +178,8 @@ mod tests {
         assert!(refused(|p| p.damping = 1e99).contains("decay rate"));
         assert!(refused(|p| p.primary_mass = 1e-300).contains("primary mass"));
         assert!(
-            refused(|p| (p.primary_mass, p.stiffness) = (1e-100, 1e100)).contains("natural frequency")
+            refused(|p| (p.primary_mass, p.stiffness) = (1e-100, 1e100))
+                .contains("natural frequency")
         );
     }
 

@@ -135,7 +135,10 @@ pub(crate) struct Masses {
 /// The plant: parameters, what follows from them, and the state.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(into = "snapshot::Snapshot", from = "snapshot::Snapshot"))]
+#[cfg_attr(
+    feature = "serde",
+    serde(into = "snapshot::Snapshot", from = "snapshot::Snapshot")
+)]
 pub struct Plant {
     rig: Rig,
     contact: Contact,

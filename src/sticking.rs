@@ -1,8 +1,8 @@
 //! Persistent contact: both masses move as one while the wall must push, and part at the instant it need not.
 
 use crate::clearance::{Gap, first_closure};
-use crate::segment::{Derivatives, Segment, nearby};
 use crate::contact::Wall;
+use crate::segment::{Derivatives, Segment, nearby};
 
 /// How a stretch of sticking ended.
 #[derive(Clone, Copy, Debug, PartialEq)]

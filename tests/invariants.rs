@@ -130,7 +130,9 @@ fn a_particle_at_rest_on_the_wall_is_held_let_go_and_caught_again() {
     };
     let mut plant = Plant::new(parameters, start).unwrap();
     let mut events = Vec::new();
-    plant.advance_with(Drive::held(2.0), 60.0, |event| events.push(event)).unwrap();
+    plant
+        .advance_with(Drive::held(2.0), 60.0, |event| events.push(event))
+        .unwrap();
     assert!(matches!(
         events[0],
         Event::Stuck {

@@ -147,7 +147,9 @@ impl Keys {
             phasor: fast.phasor,
             rotations: fast.rotations,
             step: cache.step.t,
-            flights: cache.flights.map(|propagator| (propagator.t, propagator.exact)),
+            flights: cache
+                .flights
+                .map(|propagator| (propagator.t, propagator.exact)),
             followers: cache.followers,
             last: cache.last,
             regular: cache.regular,

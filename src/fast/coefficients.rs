@@ -7,7 +7,7 @@ use crate::oscillator::Oscillator;
 /// 5 then leave out less than 1e-17.
 pub(super) const NEAR: f64 = 1.0 / 2048.0;
 /// Length of a stretch of a march, in the same unit.
-const STRETCH: f64 = 1.0;
+const STRETCH: f64 = 1.5;
 
 /// What follows from an oscillator and a frequency.
 #[derive(Clone, Copy, Debug)]
@@ -53,7 +53,10 @@ impl Coefficients {
             ..
         } = *oscillator;
         // `f'' = -omega² f`: every derivative is a combination of the same four numbers.
-        let (mut last, mut now) = ([0.0, 1.0, 0.0, 0.0], [-omega0_squared, -2.0 * delta, 1.0, 0.0]);
+        let (mut last, mut now) = (
+            [0.0, 1.0, 0.0, 0.0],
+            [-omega0_squared, -2.0 * delta, 1.0, 0.0],
+        );
         let mut forcing = [1.0, 0.0];
         let mut factorial = 1.0;
         let taylor = [2.0, 3.0, 4.0, 5.0].map(|n| {

@@ -3,7 +3,7 @@
 use super::coefficients::{Coefficients, NEAR};
 use super::propagator::{Increment, Nearby, Point, Propagator};
 use super::verify::{Envelope, Sample, is_monotone};
-use super::{FastPath, Moving, Next, ROTATIONS};
+use super::{FastPath, Moving, Next};
 use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Phase, shift};
 use crate::contact::Wall;
@@ -16,7 +16,7 @@ const HEAVIEST: f64 = 0.5;
 /// Longest flight that is marched over, in stretches.
 const MOST_STRETCHES: u32 = 64;
 /// Fine stretches in a coarse one.
-pub(super) const FINE: usize = 4;
+pub(super) const FINE: usize = 3;
 /// Longest stretch before a predicted contact that one bound can verify, in stretches.
 const LONGEST_STRETCH: f64 = 2.0;
 /// Attempts to come near enough to an arrival.
@@ -83,6 +83,15 @@ impl<'a> Start<'a> {
         let (f, _) = coefficients.forcing_at(point.phasor);
         self.base.drive.amplitude * f
             - (oscillator.omega0_squared * point.y + 2.0 * oscillator.delta * point.dy)
+    }
+
+    /// Its rate of change at a mark, m/s³.
+    #[inline(always)]
+    fn jerk(&self, coefficients: &Coefficients, mark: &Mark) -> f64 {
+        let oscillator = &self.rig.alone;
+        let (_, df) = coefficients.forcing_at(mark.point.phasor);
+        self.base.drive.amplitude * df
+            - (oscillator.omega0_squared * mark.point.dy + 2.0 * oscillator.delta * mark.sample.ddw)
     }
 
     #[inline(always)]
@@ -205,13 +214,8 @@ impl FastPath {
         masses.x = arrival.x;
         masses.v = arrival.v;
         masses.dw = arrival.dw;
-        base.phase = arrival.phase;
-        self.phasor = arrival.phasor;
+        self.turned(base, arrival.phase, arrival.phasor);
         self.contact_free = 0.0;
-        self.rotations += 1;
-        if self.rotations >= ROTATIONS {
-            self.resynchronise(arrival.phase);
-        }
         Next::Contact(arrival.t, arrival.wall)
     }
 
@@ -248,7 +252,8 @@ impl FastPath {
     /// divided once.
     #[inline(never)]
     fn march(&mut self, start: &Start, left: f64, predicted: Option<&Predicted>) -> Found {
-        self.cache.prepare_march(&start.rig.alone, &self.coefficients);
+        self.cache
+            .prepare_march(&start.rig.alone, &self.coefficients);
         let mut from = Mark {
             t: 0.0,
             point: start.point,
@@ -257,14 +262,15 @@ impl FastPath {
         let mut fine = 0;
         for _ in 0..MOST_STRETCHES {
             if let Some(predicted) = predicted
-                && predicted.arrival.t.value() - from.t <= LONGEST_STRETCH * self.coefficients.stretch
+                && predicted.arrival.t.value() - from.t
+                    <= LONGEST_STRETCH * self.coefficients.stretch
                 && verified(start, &from, predicted)
             {
                 self.cache.confirm();
                 return Found::Contact(predicted.arrival);
             }
             let to = self.mark(start, &from, usize::from(fine > 0));
-            let found = match stretch(start, &from, &to) {
+            let found = match stretch(&self.coefficients, start, &from, &to) {
                 Stretch::Open => {
                     from = to;
                     fine = if fine > 0 { fine - 1 } else { 0 };
@@ -330,7 +336,11 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
         && u3 == 0.0
         && base.drive.omega >= 0.0
         && oscillator.delta <= HEAVIEST * oscillator.omega0
-        && offset.abs().max(base.drive.amplitude.abs()).max(point.y.abs()) <= widest
+        && offset
+            .abs()
+            .max(base.drive.amplitude.abs())
+            .max(point.y.abs())
+            <= widest
         && slope.abs().max(point.dy.abs()) <= fastest
 }
 
@@ -344,7 +354,7 @@ fn verified(start: &Start, from: &Mark, predicted: &Predicted) -> bool {
 
 /// What happens between two marks.
 #[inline(always)]
-fn stretch(start: &Start, from: &Mark, to: &Mark) -> Stretch {
+fn stretch(coefficients: &Coefficients, start: &Start, from: &Mark, to: &Mark) -> Stretch {
     let (b, t) = (start.half_width(), to.t - from.t);
     if to.sample.w.abs() < b {
         let envelope = start.envelope(&from.point, t);
@@ -359,33 +369,42 @@ fn stretch(start: &Start, from: &Mark, to: &Mark) -> Stretch {
     } else {
         Wall::Minus
     };
-    match crossing(wall.sign() * b, &from.sample, &to.sample, t) {
-        Some(after) => Stretch::Contact(from.t + after, wall),
+    let shape = |mark: &Mark| {
+        let Sample { w, dw, ddw } = mark.sample;
+        let jerk = start.jerk(coefficients, mark);
+        [w, dw * t, ddw * (t * t / 2.0), jerk * (t * t * t / 6.0)]
+    };
+    match crossing(wall.sign() * b, shape(from), shape(to)) {
+        Some(part) => Stretch::Contact(from.t + part * t, wall),
         None => Stretch::Unknown,
     }
 }
 
-/// When `w` crosses `target` on the quintic through both samples, `t` seconds apart; `to` is behind the target.
-fn crossing(target: f64, from: &Sample, to: &Sample, t: f64) -> Option<f64> {
-    let (d0, d1) = (from.dw * t, to.dw * t);
-    let (a0, a1) = (0.5 * from.ddw * t * t, 0.5 * to.ddw * t * t);
-    let rise = (to.w - from.w) - d0 - a0;
-    let slope = d1 - d0 - 2.0 * a0;
-    let curvature = a1 - a0;
-    let (c3, c4, c5) = (
-        10.0 * rise - 4.0 * slope + curvature,
-        -15.0 * rise + 7.0 * slope - 2.0 * curvature,
-        6.0 * rise - 3.0 * slope + curvature,
-    );
-    let gap = target - from.w;
+/// The part of a stretch after which `w` crosses `target`, on the polynomial of degree 7 that has the same value and the same three
+/// Taylor coefficients at both ends; the end is behind the target.
+fn crossing(target: f64, from: [f64; 4], to: [f64; 4]) -> Option<f64> {
+    let [w0, d0, a0, j0] = from;
+    let [w1, d1, a1, j1] = to;
+    let e0 = (w1 - w0) - (d0 + a0 + j0);
+    let e1 = d1 - (d0 + 2.0 * a0 + 3.0 * j0);
+    let e2 = a1 - (a0 + 3.0 * j0);
+    let e3 = j1 - j0;
+    let c4 = 35.0 * e0 - 15.0 * e1 + 5.0 * e2 - e3;
+    let c5 = -84.0 * e0 + 39.0 * e1 - 14.0 * e2 + 3.0 * e3;
+    let c6 = 70.0 * e0 - 34.0 * e1 + 13.0 * e2 - 3.0 * e3;
+    let c7 = -20.0 * e0 + 10.0 * e1 - 4.0 * e2 + e3;
+    let gap = target - w0;
     // From behind, so that a start on this very wall is not found again.
-    let mut s = if gap == 0.0 { 1.0 } else { gap / (to.w - from.w) };
+    let mut s = if gap == 0.0 { 1.0 } else { gap / (w1 - w0) };
     for _ in 0..3 {
-        let value = s * (d0 + s * (a0 + s * (c3 + s * (c4 + s * c5)))) - gap;
-        let slope = d0 + s * (2.0 * a0 + s * (3.0 * c3 + s * (4.0 * c4 + s * (5.0 * c5))));
+        let high = c4 + s * (c5 + s * (c6 + s * c7));
+        let dhigh = 4.0 * c4 + s * (5.0 * c5 + s * (6.0 * c6 + s * (7.0 * c7)));
+        let (s2, s3) = (s * s, s * s * s);
+        let value = s * d0 + s2 * (a0 + s * j0 + s2 * high) - gap;
+        let slope = d0 + s * (2.0 * a0) + s2 * (3.0 * j0) + s3 * dhigh;
         s -= value / slope;
     }
-    (s > 0.0 && s <= 1.0).then_some(s * t)
+    (s > 0.0 && s <= 1.0).then_some(s)
 }
 
 /// The contact at `wall`, if it is so near the time of `propagator` that its digits can be trusted; else a better guess of

@@ -63,7 +63,8 @@ impl FastPath {
             h = 2.0 * speed / (pressing + h * (j + h * (k + h * (l + h * n))));
         }
         let fifth = d4 / 24.0 + h * (d5 / 120.0 + h * (d6 / 720.0));
-        let gained = h * (d[2] + h * (d3 / 2.0 + h * (d4 / 6.0 + h * (d5 / 24.0 + h * d6 / 120.0))));
+        let gained =
+            h * (d[2] + h * (d3 / 2.0 + h * (d4 / 6.0 + h * (d5 / 24.0 + h * d6 / 120.0))));
         let moved = h * (d[1] + h * (d[2] / 2.0 + h * (d3 / 6.0 + h * fifth)));
         let phase = base.phase.advanced(base.drive.omega, h);
         let (sin, cos) = libm::sincos(phase.radians());

@@ -99,7 +99,12 @@ impl ShortStep {
 
     /// What one step adds to `start` under `drive`.
     #[inline(always)]
-    pub fn increment(&mut self, oscillator: &Oscillator, drive: &Drive, start: &Point) -> Increment {
+    pub fn increment(
+        &mut self,
+        oscillator: &Oscillator,
+        drive: &Drive,
+        start: &Point,
+    ) -> Increment {
         if self.omega != drive.omega {
             self.respond(oscillator, drive.omega);
         }
@@ -121,7 +126,10 @@ impl ShortStep {
 
 /// `G_n(t)`: the response from rest to a base displacement `t^n/n!`, from its Taylor series.
 fn moment(oscillator: &Oscillator, n: usize, t: f64) -> f64 {
-    let (damping, spring) = (2.0 * oscillator.delta * t, oscillator.omega0_squared * t * t);
+    let (damping, spring) = (
+        2.0 * oscillator.delta * t,
+        oscillator.omega0_squared * t * t,
+    );
     let factorial = |n: usize| (1..=n).fold(1.0, |product, k| product * k as f64);
     // Coefficients times powers of t.
     let base = |k: usize| {
@@ -134,8 +142,8 @@ fn moment(oscillator: &Oscillator, n: usize, t: f64) -> f64 {
     let (mut before, mut last, mut sum) = (0.0, 0.0, 0.0);
     for k in 0..n + 16 {
         let k1 = (k + 1) as f64;
-        let next = (spring * (base(k) - before) + damping * k1 * (base(k + 1) - last))
-            / (k1 * (k1 + 1.0));
+        let next =
+            (spring * (base(k) - before) + damping * k1 * (base(k + 1) - last)) / (k1 * (k1 + 1.0));
         sum += next;
         (before, last) = (last, next);
     }
@@ -172,7 +180,10 @@ mod tests {
                 let increment = step.increment(&oscillator, &drive, &start);
                 let (got, dgot) = (0.7 + increment.y - 0.2 * t, -0.4 + increment.dy);
                 assert!((got - x).abs() < 2e-15, "{zeta} {omega}: {got} {x}");
-                assert!((dgot - v).abs() < 2e-15 * oscillator.fastest, "{zeta} {omega}: {dgot} {v}");
+                assert!(
+                    (dgot - v).abs() < 2e-15 * oscillator.fastest,
+                    "{zeta} {omega}: {dgot} {v}"
+                );
             }
         }
     }

@@ -110,7 +110,8 @@ impl Plant {
         let jumps = drive.signal[0] != before.signal[0] || drive.amplitude != before.amplitude;
         if self.begun && jumps {
             let sin = self.fast.phasor().1;
-            let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
+            let jump =
+                (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
             if jump != 0.0 {
                 let kick = 2.0 * self.rig.alone.delta * jump;
                 self.masses.v = self.masses.v.plus(kick);

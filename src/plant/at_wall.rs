@@ -67,10 +67,7 @@ impl Plant {
         }
         self.rig.law.rests(&Departure {
             speed,
-            pressing: (
-                wall.sign() * self.acceleration(),
-                self.acceleration_error(),
-            ),
+            pressing: (wall.sign() * self.acceleration(), self.acceleration_error()),
             fastest,
             half_width,
             left,

@@ -3,8 +3,8 @@
 use crate::truth::{System, Vector, after, number, start};
 use core::fmt;
 use lovines::base_motion::BaseMotion;
-use lovines::segment::Segment;
 use lovines::oscillator::Oscillator;
+use lovines::segment::Segment;
 use lovines::{Drive, Parameters, Plant, State};
 use std::f64::consts::TAU;
 

@@ -141,12 +141,14 @@ fn once(s: &Scene, number: usize) -> (Worst, [u64; 4]) {
     let mut drive = s.drive;
     for _ in 0..STEPS {
         let (mut impacts, mut backwards) = (0u64, 0);
-        let outcome = plant.advance_with(drive, s.step, |event| {
-            if let Event::Impact { wall, velocity, .. } = event {
-                backwards += u64::from(wall.sign() * velocity <= 0.0);
-                impacts += 1;
-            }
-        }).unwrap();
+        let outcome = plant
+            .advance_with(drive, s.step, |event| {
+                if let Event::Impact { wall, velocity, .. } = event {
+                    backwards += u64::from(wall.sign() * velocity <= 0.0);
+                    impacts += 1;
+                }
+            })
+            .unwrap();
         // The same signal seen from now.
         drive = plant.base().drive;
         worst.miscounted += backwards + outcome.impacts.abs_diff(impacts);
