@@ -150,9 +150,11 @@ impl<C: Component> Instance<C> {
         } = &self.session;
         let size = if own.abs() > step { own.abs() } else { step };
         let tolerance = CLOCK_TOLERANCE * size;
-        let in_order = (time - own).abs() <= tolerance && time + step <= stop_time + tolerance;
+        let end = time + step;
+        let in_order =
+            (time - own).abs() <= tolerance && end - stop_time <= tolerance + CLOCK_TOLERANCE * end.abs();
         // NaN compares false, and an infinite step makes an infinite end.
-        let sane = step >= 0.0 && time + step <= f64::MAX;
+        let sane = step >= 0.0 && end <= f64::MAX;
         if !(sane && in_order) {
             return Err(out_of_order((time, step), own, stop_time));
         }
@@ -168,7 +170,7 @@ fn out_of_order((time, step): (f64, f64), own: f64, stop_time: f64) -> Refusal {
         format!(
             "communicationStepSize = {step} s is refused; allowed is a finite number of at least 0"
         )
-    } else if time + step > stop_time + tolerance && (time - own).abs() <= tolerance {
+    } else if (time - own).abs() <= tolerance {
         format!(
             "a step from {time} s to {} s is refused; the experiment was set up to end at stopTime = {stop_time} s",
             time + step

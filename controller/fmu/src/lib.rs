@@ -44,8 +44,8 @@ const DEMODULATOR: i32 = 2;
 /// So many sample times ahead of a communication point a sample counts as being there: clocks round.
 const EARLY: f64 = 1e-3;
 
-/// The longest steps, in sample times, in which a channel is continued by a straight line.
-const LONGEST_LINE: f64 = 2.0;
+/// The longest steps, in sample times, in which a channel is extrapolated.
+const LONGEST_STEP: f64 = 2.0;
 
 /// The most samples that one step may hold: some seconds of work.
 const MOST_SAMPLES: f64 = 1e7;
@@ -268,8 +268,11 @@ impl Component for Controller {
         }
         let sample_time = self.config.sample_time;
         let begin = time - running.start_time;
-        for (name, signal) in [("response", &mut self.response), ("reference", &mut self.reference)] {
-            signal.begin(begin, step, LONGEST_LINE * sample_time);
+        for (name, signal) in [
+            ("response", &mut self.response),
+            ("reference", &mut self.reference),
+        ] {
+            signal.begin(begin, step, LONGEST_STEP * sample_time);
             if step > sample_time * (1.0 + EARLY) && !signal.is_given() {
                 log.warn_once(
                     "step",

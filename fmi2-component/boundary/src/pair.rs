@@ -185,7 +185,6 @@ fn booleans<const N: usize>(m: &Master, references: [u32; N]) -> [i32; N] {
 #[track_caller]
 fn set<const N: usize>(m: &Master, references: [u32; N], values: [f64; N]) {
     // SAFETY: as above.
-    let status: Status =
-        unsafe { (m.f.fmi2SetReal)(m.c, references.as_ptr(), N, values.as_ptr()) };
+    let status: Status = unsafe { (m.f.fmi2SetReal)(m.c, references.as_ptr(), N, values.as_ptr()) };
     m.well(status);
 }
