@@ -151,8 +151,8 @@ impl<C: Component> Instance<C> {
         let size = if own.abs() > step { own.abs() } else { step };
         let tolerance = CLOCK_TOLERANCE * size;
         let end = time + step;
-        let in_order =
-            (time - own).abs() <= tolerance && end - stop_time <= tolerance + CLOCK_TOLERANCE * end.abs();
+        let in_order = (time - own).abs() <= tolerance
+            && end - stop_time <= tolerance + CLOCK_TOLERANCE * end.abs();
         // NaN compares false, and an infinite step makes an infinite end.
         let sane = step >= 0.0 && end <= f64::MAX;
         if !(sane && in_order) {

@@ -41,7 +41,10 @@ mod tests {
     fn what_is_no_number_of_seconds_is_refused() {
         for text in ["yesterday", "1.5", "99999999999999999"] {
             let message = format(text).expect_err("no date").to_string();
-            assert!(message.contains(text) && message.contains("1700000000"), "{message}");
+            assert!(
+                message.contains(text) && message.contains("1700000000"),
+                "{message}"
+            );
         }
     }
 }

@@ -70,8 +70,7 @@ fn one(
             (name, library.content.as_slice())
         })
         .collect();
-    let pages =
-        documentation(identifier, &description).map_err(PackError::Description)?;
+    let pages = documentation(identifier, &description).map_err(PackError::Description)?;
     let mut entries = vec![("modelDescription.xml", description.as_bytes())];
     entries.extend(
         pages

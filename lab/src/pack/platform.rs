@@ -133,7 +133,9 @@ impl Platform {
         }
         let serves = |&(format, architecture): &(BinaryFormat, Architecture)| {
             let same = |one: &Self| one.format == format && one.architecture == architecture;
-            KNOWN.iter().any(|one| one.folder == self.folder && same(one))
+            KNOWN
+                .iter()
+                .any(|one| one.folder == self.folder && same(one))
         };
         match found.first() {
             _ if found.iter().any(serves) => Ok(()),

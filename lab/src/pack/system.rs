@@ -21,7 +21,10 @@ pub(super) fn file(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
     let date = date::generation()?;
     let mut structure = STRUCTURE.to_owned();
     for (attribute, value) in [
-        ("stopTime", Some((PERIODS * scene.plant.natural_period()).to_string())),
+        (
+            "stopTime",
+            Some((PERIODS * scene.plant.natural_period()).to_string()),
+        ),
         ("stepSize", Some(step.to_string())),
         ("baseStepSize", Some(step.to_string())),
         ("generationDateAndTime", date),
