@@ -65,5 +65,5 @@ libclang() {
 build() {
     local quiet=--quiet
     [ -t 2 ] && quiet=
-    cargo build --release --locked $quiet
+    cargo build --release --locked $quiet --features lovines/fmu
 }

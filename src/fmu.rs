@@ -11,7 +11,7 @@ mod reach;
 use crate::hybrid::Hybrid;
 use crate::plant::MOST_IMPACTS;
 use crate::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
-use fmi2_component::{Archive, Component, Log, Refusal};
+use fmi2_component::{Archive, Component, Key, Log, Refusal};
 use outputs::Outputs;
 use reach::Reach;
 use std::cell::Cell;
@@ -67,6 +67,9 @@ const LONGEST_STEP: f64 = 1e7;
 /// The fastest rate that is followed, rad/s: bounds of the motion are made of its powers, which are to be numbers, and a search
 /// with bounds that are none does not end.
 const FASTEST: f64 = 1e50;
+
+/// The highest order of input derivatives that is followed.
+const DERIVATIVES: u32 = 3;
 
 /// An advance with every event told.
 #[cold]
@@ -142,6 +145,10 @@ impl LoViNes {
             Real::e => self.drive.signal[0],
             Real::E => self.drive.amplitude,
             Real::omega => self.drive.omega,
+            Real::q1_start => self.start.q1,
+            Real::der_q1_start => self.start.dq1,
+            Real::q2_start => self.start.q2,
+            Real::der_q2_start => self.start.dq2,
             _ => return None,
         })
     }
@@ -183,10 +190,11 @@ impl LoViNes {
     fn configure(&mut self, variable: Real, value: f64) -> Result<(), Refusal> {
         let mut parameters = self.parameters;
         let slot = match variable {
-            Real::q1 => &mut self.start.q1,
-            Real::der_q1 => &mut self.start.dq1,
-            Real::q2 => &mut self.start.q2,
-            Real::der_q2 => &mut self.start.dq2,
+            // One value under two names: some masters set parameters only, others start values of outputs only.
+            Real::q1 | Real::q1_start => &mut self.start.q1,
+            Real::der_q1 | Real::der_q1_start => &mut self.start.dq1,
+            Real::q2 | Real::q2_start => &mut self.start.q2,
+            Real::der_q2 | Real::der_q2_start => &mut self.start.dq2,
             Real::M => &mut self.parameters.primary_mass,
             Real::m => &mut self.parameters.particle_mass,
             Real::b => &mut self.parameters.half_width,
@@ -302,6 +310,13 @@ impl Component for LoViNes {
         Ok(())
     }
 
+    fn leave_initialization(&mut self) {
+        // From now on an integrator's states count, not the values that were set.
+        if matches!(self.rig, Rig::Equations(_)) {
+            self.progress = Progress::UnderWay;
+        }
+    }
+
     #[inline]
     fn accept_step(&self, step: f64) -> Result<(), Refusal> {
         if step <= self.longest.get() {
@@ -342,24 +357,32 @@ impl Component for LoViNes {
         variable: Real,
         order: u32,
         value: f64,
+        log: &Log,
     ) -> Result<(), Refusal> {
+        let name = variable.variable().name;
+        if order > DERIVATIVES {
+            return Err(Refusal::error(format!(
+                "derivative {order} of {name} is refused; allowed are orders 1 to {DERIVATIVES}"
+            )));
+        }
+        if !matches!(variable, Real::e) {
+            if value != 0.0 {
+                log.warn_once(
+                    name,
+                    format_args!(
+                        "derivatives of {name} have no effect: E and omega are held during a step; those of e are followed"
+                    ),
+                );
+            }
+            return Ok(());
+        }
         self.longest = unknown();
         // The coefficients of a Taylor polynomial.
         let signal = &mut self.drive.signal;
-        match (variable, order) {
-            (Real::e, 1) => signal[1] = value,
-            (Real::e, 2) => signal[2] = value / 2.0,
-            (Real::e, 3) => signal[3] = value / 6.0,
-            (Real::e, _) => {
-                return Err(Refusal::error(format!(
-                    "derivative {order} of e is refused; allowed are orders 1 to 3"
-                )));
-            }
-            _ => {
-                return Err(Refusal::error(
-                    "input derivatives are refused but for e; E and omega are held between samples",
-                ));
-            }
+        match order {
+            1 => signal[1] = value,
+            2 => signal[2] = value / 2.0,
+            _ => signal[3] = value / 6.0,
         }
         Ok(())
     }

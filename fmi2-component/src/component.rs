@@ -104,6 +104,10 @@ pub trait Component: Clone + Send + 'static {
     /// Values that make no sense. The component stays in Initialization Mode.
     fn initialise(&mut self, start_time: f64, log: &Log) -> Result<(), Refusal>;
 
+    /// Says that Initialization Mode has been left: from now on only what the standard calls known may change. Called once,
+    /// after the last [`Component::initialise`].
+    fn leave_initialization(&mut self) {}
+
     /// Whether a step of that length (finite, above 0) can be done at all. Asked before every step.
     ///
     /// # Errors
@@ -129,8 +133,9 @@ pub trait Component: Clone + Send + 'static {
         variable: RealOf<Self>,
         order: u32,
         value: f64,
+        log: &Log,
     ) -> Result<(), Refusal> {
-        let _ = value;
+        let _ = (value, log);
         Err(Refusal::error(format!(
             "derivative {order} of {} is refused; the component takes no input derivatives",
             variable.variable().name
@@ -152,7 +157,8 @@ pub trait Component: Clone + Send + 'static {
         )))
     }
 
-    /// The partial derivative of `unknown` by `known`; the shell sums them up along the direction asked for.
+    /// The partial derivative of `unknown` by `known`; the shell sums them up along the direction asked for. Discrete outputs
+    /// are not asked for: between events they have no slope.
     ///
     /// # Errors
     /// Pairs that the component has no derivative of; by default all.

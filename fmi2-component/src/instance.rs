@@ -12,7 +12,7 @@ use crate::session::{Select, Session};
 use crate::snapshots::Snapshots;
 use crate::variable::Variable;
 
-/// How far, relatively, a master's clock may be from ours: both round.
+/// How far, relatively, a master's clock may be from ours, and a step may lead past the stop time: both round.
 const CLOCK_TOLERANCE: f64 = 1e-9;
 
 /// A component, its log and its FMU states.
@@ -58,6 +58,7 @@ impl<C: Component> Instance<C> {
 
     pub fn leave_initialization(&mut self) -> Result<(), Refusal> {
         self.refresh()?;
+        self.session.component.leave_initialization();
         self.session.state = match self.session.interface {
             Interface::CoSimulation => State::StepComplete,
             Interface::ModelExchange => State::EventMode,
@@ -149,9 +150,11 @@ impl<C: Component> Instance<C> {
         } = &self.session;
         let size = if own.abs() > step { own.abs() } else { step };
         let tolerance = CLOCK_TOLERANCE * size;
-        let in_order = (time - own).abs() <= tolerance && time <= stop_time + tolerance;
+        let end = time + step;
+        let in_order = (time - own).abs() <= tolerance
+            && end - stop_time <= tolerance + CLOCK_TOLERANCE * end.abs();
         // NaN compares false, and an infinite step makes an infinite end.
-        let sane = step >= 0.0 && time + step <= f64::MAX;
+        let sane = step >= 0.0 && end <= f64::MAX;
         if !(sane && in_order) {
             return Err(out_of_order((time, step), own, stop_time));
         }
@@ -167,9 +170,10 @@ fn out_of_order((time, step): (f64, f64), own: f64, stop_time: f64) -> Refusal {
         format!(
             "communicationStepSize = {step} s is refused; allowed is a finite number of at least 0"
         )
-    } else if time > stop_time + tolerance && (time - own).abs() <= tolerance {
+    } else if (time - own).abs() <= tolerance {
         format!(
-            "a step at {time} s is refused; the experiment was set up to end at stopTime = {stop_time} s"
+            "a step from {time} s to {} s is refused; the experiment was set up to end at stopTime = {stop_time} s",
+            time + step
         )
     } else {
         format!(

@@ -1,5 +1,6 @@
 //! Lines for the master's logger (FMI 2.0, clause 2.1.5): categories, and text that is safe as a printf format.
 
+use std::cell::RefCell;
 use std::ffi::{CStr, CString, c_char, c_void};
 use std::fmt::Arguments;
 
@@ -41,6 +42,8 @@ pub struct Log {
     sink: Option<Sink>,
     enabled: u64,
     categories: &'static [&'static str],
+    /// The subjects that an instance has warned of.
+    warned: RefCell<Vec<&'static str>>,
 }
 
 #[derive(Debug)]
@@ -57,6 +60,7 @@ impl Log {
             sink: None,
             enabled: 0,
             categories: &[],
+            warned: RefCell::new(Vec::new()),
         }
     }
 
@@ -78,6 +82,7 @@ impl Log {
             }),
             enabled: 0,
             categories,
+            warned: RefCell::new(Vec::new()),
         }
     }
 
@@ -103,6 +108,19 @@ impl Log {
             "logAll"
         };
         self.write(Status::Warning, category, &message.to_string());
+    }
+
+    /// Logs a warning the first time that `subject` comes up in the life of the instance, whatever is reset or rolled back:
+    /// what happens in every step would otherwise fill the master's log.
+    #[cold]
+    pub fn warn_once(&self, subject: &'static str, message: Arguments<'_>) {
+        let mut warned = self.warned.borrow_mut();
+        if !warned.contains(&subject) {
+            warned.push(subject);
+            // The logger may call back.
+            drop(warned);
+            self.warn(message);
+        }
     }
 
     /// Logs why a call ends in `status`.

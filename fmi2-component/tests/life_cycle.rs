@@ -212,13 +212,17 @@ fn steps_follow_each_other() {
 }
 
 #[test]
-fn the_last_step_may_run_past_the_stop_time_but_no_other() {
+fn a_step_may_lead_past_the_stop_time_by_rounding_only() {
     let master = Master::new(GUID);
     unsafe { fmi2SetupExperiment(master.c, 1, 1e-6, 0.0, 1, 1.0) };
     start(&master);
-    assert_eq!(master.step(0.0, 1.0 + 1e-12), Status::Ok);
-    assert_eq!(master.step(1.0, 0.3), Status::Ok);
-    assert_eq!(master.step(1.3, 0.3), Status::Error);
+    assert_eq!(master.step(0.0, 0.9), Status::Ok);
+    assert_eq!(master.step(0.9, 0.3), Status::Error);
+    master.heard_one(&["from 0.9 s to 1.2 s", "stopTime = 1 s"]);
+    assert_eq!(master.step(0.9, 0.1 + 1e-8), Status::Error);
+    master.heard_one(&["stopTime = 1 s"]);
+    assert_eq!(master.step(0.9, 0.1 + 1e-12), Status::Ok);
+    assert_eq!(master.step(1.0, 0.3), Status::Error);
     master.heard_one(&["stopTime = 1 s"]);
 }
 

@@ -3,6 +3,7 @@
 mod archive;
 mod binary;
 mod components;
+mod date;
 mod documentation;
 mod error;
 mod fmu;
@@ -31,6 +32,8 @@ use crate::{files::temporary, scene::Scene};
 pub struct Libraries {
     /// Folder with those for this platform, under the names that cargo gives them.
     pub folder: PathBuf,
+    /// Whether those for this platform are packed at all.
+    pub own: bool,
     /// Those for other platforms.
     pub others: Vec<Binary>,
 }
@@ -39,6 +42,7 @@ impl From<&Path> for Libraries {
     fn from(folder: &Path) -> Self {
         Self {
             folder: folder.into(),
+            own: true,
             others: Vec::new(),
         }
     }

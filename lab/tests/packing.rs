@@ -146,7 +146,41 @@ fn with_other(folder: &Path, argument: &str) -> Libraries {
     let other: Binary = format!("{argument}={path}").parse().unwrap();
     Libraries {
         folder: folder.into(),
+        own: true,
         others: vec![other],
+    }
+}
+
+#[test]
+fn only_the_libraries_given_are_packed_where_this_platform_is_left_out() {
+    let folder = tempfile::tempdir().unwrap();
+    build(folder.path(), "fmi2Instantiate", GUID);
+    let running = Platform::running().folder;
+    let mut libraries = with_other(folder.path(), running);
+    libraries.own = false;
+    libraries.folder = folder.path().join("missing");
+    let out = folder.path().join("out");
+    let written = pack(&[component()], &libraries, &out).unwrap();
+    let zip = zip::ZipArchive::new(fs::File::open(&written[0]).unwrap()).unwrap();
+    let names = zip.file_names().map(|name| name.unwrap().into_owned());
+    let served = names.filter(|name| name.starts_with("binaries/"));
+    assert_eq!(
+        served.collect::<Vec<_>>(),
+        [format!("binaries/{running}/Tiny{DLL_SUFFIX}")]
+    );
+}
+
+#[test]
+fn a_component_that_no_platform_has_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let libraries = Libraries {
+        folder: folder.path().into(),
+        own: false,
+        others: Vec::new(),
+    };
+    let message = complaint_of(folder.path(), &libraries);
+    for part in ["no library of Tiny", "--binary PLATFORM=FILE"] {
+        assert!(message.contains(part), "{message}");
     }
 }
 

@@ -67,6 +67,19 @@ impl LoViNes {
                 unknown.variable().name
             )));
         }
+        let known = match known {
+            // A start value has its say until Initialization Mode is left.
+            Real::q1_start | Real::der_q1_start | Real::q2_start | Real::der_q2_start
+                if self.progress == Progress::UnderWay =>
+            {
+                return Ok(0.0);
+            }
+            Real::q1_start => Real::q1,
+            Real::der_q1_start => Real::der_q1,
+            Real::q2_start => Real::q2,
+            Real::der_q2_start => Real::der_q2,
+            other => other,
+        };
         let (now, integrated) = match &self.rig {
             Rig::Steps(plant) => (self.instant(plant), false),
             Rig::Equations(hybrid) => (hybrid.instant(), self.progress == Progress::UnderWay),

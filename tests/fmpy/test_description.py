@@ -5,7 +5,8 @@ from fmpy import simulate_fmu, supported_platforms
 from fmpy.validation import validate_fmu
 
 PLANT = {
-    "parameter": {"M": "kg", "k": "N/m", "c": "N.s/m", "m": "kg", "b": "m", "r": "1"},
+    "parameter": {"M": "kg", "k": "N/m", "c": "N.s/m", "m": "kg", "b": "m", "r": "1"}
+    | {"q1_start": "m", "der_q1_start": "m/s", "q2_start": "m", "der_q2_start": "m/s"},
     "input": {"e": "m", "E": "m", "omega": "rad/s"},
     "output": {
         "q1": "m",

@@ -7,6 +7,7 @@ import pytest
 from fmpy import simulate_fmu
 
 from bench import SAMPLE_TIME, Scene
+from component import FMICallException
 
 STATES = ("q1", "der(q1)", "q2", "der(q2)")
 DRIVE = {"E": Scene().amplitude, "omega": 0.990417}
@@ -47,9 +48,13 @@ def test_a_clock_that_deviates_by_1e_12_is_tolerated(instance, figure):
 
 
 @pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
-def test_a_step_may_lead_past_the_stop_time(instance, name):
-    component = instance(name).start(stop=0.1)
-    component.step(0.03, 4)
+def test_a_step_past_the_stop_time_is_refused_but_for_rounding(instance, name):
+    component = instance(name, logging=True).start(stop=0.1)
+    component.step(0.03, 3)
+    with pytest.raises(FMICallException):
+        component.step(0.03)
+    assert any("stopTime = 0.1 s" in message.text for message in component.messages)
+    component.step(0.1 - 0.09 + 1e-12)
 
 
 @pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])

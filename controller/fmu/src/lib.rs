@@ -1,9 +1,13 @@
 //! The phase-lock controller as an FMI 2.0 component: which variable is which number of the core.
 #![forbid(unsafe_code)]
 
-use fmi2_component::{Archive, Component, Log, Refusal};
+use fmi2_component::{Archive, Component, Key, Log, Refusal};
 use phase_lock::{Config, Detector, Fault, Input, Output, Phase, PhaseLock, SampleClock, State};
 use variables::{Boolean, Integer, Model, Real, category};
+
+mod signal;
+
+use signal::{DERIVATIVES, Signal};
 
 mod variables {
     include!(concat!(env!("OUT_DIR"), "/variables.rs"));
@@ -18,7 +22,9 @@ struct Controller {
     /// The FMU's three detector parameters: 1 adaptive or 2 demodulator, harmonics, odd ones only.
     detector: (i32, i32, bool),
     dwell: i32,
-    input: Input,
+    response: Signal,
+    reference: Signal,
+    active: bool,
     running: Option<Running>,
 }
 
@@ -34,6 +40,12 @@ struct Running {
 
 const ADAPTIVE: i32 = 1;
 const DEMODULATOR: i32 = 2;
+
+/// So many sample times ahead of a communication point a sample counts as being there: clocks round.
+const EARLY: f64 = 1e-3;
+
+/// The longest steps, in sample times, in which a channel is extrapolated.
+const LONGEST_STEP: f64 = 2.0;
 
 /// The most samples that one step may hold: some seconds of work.
 const MOST_SAMPLES: f64 = 1e7;
@@ -84,16 +96,15 @@ impl Component for Controller {
             config: Config::for_resonance(1.0, 1.0),
             detector: (ADAPTIVE, 1, true),
             dwell: 1,
-            input: Input {
-                reference: Some(0.0),
-                ..Input::default()
-            },
+            response: Signal::default(),
+            reference: Signal::default(),
+            active: false,
             running: None,
         }
     }
 
     fn get_real(&self, variable: Real) -> f64 {
-        let Self { config, input, .. } = self;
+        let config = &self.config;
         let put_out = |value: fn(&Output) -> f64| self.output().map_or(0.0, value);
         match variable {
             Real::sample_time => config.sample_time,
@@ -118,8 +129,8 @@ impl Component for Controller {
             Real::lock_response_min => config.lock.response_min,
             Real::response_max => config.response_max,
             Real::acquire_timeout => config.acquire_timeout,
-            Real::response => input.response,
-            Real::reference => input.reference.unwrap_or(0.0),
+            Real::response => self.response.value,
+            Real::reference => self.reference.value,
             Real::omega => self.output().map_or(config.omega_start, |o| o.omega),
             Real::frequency => self.output().map_or(config.omega_start, |o| o.frequency),
             Real::E => put_out(|o| o.amplitude),
@@ -143,7 +154,7 @@ impl Component for Controller {
             }
             tuned.build()?;
         }
-        let Self { config, input, .. } = self;
+        let config = &mut self.config;
         let slot = match variable {
             Real::sample_time => &mut config.sample_time,
             Real::omega_start => &mut config.omega_start,
@@ -167,8 +178,8 @@ impl Component for Controller {
             Real::lock_response_min => &mut config.lock.response_min,
             Real::response_max => &mut config.response_max,
             Real::acquire_timeout => &mut config.acquire_timeout,
-            Real::response => &mut input.response,
-            Real::reference => input.reference.get_or_insert(0.0),
+            Real::response => &mut self.response.value,
+            Real::reference => &mut self.reference.value,
             _ => return Err(Refusal::error("this variable is computed, not set")),
         };
         *slot = value;
@@ -202,7 +213,7 @@ impl Component for Controller {
     fn get_boolean(&self, variable: Boolean) -> bool {
         match variable {
             Boolean::odd_only => self.detector.2,
-            Boolean::active => self.input.active,
+            Boolean::active => self.active,
             Boolean::locked => self.output().is_some_and(|o| o.locked),
             Boolean::settled => self.output().is_some_and(|o| o.settled),
         }
@@ -211,7 +222,7 @@ impl Component for Controller {
     fn set_boolean(&mut self, variable: Boolean, value: bool) -> Result<(), Refusal> {
         let slot = match variable {
             Boolean::odd_only => &mut self.detector.2,
-            Boolean::active => &mut self.input.active,
+            Boolean::active => &mut self.active,
             _ => return Err(Refusal::error("this variable is computed, not set")),
         };
         *slot = value;
@@ -255,12 +266,40 @@ impl Component for Controller {
         if (tuned.amplitude, tuned.phase_target) != (amplitude, phase_target) {
             running.lock.retune(amplitude, phase_target)?;
         }
-        let until = (time - running.start_time) + step;
-        for sample in running.clock.take(until) {
+        let sample_time = self.config.sample_time;
+        let begin = time - running.start_time;
+        for (name, signal) in [
+            ("response", &mut self.response),
+            ("reference", &mut self.reference),
+        ] {
+            signal.begin(begin, step, LONGEST_STEP * sample_time);
+            if step > sample_time * (1.0 + EARLY) && !signal.is_given() {
+                log.warn_once(
+                    "step",
+                    format_args!(
+                        "a step of {step} s holds more samples than {name} has values: sample_time = {sample_time} s; \
+                         expected are steps of at most sample_time, or input derivatives"
+                    ),
+                );
+            }
+        }
+        for sample in running.clock.take(begin + step) {
+            let elapsed = sample as f64 * sample_time - begin;
+            // A communication point that is meant to be on the grid is: its value is taken as it is.
+            let elapsed = if elapsed <= EARLY * sample_time {
+                0.0
+            } else {
+                elapsed
+            };
+            let input = Input {
+                response: self.response.at(elapsed),
+                reference: Some(self.reference.at(elapsed)),
+                active: self.active,
+            };
             let before = running.output.state;
-            running.output = running.lock.process(&mut running.state, self.input);
+            running.output = running.lock.process(&mut running.state, input);
             if running.output.state != before {
-                let t = running.start_time + sample as f64 * self.config.sample_time;
+                let t = running.start_time + sample as f64 * sample_time;
                 let Output { state, fault, .. } = running.output;
                 log.tell(
                     category::logEvents,
@@ -268,6 +307,31 @@ impl Component for Controller {
                 );
             }
         }
+        self.response.end(begin);
+        self.reference.end(begin);
+        Ok(())
+    }
+
+    fn set_real_input_derivative(
+        &mut self,
+        variable: Real,
+        order: u32,
+        value: f64,
+        _log: &Log,
+    ) -> Result<(), Refusal> {
+        let signal = match variable {
+            Real::response => &mut self.response,
+            Real::reference => &mut self.reference,
+            _ => return Err(Refusal::error("only inputs have derivatives")),
+        };
+        let order = order as usize;
+        if order > DERIVATIVES {
+            let name = variable.variable().name;
+            return Err(Refusal::error(format!(
+                "derivative {order} of {name} is refused; allowed are orders 1 to {DERIVATIVES}"
+            )));
+        }
+        signal.set_derivative(order, value);
         Ok(())
     }
 

@@ -7,6 +7,7 @@ mod functions;
 pub mod fuzz;
 mod library;
 mod master;
+pub mod pair;
 
 pub use functions::{Functions, Raw};
 pub use library::{CONTROLLER, Fmu, PLANT};

@@ -32,7 +32,7 @@ impl Fmu {
     /// If it cannot be built or loaded.
     #[must_use]
     pub fn plant() -> Self {
-        Self::load("LoViNes", PLANT)
+        Self::load("LoViNes", PLANT, &Self::path("LoViNes"))
     }
 
     /// `PhaseLock`, built as this program is.
@@ -41,7 +41,7 @@ impl Fmu {
     /// If it cannot be built or loaded.
     #[must_use]
     pub fn controller() -> Self {
-        Self::load("PhaseLock", CONTROLLER)
+        Self::load("PhaseLock", CONTROLLER, &Self::path("PhaseLock"))
     }
 
     /// Where cargo puts the library of that name.
@@ -58,10 +58,23 @@ impl Fmu {
         folder().join(format!("{DLL_PREFIX}{library}{DLL_SUFFIX}"))
     }
 
-    fn load(name: &'static str, description: &'static str) -> Self {
-        let path = Self::path(name);
+    /// Both libraries as an FMU holds them, `LoViNes` and `PhaseLock` with the platform's suffix, from one folder.
+    ///
+    /// # Panics
+    /// If they cannot be loaded.
+    #[must_use]
+    pub fn packed(folder: &Path) -> [Self; 2] {
+        let load = |name, description| {
+            // An absolute path: a loader looks for a bare name elsewhere.
+            let path = std::path::absolute(folder.join(format!("{name}{DLL_SUFFIX}")));
+            Self::load(name, description, &path.expect("a folder has a path"))
+        };
+        [load("LoViNes", PLANT), load("PhaseLock", CONTROLLER)]
+    }
+
+    fn load(name: &'static str, description: &'static str, path: &Path) -> Self {
         // SAFETY: it is ours, and loading it runs no code of its own.
-        let library = unsafe { Library::new(&path) };
+        let library = unsafe { Library::new(path) };
         let library = library.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         // SAFETY: an FMI 2.0 library, which stays loaded since nobody drops it.
         let functions = unsafe { Functions::load(&library) };

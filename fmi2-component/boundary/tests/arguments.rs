@@ -102,7 +102,7 @@ fn where_one_of_several_values_is_refused_none_is_set() {
 #[test]
 fn a_controller_tuned_to_nonsense_takes_no_part_of_it() {
     let m = Master::ready(&Fmu::controller());
-    m.well(m.step(0.0, 0.1));
+    m.well(m.step(0.0, 1e-3));
     let before = m.bytes();
     // amplitude is fine, phase_target is not.
     let (vr, values) = ([5, 10], [1e-5, 7.0]);

@@ -98,6 +98,38 @@ fn outputs_between_steps_by_inputs() {
 }
 
 #[test]
+fn derivatives_in_the_first_event_mode_are_those_of_continuous_time() {
+    let m = in_initialization_mode(Interface::ModelExchange);
+    leave_initialization_mode(&m);
+    for unknown in [&OUTPUTS[..], &DERIVATIVES, &[24, 26]].concat() {
+        for known in INPUTS {
+            compare(&m, unknown, known, |value| m.well(m.set_real(known, value)));
+        }
+    }
+    // der(q1) = u1 + (c/M) base: the velocity follows the base while the state is held.
+    assert_eq!(partial(&m, 10, 6), 7.5 / 2.0);
+}
+
+#[test]
+fn discrete_outputs_have_no_slope() {
+    let m = in_initialization_mode(Interface::ModelExchange);
+    leave_initialization_mode(&m);
+    // Some masters ask for the slopes of all outputs, the Integers `impacts` and `contact` among them.
+    let unknowns = [9, 18, 16, 21];
+    let mut answers = [f64::NAN; 4];
+    let f = m.f.fmi2GetDirectionalDerivative;
+    // SAFETY: arrays of four and one element each.
+    m.well(unsafe { f(m.c, unknowns.as_ptr(), 4, &6, 1, &1.0, answers.as_mut_ptr()) });
+    assert_eq!(answers, [0.0, 0.0, 1.0, 0.0]);
+    // An Integer is not a known, and an unknown reference stays an error.
+    for (unknown, known) in [(16, 18), (99, 6)] {
+        // SAFETY: one element each.
+        let status = unsafe { f(m.c, &unknown, 1, &known, 1, &1.0, &mut 0.0) };
+        assert_eq!(status, Status::Error);
+    }
+}
+
+#[test]
 fn derivatives_and_outputs_by_states_and_inputs() {
     let m = in_initialization_mode(Interface::ModelExchange);
     leave_initialization_mode(&m);

@@ -6,7 +6,7 @@ use super::entry::enter;
 use super::pointers::{input, output};
 use super::types::{CComponent, CValueReference};
 use super::values::{find, refresh_for};
-use crate::component::{Component, RealOf};
+use crate::component::{BooleanOf, Component, IntegerOf, RealOf};
 use crate::instance::Instance;
 use crate::life_cycle::Function;
 use crate::model::Key;
@@ -36,13 +36,13 @@ pub unsafe fn set_real_input_derivatives<C: Component>(
             check(key, order, Causality::Input, "an input")?;
             Instance::<C>::check_finite(key, value)?;
         }
-        instance.change(|component| {
-            for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
-                let (key, order) = (find(reference)?, order.unsigned_abs());
-                component.set_real_input_derivative(key, order, value)?;
-            }
-            Ok(())
-        })?;
+        // All are set or none.
+        let mut changed = instance.session.component.clone();
+        for ((&reference, &order), &value) in references.iter().zip(orders).zip(values) {
+            let (key, order) = (find(reference)?, order.unsigned_abs());
+            changed.set_real_input_derivative(key, order, value, &instance.log)?;
+        }
+        instance.session.component = changed;
         instance.values_change();
         Ok(())
     };
@@ -105,6 +105,13 @@ pub unsafe fn get_directional_derivative<C: Component>(
             refresh_for::<C, RealOf<C>>(instance, unknowns)?;
         }
         for (&unknown, answer) in unknowns.iter().zip(answer) {
+            if is_discrete::<C>(unknown) {
+                for &known in knowns {
+                    find::<RealOf<C>>(known)?;
+                }
+                answer.write(0.0);
+                continue;
+            }
             let unknown = find::<RealOf<C>>(unknown)?;
             let mut sum = 0.0;
             for (&known, &along) in knowns.iter().zip(direction) {
@@ -119,6 +126,16 @@ pub unsafe fn get_directional_derivative<C: Component>(
     let function = Function::GetDirectionalDerivative;
     // SAFETY: the contract is passed on.
     unsafe { enter(component, function, "fmi2GetDirectionalDerivative", body) }
+}
+
+/// Whether a reference is that of an Integer or Boolean output and of no Real. Some masters ask for the derivatives of all
+/// outputs, whatever their type; such a value does not change between events, so that its derivative is 0.
+fn is_discrete<C: Component>(reference: CValueReference) -> bool {
+    fn is_output<K: Key>(reference: CValueReference) -> bool {
+        K::find(reference).is_some_and(|key| key.variable().causality == Causality::Output)
+    }
+    RealOf::<C>::find(reference).is_none()
+        && (is_output::<IntegerOf<C>>(reference) || is_output::<BooleanOf<C>>(reference))
 }
 
 fn check<K: Key>(

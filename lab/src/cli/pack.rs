@@ -34,10 +34,14 @@ pub(super) struct Arguments {
     #[arg(long, conflicts_with = "libraries")]
     portable: bool,
 
-    /// Add a library for another platform, such as win64 or darwin64; may be given many times. The guid inside tells
+    /// Add a library for another platform, such as win64 or aarch64-linux; may be given many times. The guid inside tells
     /// which FMU it belongs to
     #[arg(long = "binary", value_name = "PLATFORM=FILE")]
     binaries: Vec<Binary>,
+
+    /// Pack the libraries given by --binary, and none of this platform
+    #[arg(long, requires = "binaries", conflicts_with_all = ["libraries", "portable"])]
+    only_binaries: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
@@ -49,6 +53,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     };
     let libraries = Libraries {
         folder,
+        own: !arguments.only_binaries,
         others: arguments.binaries.clone(),
     };
     let written = pack_bench(&scene, &libraries, &arguments.out)?;

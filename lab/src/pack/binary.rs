@@ -99,6 +99,11 @@ fn fit(binary: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
 }
 
 impl Binary {
+    /// Whether it is meant for the folder of that platform.
+    pub(super) fn is_for(&self, platform: &Platform) -> bool {
+        self.platform.folder == platform.folder
+    }
+
     fn refused(&self, problem: impl Into<String>) -> PackError {
         PackError::Binary {
             path: self.path.clone(),

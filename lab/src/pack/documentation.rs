@@ -152,10 +152,7 @@ fn row(variable: Node) -> String {
     let start = content
         .and_then(|c| c.attribute("start"))
         .unwrap_or_default();
-    let unit = match value("unit").as_str() {
-        "1" => String::new(),
-        unit => unit.to_owned(),
-    };
+    let unit = value("unit");
     format!(
         "<tr><td><code>{}</code></td><td>{}</td><td>{unit}</td><td>{}</td><td>{}</td></tr>\n",
         said("name"),
@@ -194,6 +191,22 @@ mod tests {
                 assert!(page.contains(&description), "{name}");
             }
             assert!(page.contains("<svg") && files[1].1.starts_with(b"\x89PNG"));
+        }
+    }
+
+    #[test]
+    fn every_real_variable_shows_its_unit() {
+        for component in components() {
+            let files = documentation(component.identifier, &component.description).unwrap();
+            let page = std::str::from_utf8(&files[0].1).unwrap();
+            for row in page.lines().filter(|line| line.starts_with("<tr><td>")) {
+                let cells: Vec<_> = row.split("</td><td>").collect();
+                let whole =
+                    ["impacts", "contact"].map(|name| format!("<tr><td><code>{name}</code>"));
+                let is_real =
+                    component.identifier == "LoViNes" && !whole.contains(&cells[0].into());
+                assert!(!is_real || !cells[2].is_empty(), "{row}");
+            }
         }
     }
 

@@ -73,6 +73,21 @@ pub enum PackError {
         /// What is wrong with it.
         problem: String,
     },
+    /// No platform is served.
+    #[error(
+        "there is no library of {identifier} for any platform: give one by --binary PLATFORM=FILE, or leave out \
+         --only-binaries"
+    )]
+    Unserved {
+        /// The component.
+        identifier: &'static str,
+    },
+    /// The date of the files is no date.
+    #[error(
+        "SOURCE_DATE_EPOCH = {0:?} is refused; allowed are seconds since 1970, for instance {example}",
+        example = 1_700_000_000
+    )]
+    Date(String),
     /// There are no portable libraries.
     #[error("--portable cannot be done: {0}")]
     Portable(String),

@@ -4,7 +4,7 @@ use std::env::consts::{ARCH, OS};
 
 use object::{Architecture, BinaryFormat, FileKind, Object};
 
-use super::symbols::image;
+use super::symbols::images;
 
 /// A platform that a library may be made for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -22,9 +22,9 @@ pub struct Platform {
 use Architecture::{Aarch64, I386, X86_64};
 use BinaryFormat::{Elf, MachO, Pe};
 
-/// FMI 2.0 names no folder for 64-bit ARM: Linux and Windows use the names of FMI 3.0, and masters on Apple silicon look
-/// into `darwin64`.
-const KNOWN: [Platform; 8] = [
+/// FMI 2.0 names no folder for 64-bit ARM: its libraries go where FMI 3.0 has them. On Apple silicon some masters look there,
+/// others into `darwin64`.
+const KNOWN: [Platform; 9] = [
     linux("linux64", "a 64-bit Linux library (ELF, x86-64)", X86_64),
     linux("linux32", "a 32-bit Linux library (ELF, x86)", I386),
     linux(
@@ -39,9 +39,13 @@ const KNOWN: [Platform; 8] = [
         "a 64-bit Windows library (PE, ARM)",
         Aarch64,
     ),
-    macos("a macOS library (Mach-O, x86-64)", X86_64),
-    macos("a macOS library (Mach-O, ARM)", Aarch64),
+    macos(DARWIN, "a macOS library (Mach-O, x86-64)", X86_64),
+    macos("aarch64-darwin", "a macOS library (Mach-O, ARM)", Aarch64),
+    macos(DARWIN, "a macOS library (Mach-O, ARM)", Aarch64),
 ];
+
+/// The folder of FMI 2.0 for macOS, whatever the processor.
+const DARWIN: &str = "darwin64";
 
 const fn linux(folder: &'static str, name: &'static str, architecture: Architecture) -> Platform {
     Platform {
@@ -63,9 +67,9 @@ const fn windows(folder: &'static str, name: &'static str, architecture: Archite
     }
 }
 
-const fn macos(name: &'static str, architecture: Architecture) -> Platform {
+const fn macos(folder: &'static str, name: &'static str, architecture: Architecture) -> Platform {
     Platform {
-        folder: "darwin64",
+        folder,
         name,
         suffix: ".dylib",
         format: MachO,
@@ -90,10 +94,22 @@ impl Platform {
         find(format, architecture).unwrap_or(KNOWN[0])
     }
 
+    /// Another folder in which masters look for the library of this platform, if there is one.
+    pub(super) fn also(self) -> Option<Self> {
+        KNOWN.into_iter().find(|other| {
+            other.folder != self.folder
+                && (other.format, other.architecture) == (self.format, self.architecture)
+        })
+    }
+
     /// The names of the folders, for messages.
     pub(super) fn folders() -> String {
-        let mut names = KNOWN.map(|platform| platform.folder).to_vec();
-        names.dedup();
+        let mut names = Vec::new();
+        for platform in KNOWN {
+            if !names.contains(&platform.folder) {
+                names.push(platform.folder);
+            }
+        }
         names.join(", ")
     }
 
@@ -102,26 +118,32 @@ impl Platform {
         KNOWN.into_iter().find(|platform| platform.folder == folder)
     }
 
-    /// The platform that a library is made for; the error says what the file is instead.
-    pub(super) fn recognise(file: &[u8]) -> Result<Self, String> {
+    /// Checks the header of a library against this platform; the error says what the file is instead.
+    pub(super) fn check(&self, file: &[u8]) -> Result<(), String> {
         if FileKind::parse(file).is_err() {
             return Err("no shared library (unknown header)".into());
         }
-        let parsed = match object::File::parse(image(file)) {
-            Ok(parsed) => parsed,
-            Err(error) => return Err(format!("a damaged library ({error})")),
+        // A universal library for macOS holds several.
+        let mut found = Vec::new();
+        for image in images(file) {
+            match object::File::parse(image) {
+                Ok(parsed) => found.push((parsed.format(), parsed.architecture())),
+                Err(error) => return Err(format!("a damaged library ({error})")),
+            }
+        }
+        let serves = |&(format, architecture): &(BinaryFormat, Architecture)| {
+            let same = |one: &Self| one.format == format && one.architecture == architecture;
+            KNOWN
+                .iter()
+                .any(|one| one.folder == self.folder && same(one))
         };
-        let (format, architecture) = (parsed.format(), parsed.architecture());
-        find(format, architecture)
-            .ok_or_else(|| format!("a library for another platform ({format:?}, {architecture:?})"))
-    }
-
-    /// Checks the header of a library against this platform; the error says what the file is instead.
-    pub(super) fn check(&self, file: &[u8]) -> Result<(), String> {
-        match Self::recognise(file)? {
-            // A universal library for macOS serves both architectures from one folder.
-            found if found.folder == self.folder => Ok(()),
-            found => Err(found.name.into()),
+        match found.first() {
+            _ if found.iter().any(serves) => Ok(()),
+            Some(&(format, architecture)) => Err(match find(format, architecture) {
+                Some(known) => known.name.into(),
+                None => format!("a library for another platform ({format:?}, {architecture:?})"),
+            }),
+            None => Err("an empty universal library".into()),
         }
     }
 }
@@ -130,4 +152,65 @@ fn find(format: BinaryFormat, architecture: Architecture) -> Option<Platform> {
     KNOWN
         .into_iter()
         .find(|one| (one.format, one.architecture) == (format, architecture))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const X86: u32 = 0x0100_0007;
+    const ARM: u32 = 0x0100_000c;
+
+    /// The header of a library for macOS, with no load commands.
+    fn library(processor: u32) -> Vec<u8> {
+        let words = [0xfeed_facf, processor, 0, 6, 0, 0, 0, 0];
+        words.into_iter().flat_map(u32::to_le_bytes).collect()
+    }
+
+    /// Several of them in one file.
+    fn universal(processors: &[u32]) -> Vec<u8> {
+        let libraries: Vec<_> = processors.iter().map(|&one| (one, library(one))).collect();
+        let mut words = vec![0xcafe_babe, processors.len() as u32];
+        let mut offset = 8 + 20 * processors.len() as u32;
+        for (processor, library) in &libraries {
+            let size = library.len() as u32;
+            words.extend([*processor, 0, offset, size, 0]);
+            offset += size;
+        }
+        let header = words.into_iter().flat_map(u32::to_be_bytes);
+        let bodies = libraries.into_iter().flat_map(|(_, library)| library);
+        header.chain(bodies).collect()
+    }
+
+    fn fits(folder: &str, file: &[u8]) -> bool {
+        Platform::of_folder(folder).unwrap().check(file).is_ok()
+    }
+
+    #[test]
+    fn a_folder_for_macos_takes_what_masters_look_for_there() {
+        for (file, darwin64, aarch64) in [
+            (library(X86), true, false),
+            (library(ARM), true, true),
+            (universal(&[X86, ARM]), true, true),
+            (universal(&[X86]), true, false),
+        ] {
+            assert_eq!(fits("darwin64", &file), darwin64);
+            assert_eq!(fits("aarch64-darwin", &file), aarch64);
+            assert!(!fits("linux64", &file) && !fits("win64", &file));
+        }
+        assert!(!fits("darwin64", &universal(&[])));
+    }
+
+    #[test]
+    fn a_library_for_apple_silicon_has_a_second_folder_and_no_other_has() {
+        for platform in KNOWN {
+            let also = platform.also().map(|other| other.folder);
+            let expected = match (platform.folder, platform.architecture) {
+                ("aarch64-darwin", _) => Some("darwin64"),
+                ("darwin64", Aarch64) => Some("aarch64-darwin"),
+                _ => None,
+            };
+            assert_eq!(also, expected, "{}", platform.folder);
+        }
+    }
 }

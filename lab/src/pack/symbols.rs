@@ -8,23 +8,31 @@ use object::{
     },
 };
 
-/// The library itself, or the first of those in a universal library for macOS.
-pub(super) fn image(file: &[u8]) -> &[u8] {
-    let first = match FileKind::parse(file) {
-        Ok(FileKind::MachOFat32) => MachOFatFile32::parse(file)
-            .ok()
-            .and_then(|fat| fat.arches().first()?.data(file).ok()),
-        Ok(FileKind::MachOFat64) => MachOFatFile64::parse(file)
-            .ok()
-            .and_then(|fat| fat.arches().first()?.data(file).ok()),
-        _ => None,
-    };
-    first.unwrap_or(file)
+/// The library itself, or those in a universal library for macOS.
+pub(super) fn images(file: &[u8]) -> Vec<&[u8]> {
+    fn of<'a>(arches: &[impl FatArch], file: &'a [u8]) -> Vec<&'a [u8]> {
+        let data = arches.iter().map(|arch| arch.data(file));
+        data.filter_map(Result::ok).collect()
+    }
+    match FileKind::parse(file) {
+        Ok(FileKind::MachOFat32) => {
+            MachOFatFile32::parse(file).map_or_else(|_| Vec::new(), |fat| of(fat.arches(), file))
+        }
+        Ok(FileKind::MachOFat64) => {
+            MachOFatFile64::parse(file).map_or_else(|_| Vec::new(), |fat| of(fat.arches(), file))
+        }
+        _ => vec![file],
+    }
 }
 
-/// Whether the library exports `function`; Mach-O puts an underscore before it.
+/// Whether the library exports `function`, for every processor that it serves; Mach-O puts an underscore before it.
 pub(super) fn exports(file: &[u8], function: &str) -> bool {
-    let Ok(parsed) = object::File::parse(image(file)) else {
+    let images = images(file);
+    !images.is_empty() && images.iter().all(|image| one_exports(image, function))
+}
+
+fn one_exports(image: &[u8], function: &str) -> bool {
+    let Ok(parsed) = object::File::parse(image) else {
         return false;
     };
     let Ok(mut exports) = parsed.exports() else {

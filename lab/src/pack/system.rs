@@ -2,12 +2,12 @@
 
 mod parameters;
 
-use super::{File, PackError, archive};
+use super::{File, PackError, archive, date};
 use crate::scene::Scene;
 
 use parameters::parameter_set;
 
-/// The structure, but for the end of the default experiment.
+/// The structure, but for what is `derived`: step size and end of the default experiment, and the date.
 const STRUCTURE: &str = include_str!("system/SystemStructure.ssd");
 
 /// The end of the default experiment, natural periods: the default scene has been locked for nearly a hundred by then.
@@ -15,10 +15,23 @@ const PERIODS: f64 = 400.0;
 
 /// The system file of the FMUs, with the parameters of the scene.
 pub(super) fn file(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
-    let plant = parameter_set(&parameters::plant(scene));
-    let controller = parameter_set(&parameters::controller(scene)?);
-    let stop_time = format!("stopTime=\"{}\"", PERIODS * scene.plant.natural_period());
-    let structure = STRUCTURE.replace("stopTime=\"derived\"", &stop_time);
+    let plant = parameter_set("plant", &parameters::plant(scene));
+    let controller = parameter_set("controller", &parameters::controller(scene)?);
+    let step = parameters::step(scene);
+    let date = date::generation()?;
+    let mut structure = STRUCTURE.to_owned();
+    for (attribute, value) in [
+        (
+            "stopTime",
+            Some((PERIODS * scene.plant.natural_period()).to_string()),
+        ),
+        ("stepSize", Some(step.to_string())),
+        ("baseStepSize", Some(step.to_string())),
+        ("generationDateAndTime", date),
+    ] {
+        let filled = value.map_or(String::new(), |value| format!(" {attribute}=\"{value}\""));
+        structure = structure.replace(&format!(" {attribute}=\"derived\""), &filled);
+    }
 
     let inside: Vec<String> = fmus
         .iter()

@@ -1,5 +1,6 @@
-//! Many sequences of calls on both libraries: `stress [sequences] [seed]`.
+//! Many sequences of calls on both libraries: `stress [sequences] [seed] [libraries]`.
 
+use std::path::Path;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, channel};
 use std::thread;
@@ -27,23 +28,29 @@ fn watch(done: &Receiver<()>) {
 }
 
 fn main() {
-    let mut arguments = std::env::args().skip(1).map(|text| text.parse::<u64>());
-    let mut next = |default| match arguments.next() {
+    let mut arguments = std::env::args().skip(1);
+    let mut next = |default| match arguments.next().map(|text| text.parse::<u64>()) {
         None => default,
         Some(Ok(number)) => number,
         Some(Err(_)) => {
-            eprintln!("usage: stress [sequences] [seed], two whole numbers");
+            eprintln!(
+                "usage: stress [sequences] [seed] [folder of LoViNes and PhaseLock as packed], the first two whole numbers"
+            );
             std::process::exit(2);
         }
     };
     let (sequences, seed) = (next(100_000), next(1));
+    let libraries = match arguments.next() {
+        Some(folder) => Fmu::packed(Path::new(&folder)),
+        None => [Fmu::plant(), Fmu::controller()],
+    };
     println!("{sequences} sequences of calls, seed {seed}, on each library");
     println!(
         "library    sequences     calls        ok  warning  discard     error  fatal  harmless  longest call  time"
     );
     let (running, done) = channel();
     let watchdog = thread::spawn(move || watch(&done));
-    for fmu in [Fmu::plant(), Fmu::controller()] {
+    for fmu in libraries {
         let began = Instant::now();
         let tally = (0..sequences)
             .map(|n| {

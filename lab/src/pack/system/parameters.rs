@@ -22,11 +22,25 @@ use Value::{Boolean, Integer, Real};
 
 type Named = (&'static str, Value);
 
-/// Parameters and start of the plant.
+/// Parameters and start of the plant. The start goes by its parameters: some masters set no start value of an output.
 pub(super) fn plant(scene: &Scene) -> Vec<Named> {
     start_values(scene)
-        .map(|(name, value)| (name, Real(value)))
+        .map(|(name, value)| {
+            let parameter = match name {
+                "q1" => "q1_start",
+                "der(q1)" => "der_q1_start",
+                "q2" => "q2_start",
+                "der(q2)" => "der_q2_start",
+                other => other,
+            };
+            (parameter, Real(value))
+        })
         .to_vec()
+}
+
+/// The communication step: the controller's sample time, s.
+pub(super) fn step(scene: &Scene) -> f64 {
+    configuration(scene).sample_time
 }
 
 /// Parameters of the controller, which is armed from the start.
@@ -72,10 +86,10 @@ pub(super) fn controller(scene: &Scene) -> Result<Vec<Named>, PackError> {
     ])
 }
 
-/// A file of parameter values. Both sets have one name, by which some masters choose among alternatives.
-pub(super) fn parameter_set(values: &[Named]) -> String {
-    let mut text = String::from(
-        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<ssv:ParameterSet version=\"1.0\" name=\"scene\" \
+/// A file of parameter values. Each has a name of its own, since some masters merge sets of one name.
+pub(super) fn parameter_set(name: &str, values: &[Named]) -> String {
+    let mut text = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<ssv:ParameterSet version=\"1.0\" name=\"{name}\" \
          generationTool=\"vines\"\n  xmlns:ssv=\"http://ssp-standard.org/SSP1/SystemStructureParameterValues\">\n  \
          <ssv:Parameters>\n",
     );

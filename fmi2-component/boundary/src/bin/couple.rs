@@ -1,0 +1,33 @@
+//! Couples plant and controller and tells a digest of every output bit: `couple [samples] [libraries]`.
+//!
+//! The same digest on another platform says that both libraries compute the same there, bit by bit.
+
+use std::path::Path;
+
+use fmi2_boundary::{Fmu, pair};
+
+fn main() {
+    let mut arguments = std::env::args().skip(1);
+    let samples = arguments
+        .next()
+        .map_or(Ok(40_000), |text| text.parse::<u32>());
+    let (Ok(samples), folder, None) = (samples, arguments.next(), arguments.next()) else {
+        eprintln!("usage: couple [samples] [folder of LoViNes and PhaseLock as packed]");
+        std::process::exit(2);
+    };
+    let [plant, controller] = match &folder {
+        Some(folder) => Fmu::packed(Path::new(folder)),
+        None => [Fmu::plant(), Fmu::controller()],
+    };
+    let mut pair = pair::Pair::new(&plant, &controller);
+    for _ in 0..samples {
+        pair.step(pair::SAMPLE_TIME);
+        pair.digest();
+    }
+    println!(
+        "{samples} samples, {} impacts, locked: {}",
+        pair.plant.impacts(),
+        pair.is_locked()
+    );
+    println!("sha256 {}", pair.hash());
+}

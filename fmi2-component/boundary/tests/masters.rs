@@ -1,0 +1,173 @@
+//! What masters do that this project had not met: findings of seven of them, a test for each.
+
+use fmi2_boundary::{Fmu, Interface, Line, Master};
+use fmi2_component::Status;
+
+/// Value references of the plant.
+const E: u32 = 7;
+const OMEGA: u32 = 8;
+const STATE_OUTPUTS: [u32; 4] = [9, 10, 11, 12];
+const START_PARAMETERS: [u32; 4] = [29, 30, 31, 32];
+
+/// Value references of the controller.
+const SAMPLE_TIME: u32 = 0;
+
+fn set_input_derivative(m: &Master, reference: u32, order: i32, value: f64) -> Status {
+    // SAFETY: one element each.
+    unsafe { (m.f.fmi2SetRealInputDerivatives)(m.c, &reference, 1, &order, &value) }
+}
+
+fn warnings(lines: &[Line]) -> Vec<&str> {
+    let warnings = lines.iter().filter(|line| line.status == Status::Warning);
+    warnings.map(|line| line.text.as_str()).collect()
+}
+
+#[test]
+fn derivatives_of_held_inputs_are_accepted_and_have_no_effect() {
+    let fmu = Fmu::plant();
+    let (held, told) = (Master::ready(&fmu), Master::ready(&fmu));
+    for m in [&held, &told] {
+        m.well(m.set_real(E, 1e-4));
+        m.well(m.set_real(OMEGA, 55.0));
+    }
+    for n in 0..20 {
+        for reference in [E, OMEGA] {
+            for order in 1..=3 {
+                told.well(set_input_derivative(&told, reference, order, f64::from(n)));
+            }
+        }
+        for m in [&held, &told] {
+            m.well(m.step(f64::from(n) * 1e-3, 1e-3));
+        }
+        assert_eq!(held.bytes(), told.bytes());
+    }
+    assert!(held.heard().is_empty());
+}
+
+#[test]
+fn an_ignored_input_derivative_is_warned_of_once() {
+    let m = Master::ready(&Fmu::plant());
+    for n in 0..3 {
+        m.well(set_input_derivative(&m, E, 1, 0.0));
+        m.well(set_input_derivative(&m, OMEGA, 1, 0.0));
+        m.well(m.step(f64::from(n) * 1e-3, 1e-3));
+    }
+    assert!(m.heard().is_empty(), "zero is what a held input has");
+    for n in 3..10 {
+        m.well(set_input_derivative(&m, OMEGA, 1, 2.0));
+        m.well(m.step(f64::from(n) * 1e-3, 1e-3));
+    }
+    let heard = m.heard();
+    let [warning] = warnings(&heard)[..] else {
+        panic!("one warning expected: {heard:?}");
+    };
+    assert!(
+        warning.contains("omega") && warning.contains("held"),
+        "{warning}"
+    );
+}
+
+#[test]
+fn an_order_that_no_input_has_is_still_refused() {
+    let m = Master::ready(&Fmu::plant());
+    for reference in [E, OMEGA] {
+        for order in [0, 4] {
+            assert_eq!(
+                set_input_derivative(&m, reference, order, 0.0),
+                Status::Error
+            );
+        }
+    }
+}
+
+#[test]
+fn a_start_parameter_and_its_output_are_one_value() {
+    for interface in [Interface::CoSimulation, Interface::ModelExchange] {
+        for (output, parameter) in STATE_OUTPUTS.into_iter().zip(START_PARAMETERS) {
+            let m = Master::new(&Fmu::plant(), interface);
+            // SAFETY: the instance is alive; so below.
+            unsafe {
+                m.well((m.f.fmi2SetupExperiment)(m.c, 0, 0.0, 0.0, 0, 0.0));
+                m.well((m.f.fmi2EnterInitializationMode)(m.c));
+            }
+            assert_eq!(m.real(output), m.real(parameter), "both start alike");
+            m.well(m.set_real(parameter, 1.25e-3));
+            assert_eq!((m.real(output), m.real(parameter)), (1.25e-3, 1.25e-3));
+            m.well(m.set_real(output, -2.5e-3));
+            assert_eq!((m.real(output), m.real(parameter)), (-2.5e-3, -2.5e-3));
+            // SAFETY: as above.
+            unsafe { m.well((m.f.fmi2ExitInitializationMode)(m.c)) };
+            assert_eq!(m.set_real(parameter, 0.0), Status::Error, "it is fixed");
+            assert_eq!(m.real(parameter), -2.5e-3);
+        }
+    }
+}
+
+#[test]
+fn a_plant_started_by_parameters_moves_as_one_started_by_outputs() {
+    let fmu = Fmu::plant();
+    let started = |references: [u32; 4]| {
+        let m = Master::new(&fmu, Interface::CoSimulation);
+        for (reference, value) in references.into_iter().zip([1e-3, -0.05, 2e-3, 0.4]) {
+            m.well(m.set_real(reference, value));
+        }
+        m.start();
+        for n in 0..100 {
+            m.well(m.step(f64::from(n) * 1e-3, 1e-3));
+        }
+        assert!(m.impacts() > 0);
+        m.bytes()
+    };
+    assert_eq!(started(STATE_OUTPUTS), started(START_PARAMETERS));
+}
+
+#[test]
+fn a_step_beyond_the_stop_time_is_an_error() {
+    for fmu in [Fmu::plant(), Fmu::controller()] {
+        let m = Master::new(&fmu, Interface::CoSimulation);
+        // SAFETY: the instance is alive; so below.
+        unsafe {
+            m.well((m.f.fmi2SetupExperiment)(m.c, 0, 0.0, 0.0, 1, 1.0));
+            m.well((m.f.fmi2EnterInitializationMode)(m.c));
+            m.well((m.f.fmi2ExitInitializationMode)(m.c));
+        }
+        m.well(m.step(0.0, 0.9));
+        assert_eq!(m.step(0.9, 0.2), Status::Error);
+        let heard = m.heard();
+        let last = heard.last().map(|line| line.text.as_str());
+        assert!(
+            last.is_some_and(|text| text.contains("stopTime = 1 s")),
+            "{heard:?}"
+        );
+        // A step that is not begun has done no harm, and the sum of a master's steps may be off by its rounding.
+        m.well(m.step(0.9, 0.1 + 5e-10));
+    }
+}
+
+#[test]
+fn a_step_longer_than_the_sample_time_is_warned_of_once() {
+    let m = Master::new(&Fmu::controller(), Interface::CoSimulation);
+    m.well(m.set_real(SAMPLE_TIME, 0.001));
+    m.start();
+    for n in 0..10 {
+        m.well(m.step(f64::from(n) * 0.001, 0.001));
+    }
+    for n in 0..10 {
+        m.well(m.step(0.01 + f64::from(n) * 0.0004, 0.0004));
+    }
+    let heard = m.heard();
+    assert!(
+        warnings(&heard).is_empty(),
+        "every sample had its input: {heard:?}"
+    );
+    for n in 0..5 {
+        m.well(m.step(0.014 + f64::from(n) * 5.0, 5.0));
+    }
+    let heard = m.heard();
+    let [warning] = warnings(&heard)[..] else {
+        panic!("one warning expected: {heard:?}");
+    };
+    for part in ["5 s", "sample_time = 0.001 s"] {
+        assert!(warning.contains(part), "{warning}");
+    }
+}

@@ -1,0 +1,50 @@
+//! The date of generated files: the same input gives the same bytes, so that no clock is asked.
+
+use std::env::{self, VarError};
+
+use chrono::{DateTime, SecondsFormat};
+
+use super::PackError;
+
+/// By convention of reproducible builds, the date of the sources in seconds since 1970.
+const VARIABLE: &str = "SOURCE_DATE_EPOCH";
+
+/// The date of the sources in the format of XML, if the environment tells it.
+pub(super) fn generation() -> Result<Option<String>, PackError> {
+    match env::var(VARIABLE) {
+        Ok(text) if text.is_empty() => Ok(None),
+        Ok(text) => format(&text).map(Some),
+        Err(VarError::NotPresent) => Ok(None),
+        Err(VarError::NotUnicode(text)) => {
+            Err(PackError::Date(text.to_string_lossy().into_owned()))
+        }
+    }
+}
+
+fn format(seconds: &str) -> Result<String, PackError> {
+    let parsed = seconds.parse::<i64>().ok();
+    let date = parsed.and_then(|seconds| DateTime::from_timestamp(seconds, 0));
+    let date = date.ok_or_else(|| PackError::Date(seconds.to_owned()))?;
+    Ok(date.to_rfc3339_opts(SecondsFormat::Secs, true))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn seconds_become_a_date_in_universal_time() {
+        assert_eq!(format("1700000000").unwrap(), "2023-11-14T22:13:20Z");
+    }
+
+    #[test]
+    fn what_is_no_number_of_seconds_is_refused() {
+        for text in ["yesterday", "1.5", "99999999999999999"] {
+            let message = format(text).expect_err("no date").to_string();
+            assert!(
+                message.contains(text) && message.contains("1700000000"),
+                "{message}"
+            );
+        }
+    }
+}

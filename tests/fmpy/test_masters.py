@@ -1,0 +1,169 @@
+"""What other masters read: bench.ssp, descriptions, the default tolerance. A test for each of their findings."""
+
+import os
+import re
+import subprocess
+import zipfile
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+from fmpy import read_model_description, simulate_fmu
+from fmpy.ssp.ssd import read_ssd
+
+SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
+SSC = "{http://ssp-standard.org/SSP1/SystemStructureCommon}"
+OMS = "{https://raw.githubusercontent.com/OpenModelica/OMSimulator/master/schema/oms.xsd}"
+OSP = "{http://opensimulationplatform.com/SSP/OSPAnnotations}"
+SAMPLE_TIME = 0.0011343573395537938
+STARTS = {"q1": "q1_start", "der(q1)": "der_q1_start", "q2": "q2_start", "der(q2)": "der_q2_start"}
+
+
+def pack(vines: Path, folder: Path, epoch: str | None, *options: str) -> Path:
+    environment = {name: value for name, value in os.environ.items() if name != "SOURCE_DATE_EPOCH"}
+    environment |= {} if epoch is None else {"SOURCE_DATE_EPOCH": epoch}
+    subprocess.run([vines, "pack", "--out", folder, *options], check=True, env=environment, stdout=subprocess.DEVNULL)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def bench(vines, tmp_path_factory) -> Path:
+    return pack(vines, tmp_path_factory.mktemp("bench"), "1700000000")
+
+
+def inside(archive: Path, name: str) -> ElementTree.Element:
+    with zipfile.ZipFile(archive) as files:
+        return ElementTree.fromstring(files.read(name))
+
+
+@pytest.fixture(scope="module")
+def structure(bench) -> ElementTree.Element:
+    return inside(bench / "bench.ssp", "SystemStructure.ssd")
+
+
+def test_the_system_file_holds_the_step_size_where_omsimulator_and_libcosim_look(structure):
+    system = structure.find(f"{SSD}System")
+    (master,) = system.findall(
+        f"{SSD}Annotations/{SSC}Annotation[@type='org.openmodelica']/{OMS}Annotations/{OMS}SimulationInformation"
+        f"/{OMS}FixedStepMaster"
+    )
+    assert float(master.get("stepSize")) == SAMPLE_TIME
+    experiment = structure.find(f"{SSD}DefaultExperiment")
+    (algorithm,) = experiment.findall(
+        f"{SSD}Annotations/{SSC}Annotation[@type='com.opensimulationplatform']/{OSP}Algorithm/{OSP}FixedStepAlgorithm"
+    )
+    assert float(algorithm.get("baseStepSize")) == SAMPLE_TIME
+    # OMSimulator's command line rejects this element, which says no more than the geometry of the components does.
+    assert structure.find(f".//{SSD}SystemGeometry") is None
+
+
+def test_libcosim_finds_its_prefix_as_it_compares_it_letter_by_letter(bench):
+    with zipfile.ZipFile(bench / "bench.ssp") as files:
+        text = files.read("SystemStructure.ssd").decode()
+    assert "<osp:Algorithm>" in text
+    assert "<osp:FixedStepAlgorithm baseStepSize=" in text
+
+
+def test_the_system_file_is_valid_and_says_when_it_was_made(bench, structure):
+    assert read_ssd(str(bench / "bench.ssp"), validate=True).version == "1.0"
+    assert structure.get("generationDateAndTime") == "2023-11-14T22:13:20Z"
+
+
+def test_every_real_connector_has_the_unit_of_its_variable(bench, structure):
+    defined = {unit.get("name") for unit in structure.iter(f"{SSC}Unit")}
+    seen = 0
+    for component in structure.iter(f"{SSD}Component"):
+        description = read_model_description(str(bench / Path(component.get("source")).name))
+        units = {one.name: one.unit for one in description.modelVariables}
+        for connector in component.iter(f"{SSD}Connector"):
+            kind = connector.find(f"{SSC}Real")
+            if kind is not None:
+                assert kind.get("unit") == units[connector.get("name")]
+                assert kind.get("unit") in defined
+                seen += 1
+    assert seen == 10
+
+
+def test_the_parameter_sets_have_names_of_their_own(bench):
+    names = [inside(bench / "bench.ssp", f"resources/{name}.ssv").get("name") for name in ("plant", "controller")]
+    assert names == ["plant", "controller"]
+
+
+def test_the_system_file_sets_parameters_and_inputs_only(bench):
+    for component, fmu in (("plant", "LoViNes"), ("controller", "PhaseLock")):
+        description = read_model_description(str(bench / f"{fmu}.fmu"))
+        causality = {one.name: one.causality for one in description.modelVariables}
+        for parameter in inside(bench / "bench.ssp", f"resources/{component}.ssv")[0]:
+            assert causality[parameter.get("name")] in ("parameter", "input"), parameter.get("name")
+
+
+def test_a_start_parameter_and_its_output_have_one_default(fmus):
+    for output, parameter in STARTS.items():
+        output, parameter = fmus["LoViNes"].variable(output), fmus["LoViNes"].variable(parameter)
+        assert float(output.start) == float(parameter.start)
+        assert output.unit == parameter.unit
+
+
+def test_a_start_parameter_moves_the_particle(fmus):
+    results = [
+        simulate_fmu(str(fmus["LoViNes"].path), stop_time=1, start_values=start, output=["q1", "w", "impacts"])
+        for start in ({"der(q2)": 0.5}, {"der_q2_start": 0.5}, {})
+    ]
+    by_output, by_parameter, default = [[tuple(row) for row in result] for result in results]
+    assert by_output == by_parameter
+    assert by_output != default
+
+
+def test_model_exchange_finds_every_impact_at_the_default_tolerance(fmus):
+    experiment = {"stop_time": 10, "start_values": {"der(q2)": 0.5, "E": 9.2e-5, "omega": 54.9}, "output": ["impacts"]}
+    path = str(fmus["LoViNes"].path)
+    steps = simulate_fmu(path, fmi_type="CoSimulation", **experiment)
+    exchanged = simulate_fmu(path, fmi_type="ModelExchange", solver="CVode", **experiment)
+    assert steps["impacts"][-1] == 160
+    assert exchanged["impacts"][-1] == 160
+
+
+@pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
+def test_a_variable_that_repeats_its_unit_repeats_the_display_unit(fmus, name):
+    repeated = 0
+    for variable in fmus[name].description.modelVariables:
+        declared = variable.declaredType
+        if declared is not None and declared.displayUnit and variable.unit:
+            assert variable.unit == declared.unit
+            assert variable.displayUnit == declared.displayUnit, variable.name
+            repeated += 1
+    assert repeated > 10
+
+
+@pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
+def test_the_fmu_says_when_it_was_made_where_a_date_is_given(bench, name):
+    assert read_model_description(str(bench / f"{name}.fmu")).generationDateAndTime == "2023-11-14T22:13:20Z"
+
+
+def test_no_clock_is_asked_for_the_date(vines, tmp_path):
+    once, again = (pack(vines, tmp_path / name, None) for name in ("once", "again"))
+    for name in ("LoViNes.fmu", "PhaseLock.fmu", "bench.ssp"):
+        assert (once / name).read_bytes() == (again / name).read_bytes()
+    assert read_model_description(str(once / "LoViNes.fmu")).generationDateAndTime is None
+
+
+def test_a_date_that_is_none_is_refused_and_nothing_is_written(vines, tmp_path):
+    environment = os.environ | {"SOURCE_DATE_EPOCH": "yesterday"}
+    done = subprocess.run([vines, "pack", "--out", tmp_path / "out"], env=environment, capture_output=True, text=True)
+    assert done.returncode != 0
+    assert "SOURCE_DATE_EPOCH" in done.stderr
+    assert "yesterday" in done.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_page_shows_the_unit_of_every_real_variable(fmus):
+    for name, fmu in fmus.items():
+        page = (fmu.folder / "documentation" / "index.html").read_text()
+        rows = dict(re.findall(r"<tr><td><code>(.*?)</code></td><td>.*?</td><td>(.*?)</td>", page))
+        for variable in fmu.description.modelVariables:
+            if variable.type == "Real":
+                assert rows[variable.name] == variable.unit, f"{name}: {variable.name}"
+    assert (
+        "<code>r</code></td><td>0.65</td><td>1</td>"
+        in (fmus["LoViNes"].folder / "documentation" / "index.html").read_text()
+    )
