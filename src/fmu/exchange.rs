@@ -17,9 +17,9 @@ impl LoViNes {
             Real::phase => hybrid.states.phase,
             Real::u1 => hybrid.states.u1,
             Real::u2 => hybrid.states.u2,
-            Real::impact_time => hybrid.tally().impact_time,
-            Real::impact_velocity => hybrid.tally().impact_velocity,
-            Real::dissipated => hybrid.tally().dissipated,
+            Real::impact_time => hybrid.totals().impact_time,
+            Real::impact_velocity => hybrid.totals().impact_velocity,
+            Real::dissipated => hybrid.totals().dissipated,
             _ => {
                 (self.setting(variable)).unwrap_or_else(|| of_instant(&hybrid.instant(), variable))
             }

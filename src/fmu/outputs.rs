@@ -64,8 +64,8 @@ impl LoViNes {
         let Rig::Steps(plant) = &self.rig else {
             return false;
         };
-        let (now, tally) = (plant.reading(), plant.tally());
-        let (state, w) = (now.state, now.relative_displacement);
+        let (state, totals) = (plant.state(), plant.totals());
+        let w = plant.relative_displacement();
         self.outputs.0 = [
             state.q1,
             state.dq1,
@@ -74,10 +74,10 @@ impl LoViNes {
             state.q1 + self.epsilon * state.q2,
             w,
             state.dq1 - state.dq2,
-            now.base.unwrap_or(f64::NAN),
+            plant.base_displacement(),
             f64::NAN,
-            tally.impact_time,
-            tally.impact_velocity,
+            totals.impact_time,
+            totals.impact_velocity,
         ]
         .map(Cell::new);
         self.reach.holds(&state) && w.abs() <= self.parameters.half_width
@@ -112,10 +112,10 @@ impl LoViNes {
             Real::der_w => plant.relative_velocity(),
             Real::base => self.base(plant),
             Real::phase => plant.base().phase.radians(),
-            Real::impact_time => plant.tally().impact_time,
-            Real::impact_velocity => plant.tally().impact_velocity,
+            Real::impact_time => plant.totals().impact_time,
+            Real::impact_velocity => plant.totals().impact_velocity,
             Real::energy => plant.energy(self.base(plant)),
-            Real::dissipated => plant.tally().dissipated,
+            Real::dissipated => plant.totals().dissipated,
             _ => self
                 .setting(variable)
                 .unwrap_or_else(|| derivatives::of_instant(&self.instant(plant), variable)),
