@@ -8,7 +8,7 @@ mod log;
 mod outputs;
 mod reach;
 
-use crate::hybrid::Hybrid;
+use crate::model_exchange::hybrid::Hybrid;
 use crate::plant::MOST_IMPACTS;
 use crate::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
 use fmi2_component::{Archive, Component, Key, Log, Refusal};

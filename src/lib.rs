@@ -5,18 +5,20 @@ mod arithmetic;
 pub mod base_motion;
 pub mod clearance;
 pub mod contact;
-pub mod equations;
+
 mod fast;
 pub mod flight;
 #[cfg(feature = "fmu")]
 mod fmu;
 pub mod forcing;
-pub mod hybrid;
+#[cfg(feature = "fmu")]
+pub mod model_exchange;
+
 pub mod oscillator;
 mod overdamped;
 pub mod parameters;
 pub mod plant;
-pub mod rates;
+
 pub mod segment;
 pub mod sticking;
 

@@ -10,7 +10,7 @@ mod snapshot;
 
 use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive};
-use crate::contact::{Contact, ImpactLaw, Wall};
+use crate::contact::{Contact, ImpactLaw, Touch, Wall};
 use crate::fast::FastPath;
 use crate::oscillator::Oscillator;
 use crate::parameters::{InvalidValue, Parameters};
@@ -89,6 +89,19 @@ pub struct Totals {
     pub impact_velocity: f64,
     /// Energy dissipated by impacts, J.
     pub dissipated: f64,
+}
+
+impl Totals {
+    /// Counts an impact, if `touch` is one, and what it dissipated.
+    #[inline(always)]
+    pub(crate) fn add(&mut self, touch: &Touch, time: f64) {
+        if let Some(velocity) = touch.impact {
+            self.impacts += 1;
+            self.impact_time = time;
+            self.impact_velocity = velocity;
+        }
+        self.dissipated += touch.dissipated;
+    }
 }
 
 /// The parameters and what follows from them.

@@ -200,7 +200,7 @@ impl Plant {
 
     /// Both masses move as one for at most `left` seconds, until the wall ceases to push.
     fn stay(&mut self, wall: Wall, left: f64, step: &mut Step<impl FnMut(Event)>) {
-        let noise = self.acceleration_error();
+        let noise = self.acceleration_error(self.masses.v.value());
         let start = (self.masses.x.value(), self.masses.v.value());
         let motion = Segment::new(&self.rig.joint, self.base, start);
         let stay = until_released(&motion, wall, left, noise);

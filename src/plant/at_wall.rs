@@ -3,9 +3,11 @@
 use super::advance::Step;
 use super::{Event, Plant};
 use crate::arithmetic::Sum;
-use crate::contact::{Contact, Departure, Wall};
+use crate::contact::{Contact, Resolution, Wall};
 use crate::oscillator::Oscillator;
 
+/// A hop lower than this fraction of the half-width cannot be told from contact in double precision.
+const LOWEST_HOP: f64 = 1.0 / (1u64 << 56) as f64;
 /// Relative rounding error of an acceleration that is the sum of a few terms.
 const ROUNDING: f64 = 8.0 * f64::EPSILON;
 /// Accelerations this small against `omega0² b` are zero: subnormal values carry no significant digits.
@@ -26,56 +28,40 @@ impl Plant {
     }
 
     /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
+    #[inline]
     pub(super) fn touch(&mut self, wall: Wall, step: &mut Step<impl FnMut(Event)>) {
-        let (s, velocity) = (wall.sign(), self.masses.dw);
-        self.masses.w = Sum::from(s * self.rig.parameters.half_width);
-        if s * velocity > 0.0 {
-            let v = self.masses.v.value();
-            let after = self.rig.law.rebound(v, velocity);
-            let t = step.now();
-            self.totals.impacts += 1;
-            self.totals.impact_time = self.time + t;
-            self.totals.impact_velocity = velocity;
-            self.totals.dissipated += after.dissipated;
+        let half_width = self.rig.parameters.half_width;
+        self.masses.w = Sum::from(wall.sign() * half_width);
+        let resolution = Resolution {
+            lowest_hop: LOWEST_HOP * half_width,
+            longest_chatter: step.left.value(),
+            fastest: self.rig.alone.fastest,
+            elastic: true,
+        };
+        let velocities = (self.masses.v.value(), self.masses.particle, self.masses.dw);
+        let touch = self.rig.law.touch(wall, velocities, |primary, speed| {
+            let largest = self.acceleration_bound(primary);
+            !(self.rig.law).certainly_leaves(speed, largest, &resolution)
+                && (self.rig.law).rests(speed, self.pressing(wall, primary), &resolution)
+        });
+        self.masses.v = Sum::from(touch.primary);
+        self.masses.particle = touch.particle;
+        self.masses.dw = touch.relative;
+        let t = step.now();
+        self.totals.add(&touch, self.time + t);
+        if let Some(velocity) = touch.impact {
             step.outcome.impacts += 1;
             (step.on_event)(Event::Impact { t, wall, velocity });
-            self.masses.v = Sum::from(after.primary);
-            self.masses.particle = after.particle;
-            self.masses.dw = after.relative;
         }
-        if self.rests(wall, step.left.value()) {
-            let (velocity, lost) = self.rig.law.join(self.masses.v.value(), self.masses.dw);
-            self.masses.v = Sum::from(velocity);
-            self.masses.particle = velocity;
-            self.masses.dw = 0.0;
-            self.totals.dissipated += lost;
+        if touch.stuck {
             self.contact = Contact::Stuck(wall);
             step.outcome.stuck += 1;
-            let t = step.now();
             (step.on_event)(Event::Stuck { t, wall });
         }
     }
 
-    /// Whether the particle that leaves `wall` is in truth at rest on it.
-    #[inline(always)]
-    fn rests(&self, wall: Wall, left: f64) -> bool {
-        let speed = -wall.sign() * self.masses.dw;
-        let (fastest, half_width) = (self.rig.alone.fastest, self.rig.parameters.half_width);
-        let largest = self.acceleration_bound();
-        if (self.rig.law).certainly_leaves(speed, largest, (fastest, half_width)) {
-            return false;
-        }
-        self.rig.law.rests(&Departure {
-            speed,
-            pressing: (wall.sign() * self.acceleration(), self.acceleration_error()),
-            fastest,
-            half_width,
-            left,
-        })
-    }
-
-    /// Acceleration of the primary mass alone, m/s².
-    fn acceleration(&self) -> f64 {
+    /// Acceleration of `wall` towards the particle while the primary mass moves alone, and its rounding error, m/s².
+    fn pressing(&self, wall: Wall, velocity: f64) -> (f64, f64) {
         let Oscillator {
             delta,
             omega0_squared,
@@ -84,13 +70,17 @@ impl Plant {
         let drive = &self.base.drive;
         let (cos, sin) = self.fast.phasor();
         let stretch = self.masses.x.value() - (drive.signal[0] + drive.amplitude * sin);
-        let slip = self.masses.v.value() - (drive.signal[1] + drive.amplitude * drive.omega * cos);
-        -2.0 * delta * slip - omega0_squared * stretch
+        let slip = velocity - (drive.signal[1] + drive.amplitude * drive.omega * cos);
+        let acceleration = -2.0 * delta * slip - omega0_squared * stretch;
+        (
+            wall.sign() * acceleration,
+            self.acceleration_error(velocity),
+        )
     }
 
     /// An upper bound of the acceleration's magnitude, m/s²: the sum of its terms.
     #[inline(always)]
-    fn acceleration_bound(&self) -> f64 {
+    fn acceleration_bound(&self, velocity: f64) -> f64 {
         let Oscillator {
             delta,
             omega0_squared,
@@ -98,15 +88,14 @@ impl Plant {
         } = self.rig.alone;
         let drive = &self.base.drive;
         let position = self.masses.x.value().abs() + drive.signal[0].abs() + drive.amplitude.abs();
-        let velocity = self.masses.v.value().abs()
-            + drive.signal[1].abs()
-            + (drive.amplitude * drive.omega).abs();
+        let velocity =
+            velocity.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
         (omega0_squared * position + 2.0 * delta * velocity) * (1.0 + 1e-9)
     }
 
     /// Rounding error of the acceleration, m/s².
-    pub(super) fn acceleration_error(&self) -> f64 {
+    pub(super) fn acceleration_error(&self, velocity: f64) -> f64 {
         let nothing = NOTHING * self.rig.parameters.half_width * self.rig.alone.omega0_squared;
-        ROUNDING * self.acceleration_bound() + nothing
+        ROUNDING * self.acceleration_bound(velocity) + nothing
     }
 }

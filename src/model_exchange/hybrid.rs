@@ -1,4 +1,4 @@
-//! The rig as a hybrid system, for whoever integrates it: differential equations ([`crate::equations`]), functions whose
+//! The rig as a hybrid system, for whoever integrates it: differential equations ([`crate::model_exchange::equations`]), functions whose
 //! zeros are events, and the jumps at events.
 //!
 //! Contact is a matter of rounding for an integrator: it stops a little before or behind a zero. Walls are therefore
@@ -13,8 +13,8 @@
 //! held, that of a signal is not, and is taken for zero; the plant in closed form ([`crate::plant`]) has no such limit.
 
 use crate::base_motion::Drive;
-use crate::contact::{ImpactLaw, Wall};
-use crate::equations::Instant;
+use crate::contact::{ImpactLaw, Resolution, Wall};
+use crate::model_exchange::equations::Instant;
 use crate::parameters::{InvalidValue, Parameters};
 use crate::plant::{Event, Plant, State, Totals};
 
@@ -148,20 +148,20 @@ impl Hybrid {
     }
 
     /// Applies what is due now, at `time`: a jump of the base, an impact, rest, release; whether states have jumped.
-    pub fn resolve(&mut self, time: f64, mut tell: impl FnMut(Event)) -> bool {
+    pub fn resolve(&mut self, time: f64, mut on_event: impl FnMut(Event)) -> bool {
         let before = (self.states, self.contact);
         self.base_jump();
         if let Some(wall) = self.contact
             && self.push(wall, &self.instant()) < -0.5 * DEPTH
         {
             self.part(None);
-            tell(Event::Released { t: 0.0, wall });
+            on_event(Event::Released { t: 0.0, wall });
         } else if self.contact.is_none() {
             let now = self.instant();
             let touched =
                 (Wall::BOTH.into_iter()).find(|&wall| self.gap(wall, &now) <= 0.5 * DEPTH);
             if let Some(wall) = touched {
-                self.touch(wall, time, &mut tell);
+                self.touch(wall, time, &mut on_event);
             }
         }
         // States may jump now, so that the phase can be brought back to one turn.
@@ -223,47 +223,47 @@ impl Hybrid {
     }
 
     /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
-    fn touch(&mut self, wall: Wall, time: f64, tell: &mut impl FnMut(Event)) {
-        let (s, law) = (wall.sign(), ImpactLaw::new(&self.parameters));
-        let Instant {
-            mut dq1, mut dq2, ..
-        } = self.instant();
-        if s * (dq1 - dq2) > 0.0 {
-            let velocity = dq1 - dq2;
-            let after = law.rebound(dq1, velocity);
-            self.totals.impacts += 1;
-            self.totals.impact_time = time;
-            self.totals.impact_velocity = velocity;
-            self.totals.dissipated += after.dissipated;
-            tell(Event::Impact {
+    fn touch(&mut self, wall: Wall, time: f64, on_event: &mut impl FnMut(Event)) {
+        self.states.q2 = self.states.q1 - wall.sign() * self.parameters.half_width;
+        let law = ImpactLaw::new(&self.parameters);
+        let now = self.instant();
+        let velocities = (now.dq1, now.dq2, now.dq1 - now.dq2);
+        let touch = law.touch(wall, velocities, |primary, speed| {
+            self.rests(&law, wall, primary, speed)
+        });
+        self.totals.add(&touch, time);
+        if let Some(velocity) = touch.impact {
+            on_event(Event::Impact {
                 t: 0.0,
                 wall,
                 velocity,
             });
-            (dq1, dq2) = (after.primary, after.particle);
         }
-        self.states.q2 = self.states.q1 - s * self.parameters.half_width;
-        self.set_velocities(dq1, dq2);
-        if self.rests(wall, s * (dq2 - dq1)) {
-            let (both, lost) = law.join(dq1, dq1 - dq2);
-            self.totals.dissipated += lost;
+        if touch.stuck {
             self.contact = Some(wall);
-            self.set_velocities(both, both);
-            tell(Event::Stuck { t: 0.0, wall });
+            on_event(Event::Stuck { t: 0.0, wall });
         }
+        self.set_velocities(touch.primary, touch.particle);
     }
 
     /// Whether a particle that leaves `wall` at `speed` is in truth at rest on it.
-    fn rests(&self, wall: Wall, speed: f64) -> bool {
-        let pressing = wall.sign() * self.instant().acceleration();
+    fn rests(&self, law: &ImpactLaw, wall: Wall, primary: f64, speed: f64) -> bool {
         let (b, fast) = self.scales();
-        if speed == 0.0 {
-            return pressing >= -0.5 * DEPTH * fast * fast / b;
-        }
-        let chatter = ImpactLaw::new(&self.parameters).chatter_duration(speed, pressing);
-        let over_soon = chatter * fast <= LONGEST_CHATTER * b;
-        // Without loss a hop is followed by its like for ever.
-        let endless = self.parameters.restitution == 1.0;
-        pressing > 0.0 && 0.5 * speed * speed <= LOWEST_HOP * b * pressing && (over_soon || endless)
+        let now = Instant {
+            dq1: primary,
+            ..self.instant()
+        };
+        let pressing = wall.sign() * now.acceleration();
+        let resolution = Resolution {
+            lowest_hop: LOWEST_HOP * b,
+            longest_chatter: LONGEST_CHATTER * b / fast,
+            fastest: self.parameters.fastest_rate(),
+            elastic: false,
+        };
+        law.rests(
+            speed,
+            (pressing, 0.5 * DEPTH * fast * fast / b),
+            &resolution,
+        )
     }
 }
