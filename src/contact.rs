@@ -66,19 +66,6 @@ pub struct ImpactLaw {
     half_relative_mass: f64,
 }
 
-/// Velocities right after an impact, m/s, and the energy it dissipated, J.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Rebound {
-    /// Velocity of the primary mass.
-    pub primary: f64,
-    /// Velocity of the particle.
-    pub particle: f64,
-    /// Relative velocity `w'`.
-    pub relative: f64,
-    /// Energy dissipated.
-    pub dissipated: f64,
-}
-
 /// The particle at a wall: velocities after an impact, if it approached, and after coming to rest, if it did.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Touch {
@@ -127,37 +114,15 @@ impl ImpactLaw {
         }
     }
 
-    /// Newton's law: the relative velocity is reversed and reduced by `r`, momentum is conserved.
-    #[inline(always)]
-    pub fn rebound(&self, primary: f64, relative: f64) -> Rebound {
-        let r = self.restitution;
-        let (head, tail) = self.primary_share;
-        let primary = primary - (head * relative + tail * relative);
-        let after = -r * relative;
-        Rebound {
-            primary,
-            particle: primary - after,
-            relative: after,
-            dissipated: self.half_relative_mass * ((1.0 - r) * (1.0 + r)) * (relative * relative),
-        }
-    }
-
-    /// Both masses go on as one: the velocity that conserves momentum, and the energy that is lost.
-    pub fn join(&self, primary: f64, relative: f64) -> (f64, f64) {
-        (
-            primary - self.particle_fraction * relative,
-            self.half_relative_mass * relative * relative,
-        )
-    }
-
     /// Duration of infinitely many impacts that begin with this rebound speed under a constant pressing acceleration:
     /// `2 u/a (1 + r + r² + ...)`, s; infinite for `r = 1`.
     pub fn chatter_duration(&self, speed: f64, pressing: f64) -> f64 {
         2.0 * speed / (pressing * (1.0 - self.restitution))
     }
 
-    /// The particle is at `wall` with velocities of primary mass and particle and a relative velocity: impact if it
-    /// approaches, then rest if `rests` holds for the velocity of the primary mass and the speed away from the wall.
+    /// The particle is at `wall` with velocities of primary mass and particle and a relative velocity. If it approaches, Newton's
+    /// law reverses the relative velocity and reduces it by `r`. If then `rests` holds for the velocity of the primary mass and
+    /// the speed away from the wall, both go on as one mass. Momentum is conserved.
     #[inline(always)]
     pub(crate) fn touch(
         &self,
@@ -174,19 +139,19 @@ impl ImpactLaw {
             dissipated: 0.0,
         };
         if wall.sign() * relative > 0.0 {
-            let after = self.rebound(primary, relative);
+            let (r, (head, tail)) = (self.restitution, self.primary_share);
             touch.impact = Some(relative);
-            touch.primary = after.primary;
-            touch.particle = after.particle;
-            touch.relative = after.relative;
-            touch.dissipated = after.dissipated;
+            touch.primary = primary - (head * relative + tail * relative);
+            touch.relative = -r * relative;
+            touch.particle = touch.primary - touch.relative;
+            touch.dissipated =
+                self.half_relative_mass * ((1.0 - r) * (1.0 + r)) * (relative * relative);
         }
         if rests(touch.primary, -wall.sign() * touch.relative) {
-            let (velocity, lost) = self.join(touch.primary, touch.relative);
-            touch.primary = velocity;
-            touch.particle = velocity;
+            touch.dissipated += self.half_relative_mass * touch.relative * touch.relative;
+            touch.primary -= self.particle_fraction * touch.relative;
+            touch.particle = touch.primary;
             touch.relative = 0.0;
-            touch.dissipated += lost;
             touch.stuck = true;
         }
         touch

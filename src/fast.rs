@@ -235,16 +235,4 @@ impl FastPath {
         }
         Next::ContactFree(t)
     }
-
-    /// The keys from which everything cached can be computed again.
-    #[cfg(feature = "serde")]
-    pub fn keys(&self) -> Keys {
-        Keys::of(self)
-    }
-
-    /// As it was when its keys were taken.
-    #[cfg(feature = "serde")]
-    pub fn restored(keys: &Keys, rig: &Rig) -> Self {
-        keys.restore(&rig.alone)
-    }
 }

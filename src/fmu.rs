@@ -5,10 +5,11 @@
 mod derivatives;
 mod exchange;
 mod log;
+mod model_exchange;
 mod outputs;
 mod reach;
 
-use crate::model_exchange::hybrid::Hybrid;
+use crate::fmu::model_exchange::hybrid::Hybrid;
 use crate::plant::MOST_IMPACTS;
 use crate::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
 use fmi2_component::{Archive, Component, Key, Log, Refusal};

@@ -5,20 +5,15 @@ mod arithmetic;
 pub mod base_motion;
 pub mod clearance;
 pub mod contact;
-
 mod fast;
 pub mod flight;
 #[cfg(feature = "fmu")]
 mod fmu;
 pub mod forcing;
-#[cfg(feature = "fmu")]
-pub mod model_exchange;
-
 pub mod oscillator;
 mod overdamped;
 pub mod parameters;
 pub mod plant;
-
 pub mod segment;
 pub mod sticking;
 

@@ -71,6 +71,13 @@ impl Transition {
     }
 }
 
+/// A transition whose entries are known with their rounding errors, as the sum of two.
+fn split(entries: [(f64, f64); 4]) -> (Transition, Transition) {
+    let [xx, xv, vx, vv] = entries.map(split_coefficient);
+    let part = |xx, xv, vx, vv| Transition { xx, xv, vx, vv };
+    (part(xx.0, xv.0, vx.0, vv.0), part(xx.1, xv.1, vx.1, vv.1))
+}
+
 impl Oscillator {
     /// Coefficients of the oscillator of this mass (kg), stiffness (N/m) and damping (N·s/m).
     pub fn new(mass: f64, stiffness: f64, damping: f64) -> Self {
@@ -189,13 +196,8 @@ impl Oscillator {
             s,
             (-pull.0, -pull.1),
             plus(change, (-leaning.0, -leaning.1)),
-        ]
-        .map(split_coefficient);
-        let part = |f: fn(&(f64, f64)) -> f64| {
-            let [xx, xv, vx, vv] = entries.each_ref().map(f);
-            Transition { xx, xv, vx, vv }
-        };
-        (part(|e| e.0), part(|e| e.1))
+        ];
+        split(entries)
     }
 
     /// As [`Self::split_increment`] for a time that is short against every rate (`fastest t <= 1/2`), with the relative
@@ -223,12 +225,7 @@ impl Oscillator {
         let (xx, vx) = column([(1.0, 0.0), (0.0, 0.0)]);
         let (xv, vv) = column([(0.0, 0.0), (1.0, 0.0)]);
         let (one, t2) = ((1.0, 0.0), (t, 0.0));
-        let entries = [xx, times(plus(one, xv), t2), divided(vx, t), vv].map(split_coefficient);
-        let part = |f: fn(&(f64, f64)) -> f64| {
-            let [xx, xv, vx, vv] = entries.each_ref().map(f);
-            Transition { xx, xv, vx, vv }
-        };
-        (part(|e| e.0), part(|e| e.1))
+        split([xx, times(plus(one, xv), t2), divided(vx, t), vv])
     }
 
     /// The transition from `exp(-delta t) sin(omega_d t)` and `exp(-delta t) cos(omega_d t)`.

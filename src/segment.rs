@@ -60,11 +60,6 @@ impl Segment {
         }
     }
 
-    /// The oscillator that moves.
-    pub fn oscillator(&self) -> &Oscillator {
-        &self.oscillator
-    }
-
     /// The fastest rate in the motion, 1/s.
     pub fn fastest(&self) -> f64 {
         self.oscillator.fastest.max(self.forcing.omega)

@@ -25,7 +25,7 @@ pub(super) struct ShortStep {
     free: (Transition, Transition),
     /// `G_n`, in the unit of `t^n`.
     moments: [f64; MOMENTS],
-    /// Velocities under a curved signal: `G_n'` for n = 2 and 3.
+    /// The key of the response, rad/s.
     omega: f64,
     /// `omega t`, and its rounding error.
     pub angle: (f64, f64),
@@ -81,18 +81,13 @@ impl ShortStep {
         );
         self.angle = product(omega, self.t);
         let (angle, error) = self.angle;
-        let a = angle * angle;
-        let cos = 1.0
-            - a * (0.5
-                - a * (1.0 / 24.0
-                    - a * (1.0 / 720.0
-                        - a * (1.0 / 40_320.0
-                            - a * (1.0 / 3_628_800.0 - a * (1.0 / 479_001_600.0))))));
-        let sin = angle
-            * (1.0
-                - a * (1.0 / 6.0
-                    - a * (1.0 / 120.0
-                        - a * (1.0 / 5040.0 - a * (1.0 / 362_880.0 - a * (1.0 / 39_916_800.0))))));
+        let square = angle * angle;
+        // The Taylor series of sine and cosine, from the last term to the first.
+        let sum = |divisors: [f64; 6]| {
+            (divisors.iter().rev()).fold(1.0, |sum, divisor| 1.0 - square * (1.0 / divisor) * sum)
+        };
+        let cos = sum([2.0, 12.0, 30.0, 56.0, 90.0, 132.0]);
+        let sin = angle * sum([6.0, 20.0, 42.0, 72.0, 110.0, 156.0]);
         self.rotation = (cos - error * sin, sin + error * cos);
         self.omega = omega;
     }

@@ -3,7 +3,7 @@
 use super::derivatives::of_instant;
 use super::variables::Real;
 use super::{LoViNes, Progress, Rig, log};
-use crate::model_exchange::hybrid::Hybrid;
+use crate::fmu::model_exchange::hybrid::Hybrid;
 use crate::{Drive, Parameters, State};
 use fmi2_component::{Discrete, Log, ModelExchange, Refusal};
 

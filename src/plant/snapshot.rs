@@ -3,7 +3,7 @@
 use super::{Masses, Plant, Rig, Totals};
 use crate::base_motion::BaseMotion;
 use crate::contact::Contact;
-use crate::fast::{FastPath, Keys};
+use crate::fast::Keys;
 use crate::parameters::Parameters;
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +32,7 @@ impl From<Plant> for Snapshot {
             time: plant.time,
             totals: plant.totals,
             evaluations: plant.evaluations,
-            fast: plant.fast.keys(),
+            fast: Keys::of(&plant.fast),
         }
     }
 }
@@ -41,7 +41,7 @@ impl From<Snapshot> for Plant {
     fn from(saved: Snapshot) -> Self {
         let rig = Rig::new(&saved.parameters);
         Self {
-            fast: FastPath::restored(&saved.fast, &rig),
+            fast: saved.fast.restore(&rig.alone),
             rig,
             contact: saved.contact,
             masses: saved.masses,

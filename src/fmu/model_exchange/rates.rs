@@ -81,5 +81,5 @@ fn rates_of(base: &BaseMotion) -> Rates {
 }
 
 #[cfg(test)]
-#[path = "../../tests/unit/model_exchange_rates.rs"]
+#[path = "../../../tests/unit/model_exchange_rates.rs"]
 mod tests;

@@ -97,5 +97,5 @@ impl Scalar for Dual {
 }
 
 #[cfg(test)]
-#[path = "../../tests/unit/model_exchange_dual.rs"]
+#[path = "../../../tests/unit/model_exchange_dual.rs"]
 mod tests;

@@ -1,4 +1,4 @@
-//! The rig as a hybrid system, for whoever integrates it: differential equations ([`crate::model_exchange::equations`]), functions whose
+//! The rig as a hybrid system, for whoever integrates it: differential equations ([`crate::fmu::model_exchange::equations`]), functions whose
 //! zeros are events, and the jumps at events.
 //!
 //! Contact is a matter of rounding for an integrator: it stops a little before or behind a zero. Walls are therefore
@@ -14,7 +14,7 @@
 
 use crate::base_motion::Drive;
 use crate::contact::{ImpactLaw, Resolution, Wall};
-use crate::model_exchange::equations::Instant;
+use crate::fmu::model_exchange::equations::Instant;
 use crate::parameters::{InvalidValue, Parameters};
 use crate::plant::{Event, Plant, State, Totals};
 

@@ -132,5 +132,5 @@ impl<T: Scalar> Instant<T> {
 }
 
 #[cfg(test)]
-#[path = "../../tests/unit/model_exchange_equations.rs"]
+#[path = "../../../tests/unit/model_exchange_equations.rs"]
 mod tests;
