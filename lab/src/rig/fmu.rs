@@ -7,6 +7,7 @@ use fmi::fmi2::import::Fmi2Import;
 use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
 use fmi::schema::fmi2::ScalarVariableElement;
 use fmi::traits::FmiImport;
+use phase_lock::Value;
 use thiserror::Error;
 
 /// Why an FMU cannot take its side of the bench, or cannot go on.
@@ -55,27 +56,19 @@ pub enum Kind {
     Boolean,
 }
 
-impl std::fmt::Display for Kind {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        std::fmt::Debug::fmt(self, f)
+impl From<Value> for Kind {
+    fn from(value: Value) -> Self {
+        match value {
+            Value::Real(_) => Self::Real,
+            Value::Integer(_) => Self::Integer,
+            Value::Boolean(_) => Self::Boolean,
+        }
     }
 }
 
-/// A value to start with.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Value {
-    Real(f64),
-    Integer(i32),
-    Boolean(bool),
-}
-
-impl Value {
-    fn kind(self) -> Kind {
-        match self {
-            Self::Real(_) => Kind::Real,
-            Self::Integer(_) => Kind::Integer,
-            Self::Boolean(_) => Kind::Boolean,
-        }
+impl std::fmt::Display for Kind {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        std::fmt::Debug::fmt(self, f)
     }
 }
 
@@ -134,7 +127,7 @@ impl Fmu {
     pub fn start(&mut self, values: &[(&str, Value)]) -> Result<(), FmuError> {
         let mut missing = Vec::new();
         for &(name, value) in values {
-            let Some(reference) = self.find(value.kind(), name) else {
+            let Some(reference) = self.find(value.into(), name) else {
                 missing.push(format!("`{name}`"));
                 continue;
             };

@@ -4,7 +4,9 @@ use std::path::Path;
 
 use fmi::fmi2::instance::Common;
 
-use super::fmu::{Fmu, FmuError, Kind, Reference, Value};
+use phase_lock::Value;
+
+use super::fmu::{Fmu, FmuError, Kind, Reference};
 use super::{Drive, Rig, RigError, Sensors, Witness};
 use crate::scene::Scene;
 
