@@ -1,0 +1,140 @@
+//! A controller that is an FMU: ours, or anybody's with the same variable names.
+
+use std::path::Path;
+
+use fmi::fmi2::instance::Common;
+use phase_lock::{Config, Detector};
+
+use crate::instance::{Fmu, FmuError, Kind, Reference, Value};
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Sensors, configuration};
+use vines_testbench::scene::Scene;
+
+/// A controller FMU, stepped sample by sample.
+///
+/// It needs the inputs `response` and `active` and the outputs `omega`, `E` and `settled`; `reference`, `drive` and `phase_error`
+/// are used where it has them. Of the scene's settings it gets those that it has a parameter for, by the names of
+/// `PhaseLock.fmu`. At each sample its inputs are set, it is stepped by one sample time, and what it then puts out is
+/// the drive of that very sample period.
+pub struct FmuController {
+    fmu: Fmu,
+    sample_time: f64,
+    /// `response`, and `reference` where there is one.
+    sensors: Vec<Reference>,
+    active: Reference,
+    /// `omega` and `E`.
+    drive: [Reference; 2],
+    displacement: Option<Reference>,
+    phase_error: Option<Reference>,
+    settled: Reference,
+}
+
+impl FmuController {
+    /// Loads the controller at `path` and initialises it with the settings of the scene.
+    ///
+    /// # Errors
+    /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
+    pub fn load(path: &Path, scene: &Scene) -> Result<Self, FmuError> {
+        let mut fmu = Fmu::load(path, "controller")?;
+        let mut sensors = vec![fmu.need(Kind::Real, "response")?];
+        sensors.extend(fmu.find(Kind::Real, "reference"));
+        let active = fmu.need(Kind::Boolean, "active")?;
+        let drive = [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?];
+        let settled = fmu.need(Kind::Boolean, "settled")?;
+        fmu.start(&parameters(&configuration(scene)))?;
+        Ok(Self {
+            sample_time: scene.sample_time(),
+            sensors,
+            active,
+            drive,
+            displacement: fmu.find(Kind::Real, "drive"),
+            phase_error: fmu.find(Kind::Real, "phase_error"),
+            settled,
+            fmu,
+        })
+    }
+
+    fn optional(&mut self, reference: Option<Reference>) -> Result<f64, FmuError> {
+        reference.map_or(Ok(0.0), |one| {
+            self.fmu.reals("give its outputs", [one]).map(|[x]| x)
+        })
+    }
+
+    fn exchange(&mut self, sensors: Sensors, active: bool) -> Result<Command, FmuError> {
+        // A channel that reads 0 for ever counts as not connected.
+        let readings = [sensors.response, sensors.reference.unwrap_or(0.0)];
+        let (references, active_reference) = (&self.sensors, [self.active]);
+        self.fmu.ask("take its inputs", |i| {
+            i.set_real(references, &readings[..references.len()])?;
+            i.set_boolean(&active_reference, &[active.into()])
+        })?;
+        self.fmu.step(self.sample_time)?;
+        let [omega, amplitude] = self.fmu.reals("give its outputs", self.drive)?;
+        let (reference, mut settled) = ([self.settled], [0]);
+        self.fmu.ask("give its outputs", |i| {
+            i.get_boolean(&reference, &mut settled)
+        })?;
+        Ok(Command {
+            drive: Drive {
+                omega,
+                amplitude,
+                displacement: self.optional(self.displacement)?,
+            },
+            phase_error: self.optional(self.phase_error)?,
+            settled: settled != [0],
+        })
+    }
+}
+
+impl Controller for FmuController {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        Ok(self.exchange(sensors, active)?)
+    }
+}
+
+/// The configuration under the names of the FMU's parameters.
+fn parameters(config: &Config) -> Vec<(&'static str, Value)> {
+    let lock = &config.lock;
+    let reals = [
+        ("sample_time", config.sample_time),
+        ("omega_start", config.omega_start),
+        ("omega_min", config.omega_min),
+        ("omega_max", config.omega_max),
+        ("omega_rate", config.omega_rate),
+        ("amplitude", config.amplitude),
+        ("amplitude_max", config.amplitude_max),
+        ("ramp_time", config.ramp_time),
+        ("release_time", config.release_time),
+        ("base_bandwidth", config.base_bandwidth),
+        ("phase_target", config.phase_target),
+        ("bandwidth", config.bandwidth),
+        ("damping_rate", config.damping_rate),
+        ("delay", config.delay),
+        ("lock.phase_tolerance", lock.phase_tolerance),
+        ("lock.unlock_tolerance", lock.unlock_tolerance),
+        ("lock.frequency_drift", lock.frequency_drift),
+        ("lock.amplitude_drift", lock.amplitude_drift),
+        ("lock.coherence_min", lock.coherence_min),
+        ("lock.response_min", lock.response_min),
+        ("response_max", config.response_max),
+        ("acquire_timeout", config.acquire_timeout),
+    ];
+    let (detector, harmonics, odd_only) = match config.detector {
+        Detector::Adaptive {
+            harmonics,
+            odd_only,
+        } => (1, harmonics.into(), odd_only),
+        Detector::Demodulator => (2, 1, true),
+    };
+    let dwell = i32::try_from(lock.dwell).unwrap_or(i32::MAX);
+    let mut values: Vec<_> = reals
+        .into_iter()
+        .map(|(name, value)| (name, Value::Real(value)))
+        .collect();
+    values.extend([
+        ("detector", Value::Integer(detector)),
+        ("harmonics", Value::Integer(harmonics)),
+        ("odd_only", Value::Boolean(odd_only)),
+        ("lock.dwell", Value::Integer(dwell)),
+    ]);
+    values
+}
