@@ -17,6 +17,8 @@ mod study;
 mod table;
 mod theme;
 mod tracked;
+mod tracking;
+mod tracking_picture;
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -33,6 +35,7 @@ pub use sections::{Maker, SECTIONS, Subject};
 pub use study::{Progress, Report, write_report};
 pub use table::table;
 pub use theme::dark;
+pub use tracking::{Compared, TrackedReport};
 
 /// Why a report could not be written.
 #[derive(Debug, Error)]

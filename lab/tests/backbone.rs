@@ -1,7 +1,8 @@
 //! The backbone, tracked with the response held by the loop.
 
-use vines::backbone::{Report, TrackError, track};
+use vines::backbone::{TrackError, track};
 use vines::identification::Regime;
+use vines::report::TrackedReport;
 use vines::rig::{
     BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated,
 };
@@ -13,12 +14,12 @@ fn scene(settings: &[&str]) -> Scene {
     Scene::parse("dimensionless.toml", text, &overrides).unwrap()
 }
 
-fn tracked(settings: &[&str]) -> Report {
+fn tracked(settings: &[&str]) -> TrackedReport {
     let scene = scene(settings);
     let mut rig = Chain::new(Box::new(Simulated::new(&scene).unwrap()), &scene);
     let mut controller = BuiltIn::for_backbone(&scene).unwrap();
     let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
-    let report = Report::new(&tracked, &scene);
+    let report = TrackedReport::new(&tracked, &scene);
     println!(
         "{settings:?}: {:.1} periods per point, at most {:.1e} from the exact backbone",
         report.periods_per_point(),

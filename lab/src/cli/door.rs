@@ -4,8 +4,9 @@ use std::{path::PathBuf, str::FromStr};
 
 use clap::Args;
 use vines::{
+    fmu::{FmuController, FmuRig},
     net::{NetController, NetRig, Reach, resolve},
-    rig::{BuiltIn, Chain, Controller, FmuController, FmuRig, Rig, Simulated},
+    rig::{BuiltIn, Chain, Controller, Rig, Simulated},
     scene::Scene,
 };
 

@@ -3,8 +3,9 @@
 use serde::Serialize;
 
 use super::Subject;
-use crate::backbone::{Compared, Report, track};
+use crate::backbone::track;
 use crate::identification::Regime;
+use crate::report::{Compared, TrackedReport};
 use crate::report::{csv, section::Section, tracked};
 use crate::rig::BuiltIn;
 
@@ -30,7 +31,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         done(at as f64 / of.max(1) as f64);
     });
     let tracked = match found {
-        Ok(found) if !found.points.is_empty() => Report::new(&found, scene),
+        Ok(found) if !found.points.is_empty() => TrackedReport::new(&found, scene),
         Ok(_) => {
             section.finding = "Tracking gave no point.".into();
             section.words(section.finding.clone());

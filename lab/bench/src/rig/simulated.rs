@@ -1,0 +1,87 @@
+//! The plant itself as a rig, with no FMU in between.
+
+use lovines::{InvalidValue, Parameters, Plant, State};
+
+use super::{Drive, Rig, RigError, Sensors, Witness};
+use crate::scene::Scene;
+
+/// The plant, stepped directly.
+#[derive(Clone)]
+pub struct Simulated {
+    plant: Plant,
+}
+
+impl Simulated {
+    /// The plant of the scene at its start.
+    ///
+    /// # Errors
+    /// A parameter or a start that makes no sense.
+    pub fn new(scene: &Scene) -> Result<Self, InvalidValue> {
+        let (p, s) = (&scene.plant, &scene.start);
+        let parameters = Parameters {
+            primary_mass: p.mass,
+            stiffness: p.stiffness,
+            damping: p.damping,
+            particle_mass: p.particle_mass,
+            half_width: p.half_width,
+            restitution: p.restitution,
+        };
+        let start = State {
+            q1: s.q1,
+            dq1: s.dq1,
+            q2: s.q2,
+            dq2: s.dq2,
+        };
+        Ok(Self {
+            plant: Plant::new(parameters, start)?,
+        })
+    }
+}
+
+/// Parameters and start of the plant, under the names of its variables.
+#[must_use]
+pub fn start_values(scene: &Scene) -> [(&'static str, f64); 10] {
+    let (plant, start) = (&scene.plant, &scene.start);
+    [
+        ("M", plant.mass),
+        ("k", plant.stiffness),
+        ("c", plant.damping),
+        ("m", plant.particle_mass),
+        ("b", plant.half_width),
+        ("r", plant.restitution),
+        ("q1", start.q1),
+        ("der(q1)", start.dq1),
+        ("q2", start.q2),
+        ("der(q2)", start.dq2),
+    ]
+}
+
+impl Rig for Simulated {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        Ok(Sensors {
+            response: self.plant.centre(),
+            reference: Some(self.plant.base_displacement()),
+        })
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let drive = lovines::Drive::harmonic(drive.amplitude, drive.omega);
+        self.plant.advance(drive, step);
+        Ok(())
+    }
+
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        self.plant.advance(lovines::Drive::held(displacement), step);
+        Ok(())
+    }
+
+    fn witness(&mut self) -> Result<Option<Witness>, RigError> {
+        let tally = self.plant.tally();
+        Ok(Some(Witness {
+            impacts: i64::try_from(tally.impacts).unwrap_or(i64::MAX),
+            impact_time: tally.impact_time,
+            impact_velocity: tally.impact_velocity,
+            particle_velocity: self.plant.state().dq2,
+        }))
+    }
+}
