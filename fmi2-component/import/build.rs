@@ -1,3 +1,5 @@
+//! Compiles the logger.
+
 fn main() {
     println!("cargo:rerun-if-changed=src/logger.c");
     cc::Build::new()
