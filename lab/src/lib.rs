@@ -7,6 +7,8 @@ pub mod pack;
 pub mod report;
 
 pub use vines_fmu as fmu;
-pub use vines_model::{map, orbit, theory};
+pub use vines_model::{map, numerics, orbit, regime, theory};
 pub use vines_net as net;
-pub use vines_testbench::{backbone, estimators, experiment, identification, rig, scene, stages};
+pub use vines_testbench::{
+    backbone, comparison, estimators, experiment, identification, rig, scene, stages,
+};

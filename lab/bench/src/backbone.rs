@@ -6,12 +6,10 @@
 //! that little is left to settle.
 
 mod cycle;
-mod exact;
 mod forecast;
 mod settle;
 mod track;
 
 pub use cycle::Cycle;
-pub use exact::{Distance, ExactCurve};
 pub use settle::{Criterion, Estimate};
 pub use track::{Point, TrackError, Tracked, track};

@@ -7,11 +7,12 @@
 use serde::Serialize;
 use thiserror::Error;
 
+use crate::comparison::COMPARED_ABOVE;
 use crate::experiment::{self, ExperimentError, Plan, Record, Sample};
-use crate::identification::{COMPARED_ABOVE, decay_points};
+use crate::identification::decay_points;
 use crate::rig::{BuiltIn, Command, Drive, Gauss, Rig, RigError, Simulated};
 use crate::scene::{Estimator, Scene};
-use vines_model::theory::SlowFlow;
+use vines_model::numerics::{mean, mean_square, try_bisection};
 
 /// The decay's true detuning over the time since the release.
 #[derive(Debug, Clone, PartialEq)]
@@ -93,23 +94,20 @@ impl Decay {
     #[must_use]
     pub fn quality(&self, scene: &Scene, snr: Option<f64>, seeds: u64) -> Quality {
         let seeds = if snr.is_some() { seeds } else { 1 };
-        let d = scene.dimensionless();
-        let flow = SlowFlow::new(d.lambda, d.r);
         let errors: Vec<f64> = (1..=seeds)
             .flat_map(|seed| {
                 let record = self.disturbed(snr, seed);
-                decay_points(&record, scene, &flow)
+                decay_points(&record, scene)
             })
             .filter(|point| point.c > COMPARED_ABOVE)
             .filter_map(|point| Some(point.sigma - self.truth.sigma(point.tau)?))
             .collect();
-        let n = errors.len() as f64;
         Quality {
             estimator: scene.record.estimator,
             window: scene.record.window_periods,
             snr,
-            rms: (errors.iter().map(|error| error * error).sum::<f64>() / n).sqrt(),
-            bias: errors.iter().sum::<f64>() / n,
+            rms: mean_square(errors.iter().copied()).sqrt(),
+            bias: mean(errors.iter().copied()),
             points: errors.len() / seeds as usize,
         }
     }
@@ -119,8 +117,8 @@ impl Decay {
         let mut record = self.record.clone();
         if let Some(snr) = snr {
             let held = record.hold();
-            let power = held.iter().map(|s| s.sensors.response.powi(2)).sum::<f64>();
-            let deviation = (power / held.len() as f64).sqrt() * 10_f64.powf(-snr / 20.0);
+            let power = mean_square(held.iter().map(|s| s.sensors.response));
+            let deviation = power.sqrt() * 10_f64.powf(-snr / 20.0);
             let mut gauss = Gauss::new(seed);
             for sample in &mut record.samples[self.record.released..] {
                 sample.sensors.response += deviation * gauss.next();
@@ -134,7 +132,7 @@ impl Truth {
     /// Of a rig from which the drive is taken away now.
     fn of(mut rig: Simulated, scene: &Scene) -> Result<Self, RigError> {
         let d = scene.dimensionless();
-        let step = scene.plant.natural_period() / FINE;
+        let step = d.natural_period() / FINE;
         let steps = (scene.record.decay_periods * FINE) as usize;
         let mut crossings = Vec::new();
         let mut before = rig.sense()?.response;
@@ -143,17 +141,12 @@ impl Truth {
             rig.advance(Drive::default(), step)?;
             let after = rig.sense()?.response;
             if (before > 0.0) != (after > 0.0) {
-                let (mut low, mut high) = (0.0, step);
-                while high - low > 1e-14 * step * FINE {
-                    let middle = 0.5 * (low + high);
+                let like_before = |t: f64| -> Result<bool, RigError> {
                     let mut there = from.clone();
-                    there.advance(Drive::default(), middle)?;
-                    if (there.sense()?.response > 0.0) == (before > 0.0) {
-                        low = middle;
-                    } else {
-                        high = middle;
-                    }
-                }
+                    there.advance(Drive::default(), t)?;
+                    Ok((there.sense()?.response > 0.0) == (before > 0.0))
+                };
+                let (low, high) = try_bisection(0.0, step, 1e-14 * step * FINE, like_before)?;
                 crossings.push(n as f64 * step + 0.5 * (low + high));
             }
             before = after;

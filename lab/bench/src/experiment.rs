@@ -23,7 +23,7 @@ impl Plan {
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
         let sample_time = scene.sample_time();
-        let period = scene.plant.natural_period();
+        let period = scene.dimensionless().natural_period();
         let samples = |periods: f64| (periods * period / sample_time).round() as usize;
         Self {
             sample_time,

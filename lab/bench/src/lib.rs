@@ -4,6 +4,7 @@
 #![forbid(unsafe_code)]
 
 pub mod backbone;
+pub mod comparison;
 pub mod estimators;
 pub mod experiment;
 pub mod identification;

@@ -4,16 +4,15 @@ mod backbone;
 mod chain;
 mod controller;
 mod error;
-mod excitation;
 mod overrides;
 mod plant;
-mod raw;
 mod record;
-mod start;
+mod sections;
 mod validate;
 
 use std::path::Path;
 
+use lovines::{Parameters, State};
 use serde::Serialize;
 
 pub use backbone::{Backbone, Feed};
@@ -21,10 +20,11 @@ pub use chain::{Chain, RatioOf};
 pub use controller::Controller;
 pub use error::SceneError;
 pub use overrides::Override;
-pub use plant::Plant;
+pub(crate) use plant::symbols;
 pub use record::{Estimator, Record};
-pub use start::Start;
 pub use vines_model::Dimensionless;
+
+use sections::Sections;
 
 /// The default scene, embedded so that the program works from any folder.
 pub const PAPER: &str = include_str!("../../../scenes/paper.toml");
@@ -33,9 +33,10 @@ pub const PAPER: &str = include_str!("../../../scenes/paper.toml");
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
     /// The oscillator and its particle, SI units.
-    pub plant: Plant,
+    #[serde(serialize_with = "plant::serialize")]
+    pub plant: Parameters,
     /// Where the motion starts, SI units.
-    pub start: Start,
+    pub start: State,
     /// Amplitude E of the base displacement, m.
     pub amplitude: f64,
     /// The phase-locked loop, in units of omega0 and of the natural period.
@@ -74,42 +75,28 @@ impl Scene {
             message: error.to_string().trim_end().into(),
         };
         // The file is checked by itself first: only its own text can tell the line of a mistake.
-        let raw = toml::from_str(text).map_err(syntax)?;
+        let sections: Sections = toml::from_str(text).map_err(syntax)?;
         let table = toml::from_str(text).map_err(syntax)?;
-        overrides::apply(raw, table, overrides)?.resolve(origin)
+        overrides::merged(table, overrides)?
+            .unwrap_or(sections)
+            .resolve(origin)
     }
 
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.
     #[must_use]
     pub fn dimensionless(&self) -> Dimensionless {
-        let Plant { half_width, .. } = self.plant;
-        let epsilon = self.plant.epsilon();
-        Dimensionless {
-            epsilon,
-            lambda: self.plant.lambda(),
-            r: self.plant.restitution,
-            g: self.amplitude / (half_width * epsilon),
-            omega0: self.plant.omega0(),
-            b: half_width,
-        }
+        Dimensionless::of(&self.plant, self.amplitude)
     }
 
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
     #[must_use]
     pub fn dimensionless_start(&self) -> [f64; 4] {
-        let (length, rate) = (self.plant.half_width, self.plant.omega0());
-        let Start { q1, dq1, q2, dq2 } = self.start;
-        [
-            q1 / length,
-            dq1 / (length * rate),
-            q2 / length,
-            dq2 / (length * rate),
-        ]
+        self.dimensionless().state(&self.start)
     }
 
     /// The controller's sample time, s.
     #[must_use]
     pub fn sample_time(&self) -> f64 {
-        self.plant.natural_period() / self.controller.samples_per_period
+        self.dimensionless().natural_period() / self.controller.samples_per_period
     }
 }

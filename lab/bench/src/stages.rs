@@ -4,6 +4,7 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 use thiserror::Error;
+use vines_model::numerics::{mean, standard_deviation};
 
 use crate::backbone::Cycle;
 use crate::experiment::Sample;
@@ -190,14 +191,12 @@ pub fn effect(name: &'static str, scene: &Scene) -> Result<Effect, StageError> {
             samples.clear();
         }
     }
-    let mean = |value: fn(&Cycle) -> f64| cycles.iter().map(value).sum::<f64>() / LOOK as f64;
-    let omega = mean(|cycle| cycle.omega);
-    let squares = cycles.iter().map(|cycle| (cycle.omega - omega).powi(2));
+    let omegas: Vec<f64> = cycles.iter().map(|cycle| cycle.omega).collect();
     Ok(Effect {
         name,
-        sigma: d.sigma(omega),
-        c: mean(|cycle| cycle.response[0].norm()) / d.b,
-        wander: (squares.sum::<f64>() / LOOK as f64).sqrt() / (d.epsilon * d.omega0),
+        sigma: d.sigma(mean(omegas.iter().copied())),
+        c: mean(cycles.iter().map(|cycle| cycle.response[0].norm())) / d.b,
+        wander: standard_deviation(&omegas) / d.omega_change(1.0),
         sample_seconds: fastest,
     })
 }

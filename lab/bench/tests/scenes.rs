@@ -116,18 +116,27 @@ fn a_value_of_the_wrong_type_is_named_with_its_line() {
 #[test]
 fn values_that_make_no_sense_are_named_with_unit_and_range() {
     for (argument, parts) in [
-        ("plant.M=0", ["plant.M = 0 kg", "positive"]),
-        ("plant.k=-1", ["plant.k = -1 N/m", "positive"]),
-        ("plant.m=nan", ["plant.m = NaN kg", "positive"]),
-        ("plant.b=inf", ["plant.b = inf m", "finite"]),
-        ("plant.c=-0.1", ["plant.c = -0.1 N s/m", "zero or positive"]),
-        ("plant.r=0", ["plant.r = 0 (dimensionless)", "at most 1"]),
+        ("plant.M=0", ["M (primary mass) = 0 kg", "above 0"]),
+        ("plant.k=-1", ["k (stiffness) = -1 N/m", "above 0"]),
+        ("plant.m=nan", ["m (particle mass) = NaN kg", "above 0"]),
+        (
+            "plant.b=inf",
+            ["b (half-width of the cavity) = inf m", "finite"],
+        ),
+        ("plant.c=-0.1", ["c (damping) = -0.1 N", "0 or above"]),
+        (
+            "plant.r=0",
+            ["r (coefficient of restitution) = 0", "at most 1"],
+        ),
         (
             "plant.r=1.01",
-            ["plant.r = 1.01 (dimensionless)", "at most 1"],
+            ["r (coefficient of restitution) = 1.01", "at most 1"],
         ),
-        ("start.q2=0.02", ["start.q2 = 0.02 m", "b = 0.01 m"]),
-        ("start.q1=inf", ["start.q1 = inf m", "finite"]),
+        ("start.q2=0.02", ["q1 - q2", "-0.02 m"]),
+        (
+            "start.q1=inf",
+            ["q1 (displacement of the primary mass) = inf m", "finite"],
+        ),
         (
             "excitation.G=-1",
             ["excitation.G = -1 (dimensionless)", "zero or positive"],

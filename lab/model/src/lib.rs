@@ -8,7 +8,9 @@
 
 mod dimensionless;
 pub mod map;
+pub mod numerics;
 pub mod orbit;
+pub mod regime;
 pub mod theory;
 
 pub use dimensionless::Dimensionless;

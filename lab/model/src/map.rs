@@ -7,11 +7,9 @@
 mod axis;
 mod grid;
 mod island;
-mod regime;
 mod run;
 
 pub use axis::{Axis, Range};
 pub use grid::{Cell, Map, MapError, Plan};
 pub use island::outline;
-pub use regime::Regime;
 pub use run::{Point, observe};

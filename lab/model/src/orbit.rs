@@ -14,7 +14,6 @@ mod impact_map;
 mod multipliers;
 mod oscillator;
 mod periodic;
-mod roots;
 mod search;
 mod settle;
 mod shape;

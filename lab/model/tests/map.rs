@@ -2,8 +2,9 @@
 
 use vines_model::{
     Dimensionless,
-    map::{Axis, Map, Plan, Point, Range, Regime, observe},
+    map::{Axis, Map, Plan, Point, Range, observe},
     orbit::phase_resonant,
+    regime::Regime,
 };
 
 const MOVING: [f64; 4] = [0.0, 0.0, 0.0, 0.9];

@@ -17,7 +17,10 @@ const PERIODS: f64 = 400.0;
 pub(super) fn file(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
     let plant = parameter_set(&parameters::plant(scene));
     let controller = parameter_set(&parameters::controller(scene)?);
-    let stop_time = format!("stopTime=\"{}\"", PERIODS * scene.plant.natural_period());
+    let stop_time = format!(
+        "stopTime=\"{}\"",
+        PERIODS * scene.dimensionless().natural_period()
+    );
     let structure = STRUCTURE.replace("stopTime=\"derived\"", &stop_time);
 
     let inside: Vec<String> = fmus

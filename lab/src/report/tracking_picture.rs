@@ -4,7 +4,7 @@ use plotters::chart::SeriesLabelPosition;
 use plotters::coord::Shift;
 use plotters::prelude::*;
 
-use super::tracking::TrackedReport;
+use crate::comparison::TrackedComparison;
 use crate::identification::Regime;
 use crate::orbit::Orbit;
 use crate::theory::{BackbonePoint, SlowFlow};
@@ -50,7 +50,7 @@ const PLANES: [Plane; 2] = [
 ];
 
 /// The picture as SVG; plotters reports its own errors.
-pub(super) fn draw(report: &TrackedReport) -> Result<String, String> {
+pub(super) fn draw(report: &TrackedComparison) -> Result<String, String> {
     let mut text = String::new();
     {
         let area = SVGBackend::with_string(&mut text, (px(SIZE.0), px(SIZE.1))).into_drawing_area();
@@ -63,7 +63,7 @@ pub(super) fn draw(report: &TrackedReport) -> Result<String, String> {
     Ok(text.replacen(&drawn, &shown, 1))
 }
 
-fn draw_on(area: &Area, report: &TrackedReport) -> Result<(), Failed> {
+fn draw_on(area: &Area, report: &TrackedComparison) -> Result<(), Failed> {
     area.fill(&WHITE)?;
     let p = &report.parameters;
     let title = "Backbone, tracked with the response held";
@@ -86,7 +86,7 @@ fn draw_on(area: &Area, report: &TrackedReport) -> Result<(), Failed> {
     plane(&right, report, &PLANES[1])
 }
 
-fn plane(area: &Area, report: &TrackedReport, plane: &Plane) -> Result<(), Failed> {
+fn plane(area: &Area, report: &TrackedComparison, plane: &Plane) -> Result<(), Failed> {
     let p = &report.parameters;
     let points: Vec<[f64; 3]> = report
         .points
@@ -102,7 +102,7 @@ fn plane(area: &Area, report: &TrackedReport, plane: &Plane) -> Result<(), Faile
         .filter(|point| point[0] <= top)
         .collect();
     let mut exact: Vec<[f64; 3]> = Vec::new();
-    for orbit in report.exact().orbits() {
+    for orbit in report.exact.orbits() {
         let next = of(orbit);
         let apart = |last: &[f64; 3]| (0..3).map(|i| (next[i] - last[i]).abs()).sum::<f64>();
         if next[0] <= top && exact.last().is_none_or(|last| apart(last) >= APART) {

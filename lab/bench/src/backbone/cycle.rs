@@ -1,6 +1,7 @@
 //! One period of the drive, reduced to a few numbers.
 
-use nalgebra::{Complex, SMatrix, SVector};
+use nalgebra::{Complex, DVector};
+use vines_model::numerics::{HarmonicBasis, mean};
 
 use crate::experiment::Sample;
 
@@ -28,35 +29,31 @@ impl Cycle {
         if samples.len() <= TERMS {
             return None;
         }
-        let mut normal = SMatrix::<f64, TERMS, TERMS>::zeros();
-        let mut right = [SVector::<f64, TERMS>::zeros(); 2];
         let mut turned = phase;
-        for sample in samples {
-            let mut row = SVector::<f64, TERMS>::zeros();
-            row[0] = 1.0;
-            for harmonic in 1..=3 {
-                let (sin, cos) = (harmonic as f64 * turned).sin_cos();
-                row[2 * harmonic - 1] = sin;
-                row[2 * harmonic] = cos;
-            }
-            normal += row * row.transpose();
-            right[0] += row * sample.sensors.response;
-            right[1] += row * sample.sensors.reference.unwrap_or(0.0);
-            turned += sample.command.drive.omega * sample_time;
-        }
-        let factors = normal.cholesky()?;
-        let [response, base] = right.map(|right| factors.solve(&right));
-        let harmonic = |c: &SVector<f64, TERMS>, h: usize| Complex::new(c[2 * h - 1], c[2 * h]);
-        let mean = |value: fn(&Sample) -> f64| {
-            samples.iter().map(value).sum::<f64>() / samples.len() as f64
+        let phases: Vec<f64> = samples
+            .iter()
+            .map(|sample| {
+                let now = turned;
+                turned += sample.command.drive.omega * sample_time;
+                now
+            })
+            .collect();
+        let basis = HarmonicBasis::new(&phases, 0, &[Some(0); 3]);
+        let fitted = |value: fn(&Sample) -> f64| {
+            basis.fit(&DVector::from_iterator(
+                samples.len(),
+                samples.iter().map(value),
+            ))
         };
+        let response = fitted(|s| s.sensors.response)?;
+        let mean = |value: fn(&Sample) -> f64| mean(samples.iter().map(value));
         let measured = samples.iter().all(|s| s.sensors.reference.is_some());
         let base = if measured {
-            harmonic(&base, 1)
+            fitted(|s| s.sensors.reference.unwrap_or(0.0))?.harmonic(1)
         } else {
             Complex::new(mean(|s| s.command.drive.amplitude), 0.0)
         };
-        let response = [1, 2, 3].map(|h| harmonic(&response, h));
+        let response = [1, 2, 3].map(|n| response.harmonic(n));
         let phase_error = if measured {
             (response[0] * base.conj() * Complex::from_polar(1.0, -target)).arg()
         } else {

@@ -12,6 +12,8 @@
 //! agree to within a tolerance, or to within what is random from period to period where that hides it, and the slopes are known
 //! well enough.
 
+use vines_model::numerics::{Line, mean, noise, standard_deviation};
+
 use super::cycle::Cycle;
 
 /// The criterion.
@@ -96,106 +98,59 @@ impl Estimate {
     /// From at least three periods.
     #[must_use]
     pub fn of(cycles: &[Cycle]) -> Self {
-        let mean =
-            |value: fn(&Cycle) -> f64| cycles.iter().map(value).sum::<f64>() / cycles.len() as f64;
         let amplitudes: Vec<f64> = cycles.iter().map(|c| c.response[0].norm()).collect();
-        let n = amplitudes.len() as f64;
-        let response = amplitudes.iter().sum::<f64>() / n;
-        let squares = amplitudes.iter().map(|a| (a - response).powi(2));
-        let deviation = (squares.sum::<f64>() / n).sqrt();
-        let phase_error = mean(|cycle| cycle.phase_error);
-        let gain = 0.5 * mean(|cycle| cycle.omega);
+        let response = mean(amplitudes.iter().copied());
+        let phase_error = mean(cycles.iter().map(|cycle| cycle.phase_error));
+        let gain = 0.5 * mean(cycles.iter().map(|cycle| cycle.omega));
         let period = std::f64::consts::PI / gain;
-        let drive = Line::through(&balance(
-            cycles,
-            |cycle| cycle.base.norm() * period,
-            |cycle| -cycle.response[0].norm() / gain,
-        ));
-        let base = drive.slope / period;
+        let base = |cycle: &Cycle| cycle.base.norm() * period;
+        let drive = Balance::of(cycles, base, |cycle| -cycle.response[0].norm() / gain);
+        let base = drive.line.slope / period;
         let damping_rate = gain * base / response;
-        let turning = Line::through(&balance(
-            cycles,
-            |cycle| (cycle.omega + damping_rate * cycle.phase_error) * period,
-            |cycle| cycle.phase_error,
-        ));
+        let rate = |cycle: &Cycle| (cycle.omega + damping_rate * cycle.phase_error) * period;
+        let turning = Balance::of(cycles, rate, |cycle| cycle.phase_error);
         Self {
             periods: cycles.len(),
             response,
             base,
-            omega: turning.slope / period,
+            omega: turning.line.slope / period,
             phase_error,
             damping_rate,
-            spread: [deviation, scatter(&amplitudes)].map(|one| one / response),
+            spread: [standard_deviation(&amplitudes), noise(&amplitudes)].map(|one| one / response),
             errors: [
-                drive.slope_error / drive.slope.abs(),
-                turning.slope_error / (period * damping_rate).abs(),
+                drive.line.slope_error / drive.line.slope.abs(),
+                turning.line.slope_error / (period * damping_rate).abs(),
             ],
             random: [drive.random, turning.random],
         }
     }
 }
 
-/// The integral of `rate` (per period) from the middle of the first period on, plus `level`.
-fn balance(
-    cycles: &[Cycle],
-    rate: impl Fn(&Cycle) -> f64,
-    level: impl Fn(&Cycle) -> f64,
-) -> Vec<f64> {
-    let mut integral = 0.0;
-    let mut before: Option<f64> = None;
-    cycles
-        .iter()
-        .map(|cycle| {
-            let now = rate(cycle);
-            integral += before.map_or(0.0, |before| 0.5 * (before + now));
-            before = Some(now);
-            integral + level(cycle)
-        })
-        .collect()
-}
-
-/// The straight line that fits equally spaced values best.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct Line {
-    /// Change from a value to the next.
-    slope: f64,
-    /// Standard error of the slope.
-    slope_error: f64,
+/// A balance as a straight line in time.
+struct Balance {
+    line: Line,
     /// The residuals are random.
     random: bool,
 }
 
-impl Line {
-    /// Through at least three values.
-    fn through(values: &[f64]) -> Self {
-        let n = values.len() as f64;
-        let middle = 0.5 * (n - 1.0);
-        let mean = values.iter().sum::<f64>() / n;
-        let spread = n * (n * n - 1.0) / 12.0;
-        let place = |i: usize| i as f64 - middle;
-        let moment = |(i, value): (usize, &f64)| place(i) * (value - mean);
-        let slope = values.iter().enumerate().map(moment).sum::<f64>() / spread;
-        let residual = |(i, value): (usize, &f64)| (value - mean - slope * place(i)).powi(2);
-        let variance = values.iter().enumerate().map(residual).sum::<f64>() / (n - 2.0);
+impl Balance {
+    /// The line through the integral of `rate` (per period) from the middle of the first period on, plus `level`.
+    fn of(cycles: &[Cycle], rate: impl Fn(&Cycle) -> f64, level: impl Fn(&Cycle) -> f64) -> Self {
+        let mut integral = 0.0;
+        let mut before: Option<f64> = None;
+        let mut value = |cycle: &Cycle| {
+            let now = rate(cycle);
+            integral += before.map_or(0.0, |before| 0.5 * (before + now));
+            before = Some(now);
+            integral + level(cycle)
+        };
+        let values: Vec<f64> = cycles.iter().map(&mut value).collect();
+        let line = Line::fit(&values);
         Self {
-            slope,
-            slope_error: (variance / spread).sqrt(),
-            random: scatter(values) >= RANDOM_SHARE * variance.sqrt(),
+            random: noise(&values) >= RANDOM_SHARE * line.residual,
+            line,
         }
     }
-}
-
-/// Standard deviation of white noise on a smooth course, by third differences; 0 for fewer than six values.
-fn scatter(values: &[f64]) -> f64 {
-    let differences = values
-        .windows(4)
-        .map(|v| v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]);
-    let count = differences.len();
-    if count < 3 {
-        return 0.0;
-    }
-    // White noise of variance 1 gives them the variance 1 + 9 + 9 + 1.
-    (differences.map(|d| d * d).sum::<f64>() / (20.0 * count as f64)).sqrt()
 }
 
 #[cfg(test)]

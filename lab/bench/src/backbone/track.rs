@@ -173,9 +173,9 @@ pub fn track(
         let (g, sigma) = forecast::change(settings.feed, &known, level, &slow_flow);
         bench.controller.hold_response(Move {
             response: level * d.b,
-            duration: settings.move_periods * scene.plant.natural_period(),
-            amplitude: g * d.b * d.epsilon,
-            omega: sigma * d.epsilon * d.omega0,
+            duration: settings.move_periods * d.natural_period(),
+            amplitude: d.amplitude(g),
+            omega: d.omega_change(sigma),
         })?;
         points.push(hold(&mut bench, scene, level)?);
     }
@@ -241,7 +241,7 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         level,
         c: said.response / d.b,
         sigma: d.sigma(said.omega),
-        g: said.base / (d.b * d.epsilon),
+        g: d.excitation(said.base),
         phase_error_deg: said.phase_error.to_degrees(),
         periods: bench.periods - start,
         regime: regime_by_response(averaged, scene),

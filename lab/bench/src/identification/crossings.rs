@@ -2,6 +2,8 @@
 
 use std::ops::Range;
 
+use vines_model::numerics::{bisection, mean_square};
+
 /// One period of a signal, from a zero crossing to the next but one.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Period {
@@ -29,8 +31,7 @@ pub fn periods(values: &[f64], sample_time: f64) -> Vec<Period> {
         .map(|three| {
             let (from, to) = (three[0], three[2]);
             let samples = from.ceil() as usize..to.ceil() as usize;
-            let squares = values[samples.clone()].iter().map(|value| value * value);
-            let mean_square = squares.sum::<f64>() / samples.len() as f64;
+            let mean_square = mean_square(values[samples.clone()].iter().copied());
             Period {
                 middle: 0.5 * (from + to),
                 omega: std::f64::consts::TAU / ((to - from) * sample_time),
@@ -48,16 +49,7 @@ fn between(y: [f64; 4]) -> f64 {
             - y[2] * (x + 1.0) * x * (x - 2.0) / 2.0
             + y[3] * (x + 1.0) * x * (x - 1.0) / 6.0
     };
-    let (mut low, mut high) = (0.0, 1.0);
-    let rising = y[2] > y[1];
-    for _ in 0..50 {
-        let middle = 0.5 * (low + high);
-        if (cubic(middle) > 0.0) == rising {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
+    let (low, high) = bisection(0.0, 1.0, |x| (cubic(x) > 0.0) == (y[2] > y[1]));
     0.5 * (low + high)
 }
 

@@ -5,13 +5,13 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use super::COMPARED_ABOVE;
 use super::crossings;
-use super::fit::{harmonic, mean_at_middle};
-use super::regime::{end_of_synchrony, impacts};
+use super::fit::harmonic;
+use super::regime::impacts;
 use crate::experiment::Record;
 use crate::scene::{Estimator, Scene};
-use vines_model::theory::{BranchSide, SlowFlow};
+use vines_model::numerics::mean;
+use vines_model::regime::end_of_synchrony;
 
 /// One point along the decay; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -26,14 +26,14 @@ pub struct DecayPoint {
     pub b: Option<f64>,
     /// Detuning.
     pub sigma: f64,
-    /// Detuning of the backbone at this C, to first order; absent below the fold.
-    pub sigma_theory: Option<f64>,
 }
 
 /// Points per period along the decay.
 const PER_PERIOD: f64 = 8.0;
 
-pub(crate) fn points(record: &Record, scene: &Scene, slow_flow: &SlowFlow) -> Vec<DecayPoint> {
+/// The points along the decay of a record, up to the loss of synchrony where the rig reports impacts.
+#[must_use]
+pub fn decay_points(record: &Record, scene: &Scene) -> Vec<DecayPoint> {
     let d = scene.dimensionless();
     let decay = record.decay();
     let dt = record.sample_time;
@@ -64,29 +64,20 @@ pub(crate) fn points(record: &Record, scene: &Scene, slow_flow: &SlowFlow) -> Ve
             })
             .collect(),
     };
-    // Without impacts to go by, the decay ends where the backbone does: at the fold.
-    let least = if first.witness.is_some() {
-        0.0
-    } else {
-        slow_flow.manifold.c_min() * d.b
-    };
-    let within =
-        |piece: &Piece| decay[piece.samples.end - 1].time <= end && piece.amplitude >= least;
     pieces
         .into_iter()
-        .take_while(within)
+        .take_while(|piece| decay[piece.samples.end - 1].time <= end)
         .map(|piece| {
             let speeds: Option<Vec<f64>> = decay[piece.samples]
                 .iter()
                 .map(|s| s.witness.map(|w| w.particle_velocity.abs()))
                 .collect();
-            let c = piece.amplitude / d.b;
             DecayPoint {
                 tau: d.omega0 * piece.time,
-                c,
-                b: speeds.map(|speeds| mean_at_middle(speeds.into_iter()) / (d.b * d.omega0)),
+                c: piece.amplitude / d.b,
+                // The mean is the value at the middle of the straight line that fits best.
+                b: speeds.map(|speeds| d.speed(mean(speeds))),
                 sigma: d.sigma(piece.omega),
-                sigma_theory: slow_flow.backbone_sigma(c, BranchSide::Right),
             }
         })
         .collect()
@@ -119,18 +110,4 @@ fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<Piece> {
         });
     }
     pieces
-}
-
-/// RMS of sigma less theory over the points above [`COMPARED_ABOVE`]; `None` where there is none.
-pub(super) fn rms_sigma_error(points: &[DecayPoint]) -> Option<f64> {
-    let squares: Vec<f64> = points
-        .iter()
-        .filter(|point| point.c > COMPARED_ABOVE)
-        .filter_map(|point| {
-            point
-                .sigma_theory
-                .map(|theory| (point.sigma - theory).powi(2))
-        })
-        .collect();
-    (!squares.is_empty()).then(|| (squares.iter().sum::<f64>() / squares.len() as f64).sqrt())
 }

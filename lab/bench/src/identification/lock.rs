@@ -2,8 +2,11 @@
 
 use serde::Serialize;
 
-use super::fit::{harmonic, mean_at_middle};
-use super::regime::{Regime, classify};
+use vines_model::numerics::mean;
+use vines_model::regime::Regime;
+
+use super::fit::harmonic;
+use super::regime::classify;
 use super::response::regime_by_response;
 use crate::experiment::Record;
 use crate::scene::Scene;
@@ -48,7 +51,7 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Lock {
     let d = scene.dimensionless();
     let hold = record.hold();
     let dt = record.sample_time;
-    let commanded = hold.iter().map(|s| s.command.drive.omega).sum::<f64>() / hold.len() as f64;
+    let commanded = mean(hold.iter().map(|s| s.command.drive.omega));
     let response: Vec<f64> = hold.iter().map(|s| s.sensors.response).collect();
     let v = harmonic(&response, dt, commanded);
     let omega = v.map_or(commanded, |v| v.omega);
@@ -73,10 +76,10 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Lock {
     };
     let amplitude = base.map_or(command.drive.amplitude, |base| base.amplitude);
     Lock {
-        g: amplitude / (d.b * d.epsilon),
+        g: d.excitation(amplitude),
         sigma: d.sigma(omega),
         c: v.map_or(0.0, |v| v.amplitude) / d.b,
-        b: speeds.map(|speeds| mean_at_middle(speeds.into_iter()) / (d.b * d.omega0)),
+        b: speeds.map(|speeds| d.speed(mean(speeds))),
         phase_error_deg: phase_error.to_degrees(),
         periods_to_lock: record.settled as f64 * dt * omega / std::f64::consts::TAU,
         impacts_per_period,

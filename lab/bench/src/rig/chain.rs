@@ -78,7 +78,7 @@ impl Chain {
             filter: (settings.filter > 0.0).then(|| LowPass::new(settings.filter * d.omega0)),
             converter: Converter::new(settings.adc_bits, range),
         };
-        let base_range = settings.base_range * d.b * d.epsilon;
+        let base_range = d.amplitude(settings.base_range);
         Self {
             rig,
             response: channel(settings.response_range * d.b),

@@ -34,7 +34,7 @@ impl BuiltIn {
         let limits = [scene.backbone.g_max, scene.controller.g_max];
         let g_max = limits.into_iter().filter(|limit| *limit > 0.0);
         let lock = Config {
-            amplitude_max: g_max.fold(f64::INFINITY, f64::min) * d.b * d.epsilon,
+            amplitude_max: d.amplitude(g_max.fold(f64::INFINITY, f64::min)),
             bandwidth: scene.backbone.bandwidth * d.omega0,
             ..configuration(scene)
         }
@@ -49,12 +49,11 @@ impl BuiltIn {
 /// The scene's controller settings in SI units.
 #[must_use]
 pub fn configuration(scene: &Scene) -> Config {
-    let omega0 = scene.plant.omega0();
+    let d = scene.dimensionless();
+    let omega0 = d.omega0;
     let c = &scene.controller;
     let amplitude = scene.amplitude;
-    let period = scene.plant.natural_period();
-    // What G = 1 is in metres.
-    let unit = scene.plant.half_width * scene.plant.epsilon();
+    let period = d.natural_period();
     let defaults = Config::for_resonance(omega0, amplitude);
     Config {
         sample_time: scene.sample_time(),
@@ -62,11 +61,11 @@ pub fn configuration(scene: &Scene) -> Config {
         omega_min: c.omega_min * omega0,
         omega_max: c.omega_max * omega0,
         bandwidth: c.bandwidth * omega0,
-        damping_rate: 0.5 * scene.plant.damping / scene.plant.mass,
+        damping_rate: 0.5 * scene.plant.damping / scene.plant.primary_mass,
         phase_target: c.phase_target_radians(),
         delay: scene.chain.stated_delay(omega0 * scene.sample_time()) / omega0
             + c.delay * scene.sample_time(),
-        amplitude_max: c.g_max * unit,
+        amplitude_max: d.amplitude(c.g_max),
         response_max: c.c_max * scene.plant.half_width,
         ramp_time: c.ramp_periods * period,
         release_time: c.release_periods * period,

@@ -1,9 +1,9 @@
 //! The plant itself as a rig, with no FMU in between.
 
-use lovines::{InvalidValue, Parameters, Plant, State};
+use lovines::{InvalidValue, Plant, State};
 
 use super::{Drive, Rig, RigError, Sensors, Witness};
-use crate::scene::Scene;
+use crate::scene::{Scene, symbols};
 
 /// The plant, stepped directly.
 #[derive(Clone)]
@@ -17,43 +17,19 @@ impl Simulated {
     /// # Errors
     /// A parameter or a start that makes no sense.
     pub fn new(scene: &Scene) -> Result<Self, InvalidValue> {
-        let (p, s) = (&scene.plant, &scene.start);
-        let parameters = Parameters {
-            primary_mass: p.mass,
-            stiffness: p.stiffness,
-            damping: p.damping,
-            particle_mass: p.particle_mass,
-            half_width: p.half_width,
-            restitution: p.restitution,
-        };
-        let start = State {
-            q1: s.q1,
-            dq1: s.dq1,
-            q2: s.q2,
-            dq2: s.dq2,
-        };
         Ok(Self {
-            plant: Plant::new(parameters, start)?,
+            plant: Plant::new(scene.plant, scene.start)?,
         })
     }
 }
 
-/// Parameters and start of the plant, under the names of its variables.
+/// Parameters and start of the plant, under the names of the FMU's variables.
 #[must_use]
 pub fn start_values(scene: &Scene) -> [(&'static str, f64); 10] {
-    let (plant, start) = (&scene.plant, &scene.start);
-    [
-        ("M", plant.mass),
-        ("k", plant.stiffness),
-        ("c", plant.damping),
-        ("m", plant.particle_mass),
-        ("b", plant.half_width),
-        ("r", plant.restitution),
-        ("q1", start.q1),
-        ("der(q1)", start.dq1),
-        ("q2", start.q2),
-        ("der(q2)", start.dq2),
-    ]
+    let [mass, k, c, m, b, r] = symbols(&scene.plant);
+    let State { q1, dq1, q2, dq2 } = scene.start;
+    let [q1, dq1] = [("q1", q1), ("der(q1)", dq1)];
+    [mass, k, c, m, b, r, q1, dq1, ("q2", q2), ("der(q2)", dq2)]
 }
 
 impl Rig for Simulated {

@@ -2,6 +2,8 @@
 
 use std::path::PathBuf;
 
+use lovines::InvalidValue;
+
 /// A scene that cannot be used; the message is one that a person can act on.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
@@ -41,6 +43,9 @@ pub enum SceneError {
         /// What is allowed.
         allowed: String,
     },
+    /// A plant or a start that makes no sense.
+    #[error("[plant] or [start]: {0}")]
+    Plant(#[from] InvalidValue),
     /// Keys that are missing or do not go together.
     #[error("{origin}: {message}")]
     Keys {

@@ -1,16 +1,17 @@
-//! `--set section.key=value`: one value of a scene replaced from the command line.
+//! `--set section.key=value`: one value of a scene replaced from the command line, written as in TOML.
 
 use std::str::FromStr;
 
+use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::{
     SceneError,
     plant::{DIMENSIONLESS_KEYS, SI_KEYS},
-    raw::Raw,
+    sections::Sections,
 };
 
-/// One replaced value; parse it from `section.key=value`, where the value is written as in TOML.
+/// One replaced value.
 #[derive(Debug, Clone)]
 pub struct Override {
     argument: String,
@@ -23,17 +24,26 @@ impl FromStr for Override {
     type Err = String;
 
     fn from_str(argument: &str) -> Result<Self, String> {
-        let form = "expected section.key=value, for instance plant.r=0.7";
-        let (path, value) = argument.split_once('=').ok_or(form)?;
-        let (section, key) = path.trim().split_once('.').ok_or(form)?;
-        let value = value
-            .trim()
-            .parse()
-            .map_err(|_| format!("`{}` is not a TOML value such as 0.7", value.trim()))?;
+        let table: Table = argument.parse().map_err(|error: toml::de::Error| {
+            format!(
+                "{}; expected section.key=value, for instance plant.r=0.7",
+                error.message()
+            )
+        })?;
+        let single = |table: Table| {
+            let mut entries = table.into_iter();
+            entries.next().filter(|_| entries.next().is_none())
+        };
+        let (section, keys) = match single(table) {
+            Some((section, Value::Table(keys))) => (section, single(keys)),
+            _ => (String::new(), None),
+        };
+        let (key, value) =
+            keys.ok_or("expected one section.key=value, for instance plant.r=0.7")?;
         Ok(Self {
             argument: argument.into(),
-            section: section.trim().into(),
-            key: key.trim().into(),
+            section,
+            key,
             value,
         })
     }
@@ -53,15 +63,15 @@ impl Override {
 
     /// A plant is given in one set of units; a key of the other would silently mean something else.
     fn check_units(&self, plant: &Table) -> Result<(), SceneError> {
-        let key = self.key.as_str();
+        let is_in = |keys: &[&str]| keys.contains(&self.key.as_str());
         let has = |keys: &[&str]| keys.iter().any(|key| plant.contains_key(*key));
-        if DIMENSIONLESS_KEYS.contains(&key) && has(&SI_KEYS) {
+        if is_in(&DIMENSIONLESS_KEYS) && has(&SI_KEYS) {
             return Err(self.error(
                 "this scene gives its plant in SI units; set plant.m and plant.c instead \
                  (epsilon = m/M, lambda = c/(m omega0)), or use a scene with epsilon and lambda",
             ));
         }
-        if SI_KEYS.contains(&key) && has(&DIMENSIONLESS_KEYS) {
+        if is_in(&SI_KEYS) && has(&DIMENSIONLESS_KEYS) {
             return Err(self.error(
                 "this scene gives its plant in dimensionless form; set plant.epsilon, plant.lambda or plant.r",
             ));
@@ -69,7 +79,7 @@ impl Override {
         Ok(())
     }
 
-    fn insert(&self, scene: &mut Table) -> Result<(), SceneError> {
+    fn merge_into(&self, scene: &mut Table) -> Result<(), SceneError> {
         let section = scene
             .entry(&self.section)
             .or_insert_with(|| Value::Table(Table::new()));
@@ -80,30 +90,30 @@ impl Override {
             self.check_units(section)?;
         }
         // G and E say the same thing: the one that is set replaces the other.
-        if self.is("excitation", "E") {
-            section.remove("G");
-        } else if self.is("excitation", "G") {
-            section.remove("E");
+        for (set, other) in [("E", "G"), ("G", "E")] {
+            if self.is("excitation", set) {
+                section.remove(other);
+            }
         }
         section.insert(self.key.clone(), self.value.clone());
         Ok(())
     }
 }
 
-/// Applies the overrides to the scene in both of its forms, the sections read and the table they were read from;
-/// one by one, so that a mistake is blamed on the argument that made it.
-pub(super) fn apply(
-    mut raw: Raw,
+/// The sections of `table` with the overrides applied one by one, so that a mistake is blamed on the argument that made it.
+pub(super) fn merged(
     mut table: Table,
     overrides: &[Override],
-) -> Result<Raw, SceneError> {
+) -> Result<Option<Sections>, SceneError> {
     let sets = |key| overrides.iter().find(|one| one.is("excitation", key));
     if let (Some(_), Some(second)) = (sets("G"), sets("E")) {
         return Err(second.error("excitation.G is set as well: set one of them"));
     }
+    let mut sections = None;
     for one in overrides {
-        one.insert(&mut table)?;
-        raw = Raw::from_table(table.clone()).map_err(|error| one.error(error.message().trim()))?;
+        one.merge_into(&mut table)?;
+        let read = Sections::deserialize(table.clone());
+        sections = Some(read.map_err(|error| one.error(error.message().trim()))?);
     }
-    Ok(raw)
+    Ok(sections)
 }

@@ -15,10 +15,6 @@ impl Quantity {
         Self { key, value, unit }
     }
 
-    pub(super) fn finite(self) -> Result<(), SceneError> {
-        self.check(true, "must be finite")
-    }
-
     pub(super) fn positive(self) -> Result<(), SceneError> {
         self.check(self.value > 0.0, "must be positive and finite")
     }

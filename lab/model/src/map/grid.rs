@@ -8,10 +8,10 @@ use lovines::InvalidValue;
 
 use super::{
     axis::{Axis, Range},
-    regime::Regime,
     run::{Point, observe},
 };
 use crate::Dimensionless;
+use crate::regime::Regime;
 use crate::theory::SlowFlow;
 
 /// What to map.

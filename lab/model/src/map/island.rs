@@ -1,9 +1,15 @@
 //! The outline of the theory's stable island, by marching squares on a fine grid.
 
+use std::convert::Infallible;
+
 use super::grid::Plan;
+use crate::numerics::try_bisection;
 
 /// Fine cells across the picture, each way.
 const FINE: usize = 100;
+
+/// Fraction of a fine cell to which its border is found.
+const FINEST: f64 = 1.0 / 4096.0;
 
 /// A point of the plane.
 type Place = (f64, f64);
@@ -42,14 +48,14 @@ pub fn outline(plan: &Plan) -> Vec<[Place; 2]> {
 }
 
 /// Where the border is crossed between two places, of which the first is inside or not.
-fn border(mut from: Place, mut to: Place, at_from: bool, inside: impl Fn(Place) -> bool) -> Place {
-    for _ in 0..12 {
-        let middle = (0.5 * (from.0 + to.0), 0.5 * (from.1 + to.1));
-        if inside(middle) == at_from {
-            from = middle;
-        } else {
-            to = middle;
-        }
-    }
-    to
+fn border(from: Place, to: Place, at_from: bool, inside: impl Fn(Place) -> bool) -> Place {
+    let at = |part: f64| {
+        (
+            from.0 + part * (to.0 - from.0),
+            from.1 + part * (to.1 - from.1),
+        )
+    };
+    let like_from = |part: f64| Ok::<_, Infallible>(inside(at(part)) == at_from);
+    let Ok((_, end)) = try_bisection(0.0, 1.0, FINEST, like_from);
+    at(end)
 }

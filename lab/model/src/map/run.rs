@@ -5,8 +5,8 @@ use std::f64::consts::TAU;
 use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
 
-use super::regime::{Hit, Pattern, Regime, pattern, synchrony};
 use crate::Dimensionless;
+use crate::regime::{Impact, Pattern, Regime, pattern, synchrony};
 
 /// What was found at one point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -63,27 +63,27 @@ pub fn observe(
         for _ in 0..settle {
             plant.advance(drive, TAU / omega);
         }
-        let (hits, rests) = watch(&mut plant, drive, record);
+        let (impacts, rests) = recorded(&mut plant, drive, record);
         let found = |regime, pattern: Option<Pattern>, growth| Point {
             regime,
-            impacts_per_period: hits.len() as f64 / record as f64,
+            impacts_per_period: impacts.len() as f64 / record as f64,
             impacts: pattern.map_or(0, |one| one.impacts),
             periods: pattern.map_or(0, |one| one.periods),
-            synchrony: synchrony(&hits),
+            synchrony: synchrony(&impacts),
             growth,
         };
         if rests * STICKING >= record {
             return Ok(found(Regime::Sticking, None, None));
         }
-        if hits.is_empty() {
+        if impacts.is_empty() {
             return Ok(found(Regime::NoImpacts, None, None));
         }
-        if let Some(one) = pattern(&hits) {
+        if let Some(one) = pattern(&impacts) {
             return Ok(found(one.regime, Some(one), None));
         }
         let growth = growth(scene, drive, &plant);
         round += 1;
-        let regime = if growth > CHAOS && synchrony(&hits) < CAPTURES {
+        let regime = if growth > CHAOS && synchrony(&impacts) < CAPTURES {
             Regime::Chaotic
         } else if growth > CHAOS {
             Regime::Modulated
@@ -99,21 +99,20 @@ pub fn observe(
 }
 
 /// The impacts of so many periods, and how often the particle came to rest on a wall or was at rest when they began.
-fn watch(plant: &mut Plant, drive: Drive, periods: usize) -> (Vec<Hit>, usize) {
-    let mut hits = Vec::new();
+fn recorded(plant: &mut Plant, drive: Drive, periods: usize) -> (Vec<Impact>, usize) {
+    let mut impacts = Vec::new();
     let mut rests = usize::from(plant.contact().is_some());
     for n in 0..periods {
         plant.advance_with(drive, TAU / drive.omega, |event| match event {
-            Event::Impact { t, wall, velocity } => hits.push(Hit {
-                phase: TAU * n as f64 + drive.omega * t,
-                wall: wall.sign(),
+            Event::Impact { t, velocity, .. } => impacts.push(Impact {
+                time: TAU * n as f64 + drive.omega * t,
                 velocity,
             }),
             Event::Stuck { .. } => rests += 1,
             Event::Released { .. } => {}
         });
     }
-    (hits, rests)
+    (impacts, rests)
 }
 
 fn numbers(plant: &Plant) -> [f64; 4] {

@@ -13,8 +13,9 @@ use std::f64::consts::{FRAC_PI_2, PI};
 
 use nalgebra::{Complex, Matrix2, Vector2};
 
-use super::{AfterImpact, oscillator::Oscillator, roots::quadratic};
+use super::{AfterImpact, oscillator::Oscillator};
 use crate::Dimensionless;
+use crate::numerics::quadratic;
 
 /// A symmetric motion that satisfies the impact law and the phase resonance, not yet checked for `|w| <= 1` in flight.
 #[derive(Debug, Clone, Copy)]

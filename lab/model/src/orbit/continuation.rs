@@ -12,6 +12,7 @@ use super::{
     shape::{Returned, Unknowns, follow},
 };
 use crate::Dimensionless;
+use crate::numerics::try_bisection;
 
 /// How far to go.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -99,6 +100,9 @@ const STRAIGHT: f64 = 0.98;
 /// Moduli this close to one still count as inside: rounding in conservative motions.
 const ON_CIRCLE: f64 = 1e-7;
 
+/// Fraction of a step to which a bifurcation is located.
+const FINEST: f64 = 1e-12;
+
 struct Curve<'a> {
     scene: &'a Dimensionless,
     start: &'a Periodic,
@@ -141,19 +145,10 @@ impl Curve<'_> {
     /// Where the number of multipliers outside the unit circle changes within a step.
     fn locate(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Special> {
         let x = from.unknowns();
-        let (mut low, mut high) = (0.0, step);
-        let mut found = None;
-        for _ in 0..40 {
-            let middle = 0.5 * (low + high);
-            let motion = self.motion(&self.correct(&x, tangent, middle)?)?;
-            if outside(&motion) == outside(from) {
-                low = middle;
-            } else {
-                high = middle;
-            }
-            found = Some(motion);
-        }
-        let motion = found?;
+        let at = |part: f64| self.motion(&self.correct(&x, tangent, part * step)?);
+        let like_from = |part: f64| at(part).map(|one| outside(&one) == outside(from)).ok_or(());
+        let (_, beyond) = try_bisection(0.0, 1.0, FINEST, like_from).ok()?;
+        let motion = at(beyond)?;
         let [re, im] = motion
             .multipliers
             .into_iter()

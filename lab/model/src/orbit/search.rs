@@ -5,9 +5,9 @@ use super::{
     candidate::{Candidate, candidates},
     flight::Flight,
     multipliers,
-    roots::{bisect, minimum},
 };
 use crate::Dimensionless;
+use crate::numerics::{bisection, golden_section};
 
 /// Frequencies searched, over omega0.
 const SEARCHED: [f64; 2] = [0.2, 3.0];
@@ -129,7 +129,7 @@ impl Branch<'_> {
             if let Some((before, existed)) = last
                 && existed != excess.is_some()
             {
-                let (left, right) = bisect(before, omega, |omega| self.excess(omega).is_some());
+                let (left, right) = bisection(before, omega, |omega| self.excess(omega).is_some());
                 let gap = [f64::NAN; 2];
                 let end = if existed { left } else { right };
                 let end = self.excess(end).map_or(gap, |excess| [end, excess]);
@@ -147,7 +147,7 @@ impl Branch<'_> {
         if a.is_nan() || b.is_nan() {
             return None;
         }
-        let (root, _) = bisect(a, b, |omega| {
+        let (root, _) = bisection(a, b, |omega| {
             self.excess(omega).is_some_and(|excess| excess > 0.0)
         });
         let candidate = self.at(root)?;
@@ -161,7 +161,7 @@ impl Branch<'_> {
             self.excess(omega)
                 .map_or(f64::INFINITY, |excess| sign * excess)
         };
-        let turn = minimum(a, b, distance);
+        let turn = golden_section(a, b, distance);
         if distance(turn) > 0.0 {
             return Vec::new();
         }

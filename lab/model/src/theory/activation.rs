@@ -2,6 +2,8 @@
 
 use serde::Serialize;
 
+use crate::numerics::{bisection, golden_section};
+
 use super::{
     slow_flow::SlowFlow,
     stability::{B_SYMMETRY_BREAKING, impacts_stable},
@@ -51,12 +53,14 @@ impl SlowFlow {
         let g = |b: f64| self.excitation_at(sigma, b);
         // Every B that a smallest G may need: the loss alone makes G grow with B far beyond the fold.
         let highest = 2.0 * B_SYMMETRY_BREAKING;
-        let all = smallest((0.0, highest), |_| true, g);
+        let all = smallest((0.0, highest), |_| true, g).unwrap_or(f64::NAN);
         let range = (self.manifold.b_min(), B_SYMMETRY_BREAKING);
+        let stable = smallest(range, |b| self.stable_at(sigma, b), g);
         Activation {
             from_rest: self.lambda.hypot(2.0 * sigma),
-            existence: all.unwrap_or(f64::NAN),
-            stable: smallest(range, |b| self.stable_at(sigma, b), g),
+            // Where the two minima are one, rounding does not order them.
+            existence: stable.map_or(all, |g| all.min(g)),
+            stable,
         }
     }
 }
@@ -67,22 +71,21 @@ fn smallest(
     wanted: impl Fn(f64) -> bool,
     f: impl Fn(f64) -> f64,
 ) -> Option<f64> {
-    let at = |n: f64| low + (high - low) * n / f64::from(GRID);
+    let step = (high - low) / f64::from(GRID);
     let best = (0..GRID)
-        .map(|n| at(f64::from(n) + 0.5))
+        .map(|n| low + step * (f64::from(n) + 0.5))
         .filter(|b| wanted(*b))
         .min_by(|one, other| f(*one).total_cmp(&f(*other)))?;
-    // Shrinking steps to whichever side is smaller and still wanted: towards a minimum or the edge of what is wanted.
-    let mut step = (high - low) / f64::from(GRID);
-    let mut b = best;
-    while step > 1e-15 {
-        let better = [b - step, b + step]
-            .into_iter()
-            .find(|one| *one > low && *one < high && wanted(*one) && f(*one) < f(b));
-        match better {
-            Some(one) => b = one,
-            None => step /= 2.0,
+    // The minimum lies inside the neighbouring cells, or at the edge of what is wanted.
+    let edge = |end: f64| {
+        let end = end.clamp(low, high);
+        if wanted(end) {
+            end
+        } else {
+            bisection(best, end, &wanted).0
         }
-    }
-    Some(f(b))
+    };
+    let (left, right) = (edge(best - step), edge(best + step));
+    let inner = golden_section(left, right, &f);
+    Some(f(inner).min(f(left)).min(f(right)))
 }

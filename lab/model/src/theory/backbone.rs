@@ -4,6 +4,8 @@ use std::f64::consts::FRAC_2_PI;
 
 use serde::Serialize;
 
+use crate::numerics::equally_spaced;
+
 use super::{manifold::BranchSide, slow_flow::SlowFlow, stability::impacts_stable};
 
 /// One point of the backbone, with the excitation that it needs.
@@ -81,9 +83,8 @@ impl SlowFlow {
     /// `points` samples of the backbone at equal steps of B, from `from` to `to`.
     #[must_use]
     pub fn backbone(&self, from: f64, to: f64, points: usize) -> Vec<BackbonePoint> {
-        let steps = points.saturating_sub(1).max(1) as f64;
-        (0..points)
-            .map(|i| self.backbone_at(from + (to - from) * i as f64 / steps))
+        equally_spaced(from, to, points)
+            .map(|b| self.backbone_at(b))
             .collect()
     }
 }

@@ -5,6 +5,7 @@ use std::f64::consts::{FRAC_2_PI, PI};
 use serde::Serialize;
 
 use super::slow_flow::SlowFlow;
+use crate::numerics::{bisection, equally_spaced};
 
 /// One point of the free decay.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -71,27 +72,16 @@ impl Decay {
         if !(0.0..=self.duration()).contains(&tau1) {
             return None;
         }
-        let (mut low, mut high) = (self.flow.manifold.b_min(), self.start);
-        loop {
-            let middle = low + (high - low) / 2.0;
-            if middle <= low || middle >= high {
-                return Some(self.point(tau1, middle));
-            }
-            if self.time(middle) > tau1 {
-                low = middle
-            } else {
-                high = middle
-            }
-        }
+        let until = |b: f64| self.time(b) <= tau1;
+        let (b, _) = bisection(self.start, self.flow.manifold.b_min(), until);
+        Some(self.point(tau1, b))
     }
 
     /// `points` points from the start to the fold, at equal steps of B.
     #[must_use]
     pub fn samples(&self, points: usize) -> Vec<DecayPoint> {
         let b_min = self.flow.manifold.b_min();
-        let steps = points.saturating_sub(1).max(1) as f64;
-        (0..points)
-            .map(|i| self.start + (b_min - self.start) * i as f64 / steps)
+        equally_spaced(self.start, b_min, points)
             .map(|b| self.point(self.time(b), b))
             .collect()
     }

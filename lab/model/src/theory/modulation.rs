@@ -9,6 +9,7 @@ use nalgebra::Complex;
 use serde::Serialize;
 
 use super::slow_flow::SlowFlow;
+use crate::numerics::bisection;
 
 /// Amplitudes and phases just after an impact; on or off the manifold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -136,18 +137,7 @@ impl Walk {
                 return None;
             }
             if outside(end) {
-                let (mut low, mut high) = (end - step, end);
-                loop {
-                    let middle = low + (high - low) / 2.0;
-                    if middle <= low || middle >= high {
-                        return Some(middle);
-                    }
-                    if outside(middle) {
-                        high = middle
-                    } else {
-                        low = middle
-                    }
-                }
+                return Some(bisection(end - step, end, outside).1);
             }
         }
         None

@@ -1,5 +1,7 @@
 //! Real roots of a polynomial: between two turning points there is at most one, so its derivative brackets them all.
 
+use crate::numerics::bisection;
+
 /// All real roots, ascending; coefficients by rising power. A double root counts once.
 pub(super) fn real_roots(coefficients: &[f64]) -> Vec<f64> {
     let Some(degree) = coefficients.iter().rposition(|one| *one != 0.0) else {
@@ -51,24 +53,15 @@ fn value(coefficients: &[f64], x: f64) -> f64 {
         .fold(0.0, |sum, one| sum * x + one)
 }
 
-/// Bisection to the last bit, if the sign changes.
-fn root_between(coefficients: &[f64], mut a: f64, mut b: f64) -> Option<f64> {
+/// The root between `a` and `b`, if the sign changes.
+fn root_between(coefficients: &[f64], a: f64, b: f64) -> Option<f64> {
     let positive = |x| value(coefficients, x) > 0.0;
-    let at_a = positive(a);
-    if at_a == positive(b) {
-        return None;
-    }
-    loop {
-        let middle = a + (b - a) / 2.0;
-        if middle <= a || middle >= b {
-            return Some(middle);
-        }
-        if positive(middle) == at_a {
-            a = middle
-        } else {
-            b = middle
-        }
-    }
+    (positive(a) != positive(b)).then(|| midpoint(bisection(a, b, positive)))
+}
+
+/// Rounds to one of two neighbouring doubles.
+fn midpoint((a, b): (f64, f64)) -> f64 {
+    a + (b - a) / 2.0
 }
 
 #[cfg(test)]

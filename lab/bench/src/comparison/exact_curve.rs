@@ -3,6 +3,7 @@
 use serde::Serialize;
 
 use vines_model::Dimensionless;
+use vines_model::numerics::{equally_spaced, golden_section, range};
 use vines_model::orbit::{Orbit, exact_backbone};
 use vines_model::theory::SlowFlow;
 
@@ -38,13 +39,10 @@ impl ExactCurve {
         let flow = SlowFlow::new(scene.lambda, scene.r);
         let theory = flow.backbone(flow.manifold.b_min(), SPEED_MAX, 400);
         let sigmas = theory.iter().map(|point| point.sigma);
-        let (low, high) = sigmas.fold((f64::MAX, f64::MIN), |(low, high), sigma| {
-            (low.min(sigma), high.max(sigma))
-        });
+        let (low, high) = range((f64::MAX, f64::MIN), sigmas);
         let (low, high) = (low - 0.5, high + 0.5);
         let between = |low: f64, high: f64, steps: usize| {
-            (0..=steps)
-                .map(move |n| low + (high - low) * n as f64 / steps as f64)
+            equally_spaced(low, high, steps + 1)
                 .flat_map(|sigma| exact_backbone(scene, 1.0 + scene.epsilon * sigma))
                 .filter(|orbit| orbit.b < SPEED_MAX)
         };
@@ -94,25 +92,18 @@ impl ExactCurve {
     }
 }
 
-/// Least over a segment of the largest difference. That is convex along the segment, so halving intervals finds it.
+/// Least over a segment of the largest difference. That is convex along the segment.
 fn to_segment(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
     let largest = |x: f64| {
         (0..3)
             .map(|i| (point[i] - from[i] - x * (to[i] - from[i])).abs())
             .fold(0.0, f64::max)
     };
-    let (mut low, mut high) = (0.0, 1.0);
-    for _ in 0..20 {
-        let (a, b) = (low + (high - low) / 3.0, high - (high - low) / 3.0);
-        if largest(a) < largest(b) {
-            high = b;
-        } else {
-            low = a;
-        }
-    }
-    largest(0.5 * (low + high))
-        .min(largest(0.0))
-        .min(largest(1.0))
+    let nearest = golden_section(0.0, 1.0, largest);
+    [nearest, 0.0, 1.0]
+        .map(largest)
+        .into_iter()
+        .fold(f64::INFINITY, f64::min)
 }
 
 #[cfg(test)]
