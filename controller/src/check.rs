@@ -29,6 +29,12 @@ impl Config {
         1.0 / (PhaseDetector::new(self).coefficients() as f64 * self.sample_time)
     }
 
+    /// Order of the highest harmonic of the detector. The sampling must resolve it up to `omega_max`.
+    #[must_use]
+    pub fn highest_harmonic(&self) -> usize {
+        PhaseDetector::new(self).highest_harmonic()
+    }
+
     fn check_frequencies(&self) -> Result<(), ConfigError> {
         Quantity::new("omega_max", self.omega_max, "rad/s").check(
             self.omega_max > self.omega_min,
@@ -57,7 +63,7 @@ impl Config {
             detector.total_step() <= 1.0,
             "lower: (2 harmonics + 1) bandwidth sample_time must stay below 1",
         )?;
-        let highest = detector.highest_harmonic() as f64;
+        let highest = self.highest_harmonic() as f64;
         Quantity::new("sample_time", self.sample_time, "s").check(
             self.omega_max * self.sample_time * highest < PI,
             "more than two samples per period of the highest harmonic at omega_max",
