@@ -57,7 +57,7 @@ impl Display for Session {
         writeln!(f, "session of udp://{}: {ended}", self.peer)?;
         writeln!(
             f,
-            "  {} samples in {:.3} s: {:.1} a second, nominal {:.1}",
+            "  {} samples in {:.3} s: {:.1} per second, nominal {:.1}",
             self.samples,
             self.seconds,
             self.rate(),
