@@ -17,6 +17,8 @@ mod study;
 mod table;
 mod theme;
 mod tracked;
+mod tracking;
+mod tracking_picture;
 
 use std::io::{self, Write};
 use std::path::{Path, PathBuf};
@@ -24,8 +26,8 @@ use std::path::{Path, PathBuf};
 use serde::Serialize;
 use thiserror::Error;
 
+use crate::comparison::Comparison;
 use crate::files::temporary;
-use crate::identification::Identification;
 use crate::map::{Cell, Map, Point};
 
 pub use section::{Attachment, Block, Budget, Section};
@@ -33,6 +35,7 @@ pub use sections::{Maker, SECTIONS, Subject};
 pub use study::{Progress, Report, write_report};
 pub use table::table;
 pub use theme::dark;
+pub use tracking::{tracking_table, write_tracking};
 
 /// Why a report could not be written.
 #[derive(Debug, Error)]
@@ -61,14 +64,14 @@ pub enum ReportError {
 ///
 /// # Errors
 /// A folder or file that cannot be written.
-pub fn write(found: &Identification, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
+pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let json = serde_json::to_string_pretty(found)
         .map_err(|error| format("identification.json")(error.to_string()))?;
     let files = [
         ("identification.json", json + "\n"),
         (
             "backbone.csv",
-            csv(&found.decay).map_err(format("backbone.csv"))?,
+            decay_csv(found).map_err(format("backbone.csv"))?,
         ),
         (
             "backbone.svg",
@@ -153,6 +156,18 @@ fn map_row(cell: &Cell) -> MapRow {
         growth,
         theory_stable: cell.theory_stable,
     }
+}
+
+/// The points along a decay.
+fn decay_csv(found: &Comparison) -> Result<String, String> {
+    #[derive(Serialize)]
+    struct Theory {
+        sigma_theory: Option<f64>,
+    }
+    csv(found.decay.iter().map(|one| {
+        let sigma_theory = one.sigma_theory;
+        (one.point, Theory { sigma_theory })
+    }))
 }
 
 /// A table, one row an item.

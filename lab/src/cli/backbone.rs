@@ -4,10 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::{
-    backbone::{Report, track},
-    rig::BuiltIn,
-};
+use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
 use super::{
     door::{Door, OpenRig, ReachArguments},
@@ -70,10 +67,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     bar.finish_and_clear();
     // A rig across the network is told that this is all.
     drop(rig);
-    let report = Report::new(&tracked.map_err(Failure::run)?, &scene);
-    let written = report.write(&arguments.out).map_err(Failure::run)?;
+    let found = TrackedComparison::of(&tracked.map_err(Failure::run)?, &scene);
+    let written = report::write_tracking(&found, &arguments.out).map_err(Failure::run)?;
     if arguments.json {
-        return Ok(serde_json::to_string_pretty(&report)? + "\n");
+        return Ok(serde_json::to_string_pretty(&found)? + "\n");
     }
     let files: Vec<String> = written
         .iter()
@@ -81,7 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .collect();
     Ok(format!(
         "{}\nWritten: {}\n",
-        report.table(),
+        report::tracking_table(&found),
         files.join(", ")
     ))
 }

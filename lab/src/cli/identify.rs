@@ -6,6 +6,7 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tempfile::TempDir;
 use vines::{
+    comparison::Comparison,
     experiment::{self, Plan, Stage},
     identification, pack, report,
     rig::BuiltIn,
@@ -88,6 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     drop((rig, controller));
     let record = record.map_err(Failure::run)?;
     let found = identification::identify(&record, &scene).map_err(Failure::run)?;
+    let found = Comparison::of(&found, &scene);
     let mut written = report::write(&found, &arguments.out).map_err(Failure::run)?;
     written.extend(fmus.keep()?);
     if arguments.json {

@@ -5,8 +5,9 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use vines::{
-    map::{Axis, Map, Plan, Range, Regime},
+    map::{Axis, Map, Plan, Range},
     orbit::phase_resonant,
+    regime::Regime,
     report,
     scene::Scene,
 };
@@ -130,7 +131,7 @@ fn summary(map: &Map) -> String {
         0 => "-".into(),
         _ => format!("{:.1} %", 100.0 * count as f64 / of as f64),
     };
-    let rows: Vec<Vec<String>> = Regime::ALL
+    let rows: Vec<Vec<String>> = Regime::SIMULATED
         .into_iter()
         .map(|regime| {
             let (all, here) = map.count(regime);

@@ -7,7 +7,7 @@ use super::chart::{
 };
 use super::lines::{Marked, clipped, pieces, thinned};
 use super::theme::{EXACT, FAINT, THEORY, UNSTABLE};
-use crate::identification::Identification;
+use crate::comparison::Comparison;
 use crate::orbit::{self, Limits};
 use crate::scene::Dimensionless;
 use crate::theory::{BranchSide, SlowFlow};
@@ -17,7 +17,7 @@ const TOP: f64 = 0.8;
 /// Distance of drawn points of the exact curve, as a fraction of the picture.
 const APART: f64 = 0.004;
 
-pub(super) fn draw(found: &Identification) -> Result<String, String> {
+pub(super) fn draw(found: &Comparison) -> Result<String, String> {
     let p = &found.parameters;
     let slow_flow = SlowFlow::new(p.lambda, p.r);
     let top = (1.25 * found.lock.c).max(TOP);
@@ -25,7 +25,11 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
     let theory = slow_flow.backbone(slow_flow.manifold.b_min(), reach, 400);
     // Below the fold there is no backbone, and the frequency of what is left of the motion goes anywhere.
     let fold = slow_flow.manifold.c_min();
-    let above = found.decay.iter().filter(|point| point.c >= fold);
+    let above = found
+        .decay
+        .iter()
+        .map(|one| one.point)
+        .filter(|point| point.c >= fold);
     let (low, high) = theory
         .iter()
         .map(|point| point.sigma)
@@ -47,7 +51,7 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
             ((0.0, top), "amplitude C of v, over b"),
         )?;
         backbones(&mut chart, p, (low, high), (0.0, top))?;
-        let decay = found.decay.iter().step_by(THINNED);
+        let decay = found.decay.iter().map(|one| one.point).step_by(THINNED);
         let decay = decay.map(|point| (point.sigma, point.c));
         let inside = decay.filter(|(sigma, _)| (low..=high).contains(sigma));
         decay_points(&mut chart, inside.collect(), DECAY_LABEL)?;

@@ -9,8 +9,8 @@ use super::chart::{
     DECAY_LABEL, THINNED, caption, curve, decay_points, legend, line, plane, px, svg_of,
 };
 use super::theme::{DECAY, EXACT, THEORY};
+use crate::comparison::Comparison;
 use crate::experiment::Record;
-use crate::identification::Identification;
 use crate::scene::Scene;
 use crate::theory::{BranchSide, SlowFlow};
 
@@ -30,7 +30,7 @@ struct Passage {
 }
 
 /// Draws the four panels.
-pub fn draw(record: &Record, scene: &Scene, found: &Identification) -> Result<String, String> {
+pub fn draw(record: &Record, scene: &Scene, found: &Comparison) -> Result<String, String> {
     let driven = driven(record, scene);
     let flow = SlowFlow::new(found.parameters.lambda, found.parameters.r);
     let decay = flow
@@ -44,6 +44,7 @@ pub fn draw(record: &Record, scene: &Scene, found: &Identification) -> Result<St
     let points: Vec<_> = found
         .decay
         .iter()
+        .map(|one| one.point)
         .filter(|one| one.c >= 0.9 * fold)
         .step_by(THINNED / 2)
         .collect();
@@ -151,7 +152,7 @@ pub fn draw(record: &Record, scene: &Scene, found: &Identification) -> Result<St
 fn driven(record: &Record, scene: &Scene) -> Vec<Passage> {
     let d = scene.dimensionless();
     let dt = record.sample_time;
-    let window = 2 * (scene.plant.natural_period() / dt).round().max(4.0) as usize;
+    let window = 2 * (d.natural_period() / dt).round().max(4.0) as usize;
     let samples = &record.samples[..record.released];
     let step = (samples.len() / MOST).max(window / 2);
     (0..samples.len().saturating_sub(window))

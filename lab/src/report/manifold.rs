@@ -6,12 +6,12 @@ use super::chart::{
     DECAY_LABEL, THINNED, caption, curve, decay_points, legend, line, locked_point, plane, svg,
 };
 use super::theme::{THEORY, UNSTABLE};
-use crate::identification::Identification;
+use crate::comparison::Comparison;
 use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
 
 const POINTS: usize = 300;
 
-pub(super) fn draw(found: &Identification) -> Result<String, String> {
+pub(super) fn draw(found: &Comparison) -> Result<String, String> {
     let manifold = Manifold::new(found.parameters.r);
     let right = (1.25 * found.lock.c).max(0.8);
     let at = |b: f64| (manifold.c(b), b);
@@ -54,6 +54,7 @@ pub(super) fn draw(found: &Identification) -> Result<String, String> {
         let decay = found
             .decay
             .iter()
+            .map(|one| one.point)
             .step_by(THINNED)
             .filter_map(|point| point.b.map(|b| (point.c, b)));
         decay_points(&mut chart, decay.collect(), DECAY_LABEL)?;

@@ -5,7 +5,8 @@ use plotters::style::text_anchor::{HPos, Pos, VPos};
 
 use super::chart::{Area, FONT, at, line, plane, px, svg_of};
 use super::theme;
-use crate::map::{Axis, Map, Range, Regime, outline};
+use crate::map::{Axis, Map, Range, outline};
+use crate::regime::Regime;
 
 /// Size of the picture, px, and how much of its width belongs to the axes; the legend stands beside them.
 const SIZE: (u32, u32) = (980, 600);
@@ -46,7 +47,7 @@ pub fn draw(map: &Map) -> Result<String, String> {
             (edges(&plan.x), label(plan.x.axis)),
             (edges(&plan.y), label(plan.y.axis)),
         )?;
-        for regime in Regime::ALL {
+        for regime in Regime::SIMULATED {
             let colour = theme::regime(regime).filled();
             chart.draw_series(
                 stripes(map, regime)
@@ -78,7 +79,10 @@ pub fn draw(map: &Map) -> Result<String, String> {
 fn legend(area: &Area, map: &Map) -> Result<(), Box<dyn std::error::Error>> {
     let mut y = at(80);
     let name = (FONT, px(15)).into_text_style(area);
-    for regime in Regime::ALL.into_iter().filter(|one| map.count(*one).0 > 0) {
+    for regime in Regime::SIMULATED
+        .into_iter()
+        .filter(|one| map.count(*one).0 > 0)
+    {
         let swatch = [(at(6), y), (at(36), y + at(18))];
         area.draw(&Rectangle::new(swatch, theme::regime(regime).filled()))?;
         area.draw(&Rectangle::new(swatch, line(BLACK, 10)))?;
@@ -114,6 +118,7 @@ fn letter(regime: Regime) -> &'static str {
         Regime::Modulated => "M",
         Regime::Chaotic => "C",
         Regime::Sticking => "K",
+        Regime::Other | Regime::Unresolved | Regime::Unknown => "?",
     }
 }
 
@@ -155,7 +160,7 @@ fn letters(map: &Map) -> Vec<(Regime, (f64, f64))> {
         };
         (1..=most).take_while(|reach| alike(*reach)).count()
     };
-    Regime::ALL
+    Regime::SIMULATED
         .into_iter()
         .filter_map(|regime| {
             let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));

@@ -1,10 +1,10 @@
 //! The short table of an identification.
 
-use crate::identification::{COMPARED_ABOVE, Identification};
+use crate::comparison::{COMPARED_ABOVE, Comparison};
 
 /// The result in a few lines: the locked point beside theory and exact orbit, then the decay.
 #[must_use]
-pub fn table(found: &Identification) -> String {
+pub fn table(found: &Comparison) -> String {
     let (p, lock) = (&found.parameters, &found.lock);
     let mut lines = vec![
         format!(
@@ -45,8 +45,8 @@ pub fn table(found: &Identification) -> String {
         lines.push(format!(
             "Free decay: {} points from C = {:.4} down to {:.4}, {}",
             found.decay.len(),
-            first.c,
-            last.c,
+            first.point.c,
+            last.point.c,
             if lock.impacts_per_period.is_nan() {
                 "where the backbone folds"
             } else {

@@ -6,10 +6,11 @@ use plotters::prelude::*;
 use super::backbone::backbones;
 use super::chart::{at, caption, decay_points, legend, line, plane, px, svg};
 use super::theme::DECAY;
-use crate::backbone::{Point, Report};
+use crate::backbone::Point;
+use crate::comparison::TrackedComparison;
 
 /// Draws it; points that are not settled are crossed.
-pub fn draw(tracked: &Report) -> Result<String, String> {
+pub fn draw(tracked: &TrackedComparison) -> Result<String, String> {
     let p = &tracked.parameters;
     let points = || tracked.points.iter().map(|one| one.point);
     let top = points().fold(0.5, |most: f64, one| most.max(1.15 * one.c));

@@ -3,9 +3,10 @@
 use std::cell::Cell;
 
 use super::Subject;
+use crate::comparison::{COMPARED_ABOVE, Comparison};
 use crate::experiment::{self, Plan, Stage};
-use crate::identification::{COMPARED_ABOVE, Identification, identify};
-use crate::report::{backbone, csv, history, manifold, section::Section};
+use crate::identification::identify;
+use crate::report::{backbone, decay_csv, history, manifold, section::Section};
 use crate::rig::BuiltIn;
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, String> {
@@ -31,7 +32,10 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     });
     let found = record.map_err(|error| refused(&error)).and_then(|record| {
         Ok((
-            identify(&record, scene).map_err(|error| refused(&error))?,
+            Comparison::of(
+                &identify(&record, scene).map_err(|error| refused(&error))?,
+                scene,
+            ),
             record,
         ))
     });
@@ -61,13 +65,13 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         "The identified backbone: points along the decay (circles), the locked point (square), the exact curve and first-order theory.",
         backbone::draw(&found)?,
     );
-    section.attach("backbone.csv", csv(&found.decay)?);
+    section.attach("backbone.csv", decay_csv(&found)?);
     let json = serde_json::to_string_pretty(&found).map_err(|error| error.to_string())?;
     section.attach("identification.json", json + "\n");
     Ok(section)
 }
 
-fn describe(section: &mut Section, found: &Identification, target: f64) {
+fn describe(section: &mut Section, found: &Comparison, target: f64) {
     let lock = &found.lock;
     section.finding = format!(
         "The loop locked after {:.0} periods at σ = {:.4}, C = {:.4}, in the regime {}.",
@@ -132,8 +136,8 @@ fn describe(section: &mut Section, found: &Identification, target: f64) {
         section.words(format!(
             "Then the drive was switched off. The motion decayed from C = {:.4} to C = {:.4}, where the impacts lost synchrony; on its \
              way it passed along the backbone, {} points of which were identified.",
-            first.c,
-            last.c,
+            first.point.c,
+            last.point.c,
             found.decay.len()
         ));
     }

@@ -3,8 +3,9 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::Subject;
-use crate::map::{Axis, Plan, Regime};
+use crate::map::{Axis, Plan};
 use crate::orbit::phase_resonant;
+use crate::regime::Regime;
 use crate::report::{csv, map, map_row, section::Section};
 
 /// Periods that pass, and periods recorded.
@@ -52,7 +53,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
          into 1:1 resonance and lost again, or if a small disturbance does not grow, and chaotic otherwise.",
         PERIODS.0, PERIODS.1
     ));
-    let rows = Regime::ALL.into_iter().map(|regime| {
+    let rows = Regime::SIMULATED.into_iter().map(|regime| {
         let (cells, here) = map.count(regime);
         vec![
             regime.name().into(),

@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::Subject;
-use crate::backbone::{Compared, Report, track};
+use crate::backbone::track;
+use crate::comparison::{TrackedComparison, TrackedPoint};
 use crate::identification::Regime;
 use crate::report::{csv, section::Section, tracked};
 use crate::rig::BuiltIn;
@@ -30,7 +31,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         done(at as f64 / of.max(1) as f64);
     });
     let tracked = match found {
-        Ok(found) if !found.points.is_empty() => Report::new(&found, scene),
+        Ok(found) if !found.points.is_empty() => TrackedComparison::of(&found, scene),
         Ok(_) => {
             section.finding = "Tracking gave no point.".into();
             section.words(section.finding.clone());
@@ -42,7 +43,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
             return Ok(section);
         }
     };
-    let symmetric = |one: &&Compared| one.point.regime_by_impacts == Some(Regime::Symmetric);
+    let symmetric = |one: &&TrackedPoint| one.point.regime_by_impacts == Some(Regime::Symmetric);
     let in_regime = tracked.points.iter().filter(symmetric).count();
     section.finding = format!(
         "Tracked with the loop closed, the backbone took {} points in {:.0} periods, {:.1} a point.",
