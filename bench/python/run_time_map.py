@@ -6,10 +6,10 @@ from statistics import median
 
 from report import markdown_table, number, replace, text_table
 
-# The axes of docs/regimes.svg (`vines map`): first value, last value, number of points; in a quick run fewer points.
+# First and last values are those of docs/regimes.svg (`vines map`).
 SIGMA, G = (-5.0, 5.0), (0.1, 3.0)
-POINTS, QUICK_POINTS = (101, 59), (33, 21)
-EFFORT = {"methods": "both", "periods": 200, "brent_periods": 50, "runs": 5}
+POINTS, QUICK_POINTS = (67, 39), (33, 21)
+EFFORT = {"methods": "both", "periods": 200, "brent_periods": 50, "runs": 7}
 # Largest ratios to the default lock that are accepted, as a median and in the worst cell.
 ACCEPTED = {"symmetric 1:1": (1.5, 1.5)}
 ACCEPTED_ELSEWHERE = (4.0, 8.0)
@@ -25,7 +25,7 @@ REGIMES = {
 }
 NOTE = (
     "Each cell is the default rig after 400 periods or more at that drive. One step of 200 periods is timed (50 with "
-    "Brent's method), in turns with the same step at the default lock (sigma = -1.14, G = 1.1); costs are medians of 5 "
+    "Brent's method), in turns with the same step at the default lock (sigma = -1.14, G = 1.1); costs are medians of 7 "
     "runs. A cost is that of an impact, or of a period where impacts are rarer than periods. Ratio: cost over that of "
     "an impact at the lock. Difference: of plant and Brent's method after 20 periods, in half-widths, where the "
     "motion repeats."
@@ -142,7 +142,7 @@ def draw(rows, lock, file):
     for ax, costs in ((axes[1], plant), (axes[2], brent)):
         image = ax.imshow(costs, cmap="viridis", norm=scale, **options)
     bar = figure.colorbar(image, ax=axes[1:], extend="both", pad=0.01)
-    bar.set_label(f"ns per impact, or per period where impacts are rarer (default lock: {lock:.0f})")
+    bar.set_label(f"ns per impact, or per period where that is less\n(default lock: {lock:.0f})")
     titles = ("Regime", "Plant", "Closed form with Brent's method (white: stalls)")
     for ax, title in zip(axes, titles, strict=True):
         ax.set_title(title, fontsize=9.5, fontweight="bold")
