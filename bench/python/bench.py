@@ -203,7 +203,12 @@ class Bench:
 
     def peer_command(self, side, name):
         if side == "c":
-            return [sys.executable, HERE / "python/cvode_c.py", HERE / "scenes.json", HERE.parent / "out/bench/programs"]
+            return [
+                sys.executable,
+                HERE / "python/cvode_c.py",
+                HERE / "scenes.json",
+                HERE.parent / "out/bench/programs",
+            ]
         return [sys.executable, HERE / "python/peers.py", name, HERE / "scenes.json", self.options.fmu]
 
     def rehearse(self):
@@ -290,7 +295,9 @@ def only_map(options):
     load = Load({worker})
     points = run_time_map.QUICK_POINTS if options.quick else run_time_map.POINTS
     watched = sys.stderr.isatty()
-    progress = (lambda text: print(f"\r{text} ", end="", file=sys.stderr, flush=True)) if watched else lambda _text: None
+    progress = (
+        (lambda text: print(f"\r{text} ", end="", file=sys.stderr, flush=True)) if watched else lambda _text: None
+    )
     rows, lock = run_time_map.measure(worker, points, progress)
     busy = load.others()
     worker.end()

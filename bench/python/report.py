@@ -204,7 +204,8 @@ def notes(bench):
     yield (
         "ns/impact: wall time of a run over the true number of impacts. A round repeats a run for about a tenth of a "
         "second and keeps the median; the table has the median of the rounds, of which all methods have equal numbers; "
-        "spread: half the distance of their quartiles; time/plant: ratio of the medians. Error: the largest difference of any displacement or velocity from 40-digit arithmetic, over up to "
+        "spread: half the distance of their quartiles; time/plant: ratio of the medians. "
+        "Error: the largest difference of any displacement or velocity from 40-digit arithmetic, over up to "
         "50 instants (half-width of the cavity 1, natural frequency 1). The verdict says how a method failed: an error "
         "above 0.1 is a lost trajectory, a particle more than 0.01 beyond its wall (Moreau's scheme: 0.1) at one of "
         "these instants has tunnelled; a gap width is twice the half-width."
@@ -278,6 +279,7 @@ def replace(file, text):
 def write(bench, growth, loop, profiles, run_times, folder):
     """Writes performance.txt, .csv and .md; returns the text."""
     from run_time_map import as_markdown, as_text
+
     scenes = list(dict.fromkeys(row.scene for row in bench.rows))
     text, mark = ["Run time against error", ""], ["# Run time against error", ""]
     for note in notes(bench):

@@ -92,7 +92,18 @@ def as_text(rows, lock):
 def as_markdown(rows, lock):
     picture = "![ns per impact over detuning and base amplitude](run-time-map.svg)"
     numbers = "The cells are in [run-time-map.csv](run-time-map.csv)."
-    return ["## Map of run time", "", NOTE, "", picture, "", lock_line(lock), numbers, "", markdown_table(*summary(rows))]
+    return [
+        "## Map of run time",
+        "",
+        NOTE,
+        "",
+        picture,
+        "",
+        lock_line(lock),
+        numbers,
+        "",
+        markdown_table(*summary(rows)),
+    ]
 
 
 COLUMNS = ["sigma", "G", "regime", "impacts_per_period", "unit", "ns", "ratio", "brent_ns", "difference"]
@@ -142,7 +153,7 @@ def draw(rows, lock, file):
     for ax, costs in ((axes[1], plant), (axes[2], brent)):
         image = ax.imshow(costs, cmap="viridis", norm=scale, **options)
     bar = figure.colorbar(image, ax=axes[1:], extend="both", pad=0.01)
-    bar.set_label(f"ns per impact, or per period where that is less\n(default lock: {lock:.0f})")
+    bar.set_label(f"ns per impact, or per period where impacts are rarer\n(default lock: {lock:.0f})")
     titles = ("Regime", "Plant", "Closed form with Brent's method (white: stalls)")
     for ax, title in zip(axes, titles, strict=True):
         ax.set_title(title, fontsize=9.5, fontweight="bold")
