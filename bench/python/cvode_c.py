@@ -1,4 +1,4 @@
-"""CVODE with its functions in C: compiles bench/c/cvode.c where SUNDIALS is installed; answers requests as peers.py does.
+"""CVODE with its functions in C: compiles bench/c/cvode.c where SUNDIALS is installed, and answers requests.
 
     python cvode_c.py SCENES.json FOLDER     the program goes into FOLDER
 

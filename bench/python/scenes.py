@@ -34,7 +34,7 @@ def free(periods):
 LOCKED = rig(EPSILON, EPSILON * LAMBDA, R)
 # On the 1:1 motion, after 1000 periods of the scene `lock` in tests/reference, rounded.
 STEADY = [-0.43837155, 0.00769665, -1.00385415, -0.87812325]
-# Disturbances of the chaotic motion grow by exp(0.39) per period: by 1e5 in 30 periods. Eleven digits of a double remain.
+# Disturbances of the chaotic motion grow by exp(0.39) per period: by 1e5 in 30 periods. Eleven digits remain.
 CHAOTIC_PERIODS = 30
 
 
