@@ -126,16 +126,16 @@ impl Scene {
         plant.tally().impacts
     }
 
-    /// The same by the baseline.
-    fn compare(&self, steps: usize, step: f64) -> u64 {
+    /// The same by the baseline; none if it stalls.
+    fn compare(&self, steps: usize, step: f64) -> Option<u64> {
         let mut baseline = self.baseline();
         for _ in 0..steps {
             baseline
                 .advance(black_box(self.amplitude), self.omega, step)
-                .expect("nothing sticks here");
+                .ok()?;
             black_box((baseline.q1, baseline.q2));
         }
-        baseline.impacts
+        Some(baseline.impacts)
     }
 
     /// A hundred samples per period, each with a drive of its own; v and the base displacement are read. The samples.
@@ -149,18 +149,18 @@ impl Scene {
         (PERIODS * SAMPLES) as u64
     }
 
-    /// The same by the baseline, which takes a drive of the built-in oscillator only.
-    fn compare_sampled(&self) -> u64 {
+    /// The same by the baseline, which takes a drive of the built-in oscillator only; none if it stalls.
+    fn compare_sampled(&self) -> Option<u64> {
         let mut baseline = self.baseline();
         let step = self.period() / SAMPLES as f64;
         for n in 0..PERIODS * SAMPLES {
             let drive = self.retuned(n);
             baseline
                 .advance(black_box(drive.amplitude), drive.omega, step)
-                .expect("nothing sticks here");
+                .ok()?;
             black_box((baseline.q1, baseline.q2));
         }
-        (PERIODS * SAMPLES) as u64
+        Some((PERIODS * SAMPLES) as u64)
     }
 
     /// Amplitude and frequency of sample `n`, as a phase-locked loop near its lock changes them.
@@ -199,13 +199,16 @@ fn states(plant: &Plant) {
     black_box(plant.state());
 }
 
+/// A run of the baseline: how much work it was, or none if it stalled.
+type Brent = Box<dyn Fn() -> Option<u64>>;
+
 /// What is measured; each run returns how much work it was.
 struct Case {
     name: String,
     unit: &'static str,
     run: Box<dyn Fn() -> u64>,
     /// The closed form with Brent's method on the same work.
-    brent: Option<Box<dyn Fn() -> u64>>,
+    brent: Option<Brent>,
     /// What the table says of the largest cost that is accepted.
     target: &'static str,
 }
@@ -215,11 +218,7 @@ const LOCK: &str = "default lock, one long step";
 
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
-    let mut add = |name: &str,
-                   unit,
-                   target,
-                   run: Box<dyn Fn() -> u64>,
-                   brent: Option<Box<dyn Fn() -> u64>>| {
+    let mut add = |name: &str, unit, target, run: Box<dyn Fn() -> u64>, brent: Option<Brent>| {
         cases.push(Case {
             name: name.to_owned(),
             unit,
@@ -231,7 +230,7 @@ fn cases() -> Vec<Case> {
     let long = |scene: Scene| -> Box<dyn Fn() -> u64> {
         Box::new(move || scene.follow(1, PERIODS as f64 * scene.period(), states))
     };
-    let long_brent = |scene: Scene| -> Option<Box<dyn Fn() -> u64>> {
+    let long_brent = |scene: Scene| -> Option<Brent> {
         Some(Box::new(move || {
             scene.compare(1, PERIODS as f64 * scene.period())
         }))
@@ -278,14 +277,16 @@ fn cases() -> Vec<Case> {
         "sample",
         "",
         Box::new(move || count(at_lock.follow(samples, sample, sensors))),
-        Some(Box::new(move || count(at_lock.compare(samples, sample)))),
+        Some(Box::new(move || {
+            at_lock.compare(samples, sample).map(count)
+        })),
     );
     add(
         "no impact, 100 samples per period",
         "sample",
         "",
         Box::new(move || count(empty.follow(samples, sample, sensors))),
-        Some(Box::new(move || count(empty.compare(samples, sample)))),
+        Some(Box::new(move || empty.compare(samples, sample).map(count))),
     );
     add(
         "omega and E change at every sample",
@@ -319,8 +320,8 @@ fn cases() -> Vec<Case> {
                 steps as u64
             }),
             Some(Box::new(move || {
-                at_lock.compare(steps, step);
-                steps as u64
+                at_lock.compare(steps, step)?;
+                Some(steps as u64)
             })),
         );
     }
@@ -342,11 +343,11 @@ fn median(mut values: Vec<f64>) -> f64 {
     values[values.len() / 2]
 }
 
-/// ns per unit of work.
-fn timed(run: &dyn Fn() -> u64) -> f64 {
+/// ns per unit of work; none if the run came to no end.
+fn timed(run: impl Fn() -> Option<u64>) -> Option<f64> {
     let start = Instant::now();
-    let work = black_box(run());
-    start.elapsed().as_nanos() as f64 / work as f64
+    let work = black_box(run())?;
+    Some(start.elapsed().as_nanos() as f64 / work as f64)
 }
 
 /// The table: every case takes its turn, and so does the baseline.
@@ -356,9 +357,9 @@ fn table(cases: &[Case]) {
     let began = Instant::now();
     while plant[0].len() < 5 || began.elapsed() < TABLE {
         for (n, case) in cases.iter().enumerate() {
-            plant[n].push(timed(&case.run));
+            plant[n].extend(timed(|| Some((case.run)())));
             if let Some(run) = &case.brent {
-                brent[n].push(timed(run));
+                brent[n].extend(timed(run));
             }
         }
     }
@@ -375,7 +376,8 @@ fn table(cases: &[Case]) {
     );
     for ((case, ns), brent) in cases.iter().zip(plant).zip(brent) {
         let (brent, ratio) = if brent.is_empty() {
-            ("-".to_owned(), "-".to_owned())
+            let why = case.brent.as_ref().map_or("-", |_| "stalls");
+            (why.to_owned(), "-".to_owned())
         } else {
             let brent = median(brent);
             (format!("{brent:.1}"), format!("{:.2}", brent / ns))

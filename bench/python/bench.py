@@ -248,13 +248,15 @@ class Bench:
     def measure(self):
         """Round after round, in an order drawn anew each time. Every row that comes to an end is in every round."""
         began = time.monotonic()
-        total = self.options.seconds or (45 if self.options.quick else 1200)
+        total = self.options.seconds or (45 if self.options.quick else 1250)
+        last = 0.0
         dice = random.Random(1)
         load = Load(set(self.workers.values()))
         for turn in range(1, ROUNDS + 1):
             gone = time.monotonic() - began
-            if turn > 3 and gone * turn / (turn - 1) > total:
+            if turn > 3 and gone + last > total:
                 break  # The next round would end too late.
+            start_of_round = gone
             order = [row for row in self.rows if not row.given_up()]
             dice.shuffle(order)
             for n, row in enumerate(order, 1):
@@ -263,7 +265,7 @@ class Bench:
                     f"round {turn}: {n} of {len(order)}, {gone:.0f} s, {row.scene}: {row.method} {row.setting:g}"
                 )
                 self.run(row)
-            self.rounds = turn
+            self.rounds, last = turn, time.monotonic() - began - start_of_round
         self.busy = load.others()
         self.progress("")
         self.say(f"Measured for {time.monotonic() - began:.0f} s, {self.rounds} rounds")

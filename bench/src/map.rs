@@ -69,8 +69,11 @@ pub fn row(g: f64, sigmas: &[f64], effort: &Effort) -> Result<Row, String> {
         .iter()
         .map(|&sigma| cell::Settled::new(sigma, g))
         .collect::<Result<Vec<_>, _>>()?;
-    for _ in 0..effort.runs {
-        for cell in &mut begun {
+    for round in 0..effort.runs {
+        // Each round begins elsewhere: what another program does periodically does not meet the same cell every time.
+        let first = round * begun.len() / effort.runs;
+        let (before, after) = begun.split_at_mut(first);
+        for cell in after.iter_mut().chain(before) {
             cell.run(&lock, effort);
         }
     }

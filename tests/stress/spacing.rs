@@ -66,3 +66,27 @@ impl Spacing {
         self.too_close
     }
 }
+
+#[test]
+fn an_impact_reported_twice_or_too_soon_is_noticed() {
+    let start = lovines::State {
+        dq2: 0.5,
+        ..lovines::State::default()
+    };
+    let p = lovines::Parameters::dimensionless(0.01, 1.0, 0.65);
+    let plant = Plant::new(p, start).expect("valid values");
+    let too_close = |second: f64, wall: Wall| {
+        let mut spacing = Spacing::of(&plant, &Drive::default(), 10.0);
+        for (t, wall) in [(1.0, Wall::Plus), (second, wall)] {
+            let velocity = 0.5 * wall.sign();
+            spacing.see(&Event::Impact { t, wall, velocity });
+        }
+        spacing.too_close()
+    };
+    // S = sqrt(0.01) 0.5 = 0.05 bounds the acceleration; the particle leaves the wall at 0.325.
+    assert_eq!(too_close(1.0, Wall::Plus), 1);
+    assert_eq!(too_close(1.0 + 1e-6, Wall::Plus), 1);
+    assert_eq!(too_close(1.5, Wall::Minus), 1);
+    assert_eq!(too_close(20.0, Wall::Plus), 0);
+    assert_eq!(too_close(8.0, Wall::Minus), 0);
+}
