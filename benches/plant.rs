@@ -371,7 +371,7 @@ fn table(cases: &[Case]) {
         "\nMedians of {runs} runs each, taking turns; a lock is the cost of an impact in `{LOCK}`."
     );
     println!(
-        "{:58} {:>10} {:>8} {:>10} {:>12}  accepted",
+        "{:70} {:>10} {:>8} {:>10} {:>12}  accepted",
         "case", "ns", "locks", "Brent ns", "Brent/plant"
     );
     for ((case, ns), brent) in cases.iter().zip(plant).zip(brent) {
@@ -383,7 +383,7 @@ fn table(cases: &[Case]) {
             (format!("{brent:.1}"), format!("{:.2}", brent / ns))
         };
         println!(
-            "{:58} {ns:10.1} {:8.2} {brent:>10} {ratio:>12}  {}",
+            "{:70} {ns:10.1} {:8.2} {brent:>10} {ratio:>12}  {}",
             format!("{}, per {}", case.name, case.unit),
             ns / lock,
             case.target,

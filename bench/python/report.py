@@ -177,6 +177,29 @@ SAVINGS_NOTE = (
 )
 
 
+SAMPLE_NOTE = (
+    "Wall time over the number of samples in the loop scene, where the drive changes at every sample. Each method is "
+    "at its most accurate setting that came to an end. The C interface sets two values and reads four at each sample."
+)
+
+
+def samples(bench):
+    """Cost of a sample in the loop scene, method by method."""
+    best = {}
+    for row in bench.rows:
+        if row.scene == "loop" and row.times and not row.failure:
+            known = best.get(row.method)
+            if known is None or row.error < known.error:
+                best[row.method] = row
+    plant = best.get("plant, Rust")
+    count = bench.scenes["loop"]["steps"]
+    table = []
+    for method, row in best.items():
+        compared = number(row.median / plant.median) if plant else NONE
+        table.append([method, number(row.median / count), compared, f"{row.error:.0e}"])
+    return ["method", "ns per sample", "time/plant", "error"], table
+
+
 def idle(busy):
     """Whether the machine was idle while it measured, in words."""
     if busy is None:
@@ -198,7 +221,8 @@ def notes(bench):
     yield (
         "Every method is asked for the state after each step of the scene, and stops there as a co-simulation master "
         "has it. It runs on one thread, but for the batch on all cores. A batch is of equal plants; its times are of "
-        "one of them. Just-in-time compilation (heyoka) and setting up are not in the times. Runs take turns in an "
+        "one of them. CVODE in C restarts at impacts and where the drive changes, and interpolates in between. "
+        "Just-in-time compilation (heyoka) and setting up are not in the times. Runs take turns in an "
         "order drawn anew each round. In the loop, all methods get the drive recorded from controller and plant."
     )
     yield (
@@ -311,6 +335,7 @@ def write(bench, growth, loop, profiles, run_times, folder):
         ]
     sections = [
         ("What the plant skips, and what that saves", SAVINGS_NOTE, *savings(bench, profiles)),
+        ("Cost of a sample in the loop scene", SAMPLE_NOTE, *samples(bench)),
         ("Cost as work grows", GROWTH_NOTE, *growths(growth)),
     ]
     for title, note, head, rows in sections:

@@ -53,7 +53,10 @@ def measure(worker, points, progress):
 
 def summary(rows):
     """Per regime: cells, cost, ratios to the lock, and how Brent's method compares."""
+    counted = any(cell["evaluations"] is not None for row in rows for cell in row)
     head = ["regime", "cells", "ns", "ratio", "worst", "worst at", "accepted", "Brent / plant", "difference"]
+    if counted:
+        head.append("evaluations: median, worst")
     table = []
     for regime in REGIMES:
         cells = [cell for row in rows for cell in row if cell["regime"] == regime]
@@ -78,6 +81,9 @@ def summary(rows):
                 f"{max(differences):.0e}" if differences else "\N{EN DASH}",
             ]
         )
+        if counted:
+            evaluations = [cell["evaluations"] for cell in cells]
+            table[-1].append(f"{number(median(evaluations))}, {number(max(evaluations))}")
     return head, table
 
 
@@ -106,7 +112,7 @@ def as_markdown(rows, lock):
     ]
 
 
-COLUMNS = ["sigma", "G", "regime", "impacts_per_period", "unit", "ns", "ratio", "brent_ns", "difference"]
+COLUMNS = ["sigma", "G", "regime", "impacts_per_period", "unit", "ns", "ratio", "evaluations", "brent_ns", "difference"]
 
 
 def write(rows, lock, folder):
@@ -120,6 +126,7 @@ def write(rows, lock, folder):
             "G": f"{cell['G']:.6g}",
             "ns": number(cell["ns"], 4),
             "ratio": number(cell["ratio"], 4),
+            "evaluations": "" if cell["evaluations"] is None else number(cell["evaluations"], 4),
             "brent_ns": "" if cell["brent_ns"] is None else number(cell["brent_ns"], 4),
             "difference": "" if cell["difference"] is None else f"{cell['difference']:.1e}",
         }

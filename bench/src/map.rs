@@ -165,13 +165,13 @@ mod tests {
     }
 
     #[test]
-    fn the_regimes_of_the_issue_are_told_apart_and_the_two_methods_agree_where_motion_repeats() {
+    fn regimes_are_told_apart_and_the_two_methods_agree_where_motion_repeats() {
         let expected = [
             (1.2, -3.0, "symmetric 1:1"),
             (1.2, 0.0, "symmetric 1:1"),
             (1.2, 1.0, "symmetric 1:1"),
             (1.5, -1.14, "asymmetric 1:1"),
-            (0.1, -4.0, "no impacts"),
+            (2.5, 0.0, "n impacts"),
         ];
         for (g, sigma, name) in expected {
             let row = row(g, &[sigma], &short()).expect("a row");
@@ -181,6 +181,11 @@ mod tests {
             assert!(difference < 1e-11, "{sigma}, {g}: {difference:e}");
             assert!(cell.ratio > 0.0 && cell.brent_ns.is_some());
         }
+        let rare = row(0.1, &[-4.0], &short()).expect("a row");
+        assert_eq!(
+            (rare.cells[0].regime, rare.cells[0].unit),
+            (cell::RARE, "period")
+        );
     }
 
     #[test]

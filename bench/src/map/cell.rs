@@ -6,7 +6,7 @@ use std::time::Instant;
 use lovines::{Drive, Event, Plant, State};
 use serde::Serialize;
 
-use super::reference::{Lock, RIG, drive, more, settle, timed};
+use super::reference::{Lock, RIG, drive, evaluations, more, settle, timed};
 use super::regime::{Hit, Pattern, Regime, pattern, synchrony};
 use super::{Effort, Methods, median};
 use crate::methods::{BrentBaseline, brent_baseline};
@@ -52,6 +52,8 @@ pub struct Cell {
     pub ns: f64,
     /// Over the cost of an impact at the default lock, measured in turns with this cell.
     pub ratio: f64,
+    /// Evaluations of the closed form per impact (or period), where the plant counts them.
+    pub evaluations: Option<f64>,
     /// Cost of the closed form with Brent's method, ns; none if it stalled or was not asked for.
     pub brent_ns: Option<f64>,
     /// Largest difference of the two methods after 20 periods (displacements over b, velocities over b omega0) where the motion
@@ -70,6 +72,7 @@ pub struct Settled {
     pattern: (usize, u32),
     impacts_per_period: f64,
     difference: Option<f64>,
+    evaluations: Option<f64>,
     ns: Vec<f64>,
     lock_ns: Vec<f64>,
     brent_ns: Vec<f64>,
@@ -96,6 +99,7 @@ impl Settled {
             impacts_per_period: 0.0,
             difference: repeats.then(|| difference(state, drive)).flatten(),
             plant,
+            evaluations: None,
             ns: Vec::new(),
             lock_ns: Vec::new(),
             brent_ns: Vec::new(),
@@ -105,9 +109,11 @@ impl Settled {
     /// One run of the lock, of the plant, and of the closed form with Brent's method where asked for.
     pub fn run(&mut self, lock: &Lock, effort: &Effort) {
         self.lock_ns.push(lock.run(effort.periods));
-        let (ns, impacts) = timed(&self.plant, self.drive, effort.periods);
-        self.ns.push(ns / units(impacts, effort.periods));
-        self.impacts_per_period = impacts as f64 / f64::from(effort.periods);
+        let (ns, outcome) = timed(&self.plant, self.drive, effort.periods);
+        let units = units(outcome.impacts, effort.periods);
+        self.ns.push(ns / units);
+        self.evaluations = evaluations(&outcome).map(|n| n as f64 / units);
+        self.impacts_per_period = outcome.impacts as f64 / f64::from(effort.periods);
         if effort.methods == Methods::Both {
             self.run_brent(effort.brent_periods);
         }
@@ -154,6 +160,7 @@ impl Settled {
             },
             ns,
             ratio: ns / lock,
+            evaluations: self.evaluations,
             brent_ns: self.brent.and_then(|_| median(self.brent_ns.clone())),
             difference: self.difference,
         }

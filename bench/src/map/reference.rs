@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::time::Instant;
 
-use lovines::{Drive, Parameters, Plant, State};
+use lovines::{Drive, Outcome, Parameters, Plant, State};
 
 /// The default scene (scenes/paper.toml), SI units.
 pub const RIG: Parameters = Parameters {
@@ -58,14 +58,22 @@ pub fn more(plant: &mut Plant, drive: Drive, periods: u32) {
     plant.advance(drive, f64::from(periods) * TAU / drive.omega);
 }
 
-/// Wall time of so many periods in one step with the state read at the end, ns, and impacts.
-pub fn timed(settled: &Plant, drive: Drive, periods: u32) -> (f64, u64) {
+/// Evaluations of the closed form in a step, where the plant counts them.
+///
+/// INTEGRATION POINT: the plant has no counter yet. With a field `evaluations` in [`Outcome`], this becomes
+/// `Some(outcome.evaluations)`, and the summaries of the map show evaluations per impact.
+pub fn evaluations(_outcome: &Outcome) -> Option<u64> {
+    None
+}
+
+/// Wall time of so many periods in one step with the state read at the end, ns, and what the step met.
+pub fn timed(settled: &Plant, drive: Drive, periods: u32) -> (f64, Outcome) {
     let mut plant = *settled;
     let duration = f64::from(periods) * TAU / drive.omega;
     let began = Instant::now();
     let outcome = plant.advance(std::hint::black_box(drive), duration);
     std::hint::black_box(plant.state());
-    (began.elapsed().as_nanos() as f64, outcome.impacts)
+    (began.elapsed().as_nanos() as f64, outcome)
 }
 
 /// The default lock, settled.
@@ -85,7 +93,7 @@ impl Lock {
 
     /// Cost of an impact, ns.
     pub fn run(&self, periods: u32) -> f64 {
-        let (ns, impacts) = timed(&self.plant, self.drive, periods);
-        ns / impacts as f64
+        let (ns, outcome) = timed(&self.plant, self.drive, periods);
+        ns / outcome.impacts as f64
     }
 }

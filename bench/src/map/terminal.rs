@@ -20,7 +20,7 @@ vines-bench map: run time per impact over sigma and G, as ratios to the default 
 
 Where impacts are rarer than periods, the cost is that of a period.";
 
-/// The largest ratios that are allowed: median and worst cell of a regime (issue 12).
+/// The largest ratios that are accepted: median and worst cell of a regime.
 const ALLOWED: (f64, f64) = (4.0, 8.0);
 const ALLOWED_SYMMETRIC: (f64, f64) = (1.5, 1.5);
 
@@ -162,6 +162,10 @@ fn summary(cells: &[Cell], brent_too: bool) -> String {
         "{:15} {:>5} {:>9} {:>8} {:>8}  {:24} {:>10}",
         "regime", "cells", "median ns", "ratio", "worst", "worst at", "difference"
     );
+    let counted = cells.iter().any(|c| c.evaluations.is_some());
+    if counted {
+        text += "  evaluations: median, worst";
+    }
     if brent_too {
         text += "  Brent/plant";
     }
@@ -190,6 +194,13 @@ fn summary(cells: &[Cell], brent_too: bool) -> String {
             format!("sigma {:.3}, G {:.3}", worst.sigma, worst.g),
             difference.map_or_else(|| "-".to_owned(), |x| format!("{x:.1e}")),
         );
+        if counted {
+            let worst = cells
+                .iter()
+                .filter_map(|c| c.evaluations)
+                .fold(0.0, f64::max);
+            let _ = write!(text, "  {:19.2} {worst:6.2}", middle(|c| c.evaluations));
+        }
         if brent_too {
             let times = median(
                 cells
