@@ -17,6 +17,7 @@ STYLES = {
     "heyoka": ("#d1006c", "-", "v"),
     "diffsol, Tsit45": ("#009e73", "--", "<"),
     "diffsol, BDF": ("#009e73", ":", ">"),
+    "CVODE in C": ("#7b3fb5", "-", "H"),
     "CVODE, Adams": ("#7b3fb5", "--", "h"),
     "scipy DOP853": ("#e66100", "--", "P"),
     "scipy LSODA": ("#e66100", ":", "X"),
@@ -26,6 +27,10 @@ STYLES = {
 }
 TITLES = {
     "steady": "Steady 1:1, 1000 periods",
+    "centre": "1:1 at the linear resonance",
+    "asymmetric": "Asymmetric 1:1",
+    "three": "Three impacts per period",
+    "chaotic": "Chaotic, 30 periods",
     "decay": "Transient decay",
     "grazing": "Grazing contact",
     "chatter": "Chatter to sticking",
@@ -51,7 +56,7 @@ def panel(ax, bench, scene):
         own = method.startswith("plant")
         size = {"*": 9, "o": 6, "s": 5.5}.get(marker, 5)
         style = {"color": colour, "marker": marker, "markersize": size, "linewidth": 1.1, "zorder": 4 if own else 3}
-        points = [(min(row.times) / impacts, max(row.error, LEAST), row.failure) for row in rows if row.times]
+        points = [(row.median / impacts, max(row.error, LEAST), row.failure) for row in rows if row.times]
         good = [(x, y) for x, y, failure in points if failure is None]
         bad = [(x, min(y, 10.0)) for x, y, failure in points if failure]
         slow = [time_at_the_limit(row.failure, bench.limit, impacts) for row in rows if not row.times]
