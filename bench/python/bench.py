@@ -31,9 +31,6 @@ METHODS = [
     ("plant, one step in all", "rust", "plant-one-step", (0,), (0,)),
     ("plant, 100 times the steps", "rust", "plant-100", (0,), ()),
     ("plant, general search only", "rust", "plant-general", (0,), (0,)),
-    ("plant, batch", "rust", "batch", (0,), (0,)),
-    ("plant, batch on all cores", "rust", "batch-all-cores", (0,), (0,)),
-    ("plant, batch, one step in all", "rust", "batch-one-step", (0,), (0,)),
     ("plant, C interface", "rust", "c-interface", (0,), (0,)),
     ("plant, FMPy", "python", "fmpy", (0,), (0,)),
     ("closed form + Brent", "rust", "brent", TOLERANCES, (1e-9, 1e-12)),
@@ -56,8 +53,6 @@ GROWTH = {
     "periods": (1e6, 1e4),
     "impacts": (1e7, 1e5),
     "samples per period": (1e4, 1e3),
-    "plants in a batch, one core": (1e5, 1e4),
-    "plants in a batch, all cores": (1e5, 1e4),
 }
 
 

@@ -10,7 +10,6 @@ from matplotlib.lines import Line2D
 # Told apart without colour, too: by dash and marker. This project is black; a family of methods has one colour.
 STYLES = {
     "plant, Rust": ("#000000", "-", "o"),
-    "plant, batch": ("#000000", "-", "*"),
     "plant, C interface": ("#000000", "-", "s"),
     "plant, FMPy": ("#000000", "-", "D"),
     "closed form + Brent": ("#0072b2", "-", "^"),
@@ -54,7 +53,7 @@ def panel(ax, bench, scene):
     for method, (colour, dash, marker) in STYLES.items():
         rows = [row for row in bench.rows if row.scene == scene and row.method == method]
         own = method.startswith("plant")
-        size = {"*": 9, "o": 6, "s": 5.5}.get(marker, 5)
+        size = {"o": 6, "s": 5.5}.get(marker, 5)
         style = {"color": colour, "marker": marker, "markersize": size, "linewidth": 1.1, "zorder": 4 if own else 3}
         points = [(row.median / impacts, max(row.error, LEAST), row.failure) for row in rows if row.times]
         good = [(x, y) for x, y, failure in points if failure is None]

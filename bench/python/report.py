@@ -98,9 +98,8 @@ def savings(bench, profiles):
             return times[slow] / times[quick] if {slow, quick} <= times.keys() else None
 
         general, once = over("plant-general", "plant"), over("plant", "plant-one-step")
-        abreast = ratio(over("plant", "batch")) + "; " + ratio(over("plant-one-step", "batch-one-step"))
-        rows.append([scene, ratio(general), ratio(once), abreast, skipped(profiles[scene], general)])
-    head = ["scene", "by its search", "by not stopping", "by going abreast", "what the plant skips"]
+        rows.append([scene, ratio(general), ratio(once), skipped(profiles[scene], general)])
+    head = ["scene", "by its search", "by not stopping", "what the plant skips"]
     return head, rows
 
 
@@ -166,14 +165,12 @@ def growths(curves):
 
 
 GROWTH_NOTE = (
-    "Steady 1:1 motion. Periods: a step each; impacts: all in one step; samples: over 100 periods; batches: plants of "
-    "which no two are equal, 100 periods in one step. The exponent is that of the upper half of the range, in "
-    "logarithms; the last column goes a thousand times further by it."
+    "Steady 1:1 motion. Periods: a step each; impacts: all in one step; samples: over 100 periods. The exponent is that "
+    "of the upper half of the range, in logarithms; the last column goes a thousand times further by it."
 )
 SAVINGS_NOTE = (
     "Measured, as ratios of run times. By its search: every contact by the general search, over the plant as it is. By "
-    "not stopping: the plant as asked, over everything in one step. By going abreast: the plant alone, over one of a "
-    "batch on one core, a step at a time; and the same with everything in one step."
+    "not stopping: the plant as asked, over everything in one step."
 )
 
 
@@ -220,8 +217,7 @@ def notes(bench):
     yield "Truth, checked in this run: " + "; ".join(bench.truth_notes) + "."
     yield (
         "Every method is asked for the state after each step of the scene, and stops there as a co-simulation master "
-        "has it. It runs on one thread, but for the batch on all cores. A batch is of equal plants; its times are of "
-        "one of them. CVODE in C restarts at impacts and where the drive changes, and interpolates in between. "
+        "has it, on one thread. CVODE in C restarts at impacts and where the drive changes, and interpolates in between. "
         "Just-in-time compilation (heyoka) and setting up are not in the times. Runs take turns in an "
         "order drawn anew each round. In the loop, all methods get the drive recorded from controller and plant."
     )

@@ -1,6 +1,5 @@
 //! The methods, one a file.
 
-mod batch;
 mod brent;
 mod c_interface;
 #[cfg(feature = "diffsol")]
@@ -24,9 +23,6 @@ pub const NAMES: &[&str] = &[
     "plant-one-step",
     "plant-100",
     "plant-general",
-    "batch",
-    "batch-all-cores",
-    "batch-one-step",
     "c-interface",
     "brent",
     "rk4",
@@ -54,9 +50,6 @@ pub fn measure_named(
         "plant-one-step" => measure::<plant::OneStep>,
         "plant-100" => measure::<plant::Sampled>,
         "plant-general" => measure::<plant::General>,
-        "batch" => measure::<batch::OneCore>,
-        "batch-one-step" => measure::<batch::InOneStep>,
-        "batch-all-cores" => measure::<batch::AllCores>,
         "c-interface" => measure::<c_interface::Shell>,
         "brent" => measure::<brent::Brent>,
         "rk4" => measure::<rk4::Rk4>,
@@ -120,7 +113,6 @@ mod tests {
             let growth = if scene == "chaotic" { 1e2 } else { 1.0 };
             for (method, setting, limit) in [
                 ("plant", 0.0, 1e-11),
-                ("batch", 0.0, 1e-11),
                 ("brent", 1e-12, 1e-9),
             ] {
                 let error = error_at_the_end(scene, method, setting);

@@ -7,12 +7,9 @@ use std::f64::consts::TAU;
 use std::hint::black_box;
 use std::time::{Duration, Instant};
 
-/// Evaluations of the closed form in a step, where the plant counts them.
-///
-/// INTEGRATION POINT: the plant has no counter yet. With a field `evaluations` in [`Outcome`], this becomes
-/// `Some(outcome.evaluations)`, and the column of evaluations is filled and checked.
-fn evaluations(_outcome: &Outcome) -> Option<u64> {
-    None
+/// Evaluations of the motion in a step.
+fn evaluations(outcome: &Outcome) -> Option<u64> {
+    Some(outcome.evaluations)
 }
 
 /// Evaluations that are accepted per impact, drive cycle or natural period, whichever are the most in a natural period.
@@ -79,12 +76,12 @@ fn hardest(zeta: f64, amplitude: f64, ratio: f64) -> Hardest {
     };
     let mut plant = Plant::new(rig(zeta), start).expect("valid values");
     let drive = Drive::harmonic(amplitude, ratio);
-    plant.begin(drive);
+    plant.begin(drive).expect("valid values");
     let mut worst = Hardest::default();
     let (began, mut impacts) = (Instant::now(), 0);
     for _ in 0..PERIODS {
         let before = Instant::now();
-        let outcome = plant.advance(drive, TAU);
+        let outcome = plant.advance(drive, TAU).expect("valid values");
         black_box(plant.state());
         let ns = before.elapsed().as_nanos() as f64;
         let units = (outcome.impacts as f64).max(ratio).max(1.0);
@@ -269,9 +266,11 @@ impl Simple {
             ..State::default()
         };
         let mut plant = Plant::new(rig(self.zeta), start).expect("valid values");
-        plant.begin((self.drive)(0));
+        plant.begin((self.drive)(0)).expect("valid values");
         // The first step decides about the contact.
-        plant.advance((self.drive)(0), self.step);
+        plant
+            .advance((self.drive)(0), self.step)
+            .expect("valid values");
         plant
     }
 
@@ -286,7 +285,7 @@ impl Simple {
                 drive.signal[..2].copy_from_slice(&plant.base().drive.signal[..2]);
             }
             let began = Instant::now();
-            let outcome = plant.advance(drive, self.step);
+            let outcome = plant.advance(drive, self.step).expect("valid values");
             black_box(plant.state());
             ns.push(began.elapsed().as_nanos() as f64);
             met += outcome.impacts + outcome.released;

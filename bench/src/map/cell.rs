@@ -84,7 +84,7 @@ impl Settled {
     pub fn new(sigma: f64, g: f64) -> Result<Self, String> {
         let drive = drive(sigma, g)?;
         let mut plant = settle(drive)?;
-        let found = classify(&mut plant, drive);
+        let found = classify(&mut plant, drive)?;
         let repeats = found.pattern.is_some() || found.regime == Regime::NoImpacts;
         let state = numbers(&plant.state());
         Ok(Self {
@@ -107,9 +107,12 @@ impl Settled {
     }
 
     /// One run of the lock, of the plant, and of the closed form with Brent's method where asked for.
-    pub fn run(&mut self, lock: &Lock, effort: &Effort) {
-        self.lock_ns.push(lock.run(effort.periods));
-        let (ns, outcome) = timed(&self.plant, self.drive, effort.periods);
+    ///
+    /// # Errors
+    /// None, as long as the drive of the cell is valid.
+    pub fn run(&mut self, lock: &Lock, effort: &Effort) -> Result<(), String> {
+        self.lock_ns.push(lock.run(effort.periods)?);
+        let (ns, outcome) = timed(&self.plant, self.drive, effort.periods)?;
         let units = units(outcome.impacts, effort.periods);
         self.ns.push(ns / units);
         self.evaluations = evaluations(&outcome).map(|n| n as f64 / units);
@@ -117,6 +120,7 @@ impl Settled {
         if effort.methods == Methods::Both {
             self.run_brent(effort.brent_periods);
         }
+        Ok(())
     }
 
     fn run_brent(&mut self, periods: u32) {
@@ -178,11 +182,11 @@ struct Found {
 }
 
 /// The regime that the plant is in, told as `vines map` tells it.
-fn classify(plant: &mut Plant, drive: Drive) -> Found {
+fn classify(plant: &mut Plant, drive: Drive) -> Result<Found, String> {
     let mut round = 0;
     loop {
-        let (hits, rests) = watch(plant, drive);
-        let found = |regime, pattern| Found { regime, pattern };
+        let (hits, rests) = watch(plant, drive)?;
+        let found = |regime, pattern| Ok(Found { regime, pattern });
         if f64::from(rests) >= STICKING * f64::from(RECORDED) {
             return found(Regime::Sticking, None);
         }
@@ -192,7 +196,7 @@ fn classify(plant: &mut Plant, drive: Drive) -> Found {
         if let Some(one) = pattern(&hits) {
             return found(one.regime, Some(one));
         }
-        let growth = growth(plant, drive);
+        let growth = growth(plant, drive)?;
         round += 1;
         if growth > CHAOS && synchrony(&hits) < CAPTURES {
             return found(Regime::Chaotic, None);
@@ -200,16 +204,16 @@ fn classify(plant: &mut Plant, drive: Drive) -> Found {
         if growth > CHAOS || round == ROUNDS {
             return found(Regime::Modulated, None);
         }
-        more(plant, drive, 400);
+        more(plant, drive, 400)?;
     }
 }
 
 /// The impacts of the recorded periods, and how often the particle came to rest on a wall or was at rest when they began.
-fn watch(plant: &mut Plant, drive: Drive) -> (Vec<Hit>, u32) {
+fn watch(plant: &mut Plant, drive: Drive) -> Result<(Vec<Hit>, u32), String> {
     let mut hits = Vec::new();
     let mut rests = u32::from(plant.contact().is_some());
     for n in 0..RECORDED {
-        plant.advance_with(drive, TAU / drive.omega, |event| match event {
+        let outcome = plant.advance_with(drive, TAU / drive.omega, |event| match event {
             Event::Impact { t, wall, velocity } => hits.push(Hit {
                 phase: TAU * f64::from(n) + drive.omega * t,
                 wall: wall.sign(),
@@ -218,13 +222,14 @@ fn watch(plant: &mut Plant, drive: Drive) -> (Vec<Hit>, u32) {
             Event::Stuck { .. } => rests += 1,
             Event::Released { .. } => {}
         });
+        outcome.map_err(|e| e.to_string())?;
     }
-    (hits, rests)
+    Ok((hits, rests))
 }
 
 /// Mean growth of a small disturbance per period, as a natural logarithm. The disturbed plant is brought near again after every
 /// period (Benettin et al., Meccanica 15, 1980); both begin anew at phase 0.
-fn growth(plant: &Plant, drive: Drive) -> f64 {
+fn growth(plant: &Plant, drive: Drive) -> Result<f64, String> {
     let mut here = numbers(&plant.state());
     let mut apart = [DISTURBANCE / 2.0; 4];
     let (mut sum, mut counted) = (0.0, 0);
@@ -238,8 +243,8 @@ fn growth(plant: &Plant, drive: Drive) -> f64 {
             break;
         };
         let before = distance(&numbers(&other.state()), &here);
-        more(&mut one, drive, 1);
-        more(&mut other, drive, 1);
+        more(&mut one, drive, 1)?;
+        more(&mut other, drive, 1)?;
         here = numbers(&one.state());
         let there = numbers(&other.state());
         let after = distance(&there, &here);
@@ -250,7 +255,7 @@ fn growth(plant: &Plant, drive: Drive) -> f64 {
         counted += 1;
         apart = core::array::from_fn(|n| (there[n] - here[n]) / scale(n) * (DISTURBANCE / after));
     }
-    sum / f64::from(counted.max(1))
+    Ok(sum / f64::from(counted.max(1)))
 }
 
 /// Largest difference of the plant and the closed form with Brent's method from the same state on; none if the latter stalls.
@@ -259,7 +264,7 @@ fn difference(state: [f64; 4], drive: Drive) -> Option<f64> {
     let mut brent = brent_baseline(RIG, state, time(TOLERANCE));
     let period = TAU / drive.omega;
     for _ in 0..COMPARED {
-        plant.advance(drive, period);
+        plant.advance(drive, period).ok()?;
         brent.advance(drive.amplitude, drive.omega, period).ok()?;
     }
     let there = [brent.q1, brent.dq1, brent.q2, brent.dq2];
@@ -272,7 +277,7 @@ fn difference(state: [f64; 4], drive: Drive) -> Option<f64> {
 fn begin([q1, dq1, q2, dq2]: [f64; 4], drive: Drive) -> Result<Plant, String> {
     let state = State { q1, dq1, q2, dq2 };
     let mut plant = Plant::new(RIG, state).map_err(|e| e.to_string())?;
-    plant.begin(drive);
+    plant.begin(drive).map_err(|e| e.to_string())?;
     Ok(plant)
 }
 

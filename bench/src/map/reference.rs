@@ -48,32 +48,38 @@ pub fn settle(drive: Drive) -> Result<Plant, String> {
         ..State::default()
     };
     let mut plant = Plant::new(RIG, start).map_err(|e| e.to_string())?;
-    plant.begin(drive);
-    more(&mut plant, drive, SETTLING);
+    plant.begin(drive).map_err(|e| e.to_string())?;
+    more(&mut plant, drive, SETTLING)?;
     Ok(plant)
 }
 
 /// So many more periods in one step.
-pub fn more(plant: &mut Plant, drive: Drive, periods: u32) {
-    plant.advance(drive, f64::from(periods) * TAU / drive.omega);
+///
+/// # Errors
+/// A drive that the plant does not accept.
+pub fn more(plant: &mut Plant, drive: Drive, periods: u32) -> Result<(), String> {
+    let duration = f64::from(periods) * TAU / drive.omega;
+    plant.advance(drive, duration).map_err(|e| e.to_string())?;
+    Ok(())
 }
 
-/// Evaluations of the closed form in a step, where the plant counts them.
-///
-/// INTEGRATION POINT: the plant has no counter yet. With a field `evaluations` in [`Outcome`], this becomes
-/// `Some(outcome.evaluations)`, and the summaries of the map show evaluations per impact.
-pub fn evaluations(_outcome: &Outcome) -> Option<u64> {
-    None
+/// Evaluations of the motion in a step.
+pub fn evaluations(outcome: &Outcome) -> Option<u64> {
+    Some(outcome.evaluations)
 }
 
 /// Wall time of so many periods in one step with the state read at the end, ns, and what the step met.
-pub fn timed(settled: &Plant, drive: Drive, periods: u32) -> (f64, Outcome) {
+///
+/// # Errors
+/// A drive that the plant does not accept.
+pub fn timed(settled: &Plant, drive: Drive, periods: u32) -> Result<(f64, Outcome), String> {
     let mut plant = *settled;
     let duration = f64::from(periods) * TAU / drive.omega;
     let began = Instant::now();
     let outcome = plant.advance(std::hint::black_box(drive), duration);
     std::hint::black_box(plant.state());
-    (began.elapsed().as_nanos() as f64, outcome)
+    let ns = began.elapsed().as_nanos() as f64;
+    Ok((ns, outcome.map_err(|e| e.to_string())?))
 }
 
 /// The default lock, settled.
@@ -92,8 +98,11 @@ impl Lock {
     }
 
     /// Cost of an impact, ns.
-    pub fn run(&self, periods: u32) -> f64 {
-        let (ns, outcome) = timed(&self.plant, self.drive, periods);
-        ns / outcome.impacts as f64
+    ///
+    /// # Errors
+    /// None, as long as the default scene is valid.
+    pub fn run(&self, periods: u32) -> Result<f64, String> {
+        let (ns, outcome) = timed(&self.plant, self.drive, periods)?;
+        Ok(ns / outcome.impacts as f64)
     }
 }
