@@ -76,7 +76,9 @@ fn settled(sigma: f64, g: f64) -> Scene {
         ..lock()
     };
     let mut plant = scene.plant();
-    plant.advance(scene.drive(), 1000.0 * scene.period());
+    plant
+        .advance(scene.drive(), 1000.0 * scene.period())
+        .unwrap();
     let s = plant.state();
     Scene {
         start: [s.q1, s.dq1, s.q2, s.dq2],
@@ -97,7 +99,7 @@ impl Scene {
         let [q1, dq1, q2, dq2] = self.start;
         let start = State { q1, dq1, q2, dq2 };
         let mut plant = Plant::new(self.parameters, start).expect("a valid scene");
-        plant.begin(self.drive());
+        plant.begin(self.drive()).unwrap();
         plant
     }
 
@@ -143,7 +145,7 @@ impl Scene {
         let mut plant = self.plant();
         let step = self.period() / SAMPLES as f64;
         for n in 0..PERIODS * SAMPLES {
-            plant.advance(black_box(drive(self, n)), step);
+            plant.advance(black_box(drive(self, n)), step).unwrap();
             sensors(&plant);
         }
         (PERIODS * SAMPLES) as u64

@@ -8,9 +8,6 @@ mod cell;
 mod reference;
 pub mod terminal;
 
-#[path = "../../lab/src/map/regime.rs"]
-mod regime;
-
 use serde::{Deserialize, Serialize};
 
 pub use cell::Cell;
@@ -74,7 +71,7 @@ pub fn row(g: f64, sigmas: &[f64], effort: &Effort) -> Result<Row, String> {
         let first = round * begun.len() / effort.runs;
         let (before, after) = begun.split_at_mut(first);
         for cell in after.iter_mut().chain(before) {
-            cell.run(&lock, effort);
+            cell.run(&lock, effort)?;
         }
     }
     let lock_ns = median(begun.iter().flat_map(cell::Settled::lock_ns).collect());

@@ -111,10 +111,7 @@ mod tests {
         for scene in scenes {
             // In the chaotic scene a disturbance grows by 1e5.
             let growth = if scene == "chaotic" { 1e2 } else { 1.0 };
-            for (method, setting, limit) in [
-                ("plant", 0.0, 1e-11),
-                ("brent", 1e-12, 1e-9),
-            ] {
+            for (method, setting, limit) in [("plant", 0.0, 1e-11), ("brent", 1e-12, 1e-9)] {
                 let error = error_at_the_end(scene, method, setting);
                 assert!(error < growth * limit, "{scene}, {method}: {error:e}");
             }

@@ -60,7 +60,7 @@ fn powers(plant: &Plant) -> (f64, f64) {
 /// Follows the scene for so many panels at most.
 pub fn walk(scene: &Scene, panels: u32) -> Walk {
     let mut plant = Plant::new(scene.parameters, scene.start).expect("a valid scene");
-    plant.begin(scene.drive);
+    plant.begin(scene.drive).expect("a valid drive");
     let p = scene.parameters;
     let fastest = p.fastest_rate().max(scene.drive.omega.abs());
     let panel = PANEL / fastest;
@@ -71,11 +71,13 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
         let mut first = None;
         // A clone looks ahead: the event that ends this panel.
         let mut ahead = plant;
-        ahead.advance_with(plant.base().drive, panel, |event| {
-            let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) =
-                event;
-            first.get_or_insert(t);
-        });
+        ahead
+            .advance_with(plant.base().drive, panel, |event| {
+                let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) =
+                    event;
+                first.get_or_insert(t);
+            })
+            .expect("a valid step");
         let length = first.unwrap_or(panel);
         let mut gone = 0.0;
         let nodes = (NODES.iter().rev().map(|(x, weight)| (-x, weight)))
@@ -109,7 +111,7 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
         }
         result.panels += 1;
     }
-    let dissipated = plant.tally().dissipated;
+    let dissipated = plant.totals().dissipated;
     let error = plant.energy(base(&plant).0) + dissipated + lost - done - at_start;
     let scale = at_start + exchanged + dissipated;
     if scale > 0.0 {
@@ -121,5 +123,7 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
 /// Advances under the drive as it stands.
 fn go(plant: &mut Plant, duration: f64) {
     let drive = plant.base().drive;
-    plant.advance(drive, duration.max(0.0));
+    plant
+        .advance(drive, duration.max(0.0))
+        .expect("a valid step");
 }

@@ -153,7 +153,7 @@ fn look(plant: &mut Plant, drive: Drive, step: f64) -> f64 {
     let (mut outside, mut gone) = (0.0f64, 0.0);
     for (n, part) in LOOKS.iter().enumerate() {
         let drive = if n == 0 { drive } else { plant.base().drive };
-        plant.advance(drive, part * step - gone);
+        plant.advance(drive, part * step - gone).unwrap();
         gone = part * step;
         let State { q1, q2, .. } = plant.state();
         // The difference of the two displacements carries their rounding.

@@ -5,9 +5,9 @@ use std::time::Instant;
 
 use lovines::{Drive, Event, Plant, State};
 use serde::Serialize;
+use vines_model::regime::{Impact, Pattern, Regime, pattern, synchrony};
 
 use super::reference::{Lock, RIG, drive, evaluations, more, settle, timed};
-use super::regime::{Hit, Pattern, Regime, pattern, synchrony};
 use super::{Effort, Methods, median};
 use crate::methods::{BrentBaseline, brent_baseline};
 
@@ -209,14 +209,13 @@ fn classify(plant: &mut Plant, drive: Drive) -> Result<Found, String> {
 }
 
 /// The impacts of the recorded periods, and how often the particle came to rest on a wall or was at rest when they began.
-fn watch(plant: &mut Plant, drive: Drive) -> Result<(Vec<Hit>, u32), String> {
+fn watch(plant: &mut Plant, drive: Drive) -> Result<(Vec<Impact>, u32), String> {
     let mut hits = Vec::new();
     let mut rests = u32::from(plant.contact().is_some());
     for n in 0..RECORDED {
         let outcome = plant.advance_with(drive, TAU / drive.omega, |event| match event {
-            Event::Impact { t, wall, velocity } => hits.push(Hit {
-                phase: TAU * f64::from(n) + drive.omega * t,
-                wall: wall.sign(),
+            Event::Impact { t, velocity, .. } => hits.push(Impact {
+                time: TAU * f64::from(n) + drive.omega * t,
                 velocity: velocity / speed(),
             }),
             Event::Stuck { .. } => rests += 1,

@@ -3,8 +3,9 @@
 use std::fmt::Write as _;
 use std::io::IsTerminal;
 
+use vines_model::regime::Regime;
+
 use super::cell::RARE;
-use super::regime::Regime;
 use super::{Axis, Cell, Effort, Methods, median, row};
 
 /// How the command is called.
@@ -170,7 +171,11 @@ fn summary(cells: &[Cell], brent_too: bool) -> String {
         text += "  Brent/plant";
     }
     text += "  targets (median, worst)\n";
-    for regime in Regime::ALL.map(|one| one.name()).into_iter().chain([RARE]) {
+    for regime in Regime::SIMULATED
+        .map(|one| one.name())
+        .into_iter()
+        .chain([RARE])
+    {
         let cells: Vec<&Cell> = cells.iter().filter(|c| c.regime == regime).collect();
         let middle = |value: fn(&Cell) -> Option<f64>| {
             median(cells.iter().filter_map(|c| value(c)).collect()).unwrap_or(f64::NAN)

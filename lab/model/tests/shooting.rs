@@ -95,7 +95,7 @@ fn distance_of_plant(scene: &Dimensionless, motion: &Periodic, periods: u32) -> 
     let whole = motion.shape.periods();
     (0..periods).fold(0.0, |most, _| {
         for _ in 0..whole {
-            plant.advance(drive, TAU / omega);
+            plant.advance(drive, TAU / omega).unwrap();
         }
         let now = plant.state();
         let apart = [now.q1 - q1, now.dq1 - dq1, now.q2 - q2, now.dq2 - dq2];

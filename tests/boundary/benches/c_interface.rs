@@ -110,7 +110,7 @@ impl Scene {
 
     fn plant(&self) -> Plant {
         let mut plant = Plant::new(Self::parameters(), self.start).expect("the scene makes sense");
-        plant.begin(Drive::default());
+        plant.begin(Drive::default()).expect("a valid drive");
         plant
     }
 }
@@ -148,13 +148,15 @@ fn from_rust(scene: Scene, inputs: Inputs, read: bool) -> Box<dyn FnMut()> {
     Box::new(move || {
         for _ in 0..RUN {
             let [omega, amplitude] = scene.inputs(inputs, n);
-            plant.advance(black_box(Drive::harmonic(amplitude, omega)), step);
+            plant
+                .advance(black_box(Drive::harmonic(amplitude, omega)), step)
+                .expect("a valid drive");
             if read {
                 black_box([
                     plant.centre(),
                     plant.base_displacement(),
                     plant.state().dq2,
-                    plant.tally().impact_time,
+                    plant.totals().impact_time,
                 ]);
             }
             n += 1;

@@ -2,6 +2,7 @@
 
 use std::error::Error;
 
+use lovines::InvalidValue;
 use phase_lock::ConfigError;
 use thiserror::Error;
 
@@ -14,6 +15,9 @@ pub enum RigError {
     /// What stands behind the rig failed.
     #[error("the rig: {0}")]
     Failed(#[source] Cause),
+    /// The built-in plant refused a drive.
+    #[error("the rig: {0}")]
+    Refused(#[from] InvalidValue),
     /// The rig cannot be driven by held samples.
     #[error(
         "the rig takes frequency and amplitude only, not samples of the base displacement as chain.hold asks"
@@ -41,7 +45,7 @@ impl RigError {
     pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
         match self {
             Self::Failed(cause) => cause.downcast_ref(),
-            Self::NoHold => None,
+            Self::Refused(_) | Self::NoHold => None,
         }
     }
 }

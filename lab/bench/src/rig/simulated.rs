@@ -42,21 +42,22 @@ impl Rig for Simulated {
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         let drive = lovines::Drive::harmonic(drive.amplitude, drive.omega);
-        self.plant.advance(drive, step);
+        self.plant.advance(drive, step)?;
         Ok(())
     }
 
     fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.plant.advance(lovines::Drive::held(displacement), step);
+        self.plant
+            .advance(lovines::Drive::held(displacement), step)?;
         Ok(())
     }
 
     fn witness(&mut self) -> Result<Option<Witness>, RigError> {
-        let tally = self.plant.tally();
+        let totals = self.plant.totals();
         Ok(Some(Witness {
-            impacts: i64::try_from(tally.impacts).unwrap_or(i64::MAX),
-            impact_time: tally.impact_time,
-            impact_velocity: tally.impact_velocity,
+            impacts: i64::try_from(totals.impacts).unwrap_or(i64::MAX),
+            impact_time: totals.impact_time,
+            impact_velocity: totals.impact_velocity,
             particle_velocity: self.plant.state().dq2,
         }))
     }

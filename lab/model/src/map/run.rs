@@ -61,9 +61,9 @@ pub fn observe(
     let mut round = 0;
     loop {
         for _ in 0..settle {
-            plant.advance(drive, TAU / omega);
+            plant.advance(drive, TAU / omega)?;
         }
-        let (impacts, rests) = recorded(&mut plant, drive, record);
+        let (impacts, rests) = recorded(&mut plant, drive, record)?;
         let found = |regime, pattern: Option<Pattern>, growth| Point {
             regime,
             impacts_per_period: impacts.len() as f64 / record as f64,
@@ -81,7 +81,7 @@ pub fn observe(
         if let Some(one) = pattern(&impacts) {
             return Ok(found(one.regime, Some(one), None));
         }
-        let growth = growth(scene, drive, &plant);
+        let growth = growth(scene, drive, &plant)?;
         round += 1;
         let regime = if growth > CHAOS && synchrony(&impacts) < CAPTURES {
             Regime::Chaotic
@@ -99,7 +99,11 @@ pub fn observe(
 }
 
 /// The impacts of so many periods, and how often the particle came to rest on a wall or was at rest when they began.
-fn recorded(plant: &mut Plant, drive: Drive, periods: usize) -> (Vec<Impact>, usize) {
+fn recorded(
+    plant: &mut Plant,
+    drive: Drive,
+    periods: usize,
+) -> Result<(Vec<Impact>, usize), InvalidValue> {
     let mut impacts = Vec::new();
     let mut rests = usize::from(plant.contact().is_some());
     for n in 0..periods {
@@ -110,9 +114,9 @@ fn recorded(plant: &mut Plant, drive: Drive, periods: usize) -> (Vec<Impact>, us
             }),
             Event::Stuck { .. } => rests += 1,
             Event::Released { .. } => {}
-        });
+        })?;
     }
-    (impacts, rests)
+    Ok((impacts, rests))
 }
 
 fn numbers(plant: &Plant) -> [f64; 4] {
@@ -122,7 +126,7 @@ fn numbers(plant: &Plant) -> [f64; 4] {
 
 /// Mean growth per period of the distance between the plant and a twin, which is brought near again after every period
 /// (Benettin et al., Meccanica 15, 1980). Both start anew at every passage of the base through zero.
-fn growth(scene: &Dimensionless, drive: Drive, plant: &Plant) -> f64 {
+fn growth(scene: &Dimensionless, drive: Drive, plant: &Plant) -> Result<f64, InvalidValue> {
     let period = TAU / drive.omega;
     let mut here = numbers(plant);
     let mut apart = [DISTURBANCE / 2.0; 4];
@@ -138,8 +142,8 @@ fn growth(scene: &Dimensionless, drive: Drive, plant: &Plant) -> f64 {
             break;
         };
         let before = distance(&numbers(&other), &here);
-        one.advance(drive, period);
-        other.advance(drive, period);
+        one.advance(drive, period)?;
+        other.advance(drive, period)?;
         here = numbers(&one);
         let then = numbers(&other);
         let after = distance(&then, &here);
@@ -150,11 +154,11 @@ fn growth(scene: &Dimensionless, drive: Drive, plant: &Plant) -> f64 {
         counted += 1;
         apart = std::array::from_fn(|n| (then[n] - here[n]) * (DISTURBANCE / after));
     }
-    if counted == 0 {
+    Ok(if counted == 0 {
         0.0
     } else {
         sum / f64::from(counted)
-    }
+    })
 }
 
 fn distance(one: &[f64; 4], other: &[f64; 4]) -> f64 {

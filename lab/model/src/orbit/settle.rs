@@ -32,7 +32,7 @@ pub fn settle(
     let omega = 1.0 + scene.epsilon * sigma;
     let drive = Drive::harmonic(scene.epsilon * scene.g, omega);
     for _ in 0..periods {
-        plant.advance(drive, TAU / omega);
+        plant.advance(drive, TAU / omega)?;
     }
     let State { q1, dq1, q2, dq2 } = plant.state();
     Ok(settled(scene, sigma, [q1, dq1, q2, dq2]))
