@@ -24,6 +24,23 @@ pub struct Gap {
     pub jerk: f64,
 }
 
+/// Bounds of the derivatives of all gaps over the next so many seconds, given the derivatives of the motion now.
+pub trait Bounds {
+    /// A bound of the third derivative.
+    fn third(&self, d: &Derivatives, window: f64) -> f64;
+
+    /// A bound of the first derivative. It helps where rounding errors of the higher ones are large.
+    fn first(&self, _d: &Derivatives, _window: f64) -> f64 {
+        f64::INFINITY
+    }
+
+    /// How long `gap` is certainly open, s, at most `window`.
+    fn open(&self, gap: &Gap, d: &Derivatives, window: f64) -> f64 {
+        let open = gap.certainly_open(window, |h| self.third(d, h));
+        open.max((gap.gap / self.first(d, window)).min(window))
+    }
+}
+
 /// Where a gap closes: `h` seconds after a look at `t`, close enough for the local Taylor polynomial.
 #[derive(Clone, Copy, Debug)]
 pub struct Closure {
@@ -53,14 +70,13 @@ const MOST_WINDOWS: usize = 40;
 
 /// The first closure of any of `N` gaps in `[from, limit]`.
 ///
-/// `look` returns the gaps at a time and the derivatives of the motion there; `jerk` bounds the third derivative of the
-/// gaps over the next so many seconds, given those derivatives; `fastest` is the fastest rate of the motion, 1/s;
+/// `look` returns the gaps at a time and the derivatives of the motion there; `fastest` is the fastest rate of the motion, 1/s;
 /// `resolution` is the rounding error of the gaps.
 pub fn first_closure<const N: usize>(
     (from, limit): (f64, f64),
     (fastest, resolution): (f64, f64),
     look: impl Fn(f64) -> ([Gap; N], Derivatives),
-    jerk: impl Fn(&Derivatives, f64) -> f64,
+    bounds: impl Bounds,
 ) -> Found {
     let mut t = from;
     let mut looks = 0;
@@ -73,7 +89,7 @@ pub fn first_closure<const N: usize>(
         let mut step = window;
         let mut nearest: Option<(f64, usize)> = None;
         for (which, gap) in gaps.iter().enumerate() {
-            let open = gap.certainly_open(window, |h| jerk(&derivatives, h));
+            let open = bounds.open(gap, &derivatives, window);
             if open * fastest < NEAR && open < left {
                 let contact = gap.contact_nearby(2.0 * NEAR / fastest);
                 if let Some(h) = contact.filter(|h| *h <= left)
@@ -107,7 +123,7 @@ pub fn first_closure<const N: usize>(
                     gap: gap.gap + resolution,
                     ..gap
                 };
-                gap.certainly_open(window, |h| jerk(&derivatives, h))
+                bounds.open(&gap, &derivatives, window)
             });
             least = blurred.into_iter().fold(window, f64::min).max(least);
         }

@@ -1,6 +1,6 @@
 //! The particle's free flight between the walls, up to the first instant it touches one.
 
-use crate::clearance::{Gap, clear_after_release, first_closure};
+use crate::clearance::{Bounds, Gap, clear_after_release, first_closure};
 use crate::contact::Wall;
 use crate::segment::{Derivatives, Segment, Series, nearby, velocity_change};
 
@@ -52,9 +52,8 @@ impl Flight {
             let (change, d) = self.relative_change(t);
             (Wall::BOTH.map(|wall| self.gap(wall, change, &d)), d)
         };
-        let jerk = |d: &Derivatives, h: f64| self.motion.third_derivative_bound(d, h);
         let scale = (self.motion.fastest(), RESOLUTION * self.half_width);
-        let (closure, looks) = first_closure((from, limit), scale, look, jerk);
+        let (closure, looks) = first_closure((from, limit), scale, look, self);
         match closure {
             Some(closure) => {
                 let wall = Wall::BOTH[closure.which];
@@ -122,5 +121,11 @@ impl Flight {
         let other = self.gap(wall.other(), (0.0, 0.0), &d);
         let jerk = |h| self.motion.third_derivative_bound(&d, h);
         clear.min(other.certainly_open(window, jerk))
+    }
+}
+
+impl Bounds for &Flight {
+    fn third(&self, d: &Derivatives, window: f64) -> f64 {
+        self.motion.third_derivative_bound(d, window)
     }
 }

@@ -1,6 +1,6 @@
 //! Persistent contact: both masses move as one while the wall must push, and part at the instant it need not.
 
-use crate::clearance::{Gap, first_closure};
+use crate::clearance::{Bounds, Gap, first_closure};
 use crate::contact::Wall;
 use crate::segment::{Derivatives, Segment, nearby};
 
@@ -39,9 +39,8 @@ pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> P
         };
         ([push], d)
     };
-    let jerk = |d: &Derivatives, h: f64| motion.fifth_derivative_bound(d, h);
     let scale = (motion.fastest(), noise);
-    let (closure, evaluations) = first_closure((0.0, limit), scale, look, jerk);
+    let (closure, evaluations) = first_closure((0.0, limit), scale, look, motion);
     match closure {
         Some(closure) => Parting {
             t: closure.t + closure.h,
@@ -58,5 +57,16 @@ pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> P
                 evaluations: evaluations + 1,
             }
         }
+    }
+}
+
+/// Bounds of the push, which is the second derivative of the motion.
+impl Bounds for &Segment {
+    fn third(&self, d: &Derivatives, window: f64) -> f64 {
+        self.fifth_derivative_bound(d, window)
+    }
+
+    fn first(&self, d: &Derivatives, window: f64) -> f64 {
+        self.third_derivative_bound(d, window)
     }
 }
