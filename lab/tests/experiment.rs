@@ -139,7 +139,7 @@ fn a_rig_that_does_not_tell_its_impacts_is_identified_from_its_response() {
     let fold = 0.134;
     assert!(mute.decay.iter().all(|one| one.point.c > fold));
     assert_eq!(mute.rms_sigma_error, telling.rms_sigma_error);
-    let table = vines::report::table(&mute);
+    let table = vines::report::summary::identification(&mute);
     assert!(
         table.contains("symmetric 1:1, told from the response alone"),
         "{table}"

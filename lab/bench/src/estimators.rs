@@ -4,6 +4,8 @@
 //! v, found to the last digits by advancing a copy of it in closed form. The time from a crossing to the next but one is the mean
 //! period between them. That involves no samples, no window and no model.
 
+use lovines::InvalidValue;
+use phase_lock::ConfigError;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -41,9 +43,12 @@ pub struct Quality {
 /// Why the estimators could not be looked at.
 #[derive(Debug, Error)]
 pub enum EstimatorError {
-    /// A setting that the plant or the controller refuses.
-    #[error("{0}")]
-    Setting(String),
+    /// The plant refuses a parameter or the start.
+    #[error(transparent)]
+    Plant(#[from] InvalidValue),
+    /// The controller refuses a setting.
+    #[error(transparent)]
+    Configuration(#[from] ConfigError),
     /// No lock to decay from.
     #[error(transparent)]
     Experiment(#[from] ExperimentError),
@@ -70,9 +75,8 @@ impl Decay {
     /// # Errors
     /// Settings that are refused, or no lock.
     pub fn of(scene: &Scene) -> Result<Self, EstimatorError> {
-        let refused = |text: String| EstimatorError::Setting(text);
-        let mut rig = Simulated::new(scene).map_err(|error| refused(error.to_string()))?;
-        let mut controller = BuiltIn::new(scene).map_err(|error| refused(error.to_string()))?;
+        let mut rig = Simulated::new(scene)?;
+        let mut controller = BuiltIn::new(scene)?;
         let plan = Plan::of(scene);
         let held = Plan { decay: 0, ..plan };
         let mut record = experiment::run(&mut rig, &mut controller, &held, |_, _, _| {})?;
@@ -194,24 +198,4 @@ pub fn qualities(scene: &Scene) -> Result<Vec<Quality>, EstimatorError> {
             NOISE.map(|snr| decay.quality(&scene, snr, SEEDS))
         })
         .collect())
-}
-
-/// The qualities as a table, one row per estimator and window.
-#[must_use]
-pub fn table(qualities: &[Quality]) -> String {
-    let mut text = String::from(
-        "| estimator | window, periods | clean: bias | clean: RMS | 60 dB | 50 dB | 40 dB |\n|---|---|---|---|---|---|---|\n",
-    );
-    for row in qualities.chunks(NOISE.len()) {
-        let name = match row[0].estimator {
-            Estimator::Fit => "least squares",
-            Estimator::Crossings => "zero crossings",
-        };
-        text += &format!("| {name} | {} | {:+.4} |", row[0].window, row[0].bias);
-        for quality in row {
-            text += &format!(" {:.4} |", quality.rms);
-        }
-        text += "\n";
-    }
-    text
 }

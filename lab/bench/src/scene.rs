@@ -19,7 +19,7 @@ pub use backbone::{Backbone, Feed};
 pub use chain::{Chain, RatioOf};
 pub use controller::Controller;
 pub use error::SceneError;
-pub use overrides::Override;
+pub use overrides::{Override, SyntaxError};
 pub(crate) use plant::symbols;
 pub use record::{Estimator, Record};
 pub use vines_model::Dimensionless;

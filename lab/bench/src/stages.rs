@@ -2,6 +2,8 @@
 
 use std::time::{Duration, Instant};
 
+use lovines::InvalidValue;
+use phase_lock::ConfigError;
 use serde::Serialize;
 use thiserror::Error;
 use vines_model::numerics::{mean, standard_deviation};
@@ -9,7 +11,7 @@ use vines_model::numerics::{mean, standard_deviation};
 use crate::backbone::Cycle;
 use crate::experiment::Sample;
 use crate::rig::{BuiltIn, Chain, Controller, ControllerError, Rig, RigError, Simulated};
-use crate::scene::{Override, Scene, SceneError};
+use crate::scene::{Override, Scene, SceneError, SyntaxError};
 
 /// Stages and combinations of them that are looked at: a name, and what is set in `[chain]`.
 pub const STAGES: [(&str, &[&str]); 18] = [
@@ -82,9 +84,12 @@ pub struct Effect {
 /// Why a stage could not be looked at.
 #[derive(Debug, Error)]
 pub enum StageError {
-    /// A setting that the scene refuses.
-    #[error("{0}")]
-    Setting(String),
+    /// The plant refuses a parameter or the start.
+    #[error(transparent)]
+    Plant(#[from] InvalidValue),
+    /// The controller refuses a setting.
+    #[error(transparent)]
+    Configuration(#[from] ConfigError),
     /// The scene does not take it.
     #[error(transparent)]
     Scene(#[from] SceneError),
@@ -114,8 +119,8 @@ pub fn effects(
             let overrides = settings
                 .iter()
                 .map(|setting| format!("chain.{setting}").parse())
-                .collect::<Result<Vec<Override>, String>>()
-                .map_err(StageError::Setting)?;
+                .collect::<Result<Vec<Override>, SyntaxError>>()
+                .map_err(SceneError::from)?;
             effect(name, &load(&overrides)?)
         })
         .collect()
@@ -130,8 +135,7 @@ struct Bench {
 
 impl Bench {
     fn new(scene: &Scene) -> Result<Self, StageError> {
-        let refused = |error: String| StageError::Setting(error);
-        let plant = Simulated::new(scene).map_err(|error| refused(error.to_string()))?;
+        let plant = Simulated::new(scene)?;
         let rig: Box<dyn Rig> = if scene.chain.is_on() {
             Box::new(Chain::new(Box::new(plant), scene))
         } else {
@@ -139,7 +143,7 @@ impl Bench {
         };
         Ok(Self {
             rig,
-            controller: BuiltIn::new(scene).map_err(|error| refused(error.to_string()))?,
+            controller: BuiltIn::new(scene)?,
             sample_time: scene.sample_time(),
         })
     }
@@ -199,24 +203,4 @@ pub fn effect(name: &'static str, scene: &Scene) -> Result<Effect, StageError> {
         wander: standard_deviation(&omegas) / d.omega_change(1.0),
         sample_seconds: fastest,
     })
-}
-
-/// The effects as a table, each beside the ideal chain.
-#[must_use]
-pub fn table(effects: &[Effect]) -> String {
-    let mut text = String::from(
-        "| stage | sigma moves by | C moves by | sigma wanders by | time of a sample |\n|---|---|---|---|---|\n",
-    );
-    let ideal = effects[0];
-    for effect in effects {
-        text += &format!(
-            "| {} | {:+.1e} | {:+.1e} | {:.0e} | × {:.2} |\n",
-            effect.name,
-            effect.sigma - ideal.sigma,
-            effect.c - ideal.c,
-            effect.wander,
-            effect.sample_seconds / ideal.sample_seconds
-        );
-    }
-    text
 }

@@ -9,7 +9,9 @@ use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn
 use super::{
     door::{Door, OpenRig, ReachArguments},
     failure::Failure,
+    json,
     scene_arguments::SceneArguments,
+    written,
 };
 
 const HELP: &str = "\
@@ -68,17 +70,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     // A rig across the network is told that this is all.
     drop(rig);
     let found = TrackedComparison::of(&tracked.map_err(Failure::run)?, &scene);
-    let written = report::write_tracking(&found, &arguments.out).map_err(Failure::run)?;
+    let files = report::write_tracked(&found, &arguments.out).map_err(Failure::run)?;
     if arguments.json {
-        return Ok(serde_json::to_string_pretty(&found)? + "\n");
+        return json(&found);
     }
-    let files: Vec<String> = written
-        .iter()
-        .map(|path| path.display().to_string())
-        .collect();
-    Ok(format!(
-        "{}\nWritten: {}\n",
-        report::tracking_table(&found),
-        files.join(", ")
-    ))
+    let summary = report::summary::tracked(&found);
+    Ok(format!("{summary}\n{}", written(&files)))
 }

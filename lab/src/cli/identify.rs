@@ -15,8 +15,10 @@ use vines::{
 use super::{
     door::{Door, OpenRig, ReachArguments},
     failure::Failure,
+    json,
     pack::beside_this_program,
     scene_arguments::SceneArguments,
+    written,
 };
 
 const HELP: &str = "\
@@ -90,20 +92,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let record = record.map_err(Failure::run)?;
     let found = identification::identify(&record, &scene).map_err(Failure::run)?;
     let found = Comparison::of(&found, &scene);
-    let mut written = report::write(&found, &arguments.out).map_err(Failure::run)?;
-    written.extend(fmus.keep()?);
+    let mut files = report::write(&found, &arguments.out).map_err(Failure::run)?;
+    files.extend(fmus.keep()?);
     if arguments.json {
-        return Ok(serde_json::to_string_pretty(&found)? + "\n");
+        return json(&found);
     }
-    let files: Vec<String> = written
-        .iter()
-        .map(|path| path.display().to_string())
-        .collect();
-    Ok(format!(
-        "{}\nWritten: {}\n",
-        report::table(&found),
-        files.join(", ")
-    ))
+    let summary = report::summary::identification(&found);
+    Ok(format!("{summary}\n{}", written(&files)))
 }
 
 /// This program's own FMUs: packed into a folder of their own inside the results' folder, and kept where the run succeeds.

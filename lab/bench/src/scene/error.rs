@@ -4,6 +4,8 @@ use std::path::PathBuf;
 
 use lovines::InvalidValue;
 
+use super::SyntaxError;
+
 /// A scene that cannot be used; the message is one that a person can act on.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
@@ -23,6 +25,9 @@ pub enum SceneError {
         /// The reader's message, with line and column.
         message: String,
     },
+    /// An argument of `--set` that is not section.key=value.
+    #[error("--set: {0}")]
+    Argument(#[from] SyntaxError),
     /// A `--set` argument that does not fit.
     #[error("--set {argument}: {message}")]
     Override {

@@ -20,16 +20,22 @@ pub struct Override {
     value: Value,
 }
 
-impl FromStr for Override {
-    type Err = String;
+/// An argument that is not `section.key=value`.
+#[derive(Debug, thiserror::Error)]
+pub enum SyntaxError {
+    /// Not TOML.
+    #[error("{}; expected section.key=value, for instance plant.r=0.7", .0.message())]
+    Toml(#[from] toml::de::Error),
+    /// TOML, but not one key of one section.
+    #[error("expected one section.key=value, for instance plant.r=0.7")]
+    NotOneKey,
+}
 
-    fn from_str(argument: &str) -> Result<Self, String> {
-        let table: Table = argument.parse().map_err(|error: toml::de::Error| {
-            format!(
-                "{}; expected section.key=value, for instance plant.r=0.7",
-                error.message()
-            )
-        })?;
+impl FromStr for Override {
+    type Err = SyntaxError;
+
+    fn from_str(argument: &str) -> Result<Self, SyntaxError> {
+        let table: Table = argument.parse()?;
         let single = |table: Table| {
             let mut entries = table.into_iter();
             entries.next().filter(|_| entries.next().is_none())
@@ -38,8 +44,7 @@ impl FromStr for Override {
             Some((section, Value::Table(keys))) => (section, single(keys)),
             _ => (String::new(), None),
         };
-        let (key, value) =
-            keys.ok_or("expected one section.key=value, for instance plant.r=0.7")?;
+        let (key, value) = keys.ok_or(SyntaxError::NotOneKey)?;
         Ok(Self {
             argument: argument.into(),
             section,

@@ -1,35 +1,12 @@
-//! Curves in pieces: solid where stable, dashed where not.
+//! Curves in pieces by stability.
 
-use plotters::style::ShapeStyle;
+use super::Place;
 
-use super::chart::{Plane, curve};
-
-/// A place in the picture, and whether the motion there is stable.
-pub type Marked = ((f64, f64), bool);
-
-/// Draws a curve with one style for its stable pieces and another, dashed, for the others; the labels, where given, name the
-/// first piece of each kind.
-pub fn pieces<'a, 'b: 'a>(
-    chart: &mut Plane<'a, 'b>,
-    points: &[Marked],
-    [stable, unstable]: [ShapeStyle; 2],
-    labels: &mut [Option<&str>; 2],
-) -> Result<(), Box<dyn std::error::Error>> {
-    for wanted in [false, true] {
-        for run in runs(points, wanted) {
-            let (style, label) = if wanted {
-                (stable, labels[0].take())
-            } else {
-                (unstable, labels[1].take())
-            };
-            curve(chart, run, style, !wanted, label)?;
-        }
-    }
-    Ok(())
-}
+/// A place, and whether the motion there is stable.
+pub type Marked = (Place, bool);
 
 /// Consecutive points of one kind, each run with the point after it so that the curve has no holes.
-fn runs(points: &[Marked], wanted: bool) -> Vec<Vec<(f64, f64)>> {
+pub fn runs(points: &[Marked], wanted: bool) -> Vec<Vec<Place>> {
     let mut start = 0;
     points
         .chunk_by(|one, other| one.1 == other.1)
@@ -52,14 +29,17 @@ pub fn clipped(points: &[Marked], x: (f64, f64), y: (f64, f64)) -> Vec<Vec<Marke
         .collect()
 }
 
-/// Points so far apart that dashes stay dashes: at least `apart` of the ranges.
-pub fn thinned(points: &[Marked], x: (f64, f64), y: (f64, f64), apart: f64) -> Vec<Marked> {
+/// Smallest distance of drawn points, as a fraction of the ranges: dashes stay dashes.
+const APART: f64 = 0.004;
+
+/// Points at least [`APART`] from each other, with the last and every change of stability.
+pub fn thinned(points: &[Marked], x: (f64, f64), y: (f64, f64)) -> Vec<Marked> {
     let mut kept: Vec<Marked> = Vec::new();
     for (n, point) in points.iter().enumerate() {
         let far = kept.last().is_none_or(|last| {
             let dx = (point.0.0 - last.0.0) / (x.1 - x.0);
             let dy = (point.0.1 - last.0.1) / (y.1 - y.0);
-            dx.hypot(dy) >= apart || point.1 != last.1
+            dx.hypot(dy) >= APART || point.1 != last.1
         });
         if far || n + 1 == points.len() {
             kept.push(*point);
