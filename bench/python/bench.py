@@ -249,7 +249,7 @@ def main():
         help=f"four scenes ({', '.join(QUICK)}), one or two settings of a method; under two minutes",
     )
     parser.add_argument(
-        "--keep", action="store_true", help="renew docs/performance.*, docs/work-precision.svg and the README's ratios"
+        "--keep", action="store_true", help="renew docs/performance.*, docs/work-precision.svg and the ratios in docs/plant.md"
     )
     parser.add_argument(
         "--out", type=Path, default=Path("out/bench"), help="folder for tables and picture (default %(default)s)"
@@ -277,11 +277,11 @@ def main():
     text = report.write(bench, growth, loop, profiles, options.out)
     picture.write(bench, options.out / "work-precision.svg")
     if options.keep:
-        report.renew(HERE.parent / "README.md", bench)
+        report.renew(HERE.parent / "docs/plant.md", bench)
     print(text)
     bench.say(
         f"Written: {options.out}/performance.txt, .csv, .md and work-precision.svg"
-        f"{', and the README' if options.keep else ''}, after {time.monotonic() - began:.0f} s"
+        f"{', and docs/plant.md' if options.keep else ''}, after {time.monotonic() - began:.0f} s"
     )
 
 

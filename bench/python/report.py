@@ -251,7 +251,7 @@ BEGIN, END = "<!-- ratios: scripts/bench --keep writes what is between these mar
 
 
 def renew(readme, bench):
-    """Puts the table at a glance into the README, between its marks."""
+    """Writes the short table into a page, between the marks."""
     text = readme.read_text()
     before, rest = text.split(BEGIN)
     after = rest.split(END)[1]

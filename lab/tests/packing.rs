@@ -17,7 +17,9 @@ fn component() -> Component {
         identifier: "Tiny",
         library: "tiny",
         package: "tiny-fmu",
-        description: format!("<fmiModelDescription guid=\"{GUID}\"/>"),
+        description: format!(
+            "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"Tiny\" guid=\"{GUID}\"/>"
+        ),
     }
 }
 

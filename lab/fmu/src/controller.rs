@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use fmi::fmi2::instance::Common;
-use phase_lock::{Config, Detector};
-
-use crate::instance::{Fmu, FmuError, Kind, Reference, Value};
+use phase_lock::{Config, PARAMETERS, Value};
 use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Sensors, configuration};
 use vines_testbench::scene::Scene;
+
+use crate::instance::{Fmu, FmuError, Kind, Reference};
 
 /// A controller FMU, stepped sample by sample.
 ///
@@ -93,48 +92,9 @@ impl Controller for FmuController {
 
 /// The configuration under the names of the FMU's parameters.
 fn parameters(config: &Config) -> Vec<(&'static str, Value)> {
-    let lock = &config.lock;
-    let reals = [
-        ("sample_time", config.sample_time),
-        ("omega_start", config.omega_start),
-        ("omega_min", config.omega_min),
-        ("omega_max", config.omega_max),
-        ("omega_rate", config.omega_rate),
-        ("amplitude", config.amplitude),
-        ("amplitude_max", config.amplitude_max),
-        ("ramp_time", config.ramp_time),
-        ("release_time", config.release_time),
-        ("base_bandwidth", config.base_bandwidth),
-        ("phase_target", config.phase_target),
-        ("bandwidth", config.bandwidth),
-        ("damping_rate", config.damping_rate),
-        ("delay", config.delay),
-        ("lock.phase_tolerance", lock.phase_tolerance),
-        ("lock.unlock_tolerance", lock.unlock_tolerance),
-        ("lock.frequency_drift", lock.frequency_drift),
-        ("lock.amplitude_drift", lock.amplitude_drift),
-        ("lock.coherence_min", lock.coherence_min),
-        ("lock.response_min", lock.response_min),
-        ("response_max", config.response_max),
-        ("acquire_timeout", config.acquire_timeout),
-    ];
-    let (detector, harmonics, odd_only) = match config.detector {
-        Detector::Adaptive {
-            harmonics,
-            odd_only,
-        } => (1, harmonics.into(), odd_only),
-        Detector::Demodulator => (2, 1, true),
-    };
-    let dwell = i32::try_from(lock.dwell).unwrap_or(i32::MAX);
-    let mut values: Vec<_> = reals
-        .into_iter()
-        .map(|(name, value)| (name, Value::Real(value)))
-        .collect();
-    values.extend([
-        ("detector", Value::Integer(detector)),
-        ("harmonics", Value::Integer(harmonics)),
-        ("odd_only", Value::Boolean(odd_only)),
-        ("lock.dwell", Value::Integer(dwell)),
-    ]);
-    values
+    PARAMETERS
+        .iter()
+        .filter(|parameter| parameter.is_in_fmu())
+        .map(|parameter| (parameter.name, parameter.get(config)))
+        .collect()
 }

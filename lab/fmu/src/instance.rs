@@ -1,34 +1,31 @@
-//! An FMU on the bench: loaded through the `fmi` crate, its variables found by name, stepped on one clock.
+//! An FMU as part of the bench: finds its variables by name, and keeps its time.
 
 use std::path::{Path, PathBuf};
 
-use fmi::fmi2::Fmi2Error;
-use fmi::fmi2::import::Fmi2Import;
-use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
-use fmi::schema::fmi2::ScalarVariableElement;
-use fmi::traits::FmiImport;
+use fmi2_import::{CallError, Instance, LoadError};
+use phase_lock::Value;
 use thiserror::Error;
 use vines_testbench::rig::{ControllerError, RigError};
 
-/// Why an FMU cannot take its side of the bench, or cannot go on.
+/// Reason why an FMU cannot be used, or cannot continue.
 #[derive(Debug, Error)]
 pub enum FmuError {
-    /// The file is not an FMU that can be loaded here.
+    /// The file cannot be loaded as an FMU.
     #[error("cannot load {}: {source}", path.display())]
     Load {
         /// The FMU.
         path: PathBuf,
-        /// What the loader said.
-        source: fmi::Error,
+        /// Reason.
+        source: LoadError,
     },
     /// The FMU lacks a variable that the bench needs.
     #[error("{} has no {kind} variable `{name}`, which the bench needs", path.display())]
     Variable {
         /// The FMU.
         path: PathBuf,
-        /// Its type in FMI.
+        /// Its type.
         kind: Kind,
-        /// What was looked for.
+        /// Its name.
         name: &'static str,
     },
     /// The FMU refused a call; its own message has been logged.
@@ -36,12 +33,12 @@ pub enum FmuError {
     Refused {
         /// The FMU.
         path: PathBuf,
-        /// What was asked of it.
+        /// What the FMU should have done.
         action: &'static str,
         /// Simulated time, s.
         time: f64,
-        /// The status it returned.
-        source: Fmi2Error,
+        /// The status of the call.
+        source: CallError,
     },
 }
 
@@ -57,15 +54,35 @@ impl From<FmuError> for ControllerError {
     }
 }
 
-/// Type of a variable, as FMI has it.
+/// Type of a variable in FMI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A number.
+    /// A real number.
     Real,
     /// A whole number.
     Integer,
     /// True or false.
     Boolean,
+}
+
+impl From<Kind> for fmi2_import::Kind {
+    fn from(kind: Kind) -> Self {
+        match kind {
+            Kind::Real => Self::Real,
+            Kind::Integer => Self::Integer,
+            Kind::Boolean => Self::Boolean,
+        }
+    }
+}
+
+impl From<Value> for Kind {
+    fn from(value: Value) -> Self {
+        match value {
+            Value::Real(_) => Self::Real,
+            Value::Integer(_) => Self::Integer,
+            Value::Boolean(_) => Self::Boolean,
+        }
+    }
 }
 
 impl std::fmt::Display for Kind {
@@ -74,47 +91,26 @@ impl std::fmt::Display for Kind {
     }
 }
 
-/// A value to start with.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Value {
-    Real(f64),
-    Integer(i32),
-    Boolean(bool),
-}
-
-impl Value {
-    fn kind(self) -> Kind {
-        match self {
-            Self::Real(_) => Kind::Real,
-            Self::Integer(_) => Kind::Integer,
-            Self::Boolean(_) => Kind::Boolean,
-        }
-    }
-}
-
-/// Names a variable in calls.
-pub(super) type Reference = <Fmi2Import as FmiImport>::ValueRef;
+/// Value reference of a variable.
+pub(super) type Reference = u32;
 
 /// A loaded FMU at its simulated time.
 pub(super) struct Fmu {
-    instance: InstanceCS,
-    /// Describes the FMU, and keeps it unpacked on disk while the instance lives.
-    import: Fmi2Import,
+    instance: Instance,
     path: PathBuf,
     time: f64,
 }
 
 impl Fmu {
-    /// Loads the FMU at `path`; `name` is the one it logs under.
+    /// Loads the FMU at `path`; `name` is its name in log messages.
     pub fn load(path: &Path, name: &str) -> Result<Self, FmuError> {
         let failed = |source| FmuError::Load {
             path: path.into(),
             source,
         };
-        let import: Fmi2Import = fmi::import::from_path(path).map_err(failed)?;
+        let fmu = fmi2_import::Fmu::open(path).map_err(failed)?;
         Ok(Self {
-            instance: import.instantiate_cs(name, false, true).map_err(failed)?,
-            import,
+            instance: Instance::new(fmu, name).map_err(failed)?,
             path: path.into(),
             time: 0.0,
         })
@@ -122,15 +118,8 @@ impl Fmu {
 
     /// The variable of that name and kind, if there is one.
     pub fn find(&self, kind: Kind, name: &str) -> Option<Reference> {
-        let variables = &self.import.model_description().model_variables.variables;
-        let found = variables.iter().find(|variable| variable.name == name)?;
-        let is = match found.elem {
-            ScalarVariableElement::Real(_) => Some(Kind::Real),
-            ScalarVariableElement::Integer(_) => Some(Kind::Integer),
-            ScalarVariableElement::Boolean(_) => Some(Kind::Boolean),
-            _ => None,
-        };
-        (is == Some(kind)).then_some(found.value_reference)
+        let variable = self.instance.description().variable(name)?;
+        (variable.kind() == Some(kind.into())).then_some(variable.value_reference)
     }
 
     /// The variable of that name and kind.
@@ -142,12 +131,12 @@ impl Fmu {
         })
     }
 
-    /// Sets what the FMU has of `values` and initialises it at time 0. What it does not have is said in the log: such
-    /// an FMU keeps its own.
+    /// Sets the values that the FMU has variables for, and initialises it at time 0. A warning in the log names the
+    /// others; the FMU keeps its own values for these.
     pub fn start(&mut self, values: &[(&str, Value)]) -> Result<(), FmuError> {
         let mut missing = Vec::new();
         for &(name, value) in values {
-            let Some(reference) = self.find(value.kind(), name) else {
+            let Some(reference) = self.find(value.into(), name) else {
                 missing.push(format!("`{name}`"));
                 continue;
             };
@@ -161,25 +150,22 @@ impl Fmu {
         if !missing.is_empty() {
             let path = self.path.display();
             log::warn!(
-                "{path} has no {}; it works with what it has instead",
+                "{path} has no {}; it uses its own values instead",
                 missing.join(", ")
             );
         }
-        self.ask("start", |i| i.setup_experiment(None, 0.0, None))?;
-        self.ask("start", Common::enter_initialization_mode)?;
-        self.ask("start", Common::exit_initialization_mode)?;
-        Ok(())
+        self.ask("start", Instance::initialize)
     }
 
     /// One step of `step` seconds.
     pub fn step(&mut self, step: f64) -> Result<(), FmuError> {
         let time = self.time;
-        self.ask("advance", |i| i.do_step(time, step, true))?;
+        self.ask("advance", |i| i.do_step(time, step))?;
         self.time += step;
         Ok(())
     }
 
-    /// Real numbers.
+    /// Values of real variables.
     pub fn reals<const N: usize>(
         &mut self,
         action: &'static str,
@@ -190,11 +176,11 @@ impl Fmu {
         Ok(values)
     }
 
-    /// Asks the FMU for something; `action` completes "refused to".
+    /// Calls the FMU; `action` completes the message "refused to …".
     pub fn ask<T>(
         &mut self,
         action: &'static str,
-        call: impl FnOnce(&mut InstanceCS) -> Result<T, Fmi2Error>,
+        call: impl FnOnce(&mut Instance) -> Result<T, CallError>,
     ) -> Result<T, FmuError> {
         call(&mut self.instance).map_err(|source| FmuError::Refused {
             path: self.path.clone(),

@@ -2,11 +2,11 @@
 
 use std::path::Path;
 
-use fmi::fmi2::instance::Common;
-
-use crate::instance::{Fmu, FmuError, Kind, Reference, Value};
+use phase_lock::Value;
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors, Witness, start_values};
 use vines_testbench::scene::Scene;
+
+use crate::instance::{Fmu, FmuError, Kind, Reference};
 
 /// A plant FMU, stepped sample by sample.
 ///

@@ -1,23 +1,23 @@
-//! Addresses, and the rule that nothing leaves this machine unless told to.
+//! Addresses. Without permission, only those of this machine are allowed.
 
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 
 use super::error::LinkError;
 
-/// Whether addresses beyond this machine are allowed.
+/// Which addresses are allowed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Reach {
-    /// Loopback only: 127.0.0.1 and its like, or `[::1]`.
+pub enum BindScope {
+    /// Loopback addresses only: 127.0.0.0/8 and `[::1]`.
     Loopback,
-    /// Any address. Whoever can send to it can drive the rig.
+    /// All addresses. Everyone who can send to the address can drive the rig.
     Remote,
 }
 
-/// The address that `HOST:PORT` or `udp://HOST:PORT` names; of several, an IPv4 one.
+/// The address of `HOST:PORT` or `udp://HOST:PORT`. If the name has several, an IPv4 address.
 ///
 /// # Errors
-/// Text that is no address, a name that is not known, or an address that `reach` does not cover.
-pub fn resolve(text: &str, reach: Reach) -> Result<SocketAddr, LinkError> {
+/// Text that is not an address, an unknown name, or an address outside `scope`.
+pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
     let failed = |message: String| LinkError::Address {
         address: text.into(),
         message,
@@ -25,13 +25,13 @@ pub fn resolve(text: &str, reach: Reach) -> Result<SocketAddr, LinkError> {
     let place = text.strip_prefix("udp://").unwrap_or(text);
     let mut found: Vec<_> = place
         .to_socket_addrs()
-        .map_err(|error| failed(format!("{error}; HOST:PORT is wanted")))?
+        .map_err(|error| failed(format!("{error}; expected is HOST:PORT")))?
         .collect();
     found.sort_by_key(SocketAddr::is_ipv6);
     let address = *found
         .first()
         .ok_or_else(|| failed("the name has no address".into()))?;
-    if reach == Reach::Loopback && !is_loopback(address.ip()) {
+    if scope == BindScope::Loopback && !is_loopback(address.ip()) {
         return Err(LinkError::Remote { address });
     }
     Ok(address)
@@ -46,9 +46,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn loopback_is_always_allowed_and_anything_else_only_when_told() {
+    fn loopback_is_always_allowed_and_other_addresses_only_with_permission() {
         for here in ["127.0.0.1:5000", "udp://127.8.8.8:1", "[::1]:9"] {
-            assert!(resolve(here, Reach::Loopback).is_ok(), "{here}");
+            assert!(resolve(here, BindScope::Loopback).is_ok(), "{here}");
         }
         for beyond in [
             "0.0.0.0:5000",
@@ -56,14 +56,14 @@ mod tests {
             "[::]:5000",
             "[2001:db8::1]:1",
         ] {
-            let refused = resolve(beyond, Reach::Loopback).unwrap_err();
+            let refused = resolve(beyond, BindScope::Loopback).unwrap_err();
             assert!(refused.to_string().contains("--allow-remote"), "{refused}");
-            assert!(resolve(beyond, Reach::Remote).is_ok(), "{beyond}");
+            assert!(resolve(beyond, BindScope::Remote).is_ok(), "{beyond}");
         }
     }
 
     #[test]
-    fn what_is_no_address_is_named() {
+    fn text_that_is_not_an_address_is_named() {
         for text in [
             "",
             "udp://",
@@ -71,7 +71,7 @@ mod tests {
             "127.0.0.1:99999",
             "127.0.0.1:rig",
         ] {
-            let refused = resolve(text, Reach::Remote).unwrap_err().to_string();
+            let refused = resolve(text, BindScope::Remote).unwrap_err().to_string();
             assert!(refused.contains("HOST:PORT"), "{refused}");
         }
     }

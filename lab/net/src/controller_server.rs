@@ -1,38 +1,38 @@
-//! A controller that is served to the network: a drive for every reading that arrives.
+//! The server of a controller: answers every reading with a drive.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use super::error::LinkError;
 use super::frame::{Frame, Kind, flag};
-use super::host::{Event, Host, Offer};
-use super::order::Arrival;
 use super::payload::{read_reading, write_command};
 use super::report::{Ended, Session};
+use super::sequence_window::Arrival;
+use super::server_session::{Event, Offer, ServerSession};
 use vines_testbench::rig::{Command, Controller, ControllerError, Sensors};
 
-/// How often the server looks whether it shall stop.
+/// Interval at which the server checks whether it should stop.
 const IDLE: Duration = Duration::from_millis(50);
 
-/// How a controller is served.
+/// Settings of the server.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct ControllerService {
-    /// Time from sample to sample, s.
+    /// Sample time, s.
     pub sample_time: f64,
-    /// Longest silence before the session is shut down, s; also the longest gap in the readings that is bridged.
+    /// Longest silence before the session is shut down, s; also the longest gap in the readings.
     pub silence: f64,
 }
 
-/// A socket that serves a controller, one session at a time.
+/// A server of a controller, one session at a time.
 pub struct ControllerServer {
-    host: Host,
+    session: ServerSession,
     service: ControllerService,
 }
 
 /// The controller of a session.
 struct Run {
     controller: Box<dyn Controller>,
-    /// The last good reading.
+    /// The last valid reading.
     sensors: Sensors,
     active: bool,
     /// Frequency of the last drive, rad/s.
@@ -43,10 +43,10 @@ struct Run {
 }
 
 impl ControllerServer {
-    /// Listens on `address`; port 0 takes a free one.
+    /// Listens on `address`; with port 0 the system chooses a free port.
     ///
     /// # Errors
-    /// An address that cannot be had.
+    /// An address that is not available.
     pub fn listen(address: SocketAddr, service: ControllerService) -> Result<Self, LinkError> {
         let offer = Offer {
             controller: true,
@@ -55,20 +55,20 @@ impl ControllerServer {
             silence: service.silence,
         };
         Ok(Self {
-            host: Host::listen(address, offer)?,
+            session: ServerSession::listen(address, offer)?,
             service,
         })
     }
 
-    /// Where clients reach the controller.
+    /// Address of the server.
     ///
     /// # Errors
     /// The system's.
     pub fn address(&self) -> Result<SocketAddr, LinkError> {
-        self.host.address()
+        self.session.address()
     }
 
-    /// Serves sessions until `stop` says so: each with a controller of its own from `make`, each told to `tell` at its end.
+    /// Serves sessions until `stop` returns true. `make` creates the controller of a session; `tell` receives its report.
     ///
     /// # Errors
     /// A controller that fails, or the network.
@@ -80,9 +80,9 @@ impl ControllerServer {
     ) -> Result<(), ControllerError> {
         let mut run: Option<Run> = None;
         loop {
-            match self.host.next(Instant::now() + IDLE)? {
+            match self.session.next(Instant::now() + IDLE)? {
                 Event::Opened => run = Some(Run::new(make()?)),
-                Event::Again => self.host.send_again()?,
+                Event::Again => self.session.send_again()?,
                 Event::Frame(frame, arrival) => match &mut run {
                     Some(run) => self.answer(run, &frame, arrival)?,
                     None => self.tell_shut_down(&frame, 0.0)?,
@@ -90,7 +90,7 @@ impl ControllerServer {
                 Event::Farewell => end(&mut run, Ended::Farewell),
                 Event::Nothing => {}
             }
-            if self.host.silence().as_secs_f64() > self.service.silence {
+            if self.session.silence().as_secs_f64() > self.service.silence {
                 end(&mut run, Ended::Silence);
             }
             if stop() {
@@ -113,42 +113,42 @@ impl ControllerServer {
     ) -> Result<(), ControllerError> {
         let missing = match arrival {
             Arrival::New { missing } => missing,
-            Arrival::Repeated => return Ok(self.host.send_again()?),
+            Arrival::Repeated => return Ok(self.session.send_again()?),
             Arrival::Late => return Ok(()),
         };
         if missing as f64 * self.service.sample_time > self.service.silence {
             run.ending = Some(Ended::Silence);
             return Ok(self.tell_shut_down(frame, run.omega)?);
         }
-        // The controller counts time in samples: it gets one for every reading that was lost, too.
+        // The controller counts time in samples, so it also gets one for every lost reading.
         for _ in 0..missing {
-            self.host.counters.held += 1;
+            self.session.counters.held += 1;
             run.sample()?;
         }
         run.sensors = read_reading(frame).sensors;
         run.active = frame.has(flag::ACTIVE);
         let command = run.sample()?;
-        let answer = write_command(self.host.answer(Kind::Drive, frame.sequence), &command);
-        Ok(self.host.send(answer)?)
+        let answer = write_command(self.session.answer(Kind::Drive, frame.sequence), &command);
+        Ok(self.session.send(answer)?)
     }
 
-    /// The answer to a client whose session is over: no drive.
+    /// Answers a client whose session has ended: no drive.
     fn tell_shut_down(&mut self, frame: &Frame, omega: f64) -> Result<(), LinkError> {
         let mut none = Command::default();
         none.drive.omega = omega;
-        let mut answer = write_command(self.host.answer(Kind::Drive, frame.sequence), &none);
+        let mut answer = write_command(self.session.answer(Kind::Drive, frame.sequence), &none);
         answer.flags |= flag::SHUT_DOWN;
-        self.host.send(answer)
+        self.session.send(answer)
     }
 
     fn finish(&mut self, run: &Run, tell: &mut impl FnMut(&Session)) {
-        let (Some(ended), Some(peer)) = (run.ending, self.host.peer()) else {
+        let (Some(ended), Some(peer)) = (run.ending, self.session.peer()) else {
             return;
         };
         let counters = if ended == Ended::Silence {
-            self.host.release()
+            self.session.release()
         } else {
-            self.host.close()
+            self.session.close()
         };
         tell(&Session {
             peer,

@@ -1,34 +1,34 @@
-//! What has happened on a link.
+//! Counters of a session.
 
 use std::fmt::{self, Display, Formatter};
 
 use serde::Serialize;
 
-/// Frames and samples of one session at one end.
+/// Frames and samples of a session, counted by client or server.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
 pub struct Counters {
-    /// Frames sent, those sent again included.
+    /// Frames sent, including repetitions.
     pub sent: u64,
-    /// Frames of this session that arrived whole.
+    /// Valid frames of this session.
     pub received: u64,
-    /// Frames sent again because no answer had come.
+    /// Frames sent again because no answer arrived.
     pub resent: u64,
-    /// Numbers that had not arrived when a later one did.
+    /// Sequence numbers that were skipped.
     pub lost: u64,
-    /// Frames that arrived after a later one, or after their sample had passed.
+    /// Frames that arrived after a later one, or after their sample.
     pub late: u64,
-    /// Frames that had arrived before.
+    /// Frames that were received before.
     pub repeated: u64,
-    /// Frames from another sender or of another session.
+    /// Frames of another sender or another session.
     pub foreign: u64,
-    /// Datagrams that are no frames, and frames with numbers that cannot be used.
+    /// Datagrams that are not frames, and frames with invalid values.
     pub malformed: u64,
-    /// Samples for which the last good value was taken again.
+    /// Samples for which the last valid value was held.
     pub held: u64,
 }
 
 impl Counters {
-    /// Whether anything went other than it should.
+    /// Whether any frame was not delivered once and in time.
     #[must_use]
     pub fn is_troubled(&self) -> bool {
         let Self {

@@ -1,4 +1,4 @@
-//! Why a link cannot be made, or cannot go on.
+//! Errors of a connection.
 
 use std::io;
 use std::net::SocketAddr;
@@ -9,49 +9,49 @@ use vines_testbench::rig::{ControllerError, RigError};
 use super::frame::VERSION;
 use super::refusal::Refusal;
 
-/// Why a link cannot be made, or cannot go on.
+/// Reason why a connection cannot be opened, or cannot continue.
 #[derive(Debug, Error)]
 pub enum LinkError {
     /// Not an address.
-    #[error("{address} is no address: {message}")]
+    #[error("{address} is not an address: {message}")]
     Address {
-        /// What was given.
+        /// The text.
         address: String,
-        /// What is wrong with it.
+        /// The fault.
         message: String,
     },
     /// An address beyond this machine, without permission.
     #[error(
-        "{address} is not of this machine, and whoever reaches it can drive the rig: there is no authentication. \
-         Give --allow-remote if that is wanted, on a network where everybody may"
+        "{address} is not an address of this machine. There is no authentication: everyone who can reach the address can drive \
+         the rig. Use --allow-remote only on a network where everyone may do so"
     )]
     Remote {
         /// The address.
         address: SocketAddr,
     },
-    /// The address cannot be listened on.
+    /// The server cannot listen on the address.
     #[error("cannot listen on {address}: {source}")]
     Listen {
         /// The address.
         address: SocketAddr,
-        /// What the system said, such as that the port is in use.
+        /// Error of the system, such as a port that is in use.
         source: io::Error,
     },
-    /// Nobody answers.
+    /// There is no answer.
     #[error(
         "no answer from udp://{peer} within {seconds} s: is `vines {role} --listen {peer}` running there?"
     )]
     Unreachable {
         /// The address.
         peer: SocketAddr,
-        /// What was asked for: `rig` or `controller`.
+        /// What the client needs: `rig` or `controller`.
         role: &'static str,
-        /// How long it was waited for, s.
+        /// Waiting time, s.
         seconds: f64,
     },
-    /// The peer speaks another version of the protocol.
+    /// The peer has another version of the protocol.
     #[error(
-        "udp://{peer} speaks version {theirs} of the protocol, this program version {VERSION}: use the same release of both"
+        "udp://{peer} has version {theirs} of the protocol, this program has version {VERSION}: use the same release of both"
     )]
     Version {
         /// The address.
@@ -59,28 +59,28 @@ pub enum LinkError {
         /// The peer's version.
         theirs: u16,
     },
-    /// The peer does not want this session.
+    /// The peer refuses the session.
     #[error("udp://{peer} refuses: {reason}")]
     Refused {
         /// The address.
         peer: SocketAddr,
-        /// Why.
+        /// Reason.
         reason: Refusal,
     },
-    /// The peer is gone.
+    /// The peer is silent.
     #[error("udp://{peer} has been silent for {seconds} s, at t = {time} s of the experiment")]
     Silent {
         /// The address.
         peer: SocketAddr,
-        /// Longest silence allowed, s.
+        /// Longest silence, s.
         seconds: f64,
-        /// Time of the sample that was waited for, s.
+        /// Time of the sample whose answer is missing, s.
         time: f64,
     },
-    /// The peer has taken its drive away.
+    /// The peer has shut down its drive.
     #[error(
-        "udp://{peer} has shut down its drive, at t = {time} s of the experiment: it was stopped, or had heard nothing from \
-         here for too long"
+        "udp://{peer} has shut down its drive, at t = {time} s of the experiment: it was stopped, or has received no frame from \
+         this program for too long"
     )]
     ShutDown {
         /// The address.
@@ -88,17 +88,19 @@ pub enum LinkError {
         /// Time of the sample, s.
         time: f64,
     },
-    /// A step of another length than agreed on.
-    #[error("a step of {step} s, where {sample_time} s were agreed on with udp://{peer}")]
+    /// A step whose length is not the sample time of the session.
+    #[error(
+        "the step of {step} s is not the sample time of the session with udp://{peer}, {sample_time} s"
+    )]
     Step {
         /// The address.
         peer: SocketAddr,
-        /// The step wanted, s.
+        /// The step, s.
         step: f64,
         /// The sample time of the session, s.
         sample_time: f64,
     },
-    /// The system's network failed.
+    /// Error of the network.
     #[error("the network: {0}")]
     System(#[from] io::Error),
 }

@@ -1,32 +1,32 @@
-//! The frame: 84 bytes, little-endian, the same layout whatever it carries. `docs/network-protocol.md` is the contract.
+//! The frame: 84 bytes, little-endian, one layout for all kinds. The specification is `docs/network-protocol.md`.
 
 use thiserror::Error;
 
-/// Version of the protocol that is spoken here.
+/// Version of the protocol.
 pub const VERSION: u16 = 1;
 /// Size of every frame, bytes.
 pub const SIZE: usize = 84;
-/// First four bytes of every frame of any version.
+/// First four bytes of every frame in every version.
 pub const MAGIC: [u8; 4] = *b"VINE";
-/// Numbers a frame carries.
+/// Number of values in a frame.
 pub const VALUES: usize = 6;
 
 const CHECKSUM_AT: usize = SIZE - 4;
 
-/// What a frame is for.
+/// Kind of a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Kind {
-    /// A client asks for a session.
+    /// A client requests a session.
     Hello = 1,
-    /// The server grants it.
+    /// The server accepts it.
     Welcome = 2,
-    /// The server does not.
+    /// The server refuses it.
     Refusal = 3,
-    /// Readings of a rig: from a rig server, or to a controller server.
+    /// Readings: from a rig server, or to a controller server.
     Sensors = 4,
     /// A drive: to a rig server, or from a controller server.
     Drive = 5,
-    /// The session is over.
+    /// The client ends the session.
     Farewell = 6,
 }
 
@@ -39,54 +39,54 @@ impl Kind {
     }
 }
 
-/// Yes-or-no facts of a frame; a bit that means nothing in a kind is 0 there.
+/// Booleans of a frame. A bit without a meaning in a kind is 0.
 pub mod flag {
-    /// Sensors, to a controller: the drive is wanted.
+    /// Sensors, to a controller: the drive is requested.
     pub const ACTIVE: u8 = 1;
     /// Drive, from a controller: its lock has settled.
     pub const SETTLED: u8 = 2;
     /// Sensors: there is a reference channel.
     pub const REFERENCE: u8 = 4;
-    /// Sensors: the rig is a simulation and tells its impacts.
+    /// Sensors: the rig is a simulation, and its last four values describe the impacts.
     pub const WITNESS: u8 = 8;
-    /// Sensors or Drive, from a server: the link was silent too long, and the drive is shut down for this session.
+    /// Sensors or Drive, from a server: the drive has been shut down for this session.
     pub const SHUT_DOWN: u8 = 16;
-    /// Welcome, of a rig: it runs in real time, whether drives arrive or not.
+    /// Welcome, of a rig: it runs in real time.
     pub const PACED: u8 = 32;
-    /// Hello and Welcome: a controller is asked for, or answers; else a rig.
+    /// Hello and Welcome: the server is, or should be, a controller; otherwise a rig.
     pub const CONTROLLER: u8 = 64;
 }
 
 /// One frame.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Frame {
-    /// What it is for.
+    /// Kind.
     pub kind: Kind,
     /// Bits of [`flag`].
     pub flags: u8,
-    /// Number of the session, drawn at random by the client.
+    /// Number of the session, chosen at random by the client.
     pub session: u64,
     /// Number of the sample.
     pub sequence: u64,
     /// Time of that sample since the start of the session, s.
     pub time: f64,
-    /// The numbers, by kind.
+    /// Values; their meaning depends on the kind.
     pub values: [f64; VALUES],
 }
 
-/// Why a datagram is no frame.
+/// Reason why a datagram is not a frame.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum FrameError {
-    /// It does not begin with the magic bytes.
+    /// It does not begin with [`MAGIC`].
     #[error("not a frame of this protocol")]
     Magic,
-    /// It is of another version.
+    /// It has another version.
     #[error("version {0} of the protocol")]
     Version(u16),
     /// It is too long or too short.
     #[error("{0} bytes instead of {SIZE}")]
     Size(usize),
-    /// The checksum is not that of the content.
+    /// The checksum does not match the content.
     #[error("wrong checksum")]
     Checksum,
     /// Its kind is unknown.
@@ -114,7 +114,7 @@ impl Frame {
         self.flags & flag != 0
     }
 
-    /// The bytes on the wire.
+    /// The bytes of the frame.
     #[must_use]
     pub fn encode(&self) -> [u8; SIZE] {
         let mut bytes = [0; SIZE];
@@ -136,7 +136,7 @@ impl Frame {
     /// Reads a datagram.
     ///
     /// # Errors
-    /// What makes it no frame. The version is looked at before everything that another version may do otherwise.
+    /// A datagram that is not a frame. The version is checked first, because everything after it may differ between versions.
     pub fn decode(bytes: &[u8]) -> Result<Self, FrameError> {
         if bytes.len() < 6 || bytes[..4] != MAGIC {
             return Err(FrameError::Magic);
@@ -196,7 +196,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn every_frame_comes_back_bit_for_bit(frame in frames()) {
+        fn every_frame_is_decoded_to_the_same_bits(frame in frames()) {
             let bytes = frame.encode();
             let back = Frame::decode(&bytes).unwrap();
             // NaN is not equal to itself; its bits are.
@@ -204,7 +204,7 @@ mod tests {
         }
 
         #[test]
-        fn a_frame_with_any_three_bits_turned_is_refused(frame in frames(), turned in prop::collection::btree_set(0..SIZE * 8, 1..=3)) {
+        fn a_frame_with_up_to_three_inverted_bits_is_refused(frame in frames(), turned in prop::collection::btree_set(0..SIZE * 8, 1..=3)) {
             let mut bytes = frame.encode();
             for bit in turned {
                 bytes[bit / 8] ^= 1 << (bit % 8);
@@ -213,12 +213,12 @@ mod tests {
         }
 
         #[test]
-        fn no_datagram_whatever_brings_the_reader_down(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        fn no_datagram_makes_the_decoder_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
             prop_assert!(Frame::decode(&bytes).is_err());
         }
 
         #[test]
-        fn a_cut_or_padded_frame_is_refused(frame in frames(), length in 0..2 * SIZE) {
+        fn a_frame_of_another_size_is_refused(frame in frames(), length in 0..2 * SIZE) {
             prop_assume!(length != SIZE);
             let mut bytes = frame.encode().to_vec();
             bytes.resize(length, 0);
@@ -242,12 +242,12 @@ mod tests {
         assert_eq!(bytes[16..24], [9, 0, 0, 0, 0, 0, 0, 0]);
         assert_eq!(bytes[24..32], 0.5f64.to_le_bytes());
         assert_eq!(bytes[72..80], (-1.0f64).to_le_bytes());
-        // As zlib.crc32 of Python has it.
+        // The value of zlib.crc32 in Python.
         assert_eq!(bytes[80..], 0xadb8_2c0eu32.to_le_bytes());
     }
 
     #[test]
-    fn another_version_is_told_from_rubbish_whatever_its_size() {
+    fn another_version_is_recognised_in_a_datagram_of_any_size() {
         let longer = [&b"VINE\x07\x00"[..], &[0; 100]].concat();
         assert_eq!(Frame::decode(&longer), Err(FrameError::Version(7)));
         assert_eq!(Frame::decode(b"VINE"), Err(FrameError::Magic));

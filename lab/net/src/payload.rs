@@ -1,16 +1,16 @@
-//! What the six numbers of a frame mean: readings, or a drive.
+//! The six values of a frame: readings or a drive.
 
 use super::frame::{Frame, Kind, flag};
 use vines_testbench::rig::{Command, Drive, Sensors, Witness};
 
-/// What a rig tells at a sample.
+/// Readings of a sample.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Reading {
     pub sensors: Sensors,
     pub witness: Option<Witness>,
 }
 
-/// `frame` as Sensors.
+/// Writes readings into a frame.
 pub(super) fn write_reading(mut frame: Frame, reading: &Reading) -> Frame {
     let Reading { sensors, witness } = reading;
     frame.kind = Kind::Sensors;
@@ -32,7 +32,7 @@ pub(super) fn write_reading(mut frame: Frame, reading: &Reading) -> Frame {
     frame
 }
 
-/// What Sensors say.
+/// The readings in a frame.
 pub(super) fn read_reading(frame: &Frame) -> Reading {
     let [
         response,
@@ -56,7 +56,7 @@ pub(super) fn read_reading(frame: &Frame) -> Reading {
     }
 }
 
-/// `frame` as Drive.
+/// Writes a command into a frame.
 pub(super) fn write_command(mut frame: Frame, command: &Command) -> Frame {
     frame.kind = Kind::Drive;
     if command.settled {
@@ -78,7 +78,7 @@ pub(super) fn write_command(mut frame: Frame, command: &Command) -> Frame {
     frame
 }
 
-/// What Drive says. None where a number is no drive: nothing of it may reach a shaker.
+/// The command in a frame; None if a value is invalid. An invalid value must not reach a shaker.
 pub(super) fn read_command(frame: &Frame) -> Option<Command> {
     let [omega, amplitude, displacement, phase_error, ..] = frame.values;
     frame.values.iter().all(|x| x.is_finite()).then_some(())?;
@@ -100,7 +100,7 @@ mod tests {
 
     proptest! {
         #[test]
-        fn readings_come_back(response: f64, reference: Option<f64>, witness: Option<(i32, f64, f64, f64)>) {
+        fn readings_survive_the_frame(response: f64, reference: Option<f64>, witness: Option<(i32, f64, f64, f64)>) {
             let reading = Reading {
                 sensors: Sensors { response, reference },
                 witness: witness.map(|(impacts, impact_time, impact_velocity, particle_velocity)| Witness {
@@ -112,7 +112,7 @@ mod tests {
         }
 
         #[test]
-        fn drives_come_back(omega in 0.0..1e6, amplitude in 0.0..1e6, displacement in -1e6..1e6, settled: bool) {
+        fn drives_survive_the_frame(omega in 0.0..1e6, amplitude in 0.0..1e6, displacement in -1e6..1e6, settled: bool) {
             let command = Command {
                 drive: Drive { omega, amplitude, displacement },
                 phase_error: -0.5,
@@ -124,7 +124,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_of_nan_infinity_or_a_negative_amplitude_is_none() {
+    fn a_drive_with_nan_infinity_or_a_negative_amplitude_is_invalid() {
         for values in [
             [f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0],
             [1.0, f64::INFINITY, 0.0, 0.0, 0.0, 0.0],

@@ -1,21 +1,21 @@
-//! Why a server does not grant a session.
+//! Reasons of a server to refuse a session.
 
 use std::fmt::{self, Display, Formatter};
 
 use super::frame::Frame;
 
-/// Why a server does not grant a session. On the wire: a code, and a number that goes with it.
+/// Reason of a server to refuse a session. In the frame: a code and a number.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Refusal {
     /// Code 1: another client has a session.
     Busy,
-    /// Code 2: its sample time, s, is not the client's.
+    /// Code 2: the sample times differ; that of the server, s.
     SampleTime(f64),
-    /// Code 3: a controller was asked for at a rig, or the reverse.
+    /// Code 3: the server is a rig and the client needs a controller, or the reverse.
     Role,
-    /// Code 4: its version of the protocol.
+    /// Code 4: the versions differ; that of the server.
     Version(u16),
-    /// A code that this version does not know.
+    /// An unknown code.
     Other(f64),
 }
 
@@ -54,12 +54,10 @@ impl Display for Refusal {
             Self::Busy => f.write_str("it has another client; sessions are served one at a time"),
             Self::SampleTime(seconds) => write!(
                 f,
-                "it samples every {seconds} s, which is not this program's sample time: give both the same scene"
+                "its sample time is {seconds} s, which differs from that of this program: use the same scene for both"
             ),
-            Self::Role => f.write_str(
-                "it is the other side of the bench: a rig where a controller was wanted, or the reverse",
-            ),
-            Self::Version(version) => write!(f, "it speaks version {version} of the protocol"),
+            Self::Role => f.write_str("it is a rig where a controller is needed, or the reverse"),
+            Self::Version(version) => write!(f, "it has version {version} of the protocol"),
             Self::Other(code) => write!(f, "reason {code}"),
         }
     }

@@ -1,4 +1,4 @@
-//! What a server tells about a session.
+//! Report of a server on a session.
 
 use std::fmt::{self, Display, Formatter};
 use std::net::SocketAddr;
@@ -6,36 +6,36 @@ use std::net::SocketAddr;
 use serde::Serialize;
 
 use super::counters::Counters;
-use super::pace::Punctuality;
+use super::real_time_clock::Punctuality;
 
-/// How a session ended.
+/// End of a session.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Ended {
-    /// The client said farewell.
+    /// The client ended the session.
     Farewell,
-    /// The client was silent for too long: the drive was shut down.
+    /// The client was silent for too long; the drive was shut down.
     Silence,
-    /// This program was asked to stop.
+    /// The server was stopped.
     Stopped,
 }
 
 /// One session of a server.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Session {
-    /// Who the client was.
+    /// Address of the client.
     pub peer: SocketAddr,
-    /// How it ended.
+    /// How the session ended.
     pub ended: Ended,
     /// Samples served.
     pub samples: u64,
-    /// Time from sample to sample, s.
+    /// Sample time, s.
     pub sample_time: f64,
-    /// From the first drive or reading to the end, s.
+    /// Duration from the first drive or reading to the end, s.
     pub seconds: f64,
-    /// Of a rig in real time.
+    /// Lateness of the samples, for a rig in real time.
     pub punctuality: Option<Punctuality>,
-    /// What happened on the link.
+    /// Counters.
     pub counters: Counters,
 }
 
@@ -50,14 +50,14 @@ impl Session {
 impl Display for Session {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let ended = match self.ended {
-            Ended::Farewell => "its client said farewell",
-            Ended::Silence => "SHUT DOWN: its client was silent for too long",
-            Ended::Stopped => "stopped here",
+            Ended::Farewell => "ended by the client's farewell",
+            Ended::Silence => "SHUT DOWN: the client was silent for too long",
+            Ended::Stopped => "stopped by the server",
         };
         writeln!(f, "session of udp://{}: {ended}", self.peer)?;
         writeln!(
             f,
-            "  {} samples in {:.3} s: {:.1} a second, nominal {:.1}",
+            "  {} samples in {:.3} s: {:.1} per second, nominal {:.1}",
             self.samples,
             self.seconds,
             self.rate(),

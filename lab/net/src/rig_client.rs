@@ -2,40 +2,40 @@
 
 use std::net::SocketAddr;
 
-use super::caller::Caller;
+use super::client::Client;
 use super::counters::Counters;
 use super::error::LinkError;
 use super::frame::{Frame, Kind};
-use super::order::{Arrival, Order};
 use super::payload::{Reading, read_reading, write_command};
+use super::sequence_window::{Arrival, SequenceWindow};
 use vines_testbench::rig::{Command, Drive, Rig, RigError, Sensors, Witness};
 
-/// A rig that is driven across the network, sample by sample.
+/// A rig at a network address.
 ///
-/// A reading that is lost is replaced by the last good one, so that the controller sees every sample of the rig's clock.
+/// The last valid reading replaces a lost one, so that the controller gets every sample of the rig's clock.
 #[derive(Debug)]
 pub struct NetRig {
-    caller: Caller,
-    order: Order,
-    /// Number of the sample that is due.
+    client: Client,
+    order: SequenceWindow,
+    /// Sequence number of the present sample.
     at: u64,
-    /// Its reading, once it is known.
+    /// Reading of the present sample, if it has arrived.
     now: Option<Reading>,
-    /// The last good reading.
+    /// The last valid reading.
     good: Reading,
-    /// A reading of a later sample, which arrived first.
+    /// Reading of a later sample, which arrived first.
     ahead: Option<Frame>,
 }
 
 impl NetRig {
-    /// Asks the rig server at `peer` for a session, sampled every `sample_time` s.
+    /// Opens a session with the rig server at `peer`; `sample_time` in s.
     ///
     /// # Errors
-    /// A server that is not there, refuses, or speaks another version.
+    /// A server that does not answer, refuses, or has another version.
     pub fn connect(peer: SocketAddr, sample_time: f64) -> Result<Self, LinkError> {
         Ok(Self {
-            caller: Caller::connect(peer, false, sample_time)?,
-            order: Order::default(),
+            client: Client::connect(peer, false, sample_time)?,
+            order: SequenceWindow::default(),
             at: 0,
             now: None,
             good: Reading::default(),
@@ -43,24 +43,24 @@ impl NetRig {
         })
     }
 
-    /// The longest silence, s, that a rig in real time bears; None for one in lock-step.
+    /// The longest silence, s, of a rig in real time; None for a rig in lock-step.
     #[must_use]
     pub fn pace(&self) -> Option<f64> {
-        self.caller.pace()
+        self.client.pace()
     }
 
-    /// What has happened on the link.
+    /// The counters of the session.
     #[must_use]
     pub fn counters(&mut self) -> Counters {
-        *self.caller.counters()
+        *self.client.counters()
     }
 
-    /// The reading of the sample that is due.
+    /// The reading of the present sample.
     fn reading(&mut self) -> Result<Reading, LinkError> {
         while self.now.is_none() {
             match self.ahead {
                 Some(frame) if frame.sequence > self.at => {
-                    self.caller.counters().held += 1;
+                    self.client.counters().held += 1;
                     self.now = Some(self.good);
                 }
                 Some(frame) => {
@@ -74,25 +74,25 @@ impl NetRig {
     }
 
     fn wait(&mut self) -> Result<(), LinkError> {
-        let Some(frame) = self.caller.receive(None)? else {
+        let Some(frame) = self.client.receive(None)? else {
             return Ok(());
         };
         if frame.kind != Kind::Sensors {
-            // A welcome that came twice.
-            self.caller.counters().repeated += 1;
+            // A second Welcome.
+            self.client.counters().repeated += 1;
             return Ok(());
         }
         match self.order.arrive(frame.sequence) {
-            Arrival::New { missing } if missing > self.caller.patience() => {
-                return Err(self.caller.silent());
+            Arrival::New { missing } if missing > self.client.patience() => {
+                return Err(self.client.silent());
             }
             Arrival::New { missing } => {
-                self.caller.answered();
-                self.caller.counters().lost += missing;
+                self.client.answered();
+                self.client.counters().lost += missing;
                 self.ahead = Some(frame);
             }
-            Arrival::Late => self.caller.counters().late += 1,
-            Arrival::Repeated => self.caller.counters().repeated += 1,
+            Arrival::Late => self.client.counters().late += 1,
+            Arrival::Repeated => self.client.counters().repeated += 1,
         }
         Ok(())
     }
@@ -103,13 +103,13 @@ impl NetRig {
     }
 
     fn drive(&mut self, drive: Drive, step: f64) -> Result<(), LinkError> {
-        self.caller.check_step(step)?;
-        let frame = self.caller.frame(Kind::Drive, self.at);
+        self.client.check_step(step)?;
+        let frame = self.client.frame(Kind::Drive, self.at);
         let command = Command {
             drive,
             ..Command::default()
         };
-        self.caller.send(write_command(frame, &command))?;
+        self.client.send(write_command(frame, &command))?;
         self.at += 1;
         self.now = None;
         Ok(())

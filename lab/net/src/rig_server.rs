@@ -1,39 +1,39 @@
-//! A rig that is served to the network: in real time, or in lock-step with the drives that arrive.
+//! The server of a rig: in real time, or in lock-step with the drives.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
 use super::error::LinkError;
 use super::frame::{Frame, Kind, flag};
-use super::host::{Event, Host, Offer};
-use super::order::Arrival;
-use super::pace::Pace;
 use super::payload::{Reading, read_command, write_reading};
+use super::real_time_clock::RealTimeClock;
 use super::report::{Ended, Session};
-use super::watch::Watch;
+use super::sequence_window::Arrival;
+use super::server_session::{Event, Offer, ServerSession};
+use super::watchdog::Watchdog;
 use vines_testbench::rig::{Drive, Rig, RigError};
 
-/// How often a server without a clock looks whether it shall stop.
+/// Interval at which a server in lock-step checks whether it should stop.
 const IDLE: Duration = Duration::from_millis(50);
-/// How long a client may take from its hello to the first drive.
+/// Longest time from Hello to the first drive.
 const FIRST_DRIVE: Duration = Duration::from_secs(5);
 
-/// How a rig is served.
+/// Settings of the server.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RigService {
-    /// Time from sample to sample, s.
+    /// Sample time, s.
     pub sample_time: f64,
-    /// In real time; else in lock-step: the rig advances when a drive arrives.
+    /// Whether the rig runs in real time; otherwise it advances when a drive arrives (lock-step).
     pub paced: bool,
     /// Longest silence before the drive is shut down, s.
     pub silence: f64,
-    /// Largest drive amplitude that is taken, m. A greater one is refused, and the last good drive held.
+    /// Largest drive amplitude, m. A drive above it is refused, and the last valid drive is held.
     pub max_amplitude: f64,
 }
 
-/// A socket that serves a rig, one session at a time.
+/// A server of a rig, one session at a time.
 pub struct RigServer {
-    host: Host,
+    session: ServerSession,
     service: RigService,
 }
 
@@ -44,20 +44,20 @@ struct Run {
     at: u64,
     /// Number of the newest drive.
     newest: Option<u64>,
-    watch: Watch,
-    pace: Option<Pace>,
-    /// When the first drive came.
+    watchdog: Watchdog,
+    pace: Option<RealTimeClock>,
+    /// Time of the first drive.
     began: Option<Instant>,
-    /// When the silence was last added up.
+    /// Time up to which the watchdog has counted the silence.
     checked: Instant,
     ending: Option<Ended>,
 }
 
 impl RigServer {
-    /// Listens on `address`; port 0 takes a free one.
+    /// Listens on `address`; with port 0 the system chooses a free port.
     ///
     /// # Errors
-    /// An address that cannot be had.
+    /// An address that is not available.
     pub fn listen(address: SocketAddr, service: RigService) -> Result<Self, LinkError> {
         let offer = Offer {
             controller: false,
@@ -66,20 +66,20 @@ impl RigServer {
             silence: service.silence,
         };
         Ok(Self {
-            host: Host::listen(address, offer)?,
+            session: ServerSession::listen(address, offer)?,
             service,
         })
     }
 
-    /// Where clients reach the rig.
+    /// Address of the server.
     ///
     /// # Errors
     /// The system's.
     pub fn address(&self) -> Result<SocketAddr, LinkError> {
-        self.host.address()
+        self.session.address()
     }
 
-    /// Serves sessions until `stop` says so: each with a rig of its own from `make`, each told to `tell` at its end.
+    /// Serves sessions until `stop` returns true. `make` creates the rig of a session; `tell` receives its report.
     ///
     /// # Errors
     /// A rig that fails, or the network.
@@ -91,12 +91,12 @@ impl RigServer {
     ) -> Result<(), RigError> {
         let mut run: Option<Run> = None;
         loop {
-            match self.host.next(self.deadline(run.as_ref()))? {
+            match self.session.next(self.deadline(run.as_ref()))? {
                 Event::Opened => {
                     let fresh = run.insert(Run::new(make()?, self.service.silence));
                     self.tell_reading(fresh)?;
                 }
-                Event::Again => self.host.send_again()?,
+                Event::Again => self.session.send_again()?,
                 Event::Frame(frame, arrival) => match &mut run {
                     Some(run) => self.drive(run, &frame, arrival)?,
                     None => self.tell_shut_down()?,
@@ -122,20 +122,20 @@ impl RigServer {
         due.unwrap_or_else(|| Instant::now() + IDLE)
     }
 
-    /// Takes a drive; in lock-step, the rig advances by it.
+    /// Processes a drive. In lock-step, the rig advances with it.
     fn drive(&mut self, run: &mut Run, frame: &Frame, arrival: Arrival) -> Result<(), RigError> {
         match arrival {
             Arrival::Late => return Ok(()),
-            Arrival::Repeated if run.pace.is_none() => return Ok(self.host.send_again()?),
+            Arrival::Repeated if run.pace.is_none() => return Ok(self.session.send_again()?),
             Arrival::Repeated => return Ok(()),
             Arrival::New { .. } => {}
         }
         let Some(drive) = self.usable(frame) else {
-            self.host.counters.malformed += 1;
+            self.session.counters.malformed += 1;
             return Ok(());
         };
-        run.watch.heard();
-        run.watch.take(drive);
+        run.watchdog.heard();
+        run.watchdog.take(drive);
         run.checked = Instant::now();
         run.newest = Some(frame.sequence);
         if run.began.is_none() {
@@ -143,16 +143,16 @@ impl RigServer {
             run.pace = self
                 .service
                 .paced
-                .then(|| Pace::start(self.service.sample_time));
+                .then(|| RealTimeClock::start(self.service.sample_time));
         }
         if run.pace.is_none() {
             return self.advance(run);
         }
-        self.host.counters.late += u64::from(frame.sequence < run.at);
+        self.session.counters.late += u64::from(frame.sequence < run.at);
         Ok(())
     }
 
-    /// The drive in a frame, if a rig may be given it.
+    /// The drive in a frame, if it is valid and within the limits.
     fn usable(&self, frame: &Frame) -> Option<Drive> {
         let drive = read_command(frame)?.drive;
         let nyquist = std::f64::consts::PI / self.service.sample_time;
@@ -163,75 +163,77 @@ impl RigServer {
             .then_some(drive)
     }
 
-    /// The deadline has passed: a sample is due, or somebody is silent.
+    /// The deadline has passed: a sample is due, or the client is silent.
     fn pass(&mut self, run: Option<&mut Run>) -> Result<(), RigError> {
         let Some(run) = run else {
             return Ok(());
         };
         if let Some(pace) = &mut run.pace {
             pace.serve(run.at + 1);
-            if run.newest != Some(run.at) && !run.watch.is_latched() {
-                self.host.counters.held += 1;
-                run.watch.silent(self.service.sample_time);
+            if run.newest != Some(run.at) && !run.watchdog.is_latched() {
+                self.session.counters.held += 1;
+                run.watchdog.silent(self.service.sample_time);
             }
             return self.advance(run);
         }
         if run.began.is_some() {
-            run.watch.silent(run.checked.elapsed().as_secs_f64());
+            run.watchdog.silent(run.checked.elapsed().as_secs_f64());
             run.checked = Instant::now();
-        } else if self.host.silence() > FIRST_DRIVE {
-            run.watch.latch();
+        } else if self.session.silence() > FIRST_DRIVE {
+            run.watchdog.latch();
         }
         Ok(())
     }
 
     fn advance(&mut self, run: &mut Run) -> Result<(), RigError> {
         run.rig
-            .advance(run.watch.drive(), self.service.sample_time)?;
+            .advance(run.watchdog.drive(), self.service.sample_time)?;
         run.at += 1;
         self.tell_reading(run)
     }
 
     fn tell_reading(&mut self, run: &mut Run) -> Result<(), RigError> {
-        self.host.horizon = run.at;
+        self.session.horizon = run.at;
         let reading = Reading {
             sensors: run.rig.sense()?,
             witness: run.rig.witness()?,
         };
-        let mut frame = write_reading(self.host.answer(Kind::Sensors, run.at), &reading);
-        if run.watch.is_latched() {
+        let mut frame = write_reading(self.session.answer(Kind::Sensors, run.at), &reading);
+        if run.watchdog.is_latched() {
             frame.flags |= flag::SHUT_DOWN;
         }
-        Ok(self.host.send(frame)?)
+        Ok(self.session.send(frame)?)
     }
 
-    /// The answer to a client whose session is over.
+    /// Answers a client whose session has ended.
     fn tell_shut_down(&mut self) -> Result<(), LinkError> {
-        let mut frame = self.host.answer(Kind::Sensors, self.host.horizon);
+        let mut frame = self.session.answer(Kind::Sensors, self.session.horizon);
         frame.flags |= flag::SHUT_DOWN;
-        self.host.send(frame)
+        self.session.send(frame)
     }
 
-    /// Takes the drive away for good. A clock runs on until the drive is down; without one that is now.
+    /// Shuts the drive down. In real time the clock continues until the drive is zero; in lock-step the ramp follows at once.
     fn end(&mut self, run: Option<&mut Run>, ended: Ended) {
         if let Some(run) = run {
-            run.watch.latch();
+            run.watchdog.latch();
             run.ending.get_or_insert(ended);
         }
     }
 
     fn finish(&mut self, run: Option<Run>, ended: Ended, tell: &mut impl FnMut(&Session)) {
-        let (Some(mut run), Some(peer)) = (run, self.host.peer()) else {
+        let (Some(mut run), Some(peer)) = (run, self.session.peer()) else {
             return;
         };
-        while run.pace.is_none() && !run.watch.is_down() {
-            // A rig that fails now is going down anyway.
-            let _ = run.rig.advance(run.watch.drive(), self.service.sample_time);
+        while run.pace.is_none() && !run.watchdog.is_down() {
+            // An error of the rig changes nothing now: the session ends.
+            let _ = run
+                .rig
+                .advance(run.watchdog.drive(), self.service.sample_time);
         }
         let counters = if ended == Ended::Silence {
-            self.host.release()
+            self.session.release()
         } else {
-            self.host.close()
+            self.session.close()
         };
         tell(&Session {
             peer,
@@ -251,7 +253,7 @@ impl Run {
             rig,
             at: 0,
             newest: None,
-            watch: Watch::new(silence),
+            watchdog: Watchdog::new(silence),
             pace: None,
             began: None,
             checked: Instant::now(),
@@ -259,9 +261,9 @@ impl Run {
         }
     }
 
-    /// How the session ended, once its drive is down.
+    /// The end of the session, after the drive has reached zero.
     fn is_over(&self) -> Option<Ended> {
-        let down = self.watch.is_down() || (self.pace.is_none() && self.watch.is_latched());
+        let down = self.watchdog.is_down() || (self.pace.is_none() && self.watchdog.is_latched());
         down.then(|| self.ending.unwrap_or(Ended::Silence))
     }
 }

@@ -5,7 +5,7 @@ use std::{path::PathBuf, str::FromStr};
 use clap::Args;
 use vines::{
     fmu::{FmuController, FmuRig},
-    net::{NetController, NetRig, Reach, resolve},
+    net::{BindScope, NetController, NetRig, resolve},
     rig::{BuiltIn, Chain, Controller, Rig, Simulated},
     scene::Scene,
 };
@@ -52,13 +52,13 @@ pub(super) struct OpenRig {
 
 impl Door {
     /// The rig behind this door.
-    pub(super) fn rig(&self, scene: &Scene, reach: Reach) -> Result<OpenRig, Failure> {
+    pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
         let mut pace = None;
         let rig: Box<dyn Rig> = match self {
             Self::BuiltIn => Box::new(Simulated::new(scene).map_err(Failure::input)?),
             Self::Fmu(file) => Box::new(FmuRig::load(file, scene).map_err(Failure::run)?),
             Self::Udp(address) => {
-                let rig = NetRig::connect(resolve(address, reach)?, scene.sample_time())?;
+                let rig = NetRig::connect(resolve(address, scope)?, scene.sample_time())?;
                 pace = rig.pace();
                 Box::new(rig)
             }
@@ -75,14 +75,14 @@ impl Door {
     pub(super) fn controller(
         &self,
         scene: &Scene,
-        reach: Reach,
+        scope: BindScope,
         pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
         Ok(match self {
             Self::BuiltIn => Box::new(BuiltIn::new(scene).map_err(Failure::input)?),
             Self::Fmu(file) => Box::new(FmuController::load(file, scene).map_err(Failure::run)?),
             Self::Udp(address) => {
-                let peer = resolve(address, reach)?;
+                let peer = resolve(address, scope)?;
                 Box::new(NetController::connect(peer, scene.sample_time(), pace)?)
             }
         })
@@ -98,11 +98,11 @@ pub(super) struct ReachArguments {
 }
 
 impl ReachArguments {
-    pub(super) fn reach(&self) -> Reach {
+    pub(super) fn reach(&self) -> BindScope {
         if self.allow_remote {
-            Reach::Remote
+            BindScope::Remote
         } else {
-            Reach::Loopback
+            BindScope::Loopback
         }
     }
 }

@@ -81,7 +81,7 @@ pub enum PackError {
     Controller(#[from] phase_lock::ConfigError),
     /// The description is no XML.
     #[error("the description cannot be read: {0}")]
-    Description(roxmltree::Error),
+    Description(fmi2_description::Error),
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {

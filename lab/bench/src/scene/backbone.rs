@@ -88,7 +88,7 @@ impl Backbone {
             "must be from 1 to 10000",
         )?;
         Quantity::new("backbone.G_max", self.g_max, "(dimensionless)").positive()?;
-        let widest = controller.samples_per_period / (7.0 * std::f64::consts::TAU);
+        let widest = controller.bandwidth_max();
         Quantity::new("backbone.bandwidth", self.bandwidth, "(omega0)").check(
             self.bandwidth > 0.0 && self.bandwidth <= widest,
             format!("must be above 0 and at most {widest:.3} at that many samples per period"),

@@ -1,5 +1,8 @@
 //! The `[controller]` section: the phase-locked loop.
 
+use std::f64::consts::TAU;
+
+use phase_lock::Config;
 use serde::{Deserialize, Serialize};
 
 use super::{SceneError, validate::Quantity};
@@ -77,17 +80,29 @@ impl Controller {
         self.phase_target.to_radians()
     }
 
+    /// The detector at the natural frequency omega0 = 1.
+    fn detector(&self) -> Config {
+        Config {
+            sample_time: TAU / self.samples_per_period,
+            ..Config::for_resonance(1.0, 0.0)
+        }
+    }
+
+    /// Largest bandwidth of the detector at this number of samples per period, in units of omega0.
+    pub(super) fn bandwidth_max(&self) -> f64 {
+        self.detector().bandwidth_max()
+    }
+
     pub(super) fn check(&self) -> Result<(), SceneError> {
         self.check_limits()?;
         let samples = self.samples_per_period;
-        // The detector follows the fifth harmonic, which takes more than two samples in its period.
-        let fewest = (10.0 * self.omega_max).floor() + 1.0;
+        let highest = self.detector().highest_harmonic();
+        let fewest = (2.0 * highest as f64 * self.omega_max).floor() + 1.0;
         Quantity::new("controller.samples_per_period", samples, "(samples)").check(
             (fewest..=1e5).contains(&samples),
-            format!("must be from {fewest} (two in a period of the fifth harmonic at omega_max) to 100000"),
+            format!("must be from {fewest} (two per period of harmonic {highest} at omega_max) to 100000"),
         )?;
-        // Seven filter coefficients, each of which takes up bandwidth times sample time of the error at every sample.
-        let widest = samples / (7.0 * std::f64::consts::TAU);
+        let widest = self.bandwidth_max();
         Quantity::new("controller.bandwidth", self.bandwidth, "(omega0)").check(
             self.bandwidth > 0.0 && self.bandwidth <= widest,
             format!("must be above 0 and at most {widest:.3} with {samples} samples per period"),

@@ -12,9 +12,9 @@ use vines_testbench::rig::{
 };
 use vines_testbench::scene::{Override, PAPER, Scene};
 
-/// Any port of this machine.
+/// A free port of this machine.
 pub const ANYWHERE: &str = "127.0.0.1:0";
-/// No server outlives this.
+/// Time limit of a server.
 const LONGEST: Duration = Duration::from_secs(60);
 
 /// The default scene, 882 samples a second, with settings.
@@ -23,7 +23,7 @@ pub fn scene(settings: &[&str]) -> Scene {
     Scene::parse("paper.toml", PAPER, &overrides).unwrap()
 }
 
-/// A server at work.
+/// A running server.
 pub struct Served {
     pub address: SocketAddr,
     stop: Arc<AtomicBool>,
@@ -32,13 +32,13 @@ pub struct Served {
 }
 
 impl Served {
-    /// Stops the server, and returns its sessions.
+    /// Stops the server and returns its sessions.
     pub fn stop(mut self) -> Vec<Session> {
         self.end();
         self.sessions.lock().unwrap().clone()
     }
 
-    /// The sessions that have ended so far, as soon as there are `count`.
+    /// Waits for the end of `count` sessions and returns them.
     pub fn sessions(&self, count: usize) -> Vec<Session> {
         let end = Instant::now() + LONGEST;
         loop {
@@ -89,7 +89,7 @@ fn serve(
     }
 }
 
-/// How the plant of `scene` is served.
+/// Settings of a server for the plant of `scene`.
 pub fn service(scene: &Scene, paced: bool, silence: f64) -> RigService {
     RigService {
         sample_time: scene.sample_time(),
@@ -118,7 +118,7 @@ pub fn lock_step_rig(scene: &Scene) -> Served {
     })
 }
 
-/// Serves the plant of the scene in real time; the log gets every drive that reaches it.
+/// Serves the plant of the scene in real time; the log contains every drive of the plant.
 pub fn paced_rig(scene: &Scene, silence: f64) -> (Served, Log) {
     let (plant, log) = (Simulated::new(scene).unwrap(), Log::default());
     let copy = Arc::clone(&log);
@@ -150,10 +150,10 @@ pub fn serve_controller(
     })
 }
 
-/// The drives a rig was given.
+/// The drives of a rig.
 pub type Log = Arc<Mutex<Vec<Drive>>>;
 
-/// A rig that tells what it was given.
+/// A rig that logs its drives.
 pub struct Spy(pub Simulated, pub Log);
 
 impl Rig for Spy {
@@ -171,7 +171,7 @@ impl Rig for Spy {
     }
 }
 
-/// A drive whose frequency tells the sample it is meant for.
+/// A drive whose frequency identifies its sample.
 pub fn drive(sample: usize) -> Drive {
     Drive {
         omega: 50.0 + sample as f64 / 1024.0,
@@ -180,7 +180,7 @@ pub fn drive(sample: usize) -> Drive {
     }
 }
 
-/// Drives a rig open loop for some samples; returns everything it told.
+/// Drives a rig in open loop for some samples. Returns all readings.
 pub fn shake(
     rig: &mut dyn Rig,
     scene: &Scene,

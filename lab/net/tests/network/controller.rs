@@ -10,7 +10,7 @@ use vines_testbench::rig::{Command, Controller, ControllerError, Sensors};
 use crate::bench::{controller, drive, scene, serve_controller};
 use crate::proxy::{Fate, Proxy};
 
-/// A silence that no busy machine makes by itself.
+/// A silence, s, longer than the pauses of a busy machine.
 const PATIENT: f64 = 2.0;
 
 fn reading(n: usize) -> Sensors {
@@ -20,7 +20,7 @@ fn reading(n: usize) -> Sensors {
     }
 }
 
-/// A controller that tells what it was asked, and answers with the number of the question.
+/// A controller that logs its readings, and answers with their number.
 struct Echo(Arc<Mutex<Vec<f64>>>);
 
 impl Controller for Echo {
@@ -36,7 +36,7 @@ impl Controller for Echo {
 }
 
 #[test]
-fn a_lost_reading_is_replaced_by_the_last_good_one_so_that_no_sample_is_missing() {
+fn the_last_valid_reading_replaces_a_lost_one_so_that_no_sample_is_missing() {
     let (scene, asked) = (scene(&[]), Arc::default());
     let log = Arc::clone(&asked);
     let server = serve_controller(&scene, PATIENT, move || Box::new(Echo(Arc::clone(&log))));
@@ -51,7 +51,7 @@ fn a_lost_reading_is_replaced_by_the_last_good_one_so_that_no_sample_is_missing(
         .collect();
     println!("{}", peer.counters());
     assert!(peer.counters().held >= 15);
-    // Held: the drive of an earlier sample, and no word of a settled lock.
+    // A held drive is that of an earlier sample, and never counts as settled.
     for (n, answer) in answers.iter().enumerate() {
         let own = answer.drive == drive(n);
         assert!(own || (!answer.settled && answer.drive.omega < drive(n).omega));
@@ -59,7 +59,7 @@ fn a_lost_reading_is_replaced_by_the_last_good_one_so_that_no_sample_is_missing(
     drop(peer);
     let session = server.sessions(1).remove(0);
     assert!(session.counters.lost >= 15 && session.counters.held >= 15);
-    // One question for every sample up to the last that arrived; what was lost repeats the one before.
+    // One reading per sample up to the last one that arrived; a lost one repeats the one before.
     let asked = asked.lock().unwrap();
     assert!(asked.len() >= 195);
     assert!(
@@ -71,7 +71,7 @@ fn a_lost_reading_is_replaced_by_the_last_good_one_so_that_no_sample_is_missing(
 }
 
 #[test]
-fn a_held_drive_is_none_once_the_drive_is_not_wanted() {
+fn a_held_drive_is_zero_when_the_drive_is_not_requested() {
     let scene = scene(&[]);
     let server = serve_controller(&scene, PATIENT, move || Box::new(Echo(Arc::default())));
     let proxy = Proxy::before(server.address, |kind, n| match kind {
@@ -90,7 +90,7 @@ fn a_held_drive_is_none_once_the_drive_is_not_wanted() {
 }
 
 #[test]
-fn a_controller_that_vanishes_is_an_error_that_stays() {
+fn a_controller_that_stops_answering_is_a_permanent_error() {
     let scene = scene(&[]);
     let server = controller(&scene, 0.3);
     let proxy = Proxy::before(server.address, |kind, n| match kind {
@@ -110,7 +110,7 @@ fn a_controller_that_vanishes_is_an_error_that_stays() {
 }
 
 #[test]
-fn a_client_that_is_silent_for_too_long_gets_no_more_drive() {
+fn a_client_that_was_silent_for_too_long_gets_no_drive() {
     let scene = scene(&[]);
     let server = controller(&scene, 0.2);
     let mut peer = NetController::connect(server.address, scene.sample_time(), None).unwrap();

@@ -1,4 +1,4 @@
-//! In lock-step, whatever the network does, every bit is that of the plant with nothing in between.
+//! In lock-step, every bit equals that of the built-in plant, whatever the network loses, repeats or reorders.
 
 use vines_net::frame::Kind;
 use vines_net::{Counters, Ended, NetController, NetRig};
@@ -38,8 +38,8 @@ fn an_experiment_across_the_network_gives_the_same_bits() {
     }
 }
 
-/// Shakes the plant through a proxy: its readings must be those without a network. Returns the counters of client and
-/// server, and how many datagrams were touched.
+/// Drives the plant through a proxy: the readings must equal those without a network. Returns the counters of client and
+/// server, and the number of datagrams that did not just pass.
 fn shaken(
     samples: usize,
     fate: impl FnMut(Kind, u64) -> Fate + Send + 'static,
@@ -54,7 +54,7 @@ fn shaken(
     let client = rig.counters();
     drop(rig);
     let session = server.sessions(1).remove(0);
-    // The last drive was not waited for.
+    // The client does not wait for the answer to the last drive.
     assert!(session.samples + 1 >= samples as u64 && session.samples <= samples as u64);
     println!("client: {client}\nserver: {}", session.counters);
     (client, session.counters, proxy.done())
@@ -81,7 +81,7 @@ fn repeated_frames_are_counted_and_change_no_bit() {
 
 #[test]
 fn late_frames_are_counted_and_change_no_bit() {
-    // What is kept back passes after the one that was sent in its stead.
+    // A delayed frame passes after its repetition.
     let (client, server, swapped) = shaken(
         300,
         |_, n| if n % 40 == 7 { Fate::Swap } else { Fate::Pass },
@@ -105,7 +105,7 @@ fn corrupted_frames_are_counted_as_malformed_and_change_no_bit() {
 }
 
 #[test]
-fn frames_of_a_stranger_are_counted_as_foreign_and_change_no_bit() {
+fn frames_of_another_sender_are_counted_as_foreign_and_change_no_bit() {
     let (client, server, copied) =
         shaken(600, |_, n| if n % 4 == 1 { Fate::Copy } else { Fate::Pass });
     assert!(copied > 200);
@@ -113,7 +113,7 @@ fn frames_of_a_stranger_are_counted_as_foreign_and_change_no_bit() {
 }
 
 #[test]
-fn frames_of_another_session_are_foreign_too() {
+fn frames_of_another_session_are_counted_as_foreign() {
     let (client, server, _) = shaken(200, |_, n| {
         if n % 50 == 20 {
             Fate::Rewrite(|frame| frame.session ^= 1)

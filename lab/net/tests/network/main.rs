@@ -1,4 +1,4 @@
-//! The network door on loopback: what arrives well, what does not, and what is refused.
+//! Rigs and controllers on loopback: correct, lost, late and invalid frames, and refused sessions.
 
 mod bench;
 mod controller;

@@ -1,4 +1,4 @@
-//! A go-between that does to datagrams what networks do, by a fixed pattern.
+//! A proxy that loses, repeats, reorders and changes datagrams in a fixed pattern.
 
 use std::io::ErrorKind;
 use std::net::{SocketAddr, UdpSocket};
@@ -8,37 +8,37 @@ use std::time::{Duration, Instant};
 
 use vines_net::frame::{Frame, Kind};
 
-/// What happens to a datagram.
+/// Treatment of a datagram.
 #[derive(Clone, Copy)]
 pub enum Fate {
     Pass,
     Lose,
     Repeat,
-    /// Kept back until the next one in the same direction has passed.
+    /// Delayed until the next one in the same direction has passed.
     Swap,
-    /// Some bits are turned.
+    /// Some bits are inverted.
     Corrupt,
-    /// Passes; somebody else sends a copy of it, too.
+    /// Passes; another sender sends a copy, too.
     Copy,
-    /// Passes, with a rewritten content and a checksum that is right.
+    /// Passes with changed content and a correct checksum.
     Rewrite(fn(&mut Frame)),
 }
 
-/// No proxy outlives this, or handles more than ...
+/// Limits of a proxy: time, ...
 const LONGEST: Duration = Duration::from_secs(60);
+/// ... and datagrams.
 const MOST: u64 = 200_000;
 
-/// A go-between at work; it stops where it is dropped.
+/// A running proxy; it stops when it is dropped.
 pub struct Proxy {
-    /// What a client takes for the server.
+    /// Address for clients.
     pub address: SocketAddr,
     stop: Arc<AtomicBool>,
     done: Arc<AtomicU64>,
 }
 
 impl Proxy {
-    /// Stands before `server`. `fate` says what happens to the n-th frame of a kind, the handshake and the farewell
-    /// excepted.
+    /// Forwards to `server`. `fate` determines the treatment of the n-th frame in a direction; handshake and farewell pass.
     pub fn before(
         server: SocketAddr,
         fate: impl FnMut(Kind, u64) -> Fate + Send + 'static,
@@ -93,7 +93,7 @@ impl Proxy {
         }
     }
 
-    /// How many datagrams met another fate than to pass.
+    /// Number of datagrams with a treatment other than `Pass`.
     pub fn done(&self) -> u64 {
         self.done.load(Ordering::Relaxed)
     }

@@ -1,7 +1,6 @@
-//! A rig in real time: it never waits, holds the last good drive, and takes it away after a silence.
+//! A rig in real time: it never waits, holds the last valid drive, and shuts it down after a silence.
 //!
-//! The machine that runs these tests may be busy, so that a real deadline is missed now and then: what is asserted is
-//! what must hold all the same.
+//! A busy machine misses deadlines now and then. The tests assert only what must hold nevertheless.
 
 use std::thread::sleep;
 use std::time::Duration;
@@ -14,10 +13,10 @@ use vines_testbench::rig::{Drive, Rig};
 use crate::bench::{controller, drive, paced_rig, scene, shake};
 use crate::proxy::{Fate, Proxy};
 
-/// A silence that no busy machine makes by itself.
+/// A silence, s, longer than the pauses of a busy machine.
 const PATIENT: f64 = 2.0;
 
-/// Shakes the paced rig through a proxy; returns the counters of the client, the session and the drives of the rig.
+/// Drives the rig through a proxy. Returns the counters of the client, the session and the drives of the rig.
 fn shaken(fate: impl FnMut(Kind, u64) -> Fate + Send + 'static) -> (Counters, Session, Vec<Drive>) {
     let scene = scene(&[]);
     let (server, log) = paced_rig(&scene, PATIENT);
@@ -31,7 +30,7 @@ fn shaken(fate: impl FnMut(Kind, u64) -> Fate + Send + 'static) -> (Counters, Se
     println!("client: {client}\n{session}");
     assert_eq!(session.ended, Ended::Farewell);
     assert!(session.samples >= 399);
-    // Whatever happened on the way, the rig was only ever given drives that were meant for it, in their order.
+    // Whatever the network did, the rig only got drives of this client, in their order.
     let driven = &drives[..399];
     assert!(driven.windows(2).all(|pair| pair[0].omega <= pair[1].omega));
     assert!(
@@ -43,7 +42,7 @@ fn shaken(fate: impl FnMut(Kind, u64) -> Fate + Send + 'static) -> (Counters, Se
 }
 
 #[test]
-fn the_rig_keeps_its_rate_and_tells_how_late_its_samples_were() {
+fn the_rig_keeps_its_rate_and_reports_the_lateness_of_its_samples() {
     let (_, session, drives) = shaken(|_, _| Fate::Pass);
     let nominal = 1.0 / session.sample_time;
     assert!(
@@ -54,7 +53,7 @@ fn the_rig_keeps_its_rate_and_tells_how_late_its_samples_were() {
     let punctuality = session.punctuality.unwrap();
     assert_eq!(punctuality.histogram.iter().sum::<u64>(), session.samples);
     assert!(punctuality.missed <= session.samples && punctuality.worst >= 0.0);
-    // The farewell brings the drive down step by step.
+    // After the farewell the drive ramps down.
     assert_eq!(drives.last().unwrap().amplitude, 0.0);
     let steps = drives
         .windows(2)
@@ -72,7 +71,7 @@ fn a_lost_drive_is_held() {
 }
 
 #[test]
-fn a_lost_reading_is_replaced_by_the_last_good_one() {
+fn the_last_valid_reading_replaces_a_lost_one() {
     let (client, _, _) = shaken(|kind, n| match (kind, n % 10) {
         (Kind::Sensors, 5) => Fate::Lose,
         _ => Fate::Pass,
@@ -81,7 +80,7 @@ fn a_lost_reading_is_replaced_by_the_last_good_one() {
 }
 
 #[test]
-fn a_drive_that_is_overtaken_never_goes_back_in_time() {
+fn a_drive_that_arrives_after_a_later_one_is_not_used() {
     let (_, session, _) = shaken(|kind, n| match (kind, n % 10) {
         (Kind::Drive, 5) => Fate::Swap,
         _ => Fate::Pass,
@@ -90,7 +89,7 @@ fn a_drive_that_is_overtaken_never_goes_back_in_time() {
 }
 
 #[test]
-fn a_reading_that_is_overtaken_is_counted_as_late() {
+fn a_reading_that_arrives_after_a_later_one_is_counted_as_late() {
     let (client, _, _) = shaken(|kind, n| match (kind, n % 10) {
         (Kind::Sensors, 5) => Fate::Swap,
         _ => Fate::Pass,
@@ -112,7 +111,7 @@ fn repeated_corrupted_and_copied_frames_are_counted_one_by_one() {
 }
 
 #[test]
-fn a_drive_that_no_shaker_may_be_given_is_refused_and_the_last_good_one_held() {
+fn an_invalid_drive_is_refused_and_the_last_valid_one_held() {
     let (_, session, drives) = shaken(|kind, n| match (kind, n % 30) {
         (Kind::Drive, 5) => Fate::Rewrite(|frame| frame.values[1] = f64::NAN),
         (Kind::Drive, 15) => Fate::Rewrite(|frame| frame.values[1] = 1e3),
@@ -128,7 +127,7 @@ fn a_drive_that_no_shaker_may_be_given_is_refused_and_the_last_good_one_held() {
 }
 
 #[test]
-fn a_drive_from_the_future_is_refused() {
+fn a_drive_of_a_future_sample_is_refused() {
     let (_, session, _) = shaken(|kind, n| match (kind, n) {
         (Kind::Drive, 50) => Fate::Rewrite(|frame| frame.sequence = u64::MAX),
         (Kind::Drive, 60) => Fate::Rewrite(|frame| frame.sequence += 1000),
@@ -138,7 +137,7 @@ fn a_drive_from_the_future_is_refused() {
 }
 
 #[test]
-fn a_silence_takes_the_drive_away_and_a_client_that_returns_is_told() {
+fn a_silence_shuts_the_drive_down_and_a_client_that_returns_is_informed() {
     let scene = scene(&[]);
     let (server, log) = paced_rig(&scene, 0.3);
     let mut rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
@@ -159,14 +158,14 @@ fn a_silence_takes_the_drive_away_and_a_client_that_returns_is_told() {
     let Some(LinkError::ShutDown { .. } | LinkError::Silent { .. }) = error.cause() else {
         panic!("{error}");
     };
-    // Latched: nothing that this client sends moves the rig again.
+    // Latched: no frame of this client moves the rig again.
     let _ = rig.advance(drive(51), scene.sample_time());
     sleep(Duration::from_millis(50));
     assert_eq!(log.lock().unwrap().len(), drives.len());
 }
 
 #[test]
-fn after_a_shutdown_another_client_may_begin_anew() {
+fn after_a_shutdown_another_client_may_start_a_session() {
     let scene = scene(&[]);
     let (server, log) = paced_rig(&scene, 0.3);
     let mut gone = NetRig::connect(server.address, scene.sample_time()).unwrap();
@@ -181,7 +180,7 @@ fn after_a_shutdown_another_client_may_begin_anew() {
 }
 
 #[test]
-fn a_rig_that_vanishes_ends_the_experiment() {
+fn a_rig_that_stops_answering_ends_the_experiment() {
     let scene = scene(&[]);
     let (server, _) = paced_rig(&scene, 0.3);
     let proxy = Proxy::before(server.address, |kind, n| match kind {
@@ -197,7 +196,7 @@ fn a_rig_that_vanishes_ends_the_experiment() {
 }
 
 #[test]
-fn a_controller_that_vanishes_brings_the_drive_of_the_rig_down() {
+fn a_controller_that_stops_answering_ramps_the_drive_of_the_rig_down() {
     let scene = scene(&[]);
     let (rig_server, log) = paced_rig(&scene, PATIENT);
     let controller_server = controller(&scene, PATIENT);

@@ -1,4 +1,4 @@
-//! Sessions that do not come about, each with a message that a person can act on.
+//! Sessions that are refused, each with a message that says what to do.
 
 use std::net::UdpSocket;
 use std::time::{Duration, Instant};
@@ -9,7 +9,7 @@ use vines_net::{LinkError, NetController, NetRig, Refusal, RigServer};
 use crate::bench::{controller, lock_step_rig, scene, service};
 
 #[test]
-fn nobody_at_the_address_is_said_with_the_command_that_would_help() {
+fn a_missing_server_is_reported_with_the_command_that_starts_it() {
     let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
     let start = Instant::now();
     let error = NetRig::connect(silent.local_addr().unwrap(), 1e-3).unwrap_err();
@@ -43,7 +43,7 @@ fn another_version_is_named_with_both_numbers() {
 }
 
 #[test]
-fn a_client_of_another_version_is_told_the_version_of_the_server() {
+fn a_client_of_another_version_is_informed_of_the_version_of_the_server() {
     let server = lock_step_rig(&scene(&[]));
     let client = UdpSocket::bind("127.0.0.1:0").unwrap();
     client
@@ -69,7 +69,7 @@ fn refused(error: &LinkError) -> Refusal {
 }
 
 #[test]
-fn a_rig_and_a_controller_are_not_taken_for_each_other() {
+fn a_rig_is_not_accepted_as_a_controller_nor_the_reverse() {
     let scene = scene(&[]);
     let (rig, peer) = (lock_step_rig(&scene), controller(&scene, 5.0));
     let sample_time = scene.sample_time();
@@ -80,7 +80,7 @@ fn a_rig_and_a_controller_are_not_taken_for_each_other() {
 }
 
 #[test]
-fn another_sample_time_is_refused_with_the_servers_own() {
+fn another_sample_time_is_refused_with_that_of_the_server() {
     let scene = scene(&[]);
     let server = lock_step_rig(&scene);
     let error = NetRig::connect(server.address, 2.0 * scene.sample_time()).unwrap_err();
@@ -89,7 +89,7 @@ fn another_sample_time_is_refused_with_the_servers_own() {
 }
 
 #[test]
-fn a_second_client_is_refused_while_the_first_one_is_there() {
+fn a_second_client_is_refused_during_the_session_of_the_first() {
     let scene = scene(&[]);
     let server = lock_step_rig(&scene);
     let _first = NetRig::connect(server.address, scene.sample_time()).unwrap();

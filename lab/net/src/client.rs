@@ -1,4 +1,4 @@
-//! The client's end of a link: asks for a session, sends, waits, sends again, and gives up.
+//! The client of a session: opens it, sends frames, waits for answers, and gives up after a silence.
 
 use std::hash::{BuildHasher, Hasher, RandomState};
 use std::net::SocketAddr;
@@ -7,37 +7,37 @@ use std::time::{Duration, Instant};
 use super::counters::Counters;
 use super::error::LinkError;
 use super::frame::{Frame, FrameError, Kind, flag};
-use super::port::Port;
+use super::frame_socket::FrameSocket;
 use super::refusal::Refusal;
 
-/// After this long without an answer, the last frame is sent again.
+/// Time without an answer after which the last frame is sent again.
 const RESEND: Duration = Duration::from_millis(50);
-/// How long a server may take to grant a session.
+/// Longest time until the server opens the session.
 const CONNECT: Duration = Duration::from_secs(2);
-/// Copies of the farewell: nobody answers it.
+/// Number of farewell frames. One may be lost, and there is no answer to it.
 const FAREWELLS: usize = 3;
-/// Relative difference of two sample times that are the same.
+/// Largest relative difference of two sample times that count as equal.
 const SAME_TIME: f64 = 1e-9;
 
-/// A session, seen from the client.
+/// The client's side of a session.
 #[derive(Debug)]
-pub(super) struct Caller {
-    port: Port,
+pub(super) struct Client {
+    socket: FrameSocket,
     peer: SocketAddr,
     session: u64,
     sample_time: f64,
     paced: bool,
     silence: Duration,
     counters: Counters,
-    /// Sent again while there is no answer.
+    /// The last frame, which is sent again if no answer arrives.
     last: Frame,
     last_sent: Instant,
-    /// Since when an answer is waited for.
+    /// Time since which an answer is due.
     waiting: Option<Instant>,
 }
 
-impl Caller {
-    /// Asks `peer` for a session as a rig, or as a `controller`, sampled every `sample_time` s.
+impl Client {
+    /// Opens a session with the rig, or the `controller`, at `peer`; `sample_time` in s.
     pub fn connect(
         peer: SocketAddr,
         controller: bool,
@@ -47,8 +47,8 @@ impl Caller {
         let mut hello = Frame::new(Kind::Hello, session);
         hello.flags = if controller { flag::CONTROLLER } else { 0 };
         hello.values[0] = sample_time;
-        let mut caller = Self {
-            port: Port::towards(peer)?,
+        let mut client = Self {
+            socket: FrameSocket::towards(peer)?,
             peer,
             session,
             sample_time,
@@ -59,7 +59,7 @@ impl Caller {
             last_sent: Instant::now(),
             waiting: None,
         };
-        caller.send(hello)?;
+        client.send(hello)?;
         let unreachable = LinkError::Unreachable {
             peer,
             role: if controller { "controller" } else { "rig" },
@@ -67,7 +67,7 @@ impl Caller {
         };
         let mut busy: Option<Refusal> = None;
         let welcome = loop {
-            let frame = match (caller.receive(None), busy) {
+            let frame = match (client.receive(None), busy) {
                 (Ok(Some(frame)), _) => frame,
                 (Ok(None), _) => continue,
                 (Err(LinkError::Silent { .. }), Some(reason)) => {
@@ -78,36 +78,36 @@ impl Caller {
             };
             match (frame.kind, Refusal::read(&frame)) {
                 (Kind::Welcome, _) => break frame,
-                // Its last client may just be leaving.
+                // The last client may be about to leave.
                 (Kind::Refusal, reason @ Refusal::Busy) => busy = Some(reason),
                 (Kind::Refusal, reason) => return Err(LinkError::Refused { peer, reason }),
                 _ => {}
             }
         };
-        caller.answered();
-        caller.paced = welcome.has(flag::PACED);
-        // What the server believes about silence is what the client does, within reason.
-        caller.silence = Duration::try_from_secs_f64(welcome.values[1]).unwrap_or(CONNECT);
-        Ok(caller)
+        client.answered();
+        client.paced = welcome.has(flag::PACED);
+        // Client and server use the same limit.
+        client.silence = Duration::try_from_secs_f64(welcome.values[1]).unwrap_or(CONNECT);
+        Ok(client)
     }
 
-    /// Longest silence, s, where the server runs in real time.
+    /// Longest silence, s, of a server in real time.
     pub fn pace(&self) -> Option<f64> {
         self.paced.then_some(self.silence.as_secs_f64())
     }
 
-    /// Allows no longer silence than this, s.
+    /// Reduces the longest silence to this value, s.
     pub fn limit_silence(&mut self, seconds: f64) {
         let limit = Duration::try_from_secs_f64(seconds).unwrap_or_default();
         self.silence = self.silence.min(limit);
     }
 
-    /// What has happened so far.
+    /// The counters of the session.
     pub fn counters(&mut self) -> &mut Counters {
         &mut self.counters
     }
 
-    /// A frame of sample `sequence`, still without content.
+    /// A frame of sample `sequence` without content.
     pub fn frame(&self, kind: Kind, sequence: u64) -> Frame {
         Frame {
             sequence,
@@ -116,25 +116,25 @@ impl Caller {
         }
     }
 
-    /// Sends a frame, and keeps it to be sent again.
+    /// Sends a frame and keeps it for a repetition.
     pub fn send(&mut self, frame: Frame) -> Result<(), LinkError> {
         self.last = frame;
         self.last_sent = Instant::now();
         self.counters.sent += 1;
-        Ok(self.port.send(&frame, self.peer)?)
+        Ok(self.socket.send(&frame, self.peer)?)
     }
 
-    /// The next good frame of this session, or None at `until`; the last frame sent is sent again meanwhile.
+    /// The next valid frame of this session, or None at `until`. Repeats the last frame if no answer arrives.
     ///
     /// # Errors
-    /// A peer that has not answered for too long, has shut down its drive, or speaks another version.
+    /// A peer that is silent for too long, has shut down its drive, or has another version.
     pub fn receive(&mut self, until: Option<Instant>) -> Result<Option<Frame>, LinkError> {
         let since = *self.waiting.get_or_insert_with(Instant::now);
         let end = since + self.silence;
         let until = until.unwrap_or(end + RESEND);
         loop {
             let again = self.last_sent + RESEND;
-            if let Some((datagram, from)) = self.port.receive(until.min(end).min(again))?
+            if let Some((datagram, from)) = self.socket.receive(until.min(end).min(again))?
                 && let Some(frame) = self.filter(datagram, from)?
             {
                 return Ok(Some(frame));
@@ -153,12 +153,12 @@ impl Caller {
         }
     }
 
-    /// What was waited for is here.
+    /// The expected answer has arrived.
     pub fn answered(&mut self) {
         self.waiting = None;
     }
 
-    /// That the peer is gone.
+    /// The error for a silent peer.
     pub fn silent(&self) -> LinkError {
         LinkError::Silent {
             peer: self.peer,
@@ -167,12 +167,12 @@ impl Caller {
         }
     }
 
-    /// Samples in the longest silence.
+    /// Number of samples in the longest silence.
     pub fn patience(&self) -> u64 {
         (self.silence.as_secs_f64() / self.sample_time) as u64
     }
 
-    /// Checks that a step is the one agreed on.
+    /// Checks that a step has the length agreed on.
     pub fn check_step(&self, step: f64) -> Result<(), LinkError> {
         let sample_time = self.sample_time;
         if same_time(step, sample_time) {
@@ -219,21 +219,21 @@ impl Caller {
     }
 }
 
-impl Drop for Caller {
+impl Drop for Client {
     fn drop(&mut self) {
         if self.counters.is_troubled() {
             log::warn!("udp://{}: {}", self.peer, self.counters);
         }
         for _ in 0..FAREWELLS {
-            // If it cannot be sent, the server's watch ends the session.
+            // If this fails, the server's watchdog ends the session.
             let _ = self
-                .port
+                .socket
                 .send(&Frame::new(Kind::Farewell, self.session), self.peer);
         }
     }
 }
 
-/// Whether two sample times, s, are the same.
+/// Whether two sample times, s, are equal.
 pub(super) fn same_time(a: f64, b: f64) -> bool {
     (a - b).abs() <= SAME_TIME * b.abs()
 }

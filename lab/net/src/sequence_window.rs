@@ -1,26 +1,26 @@
-//! The order of arrival: which frame is new, which came before, which comes too late.
+//! Sequence numbers: whether a frame is new, repeated, or late.
 
-/// What a sequence number is to a receiver.
+/// Class of a sequence number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Arrival {
-    /// Newer than all before; `missing` numbers were left out.
+    /// Larger than all before; `missing` numbers were skipped.
     New { missing: u64 },
-    /// Left out before, and here after all.
+    /// Skipped before, received now.
     Late,
-    /// Here before.
+    /// Received before.
     Repeated,
 }
 
-/// The numbers that have arrived.
+/// The sequence numbers received: the largest one, and a window of 64 before it.
 #[derive(Debug, Clone, Copy, Default)]
-pub(super) struct Order {
+pub(super) struct SequenceWindow {
     next: u64,
-    /// Bit n: number `next - 1 - n` has arrived.
+    /// Bit n: number `next - 1 - n` was received.
     seen: u64,
 }
 
-impl Order {
-    /// Takes note of a number. What is more than 64 numbers old counts as late.
+impl SequenceWindow {
+    /// Classifies and stores a number. A number older than the window counts as late.
     pub fn arrive(&mut self, sequence: u64) -> Arrival {
         if sequence >= self.next {
             let missing = sequence - self.next;
@@ -48,25 +48,25 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn numbers_in_order_are_new_and_miss_nothing() {
-        let mut order = Order::default();
+    fn numbers_in_order_are_new_without_gaps() {
+        let mut window = SequenceWindow::default();
         for n in 0..1000 {
-            assert_eq!(order.arrive(n), Arrival::New { missing: 0 });
+            assert_eq!(window.arrive(n), Arrival::New { missing: 0 });
         }
     }
 
     #[test]
-    fn the_greatest_number_is_survived() {
-        let mut order = Order::default();
-        assert!(matches!(order.arrive(u64::MAX - 1), Arrival::New { .. }));
-        assert_eq!(order.arrive(u64::MAX - 1), Arrival::Repeated);
-        assert_eq!(order.arrive(0), Arrival::Late);
+    fn the_largest_number_does_not_overflow() {
+        let mut window = SequenceWindow::default();
+        assert!(matches!(window.arrive(u64::MAX - 1), Arrival::New { .. }));
+        assert_eq!(window.arrive(u64::MAX - 1), Arrival::Repeated);
+        assert_eq!(window.arrive(0), Arrival::Late);
     }
 
     proptest! {
         #[test]
-        fn any_order_is_told_as_a_list_of_all_that_came_would(numbers in prop::collection::vec(0u64..60, 1..200)) {
-            let (mut order, mut seen, mut next) = (Order::default(), BTreeSet::new(), 0);
+        fn every_order_is_classified_like_a_list_of_all_numbers(numbers in prop::collection::vec(0u64..60, 1..200)) {
+            let (mut window, mut seen, mut next) = (SequenceWindow::default(), BTreeSet::new(), 0);
             for n in numbers {
                 let fresh = seen.insert(n);
                 let expected = match (n >= next, fresh) {
@@ -75,7 +75,7 @@ mod tests {
                     (false, false) => Arrival::Repeated,
                 };
                 next = next.max(n + 1);
-                prop_assert_eq!(order.arrive(n), expected);
+                prop_assert_eq!(window.arrive(n), expected);
             }
         }
     }

@@ -1,23 +1,23 @@
-//! The watch over a silent link: the last good drive is held, and after a stated time taken away for good.
+//! The watchdog: holds the last valid drive while the client is silent, and shuts the drive down after a time limit.
 
 use vines_testbench::rig::Drive;
 
-/// Samples in which the drive of a paced rig is brought to zero.
+/// Number of samples of the ramp to zero after a shutdown.
 pub const RAMP_SAMPLES: u32 = 100;
 
-/// Holds a drive, and takes it away when nothing has been heard for too long.
+/// Holds a drive, and shuts it down after too long a silence.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Watch {
+pub(super) struct Watchdog {
     /// Longest silence, s.
     limit: f64,
     /// Silence so far, s.
     quiet: f64,
     drive: Drive,
-    /// Samples of the ramp that are left, once the limit has passed.
+    /// Remaining samples of the ramp after the shutdown.
     latched: Option<u32>,
 }
 
-impl Watch {
+impl Watchdog {
     pub fn new(limit: f64) -> Self {
         Self {
             limit,
@@ -27,19 +27,19 @@ impl Watch {
         }
     }
 
-    /// Something was heard: the silence begins anew.
+    /// A frame has arrived: the silence starts again.
     pub fn heard(&mut self) {
         self.quiet = 0.0;
     }
 
-    /// A new drive; without effect once the drive has been taken away.
+    /// Sets a new drive; without effect after the shutdown.
     pub fn take(&mut self, drive: Drive) {
         if self.latched.is_none() {
             self.drive = drive;
         }
     }
 
-    /// `seconds` have passed without a word.
+    /// `seconds` have passed without a frame.
     pub fn silent(&mut self, seconds: f64) {
         self.quiet += seconds;
         if self.quiet > self.limit {
@@ -47,22 +47,22 @@ impl Watch {
         }
     }
 
-    /// Takes the drive away, for good.
+    /// Shuts the drive down for the rest of the session.
     pub fn latch(&mut self) {
         self.latched.get_or_insert(RAMP_SAMPLES);
     }
 
-    /// Whether the drive has been taken away.
+    /// Whether the drive has been shut down.
     pub fn is_latched(&self) -> bool {
         self.latched.is_some()
     }
 
-    /// Whether the drive has been taken away and is zero by now.
+    /// Whether the drive has been shut down and is zero.
     pub fn is_down(&self) -> bool {
         self.latched == Some(0)
     }
 
-    /// The drive of the coming sample period.
+    /// The drive of the next sample period.
     pub fn drive(&mut self) -> Drive {
         let Some(left) = &mut self.latched else {
             return self.drive;
@@ -89,31 +89,31 @@ mod tests {
 
     #[test]
     fn the_last_drive_is_held_until_the_limit() {
-        let mut watch = Watch::new(1.0);
-        watch.take(DRIVE);
+        let mut watchdog = Watchdog::new(1.0);
+        watchdog.take(DRIVE);
         for _ in 0..4 {
-            watch.silent(0.25);
-            assert_eq!(watch.drive(), DRIVE);
+            watchdog.silent(0.25);
+            assert_eq!(watchdog.drive(), DRIVE);
         }
-        watch.heard();
-        watch.silent(1.0);
-        assert!(!watch.is_latched());
+        watchdog.heard();
+        watchdog.silent(1.0);
+        assert!(!watchdog.is_latched());
     }
 
     #[test]
-    fn beyond_the_limit_the_drive_goes_to_zero_step_by_step_and_never_comes_back() {
-        let mut watch = Watch::new(1.0);
-        watch.take(DRIVE);
-        watch.silent(1.1);
+    fn beyond_the_limit_the_drive_ramps_to_zero_and_stays_there() {
+        let mut watchdog = Watchdog::new(1.0);
+        watchdog.take(DRIVE);
+        watchdog.silent(1.1);
         let mut before = DRIVE.amplitude;
-        while !watch.is_down() {
-            let now = watch.drive().amplitude;
+        while !watchdog.is_down() {
+            let now = watchdog.drive().amplitude;
             assert!(now < before && before - now < 0.011);
             before = now;
-            watch.heard();
-            watch.take(DRIVE);
+            watchdog.heard();
+            watchdog.take(DRIVE);
         }
-        assert_eq!(watch.drive().amplitude, 0.0);
-        assert_eq!(watch.drive().omega, DRIVE.omega);
+        assert_eq!(watchdog.drive().amplitude, 0.0);
+        assert_eq!(watchdog.drive().omega, DRIVE.omega);
     }
 }

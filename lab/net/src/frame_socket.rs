@@ -1,4 +1,4 @@
-//! A UDP socket that sends frames and waits for them with a deadline.
+//! A UDP socket for frames, with a deadline for receiving.
 
 use std::io::{self, ErrorKind};
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, UdpSocket};
@@ -8,21 +8,21 @@ use std::time::{Duration, Instant};
 use super::error::LinkError;
 use super::frame::{Frame, FrameError};
 
-/// Waits below this are polled: the system's own time-outs may be as coarse as 16 ms, several samples long.
+/// Shorter waits use polling: the time-outs of the system may be as coarse as 16 ms, which is several samples.
 const FINE: Duration = Duration::from_millis(20);
-/// Time from poll to poll.
+/// Polling interval.
 const POLL: Duration = Duration::from_micros(50);
 
-/// What came in, and from where.
+/// A received frame and its sender.
 pub(super) type Datagram = (Result<Frame, FrameError>, SocketAddr);
 
 /// A socket.
 #[derive(Debug)]
-pub(super) struct Port {
+pub(super) struct FrameSocket {
     socket: UdpSocket,
 }
 
-impl Port {
+impl FrameSocket {
     /// A socket that listens on `address`; port 0 takes a free one.
     pub fn listen(address: SocketAddr) -> Result<Self, LinkError> {
         let socket =
@@ -30,7 +30,7 @@ impl Port {
         Ok(Self { socket })
     }
 
-    /// A socket to talk to `peer` from: of this machine alone where the peer is.
+    /// A socket for a connection to `peer`. It is bound to loopback if the peer is on loopback.
     pub fn towards(peer: SocketAddr) -> Result<Self, LinkError> {
         let ip = match (peer, peer.ip().to_canonical().is_loopback()) {
             (SocketAddr::V4(_), true) => Ipv4Addr::LOCALHOST.into(),
@@ -41,12 +41,12 @@ impl Port {
         Self::listen(SocketAddr::new(ip, 0))
     }
 
-    /// Where this socket can be reached.
+    /// Address of this socket.
     pub fn address(&self) -> io::Result<SocketAddr> {
         self.socket.local_addr()
     }
 
-    /// Sends a frame. That it cannot be sent just now counts as lost on the way.
+    /// Sends a frame. A frame that cannot be sent now counts as lost in the network.
     pub fn send(&self, frame: &Frame, to: SocketAddr) -> io::Result<()> {
         match self.socket.send_to(&frame.encode(), to) {
             Err(error) if !is_passing(&error) => Err(error),
@@ -54,7 +54,7 @@ impl Port {
         }
     }
 
-    /// Waits for a datagram until `deadline`; one that is already there is always returned.
+    /// Waits for a datagram until `deadline`. A datagram that has arrived is returned even after the deadline.
     pub fn receive(&self, deadline: Instant) -> io::Result<Option<Datagram>> {
         loop {
             let left = deadline.saturating_duration_since(Instant::now());
@@ -63,7 +63,7 @@ impl Port {
             if coarse.is_some() {
                 self.socket.set_read_timeout(coarse)?;
             }
-            // Longer than any frame, so that a datagram that is too long is not cut to the right length.
+            // Longer than a frame: a datagram that is too long must not be cut to the valid length.
             let mut bytes = [0; 256];
             match self.socket.recv_from(&mut bytes) {
                 Ok((size, from)) => return Ok(Some((Frame::decode(&bytes[..size]), from))),
@@ -76,7 +76,7 @@ impl Port {
     }
 }
 
-/// Nothing there, a full buffer, or the echo of a datagram that nobody took: UDP goes on after these.
+/// No datagram, a full buffer, or a report that an earlier datagram was not delivered: UDP continues after these.
 fn is_passing(error: &io::Error) -> bool {
     matches!(
         error.kind(),

@@ -1,27 +1,27 @@
-//! Real time: when each sample is due, and how late it was.
+//! The clock of a rig in real time, and the lateness of its samples.
 
 use std::fmt::{self, Display, Formatter};
 use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-/// Upper ends of the classes of lateness, in sample periods; the last class has none. A sample late by a whole period
-/// has missed its deadline: by then the next one was due.
+/// Upper limits of the classes of lateness, in sample periods; the last class has none. A sample that is late by a whole
+/// period has missed its deadline, because the next one is due then.
 pub const CLASSES: [f64; 6] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0];
 
-/// How punctual the samples were.
+/// Statistics of the lateness.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Punctuality {
-    /// Samples by lateness; the classes end at [`CLASSES`].
+    /// Number of samples per class; [`CLASSES`] has the upper limits.
     pub histogram: [u64; CLASSES.len() + 1],
-    /// Samples late by a whole period or more.
+    /// Number of samples that were late by a whole period or more.
     pub missed: u64,
-    /// Greatest lateness, s.
+    /// Largest lateness, s.
     pub worst: f64,
 }
 
 impl Punctuality {
-    /// Takes note of a sample that was late by `lateness` seconds, with a period of `period` seconds.
+    /// Counts a sample that was late by `lateness`, s, of a sample period, s.
     pub fn record(&mut self, lateness: f64, period: f64) {
         let share = lateness / period;
         let class = CLASSES.iter().take_while(|end| share >= **end).count();
@@ -49,16 +49,16 @@ impl Display for Punctuality {
     }
 }
 
-/// The clock of a paced rig.
+/// The clock of a rig in real time.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Pace {
+pub(super) struct RealTimeClock {
     start: Instant,
     /// s
     period: f64,
     pub punctuality: Punctuality,
 }
 
-impl Pace {
+impl RealTimeClock {
     /// A clock that starts now; `period` in s.
     pub fn start(period: f64) -> Self {
         Self {
@@ -68,12 +68,12 @@ impl Pace {
         }
     }
 
-    /// When sample `n` is due; counted from the start, so that no rounding adds up.
+    /// Time at which sample `n` is due. Computed from the start, so that rounding errors do not accumulate.
     pub fn due(&self, n: u64) -> Instant {
         self.start + Duration::from_secs_f64(n as f64 * self.period)
     }
 
-    /// Sample `n` is served now.
+    /// Counts sample `n`, which is served now.
     pub fn serve(&mut self, n: u64) {
         let lateness = self.due(n).elapsed().as_secs_f64();
         self.punctuality.record(lateness, self.period);
@@ -85,7 +85,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lateness_is_sorted_into_its_class_and_a_whole_period_is_a_miss() {
+    fn lateness_is_counted_in_its_class_and_a_whole_period_is_a_missed_deadline() {
         let mut all = Punctuality::default();
         for share in [0.0, 0.0625, 0.3, 0.999, 1.0, 5.0] {
             all.record(share * 0.25, 0.25);

@@ -1,44 +1,44 @@
-//! The server's end of a link: grants one session at a time, and sorts what comes in.
+//! The server of sessions: accepts one client at a time, and classifies incoming frames.
 
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use super::caller::same_time;
+use super::client::same_time;
 use super::counters::Counters;
 use super::error::LinkError;
 use super::frame::{Frame, FrameError, Kind, VERSION, flag};
-use super::order::{Arrival, Order};
-use super::port::Port;
+use super::frame_socket::FrameSocket;
 use super::refusal::Refusal;
+use super::sequence_window::{Arrival, SequenceWindow};
 
-/// Most datagrams that are looked at before what is due.
+/// Largest number of datagrams that are read after the deadline has passed.
 const BURST: u32 = 256;
 
-/// What a server offers.
+/// Properties of a server.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Offer {
-    /// A controller, not a rig.
+    /// Whether it is a controller; otherwise it is a rig.
     pub controller: bool,
-    /// The rig runs in real time.
+    /// Whether the rig runs in real time.
     pub paced: bool,
-    /// Time from sample to sample, s.
+    /// Sample time, s.
     pub sample_time: f64,
     /// Longest silence, s.
     pub silence: f64,
 }
 
-/// What has come in for the server.
+/// An event for the server.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Event {
-    /// A session has begun.
+    /// A session has started.
     Opened,
-    /// Its client asks for the last answer again.
+    /// The client asks for the last answer again.
     Again,
-    /// A frame of the session with its place in the order.
+    /// A frame of the session, and whether it is new.
     Frame(Frame, Arrival),
-    /// The client is done.
+    /// The client ends the session.
     Farewell,
-    /// Nothing, until the deadline.
+    /// The deadline has passed.
     Nothing,
 }
 
@@ -46,32 +46,32 @@ pub(super) enum Event {
 struct Session {
     peer: SocketAddr,
     id: u64,
-    order: Order,
+    window: SequenceWindow,
     heard: Instant,
-    /// The drive has been shut down: another client may take over.
+    /// Whether the drive has been shut down, so that another client may connect.
     over: bool,
 }
 
 /// A socket with at most one session.
 #[derive(Debug)]
-pub(super) struct Host {
-    port: Port,
+pub(super) struct ServerSession {
+    socket: FrameSocket,
     offer: Offer,
     session: Option<Session>,
-    /// Of the session; what comes between two counts for the next one.
+    /// Counters of the session. Frames between two sessions count for the next one.
     pub counters: Counters,
     /// The last answer.
     last: Option<Frame>,
-    /// Numbers beyond this make no sense: the client is ahead of its time.
+    /// Largest valid sequence number: that of the present sample.
     pub horizon: u64,
-    /// Datagrams since the deadline was last looked at.
+    /// Datagrams read since the deadline has passed.
     burst: u32,
 }
 
-impl Host {
+impl ServerSession {
     pub fn listen(address: SocketAddr, offer: Offer) -> Result<Self, LinkError> {
         Ok(Self {
-            port: Port::listen(address)?,
+            socket: FrameSocket::listen(address)?,
             offer,
             session: None,
             counters: Counters::default(),
@@ -81,26 +81,27 @@ impl Host {
         })
     }
 
-    /// Where clients reach this server.
+    /// Address of this server.
     pub fn address(&self) -> Result<SocketAddr, LinkError> {
-        Ok(self.port.address()?)
+        Ok(self.socket.address()?)
     }
 
-    /// The client, while there is one.
+    /// Address of the client, if there is one.
     pub fn peer(&self) -> Option<SocketAddr> {
         self.session.map(|session| session.peer)
     }
 
-    /// How long the client has been silent.
+    /// Time since the last frame of the client.
     pub fn silence(&self) -> Duration {
         self.session
             .map_or(Duration::ZERO, |session| session.heard.elapsed())
     }
 
-    /// Waits for the next event until `deadline`. What is already there goes first, but no flood holds up the clock.
+    /// Waits for the next event until `deadline`. Frames that have arrived come first, but a flood of them cannot stop the
+    /// clock.
     pub fn next(&mut self, deadline: Instant) -> Result<Event, LinkError> {
         while self.burst < BURST {
-            let Some((datagram, from)) = self.port.receive(deadline)? else {
+            let Some((datagram, from)) = self.socket.receive(deadline)? else {
                 break;
             };
             self.burst += u32::from(Instant::now() >= deadline);
@@ -112,7 +113,7 @@ impl Host {
         Ok(Event::Nothing)
     }
 
-    /// An answer with the number `sequence`, still without content.
+    /// An answer of sample `sequence` without content.
     pub fn answer(&self, kind: Kind, sequence: u64) -> Frame {
         Frame {
             sequence,
@@ -121,14 +122,14 @@ impl Host {
         }
     }
 
-    /// Sends an answer to the client, and keeps it for the case that it is asked for again.
+    /// Sends an answer to the client and keeps it for a repetition.
     pub fn send(&mut self, frame: Frame) -> Result<(), LinkError> {
         self.last = Some(frame);
         let Some(session) = self.session else {
             return Ok(());
         };
         self.counters.sent += 1;
-        Ok(self.port.send(&frame, session.peer)?)
+        Ok(self.socket.send(&frame, session.peer)?)
     }
 
     /// Sends the last answer again.
@@ -140,7 +141,7 @@ impl Host {
         self.send(frame)
     }
 
-    /// Lets another client take over, because the drive of this session has been shut down; returns what happened.
+    /// Allows another client to connect, because the drive of this session has been shut down. Returns the counters.
     pub fn release(&mut self) -> Counters {
         if let Some(session) = &mut self.session {
             session.over = true;
@@ -148,7 +149,7 @@ impl Host {
         std::mem::take(&mut self.counters)
     }
 
-    /// Ends the session, and returns what happened.
+    /// Ends the session. Returns the counters.
     pub fn close(&mut self) -> Counters {
         self.session = None;
         self.last = None;
@@ -178,7 +179,7 @@ impl Host {
             .as_mut()
             .filter(|session| (session.peer, session.id) == (from, frame.session));
         let Some(session) = own else {
-            // The farewell is said several times; the copies of the last client's are nobody's fault.
+            // Clients send several farewells; the copies that follow the end of the session are no error.
             let echo = frame.kind == Kind::Farewell && self.session.is_none();
             self.counters.foreign += u64::from(!echo);
             return Ok(None);
@@ -197,7 +198,7 @@ impl Host {
             self.counters.malformed += 1;
             return Ok(None);
         }
-        let arrival = session.order.arrive(frame.sequence);
+        let arrival = session.window.arrive(frame.sequence);
         match arrival {
             Arrival::New { missing } => self.counters.lost += missing,
             Arrival::Late => self.counters.late += 1,
@@ -233,7 +234,7 @@ impl Host {
         self.session = Some(Session {
             peer: from,
             id: frame.session,
-            order: Order::default(),
+            window: SequenceWindow::default(),
             heard: Instant::now(),
             over: false,
         });
@@ -255,7 +256,7 @@ impl Host {
         welcome.values[0] = sample_time;
         welcome.values[1] = silence;
         self.counters.sent += 1;
-        Ok(self.port.send(&welcome, to)?)
+        Ok(self.socket.send(&welcome, to)?)
     }
 
     fn refuse(
@@ -265,7 +266,7 @@ impl Host {
         to: SocketAddr,
     ) -> Result<Option<Event>, LinkError> {
         let refusal = reason.write(Frame::new(Kind::Refusal, session));
-        self.port.send(&refusal, to)?;
+        self.socket.send(&refusal, to)?;
         Ok(None)
     }
 }
