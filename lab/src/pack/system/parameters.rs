@@ -7,17 +7,14 @@ use phase_lock::{
     Value::{self, Boolean, Integer, Real},
 };
 
-use crate::{
-    pack::PackError,
-    rig::{configuration, start_values},
-    scene::Scene,
-};
+use crate::{pack::PackError, scene::Scene};
 
 type Named = (&'static str, Value);
 
 /// Parameters and start of the plant. The start goes by its parameters: some masters set no start value of an output.
 pub(super) fn plant(scene: &Scene) -> Vec<Named> {
-    start_values(scene)
+    scene
+        .start_values()
         .map(|(name, value)| {
             let parameter = match name {
                 "q1" => "q1_start",
@@ -33,12 +30,12 @@ pub(super) fn plant(scene: &Scene) -> Vec<Named> {
 
 /// The communication step: the controller's sample time, s.
 pub(super) fn step(scene: &Scene) -> f64 {
-    configuration(scene).sample_time
+    scene.sample_time()
 }
 
 /// Parameters of the controller, which is armed from the start.
 pub(super) fn controller(scene: &Scene) -> Result<Vec<Named>, PackError> {
-    let config = configuration(scene);
+    let config = scene.controller_config();
     config.build()?;
     let parameters = PARAMETERS.iter().filter(|parameter| parameter.is_in_fmu());
     Ok(parameters
