@@ -166,7 +166,8 @@ def growths(curves):
 
 GROWTH_NOTE = (
     "Steady 1:1 motion. Periods: a step each; impacts: all in one step; samples: over 100 periods. The exponent is that "
-    "of the upper half of the range, in logarithms; the last column goes a thousand times further by it."
+    "of the upper half of the range, in logarithms; the last column goes a thousand times further by it. Times "
+    "are medians of three rounds."
 )
 SAVINGS_NOTE = (
     "Measured, as ratios of run times. By its search: every contact by the general search, over the plant as it is. By "

@@ -11,17 +11,17 @@ use crate::scene::Scene;
 /// Periods that samples are followed for.
 const PERIODS: usize = 100;
 
-/// Least wall time, ns, of repetitions for about `budget` seconds; at least two.
-fn least(budget: f64, mut run: impl FnMut() -> u64) -> (f64, u64) {
+/// Median wall time, ns, of repetitions for about `budget` seconds, three at least; and the work of one.
+fn timed(budget: f64, mut run: impl FnMut() -> u64) -> (f64, u64) {
     let began = Instant::now();
-    let (mut best, mut times, mut work) = (f64::INFINITY, 0, 0);
-    while times < 2 || began.elapsed().as_secs_f64() < budget {
+    let (mut times, mut work) = (Vec::new(), 0);
+    while times.len() < 3 || began.elapsed().as_secs_f64() < budget {
         let start = Instant::now();
         work = std::hint::black_box(run());
-        best = best.min(start.elapsed().as_nanos() as f64);
-        times += 1;
+        times.push(start.elapsed().as_nanos() as f64);
     }
-    (best, work)
+    times.sort_by(f64::total_cmp);
+    (times[times.len() / 2], work)
 }
 
 /// The steady scene, from where a set of runs can begin.
@@ -71,9 +71,9 @@ pub fn measure(folder: &Path, what: &str, budget: f64, most: f64) -> Result<Valu
     while size <= most * 1.001 {
         let count = f64::round(size) as usize;
         let (ns, work) = match what {
-            "periods" => least(budget, || scene.step_by_step(count, scene.period)),
-            "impacts" => least(budget, || scene.in_one_step(size)),
-            "samples per period" => least(budget, || {
+            "periods" => timed(budget, || scene.step_by_step(count, scene.period)),
+            "impacts" => timed(budget, || scene.in_one_step(size)),
+            "samples per period" => timed(budget, || {
                 scene.step_by_step(PERIODS * count, scene.period / count as f64)
             }),
             _ => {
