@@ -1,6 +1,7 @@
 //! The program as its users meet it: output, exit codes and messages.
 
 use std::process::{Command, Output};
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
@@ -51,6 +52,31 @@ fn theory_comes_as_json_with_as_many_samples_as_asked_for() {
     assert_eq!(theory["backbone"].as_array().map(Vec::len), Some(50));
     assert_eq!(theory["solutions"].as_array().map(Vec::len), Some(2));
     assert!(theory["manifold"]["C_min"].as_f64().unwrap() > 0.1);
+}
+
+/// Values that are finite numbers, and with which the plant cannot compute.
+#[test]
+fn extreme_values_of_plant_and_drive_are_refused_at_once() {
+    let commands: [&[&str]; 3] = [&["map"], &["backbone"], &["identify", "--rig", "built-in"]];
+    for (value, name) in [
+        ("plant.c=1e300", "c (damping) = "),
+        ("plant.M=1e-300", "M (primary mass) = "),
+        ("plant.k=1e100", "rad/s is refused"),
+        (
+            "excitation.E=1e300",
+            "E (amplitude of the base oscillator) = ",
+        ),
+    ] {
+        for command in commands {
+            let began = Instant::now();
+            fails(&[command, &["--set", value]].concat(), 2, name);
+            let passed = began.elapsed();
+            assert!(passed < Duration::from_secs(10), "{command:?}: {passed:?}");
+        }
+    }
+    for axes in [["--x", "sigma=0:1e300:3"], ["--y", "G=0.1:1e300:3"]] {
+        fails(&[&["map"][..], &axes].concat(), 2, "is refused");
+    }
 }
 
 #[test]

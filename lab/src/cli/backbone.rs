@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     bar.finish_and_clear();
     // A rig across the network is told that this is all.
     drop(rig);
-    let found = TrackedComparison::of(&tracked.map_err(Failure::run)?, &scene);
+    let found = TrackedComparison::of(&tracked?, &scene);
     let files = report::write_tracked(&found, &arguments.out).map_err(Failure::run)?;
     if arguments.json {
         return json(&found);

@@ -89,7 +89,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     bar.finish_and_clear();
     // A rig across the network is told that this is all, before it has to wonder.
     drop((rig, controller));
-    let record = record.map_err(Failure::run)?;
+    let record = record?;
     let found = identification::identify(&record, &scene).map_err(Failure::run)?;
     let found = Comparison::of(&found, &scene);
     let mut files = report::write(&found, &arguments.out).map_err(Failure::run)?;

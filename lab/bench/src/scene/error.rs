@@ -51,6 +51,9 @@ pub enum SceneError {
     /// A plant or a start that makes no sense.
     #[error("[plant] or [start]: {0}")]
     Plant(#[from] InvalidValue),
+    /// A drive that the plant does not take.
+    #[error("[excitation] or [controller]: {0}")]
+    Drive(InvalidValue),
     /// Keys that are missing or do not go together.
     #[error("{origin}: {message}")]
     Keys {

@@ -71,6 +71,10 @@ impl Sections {
         scene.record.check(&scene.controller)?;
         scene.backbone.check(&scene.controller)?;
         scene.chain.check(&scene.controller)?;
+        let fastest = scene.controller.omega_max * scene.dimensionless().omega0;
+        lovines::Drive::harmonic(scene.amplitude, fastest)
+            .validate()
+            .map_err(SceneError::Drive)?;
         Ok(scene)
     }
 }
