@@ -22,9 +22,6 @@ LIBRARIES=(-p lovines -p phase-lock-fmu --features lovines/fmu)
 # The compiler of Debian and the sources of its standard library, unpacked and not installed.
 RUST_WEB=.toolchains/rust-web
 
-# target_folder: where cargo puts what is built here.
-target_folder() { printf '%s' "${CARGO_TARGET_DIR:-target}"; }
-
 # platform_list NAMES: the comma-separated names, checked, one on a line.
 platform_list() {
     local name names seen=,

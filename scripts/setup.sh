@@ -1,4 +1,4 @@
-# Sourced by the other scripts: goes to the project's root, sets up what is missing, tells the build where it is.
+# Sourced by the other scripts: changes to the project's root and provides functions that set up tools and build.
 # Needs cargo, a C compiler and Python 3.11 or newer; no root.
 set -euo pipefail
 called_from=$PWD
@@ -10,19 +10,42 @@ fail() { say "error: $*"; exit 1; }
 command -v cargo >/dev/null || fail "cargo was not found; install Rust with rustup (https://rustup.rs)"
 command -v cc >/dev/null || fail "no C compiler (cc) was found; install gcc"
 
-# environment FOLDER REQUIREMENTS [options of pip]: a Python environment with what the file pins, made anew when the file
-# changes. Fails where the packages cannot be installed; pip's words are in FOLDER.log then.
+target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
+
+# The libraries in the FMUs must not contain paths of this machine, which panic messages would bring in. (Cargo's
+# trim-paths is not stable.) All builds need the same flags: cargo compiles everything again for others.
+for folder in "${CARGO_HOME:-$HOME/.cargo}=/cargo" "$PWD=/vines"; do
+    case $folder in
+        *" "*) say "warning: libraries will contain the path ${folder%=*}, because it has a space" ;;
+        *) export RUSTFLAGS="${RUSTFLAGS:+$RUSTFLAGS }--remap-path-prefix=$folder" ;;
+    esac
+done
+
+# stage TEXT: announces a stage of a script.
+stage() { say "== $*"; }
+
+# progress SUBCOMMAND [ARGUMENT ...]: runs cargo, with its progress bar in a terminal and silently elsewhere.
+progress() {
+    if [ -t 2 ]; then
+        cargo "$@"
+    else
+        cargo "$1" --quiet "${@:2}"
+    fi
+}
+
+# environment FOLDER REQUIREMENTS [options of pip]: a Python environment with the packages of a requirements file. It is
+# created again when the file changes. If the packages cannot be installed, it returns 1 and leaves pip's output in FOLDER.log.
 environment() {
     local folder=$1 requirements=$2
     cmp -s "$requirements" "$folder/requirements.txt" && return
     command -v python3 >/dev/null || fail "python3 was not found; Python 3.11 or newer is needed"
     python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
         fail "python3 is $(python3 --version); 3.11 or newer is needed"
-    say "Setting up Python packages in $folder ..."
+    stage "Python packages in $folder"
     rm -rf "$folder"
     mkdir -p "$(dirname "$folder")"
     python3 -m venv "$folder" >/dev/null 2>&1 || { rm -rf "$folder"; python3 -m virtualenv -q "$folder" >/dev/null 2>&1; } ||
-        fail "python3 cannot make a virtual environment; install python3-venv (Debian's name for it) or virtualenv"
+        fail "python3 cannot create a virtual environment; install python3-venv (name of the Debian package) or virtualenv"
     if ! "$folder/bin/python" -m pip install --quiet --disable-pip-version-check "${@:3}" -r "$requirements" >"$folder.log" 2>&1
     then
         rm -rf "$folder"
@@ -32,17 +55,17 @@ environment() {
     cp "$requirements" "$folder/requirements.txt"
 }
 
-# The project's own environment.
+# The environment of the project's own Python code.
 python_environment() {
     environment .venv scripts/requirements.txt || { cat .venv.log >&2; fail "the packages in scripts/requirements.txt could not be installed"; }
 }
 
-# `cargo zigbuild` and the zig it links with, for libraries that load on older Linux.
+# `cargo zigbuild` and the zig linker, for libraries that load on older Linux.
 portable_environment() {
     environment .venv-portable scripts/requirements-portable.txt && export PATH="$PWD/.venv-portable/bin:$PATH"
 }
 
-# An environment for each client of the FMUs in tests/clients; one that cannot be had is skipped by its test.
+# One environment per client of the FMUs in tests/clients. The test of a client without an environment is skipped.
 client_environments() {
     local file name
     for file in tests/clients/requirements/*.txt; do
@@ -51,19 +74,9 @@ client_environments() {
     done
 }
 
-# The fmi crate generates its C bindings with libclang: the system's where LIBCLANG_PATH says so, else the one from PyPI,
-# which lacks the compiler's own headers.
-libclang() {
-    [ -n "${LIBCLANG_PATH:-}" ] && return
-    environment .venv-build scripts/requirements-build.txt || { cat .venv-build.log >&2; fail "libclang could not be installed"; }
-    LIBCLANG_PATH=$(.venv-build/bin/python -c 'import clang, pathlib; print(pathlib.Path(clang.__file__).parent / "native")')
-    export LIBCLANG_PATH
-    export BINDGEN_EXTRA_CLANG_ARGS="-I$(cc -print-file-name=include) ${BINDGEN_EXTRA_CLANG_ARGS:-}"
-}
-
-# The program and the two libraries; cargo shows its progress only where somebody can watch it.
+# The program `vines` and the libraries of the two FMUs. One call for all: cargo would build the plant again for another
+# selection of packages, because the features differ.
 build() {
-    local quiet=--quiet
-    [ -t 2 ] && quiet=
-    cargo build --release --locked $quiet --features lovines/fmu
+    stage "Building vines and the FMUs (the first time: some minutes)"
+    progress build --release --locked -p vines -p lovines -p phase-lock-fmu --features lovines/fmu
 }

@@ -1,7 +1,10 @@
 //! What holds for every rig, start and excitation.
 
+#[path = "common/balance.rs"]
+mod balance;
 mod common;
 
+use balance::walk;
 use common::scene;
 use lovines::{Drive, Event, Parameters, Plant, State, Wall};
 use proptest::prelude::*;
@@ -22,6 +25,15 @@ proptest! {
             prop_assert!([state.q1, state.dq1, state.q2, state.dq2].iter().all(|x| x.is_finite()));
             prop_assert!(plant.relative_displacement().abs() <= 1.0);
         }
+    }
+
+    #[test]
+    fn inside_steps_the_particle_stays_in_its_cavity_and_damper_and_base_account_for_the_energy(
+        s in any::<bool>().prop_flat_map(scene),
+    ) {
+        let found = walk(&s, 200);
+        prop_assert!(found.outside <= 1e-12, "outside by {:e} half-widths", found.outside);
+        prop_assert!(found.imbalance <= 1e-12, "the energy balance misses {:e}", found.imbalance);
     }
 
     #[test]

@@ -15,6 +15,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import report
+import run_time_map
 from judge import judge
 from scenes import LOOP_PERIODS, fingerprint, load
 from worker import Missing, Worker
@@ -30,15 +31,13 @@ METHODS = [
     ("plant, one step in all", "rust", "plant-one-step", (0,), (0,)),
     ("plant, 100 times the steps", "rust", "plant-100", (0,), ()),
     ("plant, general search only", "rust", "plant-general", (0,), (0,)),
-    ("plant, batch", "rust", "batch", (0,), (0,)),
-    ("plant, batch on all cores", "rust", "batch-all-cores", (0,), (0,)),
-    ("plant, batch, one step in all", "rust", "batch-one-step", (0,), (0,)),
     ("plant, C interface", "rust", "c-interface", (0,), (0,)),
     ("plant, FMPy", "python", "fmpy", (0,), (0,)),
     ("closed form + Brent", "rust", "brent", TOLERANCES, (1e-9, 1e-12)),
     ("heyoka", "python", "heyoka", (1e-9, 1e-12, 1e-15), (1e-9, 1e-15)),
     ("diffsol, Tsit45", "rust", "diffsol-tsit45", TOLERANCES, (1e-6, 1e-9)),
     ("diffsol, BDF", "rust", "diffsol-bdf", COARSE, ()),
+    ("CVODE in C", "c", "cvode-c", TOLERANCES, (1e-9, 1e-12)),
     ("CVODE, Adams", "python", "cvode", TOLERANCES, (1e-9,)),
     ("scipy DOP853", "python", "scipy-dop853", TOLERANCES, (1e-9,)),
     ("scipy LSODA", "python", "scipy-lsoda", TOLERANCES, (1e-9,)),
@@ -46,16 +45,52 @@ METHODS = [
     ("RK4 + bisection", "rust", "rk4", STEPS, (100, 1000)),
     ("Moreau time-stepping", "rust", "moreau", STEPS, (100, 1000)),
 ]
-QUICK = ("steady", "grazing", "chatter", "loop")
+ROUNDS = 5
+QUICK = ("steady", "centre", "grazing", "chatter", "loop")
 # Scenes whose truth takes longer to work out than a run of this program should: a quick run takes all from the file.
 KEPT_TRUTH = ("long",)
 GROWTH = {
     "periods": (1e6, 1e4),
     "impacts": (1e7, 1e5),
     "samples per period": (1e4, 1e3),
-    "plants in a batch, one core": (1e5, 1e4),
-    "plants in a batch, all cores": (1e5, 1e4),
 }
+
+
+class Load:
+    """Processor time that other programs take while this one measures."""
+
+    def __init__(self, workers):
+        self.workers = workers
+        self.began, self.all_began, self.own_began = time.monotonic(), self.all(), self.own()
+
+    @staticmethod
+    def all():
+        """Busy seconds of all cores since the machine started; none where the system does not say."""
+        try:
+            user, nice, system, _, _, irq, softirq, steal = map(int, Path("/proc/stat").read_text().split()[1:9])
+        except (OSError, ValueError):
+            return None
+        return (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
+
+    def own(self):
+        """Processor seconds of this program and its workers, the ended ones included."""
+        parts = os.times()
+        total = parts.user + parts.system + parts.children_user + parts.children_system
+        for worker in self.workers:
+            total += worker.processor_seconds()
+        return total
+
+    def others(self):
+        """Cores that other programs kept busy on average; none where the system does not say."""
+        if self.all_began is None:
+            return None
+        busy = self.all() - self.all_began - (self.own() - self.own_began)
+        return max(0.0, busy / (time.monotonic() - self.began))
+
+
+def middle_point(points):
+    """Of points (size, ns, work) of the same size, that with the median of the times."""
+    return [points[0][0], statistics.median(point[1] for point in points), points[0][2]]
 
 
 @dataclass
@@ -67,8 +102,7 @@ class Row:
     side: str
     name: str
     setting: float
-    times: list = field(default_factory=list)
-    rounds: int = 0
+    times: list = field(default_factory=list)  # A median per round.
     error: float | None = None
     impacts: int = 0
     failure: str | None = None
@@ -85,11 +119,9 @@ class Row:
         low, _, high = statistics.quantiles(self.times, n=4, method="inclusive")
         return 0.5 * (high - low) / self.median
 
-    def enough(self):
-        """Whether it is left out of a round: what came to no end would not again; three are enough of a slow one."""
-        if not self.times:
-            return self.rounds > 0
-        return self.rounds >= (3 if self.median > 0.5e9 else 5 if self.median > 0.05e9 else 12)
+    def given_up(self):
+        """Whether it failed in the first round: it is not tried again."""
+        return self.failure is not None and not self.times
 
 
 class Bench:
@@ -103,7 +135,7 @@ class Bench:
         self.budget = 0.03 if options.quick else 0.1
         self.workers, self.missing, self.versions, self.unasked = {}, {}, [], []
         self.rows, self.truth_notes = [], []
-        self.load = os.getloadavg()[0]
+        self.rounds, self.busy = 0, 0.0
         self.told = time.monotonic()
 
     def say(self, text):
@@ -148,11 +180,11 @@ class Bench:
                 continue
             if side == "rust":
                 if name not in known:
-                    self.missing[method] = "not built: diffsol could not be had"
+                    self.missing[method] = "not in this build"
                     continue
                 self.workers[name] = rust
             else:
-                command = [sys.executable, HERE / "python/peers.py", name, HERE / "scenes.json", self.options.fmu]
+                command = self.peer_command(side, name)
                 try:
                     self.workers[name] = Worker(command, greets=True)
                 except Missing as why:
@@ -163,6 +195,16 @@ class Bench:
         for method, why in self.missing.items():
             self.say(f"warning: {method} is left out: {why}")
         self.rehearse()
+
+    def peer_command(self, side, name):
+        if side == "c":
+            return [
+                sys.executable,
+                HERE / "python/cvode_c.py",
+                HERE / "scenes.json",
+                HERE.parent / "out/bench/programs",
+            ]
+        return [sys.executable, HERE / "python/peers.py", name, HERE / "scenes.json", self.options.fmu]
 
     def rehearse(self):
         """Loads and compiles what will be needed: that is not in the times."""
@@ -175,7 +217,6 @@ class Bench:
     def run(self, row):
         scene = self.scenes[row.scene]
         checks = scene["checks"]
-        row.rounds += 1
         if row.name.endswith("one-step"):
             if row.scene == "loop":
                 row.failure = "not asked: the drive changes with every sample"
@@ -194,29 +235,35 @@ class Bench:
         elif not ended:
             row.failure = answer.get("error") or answer["failure"]
         else:
-            row.times += answer["ns"]
+            row.times.append(statistics.median(answer["ns"]))
             if row.error is None:
                 row.impacts = answer["impacts"]
                 row.error, row.failure = judge(row.name, scene, self.truth[row.scene], answer, checks)
 
     def measure(self):
-        """Round after round, in an order drawn anew each time."""
+        """Round after round, in an order drawn anew each time. Every row that comes to an end is in every round."""
         began = time.monotonic()
-        total = self.options.seconds or (45 if self.options.quick else 1200)
+        total = self.options.seconds or (45 if self.options.quick else 1250)
+        last = 0.0
         dice = random.Random(1)
-        for turn in range(1, 13):
-            order = [row for row in self.rows if not row.enough()]
+        load = Load(set(self.workers.values()))
+        for turn in range(1, ROUNDS + 1):
+            gone = time.monotonic() - began
+            if turn > 3 and gone + last > total:
+                break  # The next round would end too late.
+            start_of_round = gone
+            order = [row for row in self.rows if not row.given_up()]
             dice.shuffle(order)
             for n, row in enumerate(order, 1):
                 gone = time.monotonic() - began
-                if turn > 3 and gone > total:
-                    break
                 self.progress(
                     f"round {turn}: {n} of {len(order)}, {gone:.0f} s, {row.scene}: {row.method} {row.setting:g}"
                 )
                 self.run(row)
+            self.rounds, last = turn, time.monotonic() - began - start_of_round
+        self.busy = load.others()
         self.progress("")
-        self.say(f"Measured for {time.monotonic() - began:.0f} s")
+        self.say(f"Measured for {time.monotonic() - began:.0f} s, {self.rounds} rounds")
 
     def growth(self):
         """What grows: points of size, ns, units of work; and ns per sample of plant and controller."""
@@ -226,14 +273,36 @@ class Bench:
                 self.progress(f"growth, round {turn}: {what}")
                 request = {"growth": what, "budget": 0.02, "most": quick if self.options.quick else most}
                 answer = self.rust.ask(request, 200) or {}
-                old, new = curves[what], answer.get("points", [])
-                curves[what] = [min(pair, key=lambda point: point[1]) for pair in zip(old, new, strict=False)] or new
+                curves[what].append(answer.get("points", []))
+        middle = {what: [middle_point(same) for same in zip(*turns, strict=False)] for what, turns in curves.items()}
         loop = self.rust.ask({"closed_loop": LOOP_PERIODS, "budget": 0.2 if self.options.quick else 2.0}, 60)
-        return curves, loop["ns"]
+        return middle, loop["ns"]
+
+    def map_points(self):
+        return run_time_map.QUICK_POINTS if self.options.quick else run_time_map.POINTS
 
     def profiles(self):
         """What each scene asks of the plant, counted."""
         return {scene: self.rust.ask({"profile": scene}, 60) for scene in dict.fromkeys(row.scene for row in self.rows)}
+
+
+def only_map(options):
+    """The map of run time without the rest."""
+    worker = Worker([options.worker, HERE], greets=False)
+    load = Load({worker})
+    points = run_time_map.QUICK_POINTS if options.quick else run_time_map.POINTS
+    watched = sys.stderr.isatty()
+    progress = (
+        (lambda text: print(f"\r{text} ", end="", file=sys.stderr, flush=True)) if watched else lambda _text: None
+    )
+    rows, lock = run_time_map.measure(worker, points, progress)
+    busy = load.others()
+    worker.end()
+    options.out.mkdir(parents=True, exist_ok=True)
+    run_time_map.write(rows, lock, options.out)
+    print(f"\r{run_time_map.as_text(rows, lock)}" if watched else run_time_map.as_text(rows, lock))
+    print(report.idle(busy))
+    print(f"Written: {options.out}/run-time-map.csv and .svg", file=sys.stderr)
 
 
 def main():
@@ -246,15 +315,18 @@ def main():
     parser.add_argument(
         "--quick",
         action="store_true",
-        help=f"four scenes ({', '.join(QUICK)}), one or two settings of a method; under two minutes",
+        help=f"five scenes ({', '.join(QUICK)}), one or two settings of a method; under two minutes",
     )
     parser.add_argument(
-        "--keep", action="store_true", help="renew docs/performance.*, docs/work-precision.svg and the README's ratios"
+        "--keep",
+        action="store_true",
+        help="renew docs/performance.*, docs/work-precision.svg, docs/run-time-map.* and the ratios in docs/plant.md",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("out/bench"), help="folder for tables and picture (default %(default)s)"
     )
-    parser.add_argument("--seconds", type=float, help="about how long to measure; every row gets three rounds")
+    parser.add_argument("--seconds", type=float, help="about how long to measure; there are three rounds at least")
+    parser.add_argument("--map", action="store_true", help="only the map of run time: figure, CSV and table per regime")
     parser.add_argument("--worker", help=argparse.SUPPRESS)
     parser.add_argument("--fmu", help=argparse.SUPPRESS)
     options = parser.parse_args()
@@ -262,6 +334,9 @@ def main():
         parser.error("--keep is for a full run: it renews what docs/ says of all scenes")
     if options.keep:
         options.out = HERE.parent / "docs"
+    if options.map:
+        only_map(options)
+        return
     began = time.monotonic()
     bench = Bench(options)
     bench.check_truth()
@@ -269,19 +344,21 @@ def main():
     bench.measure()
     growth, loop = bench.growth()
     profiles = bench.profiles()
+    rows, lock = run_time_map.measure(bench.rust, bench.map_points(), bench.progress)
     for worker in set(bench.workers.values()):
         worker.end()
     import picture  # Here, so that --help needs nothing installed.
 
     options.out.mkdir(parents=True, exist_ok=True)
-    text = report.write(bench, growth, loop, profiles, options.out)
+    run_time_map.write(rows, lock, options.out)
+    text = report.write(bench, growth, loop, profiles, (rows, lock), options.out)
     picture.write(bench, options.out / "work-precision.svg")
     if options.keep:
-        report.renew(HERE.parent / "README.md", bench)
+        report.renew(HERE.parent / "docs/plant.md", bench)
     print(text)
     bench.say(
-        f"Written: {options.out}/performance.txt, .csv, .md and work-precision.svg"
-        f"{', and the README' if options.keep else ''}, after {time.monotonic() - began:.0f} s"
+        f"Written: {options.out}/performance.txt, .csv, .md, work-precision.svg, run-time-map.csv and .svg"
+        f"{', and docs/plant.md' if options.keep else ''}, after {time.monotonic() - began:.0f} s"
     )
 
 

@@ -10,13 +10,13 @@ from matplotlib.lines import Line2D
 # Told apart without colour, too: by dash and marker. This project is black; a family of methods has one colour.
 STYLES = {
     "plant, Rust": ("#000000", "-", "o"),
-    "plant, batch": ("#000000", "-", "*"),
     "plant, C interface": ("#000000", "-", "s"),
     "plant, FMPy": ("#000000", "-", "D"),
     "closed form + Brent": ("#0072b2", "-", "^"),
     "heyoka": ("#d1006c", "-", "v"),
     "diffsol, Tsit45": ("#009e73", "--", "<"),
     "diffsol, BDF": ("#009e73", ":", ">"),
+    "CVODE in C": ("#7b3fb5", "-", "H"),
     "CVODE, Adams": ("#7b3fb5", "--", "h"),
     "scipy DOP853": ("#e66100", "--", "P"),
     "scipy LSODA": ("#e66100", ":", "X"),
@@ -26,6 +26,10 @@ STYLES = {
 }
 TITLES = {
     "steady": "Steady 1:1, 1000 periods",
+    "centre": "1:1 at the linear resonance",
+    "asymmetric": "Asymmetric 1:1",
+    "three": "Three impacts per period",
+    "chaotic": "Chaotic, 30 periods",
     "decay": "Transient decay",
     "grazing": "Grazing contact",
     "chatter": "Chatter to sticking",
@@ -49,9 +53,9 @@ def panel(ax, bench, scene):
     for method, (colour, dash, marker) in STYLES.items():
         rows = [row for row in bench.rows if row.scene == scene and row.method == method]
         own = method.startswith("plant")
-        size = {"*": 9, "o": 6, "s": 5.5}.get(marker, 5)
+        size = {"o": 6, "s": 5.5}.get(marker, 5)
         style = {"color": colour, "marker": marker, "markersize": size, "linewidth": 1.1, "zorder": 4 if own else 3}
-        points = [(min(row.times) / impacts, max(row.error, LEAST), row.failure) for row in rows if row.times]
+        points = [(row.median / impacts, max(row.error, LEAST), row.failure) for row in rows if row.times]
         good = [(x, y) for x, y, failure in points if failure is None]
         bad = [(x, min(y, 10.0)) for x, y, failure in points if failure]
         slow = [time_at_the_limit(row.failure, bench.limit, impacts) for row in rows if not row.times]

@@ -42,10 +42,6 @@ def per_impact(row, bench):
     return row.median / max(1, bench.truth[row.scene]["impacts"])
 
 
-def least_per_impact(row, bench):
-    return min(row.times) / max(1, bench.truth[row.scene]["impacts"])
-
-
 def cells(row, bench):
     """What a row shows, in the order of HEAD."""
     setting = {0: NONE}.get(row.setting, f"{row.setting:g}" if row.setting >= 1 else f"{row.setting:.0e}")
@@ -53,10 +49,10 @@ def cells(row, bench):
     if not row.times:
         rough = time_at_the_limit(row.failure, bench.limit, bench.truth[row.scene]["impacts"])
         pace = "~" + number(rough, 2) if rough else NONE
-        times = "~" + number(rough / least_per_impact(plant, bench), 2) if rough and plant else NONE
+        times = "~" + number(rough / per_impact(plant, bench), 2) if rough and plant else NONE
         how = re.sub(r"[\d.]+(?= %)", lambda done: f"{float(done[0]):.2g}", row.failure or "not run")
-        return [row.method, setting, pace, NONE, NONE, NONE, NONE, times, how]
-    compared = number(min(row.times) / min(plant.times)) if plant else NONE
+        return [row.method, setting, pace, NONE, NONE, NONE, times, how]
+    compared = number(row.median / plant.median) if plant else NONE
     spread = NONE if row.spread is None else f"±{100 * row.spread:.0f} %"
     verdict = row.failure or "ok"
     return [
@@ -64,7 +60,6 @@ def cells(row, bench):
         setting,
         number(per_impact(row, bench)),
         spread,
-        number(least_per_impact(row, bench)),
         str(len(row.times)),
         f"{row.error:.0e}",
         compared,
@@ -72,7 +67,7 @@ def cells(row, bench):
     ]
 
 
-HEAD = ["method", "setting", "ns/impact", "spread", "least", "runs", "error", "time/plant", "verdict"]
+HEAD = ["method", "setting", "ns/impact", "spread", "rounds", "error", "time/plant", "verdict"]
 
 
 def text_table(head, rows):
@@ -97,15 +92,14 @@ def savings(bench, profiles):
     """Per scene: what the plant skipped, counted and timed."""
     rows = []
     for scene in dict.fromkeys(row.scene for row in bench.rows):
-        times = {row.name: min(row.times) for row in bench.rows if row.scene == scene and row.times}
+        times = {row.name: row.median for row in bench.rows if row.scene == scene and row.times}
 
         def over(slow, quick, times=times):
             return times[slow] / times[quick] if {slow, quick} <= times.keys() else None
 
         general, once = over("plant-general", "plant"), over("plant", "plant-one-step")
-        abreast = ratio(over("plant", "batch")) + "; " + ratio(over("plant-one-step", "batch-one-step"))
-        rows.append([scene, ratio(general), ratio(once), abreast, skipped(profiles[scene], general)])
-    head = ["scene", "by its search", "by not stopping", "by going abreast", "what the plant skips"]
+        rows.append([scene, ratio(general), ratio(once), skipped(profiles[scene], general)])
+    head = ["scene", "by its search", "by not stopping", "what the plant skips"]
     return head, rows
 
 
@@ -171,20 +165,51 @@ def growths(curves):
 
 
 GROWTH_NOTE = (
-    "Steady 1:1 motion. Periods: a step each; impacts: all in one step; samples: over 100 periods; batches: plants of "
-    "which no two are equal, 100 periods in one step. The exponent is that of the upper half of the range, in "
-    "logarithms; the last column goes a thousand times further by it."
+    "Steady 1:1 motion. Periods: a step each; impacts: all in one step; samples: over 100 periods. The exponent is that "
+    "of the upper half of the range, in logarithms; the last column goes a thousand times further by it. Times "
+    "are medians of three rounds."
 )
 SAVINGS_NOTE = (
     "Measured, as ratios of run times. By its search: every contact by the general search, over the plant as it is. By "
-    "not stopping: the plant as asked, over everything in one step. By going abreast: the plant alone, over one of a "
-    "batch on one core, a step at a time; and the same with everything in one step."
+    "not stopping: the plant as asked, over everything in one step."
 )
+
+
+SAMPLE_NOTE = (
+    "Wall time over the number of samples in the loop scene, where the drive changes at every sample. Each method is "
+    "at its most accurate setting that came to an end. The C interface sets two values and reads four at each sample."
+)
+
+
+def samples(bench):
+    """Cost of a sample in the loop scene, method by method."""
+    best = {}
+    for row in bench.rows:
+        if row.scene == "loop" and row.times and not row.failure:
+            known = best.get(row.method)
+            if known is None or row.error < known.error:
+                best[row.method] = row
+    plant = best.get("plant, Rust")
+    count = bench.scenes["loop"]["steps"]
+    table = []
+    for method, row in best.items():
+        compared = number(row.median / plant.median) if plant else NONE
+        table.append([method, number(row.median / count), compared, f"{row.error:.0e}"])
+    return ["method", "ns per sample", "time/plant", "error"], table
+
+
+def idle(busy):
+    """Whether the machine was idle while it measured, in words."""
+    if busy is None:
+        return "What other programs did meanwhile is not known on this system."
+    if busy < 0.1:
+        return f"The machine was otherwise idle (other programs: {busy:.2f} cores on average)."
+    return f"The machine was not idle: other programs kept {busy:.1f} cores busy on average."
 
 
 def notes(bench):
     yield f"{date.today().isoformat()}, {machine()}; " + ("quick run" if bench.options.quick else "full run") + "."
-    yield f"Other programs kept {bench.load:.1f} cores busy when it began; least times are what to compare."
+    yield f"{bench.rounds} rounds. {idle(bench.busy)}"
     yield "Peers: " + ", ".join(dict.fromkeys(bench.versions)) + "; diffsol and roots as Cargo.lock has them."
     if bench.missing:
         yield "Left out: " + "; ".join(f"{method} ({why})" for method, why in bench.missing.items()) + "."
@@ -193,14 +218,15 @@ def notes(bench):
     yield "Truth, checked in this run: " + "; ".join(bench.truth_notes) + "."
     yield (
         "Every method is asked for the state after each step of the scene, and stops there as a co-simulation master "
-        "has it. It runs on one thread, but for the batch on all cores. A batch is of equal plants; its times are of "
-        "one of them. Just-in-time compilation (heyoka) and setting up are not in the times. Runs take turns in an "
+        "has it, on one thread. CVODE in C restarts at impacts and where the drive changes, and interpolates in between. "
+        "Just-in-time compilation (heyoka) and setting up are not in the times. Runs take turns in an "
         "order drawn anew each round. In the loop, all methods get the drive recorded from controller and plant."
     )
     yield (
-        "ns/impact: median of the wall time of a run over the true number of impacts; spread: half the distance of the "
-        "quartiles; least: the quickest run, which other programs on the machine disturb least, and which time/plant "
-        "compares. Error: the largest difference of any displacement or velocity from 40-digit arithmetic, over up to "
+        "ns/impact: wall time of a run over the true number of impacts. A round repeats a run for about a tenth of a "
+        "second and keeps the median; the table has the median of the rounds, of which all methods have equal numbers; "
+        "spread: half the distance of their quartiles; time/plant: ratio of the medians. "
+        "Error: the largest difference of any displacement or velocity from 40-digit arithmetic, over up to "
         "50 instants (half-width of the cavity 1, natural frequency 1). The verdict says how a method failed: an error "
         "above 0.1 is a lost trajectory, a particle more than 0.01 beyond its wall (Moreau's scheme: 0.1) at one of "
         "these instants has tunnelled; a gap width is twice the half-width."
@@ -215,16 +241,21 @@ def notes(bench):
 SHOWN = {
     "plant": "plant: error",
     "brent": "closed form + Brent",
+    "cvode-c": "CVODE in C",
     "heyoka": "heyoka",
     "diffsol-tsit45": "diffsol",
-    "cvode": "CVODE",
-    "scipy-dop853": "scipy DOP853",
+    "cvode": "CVODE, Python",
+    "scipy-dop853": "scipy DOP853, Python",
     "rk4": "RK4",
     "moreau": "Moreau",
 }
+CALLBACKS = (
+    "Python in a column's title: the solver calls Python functions for the right-hand side and the gaps to the walls. "
+    "heyoka compiles the right-hand side and calls Python at impacts. All others are compiled throughout, in Rust or C."
+)
 MATRIX_NOTE = (
     "Run time over the plant's (Rust interface, a step at a time), and error, of each method at its most accurate "
-    "setting that came to an end; or how it failed at all of them."
+    f"setting that came to an end; or how it failed at all of them. {CALLBACKS}"
 )
 
 
@@ -237,7 +268,7 @@ def glance(bench, scene, name):
         best = min(good, key=lambda row: row.error)
         if name == "plant":
             return f"{best.error:.0e}"
-        return f"{ratio(min(best.times) / min(plant.times))}; {best.error:.0e}"
+        return f"{ratio(best.median / plant.median)}; {best.error:.0e}"
     return ", ".join(dict.fromkeys(short(row.failure) for row in rows if row.failure)) or NONE
 
 
@@ -251,7 +282,7 @@ BEGIN, END = "<!-- ratios: scripts/bench --keep writes what is between these mar
 
 
 def renew(readme, bench):
-    """Puts the table at a glance into the README, between its marks."""
+    """Writes the short table into a page, between the marks."""
     text = readme.read_text()
     before, rest = text.split(BEGIN)
     after = rest.split(END)[1]
@@ -266,8 +297,10 @@ def replace(file, text):
     part.replace(file)
 
 
-def write(bench, growth, loop, profiles, folder):
+def write(bench, growth, loop, profiles, run_times, folder):
     """Writes performance.txt, .csv and .md; returns the text."""
+    from run_time_map import as_markdown, as_text
+
     scenes = list(dict.fromkeys(row.scene for row in bench.rows))
     text, mark = ["Run time against error", ""], ["# Run time against error", ""]
     for note in notes(bench):
@@ -281,6 +314,8 @@ def write(bench, growth, loop, profiles, folder):
     head, rows = matrix(bench)
     mark += ["## At a glance", "", MATRIX_NOTE, "", markdown_table(head, rows), ""]
     text += ["At a glance", MATRIX_NOTE, text_table(head, rows), ""]
+    text += [as_text(*run_times), ""]
+    mark += [*as_markdown(*run_times), ""]
     for scene in scenes:
         title = bench.scenes[scene]["title"]
         impacts = bench.truth[scene]["impacts"]
@@ -297,6 +332,7 @@ def write(bench, growth, loop, profiles, folder):
         ]
     sections = [
         ("What the plant skips, and what that saves", SAVINGS_NOTE, *savings(bench, profiles)),
+        ("Cost of a sample in the loop scene", SAMPLE_NOTE, *samples(bench)),
         ("Cost as work grows", GROWTH_NOTE, *growths(growth)),
     ]
     for title, note, head, rows in sections:
@@ -316,9 +352,8 @@ def write(bench, growth, loop, profiles, folder):
             "method",
             "setting",
             "median_ns",
-            "least_ns",
             "relative_spread",
-            "runs",
+            "rounds",
             "true_impacts",
             "impacts",
             "error",
@@ -326,7 +361,7 @@ def write(bench, growth, loop, profiles, folder):
         ]
     )
     for row in bench.rows:
-        timed = [round(row.median), round(min(row.times)), number(row.spread)] if row.times else ["", "", ""]
+        timed = [round(row.median), number(row.spread)] if row.times else ["", ""]
         truth = bench.truth[row.scene]["impacts"]
         error = "" if row.error is None else f"{row.error:.3e}"
         sheet.writerow(

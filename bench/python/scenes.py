@@ -34,6 +34,8 @@ def free(periods):
 LOCKED = rig(EPSILON, EPSILON * LAMBDA, R)
 # On the 1:1 motion, after 1000 periods of the scene `lock` in tests/reference, rounded.
 STEADY = [-0.43837155, 0.00769665, -1.00385415, -0.87812325]
+# Disturbances of the chaotic motion grow by exp(0.39) per period: by 1e5 in 30 periods. Eleven digits remain.
+CHAOTIC_PERIODS = 30
 
 
 def scenes():
@@ -44,6 +46,30 @@ def scenes():
             **LOCKED,
             "start": STEADY,
             **driven(EPSILON * 1.1, OMEGA, 1000),
+        },
+        "centre": {
+            "title": "steady 1:1 at the linear resonance (sigma = 0, G = 1.2), 200 periods",
+            **LOCKED,
+            "start": [-0.19261339, -0.13423939, -0.16138338, -0.74405263],
+            **driven(EPSILON * 1.2, 1.0, 200),
+        },
+        "asymmetric": {
+            "title": "asymmetric 1:1 (sigma = -1.14, G = 1.5), 200 periods",
+            **LOCKED,
+            "start": [-0.69173097, 0.18241035, -1.58594360, 0.93666100],
+            **driven(EPSILON * 1.5, 0.990424, 200),
+        },
+        "three": {
+            "title": "three impacts per period (sigma = 0, G = 2.5), 200 periods",
+            **LOCKED,
+            "start": [-0.82181889, -0.62275774, -0.32663444, -1.39999131],
+            **driven(EPSILON * 2.5, 1.0, 200),
+        },
+        "chaotic": {
+            "title": f"chaotic (sigma = -1, G = 2.6), {CHAOTIC_PERIODS} periods, in which disturbances grow by 1e5",
+            **LOCKED,
+            "start": [-1.30395894, 0.48468596, -1.97219916, 0.59318103],
+            **driven(EPSILON * 2.6, 0.9916, CHAOTIC_PERIODS),
         },
         "decay": {"title": "transient decay, drive off, 15 periods", **LOCKED, "start": STEADY, **free(15)},
         "grazing": {

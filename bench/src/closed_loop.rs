@@ -37,10 +37,10 @@ fn run(periods: usize, mut see: impl FnMut(f64, f64)) -> Plant {
         };
         let output = lock.process(&mut state, input);
         see(output.amplitude, output.omega);
-        plant.advance(
-            Drive::harmonic(output.amplitude, output.omega),
-            TAU / SAMPLES as f64,
-        );
+        let drive = Drive::harmonic(output.amplitude, output.omega);
+        plant
+            .advance(drive, TAU / SAMPLES as f64)
+            .expect("the controller puts out a valid drive");
     }
     plant
 }

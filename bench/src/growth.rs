@@ -1,28 +1,27 @@
-//! How the plant's run time grows with the work: periods, impacts, samples per period, plants in a batch.
+//! How the plant's run time grows with the work: periods, impacts, samples per period.
 
 use std::path::Path;
 use std::time::Instant;
 
-use lovines::batch::Batch;
-use lovines::{Drive, Plant, State};
+use lovines::{Drive, Plant};
 use serde_json::{Value, json};
 
 use crate::scene::Scene;
 
-/// Periods that samples and batches are followed for.
+/// Periods that samples are followed for.
 const PERIODS: usize = 100;
 
-/// Least wall time, ns, of repetitions for about `budget` seconds; at least two.
-fn least(budget: f64, mut run: impl FnMut() -> u64) -> (f64, u64) {
+/// Median wall time, ns, of repetitions for about `budget` seconds, three at least; and the work of one.
+fn timed(budget: f64, mut run: impl FnMut() -> u64) -> (f64, u64) {
     let began = Instant::now();
-    let (mut best, mut times, mut work) = (f64::INFINITY, 0, 0);
-    while times < 2 || began.elapsed().as_secs_f64() < budget {
+    let (mut times, mut work) = (Vec::new(), 0);
+    while times.len() < 3 || began.elapsed().as_secs_f64() < budget {
         let start = Instant::now();
         work = std::hint::black_box(run());
-        best = best.min(start.elapsed().as_nanos() as f64);
-        times += 1;
+        times.push(start.elapsed().as_nanos() as f64);
     }
-    (best, work)
+    times.sort_by(f64::total_cmp);
+    (times[times.len() / 2], work)
 }
 
 /// The steady scene, from where a set of runs can begin.
@@ -46,7 +45,7 @@ impl Steady {
     fn step_by_step(&self, steps: usize, duration: f64) -> u64 {
         let mut plant = self.plant;
         for _ in 0..steps {
-            plant.advance(self.drive, duration);
+            plant.advance(self.drive, duration).expect("a valid step");
             std::hint::black_box((plant.centre(), plant.base_displacement()));
         }
         steps as u64
@@ -54,33 +53,10 @@ impl Steady {
 
     fn in_one_step(&self, impacts: f64) -> u64 {
         let mut plant = self.plant;
-        plant.advance(self.drive, 0.5 * impacts * self.period);
-        plant.tally().impacts
-    }
-
-    /// Plants of which no two are equal: each has a drive and a start of its own, all near the 1:1 motion.
-    fn batch(&self, size: usize) -> Result<Batch, String> {
-        let start = self.plant.state();
-        let members = (0..size).map(|n| {
-            let shade = 1.0 + 1e-3 * ((n as f64 * 0.618_033_988_749_895).fract() - 0.5);
-            let state = State {
-                dq2: start.dq2 * shade,
-                ..start
-            };
-            let drive = Drive::harmonic(self.drive.amplitude * shade, self.drive.omega * shade);
-            Plant::new(*self.plant.parameters(), state).map(|plant| (plant, drive))
-        });
-        let members: Result<Vec<_>, _> = members.collect();
-        Ok(Batch::new(members.map_err(|e| e.to_string())?))
-    }
-
-    /// A batch in one step, with the state of each plant read after it.
-    fn batch_in_one_step(&self, batch: &mut Batch, advance: fn(&mut Batch, f64)) -> u64 {
-        advance(batch, PERIODS as f64 * self.period);
-        for plant in batch.plants() {
-            std::hint::black_box(plant.state());
-        }
-        0
+        plant
+            .advance(self.drive, 0.5 * impacts * self.period)
+            .expect("a valid step");
+        plant.totals().impacts
     }
 }
 
@@ -95,24 +71,14 @@ pub fn measure(folder: &Path, what: &str, budget: f64, most: f64) -> Result<Valu
     while size <= most * 1.001 {
         let count = f64::round(size) as usize;
         let (ns, work) = match what {
-            "periods" => least(budget, || scene.step_by_step(count, scene.period)),
-            "impacts" => least(budget, || scene.in_one_step(size)),
-            "samples per period" => least(budget, || {
+            "periods" => timed(budget, || scene.step_by_step(count, scene.period)),
+            "impacts" => timed(budget, || scene.in_one_step(size)),
+            "samples per period" => timed(budget, || {
                 scene.step_by_step(PERIODS * count, scene.period / count as f64)
             }),
-            "plants in a batch, one core" | "plants in a batch, all cores" => {
-                let mut batch = scene.batch(count)?;
-                let advance = if what.ends_with("one core") {
-                    Batch::advance_on_one_core
-                } else {
-                    Batch::advance
-                };
-                let (ns, _) = least(budget, || scene.batch_in_one_step(&mut batch, advance));
-                (ns, (count * PERIODS) as u64)
-            }
             _ => {
                 return Err(format!(
-                    "{what}: there are periods, impacts, samples per period, plants in a batch, one core (or: all cores)"
+                    "{what}: there are periods, impacts and samples per period"
                 ));
             }
         };

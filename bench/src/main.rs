@@ -5,12 +5,16 @@
 //! {"growth": "periods", "budget": 0.1, "most": 1e6}
 //! {"profile": "chatter"}
 //! {"record": 20}
+//! {"map_g": 1.2, "sigmas": [-1.0, 0.0], "effort": {"methods": "both", "periods": 200, "brent_periods": 50, "runs": 5}}
 //! ```
+//!
+//! `vines-bench map` prints the map of run time on the terminal, without Python.
 
 #![forbid(unsafe_code)]
 
 mod closed_loop;
 mod growth;
+mod map;
 mod method;
 mod methods;
 mod profile;
@@ -53,6 +57,11 @@ enum Request {
     Methods {
         methods: bool,
     },
+    Map {
+        map_g: f64,
+        sigmas: Vec<f64>,
+        effort: map::Effort,
+    },
 }
 
 fn answer(folder: &Path, request: &str) -> Result<serde_json::Value, String> {
@@ -85,11 +94,27 @@ fn answer(folder: &Path, request: &str) -> Result<serde_json::Value, String> {
             closed_loop,
             budget,
         } => Ok(closed_loop::measure(closed_loop, budget)),
+        Request::Map {
+            map_g,
+            sigmas,
+            effort,
+        } => serde_json::to_value(map::row(map_g, &sigmas, &effort)?).map_err(wrong),
         Request::Methods { methods } => Ok(json!(methods.then_some(methods::NAMES))),
     }
 }
 
 fn main() -> std::io::Result<()> {
+    let arguments: Vec<String> = std::env::args().collect();
+    if arguments.get(1).is_some_and(|name| name == "map") {
+        match map::terminal::run(&arguments[2..]) {
+            Ok(text) => println!("{text}"),
+            Err(error) => {
+                eprintln!("error: {error}");
+                std::process::exit(2);
+            }
+        }
+        return Ok(());
+    }
     let folder = std::env::args_os()
         .nth(1)
         .unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());

@@ -21,6 +21,7 @@ pub fn of(scene: &Scene) -> Result<Value, String> {
             Event::Released { t, .. } => at_rest += t - since.take().unwrap_or(t),
             Event::Impact { .. } => {}
         });
+        let outcome = outcome.map_err(|error| error.to_string())?;
         at_rest += since.map_or(0.0, |since| step.duration - since);
         whole += step.duration;
         empty += u64::from(outcome.impacts == 0);
@@ -28,7 +29,7 @@ pub fn of(scene: &Scene) -> Result<Value, String> {
     Ok(json!({
         "steps": scene.steps.len(),
         "empty": empty,
-        "impacts": plant.tally().impacts,
+        "impacts": plant.totals().impacts,
         "at_rest": at_rest / whole,
     }))
 }

@@ -2,12 +2,15 @@
 
 use core::f64::consts::{PI, TAU};
 
-/// The angle equal to `x` modulo a turn, rad, in [-pi, pi].
+/// The angle `x` modulo 2 pi, rad, in [-pi, pi].
 pub fn wrap(x: f64) -> f64 {
     (x - TAU * libm::rint(x / TAU)).clamp(-PI, PI)
 }
 
-/// A complex number; as a rotor, `exp(i phase)`.
+/// A complex number. A rotor is `exp(i phase)`.
+///
+/// Not `num-complex`: whether that takes `hypot` and `atan2` from libm or from the system depends on the features that
+/// other crates of the same build enable, and the controller must give the same bits in every build.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Complex {
@@ -43,7 +46,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn an_angle_wraps_into_half_a_turn_either_way() {
+    fn an_angle_wraps_into_the_range_from_minus_pi_to_pi() {
         for (x, expected) in [(0.3, 0.3), (PI + 0.5, 0.5 - PI), (-5.0, TAU - 5.0)] {
             assert!((wrap(x) - expected).abs() < 1e-15, "{x}");
         }

@@ -1,110 +1,59 @@
 //! The controller: one function per sample.
 
-mod sense;
-
+use crate::amplitude_loop::{AmplitudeLoop, AmplitudeState, Move};
 use crate::config::Config;
-use crate::detector::{Detector, Estimate};
-use crate::drive::{Drive, Level};
+use crate::drive::Drive;
 use crate::error::{ConfigError, Quantity};
 use crate::gains::Gains;
-use crate::loop_filter::{Frequency, LoopFilter};
-use crate::oscillator::Oscillator;
-use crate::response_loop::{Hold, Move, ResponseLoop};
+use crate::loop_filter::LoopFilter;
+use crate::sensing::{Measurement, PresentDrive, Sensing};
 use crate::signals::{Input, Output};
+use crate::state::State;
 use crate::stationarity::{Dwell, Reading, Stationarity};
-use crate::supervisor::{Fault, Phase, Signs};
-use sense::Sense;
+use crate::supervisor::{Conditions, LoopState};
 
-/// Phase error, rad, up to which more drive reliably means more response.
+/// Phase error, rad, up to which a larger drive certainly gives a larger response.
 const PHASE_RANGE: f64 = core::f64::consts::FRAC_PI_3;
 
-/// A checked configuration and its coefficients; immutable but for [`PhaseLock::retune`].
+/// A checked configuration and its coefficients; only [`PhaseLock::retune`] changes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct PhaseLock {
     config: Config,
-    detector: Detector,
+    sensing: Sensing,
     filter: LoopFilter,
     drive: Drive,
-    response_loop: ResponseLoop,
+    amplitude_loop: AmplitudeLoop,
     stationarity: Stationarity,
 }
 
-/// Everything that changes from sample to sample. A copy of it, put back later, continues with the same bits.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct State {
-    oscillator: Oscillator,
-    response: Estimate,
-    reference: Estimate,
-    /// Whether the reference channel has ever read other than exactly zero.
-    connected: bool,
-    frequency: Frequency,
-    level: Level,
-    /// Where the response amplitude is held rather than the drive's.
-    hold: Option<Hold>,
-    dwell: Dwell,
-    phase: Phase,
-    fault: Option<Fault>,
-    /// Whether the last sample ended a ramp.
-    ready: bool,
-    /// Whether the last sample ended a period in which the phase escaped.
-    escaped: bool,
-    /// Samples since acquiring began.
-    acquiring: u64,
-    /// Amplitude and phase target that the dwell is about.
-    tuning: (f64, f64),
+impl Config {
+    /// Checks all parameters and computes the coefficients.
+    ///
+    /// # Errors
+    /// The first parameter with an invalid value, with its unit and the allowed values.
+    pub fn build(self) -> Result<PhaseLock, ConfigError> {
+        self.check()?;
+        let drive = Drive::new(&self);
+        Ok(PhaseLock {
+            sensing: Sensing::new(&self),
+            filter: LoopFilter::new(&self),
+            drive,
+            amplitude_loop: AmplitudeLoop::new(&self, &drive),
+            stationarity: Stationarity::new(&self.lock),
+            config: self,
+        })
+    }
 }
 
 impl PhaseLock {
-    pub(crate) fn new(config: Config) -> Self {
-        let per_sample = |range: f64, time: f64| {
-            if time > 0.0 {
-                range * (config.sample_time / time)
-            } else {
-                f64::INFINITY
-            }
-        };
-        let gains = Gains::from_bandwidth(config.bandwidth, config.damping_rate);
-        let drive = Drive {
-            amplitude_max: config.amplitude_limit(),
-            ramp_step: per_sample(config.amplitude, config.ramp_time),
-            release_step: per_sample(config.amplitude, config.release_time),
-            control_step: -libm::expm1(-config.base_bandwidth * config.sample_time),
-        };
-        Self {
-            detector: Detector::new(config.detector, config.bandwidth, config.sample_time),
-            filter: LoopFilter {
-                gains,
-                omega_min: config.omega_min,
-                omega_max: config.omega_max,
-                max_change: if config.omega_rate > 0.0 {
-                    config.omega_rate * config.sample_time
-                } else {
-                    f64::INFINITY
-                },
-                sample_time: config.sample_time,
-            },
-            drive,
-            response_loop: ResponseLoop::new(&config, gains, &drive),
-            stationarity: Stationarity {
-                phase_tolerance: config.lock.phase_tolerance,
-                unlock_tolerance: config.lock.unlock_tolerance,
-                frequency_drift: config.lock.frequency_drift,
-                amplitude_drift: config.lock.amplitude_drift,
-                block: config.lock.dwell.div_ceil(4),
-            },
-            config,
-        }
-    }
-
-    /// The configuration in use.
+    /// The configuration.
     #[must_use]
     pub fn config(&self) -> &Config {
         &self.config
     }
 
-    /// The gains in use.
+    /// The gains.
     #[must_use]
     pub fn gains(&self) -> Gains {
         self.filter.gains
@@ -113,50 +62,19 @@ impl PhaseLock {
     /// The state before the first sample.
     #[must_use]
     pub fn start(&self) -> State {
-        State {
-            oscillator: Oscillator::default(),
-            response: Estimate::default(),
-            reference: Estimate::default(),
-            connected: false,
-            frequency: Frequency::at(self.config.omega_start),
-            level: Level::default(),
-            hold: None,
-            dwell: Dwell::default(),
-            phase: Phase::Idle,
-            fault: None,
-            ready: false,
-            escaped: false,
-            acquiring: 0,
-            tuning: self.tuning(),
-        }
+        State::new(self.config.omega_start, self.tuning())
     }
 
-    /// What is put out before the first sample: no drive, nothing measured.
+    /// The output before the first sample: no drive, no measurements.
     #[must_use]
     pub fn idle(&self) -> Output {
-        let omega = self.config.omega_start;
-        Output {
-            omega,
-            amplitude: 0.0,
-            drive: 0.0,
-            phase_error: 0.0,
-            response_amplitude: 0.0,
-            response_target: 0.0,
-            reference_amplitude: 0.0,
-            coherence: 0.0,
-            frequency: omega,
-            response_mean: 0.0,
-            locked: false,
-            settled: false,
-            state: Phase::Idle,
-            fault: None,
-        }
+        Output::idle(self.config.omega_start)
     }
 
-    /// Changes drive amplitude (m) and phase target (rad) between samples. The state goes on; `settled` starts anew.
+    /// Changes drive amplitude (m) and phase target (rad) between samples. The state continues; `settled` becomes false.
     ///
     /// # Errors
-    /// A value out of range; then nothing is changed.
+    /// A value out of range; then nothing changes.
     pub fn retune(&mut self, amplitude: f64, phase_target: f64) -> Result<(), ConfigError> {
         let tuned = Config {
             amplitude,
@@ -165,19 +83,18 @@ impl PhaseLock {
         };
         let before = self.drive;
         *self = tuned.build()?;
-        // A ramp keeps its rate: down to a small amplitude, or to none, it would otherwise take for ever.
+        // A ramp keeps its rate: a rate in proportion to the new amplitude could make a ramp down endless.
         self.drive.ramp_step = self.drive.ramp_step.max(before.ramp_step);
         self.drive.release_step = self.drive.release_step.max(before.release_step);
-        self.response_loop = ResponseLoop::new(&self.config, self.filter.gains, &self.drive);
+        self.amplitude_loop = AmplitudeLoop::new(&self.config, &self.drive);
         Ok(())
     }
 
-    /// Holds the amplitude of the response from now on and moves it as stated; the drive does what it must, within its limits.
-    /// The first move sets out from the amplitude that the response has. Taking `active` away, or a fault, ends it.
+    /// Controls the response amplitude from now on and moves it to another setpoint; the drive follows within its limits.
+    /// The first move starts at the present response amplitude. The control ends when `active` becomes false, or at a fault.
     ///
     /// # Errors
-    /// A move that makes no sense, a drive without a limit (`amplitude_max`), or a loop that is not closed; then nothing
-    /// is changed.
+    /// A move with an invalid value, a drive without a limit (`amplitude_max`), or an open loop; then nothing changes.
     pub fn hold_response(&self, state: &mut State, to: Move) -> Result<(), ConfigError> {
         Quantity::new("response", to.response, "m").positive()?;
         Quantity::new("duration", to.duration, "s").not_negative()?;
@@ -185,29 +102,35 @@ impl PhaseLock {
         Quantity::new("omega", to.omega, "rad/s").check(true, "a finite number")?;
         Quantity::new("amplitude_max", self.config.amplitude_max, "m").check(
             self.config.amplitude_max > 0.0,
-            "above 0 where the response is to be held: the drive needs a limit",
+            "above 0 to control the response amplitude: the drive needs a limit",
         )?;
-        Quantity::new("state", state.phase as u8 as f64, "").check(
-            state.phase.is_closed(),
-            "2 (acquiring) or 3 (locked): the response can be held only in a closed loop",
+        Quantity::new("state", f64::from(state.loop_state as u8), "").check(
+            state.loop_state.is_closed(),
+            "2 (acquiring) or 3 (locked): the response amplitude can be controlled only in a closed loop",
         )?;
-        let (read, drive) = (state.response.amplitude(), state.level.amplitude);
-        let hold = state.hold.get_or_insert(Hold::at(read, drive));
-        hold.set_out(to, self.response_loop.sample_time());
+        let (reading, drive) = (state.channels.response.amplitude(), state.drive.amplitude);
+        state
+            .amplitude_loop
+            .get_or_insert(AmplitudeState::constant(reading, drive))
+            .start(to, self.amplitude_loop.sample_time());
         state.dwell = Dwell::default();
         Ok(())
     }
 
-    /// One sample: takes what the sensors read now, returns what the drive shall be until the next sample.
+    /// One sample: takes the sensor readings, returns the drive until the next sample.
     pub fn process(&self, state: &mut State, input: Input) -> Output {
-        let rotor = state.oscillator.rotor();
-        let sense = self.sense(state, &input, rotor);
-        self.sequence(state, input.active, &sense);
-        self.steer(state, &sense);
-        let output = self.output(state, &sense, rotor.im * state.level.amplitude);
+        let drive = PresentDrive {
+            rotor: state.oscillator.rotor(),
+            omega: state.frequency.omega,
+            amplitude: state.drive.amplitude,
+        };
+        let measured = self.sensing.measure(&mut state.channels, &input, drive);
+        self.change_state(state, input.active, &measured);
+        self.steer(state, &measured);
+        let output = self.output(state, &measured, drive.rotor.im * state.drive.amplitude);
         let omega = state.frequency.omega;
         let period_ends = state.oscillator.advance(omega, self.config.sample_time);
-        self.judge(state, &sense, period_ends);
+        self.judge(state, &measured, period_ends);
         output
     }
 
@@ -215,134 +138,135 @@ impl PhaseLock {
         (self.config.amplitude, self.config.phase_target)
     }
 
-    /// Moves the sequence on.
-    fn sequence(&self, state: &mut State, active: bool, sense: &Sense) {
+    /// Advances the state machine.
+    fn change_state(&self, state: &mut State, active: bool, measured: &Measurement) {
         let timeout = self.config.acquire_timeout;
         let elapsed = state.acquiring as f64 * self.config.sample_time;
-        let before = state.phase;
-        let (phase, fault) = before.next(&Signs {
+        let before = state.loop_state;
+        let (next, fault) = before.next(&Conditions {
             active,
-            fault: sense.fault,
+            fault: measured.fault,
             ready: state.ready,
             settled: state.dwell.settled(),
-            escaped: state.escaped,
-            late: timeout > 0.0 && elapsed >= timeout,
+            lost: state.lost,
+            timed_out: timeout > 0.0 && elapsed >= timeout,
         });
-        state.phase = phase;
-        if phase == Phase::Locked && state.tuning.1 != self.config.phase_target {
-            // The new target is not held yet: being away from it is no loss of the lock.
-            state.phase = Phase::Acquiring;
+        state.loop_state = next;
+        if next == LoopState::Locked && state.tuning.1 != self.config.phase_target {
+            // A new phase target: the distance from it does not mean that the lock is lost.
+            state.loop_state = LoopState::Acquiring;
             state.dwell = Dwell::default();
         }
-        if fault.is_some() || (phase == Phase::Ramping && before != Phase::Ramping) {
+        if fault.is_some() || (next == LoopState::Ramping && before != LoopState::Ramping) {
             state.fault = fault;
         }
-        state.acquiring = if phase == Phase::Acquiring {
+        state.acquiring = if next == LoopState::Acquiring {
             state.acquiring + 1
         } else {
             0
         };
     }
 
-    /// Sets frequency and drive amplitude as the state of the sequence demands.
-    fn steer(&self, state: &mut State, sense: &Sense) {
+    /// Sets frequency and drive amplitude according to the loop state.
+    fn steer(&self, state: &mut State, measured: &Measurement) {
         let Self { filter, drive, .. } = self;
-        let State {
-            frequency, level, ..
-        } = state;
-        let Config {
-            omega_start,
-            amplitude,
-            ..
-        } = self.config;
+        let omega_start = self.config.omega_start;
         state.ready = false;
-        if !state.phase.is_closed() {
-            state.hold = None;
+        if !state.loop_state.is_closed() {
+            state.amplitude_loop = None;
         }
-        match state.phase {
-            Phase::Idle => {
+        let frequency = &mut state.frequency;
+        match state.loop_state {
+            LoopState::Idle => {
                 filter.go_to(frequency, omega_start);
-                drive.ramp_down(level);
+                drive.ramp_down(&mut state.drive);
             }
-            Phase::Ramping => {
+            LoopState::Ramping => {
                 filter.go_to(frequency, omega_start);
-                state.ready = drive.ramp(level, amplitude) && frequency.omega == omega_start;
+                state.ready = drive.ramp(&mut state.drive, self.config.amplitude)
+                    && frequency.omega == omega_start;
             }
-            Phase::Acquiring | Phase::Locked => {
-                if sense.qualified {
-                    filter.follow(frequency, sense.error);
-                } else {
-                    filter.hold(frequency);
-                }
-                if let Some(hold) = &mut state.hold {
-                    let read = state.response.amplitude();
-                    let near = sense.qualified && sense.error.abs() < PHASE_RANGE;
-                    let (driven, shift) =
-                        self.response_loop
-                            .follow(hold, level.amplitude, near.then_some(read));
-                    level.amplitude = driven;
-                    filter.shift(frequency, shift);
-                    state.ready = hold.arrived();
-                } else {
-                    if sense.qualified && sense.measured {
-                        drive.control(level, amplitude, sense.reference_amplitude);
-                    }
-                    state.ready = drive.ramp(level, amplitude);
-                }
-            }
-            Phase::LockLost | Phase::Tripped => {
+            LoopState::Acquiring | LoopState::Locked => self.close_loop(state, measured),
+            LoopState::LockLost | LoopState::Tripped => {
                 filter.hold(frequency);
-                drive.ramp_down(level);
+                drive.ramp_down(&mut state.drive);
             }
-            Phase::ShutDown => {
+            LoopState::ShutDown => {
                 filter.hold(frequency);
-                drive.release(level);
+                drive.release(&mut state.drive);
             }
         }
     }
 
-    /// Feeds the lock criterion, which starts anew where the loop is open or its aim has changed.
-    fn judge(&self, state: &mut State, sense: &Sense, period_ends: bool) {
-        let aim = self.tuning();
-        if !state.phase.is_closed() || state.tuning != aim || !state.ready {
+    /// One sample of the closed loop.
+    fn close_loop(&self, state: &mut State, measured: &Measurement) {
+        let Self { filter, drive, .. } = self;
+        if measured.valid {
+            filter.follow(&mut state.frequency, measured.error);
+        } else {
+            filter.hold(&mut state.frequency);
+        }
+        if let Some(amplitude_loop) = &mut state.amplitude_loop {
+            let reading = state.channels.response.amplitude();
+            let near = measured.valid && measured.error.abs() < PHASE_RANGE;
+            let before = state.drive.amplitude;
+            let (amplitude, shift) =
+                self.amplitude_loop
+                    .follow(amplitude_loop, before, near.then_some(reading));
+            state.drive.amplitude = amplitude;
+            filter.shift(&mut state.frequency, shift);
+            state.ready = amplitude_loop.has_arrived();
+        } else {
+            let setpoint = self.config.amplitude;
+            if measured.valid && measured.has_sensor {
+                drive.control(&mut state.drive, setpoint, measured.reference_amplitude);
+            }
+            state.ready = drive.ramp(&mut state.drive, setpoint);
+        }
+    }
+
+    /// Updates the lock criterion. It restarts while the loop is open and when the tuning has changed.
+    fn judge(&self, state: &mut State, measured: &Measurement, period_ends: bool) {
+        let tuning = self.tuning();
+        if !state.loop_state.is_closed() || state.tuning != tuning || !state.ready {
             state.dwell = Dwell::default();
         }
-        state.tuning = aim;
-        state.escaped = false;
-        if state.phase.is_closed() {
+        state.tuning = tuning;
+        state.lost = false;
+        if state.loop_state.is_closed() {
             let reading = Reading {
-                error: sense.error,
+                error: measured.error,
                 integral: state.frequency.integral,
                 omega: state.frequency.omega,
-                amplitude: state.response.amplitude(),
-                qualified: sense.qualified,
+                amplitude: state.channels.response.amplitude(),
+                valid: measured.valid,
             };
-            state.escaped = self
+            state.lost = self
                 .stationarity
                 .update(&mut state.dwell, &reading, period_ends);
         }
     }
 
-    fn output(&self, state: &State, sense: &Sense, drive: f64) -> Output {
+    fn output(&self, state: &State, measured: &Measurement, drive: f64) -> Output {
         let omega = state.frequency.omega;
-        let response_amplitude = state.response.amplitude();
+        let response_amplitude = state.channels.response.amplitude();
         let means = state.dwell.means();
         let (frequency, response_mean) = means.unwrap_or((omega, response_amplitude));
         Output {
             omega,
-            amplitude: state.level.amplitude,
+            amplitude: state.drive.amplitude,
             drive,
-            phase_error: sense.error,
+            phase_error: measured.error,
             response_amplitude,
-            response_target: state.hold.map_or(0.0, |hold| hold.wanted()),
-            reference_amplitude: sense.reference_amplitude,
-            coherence: state.response.coherence(),
-            // The mean of values at a limit may round to beyond it.
+            response_target: state.amplitude_loop.map_or(0.0, |l| l.setpoint()),
+            reference_amplitude: measured.reference_amplitude,
+            coherence: state.channels.response.coherence(),
+            // Rounding can move the mean of values at a limit beyond the limit.
             frequency: frequency.clamp(self.config.omega_min, self.config.omega_max),
             response_mean,
-            locked: state.phase == Phase::Locked,
+            locked: state.loop_state == LoopState::Locked,
             settled: state.dwell.settled() && state.tuning == self.tuning(),
-            state: state.phase,
+            state: state.loop_state,
             fault: state.fault,
         }
     }

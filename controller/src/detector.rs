@@ -1,24 +1,24 @@
 //! The phase detector of one channel.
 
 use crate::angle::Complex;
-use crate::config::Detector as Kind;
+use crate::config::{Config, Detector};
 use crate::harmonics::{Coefficients, Harmonics};
 
-/// Either detector, ready to run. Both are first order with the same bandwidth.
+/// Coefficients of a phase detector. Both methods are of first order and have the same bandwidth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Detector {
+pub enum PhaseDetector {
     Adaptive(Harmonics),
     Demodulator { step: f64 },
 }
 
-/// What is known of one channel.
+/// Estimate of the signal of one channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Estimate {
-    /// In m, relative to the oscillator's phase; the demodulator knows only the fundamental.
+    /// m, relative to the oscillator's phase. The demodulator estimates only the fundamental.
     coefficients: Coefficients,
-    /// Mean square of what the detector leaves unexplained, m².
+    /// Mean square of the residual, m².
     residual_power: f64,
 }
 
@@ -34,12 +34,12 @@ impl Estimate {
 
     /// Phase of `sin` relative to the oscillator's sine, rad.
     pub fn argument(&self) -> f64 {
-        // Re(c exp(i phase)) is a cosine; a sine is a cosine a quarter turn late.
+        // Re(c exp(i phase)) is a cosine; a sine lags a cosine by pi/2.
         let Complex { re, im } = self.fundamental();
         Complex { re: -im, im: re }.argument()
     }
 
-    /// Share of the fundamental in the power of itself and the residual; 0 for silence.
+    /// Power of the fundamental over the sum of itself and the residual power; 0 for a zero signal.
     pub fn coherence(&self) -> f64 {
         let power = 0.5 * self.amplitude() * self.amplitude();
         let total = power + self.residual_power;
@@ -47,24 +47,29 @@ impl Estimate {
     }
 }
 
-impl Detector {
-    /// A detector of the given bandwidth (rad/s), sampled every `sample_time` s.
-    pub fn new(kind: Kind, bandwidth: f64, sample_time: f64) -> Self {
-        let step = -libm::expm1(-bandwidth * sample_time);
-        match kind {
-            Kind::Adaptive {
-                harmonics,
-                odd_only,
-            } => Self::Adaptive(Harmonics {
-                count: harmonics.into(),
-                odd_only,
+impl PhaseDetector {
+    /// The detector of a configuration.
+    pub fn new(config: &Config) -> Self {
+        let step = -libm::expm1(-config.bandwidth * config.sample_time);
+        match config.detector {
+            Detector::Adaptive => Self::Adaptive(Harmonics {
+                count: config.harmonics.into(),
+                odd_only: config.odd_only,
                 step,
             }),
-            Kind::Demodulator => Self::Demodulator { step },
+            Detector::Demodulator => Self::Demodulator { step },
         }
     }
 
-    /// Sum of the steps of all coefficients: the share of a residual that one update takes away, at most 1.
+    /// Number of coefficients that one sample updates.
+    pub fn coefficients(&self) -> usize {
+        match self {
+            Self::Adaptive(harmonics) => harmonics.coefficients(),
+            Self::Demodulator { .. } => 1,
+        }
+    }
+
+    /// Sum of the steps of all coefficients: the share of the residual that one update removes, at most 1.
     pub fn total_step(&self) -> f64 {
         match self {
             Self::Adaptive(harmonics) => harmonics.total_step(),
@@ -72,7 +77,7 @@ impl Detector {
         }
     }
 
-    /// Order of the highest harmonic that must be sampled well.
+    /// Order of the highest harmonic that the sampling must resolve.
     pub fn highest_harmonic(&self) -> usize {
         match self {
             Self::Adaptive(harmonics) => harmonics.highest(),
@@ -80,7 +85,7 @@ impl Detector {
         }
     }
 
-    /// Takes a sample, m, at the oscillator's phase.
+    /// Updates the estimate with a sample, m. `rotor` is `exp(i phase)` of the oscillator.
     pub fn update(&self, estimate: &mut Estimate, sample: f64, rotor: Complex) {
         let (residual, step) = match self {
             Self::Adaptive(harmonics) => {
@@ -104,15 +109,19 @@ mod tests {
     use super::*;
     use crate::oscillator::Oscillator;
 
-    const ADAPTIVE: Kind = Kind::Adaptive {
-        harmonics: 3,
-        odd_only: true,
-    };
+    /// A detector of bandwidth 0.1 for a frequency near 1.
+    fn detector(detector: Detector, sample_time: f64) -> PhaseDetector {
+        PhaseDetector::new(&Config {
+            detector,
+            sample_time,
+            ..Config::for_resonance(1.0, 0.0)
+        })
+    }
 
-    /// Largest distance of amplitude and phase from the truth over the last of many periods.
-    fn ripple(kind: Kind, signal: impl Fn(f64) -> f64, truth: (f64, f64)) -> f64 {
+    /// Largest error of amplitude and phase in the last period, after the transient.
+    fn ripple(method: Detector, signal: impl Fn(f64) -> f64, truth: (f64, f64)) -> f64 {
         let (omega, sample_time) = (1.0, core::f64::consts::TAU / 100.3);
-        let detector = Detector::new(kind, 0.1, sample_time);
+        let detector = detector(method, sample_time);
         let mut estimate = Estimate::default();
         let mut oscillator = Oscillator::default();
         let mut worst = 0.0_f64;
@@ -136,26 +145,30 @@ mod tests {
     }
 
     #[test]
-    fn the_adaptive_filter_rejects_harmonics_it_follows() {
-        let error = ripple(ADAPTIVE, with_third_harmonic, (2.0, 0.7));
+    fn the_adaptive_filter_separates_the_fundamental_from_a_harmonic() {
+        let error = ripple(Detector::Adaptive, with_third_harmonic, (2.0, 0.7));
         assert!(error < 1e-12, "{error}");
     }
 
     #[test]
     fn the_adaptive_filter_rejects_an_offset() {
-        let error = ripple(ADAPTIVE, |phase| 5.0 + libm::sin(phase), (1.0, 0.0));
+        let error = ripple(
+            Detector::Adaptive,
+            |phase| 5.0 + libm::sin(phase),
+            (1.0, 0.0),
+        );
         assert!(error < 1e-12, "{error}");
     }
 
     #[test]
-    fn the_demodulator_finds_the_fundamental_but_ripples() {
-        let error = ripple(Kind::Demodulator, with_third_harmonic, (2.0, 0.7));
+    fn the_demodulator_finds_the_fundamental_with_ripple() {
+        let error = ripple(Detector::Demodulator, with_third_harmonic, (2.0, 0.7));
         assert!((1e-2..0.2).contains(&error), "{error}");
     }
 
     #[test]
-    fn a_clean_sine_is_coherent_and_silence_is_not() {
-        let detector = Detector::new(ADAPTIVE, 0.1, 0.06);
+    fn the_coherence_is_one_for_a_sine_and_zero_for_a_zero_signal() {
+        let detector = detector(Detector::Adaptive, 0.06);
         let mut estimate = Estimate::default();
         assert_eq!(estimate.coherence(), 0.0);
         let mut oscillator = Oscillator::default();

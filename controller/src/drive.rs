@@ -1,57 +1,76 @@
 //! Amplitude of the drive.
 
-/// Ramps of the drive amplitude, and the control that makes the measured base amplitude the wanted one.
+use crate::config::Config;
+
+/// Ramps of the drive amplitude, and the control of the measured base amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Drive {
     /// m
     pub amplitude_max: f64,
-    /// Largest change in one sample, m, while ramping; infinite to jump.
+    /// Largest change per sample during a ramp, m; infinite for a step change.
     pub ramp_step: f64,
-    /// Largest change in one sample, m, where the drive is released; infinite to switch off at once.
+    /// Largest change per sample after `active` became false, m; infinite to switch off at once.
     pub release_step: f64,
-    /// Share of the error of the base amplitude that is taken up in one sample; 0 without control.
+    /// Share of the base amplitude's error that the control corrects per sample; 0 without control.
     pub control_step: f64,
 }
 
 /// State of the drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Level {
-    /// Amplitude put out, m.
+pub struct DriveState {
+    /// Amplitude of the output, m.
     pub amplitude: f64,
-    /// What the control of the base amplitude has added, m.
+    /// Correction by the control of the base amplitude, m.
     trim: f64,
 }
 
 impl Drive {
-    /// Takes up the error between the wanted and the measured amplitude of the base, m.
-    pub fn control(&self, level: &mut Level, wanted: f64, measured: f64) {
-        let trim = level.trim + self.control_step * (wanted - measured);
-        // Bounded by what the drive can give, so the control does not wind up.
-        level.trim = trim.clamp(-wanted, self.amplitude_max - wanted);
+    /// The drive of a configuration.
+    pub fn new(config: &Config) -> Self {
+        let per_sample = |range: f64, time: f64| {
+            if time > 0.0 {
+                range * (config.sample_time / time)
+            } else {
+                f64::INFINITY
+            }
+        };
+        Self {
+            amplitude_max: config.amplitude_limit(),
+            ramp_step: per_sample(config.amplitude, config.ramp_time),
+            release_step: per_sample(config.amplitude, config.release_time),
+            control_step: -libm::expm1(-config.base_bandwidth * config.sample_time),
+        }
     }
 
-    /// Ramps towards `wanted` m for one sample; true where that is reached.
-    pub fn ramp(&self, level: &mut Level, wanted: f64) -> bool {
-        let target = (wanted + level.trim).clamp(0.0, self.amplitude_max);
-        level.amplitude = approach(level.amplitude, target, self.ramp_step);
-        level.amplitude == target
+    /// Corrects the error between setpoint and measured amplitude of the base, m.
+    pub fn control(&self, state: &mut DriveState, setpoint: f64, measured: f64) {
+        let trim = state.trim + self.control_step * (setpoint - measured);
+        // Anti-windup: the trim stays within the range of the drive.
+        state.trim = trim.clamp(-setpoint, self.amplitude_max - setpoint);
     }
 
-    /// Ramps down for one sample, as after a fault.
-    pub fn ramp_down(&self, level: &mut Level) {
-        self.down(level, self.ramp_step);
+    /// Ramps towards `setpoint`, m, for one sample. Returns whether the setpoint is reached.
+    pub fn ramp(&self, state: &mut DriveState, setpoint: f64) -> bool {
+        let target = (setpoint + state.trim).clamp(0.0, self.amplitude_max);
+        state.amplitude = approach(state.amplitude, target, self.ramp_step);
+        state.amplitude == target
     }
 
-    /// Ramps down for one sample, as where the operator has enough.
-    pub fn release(&self, level: &mut Level) {
-        self.down(level, self.release_step);
+    /// Ramps down for one sample after a fault.
+    pub fn ramp_down(&self, state: &mut DriveState) {
+        self.down(state, self.ramp_step);
     }
 
-    fn down(&self, level: &mut Level, step: f64) {
-        level.trim = 0.0;
-        level.amplitude = approach(level.amplitude, 0.0, step);
+    /// Ramps down for one sample after `active` became false.
+    pub fn release(&self, state: &mut DriveState) {
+        self.down(state, self.release_step);
+    }
+
+    fn down(&self, state: &mut DriveState, step: f64) {
+        state.trim = 0.0;
+        state.amplitude = approach(state.amplitude, 0.0, step);
     }
 }
 
@@ -71,40 +90,40 @@ mod tests {
     };
 
     #[test]
-    fn a_ramp_ends_exactly_at_the_wanted_amplitude() {
-        let mut level = Level::default();
-        let samples = (0..10).take_while(|_| !DRIVE.ramp(&mut level, 1.0)).count();
-        assert_eq!((samples, level.amplitude), (3, 1.0));
+    fn a_ramp_ends_exactly_at_its_setpoint() {
+        let mut state = DriveState::default();
+        let samples = (0..10).take_while(|_| !DRIVE.ramp(&mut state, 1.0)).count();
+        assert_eq!((samples, state.amplitude), (3, 1.0));
     }
 
     #[test]
-    fn a_release_without_a_ramp_is_at_once() {
-        let mut level = Level {
+    fn a_release_without_a_ramp_takes_one_sample() {
+        let mut state = DriveState {
             amplitude: 1.0,
             trim: 0.2,
         };
-        DRIVE.release(&mut level);
-        assert_eq!(level, Level::default());
+        DRIVE.release(&mut state);
+        assert_eq!(state, DriveState::default());
     }
 
     #[test]
-    fn the_control_makes_up_for_a_weak_shaker() {
-        let mut level = Level::default();
+    fn the_control_corrects_a_shaker_of_low_gain() {
+        let mut state = DriveState::default();
         for _ in 0..1000 {
-            DRIVE.ramp(&mut level, 1.0);
-            let measured = 0.8 * level.amplitude;
-            DRIVE.control(&mut level, 1.0, measured);
+            DRIVE.ramp(&mut state, 1.0);
+            let measured = 0.8 * state.amplitude;
+            DRIVE.control(&mut state, 1.0, measured);
         }
-        assert!((level.amplitude - 1.25).abs() < 1e-9);
+        assert!((state.amplitude - 1.25).abs() < 1e-9);
     }
 
     #[test]
-    fn the_control_of_a_dead_shaker_stays_within_its_limit() {
-        let mut level = Level::default();
+    fn the_control_stays_within_its_limit_if_the_base_does_not_move() {
+        let mut state = DriveState::default();
         for _ in 0..1000 {
-            DRIVE.ramp(&mut level, 1.0);
-            DRIVE.control(&mut level, 1.0, 0.0);
-            assert!(level.amplitude <= 2.0);
+            DRIVE.ramp(&mut state, 1.0);
+            DRIVE.control(&mut state, 1.0, 0.0);
+            assert!(state.amplitude <= 2.0);
         }
     }
 }

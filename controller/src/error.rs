@@ -1,17 +1,17 @@
-//! What is wrong with a configuration.
+//! Error of a configuration.
 
 use core::fmt;
 
-/// A value of a [`Config`](crate::Config) that makes no sense: which, its unit, and what is allowed.
+/// An invalid value of a [`Config`](crate::Config) or of a call: its name, value and unit, and the allowed values.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ConfigError {
     /// Name of the field.
     pub name: &'static str,
-    /// The value refused.
+    /// The invalid value.
     pub value: f64,
-    /// Its unit; empty for a pure number.
+    /// Unit; empty for a pure number.
     pub unit: &'static str,
-    /// What would have been accepted.
+    /// The allowed values.
     pub allowed: &'static str,
 }
 
@@ -27,7 +27,7 @@ impl fmt::Display for ConfigError {
 
 impl core::error::Error for ConfigError {}
 
-/// A value under test.
+/// A value to check.
 pub(crate) struct Quantity {
     pub name: &'static str,
     pub value: f64,
@@ -39,17 +39,22 @@ impl Quantity {
         Self { name, value, unit }
     }
 
-    /// Passes a finite value for which `holds`.
-    pub fn check(&self, holds: bool, allowed: &'static str) -> Result<(), ConfigError> {
-        if self.value.is_finite() && holds {
+    /// Accepts a finite value that is `valid`.
+    pub fn check(&self, valid: bool, allowed: &'static str) -> Result<(), ConfigError> {
+        if self.value.is_finite() && valid {
             return Ok(());
         }
-        Err(ConfigError {
+        Err(self.refuse(allowed))
+    }
+
+    /// The error for this value.
+    pub fn refuse(&self, allowed: &'static str) -> ConfigError {
+        ConfigError {
             name: self.name,
             value: self.value,
             unit: self.unit,
             allowed,
-        })
+        }
     }
 
     pub fn positive(&self) -> Result<(), ConfigError> {

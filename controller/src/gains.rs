@@ -1,19 +1,18 @@
-//! The gains of the loop, from one knob.
+//! The gains of the loop from the detector's bandwidth.
 
 /// Gains of the PI loop filter.
 ///
 /// Near phase resonance the phase of a lightly damped structure follows `phi' = -delta phi + omega_0 - omega` (`delta`: its
 /// damping rate), the detector is a low pass of bandwidth `wLP`, and the loop filter is `omega = omega_c + kp e + ki ∫e`.
 /// With `x = s/wLP` and `d = delta/wLP` the closed loop has the characteristic polynomial
-/// `x^3 + (1 + d) x^2 + (d + kp/wLP) x + ki/wLP^2`. The sum of its roots is fixed, so the slowest is fastest where
-/// all three have the real part `p = -(d + 1)/3`; with imaginary parts `0, ±l` that is
+/// `x^3 + (1 + d) x^2 + (d + kp/wLP) x + ki/wLP^2`. The sum of its roots is fixed, so the slowest root is fastest if
+/// all three have the real part `p = -(d + 1)/3`. With imaginary parts `0, ±l` the gains are
 ///
 /// ```text
 /// kp = wLP (3 p^2 + l^2 - d),     ki = -wLP^2 p (p^2 + l^2)
 /// ```
 ///
-/// `l = 0`, three equal real roots, is the conservative choice, and the one taken here. `delta = 0` may be given
-/// where the damping is unknown.
+/// The choice here is `l = 0`, three equal real roots, which is conservative. Use `delta = 0` if the damping is unknown.
 ///
 /// Source: P. Hippold, M. Scheel, L. Renson, M. Krack, "Robust and fast backbone tracking via phase-locked loops"
 /// (2024), arXiv:2403.06639, for an ideal exciter.

@@ -2,18 +2,18 @@
 
 use crate::angle::Complex;
 
-/// Most harmonics an adaptive filter follows.
+/// Largest number of harmonics of the adaptive filter.
 pub const MAX_HARMONICS: usize = 8;
 
-/// Which harmonics to follow, and how fast.
+/// Coefficients of the adaptive filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Harmonics {
-    /// How many, the fundamental included.
+    /// Number of harmonics, including the fundamental.
     pub count: usize,
-    /// 1, 3, 5, … instead of 1, 2, 3, …
+    /// Whether the harmonics are 1, 3, 5, … instead of 1, 2, 3, ….
     pub odd_only: bool,
-    /// Step of the adaptation, per sample: the coefficient's distance from the truth shrinks by this fraction.
+    /// Adaptation step: fraction by which the error of a coefficient decreases per sample.
     pub step: f64,
 }
 
@@ -23,7 +23,7 @@ pub struct Harmonics {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Coefficients {
     offset: f64,
-    /// The first is the fundamental's.
+    /// The first entry belongs to the fundamental.
     pub harmonic: [Complex; MAX_HARMONICS],
 }
 
@@ -37,15 +37,20 @@ impl Harmonics {
         }
     }
 
-    /// Sum of the steps of all coefficients; the filter is stable below 2 and well behaved below 1.
-    pub fn total_step(&self) -> f64 {
-        self.step * (2 * self.count + 1) as f64
+    /// Number of coefficients: the offset, and two per harmonic.
+    pub fn coefficients(&self) -> usize {
+        2 * self.count + 1
     }
 
-    /// Takes a sample at the oscillator's phase (`rotor = exp(i phase)`) and returns what the filter left unexplained.
+    /// Sum of the steps of all coefficients. The filter is stable below 2; below 1 it converges without oscillation.
+    pub fn total_step(&self) -> f64 {
+        self.step * self.coefficients() as f64
+    }
+
+    /// Updates the coefficients with a sample; `rotor` is `exp(i phase)` of the oscillator. Returns the residual.
     ///
-    /// Least mean squares (LMS): every coefficient moves down the gradient of the squared residual. Since all
-    /// harmonics and the offset share one residual, what belongs to one does not ripple through the others.
+    /// Least mean squares (LMS): every coefficient moves down the gradient of the squared residual. All harmonics and the
+    /// offset share one residual, so that no component causes ripple in another.
     pub fn update(&self, c: &mut Coefficients, sample: f64, rotor: Complex) -> f64 {
         let stride = if self.odd_only {
             rotor.times(rotor)

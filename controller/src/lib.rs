@@ -1,28 +1,29 @@
-//! A phase-locked loop (PLL) that drives a shaker to phase resonance and holds it there.
+//! A phase-locked loop (PLL) that drives a shaker to phase resonance and keeps it there.
 //!
 //! | | |
 //! |---|---|
 //! | type | 2: one integrator in the loop filter, one in the oscillator that turns frequency into phase |
-//! | order | 3: detector low pass, loop filter, and the phase of the lightly damped structure |
-//! | gains | from one knob, the detector's `bandwidth` (usefully 0.02 to 0.5 times the resonance frequency); see [`Gains`] |
-//! | sign | both gains are positive. The response of an oscillator lags more the higher the frequency, so too great a lag is a negative phase error, and lowers the frequency |
-//! | response | may be held instead of the drive ([`PhaseLock::hold_response`]): a loop of type 1 and order 3 on the response's amplitude, its gains positive and from the same knob |
-//! | sampling | one call of [`PhaseLock::process`] every `sample_time`; nothing else keeps time |
+//! | order | 3: low-pass filter of the detector, loop filter, and the phase of the lightly damped structure |
+//! | gains | from one tuning parameter, the detector's `bandwidth` (useful range 0.02 to 0.5 times the resonance frequency); see [`Gains`] |
+//! | sign | both gains are positive. The response of an oscillator lags more at a higher frequency. Too large a lag is a negative phase error, and decreases the frequency |
+//! | amplitude | the response amplitude may be controlled instead of the drive amplitude ([`PhaseLock::hold_response`]): a loop of type 1 and order 3 with positive gains from the same parameter |
+//! | sampling | one call of [`PhaseLock::process`] every `sample_time`; the controller has no other clock |
 //!
-//! The phase error is `wrap(arg response - arg reference - phase_target)`, both phases being those of the
-//! fundamental. With a displacement response and a base displacement as the reference, `phase_target = -pi/2` is phase
-//! resonance.
+//! The phase error is `wrap(arg response - arg reference - phase_target)`, where both phases are those of the
+//! fundamental. With a displacement response and a base displacement as the reference, phase resonance is
+//! `phase_target = -pi/2`.
 //!
-//! **Timing.** [`PhaseLock::process`] takes what the sensors read at the instant `t` and yields the frequency and the
-//! amplitude that hold from `t` to `t + sample_time`. The own oscillator starts with phase 0 at the first sample and never
-//! stops, so a rig whose built-in oscillator is handed `omega` stays in step with it. `drive` is `E sin(phase)` at `t`.
+//! **Timing.** [`PhaseLock::process`] takes the sensor readings at the instant `t` and returns the frequency and the
+//! amplitude from `t` to `t + sample_time`. The internal oscillator starts with phase 0 at the first sample and never
+//! stops. A rig with an oscillator of its own that receives `omega` therefore stays in phase with it. `drive` is
+//! `E sin(phase)` at `t`.
 //!
-//! **Reference.** A reference channel which is absent, or has never read other than exactly zero, counts as not
-//! connected: then the own oscillator, late by the stated `delay`, is the reference. From the first other reading on
-//! the channel is believed. Both channels pass identical detectors, so that what these do to the phase cancels.
+//! **Reference.** A reference channel that is absent, or has read exactly zero so far, counts as not connected. Then the
+//! internal oscillator with the configured `delay` is the reference. From the first other reading on, the channel is
+//! the reference. Both channels have identical detectors, so that their phase shifts cancel.
 //!
-//! **Safety.** Whatever the sensors read, NaN included, every output is finite and within the configured limits, and a
-//! reading that cannot be trusted ramps the drive down and latches; see [`Phase`].
+//! **Safety.** For any sensor readings, including NaN, every output is finite and within the configured limits. An
+//! invalid reading ramps the drive down and latches; see [`LoopState`].
 //!
 //! ```
 //! use phase_lock::{Config, Input};
@@ -46,7 +47,9 @@
 #![no_std]
 #![forbid(unsafe_code)]
 
+mod amplitude_loop;
 mod angle;
+mod check;
 mod config;
 mod controller;
 mod detector;
@@ -56,18 +59,24 @@ mod gains;
 mod harmonics;
 mod loop_filter;
 mod oscillator;
-mod response_loop;
+mod parameters;
+mod range;
 mod sample_clock;
+mod sensing;
 mod signals;
+mod state;
 mod stationarity;
 mod supervisor;
 
+pub use amplitude_loop::Move;
 pub use config::{Config, Detector, LockCriterion};
-pub use controller::{PhaseLock, State};
+pub use controller::PhaseLock;
 pub use error::ConfigError;
 pub use gains::Gains;
 pub use harmonics::MAX_HARMONICS;
-pub use response_loop::Move;
+pub use parameters::{PARAMETERS, Parameter};
+pub use range::{Range, Value};
 pub use sample_clock::SampleClock;
 pub use signals::{Input, Output};
-pub use supervisor::{Fault, Phase};
+pub use state::State;
+pub use supervisor::{Fault, LoopState};

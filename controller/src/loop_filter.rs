@@ -1,8 +1,9 @@
-//! The loop filter: from a phase error to a frequency.
+//! The loop filter: computes the frequency from the phase error.
 
+use crate::config::Config;
 use crate::gains::Gains;
 
-/// A PI filter with bounds, a limited rate of change, and conditional anti-windup.
+/// A PI filter with limits, a limited rate of change, and conditional anti-windup.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LoopFilter {
@@ -11,7 +12,7 @@ pub struct LoopFilter {
     pub omega_min: f64,
     /// rad/s
     pub omega_max: f64,
-    /// Largest change in one sample, rad/s; infinite where there is no limit.
+    /// Largest change per sample, rad/s; infinite without a limit.
     pub max_change: f64,
     /// s
     pub sample_time: f64,
@@ -23,11 +24,12 @@ pub struct LoopFilter {
 pub struct Frequency {
     /// Centre frequency and integral part, rad/s.
     pub integral: f64,
-    /// Frequency put out, rad/s.
+    /// Output frequency, rad/s.
     pub omega: f64,
 }
 
 impl Frequency {
+    /// The state at a constant frequency, rad/s.
     pub fn at(omega: f64) -> Self {
         Self {
             integral: omega,
@@ -37,37 +39,51 @@ impl Frequency {
 }
 
 impl LoopFilter {
-    /// Closes the loop for one sample on `error`, rad.
+    /// The filter of a configuration.
+    pub fn new(config: &Config) -> Self {
+        Self {
+            gains: Gains::from_bandwidth(config.bandwidth, config.damping_rate),
+            omega_min: config.omega_min,
+            omega_max: config.omega_max,
+            max_change: if config.omega_rate > 0.0 {
+                config.omega_rate * config.sample_time
+            } else {
+                f64::INFINITY
+            },
+            sample_time: config.sample_time,
+        }
+    }
+
+    /// One sample with the loop closed; `error` in rad.
     pub fn follow(&self, frequency: &mut Frequency, error: f64) {
-        let wanted = frequency.integral + self.gains.proportional * error;
-        let granted = self.limit(frequency.omega, wanted);
-        frequency.omega = granted;
-        // The integral moves unless a limit already withholds what it would ask more of.
-        let withheld = wanted - granted;
-        if withheld * error <= 0.0 {
+        let unlimited = frequency.integral + self.gains.proportional * error;
+        frequency.omega = self.limit(frequency.omega, unlimited);
+        // Anti-windup: no integration in the direction in which the output is already limited.
+        let excess = unlimited - frequency.omega;
+        if excess * error <= 0.0 {
             let integral = frequency.integral + self.gains.integral * self.sample_time * error;
             frequency.integral = integral.clamp(self.omega_min, self.omega_max);
         }
     }
 
-    /// Shifts the frequency by `shift`, rad/s, with the loop as it is.
+    /// Shifts the centre frequency by `shift`, rad/s.
     pub fn shift(&self, frequency: &mut Frequency, shift: f64) {
         let integral = frequency.integral + shift;
         frequency.integral = integral.clamp(self.omega_min, self.omega_max);
     }
 
-    /// Opens the loop for one sample and moves towards `omega`, rad/s.
+    /// One sample with the loop open; the frequency moves towards `omega`, rad/s.
     pub fn go_to(&self, frequency: &mut Frequency, omega: f64) {
         *frequency = Frequency::at(self.limit(frequency.omega, omega));
     }
 
-    /// Opens the loop for one sample; the integral part stays.
+    /// One sample with the loop open; the integral part does not change.
     pub fn hold(&self, frequency: &mut Frequency) {
         frequency.omega = self.limit(frequency.omega, frequency.integral);
     }
 
-    fn limit(&self, before: f64, wanted: f64) -> f64 {
-        wanted
+    fn limit(&self, before: f64, unlimited: f64) -> f64 {
+        unlimited
             .clamp(before - self.max_change, before + self.max_change)
             .clamp(self.omega_min, self.omega_max)
     }
@@ -89,7 +105,7 @@ mod tests {
     };
 
     #[test]
-    fn a_saturated_loop_recovers_at_once() {
+    fn a_saturated_loop_recovers_within_one_sample() {
         let mut frequency = Frequency::at(10.0);
         for _ in 0..100_000 {
             FILTER.follow(&mut frequency, 2.0);
@@ -101,7 +117,7 @@ mod tests {
     }
 
     #[test]
-    fn a_limited_rate_does_not_wind_up_either() {
+    fn a_limited_rate_causes_no_windup() {
         let filter = LoopFilter {
             max_change: 1e-3,
             ..FILTER

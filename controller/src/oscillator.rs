@@ -4,8 +4,8 @@ use core::f64::consts::TAU;
 
 use crate::angle::Complex;
 
-/// Phase of the own oscillator, in turns: taking off a whole turn is exact in binary, so wrapping costs no accuracy
-/// however long the run.
+/// Phase of the internal oscillator, in turns. Subtracting a whole turn is exact in binary arithmetic, so wrapping
+/// causes no rounding error however long the run is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Oscillator {
@@ -23,7 +23,7 @@ impl Oscillator {
         Complex::unit(self.phase())
     }
 
-    /// Advances by `omega` (rad/s) times `duration` (s), less than one turn; true where a new period begins.
+    /// Advances by `omega` (rad/s) times `duration` (s), less than one turn. Returns whether a new period begins.
     pub fn advance(&mut self, omega: f64, duration: f64) -> bool {
         self.turns += omega * duration / TAU;
         let wrapped = self.turns >= 1.0;

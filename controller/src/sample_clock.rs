@@ -1,18 +1,18 @@
-//! A sampling grid inside steps of any length.
+//! A sampling grid within communication steps of any length.
 
 use core::ops::Range;
 
-/// Slack, in samples, below which an instant is not told from a grid point, ...
+/// An instant counts as a grid point if it is closer than this slack, in samples.
 const SLACK: f64 = 1e-6;
-/// ... what it grows by per sample, because the error of a caller's step adds up, ...
+/// Growth of the slack per sample: the rounding errors of the caller's steps accumulate.
 const SLACK_PER_SAMPLE: f64 = 2e-9;
-/// ... and where it ends.
+/// Largest slack, in samples.
 const SLACK_MAX: f64 = 0.25;
 
-/// Tells which samples, taken at `0, sample_time, 2 sample_time, …`, fall into successive steps `[t, t + h)`.
+/// Determines which of the samples at `0, sample_time, 2 sample_time, …` lie in successive steps `[t, t + h)`.
 ///
-/// Samples are counted, never timed, so none is lost or taken twice. Steps which are nominally a multiple of the
-/// sample time but deviate from it by up to 1e-9 relative hold the same number of samples every time.
+/// The clock counts samples, so none is lost or taken twice. Steps that are nominally a multiple of the sample time but
+/// deviate from it by up to 1e-9, relative, contain the same number of samples every time.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct SampleClock {
@@ -36,13 +36,13 @@ impl SampleClock {
         self.taken
     }
 
-    /// Numbers of the samples not yet taken that lie before `until` (s since the start); they count as taken after.
+    /// Takes the samples before `until` (s since the start) and returns their numbers.
     ///
-    /// A long step holds several, a short one none, an `until` that goes backwards or is NaN none.
+    /// A long step contains several samples, a short one perhaps none. The range is empty if `until` decreases or is NaN.
     pub fn take(&mut self, until: f64) -> Range<u64> {
         let end = until / self.sample_time;
         let slack = (SLACK + SLACK_PER_SAMPLE * end).min(SLACK_MAX);
-        // The conversion saturates: NaN and negative numbers become 0.
+        // The conversion saturates: NaN and negative numbers give 0.
         let end = libm::ceil(end - slack) as u64;
         let first = self.taken;
         self.taken = first.max(end);
@@ -52,6 +52,10 @@ impl SampleClock {
 
 #[cfg(test)]
 mod tests {
+    extern crate std;
+
+    use std::vec::Vec;
+
     use super::*;
 
     fn counts(sample_time: f64, step: f64, steps: u32) -> impl Iterator<Item = usize> {
@@ -93,7 +97,4 @@ mod tests {
         }
         assert_eq!((seen, clock.taken()), (11, 11));
     }
-
-    extern crate std;
-    use std::vec::Vec;
 }

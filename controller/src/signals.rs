@@ -1,21 +1,21 @@
-//! What a sample brings in, and what it puts out.
+//! Input and output of a sample.
 
-use crate::supervisor::{Fault, Phase};
+use crate::supervisor::{Fault, LoopState};
 
-/// What the sensors read at a sample, and what the operator wants.
+/// Sensor readings of a sample, and the operator's request.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Input {
     /// Response of the structure, m.
     pub response: f64,
-    /// Displacement of the base, m. None, or a channel that has never read other than exactly zero, makes the own
-    /// oscillator the reference.
+    /// Displacement of the base, m. If it is `None`, or if the channel has read exactly zero so far, the internal
+    /// oscillator is the reference.
     pub reference: Option<f64>,
-    /// Whether the drive is wanted. Going from false to true arms the controller, also after a fault.
+    /// Whether the drive is requested. A change from false to true arms the controller, also after a fault.
     pub active: bool,
 }
 
-/// What the controller wants until the next sample, and what it knows.
+/// Drive until the next sample, and the controller's estimates.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Output {
@@ -23,30 +23,52 @@ pub struct Output {
     pub omega: f64,
     /// Drive amplitude `E`, m; always between 0 and `amplitude_max` (where that is set).
     pub amplitude: f64,
-    /// The base displacement wanted at this sample, `E sin(phase)`, m, for a rig that takes samples.
+    /// Setpoint of the base displacement at this sample, `E sin(phase)`, m, for a rig that takes samples.
     pub drive: f64,
-    /// Phase of the response relative to the reference, less the target, rad, in [-pi, pi]; 0 while there is nothing to
-    /// measure.
+    /// Phase of the response relative to the reference, minus the target, rad, in [-pi, pi]; 0 while one of the two
+    /// amplitudes is 0.
     pub phase_error: f64,
     /// Amplitude of the response's fundamental, m.
     pub response_amplitude: f64,
-    /// Response amplitude that is held now, m; 0 where the drive amplitude is what is held.
+    /// Present setpoint of the response amplitude, m; 0 while the drive amplitude is controlled instead.
     pub response_target: f64,
-    /// Amplitude of the reference's fundamental, m: measured, or the own drive's.
+    /// Amplitude of the reference's fundamental, m: measured, or that of the drive.
     pub reference_amplitude: f64,
-    /// Power of the response's fundamental relative to itself and what the detector leaves unexplained, 0 to 1.
+    /// Power of the response's fundamental over the sum of itself and the detector's residual power, 0 to 1.
     pub coherence: f64,
-    /// Mean frequency, rad/s, over the complete blocks of the running dwell; `omega` where there is none yet.
+    /// Mean frequency, rad/s, over the complete blocks of the running dwell; `omega` before the first one.
     pub frequency: f64,
-    /// Mean of `response_amplitude`, m, over the same blocks; `response_amplitude` where there is none yet.
+    /// Mean of `response_amplitude`, m, over the same blocks; `response_amplitude` before the first one.
     pub response_mean: f64,
-    /// Phase resonance is held: the lock criterion has been met, and the phase has not escaped since.
+    /// Whether the loop is locked: the lock criterion has been met, and the lock has not been lost since.
     pub locked: bool,
-    /// The lock criterion is met now: phase, frequency and amplitude have been stationary for the whole dwell. Turns
-    /// false at once where the controller is retuned, and true again once the new point has settled.
+    /// Whether the lock criterion is met now: phase, frequency and amplitude have been stationary for the whole dwell.
+    /// A retuned controller is not settled until the new operating point is stationary.
     pub settled: bool,
-    /// State of the sequence.
-    pub state: Phase,
-    /// Why the drive was taken away; kept until the controller is armed again.
+    /// State of the loop.
+    pub state: LoopState,
+    /// Reason why the drive was switched off; kept until the controller is armed again.
     pub fault: Option<Fault>,
+}
+
+impl Output {
+    /// The output before the first sample: no drive, no measurements.
+    pub(crate) fn idle(omega: f64) -> Self {
+        Self {
+            omega,
+            amplitude: 0.0,
+            drive: 0.0,
+            phase_error: 0.0,
+            response_amplitude: 0.0,
+            response_target: 0.0,
+            reference_amplitude: 0.0,
+            coherence: 0.0,
+            frequency: omega,
+            response_mean: 0.0,
+            locked: false,
+            settled: false,
+            state: LoopState::Idle,
+            fault: None,
+        }
+    }
 }

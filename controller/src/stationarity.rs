@@ -1,9 +1,11 @@
-//! Whether phase, frequency and amplitude have been stationary.
+//! Stationarity of phase, frequency and amplitude.
 
-/// Blocks that a dwell is cut into.
+use crate::config::LockCriterion;
+
+/// Number of blocks of a dwell.
 const BLOCKS: usize = 4;
 
-/// The criterion. Impacts make every sample ripple, so only means over whole periods are ever compared.
+/// The criterion. Impacts cause ripple within a period, so it compares means over whole periods only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stationarity {
@@ -19,19 +21,19 @@ pub struct Stationarity {
     pub block: u32,
 }
 
-/// What enters the criterion at a sample.
+/// Values of a sample that the criterion uses.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     /// Phase error, rad.
     pub error: f64,
-    /// Integral part of the frequency, rad/s: the smoother one, and the same where the phase error is 0.
+    /// Integral part of the frequency, rad/s. It is smoother than the frequency, and equal to it at zero phase error.
     pub integral: f64,
     /// Frequency, rad/s.
     pub omega: f64,
     /// Response amplitude, m.
     pub amplitude: f64,
-    /// Whether these can be believed.
-    pub qualified: bool,
+    /// Whether these values are valid.
+    pub valid: bool,
 }
 
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -42,7 +44,7 @@ struct Sums {
     omega: f64,
     amplitude: f64,
     samples: u64,
-    unqualified: u64,
+    invalid: u64,
 }
 
 impl Sums {
@@ -52,7 +54,7 @@ impl Sums {
         self.omega += other.omega;
         self.amplitude += other.amplitude;
         self.samples += other.samples;
-        self.unqualified += other.unqualified;
+        self.invalid += other.invalid;
     }
 }
 
@@ -65,7 +67,7 @@ struct Block {
     amplitude: f64,
 }
 
-/// The running dwell: the last complete blocks, and the one being filled.
+/// The running dwell: the last complete blocks, and the present one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Dwell {
@@ -94,7 +96,18 @@ impl Dwell {
 }
 
 impl Stationarity {
-    /// Takes a sample; `period_ends` where it is the last one of a period. True where the phase has escaped.
+    /// The criterion of a configuration.
+    pub fn new(lock: &LockCriterion) -> Self {
+        Self {
+            phase_tolerance: lock.phase_tolerance,
+            unlock_tolerance: lock.unlock_tolerance,
+            frequency_drift: lock.frequency_drift,
+            amplitude_drift: lock.amplitude_drift,
+            block: lock.dwell.div_ceil(BLOCKS as u32),
+        }
+    }
+
+    /// Takes a sample; `period_ends` marks the last one of a period. Returns whether the lock is lost.
     pub fn update(&self, dwell: &mut Dwell, reading: &Reading, period_ends: bool) -> bool {
         dwell.period.add(&Sums {
             error: reading.error,
@@ -102,20 +115,20 @@ impl Stationarity {
             omega: reading.omega,
             amplitude: reading.amplitude,
             samples: 1,
-            unqualified: u64::from(!reading.qualified),
+            invalid: u64::from(!reading.valid),
         });
         if !period_ends {
             return false;
         }
         let period = core::mem::take(&mut dwell.period);
         let error = (period.error / period.samples as f64).abs();
-        let believed = period.unqualified == 0;
-        if believed && error <= self.phase_tolerance {
+        let valid = period.invalid == 0;
+        if valid && error <= self.phase_tolerance {
             self.end_period(dwell, &period);
         } else {
             *dwell = Dwell::default();
         }
-        !believed || error > self.unlock_tolerance
+        !valid || error > self.unlock_tolerance
     }
 
     fn end_period(&self, dwell: &mut Dwell, period: &Sums) {
@@ -134,16 +147,16 @@ impl Stationarity {
             amplitude: sums.amplitude / samples,
         };
         dwell.complete = (dwell.complete + 1).min(BLOCKS);
-        // Between the middles of the first and the last block. The range also sees what a slope would miss: the crest
-        // of a slow modulation.
-        let apart = f64::from(self.block) * (BLOCKS - 1) as f64;
+        // Periods between the centres of the first and the last block. A slope would miss the crest of a slow
+        // modulation; the range does not.
+        let distance = f64::from(self.block) * (BLOCKS - 1) as f64;
         dwell.settled = dwell.complete == BLOCKS
-            && range(&dwell.blocks, |block| block.integral) <= self.frequency_drift * apart
-            && range(&dwell.blocks, |block| block.amplitude) <= self.amplitude_drift * apart;
+            && range(&dwell.blocks, |block| block.integral) <= self.frequency_drift * distance
+            && range(&dwell.blocks, |block| block.amplitude) <= self.amplitude_drift * distance;
     }
 }
 
-/// Largest less smallest, relative to the last.
+/// Difference of the largest and the smallest value, relative to the last one.
 fn range(blocks: &[Block; BLOCKS], value: impl Fn(&Block) -> f64) -> f64 {
     let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
     for block in blocks {
@@ -164,15 +177,15 @@ mod tests {
         amplitude_drift: 1e-4,
         block: 5,
     };
-    const STILL: Reading = Reading {
+    const CONSTANT: Reading = Reading {
         error: 0.0,
         integral: 1.0,
         omega: 1.0,
         amplitude: 1.0,
-        qualified: true,
+        valid: true,
     };
 
-    /// Periods of ten samples until settled, or None within 200.
+    /// Number of periods of ten samples until settled; None after 200.
     fn periods_to_settle(reading: impl Fn(f64) -> Reading) -> Option<u32> {
         let mut dwell = Dwell::default();
         (1..=200).find(|period| {
@@ -185,32 +198,32 @@ mod tests {
     }
 
     #[test]
-    fn a_still_signal_settles_after_the_dwell() {
-        assert_eq!(periods_to_settle(|_| STILL), Some(20));
+    fn a_constant_signal_settles_after_the_dwell() {
+        assert_eq!(periods_to_settle(|_| CONSTANT), Some(20));
     }
 
     #[test]
     fn ripple_within_the_period_does_not_matter() {
         let reading = |t: f64| Reading {
             error: 0.05 * libm::sin(core::f64::consts::TAU * t),
-            ..STILL
+            ..CONSTANT
         };
         assert_eq!(periods_to_settle(reading), Some(20));
     }
 
     #[test]
-    fn what_drifts_too_fast_does_not_settle() {
+    fn a_signal_that_drifts_too_fast_does_not_settle() {
         let amplitude = |rate: f64| {
             move |t: f64| Reading {
                 amplitude: 1.0 + rate * t,
-                ..STILL
+                ..CONSTANT
             }
         };
         assert_eq!(periods_to_settle(amplitude(1.1e-4)), None);
         assert_eq!(periods_to_settle(amplitude(0.9e-4)), Some(20));
         let frequency = |t: f64| Reading {
             integral: 1.0 + 1.1e-6 * t,
-            ..STILL
+            ..CONSTANT
         };
         assert_eq!(periods_to_settle(frequency), None);
     }
@@ -219,25 +232,26 @@ mod tests {
     fn a_slow_modulation_is_not_stationary_at_its_crest() {
         let reading = |t: f64| Reading {
             amplitude: 1.0 + 0.1 * libm::sin(0.06 * t),
-            ..STILL
+            ..CONSTANT
         };
         assert_eq!(periods_to_settle(reading), None);
     }
 
     #[test]
-    fn one_unbelievable_sample_starts_the_dwell_again() {
+    fn one_invalid_sample_restarts_the_dwell() {
         let reading = |t: f64| Reading {
-            qualified: t != 10.5,
-            ..STILL
+            valid: t != 10.5,
+            ..CONSTANT
         };
         assert_eq!(periods_to_settle(reading), Some(30));
     }
 
     #[test]
-    fn the_phase_escapes_only_beyond_the_wider_tolerance() {
+    fn the_lock_is_lost_only_beyond_the_wider_tolerance() {
         let mut dwell = Dwell::default();
-        let mut escapes = |error| CRITERION.update(&mut dwell, &Reading { error, ..STILL }, true);
-        assert!(!escapes(0.05) && !escapes(-0.09));
-        assert!(escapes(0.11));
+        let mut is_lost =
+            |error| CRITERION.update(&mut dwell, &Reading { error, ..CONSTANT }, true);
+        assert!(!is_lost(0.05) && !is_lost(-0.09));
+        assert!(is_lost(0.11));
     }
 }

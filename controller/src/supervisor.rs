@@ -1,58 +1,58 @@
-//! The sequence: what may follow what.
+//! The state machine of the loop.
 
-/// State of the sequence. The numbers are those of the FMU's `state`.
+/// State of the loop. The numbers are those of the FMU's `state`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub enum Phase {
-    /// Not armed; the drive is off, or on its way there after a fault. The oscillator runs at `omega_start`.
+pub enum LoopState {
+    /// Not armed; the drive is off, or still ramps down after a fault. The oscillator runs at `omega_start`.
     #[default]
     Idle = 0,
-    /// The drive rises at `omega_start`; the loop is open.
+    /// The drive ramps up at `omega_start`; the loop is open.
     Ramping = 1,
-    /// The loop is closed, and not yet locked.
+    /// The loop is closed, but not yet locked.
     Acquiring = 2,
-    /// Phase resonance is held.
+    /// Locked at phase resonance.
     Locked = 3,
-    /// The phase escaped. The drive ramps down; latched until `active` is taken away.
+    /// The lock was lost. The drive ramps down; latched until `active` becomes false.
     LockLost = 4,
-    /// A [`Fault`] other than a lost lock. The drive ramps down; latched until `active` is taken away.
+    /// A [`Fault`] other than a lost lock. The drive ramps down; latched until `active` becomes false.
     Tripped = 5,
-    /// `active` was taken away: the drive is released, the frequency stays.
+    /// `active` became false: the drive is released, the frequency stays constant.
     ShutDown = 6,
 }
 
-/// Why the drive was taken away. The numbers are those of the FMU's `fault`, where 0 is none.
+/// Reason why the drive was switched off. The numbers are those of the FMU's `fault`, where 0 means no fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Fault {
-    /// A sensor read NaN, infinity, or a number beyond all reason.
+    /// A sensor read NaN, infinity, or more than 1e100 m.
     Sensor = 1,
     /// The response exceeded `response_max`.
     ResponseTooLarge = 2,
     /// No lock within `acquire_timeout`.
     TimedOut = 3,
-    /// The phase escaped, or the response was lost in noise, while locked.
+    /// The phase error exceeded `unlock_tolerance`, or the response was no longer valid, while locked.
     LockLost = 4,
 }
 
-/// What the sequence depends on.
+/// Conditions of the transitions.
 #[derive(Clone, Copy, Debug, Default)]
-pub struct Signs {
-    /// The operator wants the drive.
+pub struct Conditions {
+    /// The operator requests the drive.
     pub active: bool,
-    /// A reading that cannot be tolerated.
+    /// Fault of a sensor reading.
     pub fault: Option<Fault>,
     /// The ramp has ended.
     pub ready: bool,
     /// The lock criterion is met.
     pub settled: bool,
-    /// The phase has escaped.
-    pub escaped: bool,
-    /// Acquiring has taken too long.
-    pub late: bool,
+    /// The phase error or the validity of the response ends the lock.
+    pub lost: bool,
+    /// The time limit for acquiring the lock is over.
+    pub timed_out: bool,
 }
 
-impl Phase {
+impl LoopState {
     /// Whether the drive is on.
     #[must_use]
     pub fn is_driving(self) -> bool {
@@ -65,21 +65,21 @@ impl Phase {
         matches!(self, Self::Acquiring | Self::Locked)
     }
 
-    /// The next state, and the fault that led there.
-    pub(crate) fn next(self, signs: &Signs) -> (Self, Option<Fault>) {
+    /// The next state, and the fault that caused it.
+    pub(crate) fn next(self, conditions: &Conditions) -> (Self, Option<Fault>) {
         match self {
-            Self::Ramping | Self::Acquiring | Self::Locked if !signs.active => {
+            Self::Ramping | Self::Acquiring | Self::Locked if !conditions.active => {
                 (Self::ShutDown, None)
             }
-            Self::LockLost | Self::Tripped if !signs.active => (Self::Idle, None),
+            Self::LockLost | Self::Tripped if !conditions.active => (Self::Idle, None),
             Self::LockLost | Self::Tripped => (self, None),
-            Self::Idle | Self::ShutDown if !signs.active => (self, None),
-            _ if signs.fault.is_some() => (Self::Tripped, signs.fault),
+            Self::Idle | Self::ShutDown if !conditions.active => (self, None),
+            _ if conditions.fault.is_some() => (Self::Tripped, conditions.fault),
             Self::Idle | Self::ShutDown => (Self::Ramping, None),
-            Self::Ramping if signs.ready => (Self::Acquiring, None),
-            Self::Acquiring if signs.settled => (Self::Locked, None),
-            Self::Acquiring if signs.late => (Self::Tripped, Some(Fault::TimedOut)),
-            Self::Locked if signs.escaped => (Self::LockLost, Some(Fault::LockLost)),
+            Self::Ramping if conditions.ready => (Self::Acquiring, None),
+            Self::Acquiring if conditions.settled => (Self::Locked, None),
+            Self::Acquiring if conditions.timed_out => (Self::Tripped, Some(Fault::TimedOut)),
+            Self::Locked if conditions.lost => (Self::LockLost, Some(Fault::LockLost)),
             running => (running, None),
         }
     }
@@ -89,44 +89,44 @@ impl Phase {
 mod tests {
     use super::*;
 
-    const ACTIVE: Signs = Signs {
+    const ACTIVE: Conditions = Conditions {
         active: true,
         fault: None,
         ready: true,
         settled: true,
-        escaped: false,
-        late: false,
+        lost: false,
+        timed_out: false,
     };
-    const ALL: [Phase; 7] = [
-        Phase::Idle,
-        Phase::Ramping,
-        Phase::Acquiring,
-        Phase::Locked,
-        Phase::LockLost,
-        Phase::Tripped,
-        Phase::ShutDown,
+    const ALL: [LoopState; 7] = [
+        LoopState::Idle,
+        LoopState::Ramping,
+        LoopState::Acquiring,
+        LoopState::Locked,
+        LoopState::LockLost,
+        LoopState::Tripped,
+        LoopState::ShutDown,
     ];
 
     #[test]
-    fn the_way_to_a_lock_leaves_no_state_out() {
-        let mut phase = Phase::Idle;
+    fn locking_passes_through_every_state_in_order() {
+        let mut state = LoopState::Idle;
         for expected in [
-            Phase::Ramping,
-            Phase::Acquiring,
-            Phase::Locked,
-            Phase::Locked,
+            LoopState::Ramping,
+            LoopState::Acquiring,
+            LoopState::Locked,
+            LoopState::Locked,
         ] {
-            phase = phase.next(&ACTIVE).0;
-            assert_eq!(phase, expected);
+            state = state.next(&ACTIVE).0;
+            assert_eq!(state, expected);
         }
     }
 
     #[test]
-    fn nothing_drives_once_active_is_taken_away() {
-        for phase in ALL {
+    fn no_state_drives_after_active_becomes_false() {
+        for state in ALL {
             assert!(
-                !phase
-                    .next(&Signs {
+                !state
+                    .next(&Conditions {
                         active: false,
                         ..ACTIVE
                     })
@@ -138,39 +138,42 @@ mod tests {
 
     #[test]
     fn no_state_drives_on_a_fault() {
-        let signs = Signs {
+        let conditions = Conditions {
             fault: Some(Fault::Sensor),
             ..ACTIVE
         };
-        for phase in ALL {
-            assert!(!phase.next(&signs).0.is_driving());
+        for state in ALL {
+            assert!(!state.next(&conditions).0.is_driving());
         }
     }
 
     #[test]
-    fn what_is_latched_needs_active_taken_away() {
-        for phase in [Phase::LockLost, Phase::Tripped] {
-            assert_eq!(phase.next(&ACTIVE).0, phase);
+    fn a_latched_state_ends_only_when_active_becomes_false() {
+        for state in [LoopState::LockLost, LoopState::Tripped] {
+            assert_eq!(state.next(&ACTIVE).0, state);
             assert_eq!(
-                phase
-                    .next(&Signs {
+                state
+                    .next(&Conditions {
                         active: false,
                         ..ACTIVE
                     })
                     .0,
-                Phase::Idle
+                LoopState::Idle
             );
         }
     }
 
     #[test]
     fn a_lock_is_lost_only_from_locked() {
-        let signs = Signs {
-            escaped: true,
+        let conditions = Conditions {
+            lost: true,
             settled: false,
             ..ACTIVE
         };
-        assert_eq!(Phase::Locked.next(&signs).0, Phase::LockLost);
-        assert_eq!(Phase::Acquiring.next(&signs).0, Phase::Acquiring);
+        assert_eq!(LoopState::Locked.next(&conditions).0, LoopState::LockLost);
+        assert_eq!(
+            LoopState::Acquiring.next(&conditions).0,
+            LoopState::Acquiring
+        );
     }
 }

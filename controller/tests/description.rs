@@ -1,54 +1,104 @@
-//! The FMU's start values are those of the core.
+//! The FMU's `modelDescription.xml` against the core's table of parameters.
 
-use phase_lock::{Config, LockCriterion};
+use phase_lock::{Config, PARAMETERS, Range, Value};
 
 const DESCRIPTION: &str = include_str!("../fmu/modelDescription.xml");
 
-fn start(name: &str) -> f64 {
-    let variable = DESCRIPTION
-        .split("<ScalarVariable ")
+/// The text of each variable's element.
+fn variables() -> impl Iterator<Item = &'static str> {
+    DESCRIPTION.split("<ScalarVariable ").skip(1)
+}
+
+fn attribute<'a>(element: &'a str, name: &str) -> Option<&'a str> {
+    let from = element.find(&format!(" {name}=\""))? + name.len() + 3;
+    element[from..].split('"').next()
+}
+
+/// The element of a variable.
+fn variable(name: &str) -> &'static str {
+    variables()
         .find(|text| text.starts_with(&format!("name=\"{name}\"")))
-        .unwrap_or_else(|| panic!("no variable {name}"));
-    let value = variable.split("start=\"").nth(1).expect("a start value");
-    value
-        .split('"')
-        .next()
-        .and_then(|text| text.parse().ok())
-        .expect("a number")
+        .unwrap_or_else(|| panic!("no variable {name}"))
+}
+
+fn number(element: &str, name: &str) -> Option<f64> {
+    attribute(element, name).map(|text| text.parse().expect("a number"))
+}
+
+#[test]
+fn the_parameters_of_the_fmu_are_those_of_the_core_in_the_same_order() {
+    let described: Vec<_> = variables()
+        .filter(|text| attribute(text, "causality") == Some("parameter"))
+        .map(|text| {
+            let (name, _) = text["name=\"".len()..].split_once('"').expect("a name");
+            name
+        })
+        .collect();
+    let in_core: Vec<_> = PARAMETERS
+        .iter()
+        .filter(|parameter| parameter.is_in_fmu())
+        .map(|parameter| parameter.name)
+        .collect();
+    assert_eq!(described, in_core);
+}
+
+#[test]
+fn types_and_units_of_the_fmu_are_those_of_the_core() {
+    let config = Config::for_resonance(1.0, 1.0);
+    for parameter in PARAMETERS.iter().filter(|parameter| parameter.is_in_fmu()) {
+        let element = variable(parameter.name);
+        let (kind, unit) = match parameter.get(&config) {
+            // FMI writes the unit of a pure number as 1.
+            Value::Real(_) if parameter.unit.is_empty() => ("<Real ", Some("1")),
+            Value::Real(_) => ("<Real ", Some(parameter.unit)),
+            Value::Integer(_) => ("<Integer ", None),
+            Value::Boolean(_) => ("<Boolean ", None),
+        };
+        assert!(element.contains(kind), "{}", parameter.name);
+        assert_eq!(attribute(element, "unit"), unit, "{}", parameter.name);
+    }
 }
 
 #[test]
 fn the_fmu_starts_as_the_core_would_for_the_same_resonance() {
+    let start = |name| number(variable(name), "start").expect("a start value");
     let (omega, amplitude) = (start("omega_start"), start("amplitude"));
     assert!((omega - (11.68e3_f64 / 3.807).sqrt()).abs() < 1e-12);
     let config = Config::for_resonance(omega, amplitude);
-    let LockCriterion { dwell, .. } = config.lock;
-    for (name, expected) in [
-        ("sample_time", config.sample_time),
-        ("omega_min", config.omega_min),
-        ("omega_max", config.omega_max),
-        ("omega_rate", config.omega_rate),
-        ("amplitude_max", config.amplitude_max),
-        ("ramp_time", config.ramp_time),
-        ("release_time", config.release_time),
-        ("base_bandwidth", config.base_bandwidth),
-        ("phase_target", config.phase_target),
-        ("bandwidth", config.bandwidth),
-        ("delay", config.delay),
-        ("lock.phase_tolerance", config.lock.phase_tolerance),
-        ("lock.unlock_tolerance", config.lock.unlock_tolerance),
-        ("lock.frequency_drift", config.lock.frequency_drift),
-        ("lock.amplitude_drift", config.lock.amplitude_drift),
-        ("lock.dwell", dwell.into()),
-        ("lock.coherence_min", config.lock.coherence_min),
-        ("lock.response_min", config.lock.response_min),
-        ("response_max", config.response_max),
-        ("acquire_timeout", config.acquire_timeout),
-    ] {
+    for parameter in PARAMETERS.iter().filter(|parameter| parameter.is_in_fmu()) {
+        let name = parameter.name;
+        let expected = match parameter.get(&config) {
+            Value::Real(expected) => expected,
+            Value::Integer(expected) => expected.into(),
+            Value::Boolean(expected) => {
+                let start = attribute(variable(name), "start");
+                assert_eq!(
+                    start,
+                    Some(if expected { "true" } else { "false" }),
+                    "{name}"
+                );
+                continue;
+            }
+        };
         let value = start(name);
         assert!(
             (value - expected).abs() <= 1e-12 * expected.abs(),
             "{name}: {value}, {expected}"
+        );
+    }
+}
+
+#[test]
+fn start_values_lie_in_the_ranges_of_the_core() {
+    for parameter in PARAMETERS.iter().filter(|parameter| parameter.is_in_fmu()) {
+        if parameter.range == Range::Boolean {
+            continue;
+        }
+        let start = number(variable(parameter.name), "start").expect("a start value");
+        assert!(
+            parameter.range.contains(start),
+            "{} = {start}",
+            parameter.name
         );
     }
 }

@@ -1,13 +1,13 @@
-//! Limits, and what is refused.
+//! Limits of the outputs, and refused configurations.
 
 mod rig;
 
-use phase_lock::{Config, Input, Move, Phase};
+use phase_lock::{Config, Input, LoopState, Move};
 use proptest::prelude::*;
 use rig::{Bench, OMEGA_0, config};
 
 #[test]
-fn ramps_keep_to_their_rates() {
+fn ramps_stay_within_their_rates() {
     let mut bench = Bench::new(Config {
         ramp_time: 2.0,
         omega_rate: 0.5,
@@ -34,7 +34,7 @@ fn ramps_keep_to_their_rates() {
 }
 
 #[test]
-fn a_configuration_that_makes_no_sense_is_refused_by_name() {
+fn an_invalid_configuration_is_refused_by_name() {
     let refusal = |config: Config| config.build().expect_err("must be refused").to_string();
     assert_eq!(
         refusal(Config {
@@ -136,7 +136,7 @@ proptest! {
         let mut state = controller.start();
         for (n, (response, reference, active)) in readings.into_iter().enumerate() {
             if hold && n % 50 == 40 {
-                // Refused where the loop is open; what it does elsewhere must keep to the limits.
+                // Refused while the loop is open; otherwise the outputs must stay within the limits.
                 let to = Move { response: 0.01, duration: 0.1, amplitude: 1.0, omega: -500.0 };
                 let _ = controller.hold_response(&mut state, to);
             }
@@ -148,7 +148,7 @@ proptest! {
             prop_assert!(output.phase_error.abs() <= std::f64::consts::PI);
             prop_assert!(output.response_amplitude.is_finite() && output.reference_amplitude.is_finite());
             prop_assert!((0.0..=1.0).contains(&output.coherence));
-            prop_assert!(!output.locked || output.state == Phase::Locked);
+            prop_assert!(!output.locked || output.state == LoopState::Locked);
         }
     }
 }

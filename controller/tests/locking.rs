@@ -1,8 +1,8 @@
-//! The loop around a resonator: that it locks, where, and how fast.
+//! The loop around a resonator: whether it locks, at which frequency, and how fast.
 
 mod rig;
 
-use phase_lock::{Config, Detector, Move, Phase};
+use phase_lock::{Config, Detector, LoopState, Move};
 use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, ZETA, config};
 
 fn relative(a: f64, b: f64) -> f64 {
@@ -30,19 +30,15 @@ fn locks_at_the_natural_frequency_from_ten_percent_off() {
 
 #[test]
 fn locks_with_either_detector() {
-    for detector in [
-        Detector::Demodulator,
-        Detector::Adaptive {
-            harmonics: 1,
-            odd_only: true,
-        },
-        Detector::Adaptive {
-            harmonics: 4,
-            odd_only: false,
-        },
+    for (detector, harmonics, odd_only) in [
+        (Detector::Demodulator, 1, true),
+        (Detector::Adaptive, 1, true),
+        (Detector::Adaptive, 4, false),
     ] {
         let mut bench = Bench::new(Config {
             detector,
+            harmonics,
+            odd_only,
             ..config()
         });
         let (_, output) = bench.run_to_lock(2000).expect("a lock");
@@ -54,7 +50,7 @@ fn locks_with_either_detector() {
 }
 
 #[test]
-fn the_own_oscillator_agrees_with_a_measured_reference() {
+fn the_internal_oscillator_agrees_with_a_measured_reference() {
     let locked = |measured_reference| {
         let mut bench = Bench::new(config());
         bench.measured_reference = measured_reference;
@@ -66,7 +62,7 @@ fn the_own_oscillator_agrees_with_a_measured_reference() {
     assert!(relative(own.response_amplitude, measured.response_amplitude) < 1e-9);
 }
 
-/// Response and drive late by one sample, as FMI co-simulation makes them.
+/// Both sensors with a delay of one sample, as in FMI co-simulation.
 fn locked_frequency_with_a_late_sensor(delay_samples: f64, measured_reference: bool) -> f64 {
     let mut bench = Bench::new(Config {
         delay: delay_samples * config().sample_time,
@@ -111,7 +107,7 @@ fn follows_a_resonance_that_moves() {
 }
 
 #[test]
-fn retuning_keeps_the_lock_and_settles_anew() {
+fn retuning_keeps_the_lock_and_settles_again() {
     let mut bench = Bench::new(config());
     bench.run_to_lock(2000).expect("a lock");
     let target = bench.controller.config().phase_target;
@@ -127,14 +123,14 @@ fn retuning_keeps_the_lock_and_settles_anew() {
 }
 
 #[test]
-fn the_base_amplitude_is_controlled_where_that_is_wanted() {
+fn the_base_amplitude_is_controlled_if_base_bandwidth_is_positive() {
     let mut bench = Bench::new(Config {
         base_bandwidth: 0.02 * OMEGA_0,
         ..config()
     });
     let mut output = bench.sample();
     for _ in 0..60_000 {
-        // A shaker that gives only 80 % of what it is told.
+        // A shaker with a gain of 0.8.
         let (q, base) = (bench.resonator.q, 0.8 * bench.resonator.base);
         output = bench.sample_reading(q, Some(base));
     }
@@ -199,7 +195,7 @@ fn two_runs_give_the_same_bits() {
     let outputs = || {
         let mut bench = Bench::new(config());
         let mut outputs: Vec<_> = (0..5_000).map(|_| bench.sample()).collect();
-        // A state put back continues the same way, too.
+        // A restored state gives the same bits, too.
         let (state, resonator) = (bench.state, bench.resonator);
         let ahead: Vec<_> = (0..5_000).map(|_| bench.sample()).collect();
         (bench.state, bench.resonator) = (state, resonator);
@@ -213,7 +209,7 @@ fn two_runs_give_the_same_bits() {
         assert_eq!(a.phase_error.to_bits(), b.phase_error.to_bits());
     }
     assert_eq!(first, second);
-    assert_eq!(first[0].state, Phase::Ramping);
+    assert_eq!(first[0].state, LoopState::Ramping);
 }
 
 #[test]
@@ -233,7 +229,7 @@ fn a_new_phase_target_is_acquired_with_the_drive_on() {
 }
 
 #[test]
-fn a_ramp_goes_down_to_nothing_at_the_rate_it_came_up() {
+fn a_ramp_down_to_zero_has_the_rate_of_the_ramp_up() {
     let mut bench = Bench::new(Config {
         ramp_time: 1.0,
         ..config()
@@ -249,7 +245,7 @@ fn a_ramp_goes_down_to_nothing_at_the_rate_it_came_up() {
 }
 
 #[test]
-fn the_response_is_held_at_an_amplitude_and_moved_to_another() {
+fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
     let mut bench = Bench::new(Config {
         amplitude_max: 4.0 * AMPLITUDE,
         damping_rate: ZETA * OMEGA_0,
@@ -268,7 +264,7 @@ fn the_response_is_held_at_an_amplitude_and_moved_to_another() {
             .controller
             .hold_response(&mut bench.state, to)
             .expect("a closed loop");
-        // Twenty periods, where the structure forgets by half.
+        // A free transient would decay by a factor of 2.6 in 30 periods.
         let output = bench.run(30);
         println!("{share}: {:.5}", output.response_amplitude / before);
         assert!(relative(output.response_amplitude, share * before) < 0.02);
@@ -278,13 +274,13 @@ fn the_response_is_held_at_an_amplitude_and_moved_to_another() {
         assert!(relative(output.amplitude, share * AMPLITUDE) < 1e-5);
         assert!(output.settled);
     }
-    // Taking the drive away ends it.
+    // Switching the drive off ends the control of the response.
     bench.active = false;
     assert_eq!(bench.sample().response_target, 0.0);
 }
 
 #[test]
-fn the_response_cannot_be_held_without_a_limit_of_the_drive_or_in_an_open_loop() {
+fn the_response_cannot_be_controlled_without_a_limit_of_the_drive_or_in_an_open_loop() {
     let to = Move {
         response: 0.01,
         ..Move::default()

@@ -1,12 +1,12 @@
-//! What must never happen, whatever the sensors read.
+//! Safe behaviour for any sensor readings.
 
 mod rig;
 
-use phase_lock::{Config, Fault, LockCriterion, Move, Phase};
+use phase_lock::{Config, Fault, LockCriterion, LoopState, Move};
 use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, config};
 
 #[test]
-fn never_locks_on_silence() {
+fn never_locks_on_a_zero_signal() {
     let mut bench = Bench::new(config());
     for _ in 0..50_000 {
         let output = bench.sample_reading(0.0, None);
@@ -18,7 +18,7 @@ fn never_locks_on_silence() {
 #[test]
 fn never_locks_on_noise() {
     let mut bench = Bench::new(Config {
-        // As lenient as can be: only the coherence is left to tell.
+        // All tolerances are as wide as possible: only the coherence can prevent a lock.
         lock: LockCriterion {
             phase_tolerance: 3.0,
             unlock_tolerance: 3.1,
@@ -50,7 +50,7 @@ fn never_locks_without_a_drive() {
 }
 
 #[test]
-fn a_reference_that_goes_dead_does_not_keep_the_lock() {
+fn a_reference_that_fails_ends_the_lock() {
     let mut bench = Bench::new(config());
     bench.run_to_lock(2000).expect("a lock");
     let mut output = bench.sample();
@@ -58,11 +58,11 @@ fn a_reference_that_goes_dead_does_not_keep_the_lock() {
         let q = bench.resonator.q;
         output = bench.sample_reading(q, Some(0.0));
     }
-    assert_eq!(output.state, Phase::LockLost);
+    assert_eq!(output.state, LoopState::LockLost);
 }
 
 #[test]
-fn a_reading_that_is_no_number_ramps_the_drive_down_and_latches() {
+fn an_invalid_reading_ramps_the_drive_down_and_latches() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
         for (response, reference) in [(bad, 0.0), (0.0, bad)] {
             let mut bench = Bench::new(Config {
@@ -74,16 +74,16 @@ fn a_reading_that_is_no_number_ramps_the_drive_down_and_latches() {
             let output = bench.sample_reading(response, Some(reference));
             assert_eq!(
                 (output.state, output.fault),
-                (Phase::Tripped, Some(Fault::Sensor))
+                (LoopState::Tripped, Some(Fault::Sensor))
             );
             assert!(
                 output.amplitude < before && output.amplitude > 0.9 * before,
                 "gradual"
             );
             let output = bench.run(100);
-            assert_eq!((output.state, output.amplitude), (Phase::Tripped, 0.0));
+            assert_eq!((output.state, output.amplitude), (LoopState::Tripped, 0.0));
             bench.active = false;
-            assert_eq!(bench.sample().state, Phase::Idle);
+            assert_eq!(bench.sample().state, LoopState::Idle);
             bench.active = true;
             assert_eq!(bench.sample().fault, None);
             assert!(
@@ -101,7 +101,7 @@ fn too_large_a_response_trips() {
         ..config()
     });
     let output = bench.run(400);
-    assert_eq!(output.state, Phase::Tripped);
+    assert_eq!(output.state, LoopState::Tripped);
     assert_eq!(output.fault, Some(Fault::ResponseTooLarge));
 }
 
@@ -114,8 +114,8 @@ fn acquiring_times_out() {
     let states: Vec<_> = (0..600)
         .map(|_| bench.sample_reading(0.0, None).state)
         .collect();
-    assert_eq!(states[400], Phase::Acquiring);
-    assert_eq!(states[599], Phase::Tripped);
+    assert_eq!(states[400], LoopState::Acquiring);
+    assert_eq!(states[599], LoopState::Tripped);
     assert_eq!(bench.sample().fault, Some(Fault::TimedOut));
 }
 
@@ -127,11 +127,11 @@ fn a_lost_lock_is_latched() {
     let output = bench.run(100);
     assert_eq!(
         (output.state, output.fault),
-        (Phase::LockLost, Some(Fault::LockLost))
+        (LoopState::LockLost, Some(Fault::LockLost))
     );
     bench.resonator.omega_0 /= 1.1;
     let output = bench.run(500);
-    assert_eq!((output.state, output.amplitude), (Phase::LockLost, 0.0));
+    assert_eq!((output.state, output.amplitude), (LoopState::LockLost, 0.0));
 }
 
 #[test]
@@ -157,7 +157,7 @@ fn a_disturbance_between_the_two_tolerances_does_not_unlock() {
 }
 
 #[test]
-fn the_drive_is_switched_off_at_once_or_gradually_as_configured() {
+fn the_drive_is_switched_off_at_once_or_with_a_ramp_as_configured() {
     for (release_time, expected) in [(0.0, 0.0), (10.0, 0.999)] {
         let mut bench = Bench::new(Config {
             release_time,
@@ -166,18 +166,18 @@ fn the_drive_is_switched_off_at_once_or_gradually_as_configured() {
         let before = bench.run(10);
         bench.active = false;
         let output = bench.sample();
-        assert_eq!(output.state, Phase::ShutDown);
+        assert_eq!(output.state, LoopState::ShutDown);
         assert!((output.amplitude / AMPLITUDE - expected).abs() < 1e-3);
         let after = bench.run(200);
         assert_eq!(after.amplitude, 0.0);
         assert!(
             (after.omega - before.omega).abs() < 0.1,
-            "the frequency stays"
+            "the frequency stays constant"
         );
     }
 }
 
-/// A bench that holds its response at half of what it was, with a limited drive.
+/// A bench with the response amplitude controlled at half of its value at the lock, and a limited drive.
 fn holding(config: Config) -> Bench {
     let mut bench = Bench::new(Config {
         amplitude_max: 2.0 * AMPLITUDE,
@@ -199,7 +199,7 @@ fn holding(config: Config) -> Bench {
 }
 
 #[test]
-fn a_sensor_that_fails_while_the_response_is_held_takes_the_drive_away_gradually() {
+fn a_sensor_that_fails_while_the_response_is_controlled_ramps_the_drive_down() {
     let mut bench = holding(Config {
         ramp_time: 1.0,
         ..config()
@@ -209,14 +209,14 @@ fn a_sensor_that_fails_while_the_response_is_held_takes_the_drive_away_gradually
     let output = bench.sample_reading(f64::NAN, None);
     assert_eq!(
         (output.state, output.fault, output.response_target),
-        (Phase::Tripped, Some(Fault::Sensor), 0.0)
+        (LoopState::Tripped, Some(Fault::Sensor), 0.0)
     );
     assert!(output.amplitude < before.amplitude && output.amplitude > 0.9 * before.amplitude);
     assert_eq!(bench.run(50).amplitude, 0.0);
 }
 
 #[test]
-fn a_dead_response_does_not_make_the_held_drive_exceed_its_limit_or_its_rate() {
+fn a_response_that_fades_out_does_not_make_the_drive_exceed_its_limit_or_its_rate() {
     let mut bench = holding(Config {
         ramp_time: 1.0,
         ..config()
@@ -224,7 +224,7 @@ fn a_dead_response_does_not_make_the_held_drive_exceed_its_limit_or_its_rate() {
     let step = bench.controller.config().sample_time * AMPLITUDE;
     let mut before = bench.sample().amplitude;
     for n in 0..20_000 {
-        // The sensor fades to nothing.
+        // The reading decays to zero.
         let fading = bench.resonator.q * 0.999_f64.powi(n);
         let base = bench.resonator.base;
         let output = bench.sample_reading(fading, Some(base));
@@ -232,5 +232,5 @@ fn a_dead_response_does_not_make_the_held_drive_exceed_its_limit_or_its_rate() {
         assert!((output.amplitude - before).abs() <= step * (1.0 + 1e-9));
         before = output.amplitude;
     }
-    assert_eq!(bench.sample().state, Phase::LockLost);
+    assert_eq!(bench.sample().state, LoopState::LockLost);
 }

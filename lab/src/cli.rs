@@ -4,7 +4,7 @@ mod backbone;
 mod chain;
 mod controller;
 mod decay;
-mod door;
+mod endpoint;
 mod failure;
 mod identify;
 mod map;
@@ -14,15 +14,16 @@ mod report;
 mod rig;
 mod scene_arguments;
 mod serving;
-mod table;
 mod theory;
 
 use std::{
     io::{self, Write},
+    path::PathBuf,
     process::ExitCode,
 };
 
 use clap::{Parser, Subcommand};
+use serde::Serialize;
 
 use failure::Failure;
 
@@ -97,4 +98,21 @@ fn print(text: &str) -> Result<(), Failure> {
         }
         _ => Ok(()),
     }
+}
+
+fn yes_no(value: bool) -> String {
+    if value { "yes" } else { "no" }.into()
+}
+
+/// The paths that were written, in one line.
+fn written(paths: &[PathBuf]) -> String {
+    let files: Vec<String> = paths
+        .iter()
+        .map(|path| path.display().to_string())
+        .collect();
+    format!("Written: {}\n", files.join(", "))
+}
+
+fn json(found: &impl Serialize) -> Result<String, Failure> {
+    Ok(serde_json::to_string_pretty(found)? + "\n")
 }

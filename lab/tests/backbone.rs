@@ -1,6 +1,7 @@
 //! The backbone, tracked with the response held by the loop.
 
-use vines::backbone::{Report, TrackError, track};
+use vines::backbone::{TrackError, track};
+use vines::comparison::TrackedComparison;
 use vines::identification::Regime;
 use vines::rig::{
     BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated,
@@ -13,12 +14,17 @@ fn scene(settings: &[&str]) -> Scene {
     Scene::parse("dimensionless.toml", text, &overrides).unwrap()
 }
 
-fn tracked(settings: &[&str]) -> Report {
+fn tracked(settings: &[&str]) -> TrackedComparison {
     let scene = scene(settings);
-    let mut rig = Chain::new(Box::new(Simulated::new(&scene).unwrap()), &scene);
-    let mut controller = BuiltIn::for_backbone(&scene).unwrap();
+    let mut rig = Chain::new(
+        Box::new(Simulated::new(scene.plant, scene.start).unwrap()),
+        &scene.chain,
+        &scene.dimensionless(),
+        scene.controller.samples_per_period,
+    );
+    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
     let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
-    let report = Report::new(&tracked, &scene);
+    let report = TrackedComparison::of(&tracked, &scene);
     println!(
         "{settings:?}: {:.1} periods per point, at most {:.1e} from the exact backbone",
         report.periods_per_point(),
@@ -109,8 +115,8 @@ fn the_linear_mode_is_told_from_the_impacting_one_by_the_response() {
         "backbone.points=2",
     ]);
     for one in &report.points {
-        assert_eq!(one.point.regime, Regime::Silent);
-        assert_eq!(one.point.regime_by_impacts, Some(Regime::Silent));
+        assert_eq!(one.point.regime, Regime::NoImpacts);
+        assert_eq!(one.point.regime_by_impacts, Some(Regime::NoImpacts));
     }
 }
 

@@ -1,6 +1,7 @@
 //! The program as its users meet it: output, exit codes and messages.
 
 use std::process::{Command, Output};
+use std::time::{Duration, Instant};
 
 use serde_json::Value;
 
@@ -53,6 +54,31 @@ fn theory_comes_as_json_with_as_many_samples_as_asked_for() {
     assert!(theory["manifold"]["C_min"].as_f64().unwrap() > 0.1);
 }
 
+/// Values that are finite numbers, and with which the plant cannot compute.
+#[test]
+fn extreme_values_of_plant_and_drive_are_refused_at_once() {
+    let commands: [&[&str]; 3] = [&["map"], &["backbone"], &["identify", "--rig", "built-in"]];
+    for (value, name) in [
+        ("plant.c=1e300", "c (damping) = "),
+        ("plant.M=1e-300", "M (primary mass) = "),
+        ("plant.k=1e100", "rad/s is refused"),
+        (
+            "excitation.E=1e300",
+            "E (amplitude of the base oscillator) = ",
+        ),
+    ] {
+        for command in commands {
+            let began = Instant::now();
+            fails(&[command, &["--set", value]].concat(), 2, name);
+            let passed = began.elapsed();
+            assert!(passed < Duration::from_secs(10), "{command:?}: {passed:?}");
+        }
+    }
+    for axes in [["--x", "sigma=0:1e300:3"], ["--y", "G=0.1:1e300:3"]] {
+        fails(&[&["map"][..], &axes].concat(), 2, "is refused");
+    }
+}
+
 #[test]
 fn a_person_gets_tables() {
     for command in ["orbit", "theory"] {
@@ -70,7 +96,11 @@ fn a_person_gets_tables() {
 
 #[test]
 fn bad_input_ends_with_code_two_and_one_message() {
-    fails(&["orbit", "--set", "plant.r=1.5"], 2, "plant.r = 1.5");
+    fails(
+        &["orbit", "--set", "plant.r=1.5"],
+        2,
+        "r (coefficient of restitution) = 1.5",
+    );
     fails(&["orbit", "--set", "plant.rr=0.5"], 2, "`rr`");
     fails(&["orbit", "--set", "nonsense"], 2, "section.key=value");
     fails(&["theory", "--scene", "no-such.toml"], 2, "no-such.toml");
@@ -102,7 +132,11 @@ fn packing_refuses_what_it_cannot_pack_before_it_writes() {
     let pack = |option: &[&'static str]| [&["pack", "--out", out], option].concat();
     fails(&pack(&["--binary", "win64"]), 2, "PLATFORM=PATH");
     fails(&pack(&["--binary", "amiga=x.so"]), 2, "amiga");
-    fails(&pack(&["--set", "plant.r=2"]), 2, "plant.r = 2");
+    fails(
+        &pack(&["--set", "plant.r=2"]),
+        2,
+        "r (coefficient of restitution) = 2",
+    );
     fails(&pack(&["--portable"]), 2, "--portable cannot be done");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

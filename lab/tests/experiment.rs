@@ -1,11 +1,12 @@
 //! The whole experiment on the plant itself, with no FMU in between.
 
+use vines::comparison::Comparison;
 use vines::experiment::{self, ExperimentError, Plan, Record};
-use vines::identification::{Identification, IdentificationError, Regime, identify};
+use vines::identification::{IdentificationError, Regime, identify};
 use vines::net::LinkError;
 use vines::rig::{
-    BuiltIn, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated,
-    Witness,
+    BuiltIn, Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors,
+    Simulated,
 };
 use vines::scene::{Override, Scene};
 
@@ -20,14 +21,14 @@ fn plan(scene: &Scene) -> Plan {
 }
 
 fn measure(scene: &Scene) -> Record {
-    let mut rig = Simulated::new(scene).unwrap();
-    let mut controller = BuiltIn::new(scene).unwrap();
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     experiment::run(&mut rig, &mut controller, &plan(scene), |_, _, _| {}).unwrap()
 }
 
-fn identified(settings: &[&str]) -> Identification {
+fn identified(settings: &[&str]) -> Comparison {
     let scene = scene(settings);
-    identify(&measure(&scene), &scene).unwrap()
+    Comparison::of(&identify(&measure(&scene), &scene).unwrap(), &scene)
 }
 
 #[test]
@@ -74,7 +75,7 @@ fn a_lock_of_the_linear_mode_is_not_taken_for_the_impacting_one() {
     let IdentificationError::Regime { regime, sigma, .. } = refusal else {
         panic!("{refusal}");
     };
-    assert_eq!(regime, Regime::Silent);
+    assert_eq!(regime, Regime::NoImpacts);
     assert!(sigma.abs() < 0.05, "{sigma}");
 }
 
@@ -100,7 +101,7 @@ impl Rig for Noise {
 #[test]
 fn noise_is_never_locked() {
     let scene = scene(&["record.lock_periods=300"]);
-    let mut controller = BuiltIn::new(&scene).unwrap();
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let outcome = experiment::run(&mut Noise(1), &mut controller, &plan(&scene), |_, _, _| {});
     assert!(matches!(outcome, Err(ExperimentError::NoLock { .. })));
 }
@@ -119,13 +120,13 @@ impl Rig for Mute {
 }
 
 /// What is identified on a rig that does not tell its impacts.
-fn identified_mute(settings: &[&str]) -> Result<Identification, IdentificationError> {
+fn identified_mute(settings: &[&str]) -> Result<Comparison, IdentificationError> {
     let scene = scene(settings);
-    let mut rig = Mute(Simulated::new(&scene).unwrap());
-    assert_eq!(rig.witness().unwrap(), None::<Witness>);
-    let mut controller = BuiltIn::new(&scene).unwrap();
+    let mut rig = Mute(Simulated::new(scene.plant, scene.start).unwrap());
+    assert_eq!(rig.ground_truth().unwrap(), None::<GroundTruth>);
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let record = experiment::run(&mut rig, &mut controller, &plan(&scene), |_, _, _| {}).unwrap();
-    identify(&record, &scene)
+    Ok(Comparison::of(&identify(&record, &scene)?, &scene))
 }
 
 #[test]
@@ -136,9 +137,9 @@ fn a_rig_that_does_not_tell_its_impacts_is_identified_from_its_response() {
     assert_eq!(mute.lock.sigma, telling.lock.sigma);
     // The decay ends at the fold, and is the same until there.
     let fold = 0.134;
-    assert!(mute.decay.iter().all(|point| point.c > fold));
+    assert!(mute.decay.iter().all(|one| one.point.c > fold));
     assert_eq!(mute.rms_sigma_error, telling.rms_sigma_error);
-    let table = vines::report::table(&mute);
+    let table = vines::report::summary::identification(&mute);
     assert!(
         table.contains("symmetric 1:1, told from the response alone"),
         "{table}"
@@ -151,7 +152,7 @@ fn the_linear_mode_of_a_rig_that_does_not_tell_its_impacts_is_refused() {
     let IdentificationError::Regime { regime, .. } = refusal else {
         panic!("{refusal}");
     };
-    assert_eq!(regime, Regime::Silent);
+    assert_eq!(regime, Regime::NoImpacts);
 }
 
 /// A controller that drives for a while, then fails.
@@ -214,7 +215,7 @@ fn an_experiment_takes_any_controller_and_records_every_stage() {
         "record.decay_periods=2",
         "record.window_periods=1.5",
     ]);
-    let mut rig = Simulated::new(&scene).unwrap();
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let drive = Drive {
         omega: 1.0,
         amplitude: 0.01,
@@ -236,8 +237,8 @@ fn an_experiment_takes_any_controller_and_records_every_stage() {
 fn limits_of_a_scene_reach_the_controller() {
     let run = |settings: &[&str]| {
         let scene = scene(settings);
-        let mut rig = Simulated::new(&scene).unwrap();
-        let mut controller = BuiltIn::new(&scene)?;
+        let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+        let mut controller = BuiltIn::new(&scene.controller_config())?;
         let mut drives = Vec::new();
         for _ in 0..4000 {
             let command = controller.sample(rig.sense().unwrap(), true).unwrap();

@@ -17,7 +17,10 @@ fn component() -> Component {
         identifier: "Tiny",
         library: "tiny",
         package: "tiny-fmu",
-        description: format!("<fmiModelDescription guid=\"{GUID}\"/>"),
+        feature: None,
+        description: format!(
+            "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"Tiny\" guid=\"{GUID}\"/>"
+        ),
     }
 }
 

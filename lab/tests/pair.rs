@@ -1,4 +1,4 @@
-//! Both FMUs coupled through the `fmi` crate, which nobody here wrote.
+//! Both FMUs coupled in co-simulation, with the delay of one sample that it has.
 
 use std::{
     fs,
@@ -7,9 +7,7 @@ use std::{
     process::Command,
 };
 
-use fmi::fmi2::import::Fmi2Import;
-use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
-use fmi::traits::FmiImport;
+use fmi2_import::{Fmu, Instance};
 use vines::experiment::{self, Plan};
 use vines::identification::identify;
 use vines::pack::pack_bench;
@@ -36,17 +34,15 @@ fn libraries() -> PathBuf {
 
 /// One FMU of the pair.
 struct Part {
-    instance: InstanceCS,
-    import: Fmi2Import,
+    instance: Instance,
 }
 
 impl Part {
     /// Loads the FMU and starts it with the values that the system file binds to it.
     fn start(out: &Path, file: &str, bound: &str) -> Self {
-        let import: Fmi2Import = fmi::import::from_path(out.join(file)).unwrap();
+        let fmu = Fmu::open(&out.join(file)).unwrap();
         let mut part = Self {
-            instance: import.instantiate_cs(file, false, true).unwrap(),
-            import,
+            instance: Instance::new(fmu, file).unwrap(),
         };
         for (name, kind, value) in values(&out.join("bench.ssp"), bound) {
             let reference = [part.find(&name)];
@@ -58,22 +54,13 @@ impl Part {
             }
             .unwrap();
         }
-        let instance = &mut part.instance;
-        instance.setup_experiment(None, 0.0, None).unwrap();
-        instance.enter_initialization_mode().unwrap();
-        instance.exit_initialization_mode().unwrap();
+        part.instance.initialize().unwrap();
         part
     }
 
     fn find(&self, name: &str) -> u32 {
-        let mut variables = self
-            .import
-            .model_description()
-            .model_variables
-            .variables
-            .iter();
-        let found = variables.find(|variable| variable.name == name);
-        found.expect("the FMU has the variable").value_reference
+        let variable = self.instance.description().variable(name);
+        variable.expect("the FMU has the variable").value_reference
     }
 
     fn find_two(&self, names: [&str; 2]) -> [u32; 2] {
@@ -88,7 +75,7 @@ impl Part {
 
     fn advance(&mut self, inputs: [u32; 2], values: [f64; 2], time: f64, step: f64) {
         self.instance.set_real(&inputs, &values).unwrap();
-        self.instance.do_step(time, step, true).unwrap();
+        self.instance.do_step(time, step).unwrap();
     }
 }
 
@@ -109,7 +96,7 @@ fn values(system: &Path, name: &str) -> Vec<(String, String, String)> {
 }
 
 #[test]
-fn the_pair_coupled_through_the_fmi_crate_locks_where_the_own_loop_does() {
+fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
     let scene = Scene::load(None, &[]).unwrap();
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
@@ -156,8 +143,8 @@ fn the_pair_coupled_through_the_fmi_crate_locks_where_the_own_loop_does() {
 
 /// Where the lab's own loop locks.
 fn own_sigma(scene: &Scene) -> f64 {
-    let mut rig = Simulated::new(scene).unwrap();
-    let mut controller = BuiltIn::new(scene).unwrap();
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let plan = Plan::of(scene);
     let record = experiment::run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
     identify(&record, scene).unwrap().lock.sigma

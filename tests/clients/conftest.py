@@ -42,7 +42,9 @@ def bench_in_millimetres(vines: Path, tmp_path_factory: pytest.TempPathFactory) 
 
 
 def pack(vines: Path, folder: Path, *options: str) -> Bench:
-    subprocess.run([vines, "pack", "--out", folder, *options], check=True, stdout=subprocess.DEVNULL)
+    """Packs the bench, for the platforms that scripts/clients was asked for."""
+    options = (*options, *os.environ.get("PACK_OPTIONS", "").split("\n"))
+    subprocess.run([vines, "pack", "--out", folder, *filter(None, options)], check=True, stdout=subprocess.DEVNULL)
     return Bench(folder)
 
 

@@ -55,7 +55,7 @@ def either(request) -> Bench:
 def library(bench: Bench, component: str, folder: Path) -> Path:
     """The Linux library of an FMU, taken out."""
     with zipfile.ZipFile(bench.fmu(component)) as archive:
-        (name,) = [name for name in archive.namelist() if name.endswith(".so")]
+        (name,) = [name for name in archive.namelist() if name.startswith("binaries/linux64/")]
         return Path(archive.extract(name, folder))
 
 

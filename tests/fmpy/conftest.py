@@ -22,7 +22,7 @@ def vines() -> Path:
     target = Path(os.environ.get("CARGO_TARGET_DIR", "target"))
     program = ROOT / target / "release" / "vines"
     if not program.is_file():
-        pytest.exit(f"{program} is missing; build it first: cargo build --release (or run scripts/test)", returncode=2)
+        pytest.exit(f"{program} is missing; run scripts/test, which builds it first", returncode=2)
     return program
 
 

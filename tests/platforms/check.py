@@ -66,7 +66,7 @@ def output(*command: str | Path, environment: dict[str, str] | None = None, fold
 
 def functions() -> set[str]:
     """The functions of FMI 2.0, as the boundary's table has them."""
-    source = (ROOT / "fmi2-component" / "boundary" / "src" / "functions.rs").read_text()
+    source = (ROOT / "tests" / "boundary" / "src" / "functions.rs").read_text()
     return set(re.findall(r"^    (fmi2\w+)\(", source, re.MULTILINE))
 
 
@@ -137,7 +137,7 @@ class Platform:
     folder: str
     triple: str
     work: Path
-    tools: Path
+    built: Path
 
     @property
     def home(self) -> Path:
@@ -164,12 +164,12 @@ class Platform:
         """The library that was built from the same sources in another folder."""
         prefix = "" if self.suffix == ".dll" else "lib"
         name = f"{prefix}{COMPONENTS[component]}{self.suffix}"
-        return self.work / "elsewhere" / "target" / self.triple / "release" / name
+        return self.built / self.triple / "release" / name
 
     def prepare(self) -> None:
         for program in ("couple", "stress"):
             name = program + (".exe" if self.suffix == ".dll" else "")
-            shutil.copy(self.tools / self.triple / "release" / name, self.home / name)
+            shutil.copy(self.built / self.triple / "release" / name, self.home / name)
         if self.suffix == ".dll":
             source = Path(__file__).parent / "bcryptprimitives.c"
             stub = self.home / "bcryptprimitives.dll"
@@ -250,7 +250,7 @@ def keep(path: Path, text: str) -> None:
 def main() -> int:
     parser = argparse.ArgumentParser()
     parser.add_argument("--work", type=Path, required=True)
-    parser.add_argument("--tools", type=Path, required=True)
+    parser.add_argument("--built", type=Path, required=True)
     parser.add_argument("--sequences", type=int, required=True)
     parser.add_argument("--keep", type=Path)
     parser.add_argument("platforms", nargs="+", help="folder in the FMUs and Rust's name, joined by =")
@@ -259,7 +259,7 @@ def main() -> int:
     for words in given.platforms:
         folder, triple = words.split("=")
         try:
-            rows.append(examine(Platform(folder, triple, given.work, given.tools), given.sequences))
+            rows.append(examine(Platform(folder, triple, given.work, given.built), given.sequences))
             print(f"{folder}: passed", flush=True)
         except (Failure, subprocess.TimeoutExpired, OSError, KeyError) as failure:
             failed = True

@@ -1,9 +1,10 @@
 //! One scene, and the worst that it shows.
 
 use crate::common::Scene;
+use crate::spacing::Spacing;
 use crate::table::Table;
 use lovines::plant::MOST_IMPACTS;
-use lovines::{Event, Plant, State};
+use lovines::{Drive, Event, Plant, State};
 use std::f64::consts::TAU;
 use std::time::Instant;
 
@@ -11,8 +12,10 @@ use std::time::Instant;
 const STEPS: usize = 30;
 /// A scene with so many impacts has shown what it is.
 const ENOUGH: u64 = 100_000;
-/// No scene may meet more impacts than this per period of its fastest rate; the hops of a lively particle are the most.
-const MOST_IMPACTS_PER_PERIOD: f64 = 1e7;
+/// Where in a step the particle is looked for between its walls, as parts of the step.
+const LOOKS: [f64; 3] = [0.181_818, 0.618_034, 0.927_051];
+/// Steps with more impacts than these are not followed once more for looking inside.
+const MOST_LOOKED_AT: u64 = 10_000;
 
 /// The worst of one scene or of many, and which that was.
 #[derive(Clone, Copy, Debug, Default)]
@@ -30,8 +33,12 @@ pub struct Worst {
     pub stirred: u64,
     /// Impacts from behind the wall, and events that the outcome does not count.
     pub miscounted: u64,
-    /// `|w|/b - 1`.
+    /// Impacts that follow another one sooner than the motion allows.
+    pub too_close: u64,
+    /// `|w|/b - 1` at the ends of steps.
     pub outside: f64,
+    /// The same inside steps.
+    pub outside_within: f64,
     /// Growth of the energy without excitation within a step, relative to that at the start.
     pub growth: f64,
     /// What energy and dissipated energy miss of that at the start, without damping and excitation.
@@ -63,7 +70,9 @@ impl Worst {
             other_bits: self.other_bits + other.other_bits,
             stirred: self.stirred + other.stirred,
             miscounted: self.miscounted + other.miscounted,
+            too_close: self.too_close + other.too_close,
             outside: self.outside.max(other.outside),
+            outside_within: self.outside_within.max(other.outside_within),
             growth: self.growth.max(other.growth),
             missing: self.missing.max(other.missing),
             impacts_per_period: more(self.impacts_per_period, other.impacts_per_period),
@@ -98,9 +107,19 @@ impl Worst {
             0.0,
         );
         row(
+            "outside the cavity inside steps by, in half-widths",
+            self.outside_within,
+            1e-12,
+        );
+        row(
+            "impacts sooner after another one than the motion allows",
+            self.too_close as f64,
+            0.0,
+        );
+        row(
             "impacts in a period, at most",
             self.impacts_per_period.0,
-            MOST_IMPACTS_PER_PERIOD,
+            f64::INFINITY,
         );
         row(
             "advances cut short before their 10^7 impacts",
@@ -129,6 +148,21 @@ pub fn follow(scene: &Scene, number: usize) -> Worst {
     worst
 }
 
+/// Largest `|w|/b - 1` at a few instants inside a step.
+fn look(plant: &mut Plant, drive: Drive, step: f64) -> f64 {
+    let (mut outside, mut gone) = (0.0f64, 0.0);
+    for (n, part) in LOOKS.iter().enumerate() {
+        let drive = if n == 0 { drive } else { plant.base().drive };
+        plant.advance(drive, part * step - gone).unwrap();
+        gone = part * step;
+        let State { q1, q2, .. } = plant.state();
+        // The difference of the two displacements carries their rounding.
+        let w = (q1 - q2).abs() - 4.0 * f64::EPSILON * q1.abs().max(q2.abs());
+        outside = outside.max(w / plant.parameters().half_width - 1.0);
+    }
+    outside
+}
+
 fn once(s: &Scene, number: usize) -> (Worst, [u64; 4]) {
     let mut plant = Plant::new(s.parameters, s.start).expect("a scene that makes sense");
     let mut worst = Worst {
@@ -141,14 +175,22 @@ fn once(s: &Scene, number: usize) -> (Worst, [u64; 4]) {
     let mut drive = s.drive;
     for _ in 0..STEPS {
         let (mut impacts, mut backwards) = (0u64, 0);
+        let mut looked = plant;
+        let mut spacing = Spacing::of(&plant, &drive, s.step);
         let outcome = plant
             .advance_with(drive, s.step, |event| {
+                spacing.see(&event);
                 if let Event::Impact { wall, velocity, .. } = event {
                     backwards += u64::from(wall.sign() * velocity <= 0.0);
                     impacts += 1;
                 }
             })
             .unwrap();
+        worst.too_close += spacing.too_close();
+        if impacts <= MOST_LOOKED_AT {
+            let inside = look(&mut looked, drive, s.step);
+            worst.outside_within = worst.outside_within.max(inside);
+        }
         // The same signal seen from now.
         drive = plant.base().drive;
         worst.miscounted += backwards + outcome.impacts.abs_diff(impacts);

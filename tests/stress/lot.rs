@@ -1,5 +1,6 @@
 //! Scenes drawn by lot, on all cores. Each comes from a number of its own, which is told of the hardest ones.
 
+use crate::balance::{Walk, walk};
 use crate::common::{Scene, scene};
 use crate::follow::{Worst, follow};
 use crate::table::Table;
@@ -90,6 +91,50 @@ pub fn draw<T: std::fmt::Debug>(strategy: &BoxedStrategy<T>, number: usize) -> T
     let rng = TestRng::from_seed(RngAlgorithm::ChaCha, &seed);
     let mut runner = TestRunner::new_with_rng(Config::default(), rng);
     strategy.new_tree(&mut runner).expect("a scene").current()
+}
+
+/// Panels that the energy balance of a scene is followed for.
+const PANELS: u32 = 500;
+
+/// The energy balance of damped rigs, driven or not, impacts and rests included; and whether the particle stays between its walls
+/// at the nodes of the quadrature.
+pub fn balance(n: usize, table: &mut Table) {
+    let damped = || {
+        let heavy = (-3.0..1.0f64).prop_map(|x| 2.0 * 10f64.powf(x));
+        (any::<bool>().prop_flat_map(scene), heavy).prop_map(|(mut s, damping)| {
+            s.parameters.damping = damping;
+            s
+        })
+    };
+    let all: Vec<Walk> = (0..n)
+        .into_par_iter()
+        .map_init(
+            || damped().boxed(),
+            |strategy, number| walk(&draw(strategy, number), PANELS),
+        )
+        .collect();
+    let (mut worst, mut hardest) = (Walk::default(), 0);
+    for (number, one) in all.iter().enumerate() {
+        if one.imbalance > worst.imbalance {
+            (worst.imbalance, hardest) = (one.imbalance, number);
+        }
+        worst.outside = worst.outside.max(one.outside);
+        worst.events += one.events;
+    }
+    let among = format!("{n} damped scenes, {} events", worst.events);
+    table.row(
+        "energy balance with damper and base misses, relative",
+        &among,
+        worst.imbalance,
+        1e-12,
+    );
+    table.row(
+        "outside the cavity at the nodes of the quadrature, in half-widths",
+        &among,
+        worst.outside,
+        1e-12,
+    );
+    table.progress(&format!("energy balance, hardest scene {hardest}"));
 }
 
 /// Follows so many scenes, each twice, and tells the worst of all.

@@ -1,14 +1,18 @@
 //! Hard scenes by the thousand, as a table: `scripts/stress --plant` runs the long form (`SCENES=100000`), the test suite a
 //! short one. docs/stress.md keeps the table of the long form.
 
+#[path = "../common/balance.rs"]
+mod balance;
 #[path = "../common/mod.rs"]
 mod common;
 mod elastic;
 mod follow;
 mod graze;
 mod lot;
+mod spacing;
 mod steps;
 mod table;
+mod work;
 
 use table::Table;
 
@@ -17,6 +21,7 @@ fn hard_scenes_are_survived() {
     let n = std::env::var("SCENES").map_or(1500, |n| n.parse().expect("a number of scenes"));
     let mut table = Table::begin();
     lot::scenes(n, &mut table);
+    lot::balance(n / 10, &mut table);
     elastic::one_by_one(n, &mut table);
     elastic::drift(1_000_000, &mut table);
     graze::both_ways(n / 10, &mut table);
@@ -25,5 +30,7 @@ fn hard_scenes_are_survived() {
         steps::chatter(&mut table);
     }
     steps::short(&mut table);
+    work::steps(&mut table);
+    work::sweep(n > 10_000, &mut table);
     table.end();
 }

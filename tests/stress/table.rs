@@ -5,6 +5,7 @@ use std::time::Instant;
 #[derive(Debug)]
 pub struct Table {
     broken: Vec<String>,
+    others: Vec<String>,
     began: Instant,
 }
 
@@ -13,6 +14,7 @@ impl Table {
         println!("| what | among | figure | allowed |\n|---|---|---|---|");
         Self {
             broken: Vec::new(),
+            others: Vec::new(),
             began: Instant::now(),
         }
     }
@@ -39,12 +41,23 @@ impl Table {
         }
     }
 
+    /// A table of its own, printed after this one.
+    pub fn second(&mut self, title: &str, head: &str, lines: &[String]) {
+        let columns = head.matches('|').count() - 1;
+        let rule = format!("|{}", "---|".repeat(columns));
+        self.others
+            .push(format!("\n{title}\n\n{head}\n{rule}\n{}", lines.join("\n")));
+    }
+
     /// How far the run has come, apart from the table.
     pub fn progress(&self, what: &str) {
         eprintln!("{:6.1} s: {what}", self.began.elapsed().as_secs_f64());
     }
 
     pub fn end(self) {
+        for other in &self.others {
+            println!("{other}");
+        }
         assert!(self.broken.is_empty(), "{:#?}", self.broken);
     }
 }

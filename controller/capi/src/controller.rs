@@ -1,4 +1,4 @@
-//! The functions of the header. Each returns 0 where it succeeds, 1 for a value that is refused and -1 for a NULL pointer.
+//! The functions of the header. Each returns 0 for success, 1 for an invalid value and -1 for a NULL pointer.
 
 use core::ffi::{c_char, c_int};
 
@@ -9,14 +9,14 @@ use crate::types::{
     PhaseLockConfig, PhaseLockController, PhaseLockInput, PhaseLockMove, PhaseLockOutput, Stored,
 };
 
-const DONE: c_int = 0;
-const REFUSED: c_int = 1;
-const NO_POINTER: c_int = -1;
+const SUCCESS: c_int = 0;
+const INVALID_VALUE: c_int = 1;
+const NULL_POINTER: c_int = -1;
 
-/// What is stored behind the pointer.
+/// Content of the storage behind the pointer.
 ///
 /// # Safety
-/// `controller` is NULL or was set up by [`phase_lock_init`].
+/// `controller` is NULL or was initialised by [`phase_lock_init`].
 unsafe fn stored<'a>(controller: *mut PhaseLockController) -> Option<&'a mut Stored> {
     // SAFETY: the storage is large and aligned enough (asserted beside its type) and holds what phase_lock_init wrote.
     unsafe { controller.cast::<Stored>().as_mut() }
@@ -24,18 +24,18 @@ unsafe fn stored<'a>(controller: *mut PhaseLockController) -> Option<&'a mut Sto
 
 /// # Safety
 /// `message` is NULL or points to `length` bytes that may be written.
-unsafe fn answer(outcome: Result<(), ConfigError>, message: *mut c_char, length: usize) -> c_int {
+unsafe fn status(outcome: Result<(), ConfigError>, message: *mut c_char, length: usize) -> c_int {
     match outcome {
-        Ok(()) => DONE,
+        Ok(()) => SUCCESS,
         Err(error) => {
-            // SAFETY: the caller's promise.
+            // SAFETY: the caller's contract.
             unsafe { message::write(error, message, length) };
-            REFUSED
+            INVALID_VALUE
         }
     }
 }
 
-/// Fills in a sensible start for a structure that resonates near omega (rad/s) and a base of the given amplitude (m).
+/// Writes suitable initial values for a structure with a resonance near omega (rad/s) and a base amplitude in m.
 ///
 /// # Safety
 /// config is NULL or may be written.
@@ -46,16 +46,16 @@ pub unsafe extern "C" fn phase_lock_config_for_resonance(
     amplitude: f64,
 ) -> c_int {
     if config.is_null() {
-        return NO_POINTER;
+        return NULL_POINTER;
     }
-    let sensible = PhaseLockConfig::from(&Config::for_resonance(omega, amplitude));
-    // SAFETY: the caller's promise.
-    unsafe { config.write(sensible) };
-    DONE
+    let initial = PhaseLockConfig::from(&Config::for_resonance(omega, amplitude));
+    // SAFETY: the caller's contract.
+    unsafe { config.write(initial) };
+    SUCCESS
 }
 
-/// Checks a configuration and sets up a controller before its first sample. Where a value is refused the reason is
-/// written to message (of that length in bytes, NULL for none), and the controller is left as it was.
+/// Checks a configuration and initialises a controller before its first sample. For an invalid value, writes the reason to
+/// message (of that length in bytes; may be NULL) and leaves the controller unchanged.
 ///
 /// # Safety
 /// controller and message may be written, config may be read; each of them may be NULL.
@@ -66,12 +66,12 @@ pub unsafe extern "C" fn phase_lock_init(
     message: *mut c_char,
     length: usize,
 ) -> c_int {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller's contract.
     let Some(config) = (unsafe { config.as_ref() }) else {
-        return NO_POINTER;
+        return NULL_POINTER;
     };
     if controller.is_null() {
-        return NO_POINTER;
+        return NULL_POINTER;
     }
     let built = Config::from(config).build().map(|lock| Stored {
         state: lock.start(),
@@ -79,34 +79,34 @@ pub unsafe extern "C" fn phase_lock_init(
     });
     // SAFETY: the storage is large and aligned enough, and may be written.
     let outcome = built.map(|stored| unsafe { controller.cast::<Stored>().write(stored) });
-    // SAFETY: the caller's promise.
-    unsafe { answer(outcome, message, length) }
+    // SAFETY: the caller's contract.
+    unsafe { status(outcome, message, length) }
 }
 
-/// Takes what the sensors read now, puts out what the drive shall be until the next sample. To be called every sample_time.
+/// One sample: takes the sensor readings, returns the drive until the next sample. Call it every sample_time.
 ///
 /// # Safety
-/// controller is NULL or was set up, input is NULL or may be read, output is NULL or may be written.
+/// controller is NULL or was initialised, input is NULL or may be read, output is NULL or may be written.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn phase_lock_sample(
     controller: *mut PhaseLockController,
     input: *const PhaseLockInput,
     output: *mut PhaseLockOutput,
 ) -> c_int {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller's contract.
     let (Some(stored), Some(input)) = (unsafe { (stored(controller), input.as_ref()) }) else {
-        return NO_POINTER;
+        return NULL_POINTER;
     };
     if output.is_null() {
-        return NO_POINTER;
+        return NULL_POINTER;
     }
-    let put_out = stored.lock.process(&mut stored.state, input.into());
-    // SAFETY: the caller's promise.
-    unsafe { output.write(put_out.into()) };
-    DONE
+    let result = stored.lock.process(&mut stored.state, input.into());
+    // SAFETY: the caller's contract.
+    unsafe { output.write(result.into()) };
+    SUCCESS
 }
 
-/// Changes drive amplitude (m) and phase target (rad) between samples; the state goes on.
+/// Changes drive amplitude (m) and phase target (rad) between samples; the state continues.
 ///
 /// # Safety
 /// As for phase_lock_init.
@@ -118,16 +118,16 @@ pub unsafe extern "C" fn phase_lock_retune(
     message: *mut c_char,
     length: usize,
 ) -> c_int {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller's contract.
     let Some(stored) = (unsafe { stored(controller) }) else {
-        return NO_POINTER;
+        return NULL_POINTER;
     };
     let outcome = stored.lock.retune(amplitude, phase_target);
-    // SAFETY: the caller's promise.
-    unsafe { answer(outcome, message, length) }
+    // SAFETY: the caller's contract.
+    unsafe { status(outcome, message, length) }
 }
 
-/// Holds the amplitude of the response from now on and moves it as stated; the drive does what it must, within its limits.
+/// Controls the response amplitude from now on and moves it to another setpoint; the drive follows within its limits.
 ///
 /// # Safety
 /// As for phase_lock_init; to is NULL or may be read.
@@ -138,25 +138,25 @@ pub unsafe extern "C" fn phase_lock_hold_response(
     message: *mut c_char,
     length: usize,
 ) -> c_int {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller's contract.
     let (Some(stored), Some(to)) = (unsafe { (stored(controller), to.as_ref()) }) else {
-        return NO_POINTER;
+        return NULL_POINTER;
     };
     let outcome = stored.lock.hold_response(&mut stored.state, to.into());
-    // SAFETY: the caller's promise.
-    unsafe { answer(outcome, message, length) }
+    // SAFETY: the caller's contract.
+    unsafe { status(outcome, message, length) }
 }
 
-/// Back to before the first sample, with the configuration as it is.
+/// Returns to the state before the first sample, with the same configuration.
 ///
 /// # Safety
-/// controller is NULL or was set up.
+/// controller is NULL or was initialised.
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn phase_lock_reset(controller: *mut PhaseLockController) -> c_int {
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller's contract.
     let Some(stored) = (unsafe { stored(controller) }) else {
-        return NO_POINTER;
+        return NULL_POINTER;
     };
     stored.state = stored.lock.start();
-    DONE
+    SUCCESS
 }

@@ -1,11 +1,12 @@
-//! The phase-lock controller for C: the same core, with plain structures at its edge.
+//! The phase-lock controller for C: the same core with C types.
 //!
-//! Nothing is allocated and nothing is global: a [`PhaseLockController`] is storage that the caller provides, and a copy of
-//! it is a copy of the controller. The header is `include/phase_lock.h`; `docs/firmware.md` tells how to build and use it.
+//! There is no allocation and no global state: the caller provides the storage, a [`PhaseLockController`]. A copy of it is
+//! a copy of the controller. The header is `include/phase_lock.h`; `docs/firmware.md` explains how to build and use it.
 #![cfg_attr(not(feature = "std"), no_std)]
 #![warn(missing_docs)]
 
 mod controller;
+mod convert;
 mod message;
 mod types;
 

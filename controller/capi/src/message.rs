@@ -1,9 +1,9 @@
-//! Messages in a buffer of the caller's.
+//! Messages in a buffer of the caller.
 
 use core::ffi::c_char;
 use core::fmt::{Display, Write};
 
-/// Text with a length that is known beforehand; what does not fit is left out.
+/// A buffer of fixed length; text that does not fit is omitted.
 struct Buffer<'a> {
     bytes: &'a mut [u8],
     used: usize,
@@ -22,7 +22,7 @@ impl Write for Buffer<'_> {
     }
 }
 
-/// Writes `text` and a terminating zero, as much of it as fits into `length` bytes.
+/// Writes as much of `text` as fits into `length` bytes, with a terminating zero.
 ///
 /// # Safety
 /// `to` is NULL or points to `length` bytes that may be written.
@@ -30,11 +30,11 @@ pub unsafe fn write(text: impl Display, to: *mut c_char, length: usize) {
     if to.is_null() || length == 0 {
         return;
     }
-    // SAFETY: the caller's promise.
+    // SAFETY: the caller's contract.
     let bytes = unsafe { core::slice::from_raw_parts_mut(to.cast::<u8>(), length) };
     bytes.fill(0);
     let mut buffer = Buffer { bytes, used: 0 };
-    // A buffer that is full is no failure.
+    // A full buffer is not an error.
     let _ = write!(buffer, "{text}");
 }
 

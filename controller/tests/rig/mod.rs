@@ -1,5 +1,5 @@
-//! A linear resonator on a moving base, exact between samples, and a loop around it.
-#![allow(dead_code)] // every test binary uses its part
+//! A linear resonator on a moving base, exact between samples, and a control loop around it.
+#![allow(dead_code)] // each test binary uses a part of it
 
 use phase_lock::{Config, Input, Output, PhaseLock, State};
 
@@ -10,7 +10,7 @@ pub const AMPLITUDE: f64 = 1e-4;
 
 /// `q'' + 2 zeta omega0 q' + omega0^2 q = omega0^2 e`, `e = E sin(phase)`, in closed form.
 ///
-/// The base acts through the spring alone, so phase resonance (a quarter turn of lag) is at omega0 exactly.
+/// The base acts through the spring only, so phase resonance (a lag of pi/2) is exactly at omega0.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Resonator {
     pub omega_0: f64,
@@ -43,7 +43,7 @@ impl Resonator {
         };
         let (q_p, dq_p) = steady(self.phase);
         let (x, v) = (self.q - q_p, self.dq - dq_p);
-        // Free decay of what is left.
+        // Free decay of the transient.
         let wd = w * (1.0 - z * z).sqrt();
         let (s, c) = (wd * h).sin_cos();
         let decay = (-z * w * h).exp();
@@ -61,7 +61,7 @@ pub fn config() -> Config {
     Config::for_resonance(OMEGA_0, AMPLITUDE)
 }
 
-/// A controller and what it knows, coupled to a resonator.
+/// A controller and its state, coupled to a resonator.
 pub struct Bench {
     pub controller: PhaseLock,
     pub state: State,
@@ -82,13 +82,13 @@ impl Bench {
         }
     }
 
-    /// One sample: the sensors are read, and the drive holds until the next.
+    /// One sample: the sensor readings, and the drive until the next sample.
     pub fn sample(&mut self) -> Output {
         let reference = self.measured_reference.then_some(self.resonator.base);
         self.sample_reading(self.resonator.q, reference)
     }
 
-    /// One sample in which the sensors read something else.
+    /// One sample with other sensor readings.
     pub fn sample_reading(&mut self, response: f64, reference: Option<f64>) -> Output {
         let input = Input {
             response,
@@ -101,7 +101,7 @@ impl Bench {
         output
     }
 
-    /// Runs for nominal periods; the last output.
+    /// Runs for a number of nominal periods. Returns the last output.
     pub fn run(&mut self, periods: u32) -> Output {
         (0..100 * periods)
             .map(|_| self.sample())
@@ -109,7 +109,7 @@ impl Bench {
             .expect("at least one sample")
     }
 
-    /// Runs until locked; periods it took, and the output then.
+    /// Runs until locked. Returns the number of periods and the output.
     pub fn run_to_lock(&mut self, most_periods: u32) -> Option<(f64, Output)> {
         (0..100 * most_periods).find_map(|n| {
             let output = self.sample();

@@ -2,8 +2,9 @@
 
 use std::collections::HashMap;
 
+use fmi2_description::{Description, Unknown};
+
 use crate::attributes::{Causality, Initial, Variability, allowed};
-use crate::description::{Description, Unknown};
 use crate::identifier::identifier;
 use crate::table::{Kind, Table, Variable};
 
@@ -18,7 +19,7 @@ pub(crate) fn check(description: &Description, table: &Table, faults: &mut Vec<S
     }
     units(description, table, faults);
     // Places in the list mean nothing while some of it could not be read.
-    if table.variables.len() == description.model_variables.variables.len() {
+    if table.variables.len() == description.variables.len() {
         structure(description, table, faults);
     }
 }
@@ -38,11 +39,11 @@ fn identity(description: &Description, table: &Table, faults: &mut Vec<String>) 
         ));
     }
     if let (Some(exchange), Some(steps)) = (&description.model_exchange, &description.co_simulation)
-        && exchange.model_identifier != steps.model_identifier
+        && exchange != steps
     {
         faults.push(format!(
             "ModelExchange has modelIdentifier {:?}; expected is that of CoSimulation, {:?}",
-            exchange.model_identifier, steps.model_identifier
+            exchange, steps
         ));
     }
     if table.categories.len() > 64 {
@@ -125,10 +126,7 @@ fn legal(v: &Variable) -> Result<(), String> {
 }
 
 fn units(description: &Description, table: &Table, faults: &mut Vec<String>) {
-    let known = |unit: &str| {
-        let units = &description.unit_definitions.units;
-        units.iter().any(|u| u.name == unit)
-    };
+    let known = |unit: &str| description.units.iter().any(|known| known == unit);
     for variable in &table.variables {
         if let Some(unit) = variable.unit.as_deref().filter(|u| !known(u)) {
             let name = &variable.name;
@@ -138,17 +136,11 @@ fn units(description: &Description, table: &Table, faults: &mut Vec<String>) {
 }
 
 fn structure(description: &Description, table: &Table, faults: &mut Vec<String>) {
-    let structure = &description.model_structure;
+    let structure = &description.structure;
     let outputs: Vec<_> = table.places(|v| v.causality == Causality::Output);
-    exactly(
-        "Outputs",
-        &outputs,
-        &structure.outputs.unknowns,
-        table,
-        faults,
-    );
+    exactly("Outputs", &outputs, &structure.outputs, table, faults);
 
-    let initial_unknowns = &structure.initial_unknowns.unknowns;
+    let initial_unknowns = &structure.initial_unknowns;
     let unknown_at_start = |v: &Variable| {
         let computed = matches!(v.causality, Causality::Output)
             && matches!(v.initial, Some(Initial::Approx | Initial::Calculated));
@@ -163,13 +155,13 @@ fn structure(description: &Description, table: &Table, faults: &mut Vec<String>)
         }
     }
 
-    let derivatives: Vec<_> = (description.model_variables.variables.iter().enumerate())
-        .filter_map(|(i, v)| Some((i + 1, v.real.as_ref()?.derivative?)))
+    let derivatives: Vec<_> = (description.variables.iter().enumerate())
+        .filter_map(|(i, v)| Some((i + 1, v.content.first()?.derivative?)))
         .collect();
     for &(_, state) in &derivatives {
         in_range("derivative", state, table, faults);
     }
-    for unknown in &structure.derivatives.unknowns {
+    for unknown in &structure.derivatives {
         if !derivatives.iter().any(|&(place, _)| place == unknown.index) {
             faults.push(format!(
                 "Derivatives lists index {}, which has no attribute derivative",
@@ -183,7 +175,7 @@ fn structure(description: &Description, table: &Table, faults: &mut Vec<String>)
             &derivatives,
             table,
             initial_unknowns,
-            &structure.derivatives.unknowns,
+            &structure.derivatives,
             faults,
         );
     }
@@ -193,7 +185,7 @@ fn structure(description: &Description, table: &Table, faults: &mut Vec<String>)
         &structure.derivatives,
         &structure.initial_unknowns,
     ];
-    for unknown in lists.into_iter().flat_map(|list| &list.unknowns) {
+    for unknown in lists.into_iter().flatten() {
         dependencies(unknown, table, faults);
     }
 }

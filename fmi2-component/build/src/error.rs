@@ -1,20 +1,20 @@
-//! What can be wrong with a description.
+//! Errors of the build step.
 
 use std::fmt;
 
-/// Why a description is refused.
+/// Reason why a description is refused.
 #[derive(Debug)]
 pub enum Error {
     /// The file cannot be read or written.
     File {
         /// Which file.
         path: std::path::PathBuf,
-        /// Why not.
+        /// Reason.
         source: std::io::Error,
     },
-    /// It is not XML of the shape that FMI 2.0 asks for.
-    Xml(serde_xml_rs::Error),
-    /// It is, but says what FMI 2.0 forbids; one line for each fault.
+    /// The text is not a model description.
+    Description(fmi2_description::Error),
+    /// The description violates FMI 2.0; one line per fault.
     Faults(Vec<String>),
 }
 
@@ -22,7 +22,7 @@ impl fmt::Display for Error {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self {
             Self::File { path, .. } => write!(f, "{} cannot be read or written", path.display()),
-            Self::Xml(_) => f.write_str("this is not a model description of FMI 2.0"),
+            Self::Description(_) => f.write_str("the text is not a model description of FMI 2.0"),
             Self::Faults(faults) => f.write_str(&faults.join("\n")),
         }
     }
@@ -32,14 +32,14 @@ impl std::error::Error for Error {
     fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
         match self {
             Self::File { source, .. } => Some(source),
-            Self::Xml(source) => Some(source),
+            Self::Description(source) => Some(source),
             Self::Faults(_) => None,
         }
     }
 }
 
-impl From<serde_xml_rs::Error> for Error {
-    fn from(error: serde_xml_rs::Error) -> Self {
-        Self::Xml(error)
+impl From<fmi2_description::Error> for Error {
+    fn from(error: fmi2_description::Error) -> Self {
+        Self::Description(error)
     }
 }

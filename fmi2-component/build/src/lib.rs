@@ -26,7 +26,6 @@
 
 mod attributes;
 mod check;
-mod description;
 mod error;
 mod guid;
 mod identifier;
@@ -36,6 +35,7 @@ mod table;
 use std::path::{Path, PathBuf};
 
 pub use error::Error;
+use fmi2_description::{Description, unknown_names};
 use table::Table;
 
 /// Reads the description at `path`, relative to the package, and writes `$OUT_DIR/variables.rs`. For `build.rs`.
@@ -92,8 +92,8 @@ pub fn describe(xml: &str) -> Result<String, Error> {
 }
 
 fn read(xml: &str) -> Result<Table, Error> {
-    let description = serde_xml_rs::from_str(xml)?;
-    let mut faults = Vec::new();
+    let description = Description::parse(xml)?;
+    let mut faults = unknown_names(xml)?;
     let table = Table::new(&description, &mut faults);
     check::check(&description, &table, &mut faults);
     if faults.is_empty() {

@@ -1,7 +1,12 @@
 //! The variable table: the description with defaults filled in and declared types looked up.
 
+use std::fmt::Debug;
+use std::str::FromStr;
+
+use fmi2_description as xml;
+use fmi2_description::{Content, Description, ScalarVariable, SimpleType};
+
 use crate::attributes::{Causality, Initial, Variability, allowed};
-use crate::description::{Attributes, Description, ScalarVariable, SimpleType};
 
 /// A model's identity and its variables.
 #[derive(Debug)]
@@ -57,21 +62,15 @@ impl Table {
 
     /// Fills in defaults; complains about what it cannot make sense of.
     pub fn new(description: &Description, faults: &mut Vec<String>) -> Self {
-        let types = &description.type_definitions.types;
+        let types = &description.types;
         Self {
             name: description.model_name.clone(),
-            identifier: description
-                .co_simulation
-                .as_ref()
-                .map(|interface| interface.model_identifier.clone())
-                .unwrap_or_default(),
+            identifier: description.co_simulation.clone().unwrap_or_default(),
             version: description.version.clone(),
             event_indicators: description.number_of_event_indicators,
             states: states(description),
-            categories: (description.log_categories.categories.iter())
-                .map(|category| category.name.clone())
-                .collect(),
-            variables: (description.model_variables.variables.iter())
+            categories: description.categories.clone(),
+            variables: (description.variables.iter())
                 .filter_map(|variable| match read(variable, types) {
                     Ok(variable) => Some(variable),
                     Err(fault) => {
@@ -86,13 +85,13 @@ impl Table {
 
 /// What `Derivatives` lists, with the states that the derivatives are of; `check` complains about what is missing.
 fn states(description: &Description) -> Vec<(usize, usize)> {
-    let variables = &description.model_variables.variables;
-    let unknowns = &description.model_structure.derivatives.unknowns;
+    let variables = &description.variables;
+    let unknowns = &description.structure.derivatives;
     unknowns
         .iter()
         .filter_map(|unknown| {
             let derivative = unknown.index.checked_sub(1)?;
-            let of = variables.get(derivative)?.real.as_ref()?.derivative?;
+            let of = variables.get(derivative)?.content.first()?.derivative?;
             Some((of.checked_sub(1)?, derivative))
         })
         .collect()
@@ -140,8 +139,8 @@ fn named<T>(
     })
 }
 
-/// What the element of the variable's type says.
-struct Content {
+/// Attributes of the element of the variable's type, including those of the declared type.
+struct Resolved {
     kind: Kind,
     unit: Option<String>,
     start: Option<Literal>,
@@ -150,59 +149,82 @@ struct Content {
     nominal: Option<Literal>,
 }
 
-/// A pick of one element out of a declared type.
-type Pick<T> = fn(&SimpleType) -> Option<&Attributes<T>>;
-
-fn content(v: &ScalarVariable, types: &[SimpleType]) -> Result<Content, String> {
-    let contents = [
-        resolve(Kind::Real, &v.real, types, |t| t.real.as_ref()),
-        resolve(Kind::Integer, &v.integer, types, |t| t.integer.as_ref()),
-        resolve(Kind::Boolean, &v.boolean, types, |t| t.boolean.as_ref()),
-        resolve(Kind::String, &v.string, types, |t| t.string.as_ref()),
-        resolve(Kind::Integer, &v.enumeration, types, |t| {
-            t.enumeration.as_ref()
-        }),
-    ];
-    let mut contents: Vec<_> = contents.into_iter().flatten().collect();
-    match (contents.pop(), contents.is_empty()) {
-        (Some(content), true) => content,
-        _ => Err("it needs one of Real, Integer, Boolean, String, Enumeration".into()),
+fn content(v: &ScalarVariable, types: &[SimpleType]) -> Result<Resolved, String> {
+    let [own] = &v.content[..] else {
+        return Err("it needs one of Real, Integer, Boolean, String, Enumeration".into());
+    };
+    match own.kind {
+        xml::Kind::Real => resolve::<f64>(Kind::Real, own, types),
+        xml::Kind::Integer | xml::Kind::Enumeration => resolve::<i32>(Kind::Integer, own, types),
+        xml::Kind::Boolean => resolve::<Truth>(Kind::Boolean, own, types),
+        xml::Kind::String => resolve::<String>(Kind::String, own, types),
     }
 }
 
-fn resolve<T: std::fmt::Debug>(
+fn resolve<T: FromStr + Debug>(
     kind: Kind,
-    own: &Option<Attributes<T>>,
+    own: &Content,
     types: &[SimpleType],
-    pick: Pick<T>,
-) -> Option<Result<Content, String>> {
-    let own = own.as_ref()?;
-    let declared = match &own.declared_type {
-        None => None,
-        Some(name) => match types.iter().find(|t| t.name == *name).and_then(pick) {
-            Some(declared) => Some(declared),
-            None => {
-                return Some(Err(format!(
-                    "TypeDefinitions has no {name:?} of the variable's type"
-                )));
+) -> Result<Resolved, String> {
+    let declared =
+        match &own.declared_type {
+            None => None,
+            Some(name) => {
+                let declared = types.iter().find(|t| t.name == *name);
+                let declared = declared.and_then(|t| t.content.iter().find(|c| c.kind == own.kind));
+                Some(declared.ok_or_else(|| {
+                    format!("TypeDefinitions has no {name:?} of the variable's type")
+                })?)
             }
-        },
-    };
-    let inherited = |get: fn(&Attributes<T>) -> Option<&T>| {
+        };
+    let inherited = |attribute: &str, get: fn(&Content) -> Option<&String>| {
         get(own)
             .or_else(|| declared.and_then(get))
-            .map(|value| format!("{value:?}"))
+            .map(|text| literal::<T>(kind, attribute, text))
+            .transpose()
     };
-    Some(Ok(Content {
+    Ok(Resolved {
         kind,
         unit: own
             .unit
             .clone()
             .or_else(|| declared.and_then(|d| d.unit.clone())),
         // A declared type has no start value.
-        start: own.start.as_ref().map(|value| format!("{value:?}")),
-        min: inherited(|a| a.min.as_ref()),
-        max: inherited(|a| a.max.as_ref()),
-        nominal: inherited(|a| a.nominal.as_ref()),
-    }))
+        start: own
+            .start
+            .as_ref()
+            .map(|text| literal::<T>(kind, "start", text))
+            .transpose()?,
+        min: inherited("min", |c| c.min.as_ref())?,
+        max: inherited("max", |c| c.max.as_ref())?,
+        nominal: inherited("nominal", |c| c.nominal.as_ref())?,
+    })
+}
+
+/// The value as a Rust literal.
+fn literal<T: FromStr + Debug>(kind: Kind, attribute: &str, text: &str) -> Result<Literal, String> {
+    text.parse::<T>()
+        .map(|value| format!("{value:?}"))
+        .map_err(|_| format!("{attribute} = {text:?} is not a value of type {kind:?}"))
+}
+
+/// `xs:boolean`: true, false, 1 or 0.
+struct Truth(bool);
+
+impl FromStr for Truth {
+    type Err = ();
+
+    fn from_str(text: &str) -> Result<Self, ()> {
+        match text {
+            "true" | "1" => Ok(Self(true)),
+            "false" | "0" => Ok(Self(false)),
+            _ => Err(()),
+        }
+    }
+}
+
+impl Debug for Truth {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        Debug::fmt(&self.0, f)
+    }
 }

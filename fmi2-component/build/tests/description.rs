@@ -14,7 +14,7 @@ fn change(from: &str, to: &str) -> String {
 fn refused(from: &str, to: &str, reason: &str) {
     let error = match source_of(&change(from, to)) {
         Ok(_) => panic!("{to:?} was accepted"),
-        Err(Error::Xml(source)) => source.to_string(),
+        Err(Error::Description(source)) => source.to_string(),
         Err(error) => error.to_string(),
     };
     assert!(error.contains(reason), "{reason:?} is not in {error:?}");

@@ -1,9 +1,10 @@
 //! `vines chain`: what each stage of the measurement chain costs and does.
 
 use clap::Args;
-use vines::stages;
+use vines::chain_effects::{self, Effect};
+use vines::report::Table;
 
-use super::{failure::Failure, scene_arguments::SceneArguments};
+use super::{failure::Failure, json, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Locks the plant through each stage of [chain] alone and through some of them together, and prints a Markdown table:
@@ -28,10 +29,31 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let effects = stages::effects(|further| arguments.scene.load_with(further));
+    let effects = chain_effects::effects(|further| arguments.scene.load_with(further));
     let effects = effects.map_err(Failure::input)?;
     if arguments.json {
-        return Ok(serde_json::to_string_pretty(&effects)? + "\n");
+        return json(&effects);
     }
-    Ok(stages::table(&effects))
+    Ok(table(&effects).markdown())
+}
+
+/// The effects, each against the ideal chain, which is the first.
+fn table(effects: &[Effect]) -> Table {
+    let ideal = effects[0];
+    Table::new([
+        "stage",
+        "sigma moves by",
+        "C moves by",
+        "sigma wanders by",
+        "time of a sample",
+    ])
+    .rows(effects.iter().map(|effect| {
+        [
+            effect.name.to_string(),
+            format!("{:+.1e}", effect.sigma - ideal.sigma),
+            format!("{:+.1e}", effect.c - ideal.c),
+            format!("{:.0e}", effect.wander),
+            format!("× {:.2}", effect.sample_seconds / ideal.sample_seconds),
+        ]
+    }))
 }

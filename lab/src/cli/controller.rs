@@ -14,10 +14,10 @@ const HELP: &str = "\
 Examples:
   vines controller --listen 127.0.0.1:5511      then: vines identify --controller udp://127.0.0.1:5511
 
-Answers every reading with a drive. A reading that is lost is replaced by the last good one; after --silence the
-session is over, and every further reading of it is answered with no drive. The protocol is docs/network-protocol.md.
+Answers every reading with a drive. The last valid reading replaces a lost one. After --silence the session ends, and
+further readings are answered without a drive. See docs/network-protocol.md.
 
-Listens on this machine only, unless --allow-remote is given: there is no authentication and no encryption.";
+The server listens on this machine only, unless --allow-remote is given: there is no authentication and no encryption.";
 
 /// Serve the phase-locked loop to a rig or an experiment across the network
 #[derive(Debug, Args)]
@@ -36,7 +36,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let first = BuiltIn::new(&scene).map_err(Failure::input)?;
+    let first = BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
     let service = ControllerService {
         sample_time: scene.sample_time(),
         silence: arguments.silence,

@@ -1,9 +1,11 @@
 //! `vines decay`: how well the estimators of the decay do.
 
 use clap::Args;
-use vines::estimators;
+use vines::estimators::{self, Quality};
+use vines::report::Table;
+use vines::scene::Estimator;
 
-use super::{failure::Failure, scene_arguments::SceneArguments};
+use super::{failure::Failure, json, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Locks the built-in plant, lets go, and estimates sigma along the decay with every estimator and window, on clean data and
@@ -30,7 +32,35 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     let qualities = estimators::qualities(&scene).map_err(Failure::run)?;
     if arguments.json {
-        return Ok(serde_json::to_string_pretty(&qualities)? + "\n");
+        return json(&qualities);
     }
-    Ok(estimators::table(&qualities))
+    Ok(table(&qualities).markdown())
+}
+
+/// One row per estimator and window, with a column for each noise level.
+fn table(qualities: &[Quality]) -> Table {
+    let rows = qualities
+        .chunk_by(|one, other| (one.estimator, one.window) == (other.estimator, other.window));
+    Table::new([
+        "estimator",
+        "window, periods",
+        "clean: bias",
+        "clean: RMS",
+        "60 dB",
+        "50 dB",
+        "40 dB",
+    ])
+    .rows(rows.map(|row| {
+        let name = match row[0].estimator {
+            Estimator::Fit => "least squares",
+            Estimator::Crossings => "zero crossings",
+        };
+        let mut cells = vec![
+            name.to_string(),
+            row[0].window.to_string(),
+            format!("{:+.4}", row[0].bias),
+        ];
+        cells.extend(row.iter().map(|one| format!("{:.4}", one.rms)));
+        cells
+    }))
 }

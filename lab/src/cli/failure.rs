@@ -2,7 +2,10 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use vines::{net::LinkError, pack::PackError, scene::SceneError};
+use vines::{
+    backbone::TrackError, experiment::ExperimentError, net::LinkError, pack::PackError,
+    rig::RigError, scene::SceneError,
+};
 
 /// One clear message, and whose fault it was.
 #[derive(Debug)]
@@ -42,6 +45,25 @@ impl Display for Failure {
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
         Self::input(error)
+    }
+}
+
+/// A drive that the plant refuses comes from the scene.
+impl From<ExperimentError> for Failure {
+    fn from(error: ExperimentError) -> Self {
+        match error {
+            ExperimentError::Rig(RigError::Refused(_)) => Self::input(error),
+            _ => Self::run(error),
+        }
+    }
+}
+
+impl From<TrackError> for Failure {
+    fn from(error: TrackError) -> Self {
+        match error {
+            TrackError::Rig(RigError::Refused(_)) => Self::input(error),
+            _ => Self::run(error),
+        }
     }
 }
 

@@ -6,16 +6,19 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tempfile::TempDir;
 use vines::{
+    comparison::Comparison,
     experiment::{self, Plan, Stage},
     identification, pack, report,
     rig::BuiltIn,
 };
 
 use super::{
-    door::{Door, OpenRig, ReachArguments},
+    endpoint::{Endpoint, OpenRig, ReachArguments},
     failure::Failure,
+    json,
     pack::beside_this_program,
     scene_arguments::SceneArguments,
+    written,
 };
 
 const HELP: &str = "\
@@ -41,12 +44,12 @@ pub(super) struct Arguments {
 
     /// What is shaken: an FMU, `built-in`, or udp://HOST:PORT; without it, this program's plant FMU is packed into the
     /// results' folder
-    #[arg(long, value_name = "DOOR")]
-    rig: Option<Door>,
+    #[arg(long, value_name = "ENDPOINT")]
+    rig: Option<Endpoint>,
 
     /// What controls it: `built-in`, an FMU, or udp://HOST:PORT
-    #[arg(long, value_name = "DOOR", default_value = "built-in")]
-    controller: Door,
+    #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
+    controller: Endpoint,
 
     #[command(flatten)]
     reach: ReachArguments,
@@ -64,12 +67,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .init();
     let reach = arguments.reach.reach();
     // Settings are refused before anything is written or connected.
-    BuiltIn::new(&scene).map_err(Failure::input)?;
+    BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
     let (OpenRig { mut rig, pace }, fmus) = match &arguments.rig {
-        Some(door) => (door.rig(&scene, reach)?, Packed::at(&arguments.out)?),
+        Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&arguments.out)?),
         None => {
             let fmus = Packed::at(&arguments.out)?;
-            (Door::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
+            (Endpoint::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
         }
     };
     let mut controller = arguments.controller.controller(&scene, reach, pace)?;
@@ -86,22 +89,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     bar.finish_and_clear();
     // A rig across the network is told that this is all, before it has to wonder.
     drop((rig, controller));
-    let record = record.map_err(Failure::run)?;
+    let record = record?;
     let found = identification::identify(&record, &scene).map_err(Failure::run)?;
-    let mut written = report::write(&found, &arguments.out).map_err(Failure::run)?;
-    written.extend(fmus.keep()?);
+    let found = Comparison::of(&found, &scene);
+    let mut files = report::write(&found, &arguments.out).map_err(Failure::run)?;
+    files.extend(fmus.keep()?);
     if arguments.json {
-        return Ok(serde_json::to_string_pretty(&found)? + "\n");
+        return json(&found);
     }
-    let files: Vec<String> = written
-        .iter()
-        .map(|path| path.display().to_string())
-        .collect();
-    Ok(format!(
-        "{}\nWritten: {}\n",
-        report::table(&found),
-        files.join(", ")
-    ))
+    let summary = report::summary::identification(&found);
+    Ok(format!("{summary}\n{}", written(&files)))
 }
 
 /// This program's own FMUs: packed into a folder of their own inside the results' folder, and kept where the run succeeds.

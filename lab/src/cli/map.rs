@@ -5,17 +5,14 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use vines::{
-    map::{Axis, Map, Plan, Range, Regime},
+    map::{Axis, Map, Plan, Range},
     orbit::phase_resonant,
-    report,
+    regime::Regime,
+    report::{self, Table, summary::parameters},
     scene::Scene,
 };
 
-use super::{
-    failure::Failure,
-    scene_arguments::SceneArguments,
-    table::{parameters, table},
-};
+use super::{failure::Failure, scene_arguments::SceneArguments, written};
 
 const HELP: &str = "\
 Every cell is one plant, driven at a fixed frequency from the scene's start; after its transient, its impacts are classified:
@@ -83,16 +80,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let bar = ProgressBar::new(plan.cells() as u64).with_style(style);
     let map = plan.run(|| bar.inc(1)).map_err(Failure::input)?;
     bar.finish_and_clear();
-    let written = report::write_map(&map, &arguments.out).map_err(Failure::run)?;
-    let files: Vec<String> = written
-        .iter()
-        .map(|path| path.display().to_string())
-        .collect();
-    Ok(format!(
-        "{}\nWritten: {}\n",
-        summary(&map),
-        files.join(", ")
-    ))
+    let files = report::write_map(&map, &arguments.out).map_err(Failure::run)?;
+    Ok(format!("{}\n{}", summary(&map), written(&files)))
 }
 
 fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
@@ -130,29 +119,26 @@ fn summary(map: &Map) -> String {
         0 => "-".into(),
         _ => format!("{:.1} %", 100.0 * count as f64 / of as f64),
     };
-    let rows: Vec<Vec<String>> = Regime::ALL
-        .into_iter()
-        .map(|regime| {
-            let (all, here) = map.count(regime);
-            vec![
-                regime.name().into(),
-                all.to_string(),
-                share(all, map.cells.len()),
-                share(here, inside),
-            ]
-        })
-        .collect();
-    let headings = [
+    let rows = Regime::SIMULATED.into_iter().map(|regime| {
+        let (all, here) = map.count(regime);
+        [
+            regime.name().to_string(),
+            all.to_string(),
+            share(all, map.cells.len()),
+            share(here, inside),
+        ]
+    });
+    let table = Table::new([
         "regime",
         "cells",
         "share",
         "inside the theory's stable island",
-    ];
+    ]);
     format!(
         "Regimes over {} and {}\n  {}\n\n{}",
         map.plan.x,
         map.plan.y,
         parameters(&map.plan.scene),
-        table(&headings, &rows)
+        table.rows(rows).text()
     )
 }

@@ -8,14 +8,11 @@ use vines::{
         Bifurcation, Branch, Condition, Limits, Orbit, Periodic, backbone, continue_both_ways,
         convergence, phase_resonant, response, settle,
     },
+    report::{Table, number, summary::parameters},
     scene::Dimensionless,
 };
 
-use super::{
-    failure::Failure,
-    scene_arguments::SceneArguments,
-    table::{number, parameters, table, yes_no},
-};
+use super::{failure::Failure, scene_arguments::SceneArguments, yes_no};
 
 const HELP: &str = "\
 Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon sigma:
@@ -110,24 +107,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             &study,
             arguments.json,
             || {
-                let rows: Vec<_> = study
-                    .rows
-                    .iter()
-                    .map(|row| {
-                        let mut cells = vec![format!("{:.3e}", row.epsilon)];
-                        cells.extend([row.sigma, row.c, row.b].map(|one| format!("{one:.3e}")));
-                        cells
-                    })
-                    .collect();
+                let rows = study.rows.iter().map(|row| {
+                    [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}"))
+                });
                 let [sigma, c, b] = study.slopes;
-                table(&["epsilon", "sigma", "C", "B"], &rows)
+                Table::new(["epsilon", "sigma", "C", "B"]).rows(rows).text()
                     + &format!("\nExponent of epsilon: sigma {sigma:.3}, C {c:.3}, B {b:.3}\n")
             },
         );
     }
     let orbits = phase_resonant(&scene);
     if arguments.json {
-        return Ok(serde_json::to_string_pretty(&orbits)? + "\n");
+        return super::json(&orbits);
     }
     let title = "Exact symmetric 1:1 orbits at phase resonance";
     Ok(format!(
@@ -161,10 +152,14 @@ fn settled(
     })?;
     let pattern = format!(
         "{} impacts in {} period{}{}",
-        motion.shape.impacts(),
-        motion.shape.periods(),
-        if motion.shape.periods() == 1 { "" } else { "s" },
-        if motion.shape.mirrored {
+        motion.pattern.impacts(),
+        motion.pattern.periods(),
+        if motion.pattern.periods() == 1 {
+            ""
+        } else {
+            "s"
+        },
+        if motion.pattern.mirrored {
             ", mirrored"
         } else {
             ""
@@ -188,22 +183,18 @@ fn settled(
         let multipliers = motion
             .multipliers
             .map(|[re, im]| format!("{re:.5}{im:+.5}i"));
-        let rows: Vec<_> = motion
-            .bounces
-            .iter()
-            .map(|one| {
-                let phase = one.phase.to_degrees().rem_euclid(360.0);
-                let mut cells = vec![format!("{:+}", one.wall)];
-                cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
-                cells
-            })
-            .collect();
-        let headings = ["wall", "phase, degrees", "q1", "q1' after", "q2' after"];
+        let rows = motion.bounces.iter().map(|one| {
+            let phase = one.phase.to_degrees().rem_euclid(360.0);
+            let mut cells = vec![format!("{:+}", one.wall)];
+            cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
+            cells
+        });
+        let table = Table::new(["wall", "phase, degrees", "q1", "q1' after", "q2' after"]);
         format!(
             "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
             gamma.to_degrees(),
             multipliers.join(", "),
-            table(&headings, &rows)
+            table.rows(rows).text()
         )
     })
 }
@@ -221,7 +212,7 @@ fn shown(
     text: impl FnOnce() -> String,
 ) -> Result<String, Failure> {
     if json {
-        return Ok(serde_json::to_string_pretty(found)? + "\n");
+        return super::json(found);
     }
     Ok(format!("{title}\n  {}\n\n{}", parameters(scene), text()))
 }
@@ -247,7 +238,7 @@ fn curve(name: &str, branch: &Branch) -> String {
         cells.extend([number(largest), yes_no(motion.stable)]);
         cells
     };
-    let headings = [
+    let table = Table::new([
         "sigma",
         "G",
         "C",
@@ -255,12 +246,12 @@ fn curve(name: &str, branch: &Branch) -> String {
         "B",
         "largest mult.",
         "stable",
-    ];
+    ]);
     let thinned = branch
         .points
         .iter()
         .step_by(branch.points.len().div_ceil(ROWS));
-    text += &table(&headings, &thinned.map(row).collect::<Vec<_>>());
+    text += &table.rows(thinned.map(row)).text();
     for special in &branch.special {
         let what = match special.kind {
             Bifurcation::Fold => "fold",
@@ -285,18 +276,16 @@ fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
             "  none between 0.2 and 3 omega0 at this excitation\n".into()
         };
     }
-    let rows: Vec<_> = orbits
-        .iter()
-        .map(|orbit| {
-            let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.b];
-            let mut row: Vec<String> = numbers.map(number).into();
-            row.extend(orbit.multipliers.map(|one| format!("{one:.4}")));
-            row.push(yes_no(orbit.stable));
-            row
-        })
-        .collect();
-    let headings = [
+    let rows = orbits.iter().map(|orbit| {
+        let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.b];
+        let mut row: Vec<String> = numbers.map(number).into();
+        row.extend(orbit.multipliers.map(|one| format!("{one:.4}")));
+        row.push(yes_no(orbit.stable));
+        row
+    });
+    Table::new([
         "sigma", "Omega", "C", "B", "mult1", "mult2", "mult3", "mult4", "stable",
-    ];
-    table(&headings, &rows)
+    ])
+    .rows(rows)
+    .text()
 }

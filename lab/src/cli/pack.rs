@@ -9,8 +9,8 @@ use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Examples:
-  cargo build --release && target/release/vines pack --out fmus
-  vines pack --libraries target/debug --out fmus
+  scripts/pack --out fmus                                      builds the libraries first
+  vines pack --libraries target/debug --out fmus               libraries of `cargo build --features lovines/fmu`
   vines pack --out fmus --scene scenes/dimensionless.toml      bench.ssp with other parameters
   vines pack --out fmus --portable                             for older Linux; run it in the sources' folder
   vines pack --out fmus --binary win64=lovines.dll --binary win64=phase_lock_fmu.dll";

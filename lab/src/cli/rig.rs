@@ -13,18 +13,18 @@ use super::{
 const HELP: &str = "\
 Examples:
   vines rig --listen 127.0.0.1:5510                 in real time; then: vines identify --rig udp://127.0.0.1:5510
-  vines rig --listen 127.0.0.1:5510 --lock-step     as fast as drives arrive, with the same bits every time
+  vines rig --listen 127.0.0.1:5510 --lock-step     as fast as the drives arrive, with the bits of the built-in plant
 
-Every session begins with the plant at the start of the scene, and its clock with the first drive. Both sides take the sample
-time from their scene: give both the same one. Lost and late drives are counted, and the last one is held; after --silence
-the drive is brought to zero, and stays there until another session begins. The protocol is docs/network-protocol.md.
+Every session starts with the plant in the start state of the scene; the rig's clock starts with the first drive frame. Client and
+server take the sample time from their scene: use the same scene for both. Lost and late drives are counted, and the last valid
+one is held. After --silence the drive ramps to zero and stays there until another session starts. See docs/network-protocol.md.
 
-Listens on this machine only, unless --allow-remote is given: there is no authentication and no encryption, and whoever
-reaches the address can drive the rig.";
+The server listens on this machine only, unless --allow-remote is given: there is no authentication and no encryption, and everyone
+who can reach the address can drive the rig.";
 
 /// Longest silence in real time, s: about one period of the default scene.
 const SILENCE_PACED: f64 = 0.1;
-/// ... and in lock-step, where nothing moves meanwhile.
+/// Longest silence in lock-step, s. The rig does not move in the meantime.
 const SILENCE_LOCK_STEP: f64 = 5.0;
 
 /// Serve the plant to a controller or an experiment across the network
@@ -45,14 +45,14 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     silence: Option<f64>,
 
-    /// Largest drive amplitude that is taken, m [default: the half-width b of the cavity]
+    /// Largest drive amplitude, m [default: the half-width b of the cavity]
     #[arg(long, value_name = "METRES", value_parser = positive)]
     max_amplitude: Option<f64>,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let first = Simulated::new(&scene).map_err(Failure::input)?;
+    let first = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
     let default = if arguments.lock_step {
         SILENCE_LOCK_STEP
     } else {
@@ -71,7 +71,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         "in lock-step"
     };
     let what = format!(
-        "rig, {mode}, {:.1} samples a second,",
+        "rig, {mode}, {:.1} samples per second,",
         1.0 / service.sample_time
     );
     let (stop, tell) = arguments.serving.begin(&what, server.address()?)?;

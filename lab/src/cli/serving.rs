@@ -1,4 +1,4 @@
-//! What the two servers share: where they listen, when they end, what they print.
+//! Common options of the two servers: address, end, output.
 
 use std::{
     net::SocketAddr,
@@ -12,18 +12,18 @@ use std::{
 use clap::Args;
 use vines::net::{Session, resolve};
 
-use super::{door::ReachArguments, failure::Failure, print};
+use super::{endpoint::ReachArguments, failure::Failure, print};
 
 #[derive(Debug, Args)]
 pub(super) struct ServingArguments {
-    /// Where to listen, such as 127.0.0.1:5510; port 0 takes a free one, which is printed
+    /// Address of the server, such as 127.0.0.1:5510; with port 0 the system chooses a free port
     #[arg(long, value_name = "HOST:PORT")]
     listen: String,
 
     #[command(flatten)]
     reach: ReachArguments,
 
-    /// End after this long, s; without it, on Ctrl-C
+    /// End after this time, s [default: at Ctrl-C]
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     duration: Option<f64>,
 
@@ -41,7 +41,7 @@ impl ServingArguments {
         Ok(resolve(&self.listen, self.reach.reach())?)
     }
 
-    /// Says where the server listens, and returns when it shall stop and what it does with a session's report.
+    /// Prints the address. Returns a function that is true when the server should stop, and one that prints reports.
     pub(super) fn begin(
         &self,
         what: &str,
@@ -65,7 +65,7 @@ impl ServingArguments {
             } else {
                 session.to_string()
             };
-            // A reader who has gone does not end the service.
+            // A closed output does not stop the server.
             let _ = print(&text);
             served += 1;
             if sessions == Some(served) {
@@ -76,9 +76,9 @@ impl ServingArguments {
     }
 }
 
-/// A number above 0 and at most 1e8: seconds up to some years, or metres.
+/// A number above 0 and at most 1e8, for seconds and metres.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "a number is wanted")?;
+    let value: f64 = text.parse().map_err(|_| "expected is a number")?;
     if value > 0.0 && value <= 1e8 {
         Ok(value)
     } else {

@@ -3,15 +3,12 @@
 use clap::Args;
 use serde::Serialize;
 use vines::{
+    report::{Table, number, summary::parameters},
     scene::Dimensionless,
     theory::{Activation, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, SlowFlow},
 };
 
-use super::{
-    failure::Failure,
-    scene_arguments::SceneArguments,
-    table::{number, parameters, table, yes_no},
-};
+use super::{failure::Failure, json, scene_arguments::SceneArguments, yes_no};
 
 const HELP: &str = "\
 Everything is of first order in epsilon. Both branches of the slow invariant manifold are one curve over B, the particle's
@@ -101,7 +98,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         backbone: flow.backbone(highest / points as f64, highest, points),
     };
     if arguments.json {
-        return Ok(serde_json::to_string_pretty(&report)? + "\n");
+        return json(&report);
     }
     Ok(readable(&report, arguments.sigma.is_some()))
 }
@@ -151,24 +148,22 @@ fn equilibria(found: &[Equilibrium]) -> String {
     if found.is_empty() {
         return "  none at this excitation\n".into();
     }
-    let rows: Vec<_> = found
-        .iter()
-        .map(|one| {
-            let mut row = vec![branch(one.branch).to_string()];
-            row.extend([one.c, one.b, one.gamma.to_degrees()].map(number));
-            row.extend([one.impacts_stable, one.slow_flow_stable].map(yes_no));
-            row
-        })
-        .collect();
-    let headings = [
+    let rows = found.iter().map(|one| {
+        let mut row = vec![branch(one.branch).to_string()];
+        row.extend([one.c, one.b, one.gamma.to_degrees()].map(number));
+        row.extend([one.impacts_stable, one.slow_flow_stable].map(yes_no));
+        row
+    });
+    Table::new([
         "branch",
         "C",
         "B",
         "phase, degrees",
         "impacts stable",
         "slow flow stable",
-    ];
-    table(&headings, &rows)
+    ])
+    .rows(rows)
+    .text()
 }
 
 fn branch(side: BranchSide) -> &'static str {
@@ -182,22 +177,20 @@ fn solutions(points: &[BackbonePoint]) -> String {
     if points.is_empty() {
         return "  none at this excitation\n".into();
     }
-    let rows: Vec<_> = points
-        .iter()
-        .map(|point| {
-            let mut row = vec![branch(point.branch).to_string()];
-            row.extend([point.sigma, point.c, point.b].map(number));
-            row.extend([point.impacts_stable, point.slow_flow_stable].map(yes_no));
-            row
-        })
-        .collect();
-    let headings = [
+    let rows = points.iter().map(|point| {
+        let mut row = vec![branch(point.branch).to_string()];
+        row.extend([point.sigma, point.c, point.b].map(number));
+        row.extend([point.impacts_stable, point.slow_flow_stable].map(yes_no));
+        row
+    });
+    Table::new([
         "branch",
         "sigma",
         "C",
         "B",
         "impacts stable",
         "slow flow stable",
-    ];
-    table(&headings, &rows)
+    ])
+    .rows(rows)
+    .text()
 }

@@ -7,13 +7,21 @@ pub struct Component {
     pub identifier: &'static str,
     /// Cargo's name of the library, without prefix and suffix.
     pub library: &'static str,
-    /// Cargo's package, for the hint how to build it.
+    /// Cargo's package.
     pub package: &'static str,
+    /// The feature that the library needs, as `package/feature`.
+    pub feature: Option<&'static str>,
     /// The finished `modelDescription.xml`.
     pub description: String,
 }
 
 impl Component {
+    /// Options of `cargo build --release` that build the library.
+    pub(super) fn build_options(&self) -> String {
+        let feature = self.feature.map(|name| format!(" --features {name}"));
+        format!("-p {}{}", self.package, feature.unwrap_or_default())
+    }
+
     /// The guid in the description, which the library must hold as well.
     pub(super) fn guid(&self) -> Option<&str> {
         let (_, rest) = self.description.split_once("guid=\"")?;
@@ -38,12 +46,14 @@ pub fn components() -> [Component; 2] {
             identifier: "LoViNes",
             library: "lovines",
             package: "lovines",
+            feature: Some("lovines/fmu"),
             description: describe(PLANT),
         },
         Component {
             identifier: "PhaseLock",
             library: "phase_lock_fmu",
             package: "phase-lock-fmu",
+            feature: None,
             description: describe(CONTROLLER),
         },
     ]

@@ -1,20 +1,16 @@
-//! What lies in an FMU for its reader: one page and a picture.
+//! Documentation inside an FMU: one page and a figure.
 //!
-//! The page is made from `modelDescription.xml`, so that nothing is said twice; what an equation says better than a
-//! description is kept beside the picture, in `pictures/`.
+//! The tables of the page come from `modelDescription.xml`; equations and explanations are in `pictures/`.
 
 use std::fmt::Write;
 
-use roxmltree::{Document, Node};
+use fmi2_description::{Description, Error, ScalarVariable};
 
-/// The files for the reader of an FMU: name inside, content. A component that has no picture gets the page alone.
+/// The files: name inside the FMU, content. A component without a figure gets the page only.
 ///
 /// # Errors
-/// A description that is no XML.
-pub fn documentation(
-    identifier: &str,
-    description: &str,
-) -> Result<Vec<(String, Vec<u8>)>, roxmltree::Error> {
+/// A description that cannot be read.
+pub fn documentation(identifier: &str, description: &str) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let material = MATERIAL.iter().find(|one| one.identifier == identifier);
     let page = page(description, material)?;
     let mut files = vec![("documentation/index.html".to_owned(), page.into_bytes())];
@@ -53,15 +49,13 @@ const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;color:#1f2933;max-w
     th,td{text-align:left;vertical-align:top;padding:.3rem .6rem;border-bottom:1px solid #d9e2ec}\
     td:nth-child(n+2):nth-child(-n+4){white-space:nowrap}code{font-size:.95em}h2{margin-top:2.2rem}";
 
-fn page(xml: &str, material: Option<&Material>) -> Result<String, roxmltree::Error> {
-    let document = Document::parse(xml)?;
-    let root = document.root_element();
-    let said = |name: &str| escape(root.attribute(name).unwrap_or_default());
-    let name = said("modelName");
+fn page(xml: &str, material: Option<&Material>) -> Result<String, Error> {
+    let description = Description::parse(xml)?;
+    let name = escape(&description.model_name);
     let mut out = format!(
         "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name}</title>\n\
          <style>{STYLE}</style>\n</head>\n<body>\n<h1>{name}</h1>\n<p>{}.</p>\n",
-        said("description")
+        escape(&description.description)
     );
     if let Some(material) = material {
         let _ = write!(out, "{}\n{}", material.svg, material.text);
@@ -69,13 +63,13 @@ fn page(xml: &str, material: Option<&Material>) -> Result<String, roxmltree::Err
     let _ = writeln!(
         out,
         "<p>Version {}; FMI {}; {}. Default experiment: {}.</p>",
-        said("version"),
-        said("fmiVersion"),
-        interfaces(root).join(" and "),
-        experiment(root),
+        escape(&description.version),
+        escape(&description.fmi_version),
+        interfaces(&description).join(" and "),
+        experiment(&description),
     );
     for (causality, heading) in SECTIONS {
-        table(&mut out, root, causality, heading);
+        table(&mut out, &description, causality, heading);
     }
     out += "</body>\n</html>\n";
     Ok(out)
@@ -90,30 +84,30 @@ const SECTIONS: [(&str, &str); 5] = [
     ("local", "Local variables"),
 ];
 
-fn interfaces(root: Node) -> Vec<&'static str> {
-    let all = [
-        ("CoSimulation", "co-simulation"),
-        ("ModelExchange", "model exchange"),
-    ];
-    let there = |name: &str| root.children().any(|child| child.has_tag_name(name));
-    let found = all.into_iter().filter(|(element, _)| there(element));
-    found.map(|(_, words)| words).collect()
+fn interfaces(description: &Description) -> Vec<&'static str> {
+    let co_simulation = description.co_simulation.as_ref();
+    let model_exchange = description.model_exchange.as_ref();
+    [
+        co_simulation.map(|_| "co-simulation"),
+        model_exchange.map(|_| "model exchange"),
+    ]
+    .into_iter()
+    .flatten()
+    .collect()
 }
 
-fn experiment(root: Node) -> String {
-    let element = root
-        .children()
-        .find(|c| c.has_tag_name("DefaultExperiment"));
-    let said = |name| element.and_then(|e| e.attribute(name)).unwrap_or("?");
+fn experiment(description: &Description) -> String {
+    let experiment = &description.default_experiment;
+    let text = |value: &Option<String>| value.clone().unwrap_or_else(|| "?".into());
     format!(
         "{} s to {} s in steps of {} s",
-        escape(said("startTime")),
-        escape(said("stopTime")),
-        escape(&rounded(said("stepSize")))
+        escape(&text(&experiment.start_time)),
+        escape(&text(&experiment.stop_time)),
+        escape(&rounded(&text(&experiment.step_size)))
     )
 }
 
-/// A number as a reader wants it: no more than six digits. The description has them all.
+/// A number with at most six digits. The description has all digits.
 fn rounded(text: &str) -> String {
     match text.parse::<f64>() {
         Ok(number) if text.len() > 8 => {
@@ -128,11 +122,11 @@ fn rounded(text: &str) -> String {
     }
 }
 
-fn table(out: &mut String, root: Node, causality: &str, heading: &str) {
-    let variables = root
-        .descendants()
-        .filter(|node| node.has_tag_name("ScalarVariable"))
-        .filter(|node| node.attribute("causality").unwrap_or("local") == causality);
+fn table(out: &mut String, description: &Description, causality: &str, heading: &str) {
+    let variables = description
+        .variables
+        .iter()
+        .filter(|variable| variable.causality.as_deref().unwrap_or("local") == causality);
     let mut rows = variables.map(row).peekable();
     if rows.peek().is_none() {
         return;
@@ -145,20 +139,17 @@ fn table(out: &mut String, root: Node, causality: &str, heading: &str) {
     *out += "</table>\n";
 }
 
-fn row(variable: Node) -> String {
-    let said = |name| escape(variable.attribute(name).unwrap_or_default());
-    let content = variable.children().find(Node::is_element);
-    let value = |name| escape(content.and_then(|c| c.attribute(name)).unwrap_or_default());
-    let start = content
-        .and_then(|c| c.attribute("start"))
-        .unwrap_or_default();
-    let unit = value("unit");
+fn row(variable: &ScalarVariable) -> String {
+    let content = variable.content.first();
+    let start = content.and_then(|c| c.start.as_deref()).unwrap_or_default();
+    let unit = content.and_then(|c| c.unit.as_deref()).unwrap_or_default();
     format!(
-        "<tr><td><code>{}</code></td><td>{}</td><td>{unit}</td><td>{}</td><td>{}</td></tr>\n",
-        said("name"),
+        "<tr><td><code>{}</code></td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
+        escape(&variable.name),
         escape(&rounded(start)),
-        said("variability"),
-        said("description"),
+        escape(unit),
+        escape(variable.variability.as_deref().unwrap_or_default()),
+        escape(&variable.description),
     )
 }
 
@@ -182,12 +173,10 @@ mod tests {
             let names: Vec<_> = files.iter().map(|(name, _)| name.as_str()).collect();
             assert_eq!(names, ["documentation/index.html", "model.png"]);
             let page = std::str::from_utf8(&files[0].1).unwrap();
-            let document = Document::parse(xml).unwrap();
-            let variables = document.descendants();
-            for variable in variables.filter(|n| n.has_tag_name("ScalarVariable")) {
-                let name = variable.attribute("name").unwrap();
+            for variable in Description::parse(xml).unwrap().variables {
+                let name = &variable.name;
                 assert!(page.contains(&format!("<code>{name}</code>")), "{name}");
-                let description = escape(variable.attribute("description").unwrap());
+                let description = escape(&variable.description);
                 assert!(page.contains(&description), "{name}");
             }
             assert!(page.contains("<svg") && files[1].1.starts_with(b"\x89PNG"));
@@ -211,7 +200,7 @@ mod tests {
     }
 
     #[test]
-    fn numbers_have_no_more_digits_than_a_reader_wants() {
+    fn numbers_have_at_most_six_digits() {
         for (exact, shown) in [
             ("0.0011343573395537938", "0.00113436"),
             ("9.246125558182298e-05", "9.24613e-5"),
@@ -227,7 +216,11 @@ mod tests {
 
     #[test]
     fn a_component_without_a_picture_gets_a_page() {
-        let files = documentation("Tiny", "<fmiModelDescription modelName=\"a &lt; b\"/>").unwrap();
+        let files = documentation(
+            "Tiny",
+            "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"a &lt; b\"/>",
+        )
+        .unwrap();
         assert_eq!(files.len(), 1);
         let page = String::from_utf8(files[0].1.clone()).unwrap();
         assert!(page.contains("<h1>a &lt; b</h1>"));

@@ -8,15 +8,15 @@ pub enum PackError {
     /// There is no such library.
     #[error(
         "the library of {identifier} is not there: looked for {}; build it with \
-         `cargo build --release -p {package}`, or say where it is with --libraries", path.display()
+         `cargo build --release {build_options}`, or say where it is with --libraries", path.display()
     )]
     Missing {
         /// The component.
         identifier: &'static str,
         /// Where it was looked for.
         path: PathBuf,
-        /// The package that builds it.
-        package: &'static str,
+        /// Options of `cargo build --release` that build it.
+        build_options: String,
     },
     /// The library exists but cannot be read.
     #[error("cannot read {}: {source}", path.display())]
@@ -28,7 +28,7 @@ pub enum PackError {
     },
     /// The library cannot run here.
     #[error(
-        "{} is {found}, but this platform needs {needed}; build it here with `cargo build --release -p {package}`",
+        "{} is {found}, but this platform needs {needed}; build it here with `cargo build --release {build_options}`",
         path.display()
     )]
     Platform {
@@ -38,32 +38,32 @@ pub enum PackError {
         found: String,
         /// What would be right.
         needed: &'static str,
-        /// The package that builds it.
-        package: &'static str,
+        /// Options of `cargo build --release` that build it.
+        build_options: String,
     },
     /// The library is one for this platform, but without FMI functions.
     #[error(
         "{} has no function fmi2Instantiate, so it is no FMI 2.0 component; \
-         build it with `cargo build --release -p {package}`", path.display()
+         build it with `cargo build --release {build_options}`", path.display()
     )]
     NotAComponent {
         /// The library.
         path: PathBuf,
-        /// The package that builds it.
-        package: &'static str,
+        /// Options of `cargo build --release` that build it.
+        build_options: String,
     },
     /// The library was built from other variables than the description has.
     #[error(
         "{} was built from other variables than {identifier} has now: build it anew with \
-         `cargo build --release -p {package}`", path.display()
+         `cargo build --release {build_options}`", path.display()
     )]
     Stale {
         /// The library.
         path: PathBuf,
         /// The component.
         identifier: &'static str,
-        /// The package that builds it.
-        package: &'static str,
+        /// Options of `cargo build --release` that build it.
+        build_options: String,
     },
     /// A library for another platform that cannot be used.
     #[error("{} {problem}", path.display())]
@@ -96,7 +96,7 @@ pub enum PackError {
     Controller(#[from] phase_lock::ConfigError),
     /// The description is no XML.
     #[error("the description cannot be read: {0}")]
-    Description(roxmltree::Error),
+    Description(fmi2_description::Error),
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
     Write {

@@ -18,13 +18,13 @@ pub(super) fn read(
     folder: &Path,
     platform: &Platform,
 ) -> Result<Vec<u8>, PackError> {
-    let package = component.package;
+    let build_options = component.build_options();
     let path = folder.join(format!("{DLL_PREFIX}{}{DLL_SUFFIX}", component.library));
     let bytes = std::fs::read(&path).map_err(|source| match source.kind() {
         ErrorKind::NotFound => PackError::Missing {
             identifier: component.identifier,
             path: path.clone(),
-            package,
+            build_options: build_options.clone(),
         },
         _ => PackError::Read {
             path: path.clone(),
@@ -36,18 +36,21 @@ pub(super) fn read(
             path,
             found,
             needed: platform.name,
-            package,
+            build_options,
         });
     }
     if !exports(&bytes, "fmi2Instantiate") {
-        return Err(PackError::NotAComponent { path, package });
+        return Err(PackError::NotAComponent {
+            path,
+            build_options,
+        });
     }
     if component.guid().is_some_and(|guid| !mentions(&bytes, guid)) {
         let identifier = component.identifier;
         return Err(PackError::Stale {
             path,
             identifier,
-            package,
+            build_options,
         });
     }
     Ok(bytes)

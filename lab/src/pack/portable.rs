@@ -40,6 +40,9 @@ pub fn portable(components: &[Component]) -> Result<PathBuf, PackError> {
     build.arg(format!("{triple}.{major}.{minor}"));
     for component in components {
         build.args(["--package", component.package]);
+        if let Some(feature) = component.feature {
+            build.args(["--features", feature]);
+        }
     }
     if !stderr().is_terminal() {
         build.arg("--quiet");

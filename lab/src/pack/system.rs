@@ -23,7 +23,7 @@ pub(super) fn file(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
     for (attribute, value) in [
         (
             "stopTime",
-            Some((PERIODS * scene.plant.natural_period()).to_string()),
+            Some((PERIODS * scene.dimensionless().natural_period()).to_string()),
         ),
         ("stepSize", Some(step.to_string())),
         ("baseStepSize", Some(step.to_string())),

@@ -1,14 +1,16 @@
-//! What a report is made of: sections of words, pictures and tables, with one finding and a few lines of the error budget each.
+//! What a report is made of: sections of words, figures and tables, with one finding and a few lines of the error budget each.
 
 use serde::{Deserialize, Serialize};
+
+use super::table::Table;
 
 /// One part of a section.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub enum Block {
     /// A paragraph.
     Words(String),
-    /// A picture, as SVG for white paper.
-    Picture {
+    /// A figure, as SVG for white paper.
+    Figure {
         /// Name of its files, without ending.
         name: String,
         /// What it shows.
@@ -20,10 +22,8 @@ pub enum Block {
     Table {
         /// What it shows.
         caption: String,
-        /// Its columns.
-        headings: Vec<String>,
-        /// Its rows.
-        rows: Vec<Vec<String>>,
+        /// Its cells.
+        table: Table,
     },
 }
 
@@ -70,23 +70,28 @@ impl Section {
         }
     }
 
+    /// States the finding, in the summary and as a paragraph.
+    pub(super) fn found(&mut self, finding: impl Into<String>) {
+        self.finding = finding.into();
+        self.words(self.finding.clone());
+    }
+
     pub(super) fn words(&mut self, text: impl Into<String>) {
         self.blocks.push(Block::Words(text.into()));
     }
 
-    pub(super) fn picture(&mut self, name: &str, caption: impl Into<String>, svg: String) {
-        self.blocks.push(Block::Picture {
+    pub(super) fn figure(&mut self, name: &str, caption: impl Into<String>, svg: String) {
+        self.blocks.push(Block::Figure {
             name: name.into(),
             caption: caption.into(),
             svg,
         });
     }
 
-    pub(super) fn table(&mut self, caption: &str, headings: &[&str], rows: Vec<Vec<String>>) {
+    pub(super) fn table(&mut self, caption: &str, table: Table) {
         self.blocks.push(Block::Table {
             caption: caption.into(),
-            headings: headings.iter().map(|one| (*one).into()).collect(),
-            rows,
+            table,
         });
     }
 

@@ -6,8 +6,14 @@ mod regimes;
 mod theory;
 mod tracking;
 
+use lovines::InvalidValue;
+use phase_lock::ConfigError;
+use thiserror::Error;
+
+use super::figure::FigureError;
+use super::files::WriteError;
 use super::section::Section;
-use crate::map::Range;
+use crate::map::{MapError, Range};
 use crate::rig::{Chain, Rig, Simulated};
 use crate::scene::Scene;
 
@@ -22,19 +28,43 @@ pub struct Subject {
 
 impl Subject {
     /// The plant of the scene, behind its measurement chain where it has one.
-    fn rig(&self) -> Result<Box<dyn Rig>, String> {
-        let plant = Simulated::new(&self.scene).map_err(|error| error.to_string())?;
-        let rig: Box<dyn Rig> = Box::new(plant);
-        Ok(if self.scene.chain.is_on() {
-            Box::new(Chain::new(rig, &self.scene))
-        } else {
-            rig
-        })
+    fn rig(&self) -> Result<Box<dyn Rig>, InvalidValue> {
+        let plant = Simulated::new(self.scene.plant, self.scene.start)?;
+        let scene = &self.scene;
+        Ok(Chain::around(
+            Box::new(plant),
+            &scene.chain,
+            &scene.dimensionless(),
+            scene.controller.samples_per_period,
+        ))
+    }
+}
+
+/// Why a section could not be made.
+#[derive(Debug, Error)]
+pub enum SectionError {
+    /// The plant refuses a parameter or the start.
+    #[error(transparent)]
+    Plant(#[from] InvalidValue),
+    /// The controller refuses a setting.
+    #[error(transparent)]
+    Controller(#[from] ConfigError),
+    /// The map cannot be made.
+    #[error(transparent)]
+    Map(#[from] MapError),
+    /// A figure or a table could not be made.
+    #[error(transparent)]
+    Write(#[from] WriteError),
+}
+
+impl From<FigureError> for SectionError {
+    fn from(error: FigureError) -> Self {
+        Self::Write(error.into())
     }
 }
 
 /// Makes one section; the callback is told how much of it is done, from 0 to 1.
-pub type Maker = fn(&Subject, &(dyn Fn(f64) + Sync)) -> Result<Section, String>;
+pub type Maker = fn(&Subject, &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError>;
 
 /// All sections in order, each with the name that its results are kept under.
 pub const SECTIONS: [(&str, Maker); 5] = [

@@ -5,10 +5,11 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
+use super::dark;
+use super::files::{WriteError, write_files};
 use super::page::page;
 use super::section::{Block, Section};
-use super::sections::{SECTIONS, Subject};
-use super::{ReportError, dark, write_files};
+use super::sections::{SECTIONS, SectionError, Subject};
 
 /// Folder of what is kept from run to run, inside the report's folder.
 const KEPT: &str = ".vines";
@@ -40,7 +41,7 @@ pub struct Report {
     pub findings: Vec<String>,
 }
 
-/// Writes the report on `subject` into `out`: `report.html`, each picture for light and dark backgrounds, and tables. Sections
+/// Writes the report on `subject` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. Sections
 /// made by an earlier run are taken over unless scene, version or axes have changed, or `fresh` asks for all anew.
 ///
 /// # Errors
@@ -51,7 +52,7 @@ pub fn write_report(
     fresh: bool,
     work_precision: Option<&str>,
     progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Report, ReportError> {
+) -> Result<Report, SectionError> {
     let (mut sections, mut kept) = (Vec::new(), Vec::new());
     for (n, (name, make)) in SECTIONS.into_iter().enumerate() {
         let key = key(subject, name);
@@ -66,11 +67,10 @@ pub fn write_report(
             sections.push(section);
             continue;
         }
-        let message = |message| ReportError::Format { name, message };
-        let section = make(subject, &|part| progress(at(part))).map_err(message)?;
+        let section = make(subject, &|part| progress(at(part)))?;
         let entry = Kept { key, section };
-        let text = serde_json::to_string(&entry).map_err(|error| message(error.to_string()))?;
-        write_files(&out.join(KEPT), &[(file.as_str(), text)])?;
+        let text = serde_json::to_string(&entry).map_err(WriteError::from)?;
+        write_files(&out.join(KEPT), &[(file, text)])?;
         sections.push(entry.section);
     }
     let mut files = vec![(
@@ -79,7 +79,7 @@ pub fn write_report(
     )];
     for section in &sections {
         for block in &section.blocks {
-            if let Block::Picture { name, svg, .. } = block {
+            if let Block::Figure { name, svg, .. } = block {
                 files.push((format!("{name}.svg"), svg.clone()));
                 files.push((format!("{name}-dark.svg"), dark(svg)));
             }
@@ -87,10 +87,6 @@ pub fn write_report(
         let attachments = section.attachments.iter();
         files.extend(attachments.map(|one| (one.name.clone(), one.text.clone())));
     }
-    let files: Vec<(&str, String)> = files
-        .iter()
-        .map(|(name, text)| (name.as_str(), text.clone()))
-        .collect();
     Ok(Report {
         written: write_files(out, &files)?,
         kept,

@@ -1,64 +1,142 @@
-//! The short table of an identification.
+//! Tables: as text for a terminal, as Markdown for the documentation, as HTML for the page.
 
-use crate::identification::{COMPARED_ABOVE, Identification};
+use maud::{Markup, html};
+use serde::{Deserialize, Serialize};
 
-/// The result in a few lines: the locked point beside theory and exact orbit, then the decay.
-#[must_use]
-pub fn table(found: &Identification) -> String {
-    let (p, lock) = (&found.parameters, &found.lock);
-    let mut lines = vec![
-        format!(
-            "epsilon = {:.6}, lambda = {:.4}, r = {}, G = {:.4}",
-            p.epsilon, p.lambda, p.r, lock.g
-        ),
-        format!(
-            "Locked after {:.0} periods: {}, {}, phase error {:.1e} degrees",
-            lock.periods_to_lock,
-            lock.regime,
-            lock.impacts(),
-            lock.phase_error_deg
-        ),
-        String::new(),
-        format!("  {:<24}{:>12}{:>12}{:>12}", "", "sigma", "C", "B"),
-    ];
-    let mut row = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
-        let b = b.map_or("-".into(), |b| format!("{b:.6}"));
-        lines.push(format!("  {name:<24}{sigma:>12.6}{c:>12.6}{b:>12}"));
-    };
-    row("measured at the lock", lock.sigma, lock.c, lock.b);
-    if let Some(exact) = &found.exact {
-        row("exact orbit", exact.sigma, exact.c, Some(exact.b));
+/// Headings and rows of cells.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Table {
+    headings: Vec<String>,
+    rows: Vec<Vec<String>>,
+}
+
+impl Table {
+    /// An empty table with these headings.
+    #[must_use]
+    pub fn new<const N: usize>(headings: [&str; N]) -> Self {
+        Self {
+            headings: headings.map(String::from).into(),
+            rows: Vec::new(),
+        }
     }
-    if let Some(theory) = &found.theory {
-        row(
-            "theory, first order",
-            theory.sigma,
-            theory.c,
-            Some(theory.b),
+
+    /// With a row for each item; a row has as many cells as there are headings.
+    #[must_use]
+    pub fn rows<R: Into<Vec<String>>>(mut self, rows: impl IntoIterator<Item = R>) -> Self {
+        self.rows.extend(rows.into_iter().map(Into::into));
+        self
+    }
+
+    /// Whether it has no row.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
+    /// Columns under their headings, separated by two spaces; words to the left, numbers to the right.
+    #[must_use]
+    pub fn text(&self) -> String {
+        let numbers = self.numbers();
+        let all = || std::iter::once(&self.headings).chain(&self.rows);
+        let width = |n: usize| all().map(|row| row[n].chars().count()).max().unwrap_or(0);
+        let widths: Vec<usize> = (0..self.headings.len()).map(width).collect();
+        let line = |cells: &Vec<String>| {
+            let cells = cells.iter().zip(&widths).zip(&numbers);
+            let padded: Vec<String> = cells
+                .map(|((cell, width), number)| match number {
+                    true => format!("{cell:>width$}"),
+                    false => format!("{cell:<width$}"),
+                })
+                .collect();
+            format!("  {}", padded.join("  ")).trim_end().to_string() + "\n"
+        };
+        all().map(line).collect()
+    }
+
+    /// A Markdown table.
+    #[must_use]
+    pub fn markdown(&self) -> String {
+        let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
+        let rule = format!("|{}\n", "---|".repeat(self.headings.len()));
+        let rows: String = self.rows.iter().map(|row| line(row)).collect();
+        line(&self.headings) + &rule + &rows
+    }
+
+    /// An HTML table with its caption; columns of numbers are set to the right.
+    #[must_use]
+    pub fn html(&self, caption: &str) -> Markup {
+        let numbers = self.numbers();
+        let class = |n: usize| numbers[n].then_some("number");
+        html! {
+            table {
+                caption { (caption) }
+                "\n"
+                thead { tr { @for (n, cell) in self.headings.iter().enumerate() { th class=[class(n)] { (cell) } } } }
+                "\n"
+                tbody {
+                    "\n"
+                    @for row in &self.rows {
+                        tr { @for (n, cell) in row.iter().enumerate() { td class=[class(n)] { (cell) } } }
+                        "\n"
+                    }
+                }
+            }
+            "\n"
+        }
+    }
+
+    /// Which columns hold numbers only.
+    fn numbers(&self) -> Vec<bool> {
+        let is_number = |cell: &str| {
+            ["–", "-", ""].contains(&cell) || cell.trim_end_matches(" %").parse::<f64>().is_ok()
+        };
+        (0..self.headings.len())
+            .map(|n| self.rows.iter().all(|row| is_number(&row[n])))
+            .collect()
+    }
+}
+
+/// A number of a table.
+#[must_use]
+pub fn number(value: f64) -> String {
+    format!("{value:.6}")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn table() -> Table {
+        Table::new(["what", "C"])
+            .rows([["a < b", "0.5"], ["c", "-10.25"]].map(|row| row.map(String::from)))
+    }
+
+    #[test]
+    fn words_are_set_to_the_left_and_numbers_to_the_right() {
+        assert_eq!(
+            table().text(),
+            "  what        C\n  a < b     0.5\n  c      -10.25\n"
         );
     }
-    if found.exact.is_none() && found.theory.is_none() {
-        lines.push("  (neither theory nor exact orbit to compare with: they are for phase resonance, -90 degrees)".into());
+
+    #[test]
+    fn markdown_has_a_rule_below_the_headings() {
+        assert_eq!(
+            table().markdown(),
+            "| what | C |\n|---|---|\n| a < b | 0.5 |\n| c | -10.25 |\n"
+        );
     }
-    lines.push(String::new());
-    if let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) {
-        lines.push(format!(
-            "Free decay: {} points from C = {:.4} down to {:.4}, {}",
-            found.decay.len(),
-            first.c,
-            last.c,
-            if lock.impacts_per_period.is_nan() {
-                "where the backbone folds"
-            } else {
-                "where the impacts lose synchrony"
-            }
-        ));
+
+    #[test]
+    fn text_cannot_become_markup() {
+        let html = table().html("\"x\" & y").into_string();
+        assert!(
+            html.contains("<caption>&quot;x&quot; &amp; y</caption>"),
+            "{html}"
+        );
+        assert!(
+            html.contains("<td>a &lt; b</td><td class=\"number\">0.5</td>"),
+            "{html}"
+        );
     }
-    lines.push(match found.rms_sigma_error {
-        Some(rms) => format!(
-            "RMS of sigma against theory over C > {COMPARED_ABOVE}: {rms:.4} (theory is of first order in epsilon)"
-        ),
-        None => format!("No point of the decay lies above C = {COMPARED_ABOVE}"),
-    });
-    lines.join("\n") + "\n"
 }

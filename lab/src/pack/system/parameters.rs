@@ -2,29 +2,19 @@
 
 use std::fmt::Write;
 
-use phase_lock::{Config, Detector};
-
-use crate::{
-    pack::PackError,
-    rig::{configuration, start_values},
-    scene::Scene,
+use phase_lock::{
+    PARAMETERS,
+    Value::{self, Boolean, Integer, Real},
 };
 
-/// A value of a variable.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(super) enum Value {
-    Real(f64),
-    Integer(i64),
-    Boolean(bool),
-}
-
-use Value::{Boolean, Integer, Real};
+use crate::{pack::PackError, scene::Scene};
 
 type Named = (&'static str, Value);
 
 /// Parameters and start of the plant. The start goes by its parameters: some masters set no start value of an output.
 pub(super) fn plant(scene: &Scene) -> Vec<Named> {
-    start_values(scene)
+    scene
+        .start_values()
         .map(|(name, value)| {
             let parameter = match name {
                 "q1" => "q1_start",
@@ -40,50 +30,18 @@ pub(super) fn plant(scene: &Scene) -> Vec<Named> {
 
 /// The communication step: the controller's sample time, s.
 pub(super) fn step(scene: &Scene) -> f64 {
-    configuration(scene).sample_time
+    scene.sample_time()
 }
 
 /// Parameters of the controller, which is armed from the start.
 pub(super) fn controller(scene: &Scene) -> Result<Vec<Named>, PackError> {
-    let config = configuration(scene);
+    let config = scene.controller_config();
     config.build()?;
-    let Config { lock, .. } = config;
-    let (detector, harmonics, odd_only) = match config.detector {
-        Detector::Adaptive {
-            harmonics,
-            odd_only,
-        } => (1, harmonics, odd_only),
-        Detector::Demodulator => (2, 1, true),
-    };
-    Ok(vec![
-        ("sample_time", Real(config.sample_time)),
-        ("omega_start", Real(config.omega_start)),
-        ("omega_min", Real(config.omega_min)),
-        ("omega_max", Real(config.omega_max)),
-        ("omega_rate", Real(config.omega_rate)),
-        ("amplitude", Real(config.amplitude)),
-        ("amplitude_max", Real(config.amplitude_max)),
-        ("ramp_time", Real(config.ramp_time)),
-        ("release_time", Real(config.release_time)),
-        ("base_bandwidth", Real(config.base_bandwidth)),
-        ("phase_target", Real(config.phase_target)),
-        ("detector", Integer(detector)),
-        ("harmonics", Integer(harmonics.into())),
-        ("odd_only", Boolean(odd_only)),
-        ("bandwidth", Real(config.bandwidth)),
-        ("damping_rate", Real(config.damping_rate)),
-        ("delay", Real(config.delay)),
-        ("lock.phase_tolerance", Real(lock.phase_tolerance)),
-        ("lock.unlock_tolerance", Real(lock.unlock_tolerance)),
-        ("lock.frequency_drift", Real(lock.frequency_drift)),
-        ("lock.amplitude_drift", Real(lock.amplitude_drift)),
-        ("lock.dwell", Integer(lock.dwell.into())),
-        ("lock.coherence_min", Real(lock.coherence_min)),
-        ("lock.response_min", Real(lock.response_min)),
-        ("response_max", Real(config.response_max)),
-        ("acquire_timeout", Real(config.acquire_timeout)),
-        ("active", Boolean(true)),
-    ])
+    let parameters = PARAMETERS.iter().filter(|parameter| parameter.is_in_fmu());
+    Ok(parameters
+        .map(|parameter| (parameter.name, parameter.get(&config)))
+        .chain([("active", Boolean(true))])
+        .collect())
 }
 
 /// A file of parameter values. Each has a name of its own, since some masters merge sets of one name.

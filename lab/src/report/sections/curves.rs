@@ -2,9 +2,12 @@
 
 use serde::Serialize;
 
-use super::Subject;
+use super::{SectionError, Subject};
 use crate::orbit::{Bifurcation, Branch, Limits, Periodic, Response, backbone, response};
-use crate::report::{csv, period, responses, section::Section};
+use crate::report::figures::{period, responses};
+use crate::report::files::csv;
+use crate::report::section::Section;
+use crate::report::table::Table;
 use crate::scene::Dimensionless;
 use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 
@@ -24,7 +27,10 @@ struct Row {
     stable: bool,
 }
 
-pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, String> {
+pub(super) fn make(
+    subject: &Subject,
+    done: &(dyn Fn(f64) + Sync),
+) -> Result<Section, SectionError> {
     let mut section = Section::new("Exact periodic motions");
     let p = subject.scene.dimensionless();
     let limits = Limits::default();
@@ -35,8 +41,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         done((n + 1) as f64 / (excitations.len() + 1) as f64);
     }
     let Some(curve) = backbone(&p, &limits) else {
-        section.finding = "There is no exact phase-resonant 1:1 motion at this excitation.".into();
-        section.words(section.finding.clone());
+        section.found("There is no exact phase-resonant 1:1 motion at this excitation.");
         return Ok(section);
     };
     let special: Vec<String> = curve
@@ -67,11 +72,11 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         if special.is_empty() { "nowhere".into() } else { special.join("; ") }
     ));
     if !found.is_empty() {
-        section.picture(
+        section.figure(
             "responses",
             "Frequency responses at several excitations: exact, first-order, and the backbone of theory through their maxima. \
              Where a response loses its symmetry the asymmetric motions (blue, beside the dashed curve) take over.",
-            responses::draw(&p, &found)?,
+            responses::figure(&p, &found).svg()?,
         );
     }
     let rows: Vec<Vec<String>> = found
@@ -92,8 +97,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     if !rows.is_empty() {
         section.table(
             "Where the symmetric motions on the exact frequency responses change stability.",
-            &["G", "what", "σ", "C", "B"],
-            rows,
+            Table::new(["G", "what", "σ", "C", "B"]).rows(rows),
         );
     }
     let flow = SlowFlow::new(p.lambda, p.r);
@@ -108,11 +112,11 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         stable.min_by(|a, b| resonant(a).total_cmp(&resonant(b)))
     });
     if let Some(motion) = own {
-        section.picture(
+        section.figure(
             "period",
             "One period of the motion that the loop locks. Above: primary mass with its walls, and the particle between them; circles \
              mark the impacts. Below: centre of mass and relative displacement, exact and as first-order theory reconstructs them.",
-            period::draw(&p, motion, theory.as_ref())?,
+            period::figure(&p, motion, theory.as_ref()).svg()?,
         );
     }
     section.attach("curves.csv", csv(table(&curve, &found))?);

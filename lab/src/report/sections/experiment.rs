@@ -1,19 +1,26 @@
 //! The experiment: lock, hold, release, decay.
 
 use std::cell::Cell;
+use std::error::Error;
 
-use super::Subject;
+use super::{SectionError, Subject};
+use crate::comparison::{COMPARED_ABOVE, Comparison};
 use crate::experiment::{self, Plan, Stage};
-use crate::identification::{COMPARED_ABOVE, Identification, identify};
-use crate::report::{backbone, csv, history, manifold, section::Section};
+use crate::identification::identify;
+use crate::report::figures::{backbone, history, manifold};
+use crate::report::files::{decay_csv, json};
+use crate::report::section::Section;
+use crate::report::table::{Table, number};
 use crate::rig::BuiltIn;
 
-pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, String> {
+pub(super) fn make(
+    subject: &Subject,
+    done: &(dyn Fn(f64) + Sync),
+) -> Result<Section, SectionError> {
     let mut section = Section::new("The experiment");
     let scene = &subject.scene;
-    let refused = |error: &dyn std::fmt::Display| error.to_string();
     let mut rig = subject.rig()?;
-    let mut controller = BuiltIn::new(scene).map_err(|error| refused(&error))?;
+    let mut controller = BuiltIn::new(&scene.controller_config())?;
     let plan = Plan::of(scene);
     let told = Cell::new(0.0);
     let record = experiment::run(rig.as_mut(), &mut controller, &plan, |stage, at, of| {
@@ -29,45 +36,43 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
             done(part);
         }
     });
-    let found = record.map_err(|error| refused(&error)).and_then(|record| {
-        Ok((
-            identify(&record, scene).map_err(|error| refused(&error))?,
-            record,
-        ))
-    });
-    let (found, record) = match found {
-        Ok(found) => found,
-        Err(message) => {
-            section.finding = format!("The experiment gave no backbone: {message}.");
-            section.words(section.finding.clone());
-            return Ok(section);
-        }
+    let record = match record {
+        Ok(record) => record,
+        Err(error) => return Ok(without_backbone(section, &error)),
+    };
+    let found = match identify(&record, scene) {
+        Ok(found) => Comparison::of(&found, scene),
+        Err(error) => return Ok(without_backbone(section, &error)),
     };
     describe(&mut section, &found, scene.controller.phase_target);
-    section.picture(
+    section.figure(
         "history",
         "Amplitude and frequency over time. Left: the loop seeks phase resonance and holds it; measured once a period. Right: the \
          drive is off, and the motion decays along the backbone until the impacts lose synchrony at the fold. \
          Times count in periods 2π/ω₀ of the oscillator alone.",
-        history::draw(&record, scene, &found)?,
+        history::figure(&record, scene, &found).svg()?,
     );
-    section.picture(
+    section.figure(
         "decay-on-sim",
         "The decay on the slow invariant manifold, from the locked point (square) down the right branch to its fold.",
-        manifold::draw(&found)?,
+        manifold::figure(&found).svg()?,
     );
-    section.picture(
+    section.figure(
         "identified-backbone",
         "The identified backbone: points along the decay (circles), the locked point (square), the exact curve and first-order theory.",
-        backbone::draw(&found)?,
+        backbone::figure(&found).svg()?,
     );
-    section.attach("backbone.csv", csv(&found.decay)?);
-    let json = serde_json::to_string_pretty(&found).map_err(|error| error.to_string())?;
-    section.attach("identification.json", json + "\n");
+    section.attach("backbone.csv", decay_csv(&found)?);
+    section.attach("identification.json", json(&found)?);
     Ok(section)
 }
 
-fn describe(section: &mut Section, found: &Identification, target: f64) {
+fn without_backbone(mut section: Section, error: &dyn Error) -> Section {
+    section.found(format!("The experiment gave no backbone: {error}."));
+    section
+}
+
+fn describe(section: &mut Section, found: &Comparison, target: f64) {
     let lock = &found.lock;
     section.finding = format!(
         "The loop locked after {:.0} periods at σ = {:.4}, C = {:.4}, in the regime {}.",
@@ -83,13 +88,8 @@ fn describe(section: &mut Section, found: &Identification, target: f64) {
         lock.periods_to_lock, lock.impacts_per_period, lock.phase_error_deg
     ));
     let cells = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
-        let b = b.map_or("–".into(), |b| format!("{b:.6}"));
-        vec![
-            name.to_string(),
-            format!("{sigma:.6}"),
-            format!("{c:.6}"),
-            b,
-        ]
+        let b = b.map_or("–".into(), number);
+        [name.to_string(), number(sigma), number(c), b]
     };
     let mut rows = vec![cells("measured at the lock", lock.sigma, lock.c, lock.b)];
     if let Some(exact) = &found.exact {
@@ -125,15 +125,14 @@ fn describe(section: &mut Section, found: &Identification, target: f64) {
     }
     section.table(
         "The locked point. σ: detuning, C: amplitude of v over b, B: particle speed over b ω₀.",
-        &["", "σ", "C", "B"],
-        rows,
+        Table::new(["", "σ", "C", "B"]).rows(rows),
     );
     if let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) {
         section.words(format!(
             "Then the drive was switched off. The motion decayed from C = {:.4} to C = {:.4}, where the impacts lost synchrony; on its \
              way it passed along the backbone, {} points of which were identified.",
-            first.c,
-            last.c,
+            first.point.c,
+            last.point.c,
             found.decay.len()
         ));
     }

@@ -2,15 +2,22 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::Subject;
-use crate::map::{Axis, Plan, Regime};
+use super::{SectionError, Subject};
+use crate::map::{Axis, Plan};
 use crate::orbit::phase_resonant;
-use crate::report::{csv, map, map_row, section::Section};
+use crate::regime::Regime;
+use crate::report::figures::regimes;
+use crate::report::files::map_csv;
+use crate::report::section::Section;
+use crate::report::table::Table;
 
 /// Periods that pass, and periods recorded.
 const PERIODS: (usize, usize) = (400, 100);
 
-pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, String> {
+pub(super) fn make(
+    subject: &Subject,
+    done: &(dyn Fn(f64) + Sync),
+) -> Result<Section, SectionError> {
     let mut section = Section::new("Regimes of the driven response");
     let scene = subject.scene.dimensionless();
     let [x, y] = subject.map;
@@ -33,12 +40,10 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         record: PERIODS.1,
     };
     let (count, all) = (AtomicUsize::new(0), plan.cells());
-    let map = plan
-        .run(|| {
-            let n = count.fetch_add(1, Ordering::Relaxed) + 1;
-            done(n as f64 / all as f64);
-        })
-        .map_err(|error| error.to_string())?;
+    let map = plan.run(|| {
+        let n = count.fetch_add(1, Ordering::Relaxed) + 1;
+        done(n as f64 / all as f64);
+    })?;
     let inside = map.cells.iter().filter(|one| one.theory_stable).count();
     let (_, agree) = map.count(Regime::Symmetric);
     let percent = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
@@ -52,10 +57,10 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
          into 1:1 resonance and lost again, or if a small disturbance does not grow, and chaotic otherwise.",
         PERIODS.0, PERIODS.1
     ));
-    let rows = Regime::ALL.into_iter().map(|regime| {
+    let rows = Regime::SIMULATED.into_iter().map(|regime| {
         let (cells, here) = map.count(regime);
-        vec![
-            regime.name().into(),
+        [
+            regime.name().to_string(),
             cells.to_string(),
             format!("{:.1} %", percent(cells, all)),
             format!("{:.1} %", percent(here, inside)),
@@ -63,19 +68,19 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     });
     section.table(
         "How often each regime occurs.",
-        &[
+        Table::new([
             "regime",
             "cells",
             "share",
             "share inside the theory's island",
-        ],
-        rows.collect(),
+        ])
+        .rows(rows),
     );
     section.words(section.finding.clone());
-    section.picture(
+    section.figure(
         "regimes",
         "The regime map. The line is the border of the island where first-order theory has a stable symmetric 1:1 motion.",
-        map::draw(&map)?,
+        regimes::svg(&map)?,
     );
     section.budget(
         "regime map",
@@ -83,6 +88,6 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         "Where several regimes are stable the start decides. Cells at a border may still be in a transient, \
          and chaos that ends only after thousands of periods is taken for lasting.",
     );
-    section.attach("regimes.csv", csv(map.cells.iter().map(map_row))?);
+    section.attach("regimes.csv", map_csv(&map)?);
     Ok(section)
 }

@@ -1,14 +1,17 @@
 //! First-order theory: the backbones of several r, activation, and how it approaches the exact orbits.
 
-use super::Subject;
+use super::{SectionError, Subject};
 use crate::orbit::convergence;
-use crate::report::{approach, backbones, csv, section::Section};
+use crate::report::figures::{approach, backbones};
+use crate::report::files::csv;
+use crate::report::section::Section;
+use crate::report::table::Table;
 use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 
 /// Halvings of epsilon in the convergence study.
 const HALVINGS: u32 = 6;
 
-pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Section, String> {
+pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
     let mut section = Section::new("Theory, and how far it is to be trusted");
     let p = subject.scene.dimensionless();
     let flow = SlowFlow::new(p.lambda, p.r);
@@ -36,20 +39,20 @@ pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Sectio
         activation.from_rest
     ));
     if let Some(point) = &stable {
-        section.picture(
+        section.figure(
             "approach",
             "The modulation of theory off the manifold, one dot an impact. Driven at phase resonance, motions that start off the \
              manifold fall onto it within a few impacts and move along it to the locked point (square); without drive the motion moves \
              down to the fold, and loses its synchrony there. It runs a little below the manifold, as the measured decay does: its way \
              is not infinitely slow against the approach.",
-            approach::draw(&p, point)?,
+            approach::figure(&p, point).svg()?,
         );
     }
-    section.picture(
+    section.figure(
         "backbones",
         "Backbones of first-order theory. They do not depend on λ; which part of them is stable does. The less is lost at the \
          impacts, the deeper the fold.",
-        backbones::draw(&p)?,
+        backbones::figure(&p).svg()?,
     );
     match convergence(&p, HALVINGS) {
         Some(study) => {
@@ -57,23 +60,21 @@ pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Sectio
             section.finding = format!(
                 "First-order theory approaches the exact orbit as ε to the power {s:.2} in σ, {c:.2} in C and {b:.2} in B."
             );
-            let rows = study.rows.iter().map(|row| {
-                let numbers = [row.epsilon, row.sigma, row.c, row.b];
-                numbers.map(|one| format!("{one:.3e}")).into()
-            });
+            let rows = study
+                .rows
+                .iter()
+                .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}")));
             section.table(
                 "Theory less exact orbit at phase resonance, with λ, r and G as they are.",
-                &["ε", "in σ", "in C", "in B"],
-                rows.collect(),
+                Table::new(["ε", "in σ", "in C", "in B"]).rows(rows),
             );
             section.words(section.finding.clone());
             section.attach("convergence.csv", csv(&study.rows)?);
         }
         None => {
-            section.finding =
-                "Theory and exact orbits have no stable phase-resonant motion in common here."
-                    .into();
-            section.words(section.finding.clone());
+            section.found(
+                "Theory and exact orbits have no stable phase-resonant motion in common here.",
+            );
         }
     }
     Ok(section)

@@ -2,10 +2,13 @@
 
 use serde::Serialize;
 
-use super::Subject;
-use crate::backbone::{Compared, Report, track};
+use super::{SectionError, Subject};
+use crate::backbone::track;
+use crate::comparison::{TrackedComparison, TrackedPoint};
 use crate::identification::Regime;
-use crate::report::{csv, section::Section, tracked};
+use crate::report::figures::tracked as figure;
+use crate::report::files::csv;
+use crate::report::section::Section;
 use crate::rig::BuiltIn;
 
 /// One row of the table of points.
@@ -21,28 +24,29 @@ struct Row {
     distance: Option<f64>,
 }
 
-pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, String> {
+pub(super) fn make(
+    subject: &Subject,
+    done: &(dyn Fn(f64) + Sync),
+) -> Result<Section, SectionError> {
     let mut section = Section::new("The backbone, tracked with the loop closed");
     let scene = &subject.scene;
-    let mut controller = BuiltIn::for_backbone(scene).map_err(|error| error.to_string())?;
+    let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let mut rig = subject.rig()?;
     let found = track(rig.as_mut(), &mut controller, scene, |at, of| {
         done(at as f64 / of.max(1) as f64);
     });
     let tracked = match found {
-        Ok(found) if !found.points.is_empty() => Report::new(&found, scene),
+        Ok(found) if !found.points.is_empty() => TrackedComparison::of(&found, scene),
         Ok(_) => {
-            section.finding = "Tracking gave no point.".into();
-            section.words(section.finding.clone());
+            section.found("Tracking gave no point.");
             return Ok(section);
         }
         Err(error) => {
-            section.finding = format!("Tracking gave no backbone: {error}.");
-            section.words(section.finding.clone());
+            section.found(format!("Tracking gave no backbone: {error}."));
             return Ok(section);
         }
     };
-    let symmetric = |one: &&Compared| one.point.regime_by_impacts == Some(Regime::Symmetric);
+    let symmetric = |one: &&TrackedPoint| one.point.regime_by_impacts == Some(Regime::Symmetric);
     let in_regime = tracked.points.iter().filter(symmetric).count();
     section.finding = format!(
         "Tracked with the loop closed, the backbone took {} points in {:.0} periods, {:.1} a point.",
@@ -55,10 +59,10 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
          after another and waits until it is still; the drive does what it must. {} Of these points {in_regime} are in the symmetric 1:1 regime.",
         section.finding
     ));
-    section.picture(
+    section.figure(
         "tracked-backbone",
         "The backbone as tracked with the loop closed, with the exact curve and first-order theory.",
-        tracked::draw(&tracked)?,
+        figure::figure(&tracked).svg()?,
     );
     if let Some(worst) = tracked.worst() {
         section.budget(

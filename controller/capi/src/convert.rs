@@ -1,0 +1,151 @@
+//! Conversions between the types of the header and those of the core.
+
+use phase_lock::{Config, Detector, Fault, Input, LoopState, Move, Output};
+
+use crate::types::{
+    PhaseLockConfig, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOutput, PhaseLockStage,
+};
+
+// In C, `harmonics = 0` selects the demodulator; every other parameter is a field of the same name.
+macro_rules! read {
+    (detector, $c:ident, $config:ident, $group:ident, $field:ident) => {
+        $config.detector = match $c.harmonics {
+            0 => Detector::Demodulator,
+            _ => Detector::Adaptive,
+        }
+    };
+    ($type:ident, $c:ident, $config:ident, config, harmonics) => {
+        $config.harmonics = $c.harmonics.max(1)
+    };
+    ($type:ident, $c:ident, $config:ident, config, $field:ident) => {
+        $config.$field = $c.$field
+    };
+    ($type:ident, $c:ident, $config:ident, lock, $field:ident) => {
+        $config.lock.$field = $c.$field
+    };
+}
+
+macro_rules! write {
+    (detector, $c:ident, $config:ident, $group:ident, $field:ident) => {};
+    ($type:ident, $c:ident, $config:ident, config, harmonics) => {
+        $c.harmonics = match $config.detector {
+            Detector::Demodulator => 0,
+            Detector::Adaptive => $config.harmonics,
+        }
+    };
+    ($type:ident, $c:ident, $config:ident, config, $field:ident) => {
+        $c.$field = $config.$field
+    };
+    ($type:ident, $c:ident, $config:ident, lock, $field:ident) => {
+        $c.$field = $config.lock.$field
+    };
+}
+
+/// Conversions in both directions, from the table of the parameters.
+macro_rules! conversions {
+    ($($group:ident $field:ident: $type:ident, $unit:literal, $range:ident;)*) => {
+        impl From<&PhaseLockConfig> for Config {
+            fn from(c: &PhaseLockConfig) -> Self {
+                let mut config = Self::for_resonance(1.0, 1.0);
+                $(read!($type, c, config, $group, $field);)*
+                config
+            }
+        }
+
+        impl From<&Config> for PhaseLockConfig {
+            fn from(config: &Config) -> Self {
+                let mut c = Self::default();
+                $(write!($type, c, config, $group, $field);)*
+                c
+            }
+        }
+    };
+}
+
+phase_lock::parameters!(conversions);
+
+impl From<&PhaseLockInput> for Input {
+    fn from(input: &PhaseLockInput) -> Self {
+        Self {
+            response: input.response,
+            reference: input.has_reference.then_some(input.reference),
+            active: input.active,
+        }
+    }
+}
+
+impl From<&PhaseLockMove> for Move {
+    fn from(to: &PhaseLockMove) -> Self {
+        Self {
+            response: to.response,
+            duration: to.duration,
+            amplitude: to.amplitude,
+            omega: to.omega,
+        }
+    }
+}
+
+impl From<Output> for PhaseLockOutput {
+    fn from(o: Output) -> Self {
+        Self {
+            omega: o.omega,
+            amplitude: o.amplitude,
+            drive: o.drive,
+            phase_error: o.phase_error,
+            response_amplitude: o.response_amplitude,
+            response_target: o.response_target,
+            reference_amplitude: o.reference_amplitude,
+            coherence: o.coherence,
+            frequency: o.frequency,
+            response_mean: o.response_mean,
+            stage: match o.state {
+                LoopState::Idle => PhaseLockStage::Idle,
+                LoopState::Ramping => PhaseLockStage::Ramping,
+                LoopState::Acquiring => PhaseLockStage::Acquiring,
+                LoopState::Locked => PhaseLockStage::Locked,
+                LoopState::LockLost => PhaseLockStage::LockLost,
+                LoopState::Tripped => PhaseLockStage::Tripped,
+                LoopState::ShutDown => PhaseLockStage::ShutDown,
+            },
+            fault: match o.fault {
+                None => PhaseLockFault::None,
+                Some(Fault::Sensor) => PhaseLockFault::Sensor,
+                Some(Fault::ResponseTooLarge) => PhaseLockFault::ResponseTooLarge,
+                Some(Fault::TimedOut) => PhaseLockFault::TimedOut,
+                Some(Fault::LockLost) => PhaseLockFault::LockLost,
+            },
+            locked: o.locked,
+            settled: o.settled,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use phase_lock::{PARAMETERS, Value};
+
+    use super::*;
+
+    #[test]
+    fn every_parameter_survives_the_way_to_c_and_back() {
+        for detector in [Detector::Adaptive, Detector::Demodulator] {
+            let mut config = Config::for_resonance(55.0, 1e-4);
+            config.detector = detector;
+            for (n, parameter) in PARAMETERS.iter().enumerate() {
+                let value = match parameter.get(&config) {
+                    Value::Real(_) => Value::Real(1.0 + n as f64),
+                    Value::Integer(_) if parameter.name != "detector" => Value::Integer(5),
+                    same => same,
+                };
+                parameter.set(&mut config, value).expect(parameter.name);
+            }
+            if detector == Detector::Demodulator {
+                // The demodulator has no number of harmonics in C.
+                config.harmonics = 1;
+            }
+            let c = PhaseLockConfig::from(&config);
+            assert_eq!(Config::from(&c), config);
+            assert_eq!(PhaseLockConfig::from(&Config::from(&c)), c);
+        }
+    }
+}

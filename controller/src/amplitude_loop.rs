@@ -1,0 +1,191 @@
+//! The loop that controls the response amplitude by means of the drive amplitude.
+//!
+//! Under a constant drive the amplitude of a lightly damped structure takes dozens of periods to settle. At phase resonance
+//! it obeys `A' = -delta A + g E` (`g`: `response_gain`, half the frequency for an oscillator excited through its base).
+//! This equation has the same form as that of the phase. The same detector and a PI filter therefore form a loop of type 1
+//! and order 3. Its gains are those of [`Gains`] divided by `g`; both are positive: a response below its setpoint
+//! increases the drive.
+//!
+//! A move to another amplitude follows a smooth trajectory of a given duration. The feedforward consists of the expected
+//! change of the drive, and of `A'/g`, which the change of the amplitude requires. The loop compares the detector's reading
+//! with the expected reading on the trajectory, including the detector's lag, and so corrects only the deviations. The
+//! drive stays within its limit and its ramp rate. It never falls below a fifth of its integral part: without a drive
+//! the phase is undefined.
+
+use core::f64::consts::TAU;
+
+use crate::config::Config;
+use crate::drive::Drive;
+use crate::gains::Gains;
+
+/// Lowest drive, as a share of its integral part.
+const MIN_SHARE: f64 = 0.2;
+
+/// Coefficients of the loop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct AmplitudeLoop {
+    /// Proportional gain, m of drive per m of response.
+    proportional: f64,
+    /// Integral gain, m of drive per m of response and sample.
+    integral: f64,
+    /// Feedforward, m of drive for a growth of the response by 1 m per sample.
+    feedforward: f64,
+    /// Share of its error that the detector corrects per sample.
+    detector_step: f64,
+    /// Largest drive amplitude, m.
+    amplitude_max: f64,
+    /// Largest change of the drive amplitude per sample, m.
+    max_change: f64,
+    /// s
+    sample_time: f64,
+}
+
+/// A change of the response amplitude's setpoint.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Move {
+    /// New setpoint of the response amplitude, m; above 0.
+    pub response: f64,
+    /// Duration, s; 0: step change.
+    pub duration: f64,
+    /// Expected change of the drive amplitude, m; 0 if unknown.
+    pub amplitude: f64,
+    /// Expected change of the frequency, rad/s; 0 if unknown.
+    pub omega: f64,
+}
+
+/// State of the loop while it controls the response.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct AmplitudeState {
+    /// The present trajectory.
+    trajectory: Move,
+    /// Setpoint at the start of the trajectory, m.
+    from: f64,
+    /// Length of the trajectory, samples.
+    samples: u64,
+    /// Samples since the start of the trajectory.
+    taken: u64,
+    /// Present setpoint of the response amplitude, m.
+    setpoint: f64,
+    /// Reading of the detector that the setpoint leads to, m.
+    expected: f64,
+    /// Integral part of the drive, m.
+    integral: f64,
+}
+
+impl AmplitudeState {
+    /// A constant setpoint: the present reading `response`, m, at the drive `amplitude`, m.
+    pub fn constant(response: f64, amplitude: f64) -> Self {
+        Self {
+            trajectory: Move {
+                response,
+                ..Move::default()
+            },
+            from: response,
+            samples: 0,
+            taken: 0,
+            setpoint: response,
+            expected: response,
+            integral: amplitude,
+        }
+    }
+
+    /// Starts a trajectory at the present setpoint.
+    pub fn start(&mut self, trajectory: Move, sample_time: f64) {
+        self.from = self.setpoint;
+        self.trajectory = trajectory;
+        self.samples = libm::ceil(trajectory.duration / sample_time) as u64;
+        self.taken = 0;
+        if self.samples == 0 {
+            self.setpoint = trajectory.response;
+            self.integral += trajectory.amplitude;
+        }
+    }
+
+    /// Present setpoint of the response amplitude, m.
+    pub fn setpoint(&self) -> f64 {
+        self.setpoint
+    }
+
+    /// Whether the trajectory has ended.
+    pub fn has_arrived(&self) -> bool {
+        self.taken == self.samples
+    }
+
+    /// Advances the trajectory by one sample. Returns the share of the trajectory in this sample, and the growth of the
+    /// setpoint, m.
+    fn advance(&mut self) -> (f64, f64) {
+        if self.has_arrived() {
+            return (0.0, 0.0);
+        }
+        let before = self.setpoint;
+        let share = |taken: u64| smooth(taken as f64 / self.samples as f64);
+        let progress = share(self.taken + 1) - share(self.taken);
+        self.taken += 1;
+        self.setpoint = if self.has_arrived() {
+            self.trajectory.response
+        } else {
+            self.from + (self.trajectory.response - self.from) * share(self.taken)
+        };
+        (progress, self.setpoint - before)
+    }
+}
+
+/// Rises from 0 to 1 with continuous velocity and acceleration at both ends.
+fn smooth(x: f64) -> f64 {
+    x - libm::sin(TAU * x) / TAU
+}
+
+impl AmplitudeLoop {
+    /// The loop of a configuration and its drive.
+    pub fn new(config: &Config, drive: &Drive) -> Self {
+        let gains = Gains::from_bandwidth(config.bandwidth, config.damping_rate);
+        let (gain, sample_time) = (config.response_gain, config.sample_time);
+        Self {
+            proportional: gains.proportional / gain,
+            integral: gains.integral * sample_time / gain,
+            feedforward: 1.0 / (gain * sample_time),
+            detector_step: -libm::expm1(-config.bandwidth * sample_time),
+            amplitude_max: drive.amplitude_max,
+            max_change: drive.ramp_step,
+            sample_time,
+        }
+    }
+
+    /// Sample time, s.
+    pub fn sample_time(&self) -> f64 {
+        self.sample_time
+    }
+
+    /// One sample. `reading` is the measured response amplitude, m, or `None` if it is not valid: then only the feedforward
+    /// acts. Returns the drive amplitude, m, which differs from `before` at most by the ramp's rate, and the shift of the
+    /// frequency, rad/s.
+    pub fn follow(
+        &self,
+        state: &mut AmplitudeState,
+        before: f64,
+        reading: Option<f64>,
+    ) -> (f64, f64) {
+        let (progress, growth) = state.advance();
+        state.expected += self.detector_step * (state.setpoint - state.expected);
+        let planned = state.integral + progress * state.trajectory.amplitude;
+        state.integral = planned.clamp(0.0, self.amplitude_max);
+        let error = reading.map_or(0.0, |reading| state.expected - reading);
+        let unlimited = state.integral + self.feedforward * growth + self.proportional * error;
+        let lowest = MIN_SHARE * state.integral;
+        let limited = unlimited
+            .clamp(lowest, self.amplitude_max)
+            .clamp(before - self.max_change, before + self.max_change);
+        // Anti-windup: no integration in the direction in which the output is already limited.
+        if (unlimited - limited) * error <= 0.0 {
+            let integral = state.integral + self.integral * error;
+            state.integral = integral.clamp(0.0, self.amplitude_max);
+        }
+        (limited, progress * state.trajectory.omega)
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,238 @@
+//! The table of the parameters: for each its name, unit, range, and how to get and set it.
+//!
+//! Everything that lists parameters is derived from this table or checked against it: the checks of
+//! [`Config::build`], the FMU and its `modelDescription.xml`, the structure of the C interface, the parameters that the
+//! lab passes to a controller FMU and writes into an SSP file.
+
+use crate::config::{Config, Detector};
+use crate::error::{ConfigError, Quantity};
+use crate::range::{Range, Value};
+
+/// Invokes the macro `$with` with one row per parameter:
+/// `group field: type, unit, range;`. The group is `config` for a field of [`Config`] and `lock` for one of
+/// [`LockCriterion`](crate::LockCriterion). Other crates derive code from it that names the fields.
+#[macro_export]
+macro_rules! parameters {
+    ($with:ident) => {
+        $with! {
+            config sample_time: real, "s", Positive;
+            config omega_start: real, "rad/s", Positive;
+            config omega_min: real, "rad/s", Positive;
+            config omega_max: real, "rad/s", Positive;
+            config omega_rate: real, "rad/s2", NotNegative;
+            config amplitude: real, "m", NotNegative;
+            config amplitude_max: real, "m", NotNegative;
+            config ramp_time: real, "s", NotNegative;
+            config release_time: real, "s", NotNegative;
+            config base_bandwidth: real, "rad/s", NotNegative;
+            config phase_target: real, "rad", Angle;
+            config detector: detector, "", Detector;
+            config harmonics: integer, "", Harmonics;
+            config odd_only: boolean, "", Boolean;
+            config bandwidth: real, "rad/s", Positive;
+            config damping_rate: real, "rad/s", NotNegative;
+            config delay: real, "s", NotNegative;
+            lock phase_tolerance: real, "rad", Positive;
+            lock unlock_tolerance: real, "rad", Positive;
+            lock frequency_drift: real, "", Positive;
+            lock amplitude_drift: real, "", Positive;
+            lock dwell: integer, "periods", Dwell;
+            lock coherence_min: real, "", Share;
+            lock response_min: real, "", NotNegative;
+            config response_max: real, "m", NotNegative;
+            config acquire_timeout: real, "s", NotNegative;
+            config response_gain: real, "1/s", Positive;
+        }
+    };
+}
+
+/// A parameter of the controller.
+#[derive(Clone, Copy, Debug)]
+pub struct Parameter {
+    /// Name, as in the FMU; a parameter of the lock criterion begins with `lock.`.
+    pub name: &'static str,
+    /// Unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Range.
+    pub range: Range,
+    get: fn(&Config) -> Value,
+    set: fn(&mut Config, Value),
+}
+
+impl Parameter {
+    /// The parameter of that name.
+    #[must_use]
+    pub fn find(name: &str) -> Option<&'static Self> {
+        PARAMETERS.iter().find(|parameter| parameter.name == name)
+    }
+
+    /// Whether `PhaseLock.fmu` has the parameter. `response_gain` serves a function that FMI cannot call.
+    #[must_use]
+    pub fn is_in_fmu(&self) -> bool {
+        self.name != "response_gain"
+    }
+
+    /// The value in a configuration.
+    #[must_use]
+    pub fn get(&self, config: &Config) -> Value {
+        (self.get)(config)
+    }
+
+    /// Sets the value. A real number out of range is stored, because ranges may depend on values that are set later;
+    /// [`Config::build`] refuses it.
+    ///
+    /// # Errors
+    /// A value of another type, or a whole number out of range.
+    pub fn set(&self, config: &mut Config, value: Value) -> Result<(), ConfigError> {
+        let same_type = match (self.get(config), value) {
+            (Value::Real(_), Value::Real(_)) => true,
+            (Value::Integer(_), Value::Integer(_)) | (Value::Boolean(_), Value::Boolean(_)) => {
+                self.range.contains(value.number())
+            }
+            _ => false,
+        };
+        if !same_type {
+            return Err(self.refuse(value.number()));
+        }
+        (self.set)(config, value);
+        Ok(())
+    }
+
+    /// Refuses a value out of range.
+    pub(crate) fn check(&self, config: &Config) -> Result<(), ConfigError> {
+        let number = self.get(config).number();
+        if self.range.contains(number) {
+            Ok(())
+        } else {
+            Err(self.refuse(number))
+        }
+    }
+
+    fn refuse(&self, value: f64) -> ConfigError {
+        Quantity::new(self.name, value, self.unit).refuse(self.range.allowed())
+    }
+}
+
+macro_rules! name {
+    (config, $field:ident) => {
+        stringify!($field)
+    };
+    (lock, $field:ident) => {
+        concat!("lock.", stringify!($field))
+    };
+}
+
+macro_rules! place {
+    ($config:ident, config, $field:ident) => {
+        $config.$field
+    };
+    ($config:ident, lock, $field:ident) => {
+        $config.lock.$field
+    };
+}
+
+// A setter receives a value of its type and, if it is a whole number, in its range: `Parameter::set` checks both.
+macro_rules! getter {
+    (real, $place:expr) => {
+        Value::Real($place)
+    };
+    (integer, $place:expr) => {
+        Value::Integer(i32::try_from($place).unwrap_or(i32::MAX))
+    };
+    (boolean, $place:expr) => {
+        Value::Boolean($place)
+    };
+    (detector, $place:expr) => {
+        Value::Integer($place as i32)
+    };
+}
+
+macro_rules! setter {
+    (real, $place:expr, $value:ident) => {
+        $place = $value.number()
+    };
+    (integer, $place:expr, $value:ident) => {
+        $place = $value.number() as _
+    };
+    (boolean, $place:expr, $value:ident) => {
+        $place = $value == Value::Boolean(true)
+    };
+    (detector, $place:expr, $value:ident) => {
+        $place = if $value == Value::Integer(Detector::Demodulator as i32) {
+            Detector::Demodulator
+        } else {
+            Detector::Adaptive
+        }
+    };
+}
+
+macro_rules! table {
+    ($($group:ident $field:ident: $type:ident, $unit:literal, $range:ident;)*) => {
+        /// All parameters.
+        pub static PARAMETERS: [Parameter; [$(stringify!($field)),*].len()] = [$(
+            Parameter {
+                name: name!($group, $field),
+                unit: $unit,
+                range: Range::$range,
+                get: |config| getter!($type, place!(config, $group, $field)),
+                set: |config, value| setter!($type, place!(config, $group, $field), value),
+            },
+        )*];
+    };
+}
+
+parameters!(table);
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_that_was_set_is_the_value_that_is_got() {
+        for parameter in &PARAMETERS {
+            let mut config = Config::for_resonance(55.0, 1e-4);
+            let before = config;
+            let value = match parameter.get(&config) {
+                Value::Real(value) => Value::Real(0.5 * value + 0.125),
+                Value::Integer(1) => Value::Integer(2),
+                Value::Integer(_) => Value::Integer(1),
+                Value::Boolean(value) => Value::Boolean(!value),
+            };
+            parameter.set(&mut config, value).expect(parameter.name);
+            assert_eq!(parameter.get(&config), value, "{}", parameter.name);
+            let changed = PARAMETERS
+                .iter()
+                .filter(|other| other.get(&config) != other.get(&before));
+            assert_eq!(changed.count(), 1, "{}", parameter.name);
+        }
+    }
+
+    #[test]
+    fn a_value_of_another_type_is_refused_by_name_and_unit() {
+        let mut config = Config::for_resonance(55.0, 1e-4);
+        let refused = Parameter::find("delay")
+            .expect("a parameter")
+            .set(&mut config, Value::Integer(-3))
+            .expect_err("an integer is refused");
+        assert_eq!(
+            (refused.name, refused.value, refused.unit),
+            ("delay", -3.0, "s")
+        );
+    }
+
+    #[test]
+    fn a_whole_number_out_of_range_is_refused_at_once() {
+        let mut config = Config::for_resonance(55.0, 1e-4);
+        for (name, value) in [
+            ("harmonics", 9),
+            ("harmonics", -1),
+            ("lock.dwell", 0),
+            ("detector", 3),
+        ] {
+            let refused = Parameter::find(name)
+                .expect("a parameter")
+                .set(&mut config, Value::Integer(value));
+            assert_eq!(refused.expect_err(name).value, f64::from(value));
+        }
+    }
+}

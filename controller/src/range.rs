@@ -1,0 +1,83 @@
+//! Values and ranges of parameters.
+
+use core::f64::consts::PI;
+
+use crate::harmonics::MAX_HARMONICS;
+
+/// A value of a parameter. The types are those of FMI.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Value {
+    /// A real number.
+    Real(f64),
+    /// A whole number.
+    Integer(i32),
+    /// True or false.
+    Boolean(bool),
+}
+
+impl Value {
+    /// The value as a real number, with 1 for true and 0 for false.
+    pub(crate) fn number(self) -> f64 {
+        match self {
+            Self::Real(value) => value,
+            Self::Integer(value) => value.into(),
+            Self::Boolean(value) => u8::from(value).into(),
+        }
+    }
+}
+
+/// The values that a parameter may have, whatever the values of the others are.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Range {
+    /// Finite and above 0.
+    Positive,
+    /// Finite, 0 or above.
+    NotNegative,
+    /// From -pi to pi.
+    Angle,
+    /// Above 0 and below 1.
+    Share,
+    /// 1 (adaptive) or 2 (demodulator).
+    Detector,
+    /// From 1 to [`MAX_HARMONICS`].
+    Harmonics,
+    /// From 1 to 1,000,000.
+    Dwell,
+    /// True or false.
+    Boolean,
+}
+
+impl Range {
+    /// Whether the range contains the number.
+    #[must_use]
+    pub fn contains(self, number: f64) -> bool {
+        number.is_finite()
+            && match self {
+                Self::Positive => number > 0.0,
+                Self::NotNegative => number >= 0.0,
+                Self::Angle => number.abs() <= PI,
+                Self::Share => number > 0.0 && number < 1.0,
+                Self::Detector => number == 1.0 || number == 2.0,
+                Self::Harmonics => (1.0..=MAX_HARMONICS as f64).contains(&number),
+                Self::Dwell => (1.0..=1e6).contains(&number),
+                Self::Boolean => true,
+            }
+    }
+
+    /// The range in words.
+    #[must_use]
+    pub fn allowed(self) -> &'static str {
+        match self {
+            Self::Positive => "a finite number above 0",
+            Self::NotNegative => "a finite number, 0 or above",
+            Self::Angle => "between -pi and pi",
+            Self::Share => "above 0 and below 1",
+            Self::Detector => "1 (adaptive) or 2 (demodulator)",
+            Self::Harmonics => "1 to 8",
+            Self::Dwell => "1 to 1000000",
+            Self::Boolean => "true or false",
+        }
+    }
+}
+
+const _: () = assert!(MAX_HARMONICS == 8, "Range::allowed says 1 to 8");

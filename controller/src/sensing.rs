@@ -1,0 +1,156 @@
+//! The measurements of a sample: phase error, amplitudes, and whether they are valid.
+
+use crate::angle::{Complex, wrap};
+use crate::config::Config;
+use crate::detector::{Estimate, PhaseDetector};
+use crate::signals::Input;
+use crate::supervisor::Fault;
+
+/// Largest valid reading, m. Smaller readings cause no overflow.
+const READING_MAX: f64 = 1e100;
+/// Smallest valid amplitude of the reference, as a share of the drive amplitude.
+const REFERENCE_SHARE: f64 = 0.1;
+
+/// Coefficients of the measurement.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Sensing {
+    detector: PhaseDetector,
+    /// rad
+    phase_target: f64,
+    /// s
+    delay: f64,
+    /// m; 0 without a limit.
+    response_max: f64,
+    /// Smallest valid response amplitude, m.
+    response_min: f64,
+    coherence_min: f64,
+}
+
+/// State of both channels.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Channels {
+    /// Estimate of the response.
+    pub response: Estimate,
+    reference: Estimate,
+    /// Whether the reference channel has ever read anything but exactly zero.
+    connected: bool,
+}
+
+/// The drive in the present sample.
+#[derive(Clone, Copy, Debug)]
+pub struct PresentDrive {
+    /// `exp(i phase)` of the oscillator.
+    pub rotor: Complex,
+    /// Frequency, rad/s.
+    pub omega: f64,
+    /// Amplitude, m.
+    pub amplitude: f64,
+}
+
+/// Measurements of a sample.
+#[derive(Clone, Copy, Debug)]
+pub struct Measurement {
+    /// Fault of the readings.
+    pub fault: Option<Fault>,
+    /// Phase error, rad.
+    pub error: f64,
+    /// m
+    pub reference_amplitude: f64,
+    /// Whether the error is valid.
+    pub valid: bool,
+    /// Whether the reference is a sensor.
+    pub has_sensor: bool,
+}
+
+/// The reference of the phase.
+struct Reference {
+    /// rad
+    phase: f64,
+    /// m
+    amplitude: f64,
+    valid: bool,
+}
+
+impl Sensing {
+    /// The coefficients of a configuration.
+    pub fn new(config: &Config) -> Self {
+        Self {
+            detector: PhaseDetector::new(config),
+            phase_target: config.phase_target,
+            delay: config.delay,
+            response_max: config.response_max,
+            response_min: config.lock.response_min * config.amplitude,
+            coherence_min: config.lock.coherence_min,
+        }
+    }
+
+    /// Updates both channels with a sample.
+    pub fn measure(&self, state: &mut Channels, input: &Input, drive: PresentDrive) -> Measurement {
+        state.connected |= input.reference.is_some_and(|reading| reading != 0.0);
+        let channel = input.reference.filter(|_| state.connected);
+        let fault = self.fault(input.response, channel);
+        // The detectors ignore an invalid reading and keep their estimates.
+        if fault != Some(Fault::Sensor) {
+            self.detector
+                .update(&mut state.response, input.response, drive.rotor);
+            if let Some(reading) = channel {
+                self.detector
+                    .update(&mut state.reference, reading, drive.rotor);
+            }
+        }
+        let reference = if channel.is_some() {
+            self.measured_reference(&state.reference, drive)
+        } else {
+            self.internal_reference(drive)
+        };
+        let response = &state.response;
+        let amplitude = response.amplitude();
+        let measurable = amplitude > 0.0 && reference.amplitude > 0.0;
+        let error = response.argument() - reference.phase - self.phase_target;
+        Measurement {
+            fault,
+            error: if measurable { wrap(error) } else { 0.0 },
+            reference_amplitude: reference.amplitude,
+            valid: measurable
+                && reference.valid
+                && amplitude >= self.response_min
+                && self.is_coherent(response),
+            has_sensor: channel.is_some(),
+        }
+    }
+
+    fn fault(&self, response: f64, reference: Option<f64>) -> Option<Fault> {
+        let is_valid = |reading: f64| reading.abs() <= READING_MAX;
+        if !is_valid(response) || !reference.is_none_or(is_valid) {
+            Some(Fault::Sensor)
+        } else if self.response_max > 0.0 && response.abs() > self.response_max {
+            Some(Fault::ResponseTooLarge)
+        } else {
+            None
+        }
+    }
+
+    fn measured_reference(&self, estimate: &Estimate, drive: PresentDrive) -> Reference {
+        let amplitude = estimate.amplitude();
+        Reference {
+            phase: estimate.argument(),
+            amplitude,
+            valid: amplitude >= REFERENCE_SHARE * drive.amplitude && self.is_coherent(estimate),
+        }
+    }
+
+    /// The internal oscillator as a sensor would read it, with the configured delay.
+    fn internal_reference(&self, drive: PresentDrive) -> Reference {
+        Reference {
+            phase: -drive.omega * self.delay,
+            amplitude: drive.amplitude,
+            valid: true,
+        }
+    }
+
+    fn is_coherent(&self, estimate: &Estimate) -> bool {
+        estimate.coherence() >= self.coherence_min
+    }
+}

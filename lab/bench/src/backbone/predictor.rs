@@ -1,0 +1,92 @@
+//! What the next level will take, as far as it can be foreseen.
+
+use crate::scene::Predictor;
+use vines_model::theory::{BranchSide, SlowFlow};
+
+/// A working point: response amplitude, drive amplitude, detuning; dimensionless.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Known {
+    pub c: f64,
+    pub g: f64,
+    pub sigma: f64,
+}
+
+/// Change of `(G, sigma)` from the last known point to the level `c`; zeros where nothing is known.
+pub fn change(feed: Predictor, known: &[Known], c: f64, slow_flow: &SlowFlow) -> (f64, f64) {
+    match (feed, known) {
+        (Predictor::None, _) | (_, []) => (0.0, 0.0),
+        (Predictor::Theory, [.., last]) => by_theory(slow_flow, last.c, c).unwrap_or((0.0, 0.0)),
+        (Predictor::Previous, _) => extrapolate(&known[known.len().saturating_sub(3)..], c),
+    }
+}
+
+fn by_theory(slow_flow: &SlowFlow, from: f64, to: f64) -> Option<(f64, f64)> {
+    let at = |c| {
+        let b = slow_flow.manifold.b(c, BranchSide::Right)?;
+        Some(slow_flow.backbone_at(b))
+    };
+    let (from, to) = (at(from)?, at(to)?);
+    Some((to.g - from.g, to.sigma - from.sigma))
+}
+
+/// The polynomial through up to three points, less its value at the last.
+fn extrapolate(points: &[Known], c: f64) -> (f64, f64) {
+    let (mut g, mut sigma) = (0.0, 0.0);
+    for (i, point) in points.iter().enumerate() {
+        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
+        let weight: f64 = others
+            .map(|(_, other)| (c - other.c) / (point.c - other.c))
+            .product();
+        g += weight * point.g;
+        sigma += weight * point.sigma;
+    }
+    let last = points[points.len() - 1];
+    (g - last.g, sigma - last.sigma)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn known(c: f64) -> Known {
+        Known {
+            c,
+            g: 1.0 + c * c,
+            sigma: -3.0 + 2.0 * c,
+        }
+    }
+
+    fn slow_flow() -> SlowFlow {
+        SlowFlow::new(1.43, 0.65)
+    }
+
+    #[test]
+    fn three_points_foresee_a_parabola_exactly() {
+        let before = [0.7, 0.65, 0.6].map(known);
+        let (g, sigma) = change(Predictor::Previous, &before, 0.55, &slow_flow());
+        assert!((g - (known(0.55).g - known(0.6).g)).abs() < 1e-12);
+        assert!((sigma + 0.1).abs() < 1e-12);
+    }
+
+    #[test]
+    fn one_point_foresees_no_change() {
+        assert_eq!(
+            change(Predictor::Previous, &[known(0.7)], 0.6, &slow_flow()),
+            (0.0, 0.0)
+        );
+    }
+
+    #[test]
+    fn theory_foresees_the_difference_between_two_levels() {
+        let flow = slow_flow();
+        let (g, sigma) = change(Predictor::Theory, &[known(0.5)], 0.4, &flow);
+        let expected = flow.backbone_sigma(0.4, BranchSide::Right).unwrap()
+            - flow.backbone_sigma(0.5, BranchSide::Right).unwrap();
+        assert!((sigma - expected).abs() < 1e-12 && g < 0.0);
+        // Below the fold it has nothing to say.
+        assert_eq!(
+            change(Predictor::Theory, &[known(0.5)], 0.1, &flow),
+            (0.0, 0.0)
+        );
+    }
+}

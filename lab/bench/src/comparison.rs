@@ -1,0 +1,105 @@
+//! Measurements beside first-order theory and exact orbits at the same parameters.
+
+mod exact_curve;
+mod tracked;
+
+use serde::Serialize;
+use vines_model::Dimensionless;
+use vines_model::numerics::mean_square;
+use vines_model::orbit::{self, Orbit};
+use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow};
+
+use crate::identification::{DecayPoint, Identification, Lock};
+use crate::scene::Scene;
+
+pub use exact_curve::{Distance, ExactCurve};
+pub use tracked::{TrackedComparison, TrackedPoint};
+
+/// Amplitudes above which the decay is compared with theory, C.
+///
+/// Nearer to the fold (C = Cmin) the slow flow is no longer slow against a period.
+pub const COMPARED_ABOVE: f64 = 0.2;
+
+/// Phase of the response at phase resonance, degrees: theory and exact orbits are for that one.
+const PHASE_RESONANCE: f64 = -90.0;
+
+/// An identified system beside theory and exact orbits; dimensionless throughout.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Comparison {
+    /// The numbers all of this belongs to.
+    pub parameters: Dimensionless,
+    /// The locked point as measured.
+    pub lock: Lock,
+    /// First-order theory at the same G: the stable solution nearest to the lock; absent where the loop sought another phase
+    /// than that of resonance.
+    pub theory: Option<BackbonePoint>,
+    /// The exact phase-resonant orbit at the same G nearest to the lock; absent as above.
+    pub exact: Option<Orbit>,
+    /// The decay, from the release to the loss of synchrony, or to the fold where the rig does not report impacts.
+    pub decay: Vec<ComparedPoint>,
+    /// RMS of decay sigma less theory, over the points with C > 0.2.
+    pub rms_sigma_error: Option<f64>,
+}
+
+/// A point along the decay beside theory.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ComparedPoint {
+    /// The point.
+    #[serde(flatten)]
+    pub point: DecayPoint,
+    /// Detuning of the backbone at this C, to first order; absent below the fold.
+    pub sigma_theory: Option<f64>,
+}
+
+impl Comparison {
+    /// Compares what was identified on `scene`.
+    #[must_use]
+    pub fn of(found: &Identification, scene: &Scene) -> Self {
+        let (parameters, lock) = (found.parameters, found.lock);
+        let flow = SlowFlow::new(parameters.lambda, parameters.r);
+        let at_resonance = scene.controller.phase_target == PHASE_RESONANCE;
+        let distance = |sigma: f64, c: f64| (sigma - lock.sigma).hypot(c - lock.c);
+        let theory = flow
+            .phase_resonant(parameters.g)
+            .into_iter()
+            .filter(|point| at_resonance && point.stable())
+            .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
+        let exact = orbit::phase_resonant(&parameters)
+            .into_iter()
+            .filter(|_| at_resonance)
+            .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
+        // A rig that does not report impacts cannot tell the loss of synchrony: the backbone ends at the fold.
+        let lowest = if lock.impacts_per_period.is_nan() {
+            flow.manifold.c_min()
+        } else {
+            0.0
+        };
+        let decay: Vec<ComparedPoint> = found
+            .decay
+            .iter()
+            .take_while(|point| point.c >= lowest)
+            .map(|point| ComparedPoint {
+                point: *point,
+                sigma_theory: flow.backbone_sigma(point.c, BranchSide::Right),
+            })
+            .collect();
+        Self {
+            rms_sigma_error: rms_sigma_error(&decay),
+            parameters,
+            lock,
+            theory,
+            exact,
+            decay,
+        }
+    }
+}
+
+/// RMS of sigma less theory over the points above [`COMPARED_ABOVE`]; `None` where there is none.
+fn rms_sigma_error(points: &[ComparedPoint]) -> Option<f64> {
+    let errors = points
+        .iter()
+        .filter(|one| one.point.c > COMPARED_ABOVE)
+        .filter_map(|one| one.sigma_theory.map(|theory| one.point.sigma - theory));
+    let mean_square = mean_square(errors);
+    (!mean_square.is_nan()).then(|| mean_square.sqrt())
+}

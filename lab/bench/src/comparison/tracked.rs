@@ -1,0 +1,73 @@
+//! A tracked backbone beside the exact one.
+
+use serde::Serialize;
+use vines_model::Dimensionless;
+
+use super::{
+    PHASE_RESONANCE,
+    exact_curve::{Distance, ExactCurve},
+};
+use crate::backbone::{Point, Tracked};
+use crate::scene::Scene;
+
+/// A tracked backbone beside the exact one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrackedComparison {
+    /// The numbers all of this belongs to.
+    pub parameters: Dimensionless,
+    /// Periods from the start to the closed loop.
+    pub periods_to_lock: f64,
+    /// All periods, from the start to the last point.
+    pub periods: f64,
+    /// The points, each beside the exact curve.
+    pub points: Vec<TrackedPoint>,
+    /// The exact backbone that the points are compared with.
+    #[serde(skip)]
+    pub exact: ExactCurve,
+}
+
+/// A point and its distance from the exact backbone; absent where there is none to compare with.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TrackedPoint {
+    /// The point.
+    #[serde(flatten)]
+    pub point: Point,
+    /// Its distance.
+    pub exact: Option<Distance>,
+}
+
+impl TrackedComparison {
+    /// Compares the points with the exact backbone of the scene; that is for phase resonance only.
+    #[must_use]
+    pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
+        let parameters = scene.dimensionless();
+        let curve = ExactCurve::of(&parameters);
+        let at_resonance = scene.controller.phase_target == PHASE_RESONANCE;
+        let compare = |point: &Point| TrackedPoint {
+            point: *point,
+            exact: at_resonance
+                .then(|| curve.distance(point.c, point.sigma, point.g))
+                .flatten(),
+        };
+        Self {
+            points: tracked.points.iter().map(compare).collect(),
+            periods_to_lock: tracked.periods_to_lock,
+            periods: tracked.periods,
+            parameters,
+            exact: curve,
+        }
+    }
+
+    /// All periods, the lock included, over the number of points.
+    #[must_use]
+    pub fn periods_per_point(&self) -> f64 {
+        self.periods / self.points.len() as f64
+    }
+
+    /// Largest distance of a point from the exact backbone.
+    #[must_use]
+    pub fn worst(&self) -> Option<f64> {
+        let distances = self.points.iter().filter_map(|one| one.exact);
+        distances.map(|exact| exact.nearest).reduce(f64::max)
+    }
+}

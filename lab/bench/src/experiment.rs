@@ -1,0 +1,176 @@
+//! The experiment: lock at phase resonance, hold, let go, record the decay.
+
+use thiserror::Error;
+
+use crate::rig::{
+    Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors,
+};
+use crate::scene::Scene;
+
+/// How long each stage may or shall last, in samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Plan {
+    /// Time from sample to sample, s.
+    pub sample_time: f64,
+    /// Longest wait for the lock.
+    pub lock: usize,
+    /// How long the lock is held and recorded once it has settled.
+    pub hold: usize,
+    /// Length of the recorded decay.
+    pub decay: usize,
+}
+
+impl Plan {
+    /// The plan that a scene lays down.
+    #[must_use]
+    pub fn of(scene: &Scene) -> Self {
+        let sample_time = scene.sample_time();
+        let period = scene.dimensionless().natural_period();
+        let samples = |periods: f64| (periods * period / sample_time).round() as usize;
+        Self {
+            sample_time,
+            lock: samples(scene.record.lock_periods),
+            hold: samples(scene.record.hold_periods),
+            decay: samples(scene.record.decay_periods),
+        }
+    }
+}
+
+/// The stage an experiment is in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Stage {
+    /// The loop seeks phase resonance.
+    Locking,
+    /// Phase resonance is held and measured.
+    Holding,
+    /// The drive is off.
+    Decaying,
+}
+
+/// One sample of the record.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Sample {
+    /// Time, s.
+    pub time: f64,
+    /// What the sensors read.
+    pub sensors: Sensors,
+    /// What the controller answered: the drive from now to the next sample.
+    pub command: Command,
+    /// What happens inside a simulated rig.
+    pub ground_truth: Option<GroundTruth>,
+}
+
+/// Everything that was measured.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Record {
+    /// Time from sample to sample, s.
+    pub sample_time: f64,
+    /// The samples, from the start on.
+    pub samples: Vec<Sample>,
+    /// Index of the sample at which the lock had settled.
+    pub settled: usize,
+    /// Index of the sample from which on the drive is off.
+    pub released: usize,
+}
+
+impl Record {
+    /// The samples between the settled lock and the release.
+    #[must_use]
+    pub fn hold(&self) -> &[Sample] {
+        &self.samples[self.settled..self.released]
+    }
+
+    /// The samples from the release on.
+    #[must_use]
+    pub fn decay(&self) -> &[Sample] {
+        &self.samples[self.released..]
+    }
+}
+
+/// Why an experiment ended early.
+#[derive(Debug, Error)]
+pub enum ExperimentError {
+    /// The rig failed.
+    #[error(transparent)]
+    Rig(#[from] RigError),
+    /// The controller failed.
+    #[error(transparent)]
+    Controller(#[from] ControllerError),
+    /// The loop found no stationary phase resonance in the time allowed.
+    #[error(
+        "no lock within {periods:.0} periods of the drive: the phase error is {phase_error:.3} degrees at omega = {omega:.6} rad/s; \
+         see record.lock_periods and the [controller] section"
+    )]
+    NoLock {
+        /// How long it was waited for, natural periods.
+        periods: f64,
+        /// Last phase error, degrees.
+        phase_error: f64,
+        /// Last frequency, rad/s.
+        omega: f64,
+    },
+}
+
+/// Runs the whole experiment; `progress` is told the stage, and how many samples of at most how many it has taken.
+///
+/// # Errors
+/// A failure of the rig or of the controller, or no lock in the time allowed.
+pub fn run(
+    rig: &mut (impl Rig + ?Sized),
+    controller: &mut (impl Controller + ?Sized),
+    plan: &Plan,
+    mut progress: impl FnMut(Stage, usize, usize),
+) -> Result<Record, ExperimentError> {
+    let mut samples = Vec::new();
+    let mut step = |active| -> Result<Command, ExperimentError> {
+        let sensors = rig.sense()?;
+        let command = match controller.sample(sensors, active) {
+            Ok(command) => command,
+            Err(error) => {
+                // The rig is not left driven by a controller that has failed; what it says to that changes nothing.
+                let _ = rig.advance(Drive::default(), plan.sample_time);
+                return Err(error.into());
+            }
+        };
+        samples.push(Sample {
+            time: samples.len() as f64 * plan.sample_time,
+            sensors,
+            command,
+            ground_truth: rig.ground_truth()?,
+        });
+        rig.advance(command.drive, plan.sample_time)?;
+        Ok(command)
+    };
+
+    let mut settled = 0;
+    loop {
+        let command = step(true)?;
+        progress(Stage::Locking, settled, plan.lock);
+        if command.settled {
+            break;
+        }
+        settled += 1;
+        if settled >= plan.lock {
+            return Err(ExperimentError::NoLock {
+                periods: plan.lock as f64 * plan.sample_time * command.drive.omega
+                    / std::f64::consts::TAU,
+                phase_error: command.phase_error.to_degrees(),
+                omega: command.drive.omega,
+            });
+        }
+    }
+    for n in 0..plan.hold {
+        step(true)?;
+        progress(Stage::Holding, n + 1, plan.hold);
+    }
+    for n in 0..plan.decay {
+        step(false)?;
+        progress(Stage::Decaying, n + 1, plan.decay);
+    }
+    Ok(Record {
+        sample_time: plan.sample_time,
+        released: samples.len() - plan.decay,
+        samples,
+        settled,
+    })
+}

@@ -1,0 +1,81 @@
+//! What a record says: the locked point, its regime, and the backbone along the free decay.
+
+mod crossings;
+mod decay;
+mod fit;
+mod lock;
+mod regime;
+mod response;
+
+use thiserror::Error;
+
+use crate::experiment::Record;
+use crate::scene::{Dimensionless, Scene};
+
+pub use decay::{DecayPoint, decay_points};
+pub use lock::Lock;
+pub use regime::{classify, impacts};
+pub use response::regime_by_response;
+pub use vines_model::regime::{Impact, Regime};
+
+/// Why a record cannot be identified.
+#[derive(Debug, Error)]
+pub enum IdentificationError {
+    /// The loop locked something else than the symmetric 1:1 regime.
+    #[error(
+        "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the regime is {regime}, not symmetric 1:1 with two \
+         impacts per period. Try another [start] (the particle must be moving) or another G"
+    )]
+    Regime {
+        /// What was found instead.
+        regime: Regime,
+        /// Detuning at the lock.
+        sigma: f64,
+        /// Amplitude at the lock.
+        c: f64,
+    },
+    /// A window with too few samples, or none that could be fitted.
+    #[error("the decay holds no window of {periods} periods with synchronous impacts")]
+    NoDecay {
+        /// Window length asked for.
+        periods: f64,
+    },
+}
+
+/// What a record says; dimensionless throughout.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Identification {
+    /// The numbers all of this belongs to.
+    pub parameters: Dimensionless,
+    /// The locked point as measured.
+    pub lock: Lock,
+    /// The decay, from the release to the loss of synchrony where the rig reports impacts.
+    pub decay: Vec<DecayPoint>,
+}
+
+/// Identifies a record of `scene`.
+///
+/// # Errors
+/// A lock in another regime than the symmetric 1:1 one, or a decay too short to fit.
+pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, IdentificationError> {
+    let lock = lock::measure(record, scene);
+    // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
+    if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
+        return Err(IdentificationError::Regime {
+            regime: lock.regime,
+            sigma: lock.sigma,
+            c: lock.c,
+        });
+    }
+    let decay = decay_points(record, scene);
+    if decay.is_empty() {
+        return Err(IdentificationError::NoDecay {
+            periods: scene.record.window_periods,
+        });
+    }
+    Ok(Identification {
+        parameters: scene.dimensionless(),
+        lock,
+        decay,
+    })
+}

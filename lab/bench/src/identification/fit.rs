@@ -1,0 +1,84 @@
+//! Least squares of a harmonic whose amplitude and phase drift linearly across the window.
+
+use nalgebra::DVector;
+use vines_model::numerics::HarmonicBasis;
+
+/// A harmonic fitted to a window of samples; everything holds at the middle of the window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Harmonic {
+    /// Amplitude of the fundamental, in the unit of the samples.
+    pub amplitude: f64,
+    /// Phase of the fundamental, rad: the samples are `amplitude sin(phase)` there.
+    pub phase: f64,
+    /// Angular frequency, rad/s.
+    pub omega: f64,
+}
+
+/// Rounds of refitting about the frequency found; each reduces the error by orders of magnitude.
+const ROUNDS: usize = 6;
+/// Fewest samples of a window.
+const FEWEST: usize = 16;
+
+/// Fits `values`, sampled every `sample_time` seconds, by a fundamental near `omega` (rad/s) and its third harmonic, both
+/// with linear drift, and a constant.
+///
+/// The drift of the fitted phase corrects the frequency, and the fit is repeated about that. `None` for a window that is too
+/// short or contains no motion.
+pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic> {
+    if values.len() < FEWEST {
+        return None;
+    }
+    let middle = 0.5 * (values.len() - 1) as f64;
+    let right = DVector::from_column_slice(values);
+    let mut omega = omega;
+    let mut fitted = None;
+    for _ in 0..ROUNDS {
+        let phases: Vec<f64> = (0..values.len())
+            .map(|n| (n as f64 - middle) * sample_time * omega)
+            .collect();
+        let fit = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(1)]).fit(&right)?;
+        let (a, drift) = (fit.harmonic(1), fit.drift(1));
+        let square = a.norm_sqr();
+        if square == 0.0 || !square.is_finite() {
+            return None;
+        }
+        // The phase of a turns by Im(drift/a) per half window.
+        omega += (drift * a.conj()).im / square / (middle * sample_time);
+        fitted = Some(Harmonic {
+            amplitude: a.norm(),
+            phase: a.arg(),
+            omega,
+        });
+    }
+    fitted
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_drifting_harmonic_is_found_from_a_poor_guess(
+            amplitude in 0.1..2.0f64, phase in -3.0..3.0f64, decay in 0.0..0.02f64, guess in 0.98..1.02f64,
+        ) {
+            let (dt, n) = (0.063, 151);
+            let middle = 75.0;
+            let values: Vec<f64> = (0..n).map(|i| {
+                let t = (f64::from(i) - middle) * dt;
+                let theta = phase + t;
+                amplitude * (1.0 - decay * t) * theta.sin() + 0.02 * (3.0 * theta + 0.3).sin() + 0.01
+            }).collect();
+            let fit = harmonic(&values, dt, guess).unwrap();
+            prop_assert!((fit.omega - 1.0).abs() < 1e-9, "{fit:?}");
+            prop_assert!((fit.amplitude - amplitude).abs() < 1e-9);
+            prop_assert!((fit.phase - phase).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn silence_has_no_harmonic() {
+        assert_eq!(harmonic(&[0.0; 100], 0.1, 1.0), None);
+    }
+}

@@ -1,0 +1,46 @@
+//! The regime, from the impacts that a simulated rig reports.
+
+use std::f64::consts::TAU;
+
+use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
+
+use crate::experiment::Sample;
+
+/// The impacts that the samples tell of; where several fell between two samples, the last one.
+#[must_use]
+pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
+    let truths: Vec<_> = samples
+        .iter()
+        .filter_map(|sample| sample.ground_truth)
+        .collect();
+    truths
+        .windows(2)
+        .filter(|pair| pair[1].impacts > pair[0].impacts)
+        .map(|pair| Impact {
+            time: pair[1].impact_time,
+            velocity: pair[1].impact_velocity,
+        })
+        .collect()
+}
+
+/// Impacts per period of `omega` (rad/s) over the samples, and the regime they make.
+#[must_use]
+pub fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64, Regime) {
+    let mut truths = samples.iter().filter_map(|sample| sample.ground_truth);
+    let (Some(first), Some(last)) = (truths.next(), truths.next_back()) else {
+        return (f64::NAN, Regime::Unknown);
+    };
+    let impacts = impacts(samples);
+    let (Some(from), Some(to)) = (impacts.first(), impacts.last()) else {
+        return (0.0, Regime::NoImpacts);
+    };
+    let (span, period) = (to.time - from.time, TAU / omega);
+    // Counted from impact to impact, so that the ends of the record take no part.
+    let count = (last.impacts - first.impacts) as f64;
+    let per_period = if span > 0.0 {
+        (count - 1.0) * period / span
+    } else {
+        count * period / (samples.len() as f64 * sample_time)
+    };
+    (per_period, one_to_one(&impacts, per_period, MEASURED))
+}

@@ -1,0 +1,114 @@
+//! The regime from the response alone, as a rig must tell it.
+//!
+//! The centre of mass moves smoothly, so impacts leave little in it: while the particle flies to and fro at the speed `B`, its triangle
+//! wave drives the harmonic of odd order n of v to the amplitude `4 epsilon B/(pi n^2 (n^2 - 1))`. Uneven impacts
+//! bring in even harmonics. Irregular impacts let amplitude and phase wander, which no harmonic explains. And what holds the motion
+//! without impacts is known: the linear mode, at `omega0` with the drive `c omega A/k`.
+
+use nalgebra::DVector;
+use vines_model::numerics::{HarmonicBasis, mean, noise};
+use vines_model::regime::Regime;
+
+use crate::experiment::Sample;
+use crate::scene::Scene;
+
+/// Share of the amplitude that may stay unexplained in a steady motion, where it is not noise.
+const STEADY: f64 = 3e-3;
+/// What is unexplained is noise if it changes from sample to sample: third differences then see at least this share of it.
+const NOISE_SHARE: f64 = 0.5;
+/// How many standard errors a harmonic must have.
+const SIGNIFICANT: f64 = 4.0;
+/// Share of the third harmonic expected that the second may have in a symmetric motion.
+const EVEN_SHARE: f64 = 0.5;
+/// Shares of the damping rate (frequency) and of the drive within which a motion is the linear mode's.
+const LINEAR: [f64; 2] = [0.1, 0.05];
+/// Degrees of the amplitudes of the harmonics in time: the fundamental may bend, the others are constant.
+const HARMONICS: [Option<usize>; 5] = [Some(2), Some(0), Some(0), Some(0), Some(0)];
+
+/// What the response is made of, relative to its fundamental.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Content {
+    /// Amplitude of the fundamental, m.
+    amplitude: f64,
+    /// Amplitudes of the second and the third harmonic, relative.
+    second: f64,
+    third: f64,
+    /// Standard error of either.
+    error: f64,
+    /// RMS of what is left, relative, and how much of that looks like noise.
+    rest: f64,
+    noise: f64,
+}
+
+impl Content {
+    /// Fits the samples; `None` where they are too few or silent.
+    fn of(samples: &[Sample], sample_time: f64) -> Option<Self> {
+        let n = samples.len();
+        let mut phase = 0.0;
+        let phases: Vec<f64> = samples
+            .iter()
+            .map(|sample| {
+                let now = phase;
+                phase += sample.command.drive.omega * sample_time;
+                now
+            })
+            .collect();
+        let basis = HarmonicBasis::new(&phases, 1, &HARMONICS);
+        if n < 2 * basis.terms() {
+            return None;
+        }
+        let values = DVector::from_iterator(n, samples.iter().map(|s| s.sensors.response));
+        let fit = basis.fit(&values)?;
+        let rest = basis.residual(&values, &fit);
+        let [amplitude, second, third] = [1, 2, 3].map(|n| fit.harmonic(n).norm());
+        if amplitude == 0.0 || !amplitude.is_finite() {
+            return None;
+        }
+        let rms = (rest.norm_squared() / (n - basis.terms()) as f64).sqrt();
+        Some(Self {
+            amplitude,
+            second: second / amplitude,
+            third: third / amplitude,
+            error: rms * (2.0 / n as f64).sqrt() / amplitude,
+            rest: rms / amplitude,
+            noise: noise(rest.as_slice()) / amplitude,
+        })
+    }
+}
+
+/// The regime that the response of these samples tells: of the rig only what a linear test at small amplitude gives is used
+/// (`omega0`, `c`, `k`), and the mass ratio for how much of a third harmonic to expect.
+#[must_use]
+pub fn regime_by_response(samples: &[Sample], scene: &Scene) -> Regime {
+    let Some(content) = Content::of(samples, scene.sample_time()) else {
+        return Regime::Unknown;
+    };
+    if content.rest > STEADY && content.noise < NOISE_SHARE * content.rest {
+        return Regime::Other;
+    }
+    if is_linear(samples, content.amplitude, scene) {
+        return Regime::NoImpacts;
+    }
+    // The particle's speed is about b omega: what matters is the order of magnitude.
+    let expected = 4.0 * scene.dimensionless().amplitude(1.0)
+        / (72.0 * std::f64::consts::PI * content.amplitude);
+    let significant = SIGNIFICANT * content.error;
+    if content.second > significant.max(EVEN_SHARE * expected) {
+        Regime::Asymmetric
+    } else if content.third > significant && significant < expected {
+        Regime::Symmetric
+    } else {
+        Regime::Unresolved
+    }
+}
+
+/// Frequency and drive are those that the linear mode needs at this amplitude.
+fn is_linear(samples: &[Sample], amplitude: f64, scene: &Scene) -> bool {
+    let (plant, omega0) = (&scene.plant, scene.dimensionless().omega0);
+    let omega = mean(samples.iter().map(|s| s.command.drive.omega));
+    let drive = mean(samples.iter().map(|s| s.command.drive.amplitude));
+    let needed = plant.damping * omega0 / plant.stiffness * amplitude;
+    let damping_rate = 0.5 * omega * drive / amplitude;
+    (omega - omega0).abs() <= LINEAR[0] * damping_rate
+        && (drive - needed).abs() <= LINEAR[1] * drive
+}

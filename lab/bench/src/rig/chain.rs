@@ -1,0 +1,151 @@
+//! The measurement chain around any rig: what lies between its motion and the numbers that a controller sees, and between
+//! the controller's numbers and the base.
+//!
+//! Inputs pass sensor noise, anti-alias filter, converter and delay, in that order; the output is held from sample to sample
+//! and quantised. Each stage is absent unless the scene's `[chain]` asks for it.
+
+mod converter;
+mod filter;
+mod noise;
+
+use std::collections::VecDeque;
+
+use converter::Converter;
+use filter::LowPass;
+pub(crate) use noise::NormalDistribution;
+use noise::Sensor;
+
+use super::{Drive, GroundTruth, Rig, RigError, Sensors};
+use crate::scene::{Chain as Settings, Dimensionless};
+
+/// Largest deviation of a sampling instant, in standard deviations.
+const JITTER_MAX: f64 = 4.0;
+
+/// A rig behind its measurement chain.
+pub struct Chain {
+    rig: Box<dyn Rig>,
+    response: Channel,
+    base: Option<Channel>,
+    output: Option<Converter>,
+    normal: NormalDistribution,
+    /// Standard deviation of the sampling instants, in samples.
+    jitter: f64,
+    /// How far the present sampling instant lies behind its nominal time, in samples.
+    late: f64,
+    /// Readings under way; the oldest is seen next.
+    under_way: VecDeque<Sensors>,
+    /// Time since the last reading, s.
+    elapsed: f64,
+}
+
+/// The way of one input.
+struct Channel {
+    sensor: Option<Sensor>,
+    filter: Option<LowPass>,
+    converter: Converter,
+}
+
+impl Channel {
+    fn read(&mut self, value: f64, elapsed: f64, normal: &mut NormalDistribution) -> f64 {
+        let noisy = match &mut self.sensor {
+            Some(sensor) => sensor.read(value, normal),
+            None => value,
+        };
+        let filtered = match &mut self.filter {
+            Some(filter) => filter.pass(noisy, elapsed),
+            None => noisy,
+        };
+        self.converter.convert(filtered)
+    }
+}
+
+impl Chain {
+    /// The rig behind its chain, or the rig itself where the chain is off.
+    #[must_use]
+    pub fn around(
+        rig: Box<dyn Rig>,
+        settings: &Settings,
+        d: &Dimensionless,
+        samples_per_period: f64,
+    ) -> Box<dyn Rig> {
+        if settings.is_on() {
+            Box::new(Self::new(rig, settings, d, samples_per_period))
+        } else {
+            rig
+        }
+    }
+
+    /// The chain around `rig`; `d` has the units of its settings.
+    #[must_use]
+    pub fn new(
+        rig: Box<dyn Rig>,
+        settings: &Settings,
+        d: &Dimensionless,
+        samples_per_period: f64,
+    ) -> Self {
+        // The power of a signal is what it was over about one period.
+        let channel = |range: f64| Channel {
+            sensor: settings
+                .snr
+                .map(|snr| Sensor::new(snr, settings.snr_of, range, samples_per_period)),
+            filter: (settings.filter > 0.0).then(|| LowPass::new(settings.filter * d.omega0)),
+            converter: Converter::new(settings.adc_bits, range),
+        };
+        let base_range = d.amplitude(settings.base_range);
+        Self {
+            rig,
+            response: channel(settings.response_range * d.b),
+            base: settings.reference.then(|| channel(base_range)),
+            output: settings
+                .hold
+                .then(|| Converter::new(settings.dac_bits, base_range)),
+            normal: NormalDistribution::new(settings.seed),
+            jitter: settings.jitter,
+            late: 0.0,
+            under_way: vec![Sensors::default(); settings.delay as usize].into(),
+            elapsed: 0.0,
+        }
+    }
+}
+
+impl Rig for Chain {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        let seen = self.rig.sense()?;
+        let (elapsed, normal) = (self.elapsed, &mut self.normal);
+        self.elapsed = 0.0;
+        let response = self.response.read(seen.response, elapsed, normal);
+        let reference = match (&mut self.base, seen.reference) {
+            (Some(channel), Some(value)) => Some(channel.read(value, elapsed, normal)),
+            _ => None,
+        };
+        self.under_way.push_back(Sensors {
+            response,
+            reference,
+        });
+        let mut oldest = self.under_way.pop_front().unwrap_or_default();
+        // Before the first reading arrives the channel is silent, not missing.
+        if oldest.reference.is_none() && reference.is_some() {
+            oldest.reference = Some(0.0);
+        }
+        Ok(oldest)
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let late = if self.jitter > 0.0 {
+            self.jitter * self.normal.next().clamp(-JITTER_MAX, JITTER_MAX)
+        } else {
+            0.0
+        };
+        let taken = step * (1.0 + late - self.late);
+        self.late = late;
+        self.elapsed += taken;
+        match &self.output {
+            Some(output) => self.rig.hold(output.convert(drive.displacement), taken),
+            None => self.rig.advance(drive, taken),
+        }
+    }
+
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        self.rig.ground_truth()
+    }
+}

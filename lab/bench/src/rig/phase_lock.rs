@@ -1,0 +1,52 @@
+//! The built-in phase-locked loop as a controller of the bench.
+
+use phase_lock::{Config, ConfigError, Input, Move, PhaseLock, State};
+
+use super::{Command, Controller, ControllerError, Drive, Sensors};
+
+/// The built-in controller: coefficients and state.
+#[derive(Clone)]
+pub struct BuiltIn {
+    lock: PhaseLock,
+    state: State,
+}
+
+impl BuiltIn {
+    /// The controller of a configuration, at its start.
+    ///
+    /// # Errors
+    /// Settings that the controller cannot work with.
+    pub fn new(config: &Config) -> Result<Self, ConfigError> {
+        let lock = config.build()?;
+        Ok(Self {
+            state: lock.start(),
+            lock,
+        })
+    }
+}
+
+impl Controller for BuiltIn {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        let output = self.lock.process(
+            &mut self.state,
+            Input {
+                response: sensors.response,
+                reference: sensors.reference,
+                active,
+            },
+        );
+        Ok(Command {
+            drive: Drive {
+                omega: output.omega,
+                amplitude: output.amplitude,
+                displacement: output.drive,
+            },
+            phase_error: output.phase_error,
+            settled: output.settled,
+        })
+    }
+
+    fn hold_response(&mut self, to: Move) -> Result<(), ControllerError> {
+        Ok(self.lock.hold_response(&mut self.state, to)?)
+    }
+}

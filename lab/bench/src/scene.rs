@@ -1,0 +1,102 @@
+//! Scenes: what is on the bench and what is done to it, read from TOML.
+
+mod backbone;
+mod chain;
+mod configuration;
+mod controller;
+mod error;
+mod overrides;
+mod plant;
+mod record;
+mod sections;
+mod validate;
+
+use std::path::Path;
+
+use lovines::{Parameters, State};
+use serde::Serialize;
+
+pub use backbone::{Backbone, Predictor};
+pub use chain::{Chain, RatioOf};
+pub use controller::Controller;
+pub use error::SceneError;
+pub use overrides::{Override, SyntaxError};
+pub use record::{Estimator, Record};
+pub use vines_model::Dimensionless;
+
+use sections::Sections;
+
+/// The default scene, embedded so that the program works from any folder.
+pub const PAPER: &str = include_str!("../../../scenes/paper.toml");
+
+/// A checked scene in SI units; build one with [`Scene::load`] or [`Scene::parse`].
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Scene {
+    /// The oscillator and its particle, SI units.
+    #[serde(serialize_with = "plant::serialize")]
+    pub plant: Parameters,
+    /// Where the motion starts, SI units.
+    pub start: State,
+    /// Amplitude E of the base displacement, m.
+    pub amplitude: f64,
+    /// The phase-locked loop, in units of omega0 and of the natural period.
+    pub controller: Controller,
+    /// How long to drive and to record, in periods.
+    pub record: Record,
+    /// How the backbone is tracked, in units of b and in periods.
+    pub backbone: Backbone,
+    /// What lies between rig and controller.
+    pub chain: Chain,
+}
+
+impl Scene {
+    /// Reads the scene file at `path`, or the default scene without one, with the overrides applied in order.
+    ///
+    /// # Errors
+    /// An unreadable file, an unknown or missing key, or a value that is not allowed, each named.
+    pub fn load(path: Option<&Path>, overrides: &[Override]) -> Result<Self, SceneError> {
+        let Some(path) = path else {
+            return Self::parse("paper.toml (the default scene)", PAPER, overrides);
+        };
+        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
+            path: path.into(),
+            source,
+        })?;
+        Self::parse(&path.display().to_string(), &text, overrides)
+    }
+
+    /// Reads a scene from `text`; `origin` names it in messages.
+    ///
+    /// # Errors
+    /// As [`Scene::load`].
+    pub fn parse(origin: &str, text: &str, overrides: &[Override]) -> Result<Self, SceneError> {
+        let syntax = |error: toml::de::Error| SceneError::Syntax {
+            origin: origin.into(),
+            message: error.to_string().trim_end().into(),
+        };
+        // The file is checked by itself first: only its own text can tell the line of a mistake.
+        let sections: Sections = toml::from_str(text).map_err(syntax)?;
+        let table = toml::from_str(text).map_err(syntax)?;
+        overrides::merged(table, overrides)?
+            .unwrap_or(sections)
+            .resolve(origin)
+    }
+
+    /// The numbers that the dimensionless model, the theory and the exact orbits depend on.
+    #[must_use]
+    pub fn dimensionless(&self) -> Dimensionless {
+        Dimensionless::of(&self.plant, self.amplitude)
+    }
+
+    /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
+    #[must_use]
+    pub fn dimensionless_start(&self) -> [f64; 4] {
+        self.dimensionless().state(&self.start)
+    }
+
+    /// The controller's sample time, s.
+    #[must_use]
+    pub fn sample_time(&self) -> f64 {
+        self.dimensionless().natural_period() / self.controller.samples_per_period
+    }
+}

@@ -1,0 +1,175 @@
+//! The `[controller]` section: the phase-locked loop.
+
+use std::f64::consts::TAU;
+
+use phase_lock::Config;
+use serde::{Deserialize, Serialize};
+
+use super::{SceneError, validate::Quantity};
+
+/// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Controller {
+    /// Samples per natural period `2 pi/omega0`.
+    pub samples_per_period: f64,
+    /// Bandwidth of the phase detector, in units of omega0: the one tuning knob, from which the loop's gains follow.
+    pub bandwidth: f64,
+    /// Frequency at the start, in units of omega0.
+    pub omega_start: f64,
+    /// Lowest frequency allowed, in units of omega0.
+    pub omega_min: f64,
+    /// Highest frequency allowed, in units of omega0.
+    pub omega_max: f64,
+    /// Phase of the response relative to the base, degrees.
+    pub phase_target: f64,
+    /// Largest phase error that counts as locked, degrees.
+    pub phase_tolerance: f64,
+    /// Largest relative drift of the frequency per period that counts as stationary.
+    pub frequency_drift: f64,
+    /// Largest relative drift of the response amplitude per period that counts as stationary.
+    pub amplitude_drift: f64,
+    /// How long all of this must hold, periods.
+    pub dwell_periods: u32,
+    /// Largest drive allowed, base amplitude over `b epsilon`; 0 for none.
+    #[serde(rename = "G_max")]
+    pub g_max: f64,
+    /// Reading of the response above which the drive is taken away, over b; 0 for none.
+    #[serde(rename = "C_max")]
+    pub c_max: f64,
+    /// Time of a ramp of the drive to its amplitude, also down after a fault, natural periods; 0 to jump.
+    pub ramp_periods: f64,
+    /// Time of a ramp of the drive down to nothing at the release, natural periods; 0 to switch off at once.
+    pub release_periods: f64,
+    /// Largest change of the frequency in a natural period, in units of omega0; 0 for none.
+    pub omega_rate: f64,
+    /// Longest time from the end of the ramp to the lock, natural periods; 0 for ever.
+    pub acquire_periods: f64,
+    /// Delay of the rig from the drive to the sensors, samples, beside that of `[chain]`; used where no sensor reads the base.
+    pub delay: f64,
+}
+
+impl Default for Controller {
+    fn default() -> Self {
+        Self {
+            samples_per_period: 100.0,
+            bandwidth: 0.1,
+            omega_start: 1.0,
+            omega_min: 0.9,
+            omega_max: 1.1,
+            phase_target: -90.0,
+            phase_tolerance: 0.3,
+            frequency_drift: 1e-6,
+            amplitude_drift: 1e-5,
+            dwell_periods: 20,
+            g_max: 0.0,
+            c_max: 0.0,
+            ramp_periods: 0.0,
+            release_periods: 0.0,
+            omega_rate: 0.0,
+            acquire_periods: 0.0,
+            delay: 0.0,
+        }
+    }
+}
+
+impl Controller {
+    /// The phase target in radians.
+    #[must_use]
+    pub fn phase_target_radians(&self) -> f64 {
+        self.phase_target.to_radians()
+    }
+
+    /// The detector at the natural frequency omega0 = 1.
+    fn detector(&self) -> Config {
+        Config {
+            sample_time: TAU / self.samples_per_period,
+            ..Config::for_resonance(1.0, 0.0)
+        }
+    }
+
+    /// Largest bandwidth of the detector at this number of samples per period, in units of omega0.
+    pub(super) fn bandwidth_max(&self) -> f64 {
+        self.detector().bandwidth_max()
+    }
+
+    pub(super) fn check(&self) -> Result<(), SceneError> {
+        self.check_limits()?;
+        let samples = self.samples_per_period;
+        let highest = self.detector().highest_harmonic();
+        let fewest = (2.0 * highest as f64 * self.omega_max).floor() + 1.0;
+        Quantity::new("controller.samples_per_period", samples, "(samples)").check(
+            (fewest..=1e5).contains(&samples),
+            format!("must be from {fewest} (two per period of harmonic {highest} at omega_max) to 100000"),
+        )?;
+        let widest = self.bandwidth_max();
+        Quantity::new("controller.bandwidth", self.bandwidth, "(omega0)").check(
+            self.bandwidth > 0.0 && self.bandwidth <= widest,
+            format!("must be above 0 and at most {widest:.3} with {samples} samples per period"),
+        )?;
+        Quantity::new("controller.omega_min", self.omega_min, "(omega0)").positive()?;
+        let (low, high) = (self.omega_min, self.omega_max);
+        Quantity::new("controller.omega_max", high, "(omega0)")
+            .check(high > low, format!("must be above omega_min = {low}"))?;
+        let start = self.omega_start;
+        Quantity::new("controller.omega_start", start, "(omega0)").check(
+            (low..=high).contains(&start),
+            format!("must lie between omega_min = {low} and omega_max = {high}"),
+        )?;
+        let target = self.phase_target;
+        Quantity::new("controller.phase_target", target, "degrees").check(
+            target.abs() <= 180.0,
+            "must lie between -180 and 180 degrees",
+        )?;
+        let tolerance = self.phase_tolerance;
+        Quantity::new("controller.phase_tolerance", tolerance, "degrees").positive()?;
+        let drift = self.frequency_drift;
+        Quantity::new(
+            "controller.frequency_drift",
+            drift,
+            "(relative, per period)",
+        )
+        .positive()?;
+        let drift = self.amplitude_drift;
+        Quantity::new(
+            "controller.amplitude_drift",
+            drift,
+            "(relative, per period)",
+        )
+        .positive()?;
+        let dwell = self.dwell_periods;
+        Quantity::new("controller.dwell_periods", dwell.into(), "(periods)")
+            .check((4..=400).contains(&dwell), "must be from 4 to 400")
+    }
+
+    fn check_limits(&self) -> Result<(), SceneError> {
+        for (key, value, unit) in [
+            ("controller.G_max", self.g_max, "(over b epsilon)"),
+            ("controller.C_max", self.c_max, "(over b)"),
+            (
+                "controller.ramp_periods",
+                self.ramp_periods,
+                "(natural periods)",
+            ),
+            (
+                "controller.release_periods",
+                self.release_periods,
+                "(natural periods)",
+            ),
+            (
+                "controller.omega_rate",
+                self.omega_rate,
+                "(omega0 per natural period)",
+            ),
+            (
+                "controller.acquire_periods",
+                self.acquire_periods,
+                "(natural periods)",
+            ),
+            ("controller.delay", self.delay, "samples"),
+        ] {
+            Quantity::new(key, value, unit).not_negative()?;
+        }
+        Ok(())
+    }
+}

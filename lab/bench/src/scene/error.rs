@@ -1,0 +1,65 @@
+//! What can be wrong with a scene.
+
+use std::path::PathBuf;
+
+use lovines::InvalidValue;
+
+use super::SyntaxError;
+
+/// A scene that cannot be used; the message is one that a person can act on.
+#[derive(Debug, thiserror::Error)]
+pub enum SceneError {
+    /// The file could not be read.
+    #[error("cannot read the scene {}: {source}", path.display())]
+    Read {
+        /// The file asked for.
+        path: PathBuf,
+        /// What the system said.
+        source: std::io::Error,
+    },
+    /// Not TOML, an unknown key or a value of the wrong type; the message shows the line.
+    #[error("{origin}: {message}")]
+    Syntax {
+        /// The file.
+        origin: String,
+        /// The reader's message, with line and column.
+        message: String,
+    },
+    /// An argument of `--set` that is not section.key=value.
+    #[error("--set: {0}")]
+    Argument(#[from] SyntaxError),
+    /// A `--set` argument that does not fit.
+    #[error("--set {argument}: {message}")]
+    Override {
+        /// The argument as given.
+        argument: String,
+        /// What is wrong with it.
+        message: String,
+    },
+    /// A number outside its range.
+    #[error("{key} = {value} {unit}: {allowed}")]
+    Value {
+        /// Dotted key.
+        key: &'static str,
+        /// The value given.
+        value: f64,
+        /// Its unit, in brackets.
+        unit: &'static str,
+        /// What is allowed.
+        allowed: String,
+    },
+    /// A plant or a start that makes no sense.
+    #[error("[plant] or [start]: {0}")]
+    Plant(#[from] InvalidValue),
+    /// A drive that the plant does not take.
+    #[error("[excitation] or [controller]: {0}")]
+    Drive(InvalidValue),
+    /// Keys that are missing or do not go together.
+    #[error("{origin}: {message}")]
+    Keys {
+        /// The file.
+        origin: String,
+        /// Which keys, and what to do.
+        message: String,
+    },
+}

@@ -1,0 +1,124 @@
+//! `--set section.key=value`: one value of a scene replaced from the command line, written as in TOML.
+
+use std::str::FromStr;
+
+use serde::Deserialize;
+use toml::{Table, Value};
+
+use super::{
+    SceneError,
+    plant::{DIMENSIONLESS_KEYS, SI_KEYS},
+    sections::Sections,
+};
+
+/// One replaced value.
+#[derive(Debug, Clone)]
+pub struct Override {
+    argument: String,
+    section: String,
+    key: String,
+    value: Value,
+}
+
+/// An argument that is not `section.key=value`.
+#[derive(Debug, thiserror::Error)]
+pub enum SyntaxError {
+    /// Not TOML.
+    #[error("{}; expected section.key=value, for instance plant.r=0.7", .0.message())]
+    Toml(#[from] toml::de::Error),
+    /// TOML, but not one key of one section.
+    #[error("expected one section.key=value, for instance plant.r=0.7")]
+    NotOneKey,
+}
+
+impl FromStr for Override {
+    type Err = SyntaxError;
+
+    fn from_str(argument: &str) -> Result<Self, SyntaxError> {
+        let table: Table = argument.parse()?;
+        let single = |table: Table| {
+            let mut entries = table.into_iter();
+            entries.next().filter(|_| entries.next().is_none())
+        };
+        let (section, keys) = match single(table) {
+            Some((section, Value::Table(keys))) => (section, single(keys)),
+            _ => (String::new(), None),
+        };
+        let (key, value) = keys.ok_or(SyntaxError::NotOneKey)?;
+        Ok(Self {
+            argument: argument.into(),
+            section,
+            key,
+            value,
+        })
+    }
+}
+
+impl Override {
+    fn error(&self, message: impl Into<String>) -> SceneError {
+        SceneError::Override {
+            argument: self.argument.clone(),
+            message: message.into(),
+        }
+    }
+
+    fn is(&self, section: &str, key: &str) -> bool {
+        self.section == section && self.key == key
+    }
+
+    /// A plant is given in one set of units; a key of the other would silently mean something else.
+    fn check_units(&self, plant: &Table) -> Result<(), SceneError> {
+        let is_in = |keys: &[&str]| keys.contains(&self.key.as_str());
+        let has = |keys: &[&str]| keys.iter().any(|key| plant.contains_key(*key));
+        if is_in(&DIMENSIONLESS_KEYS) && has(&SI_KEYS) {
+            return Err(self.error(
+                "this scene gives its plant in SI units; set plant.m and plant.c instead \
+                 (epsilon = m/M, lambda = c/(m omega0)), or use a scene with epsilon and lambda",
+            ));
+        }
+        if is_in(&SI_KEYS) && has(&DIMENSIONLESS_KEYS) {
+            return Err(self.error(
+                "this scene gives its plant in dimensionless form; set plant.epsilon, plant.lambda or plant.r",
+            ));
+        }
+        Ok(())
+    }
+
+    fn merge_into(&self, scene: &mut Table) -> Result<(), SceneError> {
+        let section = scene
+            .entry(&self.section)
+            .or_insert_with(|| Value::Table(Table::new()));
+        let Value::Table(section) = section else {
+            return Err(self.error(format!("`{}` is not a section", self.section)));
+        };
+        if self.section == "plant" {
+            self.check_units(section)?;
+        }
+        // G and E say the same thing: the one that is set replaces the other.
+        for (set, other) in [("E", "G"), ("G", "E")] {
+            if self.is("excitation", set) {
+                section.remove(other);
+            }
+        }
+        section.insert(self.key.clone(), self.value.clone());
+        Ok(())
+    }
+}
+
+/// The sections of `table` with the overrides applied one by one, so that a mistake is blamed on the argument that made it.
+pub(super) fn merged(
+    mut table: Table,
+    overrides: &[Override],
+) -> Result<Option<Sections>, SceneError> {
+    let sets = |key| overrides.iter().find(|one| one.is("excitation", key));
+    if let (Some(_), Some(second)) = (sets("G"), sets("E")) {
+        return Err(second.error("excitation.G is set as well: set one of them"));
+    }
+    let mut sections = None;
+    for one in overrides {
+        one.merge_into(&mut table)?;
+        let read = Sections::deserialize(table.clone());
+        sections = Some(read.map_err(|error| one.error(error.message().trim()))?);
+    }
+    Ok(sections)
+}

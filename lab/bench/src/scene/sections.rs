@@ -1,0 +1,80 @@
+//! The sections of a scene as written, before they are completed and checked.
+
+use lovines::Parameters;
+use serde::Deserialize;
+
+use super::{
+    Backbone, Chain, Controller, Dimensionless, Record, Scene, SceneError,
+    plant::{PlantSection, StartSection},
+    validate::Quantity,
+};
+
+/// The file; sections left out count as empty.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub(super) struct Sections {
+    plant: PlantSection,
+    start: StartSection,
+    excitation: Excitation,
+    controller: Controller,
+    record: Record,
+    backbone: Backbone,
+    chain: Chain,
+}
+
+/// The base amplitude; exactly one of the two keys is given.
+#[derive(Debug, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Excitation {
+    #[serde(rename = "G")]
+    g: Option<f64>,
+    #[serde(rename = "E")]
+    e: Option<f64>,
+}
+
+impl Excitation {
+    /// Amplitude E of the base displacement, m.
+    fn resolve(&self, origin: &str, plant: &Parameters) -> Result<f64, SceneError> {
+        match (self.g, self.e) {
+            (Some(g), None) => {
+                Quantity::new("excitation.G", g, "(dimensionless)").not_negative()?;
+                Ok(Dimensionless::of(plant, 0.0).amplitude(g))
+            }
+            (None, Some(e)) => {
+                Quantity::new("excitation.E", e, "m").not_negative()?;
+                Ok(e)
+            }
+            (given, _) => Err(SceneError::Keys {
+                origin: origin.into(),
+                message: format!(
+                    "[excitation] has {} of G (dimensionless) and E (m): give exactly one, with G = E/(b epsilon)",
+                    if given.is_some() { "both" } else { "neither" }
+                ),
+            }),
+        }
+    }
+}
+
+impl Sections {
+    pub(super) fn resolve(self, origin: &str) -> Result<Scene, SceneError> {
+        let plant = self.plant.resolve(origin)?;
+        let scene = Scene {
+            start: self.start.resolve(&plant)?,
+            amplitude: self.excitation.resolve(origin, &plant)?,
+            plant,
+            controller: self.controller,
+            record: self.record,
+            backbone: self.backbone,
+            chain: self.chain,
+        };
+        scene.controller.check()?;
+        scene.record.check(&scene.controller)?;
+        scene.backbone.check(&scene.controller)?;
+        scene.chain.check(&scene.controller)?;
+        let fastest = scene.controller.omega_max * scene.dimensionless().omega0;
+        lovines::Drive::harmonic(scene.amplitude, fastest)
+            .validate()
+            .map_err(SceneError::Drive)?;
+        Ok(scene)
+    }
+}

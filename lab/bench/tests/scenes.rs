@@ -1,0 +1,197 @@
+//! Scenes: what they resolve to, and how mistakes are told.
+
+use std::path::Path;
+
+use vines_testbench::scene::{Override, Scene, SceneError};
+
+fn set(arguments: &[&str]) -> Vec<Override> {
+    arguments.iter().map(|one| one.parse().unwrap()).collect()
+}
+
+fn paper(arguments: &[&str]) -> Result<Scene, SceneError> {
+    Scene::load(None, &set(arguments))
+}
+
+fn complaint(result: Result<Scene, SceneError>) -> String {
+    result.expect_err("a mistake").to_string()
+}
+
+fn says(message: &str, parts: &[&str]) {
+    for part in parts {
+        assert!(message.contains(part), "`{part}` is not in: {message}");
+    }
+}
+
+fn file(name: &str) -> std::path::PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR"))
+        .join("../../scenes")
+        .join(name)
+}
+
+#[test]
+fn the_default_scene_is_the_paper_file() {
+    let embedded = paper(&[]).unwrap();
+    assert_eq!(
+        embedded,
+        Scene::load(Some(&file("paper.toml")), &[]).unwrap()
+    );
+    let numbers = embedded.dimensionless();
+    assert!((numbers.epsilon - 0.0084).abs() < 1e-5, "{numbers:?}");
+    assert!((numbers.lambda - 1.43).abs() < 5e-3, "{numbers:?}");
+    assert!((numbers.g - 1.1).abs() < 1e-14, "{numbers:?}");
+}
+
+#[test]
+fn a_dimensionless_scene_is_its_own_model() {
+    let scene = Scene::load(Some(&file("dimensionless.toml")), &[]).unwrap();
+    let numbers = scene.dimensionless();
+    assert_eq!((numbers.omega0, numbers.b), (1.0, 1.0));
+    assert_eq!(
+        (numbers.epsilon, scene.plant.damping),
+        (0.0084, 0.0084 * 1.43)
+    );
+    assert!((numbers.lambda - 1.43).abs() < 1e-14 && (numbers.g - 1.1).abs() < 1e-14);
+}
+
+#[test]
+fn every_key_of_the_paper_file_has_its_default() {
+    let scene = paper(&[]).unwrap();
+    assert_eq!(
+        scene.controller,
+        vines_testbench::scene::Controller::default()
+    );
+    assert_eq!(scene.record, vines_testbench::scene::Record::default());
+}
+
+#[test]
+fn one_value_can_be_set() {
+    let scene = paper(&["plant.r=0.7", "record.lock_periods=10", "start.dq2 = -0.4"]).unwrap();
+    assert_eq!(scene.plant.restitution, 0.7);
+    assert_eq!(scene.record.lock_periods, 10.0);
+    assert_eq!(scene.start.dq2, -0.4);
+}
+
+#[test]
+fn setting_e_replaces_g_and_back() {
+    assert_eq!(paper(&["excitation.E=1e-4"]).unwrap().amplitude, 1e-4);
+    let text = "[plant]\nepsilon = 0.01\nlambda = 1\nr = 0.65\n[excitation]\nE = 0.02";
+    let scene = Scene::parse("s.toml", text, &set(&["excitation.G=1.5"])).unwrap();
+    assert!((scene.dimensionless().g - 1.5).abs() < 1e-14);
+    says(
+        &complaint(paper(&["excitation.E=1e-4", "excitation.G=1"])),
+        &["excitation.G is set as well"],
+    );
+}
+
+#[test]
+fn a_key_of_the_other_units_is_refused_with_advice() {
+    says(
+        &complaint(paper(&["plant.epsilon=0.01"])),
+        &["--set plant.epsilon=0.01", "plant.m"],
+    );
+    let result = Scene::load(Some(&file("dimensionless.toml")), &set(&["plant.M=2"]));
+    says(&complaint(result), &["--set plant.M=2", "plant.epsilon"]);
+}
+
+#[test]
+fn an_unknown_key_is_named_with_those_allowed() {
+    says(
+        &complaint(paper(&["plant.mass=1"])),
+        &["--set plant.mass=1", "`mass`", "`M`", "`r`"],
+    );
+    says(
+        &complaint(paper(&["plants.r=1"])),
+        &["`plants`", "`plant`", "`record`"],
+    );
+    let result = Scene::parse("my.toml", "[plant]\nM = 1\nkk = 2\n", &[]);
+    says(&complaint(result), &["my.toml", "line 3", "`kk`", "`k`"]);
+}
+
+#[test]
+fn a_value_of_the_wrong_type_is_named_with_its_line() {
+    let result = Scene::parse("my.toml", "[plant]\nM = \"heavy\"\n", &[]);
+    says(&complaint(result), &["my.toml", "line 2", "heavy"]);
+}
+
+#[test]
+fn values_that_make_no_sense_are_named_with_unit_and_range() {
+    for (argument, parts) in [
+        ("plant.M=0", ["M (primary mass) = 0 kg", "above 0"]),
+        ("plant.k=-1", ["k (stiffness) = -1 N/m", "above 0"]),
+        ("plant.m=nan", ["m (particle mass) = NaN kg", "above 0"]),
+        (
+            "plant.b=inf",
+            ["b (half-width of the cavity) = inf m", "finite"],
+        ),
+        ("plant.c=-0.1", ["c (damping) = -0.1 N", "0 or above"]),
+        (
+            "plant.r=0",
+            ["r (coefficient of restitution) = 0", "at most 1"],
+        ),
+        (
+            "plant.r=1.01",
+            ["r (coefficient of restitution) = 1.01", "at most 1"],
+        ),
+        ("start.q2=0.02", ["q1 - q2", "-0.02 m"]),
+        (
+            "start.q1=inf",
+            ["q1 (displacement of the primary mass) = inf m", "finite"],
+        ),
+        (
+            "excitation.G=-1",
+            ["excitation.G = -1 (dimensionless)", "zero or positive"],
+        ),
+        (
+            "controller.omega_start=2",
+            ["controller.omega_start = 2 (omega0)", "omega_max = 1.1"],
+        ),
+        (
+            "controller.omega_max=0.5",
+            ["controller.omega_max = 0.5 (omega0)", "omega_min = 0.9"],
+        ),
+        (
+            "record.decay_periods=0",
+            ["record.decay_periods = 0 (natural periods)", "positive"],
+        ),
+    ] {
+        says(&complaint(paper(&[argument])), &parts);
+    }
+}
+
+#[test]
+fn a_start_on_the_wall_is_allowed() {
+    assert!(paper(&["start.q2=0.01"]).is_ok() && paper(&["start.q2=-0.01"]).is_ok());
+}
+
+#[test]
+fn missing_and_mixed_keys_are_told() {
+    let parse = |text| complaint(Scene::parse("my.toml", text, &[]));
+    says(&parse(""), &["my.toml", "[plant] has no", "epsilon"]);
+    says(&parse("[plant]\nM = 1\nr = 0.5"), &["[plant] has no `k`"]);
+    says(&parse("[plant]\nM = 1\nepsilon = 0.5"), &["mixes"]);
+    let plant = "[plant]\nepsilon = 0.01\nlambda = 1\nr = 0.5\n";
+    says(&parse(plant), &["neither of G"]);
+    says(
+        &parse(&format!("{plant}[excitation]\nG = 1\nE = 1")),
+        &["both of G"],
+    );
+}
+
+#[test]
+fn a_missing_file_is_named() {
+    let result = Scene::load(Some(Path::new("nowhere/at-all.toml")), &[]);
+    says(&complaint(result), &["nowhere/at-all.toml"]);
+}
+
+#[test]
+fn an_argument_that_is_no_assignment_is_refused() {
+    for argument in [
+        "plant.r",
+        "r=0.7",
+        "plant.r=",
+        "plant.r=0.7 m",
+        "plant.r=1\nx=2",
+    ] {
+        assert!(argument.parse::<Override>().is_err(), "{argument}");
+    }
+}

@@ -1,0 +1,16 @@
+//! The dimensionless model of an LO–VI NES: first-order theory, exact periodic orbits, and maps of its regimes.
+//!
+//! Lengths are over the half-width b of the cavity, times multiplied by omega0 = sqrt(k/M), and
+//! `Omega = omega/omega0 = 1 + epsilon sigma`. [`theory`] says to first order in the mass ratio where the backbone lies,
+//! [`orbit`] says it exactly.
+
+#![forbid(unsafe_code)]
+
+mod dimensionless;
+pub mod map;
+pub mod numerics;
+pub mod orbit;
+pub mod regime;
+pub mod theory;
+
+pub use dimensionless::Dimensionless;

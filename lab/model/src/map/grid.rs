@@ -1,0 +1,166 @@
+//! The grid: all points, on all cores.
+
+use rayon::prelude::*;
+use serde::Serialize;
+use thiserror::Error;
+
+use lovines::InvalidValue;
+
+use super::{
+    axis::{Axis, Range},
+    run::{Point, observe},
+};
+use crate::Dimensionless;
+use crate::regime::Regime;
+use crate::theory::SlowFlow;
+
+/// What to map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Plan {
+    /// The numbers that are on no axis.
+    pub scene: Dimensionless,
+    /// Detuning where it is on no axis.
+    pub sigma: f64,
+    /// Start (q1, q1', q2, q2'), dimensionless.
+    pub start: [f64; 4],
+    /// Horizontal axis.
+    pub x: Range,
+    /// Vertical axis.
+    pub y: Range,
+    /// Periods before the record.
+    pub settle: usize,
+    /// Periods recorded.
+    pub record: usize,
+}
+
+/// One cell of the map.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Cell {
+    /// Detuning.
+    pub sigma: f64,
+    /// Base amplitude over `b epsilon`.
+    #[serde(rename = "G")]
+    pub g: f64,
+    /// Restitution coefficient.
+    pub r: f64,
+    /// What was found.
+    #[serde(flatten)]
+    pub point: Point,
+    /// First-order theory has a stable symmetric 1:1 motion here.
+    pub theory_stable: bool,
+}
+
+/// The map, row by row from the smallest y, each from the smallest x.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Map {
+    /// What was asked for.
+    pub plan: Plan,
+    /// What was found.
+    pub cells: Vec<Cell>,
+}
+
+/// Why a map cannot be made.
+#[derive(Debug, Error)]
+pub enum MapError {
+    /// Twice the same axis.
+    #[error("both axes are {0}: take two of sigma, G and r")]
+    SameAxis(Axis),
+    /// No period is recorded, or so few that nothing can repeat.
+    #[error("{0} recorded periods are too few to see a pattern: at least 20 are needed")]
+    TooShort(usize),
+    /// A frequency that is none.
+    #[error("sigma = {sigma} (dimensionless) is a frequency of {omega} omega0: it must be above 0")]
+    Frequency {
+        /// The detuning.
+        sigma: f64,
+        /// The frequency over omega0.
+        omega: f64,
+    },
+    /// The plant refuses a parameter or the start.
+    #[error(transparent)]
+    Plant(#[from] InvalidValue),
+}
+
+impl Plan {
+    /// Detuning and scene at a point of the plane.
+    #[must_use]
+    pub fn at(&self, x: f64, y: f64) -> (f64, Dimensionless) {
+        let (mut sigma, mut scene) = (self.sigma, self.scene);
+        for (range, value) in [(self.x, x), (self.y, y)] {
+            match range.axis {
+                Axis::Sigma => sigma = value,
+                Axis::G => scene.g = value,
+                Axis::R => scene.r = value,
+            }
+        }
+        (sigma, scene)
+    }
+
+    /// Number of cells.
+    #[must_use]
+    pub fn cells(&self) -> usize {
+        self.x.points * self.y.points
+    }
+
+    /// First-order theory has a stable symmetric 1:1 motion at a point of the plane.
+    #[must_use]
+    pub fn theory_stable(&self, x: f64, y: f64) -> bool {
+        let (sigma, scene) = self.at(x, y);
+        SlowFlow::new(scene.lambda, scene.r).has_stable_motion(scene.g, sigma)
+    }
+
+    fn check(&self) -> Result<(), MapError> {
+        if self.x.axis == self.y.axis {
+            return Err(MapError::SameAxis(self.x.axis));
+        }
+        if self.record < 20 {
+            return Err(MapError::TooShort(self.record));
+        }
+        let lowest = self.at(self.x.from, self.y.from).0;
+        let omega = 1.0 + self.scene.epsilon * lowest;
+        if omega <= 0.0 {
+            return Err(MapError::Frequency {
+                sigma: lowest,
+                omega,
+            });
+        }
+        Ok(())
+    }
+
+    /// Runs all cells on all cores; `done` is told after each.
+    ///
+    /// # Errors
+    /// Axes, times or values that make no sense.
+    pub fn run(&self, done: impl Fn() + Sync) -> Result<Map, MapError> {
+        self.check()?;
+        let cells = (0..self.cells())
+            .into_par_iter()
+            .map(|n| {
+                let (x, y) = (self.x.at(n % self.x.points), self.y.at(n / self.x.points));
+                let (sigma, scene) = self.at(x, y);
+                let point = observe(&scene, sigma, self.start, (self.settle, self.record))?;
+                done();
+                Ok(Cell {
+                    sigma,
+                    g: scene.g,
+                    r: scene.r,
+                    point,
+                    theory_stable: self.theory_stable(x, y),
+                })
+            })
+            .collect::<Result<_, InvalidValue>>()?;
+        Ok(Map { plan: *self, cells })
+    }
+}
+
+impl Map {
+    /// How many cells show a regime, and how many of those lie where theory has a stable 1:1 motion.
+    #[must_use]
+    pub fn count(&self, regime: Regime) -> (usize, usize) {
+        let cells = || self.cells.iter().filter(|cell| cell.point.regime == regime);
+        (
+            cells().count(),
+            cells().filter(|cell| cell.theory_stable).count(),
+        )
+    }
+}

@@ -1,0 +1,141 @@
+//! Least squares of harmonics, by a QR decomposition of the basis.
+
+use nalgebra::{Complex, DMatrix, DVector, Dyn, linalg::QR};
+
+/// What a signal is made of at given phases: a polynomial, and harmonics whose amplitudes are polynomials in time.
+///
+/// Time runs from -1 at the first sample to 1 at the last. The factors serve any number of signals.
+pub struct HarmonicBasis {
+    matrix: DMatrix<f64>,
+    factors: QR<f64, Dyn, Dyn>,
+    /// Column of each harmonic's constant part.
+    columns: Vec<usize>,
+}
+
+/// A signal in such a basis.
+pub struct HarmonicFit {
+    coefficients: DVector<f64>,
+    columns: Vec<usize>,
+}
+
+impl HarmonicBasis {
+    /// The basis at the `phases` (rad) of the fundamental: a polynomial of degree `trend`, and each of the harmonics 1, 2, …
+    /// of `harmonics` that is given with the degree of its amplitude; `None` leaves one out.
+    #[must_use]
+    pub fn new(phases: &[f64], trend: usize, harmonics: &[Option<usize>]) -> Self {
+        let last = (phases.len().max(2) - 1) as f64;
+        let time = |row: usize| 2.0 * row as f64 / last - 1.0;
+        let mut terms: Vec<(usize, usize, bool)> =
+            (0..=trend).map(|degree| (0, degree, true)).collect();
+        let mut columns = Vec::new();
+        for (n, degree) in harmonics.iter().enumerate() {
+            columns.push(terms.len());
+            for degree in degree.map_or(0..0, |degree| 0..degree + 1) {
+                terms.extend([(n + 1, degree, false), (n + 1, degree, true)]);
+            }
+        }
+        let matrix = DMatrix::from_fn(phases.len(), terms.len(), |row, column| {
+            let (harmonic, degree, cosine) = terms[column];
+            let angle = harmonic as f64 * phases[row];
+            let wave = if cosine { angle.cos() } else { angle.sin() };
+            time(row).powi(degree as i32) * wave
+        });
+        Self {
+            factors: matrix.clone().qr(),
+            matrix,
+            columns,
+        }
+    }
+
+    /// Number of unknowns.
+    #[must_use]
+    pub fn terms(&self) -> usize {
+        self.matrix.ncols()
+    }
+
+    /// The best fit of `values`, one for each phase; `None` for fewer values than unknowns, or phases that cannot tell the
+    /// terms apart.
+    #[must_use]
+    pub fn fit(&self, values: &DVector<f64>) -> Option<HarmonicFit> {
+        if self.matrix.nrows() < self.terms() {
+            return None;
+        }
+        let mut right = values.clone();
+        self.factors.q_tr_mul(&mut right);
+        let right = right.rows(0, self.terms()).into_owned();
+        let coefficients = self.factors.r().solve_upper_triangular(&right)?;
+        Some(HarmonicFit {
+            coefficients,
+            columns: self.columns.clone(),
+        })
+    }
+
+    /// What a fit leaves of the values.
+    #[must_use]
+    pub fn residual(&self, values: &DVector<f64>, fit: &HarmonicFit) -> DVector<f64> {
+        values - &self.matrix * &fit.coefficients
+    }
+}
+
+impl HarmonicFit {
+    /// Complex amplitude a of a harmonic in the middle: `Im(a exp(i n phase))`. `harmonic` counts from 1.
+    #[must_use]
+    pub fn harmonic(&self, harmonic: usize) -> Complex<f64> {
+        self.pair(self.columns[harmonic - 1])
+    }
+
+    /// Change of that amplitude per half of the window; the basis has it where the harmonic's degree is at least 1.
+    #[must_use]
+    pub fn drift(&self, harmonic: usize) -> Complex<f64> {
+        self.pair(self.columns[harmonic - 1] + 2)
+    }
+
+    fn pair(&self, column: usize) -> Complex<f64> {
+        Complex::new(self.coefficients[column], self.coefficients[column + 1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn signal(phases: &[f64]) -> DVector<f64> {
+        let n = phases.len() as f64;
+        DVector::from_iterator(
+            phases.len(),
+            phases.iter().enumerate().map(|(i, phase)| {
+                let t = 2.0 * i as f64 / (n - 1.0) - 1.0;
+                let first = (0.7 + 0.1 * t) * phase.sin() - 0.2 * phase.cos();
+                0.3 + first + 0.05 * (3.0 * phase + 0.4).sin()
+            }),
+        )
+    }
+
+    #[test]
+    fn amplitudes_and_drift_are_found_to_rounding() {
+        let phases: Vec<f64> = (0..150).map(|n| 0.1 * f64::from(n)).collect();
+        let basis = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(0)]);
+        let values = signal(&phases);
+        let fit = basis.fit(&values).unwrap();
+        assert!((fit.harmonic(1) - Complex::new(0.7, -0.2)).norm() < 1e-14);
+        assert!((fit.drift(1) - Complex::new(0.1, 0.0)).norm() < 1e-14);
+        assert!((fit.harmonic(3) - Complex::from_polar(0.05, 0.4)).norm() < 1e-14);
+        assert!(basis.residual(&values, &fit).norm() < 1e-13);
+    }
+
+    #[test]
+    fn too_few_or_equal_phases_give_no_fit() {
+        let few = [0.0, 0.1];
+        assert!(
+            HarmonicBasis::new(&few, 0, &[Some(0)])
+                .fit(&DVector::zeros(2))
+                .is_none()
+        );
+        let equal = [0.0; 20];
+        assert!(
+            HarmonicBasis::new(&equal, 0, &[Some(0)])
+                .fit(&DVector::zeros(20))
+                .is_none()
+        );
+    }
+}

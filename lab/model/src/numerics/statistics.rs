@@ -1,0 +1,124 @@
+//! Statistics of samples.
+
+/// Arithmetic mean; NaN for no values.
+pub fn mean(values: impl IntoIterator<Item = f64>) -> f64 {
+    let (mut sum, mut count) = (0.0, 0_usize);
+    for value in values {
+        sum += value;
+        count += 1;
+    }
+    sum / count as f64
+}
+
+/// Mean of the squares; NaN for no values.
+pub fn mean_square(values: impl IntoIterator<Item = f64>) -> f64 {
+    mean(values.into_iter().map(|value| value * value))
+}
+
+/// Standard deviation of the values themselves (divided by n), not of a population they stand for; NaN for no values.
+#[must_use]
+pub fn standard_deviation(values: &[f64]) -> f64 {
+    let mean = mean(values.iter().copied());
+    mean_square(values.iter().map(|value| value - mean)).sqrt()
+}
+
+/// Smallest and largest of `start` and the values.
+pub fn range(start: (f64, f64), values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    values.into_iter().fold(start, |(low, high), value| {
+        (low.min(value), high.max(value))
+    })
+}
+
+/// `count` values from `from` to `to` at equal distances, both ends included.
+pub fn equally_spaced(from: f64, to: f64, count: usize) -> impl Iterator<Item = f64> + Clone {
+    let steps = count.saturating_sub(1).max(1) as f64;
+    (0..count).map(move |n| from + (to - from) * n as f64 / steps)
+}
+
+/// Standard deviation of the white noise on a smooth signal, from third differences; 0 for fewer than six values.
+#[must_use]
+pub fn noise(values: &[f64]) -> f64 {
+    let differences = values
+        .windows(4)
+        .map(|v| v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]);
+    if differences.len() < 3 {
+        return 0.0;
+    }
+    // White noise of variance 1 gives them the variance 1 + 9 + 9 + 1.
+    (mean_square(differences) / 20.0).sqrt()
+}
+
+/// The straight line that fits equally spaced values best.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Line {
+    /// Change from a value to the next.
+    pub slope: f64,
+    /// Standard error of the slope.
+    pub slope_error: f64,
+    /// Standard deviation of the residuals, for n - 2 degrees of freedom.
+    pub residual: f64,
+}
+
+impl Line {
+    /// Fits at least three values.
+    #[must_use]
+    pub fn fit(values: &[f64]) -> Self {
+        let n = values.len() as f64;
+        let middle = 0.5 * (n - 1.0);
+        let mean = mean(values.iter().copied());
+        let spread = n * (n * n - 1.0) / 12.0;
+        let place = |i: usize| i as f64 - middle;
+        let moment = |(i, value): (usize, &f64)| place(i) * (value - mean);
+        let slope = values.iter().enumerate().map(moment).sum::<f64>() / spread;
+        let square = |(i, value): (usize, &f64)| (value - mean - slope * place(i)).powi(2);
+        let variance = values.iter().enumerate().map(square).sum::<f64>() / (n - 2.0);
+        Self {
+            slope,
+            slope_error: (variance / spread).sqrt(),
+            residual: variance.sqrt(),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn four_numbers_have_their_mean_and_deviation() {
+        let values = [1.0, 3.0, 5.0, 7.0];
+        assert_eq!(mean(values), 4.0);
+        assert_eq!(mean_square(values), 21.0);
+        assert!((standard_deviation(&values) - 5f64.sqrt()).abs() < 1e-15);
+        assert_eq!(range((2.0, 2.0), values), (1.0, 7.0));
+        assert!(mean([]).is_nan());
+    }
+
+    #[test]
+    fn both_ends_are_included() {
+        assert!(equally_spaced(1.0, 2.0, 5).eq([1.0, 1.25, 1.5, 1.75, 2.0]));
+        assert!(equally_spaced(1.0, 2.0, 1).eq([1.0]));
+    }
+
+    #[test]
+    fn third_differences_see_noise_and_no_cubic() {
+        let cubic = |n: usize| 1e-3 * (n as f64).powi(2) - 2.0;
+        let smooth: Vec<f64> = (0..200).map(cubic).collect();
+        assert!(noise(&smooth) < 1e-12);
+        // Alternating signs: every third difference is eight times the amplitude.
+        let rough: Vec<f64> = (0..200)
+            .map(|n| cubic(n) + 0.1 * f64::from(1 - 2 * (n as i32 % 2)))
+            .collect();
+        assert!((noise(&rough) - 0.8 / 20f64.sqrt()).abs() < 1e-9);
+        assert_eq!(noise(&[1.0; 5]), 0.0);
+    }
+
+    #[test]
+    fn a_line_has_its_slope_and_no_residual() {
+        let line = Line::fit(&[1.0, 1.5, 2.0, 2.5]);
+        assert!((line.slope - 0.5).abs() < 1e-15 && line.residual < 1e-15);
+        let bent = Line::fit(&[0.0, 1.0, 0.0]);
+        assert!((bent.residual - (2f64 / 3.0).sqrt()).abs() < 1e-15);
+        assert!((bent.slope_error - (1f64 / 3.0).sqrt()).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,91 @@
+//! Exact periodic orbits: symmetric 1:1 ones at phase resonance in closed form, all others by shooting on the impact map.
+//!
+//! Everything is dimensionless: lengths over b, velocities over `b omega0`, time `tau = omega0 t`. Half a period after an
+//! impact the state of a symmetric orbit is minus itself; the particle flies in straight lines at speed ±B, so the wall gives
+//! the oscillator alternating impulses of known size, whose periodic response is closed form. What is left at a
+//! given frequency is one quadratic for B. No first-order approximation is made anywhere.
+
+mod candidate;
+mod continuation;
+mod convergence;
+mod curves;
+mod flight;
+mod impact_map;
+mod multipliers;
+mod oscillator;
+mod pattern;
+mod periodic;
+mod search;
+mod settle;
+
+use serde::Serialize;
+
+pub use continuation::{
+    Bifurcation, Branch, Ended, Limits, Special, asymmetric_branch, continue_both_ways,
+    continue_from,
+};
+pub use convergence::{Convergence, Difference, convergence};
+pub use curves::{Response, backbone, response};
+pub use impact_map::{Bounce, ImpactMap};
+pub use pattern::{ImpactPattern, Unknowns};
+pub use periodic::{Condition, Periodic};
+pub use search::{exact_backbone, phase_resonant};
+pub use settle::settle;
+
+/// An exact symmetric 1:1 orbit at phase resonance: the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Orbit {
+    /// Base amplitude over `b epsilon`.
+    #[serde(rename = "G")]
+    pub g: f64,
+    /// Detuning `(Omega - 1)/epsilon`.
+    pub sigma: f64,
+    /// Angular frequency over omega0.
+    #[serde(rename = "Omega")]
+    pub omega: f64,
+    /// Amplitude of the first harmonic of v.
+    #[serde(rename = "C")]
+    pub c: f64,
+    /// Speed of the particle in flight.
+    #[serde(rename = "B")]
+    pub b: f64,
+    /// Relative velocity just before an impact (w' at the wall w = +1).
+    pub impact_velocity: f64,
+    /// Where the orbit can be started.
+    pub start: AfterImpact,
+    /// Moduli of the multipliers of the half-period map, ascending.
+    pub multipliers: [f64; 4],
+    /// All multipliers are inside the unit circle.
+    pub stable: bool,
+}
+
+/// The state just after an impact on the wall w = +1, where the base displacement is `epsilon G sin(Omega tau + phase)`
+/// with tau counted from that impact. Half a period later the state is minus this one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct AfterImpact {
+    /// Phase of the base, rad, in (-pi, pi].
+    pub phase: f64,
+    /// Displacement of the primary mass over b.
+    pub q1: f64,
+    /// Velocity of the primary mass over `b omega0`.
+    pub dq1: f64,
+    /// Displacement of the particle over b.
+    pub q2: f64,
+    /// Velocity of the particle over `b omega0`.
+    pub dq2: f64,
+}
+
+impl Orbit {
+    /// The unknowns that shooting starts from: (phase, q1, q1', q2') after the impact on w = +1, sigma, G.
+    #[must_use]
+    pub fn unknowns(&self) -> Unknowns {
+        let AfterImpact {
+            phase,
+            q1,
+            dq1,
+            dq2,
+            ..
+        } = self.start;
+        Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
+    }
+}

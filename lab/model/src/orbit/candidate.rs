@@ -1,0 +1,99 @@
+//! All phase-resonant symmetric motions at one frequency: a quadratic for the particle's speed.
+//!
+//! Time starts at an impact on the wall w = +1; complex amplitudes Z stand for `Im(Z exp(i Omega tau))`.
+//!
+//! - The particle turns from -B to +B, so `w'- = 2 B (1 + epsilon)/(1 + r)` and the oscillator's velocity jumps by -2 epsilon B.
+//! - `q2 = -pi B/(2 Omega)` at the impact, since half a period later it is at the opposite point.
+//! - `q1 = y - 2 epsilon B p`, with the harmonic y of amplitude Y and p the periodic response to impulses of alternating sign.
+//! - `w = 1` and `w' = w'-` at the impact then give `Im Y = 1 + alpha B` and `Re Y = beta B`.
+//! - Phase resonance, `Re(V conj(F)) = 0` for the harmonic V of v and the base's harmonic F, is quadratic in B and free of G;
+//!   `G = |F|/epsilon` follows. So the exact backbone is a curve parametrised by its frequency.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use nalgebra::{Complex, Matrix2, Vector2};
+
+use super::{AfterImpact, oscillator::Oscillator};
+use crate::Dimensionless;
+use crate::numerics::quadratic;
+
+/// A symmetric motion that satisfies the impact law and the phase resonance, not yet checked for `|w| <= 1` in flight.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Candidate {
+    /// Angular frequency over omega0.
+    pub omega: f64,
+    /// Speed of the particle; not physical unless positive.
+    pub b: f64,
+    /// Amplitude of the first harmonic of v.
+    pub c: f64,
+    /// Base amplitude over `b epsilon`.
+    pub g: f64,
+    /// Harmonic amplitude of the base displacement over b.
+    pub(super) base: Complex<f64>,
+    /// Harmonic part of q1.
+    pub(super) y: Complex<f64>,
+    /// State (q1, q1') just before the impact at the wall w = +1.
+    pub(super) before: Vector2<f64>,
+    /// State (p, p') of the unit impulse response just after its impulse.
+    pub(super) p: Vector2<f64>,
+    /// The first harmonic of v lags the base by pi/2, rather than leading it.
+    pub(super) lags: bool,
+}
+
+impl Candidate {
+    pub(super) fn after_impact(&self, epsilon: f64) -> AfterImpact {
+        AfterImpact {
+            phase: self.base.arg(),
+            q1: self.before[0],
+            dq1: self.before[1] - 2.0 * epsilon * self.b,
+            q2: self.before[0] - 1.0,
+            dq2: self.b,
+        }
+    }
+}
+
+/// The two candidates at `omega`, each a continuous branch where it exists.
+pub(super) fn candidates(scene: &Dimensionless, omega: f64) -> Option<[Candidate; 2]> {
+    let Dimensionless { epsilon, r, .. } = *scene;
+    let oscillator = Oscillator::new(epsilon * scene.lambda / 2.0);
+
+    // Unit impulses at tau = 0, -T, -2T…, alternating: half a period later the state is minus the one before.
+    let flight = oscillator.propagator(PI / omega);
+    let p = (Matrix2::identity() + flight).try_inverse()? * Vector2::new(0.0, 1.0);
+    let p_before = p - Vector2::new(0.0, 1.0);
+
+    let alpha = 2.0 * epsilon * p_before[0] - FRAC_PI_2 / omega;
+    let beta = (2.0 * (1.0 + epsilon) / (1.0 + r) - 1.0 + 2.0 * epsilon * p_before[1]) / omega;
+    let harmonic = |b: f64| Complex::new(beta * b, 1.0 + alpha * b);
+
+    // v = y + B kappa in the first harmonic: impulses through the oscillator, and the particle's triangle wave.
+    let impulse = Complex::new(0.0, 2.0 * omega / PI);
+    let triangle = Complex::new(0.0, -4.0 / (PI * omega));
+    let kappa = (oscillator.compliance(omega) * impulse * -2.0 + triangle) * epsilon;
+    // F = y stiffness/base_force; only its direction matters for the phase.
+    let base_over_y = oscillator.stiffness(omega) / oscillator.base_force(omega);
+    let d = base_over_y.conj();
+    let u = d * kappa;
+
+    let speeds = quadratic(
+        d.re * (alpha * alpha + beta * beta) + u.re * beta + u.im * alpha,
+        2.0 * alpha * d.re + u.im,
+        d.re,
+    )?;
+    Some(speeds.map(|b| {
+        let y = harmonic(b);
+        let v = y + kappa * b;
+        let base = y * base_over_y;
+        Candidate {
+            omega,
+            b,
+            c: v.norm(),
+            g: base.norm() / epsilon,
+            base,
+            y,
+            before: Vector2::new(y.im, omega * y.re) - p_before * (2.0 * epsilon * b),
+            p,
+            lags: (v * base.conj()).im < -1e-12 * v.norm() * base.norm(),
+        }
+    }))
+}

@@ -1,0 +1,301 @@
+//! Continuation of periodic motions by pseudo-arclength: through folds, stable and unstable parts alike (docs/theory.md, eq. 27).
+//!
+//! The unknowns are the state after an impact, sigma and G; four equations close the motion and one more chooses the curve:
+//! fixed G for a frequency response, phase resonance for the backbone. The step follows the tangent and shrinks where the
+//! curve bends. A branch ends where its pattern of impacts does, at a graze.
+
+use nalgebra::{Matrix4, Matrix6, SVector};
+use serde::Serialize;
+
+use super::{
+    pattern::{Returned, Unknowns, follow},
+    periodic::{Condition, Periodic, newton},
+};
+use crate::Dimensionless;
+use crate::numerics::try_bisection;
+
+/// How far to go.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Range of sigma.
+    pub sigma: [f64; 2],
+    /// Range of G.
+    pub g: [f64; 2],
+    /// Most points.
+    pub points: usize,
+    /// Longest step in the space of the unknowns.
+    pub step: f64,
+}
+
+impl Default for Limits {
+    /// Detunings from -6 to 6, G up to 10, 2000 points at most 0.05 apart.
+    fn default() -> Self {
+        Self {
+            sigma: [-6.0, 6.0],
+            g: [-1e-6, 10.0],
+            points: 2000,
+            step: 0.05,
+        }
+    }
+}
+
+/// Why a branch ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Ended {
+    /// It left the range of sigma or G.
+    #[serde(rename = "left the range")]
+    Range,
+    /// It came back to its start.
+    #[serde(rename = "closed")]
+    Closed,
+    /// Most points were taken.
+    #[serde(rename = "number of points")]
+    Points,
+    /// The pattern of impacts ends here: a graze, or impacts that accumulate.
+    #[serde(rename = "graze")]
+    Graze,
+}
+
+/// How stability changes at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Bifurcation {
+    /// A multiplier passes +1: the frequency response turns back.
+    #[serde(rename = "fold")]
+    Fold,
+    /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
+    #[serde(rename = "symmetry breaking")]
+    SymmetryBreaking,
+    /// A multiplier of the whole period passes -1.
+    #[serde(rename = "period doubling")]
+    PeriodDoubling,
+    /// A complex pair leaves the unit circle (Neimark-Sacker): modulation begins.
+    #[serde(rename = "torus")]
+    Torus,
+}
+
+/// A point where stability changes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Special {
+    /// What happens.
+    pub kind: Bifurcation,
+    /// The motion there.
+    pub motion: Periodic,
+}
+
+/// A continued curve.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Branch {
+    /// Its motions in order.
+    pub points: Vec<Periodic>,
+    /// Where stability changes, in order.
+    pub special: Vec<Special>,
+    /// Why it ended.
+    pub ended: Ended,
+}
+
+/// Steps below this end a branch.
+const SHORTEST: f64 = 1e-7;
+/// Cosine of the largest turn of the tangent in a step.
+const STRAIGHT: f64 = 0.98;
+/// Moduli this close to one still count as inside: rounding in conservative motions.
+const ON_CIRCLE: f64 = 1e-7;
+
+/// Fraction of a step to which a bifurcation is located.
+const FINEST: f64 = 1e-12;
+
+struct Curve<'a> {
+    scene: &'a Dimensionless,
+    start: &'a Periodic,
+    condition: Condition,
+}
+
+impl Curve<'_> {
+    fn tangent(&self, x: &Unknowns, towards: &Unknowns) -> Option<Unknowns> {
+        let returned = follow(self.scene, &self.start.pattern, x)?;
+        let mut matrix = Matrix6::zeros();
+        matrix.fixed_rows_mut::<4>(0).copy_from(&returned.by);
+        matrix.set_row(4, &self.condition.value(x, &returned).1);
+        matrix.set_row(5, &towards.transpose());
+        let mut right = SVector::<f64, 6>::zeros();
+        right[5] = 1.0;
+        let tangent = matrix.lu().solve(&right)?;
+        let length = tangent.norm();
+        (length.is_finite() && length > 0.0).then(|| tangent / length)
+    }
+
+    /// The curve's point where the plane at the end of a step of length `step` along the tangent cuts it.
+    fn correct(&self, x: &Unknowns, tangent: &Unknowns, step: f64) -> Option<Unknowns> {
+        let ahead = x + tangent * step;
+        let found = newton(
+            self.scene,
+            &self.start.pattern,
+            ahead,
+            |x, returned: &Returned| {
+                let plane = (tangent.dot(&(x - ahead)), tangent.transpose());
+                [self.condition.value(x, returned), plane]
+            },
+        )?;
+        ((found - ahead).norm() <= step.abs()).then_some(found)
+    }
+
+    fn motion(&self, x: &Unknowns) -> Option<Periodic> {
+        Periodic::at(self.scene, &self.start.pattern, x)
+    }
+
+    /// Where the number of multipliers outside the unit circle changes within a step.
+    fn locate(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Special> {
+        let x = from.unknowns();
+        let at = |part: f64| self.motion(&self.correct(&x, tangent, part * step)?);
+        let like_from = |part: f64| at(part).map(|one| outside(&one) == outside(from)).ok_or(());
+        let (_, beyond) = try_bisection(0.0, 1.0, FINEST, like_from).ok()?;
+        let motion = at(beyond)?;
+        let [re, im] = motion
+            .multipliers
+            .into_iter()
+            .min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
+        let kind = if im.abs() > 1e-4 {
+            Bifurcation::Torus
+        } else if re > 0.0 {
+            Bifurcation::Fold
+        } else if self.start.pattern.mirrored {
+            Bifurcation::SymmetryBreaking
+        } else {
+            Bifurcation::PeriodDoubling
+        };
+        Some(Special { kind, motion })
+    }
+}
+
+fn distance([re, im]: &[f64; 2]) -> f64 {
+    (re.hypot(*im) - 1.0).abs()
+}
+
+fn outside(motion: &Periodic) -> usize {
+    let moduli = motion.moduli();
+    moduli.iter().filter(|one| **one > 1.0 + ON_CIRCLE).count()
+}
+
+/// Follows the curve of `condition` from `start` towards `towards`, a direction in the space of the unknowns.
+#[must_use]
+pub fn continue_from(
+    scene: &Dimensionless,
+    start: &Periodic,
+    condition: Condition,
+    towards: &Unknowns,
+    limits: &Limits,
+) -> Branch {
+    let curve = Curve {
+        scene,
+        start,
+        condition,
+    };
+    let mut branch = Branch {
+        points: vec![start.clone()],
+        special: Vec::new(),
+        ended: Ended::Graze,
+    };
+    let origin = start.unknowns();
+    let mut x = origin;
+    let Some(mut tangent) = curve.tangent(&x, towards) else {
+        return branch;
+    };
+    let first_tangent = tangent;
+    let mut step = limits.step / 8.0;
+    while step >= SHORTEST {
+        if branch.points.len() >= limits.points {
+            branch.ended = Ended::Points;
+            return branch;
+        }
+        let advanced = curve.correct(&x, &tangent, step).and_then(|next| {
+            let turned = curve.tangent(&next, &tangent)?;
+            let motion = curve.motion(&next)?;
+            (turned.dot(&tangent) >= STRAIGHT).then_some((next, turned, motion))
+        });
+        let Some((next, turned, motion)) = advanced else {
+            step /= 2.0;
+            continue;
+        };
+        let last = branch.points.last().unwrap_or(start);
+        if outside(last) != outside(&motion) {
+            branch.special.extend(curve.locate(last, &tangent, step));
+        }
+        branch.points.push(motion);
+        // A whole turn of the phase is the same motion.
+        let mut apart = next - origin;
+        apart[0] = super::pattern::wrapped(apart[0]);
+        let inside = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
+        if branch.points.len() > 10 && apart.norm() < step && turned.dot(&first_tangent) > 0.9 {
+            branch.ended = Ended::Closed;
+            return branch;
+        }
+        if !inside(next[4], limits.sigma) || !inside(next[5], limits.g) {
+            branch.ended = Ended::Range;
+            return branch;
+        }
+        let straight = turned.dot(&tangent) > 0.5 * (1.0 + STRAIGHT);
+        (x, tangent) = (next, turned);
+        if straight {
+            step = (step * 1.5).min(limits.step);
+        }
+    }
+    branch
+}
+
+/// Follows the curve of `condition` through `start` both ways: first where sigma falls, last where it rises.
+#[must_use]
+pub fn continue_both_ways(
+    scene: &Dimensionless,
+    start: &Periodic,
+    condition: Condition,
+    limits: &Limits,
+) -> Branch {
+    let mut towards = Unknowns::zeros();
+    towards[4] = 1.0;
+    let mut up = continue_from(scene, start, condition, &towards, limits);
+    if up.ended == Ended::Closed {
+        return up;
+    }
+    let down = continue_from(scene, start, condition, &-towards, limits);
+    let mut points: Vec<Periodic> = down.points.into_iter().skip(1).rev().collect();
+    points.append(&mut up.points);
+    let mut special: Vec<Special> = down.special.into_iter().rev().collect();
+    special.append(&mut up.special);
+    Branch {
+        points,
+        special,
+        ended: up.ended,
+    }
+}
+
+/// Distance from the symmetric motion at which an asymmetric one is sought.
+const ASIDE: f64 = 1e-3;
+
+/// The branch of asymmetric motions that leaves a symmetry breaking, along the curve of `condition`; the other one is its mirror image.
+#[must_use]
+pub fn asymmetric_branch(
+    scene: &Dimensionless,
+    breaking: &Special,
+    condition: Condition,
+    limits: &Limits,
+) -> Option<Branch> {
+    let symmetric = &breaking.motion;
+    let returned = follow(scene, &symmetric.pattern, &symmetric.unknowns())?;
+    // The direction that the half-period map turns into its opposite.
+    let flipped = returned.monodromy + Matrix4::identity();
+    let svd = flipped.svd(false, true);
+    let aside = svd.v_t?.row(svd.singular_values.imin()).transpose();
+    let mut towards = Unknowns::zeros();
+    towards.fixed_rows_mut::<4>(0).copy_from(&aside);
+    let doubled = Periodic {
+        pattern: symmetric.pattern.doubled(),
+        ..symmetric.clone()
+    };
+    let curve = Curve {
+        scene,
+        start: &doubled,
+        condition,
+    };
+    let x = curve.correct(&symmetric.unknowns(), &towards, ASIDE)?;
+    let start = curve.motion(&x)?;
+    Some(continue_from(scene, &start, condition, &towards, limits))
+}

@@ -1,0 +1,80 @@
+//! How first-order theory approaches the exact orbits as epsilon shrinks.
+
+use serde::Serialize;
+
+use super::phase_resonant;
+use crate::{Dimensionless, theory::SlowFlow};
+
+/// Theory minus exact orbit at one mass ratio.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Difference {
+    /// Mass ratio.
+    pub epsilon: f64,
+    /// Of the detuning.
+    pub sigma: f64,
+    /// Of the amplitude of v over b.
+    #[serde(rename = "C")]
+    pub c: f64,
+    /// Of the particle speed over `b omega0`.
+    #[serde(rename = "B")]
+    pub b: f64,
+}
+
+/// The study: the differences, and the exponents of epsilon that fit them.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Convergence {
+    /// One row a mass ratio, from the scene's down.
+    pub rows: Vec<Difference>,
+    /// Exponents for sigma, C and B: slopes of the straight lines that fit the logarithms best.
+    pub slopes: [f64; 3],
+}
+
+/// Compares the stable phase-resonant solutions of theory and exact orbits at the scene's mass ratio and at so many halvings of
+/// it, with lambda, r and G as they are; None where one of them has no stable solution, or there is nothing to fit.
+#[must_use]
+pub fn convergence(scene: &Dimensionless, halvings: u32) -> Option<Convergence> {
+    let theory = SlowFlow::new(scene.lambda, scene.r)
+        .phase_resonant(scene.g)
+        .into_iter()
+        .find(|point| point.stable())?;
+    let rows: Vec<Difference> = (0..=halvings)
+        .map(|n| {
+            let epsilon = scene.epsilon / 2f64.powi(n as i32);
+            let exact = phase_resonant(&Dimensionless { epsilon, ..*scene })
+                .into_iter()
+                .filter(|orbit| orbit.stable)
+                .min_by(|one, other| {
+                    (one.b - theory.b)
+                        .abs()
+                        .total_cmp(&(other.b - theory.b).abs())
+                })?;
+            Some(Difference {
+                epsilon,
+                sigma: theory.sigma - exact.sigma,
+                c: theory.c - exact.c,
+                b: theory.b - exact.b,
+            })
+        })
+        .collect::<Option<_>>()?;
+    let slope = |of: fn(&Difference) -> f64| slope(rows.iter().map(|row| (row.epsilon, of(row))));
+    let slopes = [
+        slope(|row| row.sigma),
+        slope(|row| row.c),
+        slope(|row| row.b),
+    ];
+    (halvings > 0).then_some(Convergence { rows, slopes })
+}
+
+/// Least-squares slope of `ln |y|` over `ln x`.
+fn slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
+    let logs: Vec<(f64, f64)> = points.map(|(x, y)| (x.ln(), y.abs().ln())).collect();
+    let n = logs.len() as f64;
+    let mean = |of: fn(&(f64, f64)) -> f64| logs.iter().map(of).sum::<f64>() / n;
+    let (x0, y0) = (mean(|one| one.0), mean(|one| one.1));
+    let (mut up, mut down) = (0.0, 0.0);
+    for (x, y) in &logs {
+        up += (x - x0) * (y - y0);
+        down += (x - x0).powi(2);
+    }
+    up / down
+}

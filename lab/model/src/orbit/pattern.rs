@@ -1,0 +1,229 @@
+//! A pattern of impacts, and what closing it asks for: the return map, its derivative, and the first harmonic of v (docs/theory.md, eq. 26).
+
+use std::f64::consts::{PI, TAU};
+
+use nalgebra::{Complex, Matrix4, Vector4};
+use serde::Serialize;
+
+use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll};
+use crate::Dimensionless;
+
+/// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ImpactPattern {
+    /// Walls hit, one after another, over the map; the first is the one the motion starts from.
+    pub walls: Vec<f64>,
+    /// Half periods of the base over the map: even, but for a mirrored pattern, where it is odd.
+    pub half_periods: u32,
+    /// Minus itself after those half periods.
+    pub mirrored: bool,
+}
+
+impl ImpactPattern {
+    /// Two impacts per period, half a period apart: symmetric 1:1.
+    #[must_use]
+    pub fn symmetric() -> Self {
+        Self {
+            walls: vec![1.0],
+            half_periods: 1,
+            mirrored: true,
+        }
+    }
+
+    /// The same pattern looked at over a whole period: what symmetry breaking leads to.
+    #[must_use]
+    pub fn doubled(&self) -> Self {
+        let mut walls = self.walls.clone();
+        if self.mirrored {
+            walls.extend(self.walls.iter().map(|wall| -wall));
+        } else {
+            walls.extend(&self.walls);
+        }
+        Self {
+            walls,
+            half_periods: 2 * self.half_periods,
+            mirrored: false,
+        }
+    }
+
+    /// Impacts over the whole period of the motion.
+    #[must_use]
+    pub fn impacts(&self) -> usize {
+        self.walls.len() * if self.mirrored { 2 } else { 1 }
+    }
+
+    /// Periods of the base over the whole period of the motion.
+    #[must_use]
+    pub fn periods(&self) -> u32 {
+        if self.mirrored {
+            self.half_periods
+        } else {
+            self.half_periods / 2
+        }
+    }
+
+    fn sign(&self) -> f64 {
+        if self.mirrored { -1.0 } else { 1.0 }
+    }
+
+    fn turn(&self) -> f64 {
+        f64::from(self.half_periods) * PI
+    }
+}
+
+/// Unknowns of a periodic motion: (phase, q1, q1', q2') after its first impact, sigma, G.
+pub type Unknowns = nalgebra::SVector<f64, 6>;
+
+/// The return map of a pattern from one start.
+#[derive(Debug, Clone)]
+pub(super) struct Returned {
+    /// By how much the motion fails to close.
+    pub residual: Vector4<f64>,
+    /// Derivative of the residual by the unknowns.
+    pub by: ByAll,
+    /// First harmonic of v: `Im(V exp(i phase))`.
+    pub v: Complex<f64>,
+    /// Derivative of V by the unknowns, real and imaginary part.
+    pub v_by: [RowByAll; 2],
+    /// The bounces over the map, the start included, the return not.
+    pub bounces: Vec<Bounce>,
+    /// Time of flight after each.
+    pub durations: Vec<f64>,
+    /// Derivative of the return map by the state: its eigenvalues are the multipliers.
+    pub monodromy: Matrix4<f64>,
+}
+
+/// Follows the pattern from the unknowns `x`; None where the impacts come in another pattern, or graze.
+pub(super) fn follow(
+    scene: &Dimensionless,
+    pattern: &ImpactPattern,
+    x: &Unknowns,
+) -> Option<Returned> {
+    let (sigma, g) = (x[4], x[5]);
+    let omega = 1.0 + scene.epsilon * sigma;
+    if !(omega > 0.0 && omega.is_finite() && g.is_finite()) {
+        return None;
+    }
+    let map = ImpactMap::new(scene, omega, g);
+    let mut at = Bounce::from_vector(&x.fixed_rows::<4>(0).into(), pattern.walls[0]);
+    let start = at.vector();
+    let mut by = ByAll::identity();
+    let mut sum = Complex::new(0.0, 0.0);
+    let mut sum_by = [RowByAll::zeros(); 2];
+    let (mut bounces, mut durations) = (Vec::new(), Vec::new());
+    for n in 0..pattern.walls.len() {
+        let step = map.step(&at)?;
+        let wall = match pattern.walls.get(n + 1) {
+            Some(wall) => *wall,
+            None => pattern.sign() * pattern.walls[0],
+        };
+        if step.next.wall != wall {
+            return None;
+        }
+        bounces.push(at);
+        durations.push(step.duration);
+        // The chain rule; what the step depends on by itself are Omega and G.
+        let state: Matrix4<f64> = step.by.fixed_columns::<4>(0).into();
+        let mut chained = state * by;
+        let mut impulse_by = step.impulse_by.fixed_columns::<4>(0) * by;
+        for column in 4..6 {
+            chained.set_column(column, &(chained.column(column) + step.by.column(column)));
+            impulse_by[column] += step.impulse_by[column];
+        }
+        by = chained;
+        at = step.next;
+        let phasor = Complex::from_polar(1.0, -at.phase);
+        sum += phasor * step.impulse;
+        let phase_by = by.row(0) * -step.impulse;
+        sum_by[0] += impulse_by * phasor.re - phase_by * phasor.im;
+        sum_by[1] += impulse_by * phasor.im + phase_by * phasor.re;
+    }
+
+    let mut residual = at.vector() * pattern.sign() - start;
+    residual[0] = at.phase - start[0] - pattern.turn();
+    by.fixed_rows_mut::<3>(1).scale_mut(pattern.sign());
+    let monodromy: Matrix4<f64> = by.fixed_columns::<4>(0).into();
+    by.fixed_columns_mut::<4>(0)
+        .copy_from(&(monodromy - Matrix4::identity()));
+    by.column_mut(4).scale_mut(scene.epsilon);
+
+    let harmonic = Harmonic::new(scene, &map, pattern);
+    let (v, v_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
+    Some(Returned {
+        residual,
+        by,
+        v,
+        v_by,
+        bounces,
+        durations,
+        monodromy,
+    })
+}
+
+/// `V = direct G + impulses sum`: the base through the oscillator, and the impulses through oscillator and particle.
+struct Harmonic {
+    direct: [Complex<f64>; 2],
+    impulses: [Complex<f64>; 2],
+}
+
+impl Harmonic {
+    /// Each coefficient with its derivative by Omega.
+    fn new(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern) -> Self {
+        let omega = map.omega;
+        let zeta = scene.epsilon * scene.lambda / 2.0;
+        let compliance = map.oscillator.compliance(omega);
+        let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * zeta);
+        let force = map.oscillator.base_force(omega);
+        let direct = force * compliance * scene.epsilon;
+        let direct_by =
+            (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;
+        // (2i/duration) times the response to a force through the oscillator, less that of a free mass: the impulse on the
+        // particle is the opposite one.
+        let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
+        let inner = compliance + 1.0 / (omega * omega);
+        let inner_by = compliance_by - 2.0 / omega.powi(3);
+        Self {
+            direct: [direct, direct_by],
+            impulses: [weight * inner, weight * inner_by + weight / omega * inner],
+        }
+    }
+
+    fn of(
+        &self,
+        g: f64,
+        sum: Complex<f64>,
+        sum_by: &[RowByAll; 2],
+        epsilon: f64,
+    ) -> (Complex<f64>, [RowByAll; 2]) {
+        let zero_if_undriven = |z: Complex<f64>| {
+            if g == 0.0 && z.is_nan() {
+                Complex::new(0.0, 0.0)
+            } else {
+                z
+            }
+        };
+        let v = zero_if_undriven(self.direct[0] * g) + self.impulses[0] * sum;
+        let a = self.impulses[0];
+        let mut by = [
+            sum_by[0] * a.re - sum_by[1] * a.im,
+            sum_by[0] * a.im + sum_by[1] * a.re,
+        ];
+        let own = [
+            zero_if_undriven(self.direct[1] * g) + self.impulses[1] * sum,
+            self.direct[0],
+        ];
+        for (column, own) in [4, 5].into_iter().zip(own) {
+            by[0][column] += own.re;
+            by[1][column] += own.im;
+        }
+        for row in &mut by {
+            row[4] *= epsilon;
+        }
+        (v, by)
+    }
+}
+
+/// A phase in (-pi, pi].
+pub(super) fn wrapped(phase: f64) -> f64 {
+    phase - TAU * (phase / TAU).round()
+}

@@ -1,0 +1,210 @@
+//! A periodic motion of any pattern: what it is, how stable it is, and the Newton iteration that finds it.
+
+use nalgebra::{Complex, Matrix6, RowSVector, SVector};
+use serde::Serialize;
+
+use super::{
+    impact_map::{Bounce, ImpactMap},
+    pattern::{ImpactPattern, Returned, Unknowns, follow, wrapped},
+};
+use crate::Dimensionless;
+
+/// An exact periodic motion.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Periodic {
+    /// Base amplitude over `b epsilon`.
+    #[serde(rename = "G")]
+    pub g: f64,
+    /// Detuning `(Omega - 1)/epsilon`.
+    pub sigma: f64,
+    /// Amplitude of the harmonic of v at the base's frequency.
+    #[serde(rename = "C")]
+    pub c: f64,
+    /// Phase of that harmonic relative to the base, rad, in (-pi, pi].
+    pub gamma: f64,
+    /// Speed of the particle over `b omega0`, averaged over time.
+    #[serde(rename = "B")]
+    pub b: f64,
+    /// Its pattern.
+    #[serde(rename = "shape")]
+    pub pattern: ImpactPattern,
+    /// The states just after the impacts of the map.
+    pub bounces: Vec<Bounce>,
+    /// Multipliers (real, imaginary) of the map, by rising modulus; those of a mirrored pattern are for half of its period.
+    pub multipliers: [[f64; 2]; 4],
+    /// All of them are inside the unit circle.
+    pub stable: bool,
+    #[serde(skip)]
+    pub(super) durations: Vec<f64>,
+}
+
+/// Two equations that choose a motion beside its four of closing.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Condition {
+    /// sigma has this value.
+    Sigma(f64),
+    /// G has this value.
+    Excitation(f64),
+    /// The first harmonic of v lags (or leads) the base by a quarter of a period.
+    PhaseResonance,
+}
+
+impl Condition {
+    pub(super) fn value(&self, x: &Unknowns, returned: &Returned) -> (f64, RowSVector<f64, 6>) {
+        let mut row = RowSVector::<f64, 6>::zeros();
+        match *self {
+            Condition::Sigma(sigma) => {
+                row[4] = 1.0;
+                (x[4] - sigma, row)
+            }
+            Condition::Excitation(g) => {
+                row[5] = 1.0;
+                (x[5] - g, row)
+            }
+            Condition::PhaseResonance => (returned.v.re, returned.v_by[0]),
+        }
+    }
+}
+
+/// Newton's corrections end below this size.
+const CONVERGED: f64 = 1e-12;
+const ROUNDS: usize = 30;
+
+impl Periodic {
+    /// The motion with the pattern `pattern` near the unknowns `guess` that satisfies both conditions, by Newton's method with
+    /// analytic derivatives; None where that leaves the pattern or does not converge.
+    #[must_use]
+    pub fn find(
+        scene: &Dimensionless,
+        pattern: &ImpactPattern,
+        guess: &Unknowns,
+        conditions: [Condition; 2],
+    ) -> Option<Self> {
+        let x = newton(scene, pattern, *guess, |x, returned| {
+            conditions.map(|one| one.value(x, returned))
+        })?;
+        Self::at(scene, pattern, &x)
+    }
+
+    /// The unknowns of this motion: (phase, q1, q1', q2') after its first impact, sigma, G.
+    #[must_use]
+    pub fn unknowns(&self) -> Unknowns {
+        let Bounce {
+            phase,
+            q1,
+            dq1,
+            dq2,
+            ..
+        } = self.bounces[0];
+        Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
+    }
+
+    /// The motion at unknowns that close it.
+    pub(super) fn at(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
+        let returned = follow(scene, pattern, x)?;
+        let mut multipliers: [Complex<f64>; 4] = returned.monodromy.complex_eigenvalues().into();
+        multipliers.sort_by(|one, other| one.norm().total_cmp(&other.norm()));
+        let total: f64 = returned.durations.iter().sum();
+        let travelled: f64 = returned
+            .bounces
+            .iter()
+            .zip(&returned.durations)
+            .map(|(bounce, duration)| bounce.dq2.abs() * duration)
+            .sum();
+        Some(Self {
+            g: x[5],
+            sigma: x[4],
+            c: returned.v.norm(),
+            gamma: wrapped(returned.v.arg()),
+            b: travelled / total,
+            pattern: pattern.clone(),
+            bounces: returned.bounces,
+            durations: returned.durations,
+            stable: multipliers[3].norm() < 1.0,
+            multipliers: multipliers.map(|one| [one.re, one.im]),
+        })
+    }
+
+    /// Moduli of the multipliers, ascending.
+    #[must_use]
+    pub fn moduli(&self) -> [f64; 4] {
+        self.multipliers.map(|[re, im]| re.hypot(im))
+    }
+
+    /// (tau, q1, q1', q2, q2') at `points` equal steps over one period of the base, from a passage of the base through
+    /// zero, upwards; dimensionless. The impacts fall between the points.
+    #[must_use]
+    pub fn motion(&self, scene: &Dimensionless, points: usize) -> Vec<[f64; 5]> {
+        let omega = 1.0 + scene.epsilon * self.sigma;
+        let map = ImpactMap::new(scene, omega, self.g);
+        let turn = std::f64::consts::TAU;
+        (0..points)
+            .filter_map(|n| {
+                let phase = turn * n as f64 / points as f64;
+                let [q1, dq1, q2, dq2] = self.state_at(&map, phase)?;
+                Some([phase / omega, q1, dq1, q2, dq2])
+            })
+            .collect()
+    }
+
+    /// (q1, q1', q2, q2') where the base is at `phase`, rad, in the motion's first period.
+    fn state_at(&self, map: &ImpactMap, phase: f64) -> Option<[f64; 4]> {
+        // The bounces of the whole period; a mirrored pattern's other half is minus the first.
+        let half = self.pattern.half_periods as f64 * std::f64::consts::PI;
+        let mirror = |bounce: &Bounce| Bounce {
+            phase: bounce.phase + half,
+            q1: -bounce.q1,
+            dq1: -bounce.dq1,
+            dq2: -bounce.dq2,
+            wall: -bounce.wall,
+        };
+        let mut bounces = self.bounces.clone();
+        let mut period = half;
+        if self.pattern.mirrored {
+            bounces.extend(self.bounces.iter().map(mirror));
+            period = 2.0 * half;
+        }
+        let since = |bounce: &Bounce| (phase - bounce.phase).rem_euclid(period);
+        let last = bounces
+            .iter()
+            .min_by(|one, other| since(one).total_cmp(&since(other)))?;
+        Some(map.state(last, since(last) / map.omega))
+    }
+
+    /// (q1, q1', q2, q2') where the base passes through zero, upwards: a start for the plant.
+    #[must_use]
+    pub fn start(&self, scene: &Dimensionless) -> Option<[f64; 4]> {
+        let map = ImpactMap::new(scene, 1.0 + scene.epsilon * self.sigma, self.g);
+        self.state_at(&map, 0.0)
+    }
+}
+
+/// Newton's method for the four equations of closing and two more.
+pub(super) fn newton(
+    scene: &Dimensionless,
+    pattern: &ImpactPattern,
+    mut x: Unknowns,
+    conditions: impl Fn(&Unknowns, &Returned) -> [(f64, RowSVector<f64, 6>); 2],
+) -> Option<Unknowns> {
+    for _ in 0..ROUNDS {
+        let returned = follow(scene, pattern, &x)?;
+        let mut matrix = Matrix6::zeros();
+        let mut right = SVector::<f64, 6>::zeros();
+        matrix.fixed_rows_mut::<4>(0).copy_from(&returned.by);
+        right.fixed_rows_mut::<4>(0).copy_from(&returned.residual);
+        for (n, (value, row)) in conditions(&x, &returned).into_iter().enumerate() {
+            matrix.set_row(4 + n, &row);
+            right[4 + n] = value;
+        }
+        let correction = matrix.lu().solve(&right)?;
+        let size = correction.norm();
+        if !size.is_finite() || size > 1e3 {
+            return None;
+        }
+        x -= correction;
+        if size < CONVERGED {
+            return Some(x);
+        }
+    }
+    None
+}

@@ -1,0 +1,173 @@
+//! Finding every phase-resonant orbit of a scene, by its frequency.
+
+use super::{
+    Orbit,
+    candidate::{Candidate, candidates},
+    flight::Flight,
+    multipliers,
+};
+use crate::Dimensionless;
+use crate::numerics::{bisection, golden_section};
+
+/// Frequencies searched, over omega0.
+const SEARCHED: [f64; 2] = [0.2, 3.0];
+/// Points of the search; they crowd around omega0, where the detuning is of order one.
+const POINTS: usize = 30_000;
+
+/// All exact symmetric 1:1 orbits at phase resonance at the scene's G, by rising C; empty where there are none.
+///
+/// Frequencies between 0.2 and 3 omega0 are searched on a grid of about 0.001 in the detuning where that is of
+/// order one, and every root is polished to the last bit.
+#[must_use]
+pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
+    let grid = grid(scene.epsilon);
+    let mut orbits: Vec<Orbit> = (0..2)
+        .flat_map(|branch| Branch { scene, branch }.frequencies(&grid))
+        .filter_map(|candidate| accept(scene, &candidate))
+        .collect();
+    orbits.sort_by(|one, other| one.c.total_cmp(&other.c));
+    orbits.dedup_by(|one, other| {
+        (one.sigma - other.sigma).abs() < 1e-9 && (one.b - other.b).abs() < 1e-9
+    });
+    orbits
+}
+
+/// The exact backbone: all phase-resonant orbits at the frequency `omega` (over omega0), whatever G they need.
+///
+/// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.
+#[must_use]
+pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
+    candidates(scene, omega)
+        .into_iter()
+        .flatten()
+        .filter_map(|candidate| accept(scene, &candidate))
+        .collect()
+}
+
+/// Frequencies `1 + epsilon sinh(u)` at equal steps of u.
+fn grid(epsilon: f64) -> Vec<f64> {
+    let [low, high] = SEARCHED.map(|omega| ((omega - 1.0) / epsilon).asinh());
+    (0..=POINTS)
+        .map(|i| low + (high - low) * i as f64 / POINTS as f64)
+        .map(|u| 1.0 + epsilon * u.sinh())
+        .collect()
+}
+
+/// Keeps what is physical: the particle moves and stays inside its cavity, and the response lags the base.
+fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
+    let Candidate { omega, b, c, g, .. } = *candidate;
+    let sizes = [b, c, g];
+    // Without dissipation no base motion is needed, and there is nothing to lag behind.
+    let conservative = g < 1e-12;
+    let physical = sizes.iter().all(|size| size.is_finite())
+        && b > 0.0
+        && c > 1e-12
+        && (candidate.lags || conservative)
+        && Flight::new(scene, candidate).stays_inside();
+    if !physical {
+        return None;
+    }
+    let multipliers = multipliers::moduli(scene, candidate);
+    Some(Orbit {
+        g,
+        sigma: (omega - 1.0) / scene.epsilon,
+        omega,
+        c,
+        b,
+        impact_velocity: 2.0 * b * (1.0 + scene.epsilon) / (1.0 + scene.r),
+        start: candidate.after_impact(scene.epsilon),
+        multipliers,
+        stable: multipliers[3] < 1.0,
+    })
+}
+
+/// One of the two branches of candidates, looked at as G over frequency.
+struct Branch<'a> {
+    scene: &'a Dimensionless,
+    branch: usize,
+}
+
+impl Branch<'_> {
+    fn at(&self, omega: f64) -> Option<Candidate> {
+        candidates(self.scene, omega).map(|both| both[self.branch])
+    }
+
+    /// G of the branch minus that of the scene.
+    fn excess(&self, omega: f64) -> Option<f64> {
+        let excess = self.at(omega)?.g - self.scene.g;
+        (!excess.is_nan()).then_some(excess)
+    }
+
+    fn frequencies(&self, grid: &[f64]) -> Vec<Candidate> {
+        let points = self.stretches(grid);
+        let mut found = Vec::new();
+        for pair in points.windows(2) {
+            let ([a, at_a], [b, at_b]) = (pair[0], pair[1]);
+            if (at_a > 0.0) != (at_b > 0.0) {
+                found.extend(self.root(a, b));
+            }
+        }
+        for triple in points.windows(3) {
+            let [[a, at_a], [_, at_middle], [b, at_b]] = [triple[0], triple[1], triple[2]];
+            if a.is_nan() || b.is_nan() {
+                continue;
+            }
+            let same_sign = (at_a > 0.0) == (at_middle > 0.0) && (at_middle > 0.0) == (at_b > 0.0);
+            if same_sign && at_middle.abs() <= at_a.abs().min(at_b.abs()) {
+                found.extend(self.pair_near_extremum(a, b, at_a.signum()));
+            }
+        }
+        found
+    }
+
+    /// The points (omega, excess) where the branch exists, with the ends of its stretches added; NaN separates them.
+    fn stretches(&self, grid: &[f64]) -> Vec<[f64; 2]> {
+        let mut points: Vec<[f64; 2]> = Vec::with_capacity(grid.len());
+        let mut last: Option<(f64, bool)> = None;
+        for &omega in grid {
+            let excess = self.excess(omega);
+            if let Some((before, existed)) = last
+                && existed != excess.is_some()
+            {
+                let (left, right) = bisection(before, omega, |omega| self.excess(omega).is_some());
+                let gap = [f64::NAN; 2];
+                let end = if existed { left } else { right };
+                let end = self.excess(end).map_or(gap, |excess| [end, excess]);
+                points.extend(if existed { [end, gap] } else { [gap, end] });
+            }
+            points.extend(excess.map(|excess| [omega, excess]));
+            last = Some((omega, excess.is_some()));
+        }
+        points
+    }
+
+    /// The root between two points of opposite sign; None where the sign changes through a gap, or in the rounding errors
+    /// of a motion that needs no excitation.
+    fn root(&self, a: f64, b: f64) -> Option<Candidate> {
+        if a.is_nan() || b.is_nan() {
+            return None;
+        }
+        let (root, _) = bisection(a, b, |omega| {
+            self.excess(omega).is_some_and(|excess| excess > 0.0)
+        });
+        let candidate = self.at(root)?;
+        let close = (candidate.g - self.scene.g).abs() < 1e-7 * self.scene.g;
+        close.then_some(candidate)
+    }
+
+    /// Two roots between grid points: the excess has an extremum there that reaches the other sign.
+    fn pair_near_extremum(&self, a: f64, b: f64, sign: f64) -> Vec<Candidate> {
+        let distance = |omega| {
+            self.excess(omega)
+                .map_or(f64::INFINITY, |excess| sign * excess)
+        };
+        let turn = golden_section(a, b, distance);
+        if distance(turn) > 0.0 {
+            return Vec::new();
+        }
+        [self.root(a, turn), self.root(turn, b)]
+            .into_iter()
+            .flatten()
+            .collect()
+    }
+}

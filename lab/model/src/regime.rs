@@ -1,0 +1,287 @@
+//! Regimes, told from a sequence of impacts.
+
+use std::f64::consts::{PI, TAU};
+use std::fmt::{self, Display, Formatter};
+
+use serde::Serialize;
+
+use crate::numerics::{mean, standard_deviation};
+
+/// What a response settles into.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
+pub enum Regime {
+    /// The particle hits nothing: the linear mode.
+    #[serde(rename = "no impacts")]
+    NoImpacts,
+    /// Two impacts per period, on alternating walls, half a period apart.
+    #[serde(rename = "symmetric 1:1")]
+    Symmetric,
+    /// Two impacts per period, on alternating walls, at uneven intervals.
+    #[serde(rename = "asymmetric 1:1")]
+    Asymmetric,
+    /// Another pattern that repeats.
+    #[serde(rename = "n impacts")]
+    Several,
+    /// Nothing repeats: the motion is captured into 1:1 resonance and lost again (strongly modulated response), or at least
+    /// disturbances do not grow.
+    #[serde(rename = "modulated")]
+    Modulated,
+    /// Nothing repeats, disturbances grow, and there are hardly any captures.
+    #[serde(rename = "chaotic")]
+    Chaotic,
+    /// Impacts accumulate, and the particle rests on a wall for a while.
+    #[serde(rename = "sticking")]
+    Sticking,
+    /// Not 1:1; a record too short, or without impact data, cannot say more.
+    #[serde(rename = "other")]
+    Other,
+    /// Steady and off the linear mode; noise hides whether it is symmetric.
+    #[serde(rename = "steady, symmetry unresolved")]
+    Unresolved,
+    /// No data to tell it from.
+    #[serde(rename = "unknown")]
+    Unknown,
+}
+
+impl Regime {
+    /// Those that a simulated impact sequence can show, from the least to the most impacts.
+    pub const SIMULATED: [Regime; 7] = [
+        Regime::NoImpacts,
+        Regime::Symmetric,
+        Regime::Asymmetric,
+        Regime::Several,
+        Regime::Modulated,
+        Regime::Chaotic,
+        Regime::Sticking,
+    ];
+
+    /// Its short name, as in a table.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Regime::NoImpacts => "no impacts",
+            Regime::Symmetric => "symmetric 1:1",
+            Regime::Asymmetric => "asymmetric 1:1",
+            Regime::Several => "n impacts",
+            Regime::Modulated => "modulated",
+            Regime::Chaotic => "chaotic",
+            Regime::Sticking => "sticking",
+            Regime::Other => "irregular",
+            Regime::Unresolved => "steady and nonlinear (noise hides its symmetry)",
+            Regime::Unknown => "unknown (the rig does not report impacts)",
+        }
+    }
+}
+
+impl Display for Regime {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Regime::NoImpacts => "without impacts (the linear mode)",
+            other => other.name(),
+        })
+    }
+}
+
+/// One impact.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Impact {
+    /// When: s, or phase of the base in rad.
+    pub time: f64,
+    /// Relative velocity just before; its sign tells the wall.
+    pub velocity: f64,
+}
+
+impl Impact {
+    fn on_other_wall(&self, other: &Impact) -> bool {
+        self.velocity * other.velocity < 0.0
+    }
+}
+
+/// Largest standard deviation of the intervals, relative to their mean, in a symmetric regime: of a measured motion, which
+/// noise disturbs, ...
+pub const MEASURED: f64 = 0.01;
+/// ... and of a simulated one.
+pub const SIMULATED: f64 = 0.01 / PI;
+/// Deviation of the impacts per period from two that still counts as two.
+const COUNT: f64 = 0.05;
+
+/// The regime of impacts that come `per_period` times a period: symmetric 1:1 where the intervals differ by no more than
+/// `tolerance` ([`MEASURED`] or [`SIMULATED`]), asymmetric 1:1, or another one.
+#[must_use]
+pub fn one_to_one(impacts: &[Impact], per_period: f64, tolerance: f64) -> Regime {
+    let alternate = impacts
+        .windows(2)
+        .all(|pair| pair[0].on_other_wall(&pair[1]));
+    if (per_period - 2.0).abs() > COUNT || !alternate {
+        return Regime::Other;
+    }
+    let intervals: Vec<f64> = impacts
+        .windows(2)
+        .map(|pair| pair[1].time - pair[0].time)
+        .collect();
+    let spread = standard_deviation(&intervals) / mean(intervals.iter().copied());
+    if spread <= tolerance {
+        Regime::Symmetric
+    } else {
+        Regime::Asymmetric
+    }
+}
+
+/// A repeating pattern: impacts, and periods of the base.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Pattern {
+    /// Impacts of one repetition.
+    pub impacts: usize,
+    /// Periods of the base that it takes.
+    pub periods: u32,
+    /// What that makes it.
+    pub regime: Regime,
+}
+
+/// Longest pattern looked for, impacts.
+const LONGEST: usize = 96;
+/// Two impacts are the same within this, rad and relative velocity: far above what is left of a transient.
+const SAME: f64 = 2e-3;
+
+/// The shortest pattern that all impacts repeat at least twice; times are phases of the base, rad.
+#[must_use]
+pub fn pattern(impacts: &[Impact]) -> Option<Pattern> {
+    (1..=LONGEST.min(impacts.len() / 3)).find_map(|count| {
+        let periods = ((impacts[count].time - impacts[0].time) / TAU).round();
+        let repeats = periods > 0.0
+            && impacts.iter().zip(&impacts[count..]).all(|(one, other)| {
+                !one.on_other_wall(other)
+                    && (other.time - one.time - periods * TAU).abs() < SAME
+                    && (other.velocity - one.velocity).abs() < SAME * (1.0 + one.velocity.abs())
+            });
+        let regime = || match one_to_one(&impacts[..=count], count as f64 / periods, SIMULATED) {
+            Regime::Other => Regime::Several,
+            one_to_one if count == 2 => one_to_one,
+            _ => Regime::Several,
+        };
+        repeats.then(|| Pattern {
+            impacts: count,
+            periods: periods as u32,
+            regime: regime(),
+        })
+    })
+}
+
+/// Impacts in a row, on alternating walls, that make a capture into 1:1 resonance.
+const CAPTURED: usize = 8;
+/// Deviation of an interval from half a period, rad, in a capture.
+const IN_STEP: f64 = 0.15 * PI;
+
+/// Share of the impacts that belong to captures into 1:1 resonance: at least eight in a row, on alternating walls, half a
+/// period apart within 15 %. Times are phases of the base, rad.
+#[must_use]
+pub fn synchrony(impacts: &[Impact]) -> f64 {
+    let in_step = |one: &Impact, other: &Impact| {
+        one.on_other_wall(other) && (other.time - one.time - PI).abs() < IN_STEP
+    };
+    let captured: usize = impacts
+        .chunk_by(in_step)
+        .map(<[Impact]>::len)
+        .filter(|length| *length >= CAPTURED)
+        .sum();
+    captured as f64 / impacts.len().max(1) as f64
+}
+
+/// Relative deviation of an interval from the one before at which the impacts have lost synchrony.
+const LOST: f64 = 0.25;
+
+/// Time of the last impact in synchrony with a motion whose half period starts as `half_period` and changes slowly: on the
+/// other wall than the one before, and about as long after it as that one after its own predecessor.
+#[must_use]
+pub fn end_of_synchrony(impacts: &[Impact], half_period: f64) -> Option<f64> {
+    let mut expected = half_period;
+    let mut end = impacts.first()?.time;
+    for pair in impacts.windows(2) {
+        let interval = pair[1].time - pair[0].time;
+        if (interval / expected - 1.0).abs() > LOST || !pair[0].on_other_wall(&pair[1]) {
+            break;
+        }
+        expected = interval;
+        end = pair[1].time;
+    }
+    Some(end)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn impacts(pattern: &[(f64, f64)], periods: usize, repeats: usize) -> Vec<Impact> {
+        (0..repeats)
+            .flat_map(|n| {
+                pattern.iter().map(move |(phase, wall)| Impact {
+                    time: phase + TAU * (n * periods) as f64,
+                    velocity: 1.5 * wall,
+                })
+            })
+            .collect()
+    }
+
+    fn named(impacts: &[Impact]) -> Option<(usize, u32, Regime)> {
+        pattern(impacts).map(|one| (one.impacts, one.periods, one.regime))
+    }
+
+    #[test]
+    fn captures_are_long_runs_in_step() {
+        let even = impacts(&[(0.3, 1.0), (0.3 + PI, -1.0)], 1, 10);
+        assert_eq!(synchrony(&even), 1.0);
+        // Of twelve impacts in step and eight on the same wall, the first count.
+        let mut mixed = impacts(&[(0.3, 1.0), (0.3 + PI, -1.0)], 1, 6);
+        mixed.extend((0..8).map(|n| Impact {
+            time: 40.0 + 0.7 * f64::from(n),
+            velocity: 0.2,
+        }));
+        assert!((synchrony(&mixed) - 0.6).abs() < 1e-12);
+        assert_eq!(synchrony(&[]), 0.0);
+    }
+
+    #[test]
+    fn even_intervals_are_symmetric_and_uneven_ones_are_not() {
+        let even = impacts(&[(0.3, 1.0), (0.3 + PI, -1.0)], 1, 20);
+        assert_eq!(named(&even), Some((2, 1, Regime::Symmetric)));
+        assert_eq!(one_to_one(&even, 2.0, MEASURED), Regime::Symmetric);
+        let uneven = impacts(&[(0.3, 1.0), (0.5 + PI, -1.0)], 1, 20);
+        assert_eq!(named(&uneven), Some((2, 1, Regime::Asymmetric)));
+        assert_eq!(one_to_one(&uneven, 2.0, MEASURED), Regime::Asymmetric);
+    }
+
+    #[test]
+    fn three_impacts_or_one_wall_are_not_one_to_one() {
+        let even = impacts(&[(0.3, 1.0), (0.3 + PI, -1.0)], 1, 20);
+        assert_eq!(one_to_one(&even, 3.0, MEASURED), Regime::Other);
+        let same = impacts(&[(0.3, 1.0), (0.3 + PI, 1.0)], 1, 20);
+        assert_eq!(one_to_one(&same, 2.0, MEASURED), Regime::Other);
+    }
+
+    #[test]
+    fn longer_patterns_are_counted() {
+        let three = impacts(&[(0.3, 1.0), (0.9, 1.0), (3.0, -1.0)], 1, 20);
+        assert_eq!(named(&three), Some((3, 1, Regime::Several)));
+        let doubled = impacts(&[(0.3, 1.0), (3.4, -1.0), (6.7, 1.0), (9.8, -1.0)], 2, 20);
+        assert_eq!(named(&doubled), Some((4, 2, Regime::Several)));
+    }
+
+    #[test]
+    fn a_drifting_sequence_has_no_pattern() {
+        let mut drifting = impacts(&[(0.3, 1.0), (0.3 + PI, -1.0)], 1, 40);
+        for (n, impact) in drifting.iter_mut().enumerate() {
+            impact.time += 0.2 * (0.37 * n as f64).sin();
+        }
+        assert_eq!(named(&drifting), None);
+        assert_eq!(named(&[]), None);
+    }
+
+    #[test]
+    fn synchrony_ends_at_the_first_interval_that_jumps() {
+        let mut sequence = impacts(&[(0.0, 1.0), (PI, -1.0)], 1, 5);
+        assert_eq!(end_of_synchrony(&sequence, PI), Some(9.0 * PI));
+        sequence[6].time += 1.0;
+        assert_eq!(end_of_synchrony(&sequence, PI), Some(5.0 * PI));
+        assert_eq!(end_of_synchrony(&[], PI), None);
+    }
+}

@@ -1,0 +1,32 @@
+//! First-order multiple-scales theory of the 1:1 regime with two symmetric impacts per period.
+//!
+//! Dimensionless throughout: `v0 = C sin(Omega tau + gamma)` is the centre of mass over b, `w0 = v0 + B Pi(Omega tau + psi)` the
+//! relative motion with the triangle wave Pi of slope ±1 and height pi/2, so that B is the particle's speed. On the slow invariant
+//! manifold C and B are bound to each other, and B is the better coordinate: everything below is polynomial in it, and
+//! both branches are one curve. All results are of first order in epsilon: the mass ratio itself appears only where
+//! fast and slow time meet: in the modulation from impact to impact, and in a waveform. Equation numbers are those of docs/theory.md.
+
+mod activation;
+mod backbone;
+mod decay;
+mod epmc;
+mod equilibrium;
+mod manifold;
+mod modulation;
+mod polynomial;
+mod response;
+mod slow_flow;
+mod stability;
+mod waveform;
+
+pub use activation::Activation;
+pub use backbone::BackbonePoint;
+pub use decay::{Decay, DecayPoint};
+pub use epmc::Epmc;
+pub use equilibrium::Equilibrium;
+pub use manifold::{BranchSide, Manifold};
+pub use modulation::{ImpactSequence, Modulation};
+pub use response::ResponsePoint;
+pub use slow_flow::{Coefficients, SlowFlow};
+pub use stability::{B_SYMMETRY_BREAKING, half_period_map, impacts_stable};
+pub use waveform::{Waveform, triangle_wave};

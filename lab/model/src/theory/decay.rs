@@ -1,0 +1,135 @@
+//! The free decay along the manifold, in closed form (docs/theory.md, eqs. 20 and 21).
+
+use std::f64::consts::{FRAC_2_PI, PI};
+
+use serde::Serialize;
+
+use super::slow_flow::SlowFlow;
+use crate::numerics::{bisection, equally_spaced};
+
+/// One point of the free decay.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct DecayPoint {
+    /// Slow time `epsilon omega0 t` since the release.
+    pub tau1: f64,
+    /// Amplitude of v over b.
+    #[serde(rename = "C")]
+    pub c: f64,
+    /// Particle speed over `b omega0`.
+    #[serde(rename = "B")]
+    pub b: f64,
+    /// Detuning of the motion: the backbone's.
+    pub sigma: f64,
+}
+
+/// The free decay from one particle speed on the right branch down to the fold.
+///
+/// `D1 C~ = -loss(B)` becomes `D1 B = -loss(B) dB/dC~`, and `tau1` is the integral of `(2 K B - pi)/loss(B)`
+/// with `K = R^2 + pi^2/4`: a logarithm and an arc tangent, as the loss is quadratic in B.
+#[derive(Debug, Clone, Copy)]
+pub struct Decay {
+    flow: SlowFlow,
+    start: f64,
+}
+
+/// Nodes and weights of Gauss' rule of three points on [-1, 1].
+const GAUSS: [(f64, f64); 3] = [
+    (-0.774_596_669_241_483_4, 5.0 / 9.0),
+    (0.0, 8.0 / 9.0),
+    (0.774_596_669_241_483_4, 5.0 / 9.0),
+];
+/// Panels of that rule over a decay.
+const PANELS: u32 = 64;
+
+impl SlowFlow {
+    /// The free decay from the particle speed `b`; None left of the fold, and without any dissipation.
+    #[must_use]
+    pub fn decay(&self, b: f64) -> Option<Decay> {
+        let dissipates = self.lambda > 0.0 || self.manifold.dissipation > 0.0;
+        (dissipates && b >= self.manifold.b_min()).then_some(Decay {
+            flow: *self,
+            start: b,
+        })
+    }
+}
+
+impl Decay {
+    /// Slow time at which the fold is reached and the impacts lose synchrony; infinite if it never is.
+    #[must_use]
+    pub fn duration(&self) -> f64 {
+        self.time(self.flow.manifold.b_min())
+    }
+
+    /// Slow time at which the particle speed has fallen to `b`, between the fold and the start.
+    #[must_use]
+    pub fn time(&self, b: f64) -> f64 {
+        self.primitive(self.start) - self.primitive(b)
+    }
+
+    /// Where the decay is at the slow time `tau1`; None before the release and after the fold.
+    #[must_use]
+    pub fn at(&self, tau1: f64) -> Option<DecayPoint> {
+        if !(0.0..=self.duration()).contains(&tau1) {
+            return None;
+        }
+        let until = |b: f64| self.time(b) <= tau1;
+        let (b, _) = bisection(self.start, self.flow.manifold.b_min(), until);
+        Some(self.point(tau1, b))
+    }
+
+    /// `points` points from the start to the fold, at equal steps of B.
+    #[must_use]
+    pub fn samples(&self, points: usize) -> Vec<DecayPoint> {
+        let b_min = self.flow.manifold.b_min();
+        equally_spaced(self.start, b_min, points)
+            .map(|b| self.point(self.time(b), b))
+            .collect()
+    }
+
+    /// Phase, rad, by which v has turned ahead of `omega0 t` when the particle speed has fallen to `b`: the integral of sigma
+    /// over tau1 (docs/theory.md, eq. 21), by Gauss' rule on panels; its integrand is smooth.
+    #[must_use]
+    pub fn turned(&self, b: f64) -> f64 {
+        let curvature = self.flow.manifold.curvature();
+        let integrand =
+            |b: f64| self.flow.free_detuning(b) * (2.0 * curvature * b - PI) / self.flow.loss(b);
+        let width = (self.start - b) / f64::from(PANELS);
+        (0..PANELS)
+            .map(|n| b + (f64::from(n) + 0.5) * width)
+            .flat_map(|middle| {
+                GAUSS.map(|(x, weight)| weight * integrand(middle + 0.5 * x * width))
+            })
+            .sum::<f64>()
+            * 0.5
+            * width
+    }
+
+    pub(super) fn flow(&self) -> &SlowFlow {
+        &self.flow
+    }
+
+    fn point(&self, tau1: f64, b: f64) -> DecayPoint {
+        DecayPoint {
+            tau1,
+            c: self.flow.manifold.c(b),
+            b,
+            sigma: self.flow.free_detuning(b),
+        }
+    }
+
+    fn primitive(&self, b: f64) -> f64 {
+        let SlowFlow { lambda, manifold } = self.flow;
+        let (r, k) = (manifold.dissipation, manifold.curvature());
+        let a = lambda * k + 2.0 * FRAC_2_PI * r;
+        // The root and this slope are never negative on the right branch; the root vanishes with lambda or R.
+        let root = 2.0 * (lambda * r * (lambda * r + 4.0 / PI)).sqrt();
+        let slope = 2.0 * a * b - PI * lambda;
+        let arc = if root > 0.0 {
+            (root / slope).atan() / root
+        } else {
+            1.0 / slope
+        };
+        let rest = if r > 0.0 { 8.0 * r / a * arc } else { 0.0 };
+        k / a * self.flow.loss(b).ln() + rest
+    }
+}

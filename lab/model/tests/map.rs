@@ -1,0 +1,121 @@
+//! The regime map against exact orbits, theory, and simulations whose outcome is known.
+
+use vines_model::{
+    Dimensionless,
+    map::{Axis, Map, Plan, Point, Range, observe},
+    orbit::phase_resonant,
+    regime::Regime,
+};
+
+const MOVING: [f64; 4] = [0.0, 0.0, 0.0, 0.9];
+const REST: [f64; 4] = [0.0; 4];
+
+fn at(g: f64, sigma: f64, start: [f64; 4]) -> Point {
+    let scene = Dimensionless::new(0.0084, 1.43, 0.65, g);
+    observe(&scene, sigma, start, (300, 60)).unwrap()
+}
+
+fn plan(x: &str, y: &str) -> Plan {
+    Plan {
+        scene: Dimensionless::new(0.0084, 1.43, 0.65, 1.1),
+        sigma: -1.1408,
+        start: MOVING,
+        x: x.parse().unwrap(),
+        y: y.parse().unwrap(),
+        settle: 300,
+        record: 60,
+    }
+}
+
+#[test]
+fn each_regime_is_found_where_it_is_known_to_be() {
+    // The exact orbit of the references is stable there; from rest nothing ever hits, as G < lambda.
+    assert_eq!(at(1.1, -1.1408, MOVING).regime, Regime::Symmetric);
+    assert_eq!(at(1.1, -1.1408, REST).regime, Regime::NoImpacts);
+    // Beyond the exact symmetry breaking at B = 1.05, on the stable asymmetric branch.
+    let uneven = at(1.6, -0.9, MOVING);
+    assert_eq!((uneven.regime, uneven.impacts), (Regime::Asymmetric, 2));
+    // Far above that, more impacts per period, and in the end no order.
+    assert_eq!(at(2.2, -0.6, MOVING).regime, Regime::Several);
+    let irregular = at(2.7, -0.8, MOVING);
+    assert_eq!(irregular.regime, Regime::Chaotic);
+    assert!(irregular.growth.unwrap() > 0.05);
+}
+
+#[test]
+fn just_below_the_fold_resonance_is_captured_and_lost() {
+    let point = at(0.9, -1.1, MOVING);
+    println!(
+        "{:.0} % of the impacts are captured",
+        100.0 * point.synchrony
+    );
+    assert_eq!(point.regime, Regime::Modulated);
+    assert!(point.synchrony > 0.2 && point.impacts == 0);
+}
+
+#[test]
+fn a_particle_that_is_pressed_to_its_wall_sticks() {
+    // Slowly shaken with hardly any rebound, the particle rides on the walls.
+    let scene = Dimensionless::new(0.1, 1.0, 0.05, 60.0);
+    let point = observe(&scene, -6.0, MOVING, (60, 40)).unwrap();
+    assert_eq!(point.regime, Regime::Sticking);
+}
+
+#[test]
+fn the_map_shows_the_island_of_the_theory() {
+    let map = plan("sigma=-2:1:7", "G=0.7:1.9:7").run(|| {}).unwrap();
+    let (symmetric, inside) = map.count(Regime::Symmetric);
+    let island = map.cells.iter().filter(|cell| cell.theory_stable).count();
+    println!("{inside} of {island} cells inside the island are symmetric 1:1, {symmetric} in all");
+    assert!(island >= 10 && 10 * inside >= 8 * island);
+}
+
+#[test]
+fn cells_know_their_place_and_the_axes_may_be_any_two() {
+    let map = plan("r=0.5:0.8:3", "G=1:1.2:2").run(|| {}).unwrap();
+    let places: Vec<_> = map
+        .cells
+        .iter()
+        .map(|cell| (cell.r, cell.g, cell.sigma))
+        .collect();
+    assert_eq!(places.len(), 6);
+    assert_eq!(places[1], (0.65, 1.0, -1.1408));
+    assert!((places[5].0 - 0.8).abs() < 1e-12 && places[5].1 == 1.2);
+    let Map { plan, .. } = map;
+    assert_eq!(plan.x.axis, Axis::R);
+}
+
+#[test]
+fn the_default_scene_is_symmetric_at_its_exact_orbits_frequency() {
+    let scene = Dimensionless::new(0.0084, 1.43, 0.65, 1.1);
+    let orbit = phase_resonant(&scene)
+        .into_iter()
+        .find(|one| one.stable)
+        .unwrap();
+    assert_eq!(at(1.1, orbit.sigma, MOVING).regime, Regime::Symmetric);
+}
+
+#[test]
+fn maps_that_make_no_sense_are_refused() {
+    for (text, part) in [
+        ("sigma=1:0:5", "below the last"),
+        ("G=-1:2:5", "at least 0"),
+        ("r=0.2:1.2:5", "at most 1"),
+        ("sigma=0:1:1", "from 2"),
+        ("x=0:1:5", "axis"),
+        ("G=0:nan:5", "finite"),
+    ] {
+        let message = text.parse::<Range>().unwrap_err();
+        assert!(message.contains(part), "{text}: {message}");
+    }
+    let message = |plan: Plan| plan.run(|| {}).unwrap_err().to_string();
+    assert!(message(plan("G=0:1:3", "G=0:1:3")).contains("both axes"));
+    assert!(
+        message(Plan {
+            record: 3,
+            ..plan("sigma=0:1:3", "G=0:1:3")
+        })
+        .contains("at least 20")
+    );
+    assert!(message(plan("sigma=-200:1:3", "G=0:1:3")).contains("above 0"));
+}

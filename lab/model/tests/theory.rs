@@ -1,0 +1,272 @@
+//! Identities that the first-order theory must satisfy, and the theory columns of the references.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use vines_model::{
+    Dimensionless,
+    orbit::phase_resonant,
+    theory::{B_SYMMETRY_BREAKING, BranchSide, Manifold, SlowFlow, half_period_map},
+};
+
+mod reference;
+use reference::rows;
+
+const LAMBDA: f64 = 1.43;
+const R: f64 = 0.65;
+
+fn flow() -> SlowFlow {
+    SlowFlow::new(LAMBDA, R)
+}
+
+fn close(one: f64, other: f64, tolerance: f64) {
+    let size = 1f64.max(one.abs());
+    assert!((one - other).abs() <= tolerance * size, "{one} and {other}");
+}
+
+#[test]
+fn both_branches_lie_on_the_manifold() {
+    for r in [0.3, 0.65, 0.9, 1.0] {
+        let manifold = Manifold::new(r);
+        for c in [0.4, 0.7, 0.99, 2.0] {
+            for side in [BranchSide::Left, BranchSide::Right] {
+                let Some(b) = manifold.b(c, side) else {
+                    continue;
+                };
+                close(manifold.c(b), c, 1e-14);
+                assert_eq!(manifold.side(b), side);
+            }
+        }
+        close(manifold.c(manifold.b_min()), manifold.c_min(), 1e-14);
+        assert_eq!(manifold.b(manifold.c_min() - 1e-9, BranchSide::Right), None);
+    }
+}
+
+#[test]
+fn the_slope_of_the_manifold_is_its_difference_quotient() {
+    let manifold = Manifold::new(R);
+    let (b, h) = (0.9, 1e-6);
+    let squares = manifold.c(b + h).powi(2) - manifold.c(b - h).powi(2);
+    close(manifold.slope(b), 2.0 * h / squares, 1e-8);
+}
+
+#[test]
+fn the_backbone_agrees_with_its_form_in_k5_and_k6() {
+    let (flow, manifold) = (flow(), Manifold::new(R));
+    let k = flow.coefficients(0.0);
+    for b in [0.2, 0.5, 0.7, 0.9, 1.3] {
+        let square = manifold.c(b).powi(2);
+        let root = (b - manifold.b_min()).signum() * (square - manifold.c_min().powi(2)).sqrt();
+        let sigma = (k.k5 * root + k.k6) / (2.0 * square) - 2.0 / PI * manifold.b_min();
+        close(flow.free_detuning(b), sigma, 1e-12);
+        close(flow.loss(b), k.k1 * square + k.k2 * root + k.k3, 1e-13);
+    }
+}
+
+#[test]
+fn equilibria_rest_on_the_manifold_and_satisfy_k1_to_k6() {
+    let (flow, manifold) = (flow(), Manifold::new(R));
+    let mut seen = 0;
+    for (g, sigma) in [
+        (1.1, -1.0),
+        (1.1, -1.5),
+        (1.3, 0.2),
+        (1.6, -0.8),
+        (0.9, -1.2),
+    ] {
+        let k = flow.coefficients(sigma);
+        for one in flow.equilibria(g, sigma) {
+            seen += 1;
+            let [amplitude, phase] = flow.rates(g, sigma, one.b, one.gamma);
+            close(amplitude, 0.0, 1e-12);
+            close(phase, 0.0, 1e-12);
+            let square = one.c * one.c;
+            let sign = if one.branch == BranchSide::Right {
+                1.0
+            } else {
+                -1.0
+            };
+            let root = sign * (square - manifold.c_min().powi(2)).max(0.0).sqrt();
+            let (sine, cosine) = one.gamma.sin_cos();
+            close(-g * one.c * sine, k.k1 * square + k.k2 * root + k.k3, 1e-9);
+            close(g * one.c * cosine, k.k4 * square + k.k5 * root + k.k6, 1e-9);
+        }
+    }
+    assert!(seen >= 8, "only {seen} equilibria");
+}
+
+#[test]
+fn slow_flow_stability_is_that_of_the_linearised_rates() {
+    let flow = flow();
+    for (g, sigma) in [(1.1, -1.0), (1.3, 0.2), (0.9, -1.2), (1.6, -0.8)] {
+        for one in flow.equilibria(g, sigma) {
+            let h = 1e-6;
+            let rates = |db: f64, dgamma: f64| flow.rates(g, sigma, one.b + db, one.gamma + dgamma);
+            let squares = Manifold::new(R).slope(one.b);
+            let by = |plus: [f64; 2], minus: [f64; 2], i: usize| (plus[i] - minus[i]) / (2.0 * h);
+            let (b_plus, b_minus) = (rates(h, 0.0), rates(-h, 0.0));
+            let (p_plus, p_minus) = (rates(0.0, h), rates(0.0, -h));
+            let j11 = by(b_plus, b_minus, 0) * squares;
+            let j21 = by(b_plus, b_minus, 1) * squares;
+            let (j12, j22) = (by(p_plus, p_minus, 0), by(p_plus, p_minus, 1));
+            let stable = j11 + j22 < 0.0 && j11 * j22 - j12 * j21 > 0.0;
+            assert_eq!(one.slow_flow_stable, stable, "{one:?}");
+        }
+    }
+}
+
+#[test]
+fn phase_resonance_is_the_equilibrium_at_minus_a_quarter_turn() {
+    let flow = flow();
+    for g in [0.95, 1.1, 1.3] {
+        for point in flow.phase_resonant(g) {
+            close(point.g, g, 1e-12);
+            let equilibrium = flow
+                .equilibria(g, point.sigma)
+                .into_iter()
+                .find(|one| (one.b - point.b).abs() < 1e-7)
+                .expect("an equilibrium at the backbone's detuning");
+            close(equilibrium.gamma, -FRAC_PI_2, 1e-6);
+            assert_eq!(equilibrium.slow_flow_stable, point.slow_flow_stable);
+        }
+    }
+}
+
+#[test]
+fn the_slope_of_the_excitation_is_its_difference_quotient() {
+    let flow = flow();
+    for b in [0.3, 0.7, 1.0] {
+        let h = 1e-6;
+        let (plus, minus) = (flow.backbone_at(b + h), flow.backbone_at(b - h));
+        close(
+            flow.excitation_slope(b),
+            (plus.g - minus.g) / (plus.c - minus.c),
+            1e-7,
+        );
+    }
+}
+
+#[test]
+fn the_extended_periodic_motion_concept_gives_the_same_backbone() {
+    let flow = flow();
+    for b in [0.3, 0.7, 0.9, 1.05] {
+        let (held, driven) = (flow.epmc(b), flow.backbone_at(b));
+        // The same amplitude without drive but with the negative damping rests.
+        let undamped = SlowFlow::new(LAMBDA - 2.0 * held.delta, R);
+        let [amplitude, phase] = undamped.rates(0.0, driven.sigma, b, 0.0);
+        close(amplitude, 0.0, 1e-14);
+        close(phase, 0.0, 1e-14);
+        close(driven.g, 2.0 * held.delta * held.c, 1e-14);
+        close(driven.sigma, held.sigma, 1e-15);
+    }
+}
+
+#[test]
+fn the_fast_map_is_stable_exactly_between_fold_and_symmetry_breaking() {
+    for r in [0.3, 0.65, 0.9] {
+        let b_min = Manifold::new(r).b_min();
+        for (b, expected) in [
+            (b_min - 1e-6, false),
+            (b_min + 1e-6, true),
+            (B_SYMMETRY_BREAKING - 1e-6, true),
+            (B_SYMMETRY_BREAKING + 1e-6, false),
+        ] {
+            let [trace, determinant] = half_period_map(r, b);
+            let stable = trace.abs() < 1.0 + determinant && determinant < 1.0;
+            assert_eq!(stable, expected, "r = {r}, B = {b}");
+        }
+    }
+}
+
+#[test]
+fn the_decay_in_closed_form_follows_the_slow_flow() {
+    for (lambda, r) in [
+        (LAMBDA, R),
+        (0.0, R),
+        (LAMBDA, 1.0),
+        (1e-9, R),
+        (LAMBDA, 0.2),
+    ] {
+        let flow = SlowFlow::new(lambda, r);
+        let start = 1.0;
+        let decay = flow.decay(start).expect("it dissipates");
+        let b_min = flow.manifold.b_min();
+        let middle = b_min + 0.5 * (start - b_min);
+        let tau1 = decay.time(middle);
+        let point = decay.at(tau1).expect("before the fold");
+        close(point.b, middle, 1e-9);
+        // D1 C~ at this point, by differences along the closed form.
+        let h = 1e-5;
+        let square = |tau1| decay.at(tau1).unwrap().c.powi(2);
+        let rate = (square(tau1 + h) - square(tau1 - h)) / (2.0 * h);
+        close(rate, -flow.loss(middle), 1e-7);
+        close(
+            point.sigma,
+            flow.backbone_sigma(point.c, BranchSide::Right).unwrap(),
+            1e-9,
+        );
+    }
+}
+
+#[test]
+fn a_decay_ends_at_the_fold() {
+    let decay = flow().decay(0.88).unwrap();
+    let end = decay.at(decay.duration()).unwrap();
+    close(end.c, Manifold::new(R).c_min(), 1e-8);
+    assert!(decay.at(decay.duration() * 1.001).is_none() && decay.at(-1e-3).is_none());
+    assert!(SlowFlow::new(0.0, 1.0).decay(0.9).is_none());
+    assert!(
+        SlowFlow::new(LAMBDA, 1.0)
+            .decay(0.9)
+            .unwrap()
+            .duration()
+            .is_infinite()
+    );
+}
+
+#[test]
+fn the_theory_columns_of_the_references_are_reproduced() {
+    let mut largest = 0f64;
+    for row in rows() {
+        let distance = |b: f64| (b - row.b_theory).abs();
+        let point = SlowFlow::new(row.lambda, row.r)
+            .phase_resonant(row.g)
+            .into_iter()
+            .min_by(|one, other| distance(one.b).total_cmp(&distance(other.b)))
+            .expect("a solution for every row");
+        for (found, expected) in [
+            (point.sigma, row.sigma_theory),
+            (point.c, row.c_theory),
+            (point.b, row.b_theory),
+        ] {
+            largest = largest.max((found - expected).abs());
+        }
+    }
+    println!("largest deviation of sigma, C, B: {largest:.2e}");
+    assert!(largest < 1e-10, "{largest:e}");
+}
+
+#[test]
+fn theory_and_exact_orbits_approach_each_other_as_epsilon() {
+    let theory = flow().phase_resonant(1.1);
+    let distance = |epsilon: f64| {
+        let scene = Dimensionless::new(epsilon, LAMBDA, R, 1.1);
+        let exact = phase_resonant(&scene)
+            .into_iter()
+            .find(|orbit| orbit.stable)
+            .unwrap();
+        let point = theory.iter().find(|point| point.stable()).unwrap();
+        (exact.sigma - point.sigma).abs()
+    };
+    let slope = (distance(1e-2) / distance(1e-4)).ln() / 100f64.ln();
+    println!("sigma: theory minus exact shrinks as epsilon^{slope:.3}");
+    close(slope, 1.0, 0.02);
+}
+
+#[test]
+fn elastic_impacts_have_no_solution_without_amplitude() {
+    for lambda in [LAMBDA, 0.0] {
+        for point in SlowFlow::new(lambda, 1.0).phase_resonant(1.1) {
+            assert!(point.c > 0.1, "{point:?}");
+        }
+    }
+}

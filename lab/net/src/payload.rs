@@ -1,0 +1,143 @@
+//! The six values of a frame: readings or a drive.
+
+use super::frame::{Frame, Kind, flag};
+use vines_testbench::rig::{Command, Drive, GroundTruth, Sensors};
+
+/// Readings of a sample.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(super) struct Reading {
+    pub sensors: Sensors,
+    pub ground_truth: Option<GroundTruth>,
+}
+
+/// Writes readings into a frame.
+pub(super) fn write_reading(mut frame: Frame, reading: &Reading) -> Frame {
+    let Reading {
+        sensors,
+        ground_truth,
+    } = reading;
+    frame.kind = Kind::Sensors;
+    if sensors.reference.is_some() {
+        frame.flags |= flag::REFERENCE;
+    }
+    if ground_truth.is_some() {
+        frame.flags |= flag::WITNESS;
+    }
+    let inside = ground_truth.unwrap_or_default();
+    frame.values = [
+        sensors.response,
+        sensors.reference.unwrap_or(0.0),
+        inside.impacts as f64,
+        inside.impact_time,
+        inside.impact_velocity,
+        inside.particle_velocity,
+    ];
+    frame
+}
+
+/// The readings in a frame.
+pub(super) fn read_reading(frame: &Frame) -> Reading {
+    let [
+        response,
+        reference,
+        impacts,
+        impact_time,
+        impact_velocity,
+        particle_velocity,
+    ] = frame.values;
+    Reading {
+        sensors: Sensors {
+            response,
+            reference: frame.has(flag::REFERENCE).then_some(reference),
+        },
+        ground_truth: frame.has(flag::WITNESS).then_some(GroundTruth {
+            impacts: impacts as i64,
+            impact_time,
+            impact_velocity,
+            particle_velocity,
+        }),
+    }
+}
+
+/// Writes a command into a frame.
+pub(super) fn write_command(mut frame: Frame, command: &Command) -> Frame {
+    frame.kind = Kind::Drive;
+    if command.settled {
+        frame.flags |= flag::SETTLED;
+    }
+    let Drive {
+        omega,
+        amplitude,
+        displacement,
+    } = command.drive;
+    frame.values = [
+        omega,
+        amplitude,
+        displacement,
+        command.phase_error,
+        0.0,
+        0.0,
+    ];
+    frame
+}
+
+/// The command in a frame; None if a value is invalid. An invalid value must not reach a shaker.
+pub(super) fn read_command(frame: &Frame) -> Option<Command> {
+    let [omega, amplitude, displacement, phase_error, ..] = frame.values;
+    frame.values.iter().all(|x| x.is_finite()).then_some(())?;
+    (omega >= 0.0 && amplitude >= 0.0).then_some(Command {
+        drive: Drive {
+            omega,
+            amplitude,
+            displacement,
+        },
+        phase_error,
+        settled: frame.has(flag::SETTLED),
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn readings_survive_the_frame(response: f64, reference: Option<f64>, ground_truth: Option<(i32, f64, f64, f64)>) {
+            let reading = Reading {
+                sensors: Sensors { response, reference },
+                ground_truth: ground_truth.map(|(impacts, impact_time, impact_velocity, particle_velocity)| GroundTruth {
+                    impacts: impacts.into(), impact_time, impact_velocity, particle_velocity,
+                }),
+            };
+            let frame = write_reading(Frame::new(Kind::Hello, 1), &reading);
+            prop_assert_eq!(read_reading(&Frame::decode(&frame.encode()).unwrap()), reading);
+        }
+
+        #[test]
+        fn drives_survive_the_frame(omega in 0.0..1e6, amplitude in 0.0..1e6, displacement in -1e6..1e6, settled: bool) {
+            let command = Command {
+                drive: Drive { omega, amplitude, displacement },
+                phase_error: -0.5,
+                settled,
+            };
+            let frame = write_command(Frame::new(Kind::Hello, 1), &command);
+            prop_assert_eq!(read_command(&Frame::decode(&frame.encode()).unwrap()), Some(command));
+        }
+    }
+
+    #[test]
+    fn a_drive_with_nan_infinity_or_a_negative_amplitude_is_invalid() {
+        for values in [
+            [f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0],
+            [1.0, f64::INFINITY, 0.0, 0.0, 0.0, 0.0],
+            [1.0, -1.0, 0.0, 0.0, 0.0, 0.0],
+        ] {
+            let frame = Frame {
+                values,
+                ..Frame::new(Kind::Drive, 1)
+            };
+            assert_eq!(read_command(&frame), None);
+        }
+    }
+}

@@ -1,0 +1,113 @@
+//! `--rig` and `--controller`: what stands on either side of the bench.
+
+use std::{path::PathBuf, str::FromStr};
+
+use clap::Args;
+use vines::{
+    fmu::{FmuController, FmuRig},
+    net::{BindScope, NetController, NetRig, resolve},
+    rig::{BuiltIn, Chain, Controller, Rig, Simulated},
+    scene::Scene,
+};
+
+use super::failure::Failure;
+
+/// What stands behind an endpoint, as written on the command line.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) enum Endpoint {
+    /// `built-in`: this program's own, with nothing in between.
+    BuiltIn,
+    /// The path of an FMU.
+    Fmu(PathBuf),
+    /// `udp://HOST:PORT`.
+    Udp(String),
+}
+
+impl FromStr for Endpoint {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, Self::Err> {
+        if text == "built-in" {
+            return Ok(Self::BuiltIn);
+        }
+        if text.starts_with("udp://") {
+            return Ok(Self::Udp(text.into()));
+        }
+        let file = PathBuf::from(text);
+        if file.is_file() {
+            Ok(Self::Fmu(file))
+        } else {
+            Err(format!(
+                "{text} is not there; give `built-in`, the path of an FMU, or udp://HOST:PORT"
+            ))
+        }
+    }
+}
+
+/// A rig, and the longest silence, s, that it bears where it runs in real time.
+pub(super) struct OpenRig {
+    pub rig: Box<dyn Rig>,
+    pub pace: Option<f64>,
+}
+
+impl Endpoint {
+    /// The rig behind this endpoint.
+    pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
+        let mut pace = None;
+        let rig: Box<dyn Rig> = match self {
+            Self::BuiltIn => {
+                Box::new(Simulated::new(scene.plant, scene.start).map_err(Failure::input)?)
+            }
+            Self::Fmu(file) => {
+                Box::new(FmuRig::load(file, &scene.start_values()).map_err(Failure::run)?)
+            }
+            Self::Udp(address) => {
+                let rig = NetRig::connect(resolve(address, scope)?, scene.sample_time())?;
+                pace = rig.pace();
+                Box::new(rig)
+            }
+        };
+        let (d, samples) = (scene.dimensionless(), scene.controller.samples_per_period);
+        let rig = Chain::around(rig, &scene.chain, &d, samples);
+        Ok(OpenRig { rig, pace })
+    }
+
+    /// The controller behind this endpoint, beside a rig of that `pace`.
+    pub(super) fn controller(
+        &self,
+        scene: &Scene,
+        scope: BindScope,
+        pace: Option<f64>,
+    ) -> Result<Box<dyn Controller>, Failure> {
+        Ok(match self {
+            Self::BuiltIn => {
+                Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?)
+            }
+            Self::Fmu(file) => Box::new(
+                FmuController::load(file, &scene.controller_config()).map_err(Failure::run)?,
+            ),
+            Self::Udp(address) => {
+                let peer = resolve(address, scope)?;
+                Box::new(NetController::connect(peer, scene.sample_time(), pace)?)
+            }
+        })
+    }
+}
+
+/// `--allow-remote`, which several commands share.
+#[derive(Debug, Args)]
+pub(super) struct ReachArguments {
+    /// Allow network addresses beyond this machine. Nobody is asked who they are: whoever reaches the address can drive the rig
+    #[arg(long)]
+    allow_remote: bool,
+}
+
+impl ReachArguments {
+    pub(super) fn reach(&self) -> BindScope {
+        if self.allow_remote {
+            BindScope::Remote
+        } else {
+            BindScope::Loopback
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Figures as data: panels with axes, series and labels, drawn as SVG. Colours are in [`super::theme`].
+
+mod draw;
+mod stability;
+
+use plotters::chart::SeriesLabelPosition;
+use plotters::style::{Color, RGBColor, ShapeStyle};
+use thiserror::Error;
+
+use crate::scene::Dimensionless;
+
+pub use stability::{Marked, clipped, thinned};
+
+/// A place in a panel, in the units of its axes.
+pub type Place = (f64, f64);
+
+/// Axis labels that several figures share.
+pub const DETUNING: &str = "detuning σ = (ω/ω₀ − 1)/ε";
+pub const AMPLITUDE: &str = "amplitude C of v, over b";
+pub const SPEED: &str = "particle speed B, over b ω₀";
+
+/// Usual size of a figure, px.
+pub const SIZE: (u32, u32) = (860, 600);
+/// plotters rounds to whole units: drawn this many times larger, curves are smooth.
+const FINE: u32 = 8;
+
+/// Why a figure cannot be drawn.
+#[derive(Debug, Error)]
+#[error("the figure cannot be drawn: {0}")]
+pub struct FigureError(String);
+
+/// A line of that colour, `tenths` of a pixel wide.
+pub fn line(colour: RGBColor, tenths: u32) -> ShapeStyle {
+    colour.stroke_width(tenths * FINE / 10)
+}
+
+/// A figure: its panels, and a key beside them where it has one.
+pub struct Figure {
+    size: (u32, u32),
+    panels: Vec<Panel>,
+    key: Vec<KeyEntry>,
+}
+
+/// One panel with its axes.
+pub struct Panel {
+    /// Left, top, width and height, px.
+    area: [u32; 4],
+    /// Title and caption.
+    heading: Option<(String, String)>,
+    x: Axis,
+    y: Axis,
+    series: Vec<Series>,
+    legend: Option<SeriesLabelPosition>,
+}
+
+/// Range and label of an axis.
+pub struct Axis {
+    range: (f64, f64),
+    label: String,
+}
+
+/// Something drawn in a panel; the first of each label is in the legend.
+struct Series {
+    kind: Kind,
+    style: ShapeStyle,
+    label: Option<String>,
+}
+
+enum Kind {
+    Curve(Vec<Place>),
+    Dashed(Vec<Place>),
+    /// Radius, px.
+    Circles(Vec<Place>, u32),
+    Crosses(Vec<Place>),
+    Square(Place),
+    Segments(Vec<[Place; 2]>),
+    Rectangles(Vec<[Place; 2]>),
+    /// Text, size in px, and whether its centre is at the place or its left upper corner.
+    Text(String, Place, u32, bool),
+}
+
+/// An entry of the key beside a panel.
+pub struct KeyEntry {
+    pub name: &'static str,
+    /// Colour of the swatch, letter and colour of the letter; a line without them.
+    pub swatch: Option<(RGBColor, &'static str, RGBColor)>,
+}
+
+impl Figure {
+    /// A figure of one panel of the usual size.
+    pub fn single(panel: Panel) -> Self {
+        Self::new(SIZE, vec![panel])
+    }
+
+    /// A figure of that size, px.
+    pub fn new(size: (u32, u32), panels: Vec<Panel>) -> Self {
+        Self {
+            size,
+            panels,
+            key: Vec::new(),
+        }
+    }
+
+    /// With a key at the right of the panel.
+    pub fn with_key(self, key: Vec<KeyEntry>) -> Self {
+        Self { key, ..self }
+    }
+}
+
+impl Axis {
+    pub fn new(range: (f64, f64), label: &str) -> Self {
+        Self {
+            range,
+            label: label.into(),
+        }
+    }
+}
+
+impl Panel {
+    /// An empty panel over the whole of a figure of the usual size.
+    pub fn new(x: Axis, y: Axis) -> Self {
+        Self {
+            area: [0, 0, SIZE.0, SIZE.1],
+            heading: None,
+            x,
+            y,
+            series: Vec::new(),
+            legend: None,
+        }
+    }
+
+    /// At this place of the figure: left, top, width and height, px.
+    pub fn at(self, area: [u32; 4]) -> Self {
+        Self { area, ..self }
+    }
+
+    pub fn heading(mut self, title: &str, caption: &str) -> Self {
+        self.heading = Some((title.into(), caption.into()));
+        self
+    }
+
+    pub fn legend(mut self, position: SeriesLabelPosition) -> Self {
+        self.legend = Some(position);
+        self
+    }
+
+    fn add(&mut self, kind: Kind, style: ShapeStyle, label: &str) {
+        let label = (!label.is_empty()).then(|| label.to_string());
+        self.series.push(Series { kind, style, label });
+    }
+
+    pub fn curve(&mut self, points: Vec<Place>, style: ShapeStyle, label: &str) {
+        self.add(Kind::Curve(points), style, label);
+    }
+
+    pub fn dashed(&mut self, points: Vec<Place>, style: ShapeStyle, label: &str) {
+        self.add(Kind::Dashed(points), style, label);
+    }
+
+    /// Circles of a radius in px, filled or hollow as the style says.
+    pub fn circles(&mut self, points: Vec<Place>, radius: u32, style: ShapeStyle, label: &str) {
+        self.add(Kind::Circles(points, radius), style, label);
+    }
+
+    pub fn crosses(&mut self, points: Vec<Place>, style: ShapeStyle, label: &str) {
+        self.add(Kind::Crosses(points), style, label);
+    }
+
+    pub fn square(&mut self, place: Place, colour: RGBColor, label: &str) {
+        self.add(Kind::Square(place), colour.filled(), label);
+    }
+
+    pub fn segments(&mut self, pairs: Vec<[Place; 2]>, style: ShapeStyle) {
+        self.add(Kind::Segments(pairs), style, "");
+    }
+
+    pub fn rectangles(&mut self, corners: Vec<[Place; 2]>, colour: RGBColor) {
+        self.add(Kind::Rectangles(corners), colour.filled(), "");
+    }
+
+    /// Text of that size, px, with its left upper corner at the place.
+    pub fn text(&mut self, text: String, place: Place, size: u32) {
+        let black = RGBColor(0, 0, 0).filled();
+        self.add(Kind::Text(text, place, size, false), black, "");
+    }
+
+    /// Text of that size, px, centred at the place.
+    pub fn centred_text(&mut self, text: String, place: Place, size: u32, colour: RGBColor) {
+        self.add(Kind::Text(text, place, size, true), colour.filled(), "");
+    }
+
+    /// A curve, dashed where it is unstable, with a style and a label for each of its two kinds of pieces.
+    pub fn pieces(&mut self, points: &[Marked], styles: [ShapeStyle; 2], labels: [&str; 2]) {
+        for run in stability::runs(points, false) {
+            self.dashed(run, styles[1], labels[1]);
+        }
+        for run in stability::runs(points, true) {
+            self.curve(run, styles[0], labels[0]);
+        }
+    }
+}
+
+/// The caption of a figure that belongs to a scene.
+pub fn caption(p: &Dimensionless, g: f64) -> String {
+    format!(
+        "ε = {:.5}, λ = {:.3}, r = {}, G = {g:.3}; lengths over b, times over 1/ω₀",
+        p.epsilon, p.lambda, p.r
+    )
+}

@@ -1,0 +1,28 @@
+//! The figures of the report, one file each.
+
+pub mod approach;
+pub mod backbone;
+pub mod backbones;
+pub mod history;
+pub mod manifold;
+pub mod period;
+pub mod regimes;
+pub mod responses;
+pub mod tracked;
+
+use super::figure::{Panel, Place, line};
+use super::theme::{DECAY, LOCK};
+
+/// Of the points along the decay every so many-th is drawn.
+const THINNED: usize = 4;
+const DECAY_LABEL: &str = "free decay, identified";
+
+/// Points along the decay.
+fn decay_points(panel: &mut Panel, points: impl Iterator<Item = Place>, label: &str) {
+    panel.circles(points.collect(), 4, line(DECAY, 16), label);
+}
+
+/// The locked point.
+fn locked_point(panel: &mut Panel, place: Place) {
+    panel.square(place, LOCK, "locked, measured");
+}

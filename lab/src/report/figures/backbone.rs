@@ -1,0 +1,83 @@
+//! The backbone with the decay on it: amplitude over detuning.
+
+use plotters::chart::SeriesLabelPosition;
+
+use super::{DECAY_LABEL, THINNED, decay_points, locked_point};
+use crate::comparison::Comparison;
+use crate::numerics::range;
+use crate::orbit::{self, Limits};
+use crate::report::figure::{
+    AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, caption, clipped, line, thinned,
+};
+use crate::report::theme::{EXACT, FAINT, THEORY, UNSTABLE};
+use crate::scene::Dimensionless;
+use crate::theory::{BranchSide, SlowFlow};
+
+/// Amplitude drawn up to at least this, C.
+const TOP: f64 = 0.8;
+
+/// The identified backbone beside theory and exact orbits.
+pub fn figure(found: &Comparison) -> Figure {
+    let p = &found.parameters;
+    let slow_flow = SlowFlow::new(p.lambda, p.r);
+    let top = (1.25 * found.lock.c).max(TOP);
+    let reach = slow_flow.manifold.b(top, BranchSide::Right).unwrap_or(1.0);
+    let theory = slow_flow.backbone(slow_flow.manifold.b_min(), reach, 400);
+    // Below the fold there is no backbone, and the frequency of what is left of the motion goes anywhere.
+    let fold = slow_flow.manifold.c_min();
+    let above = found.decay.iter().map(|one| one.point);
+    let sigmas = theory.iter().map(|point| point.sigma);
+    let sigmas = sigmas.chain(
+        above
+            .filter(|point| point.c >= fold)
+            .map(|point| point.sigma),
+    );
+    let (low, high) = range((f64::MAX, f64::MIN), sigmas);
+    let margin = 0.06 * (high - low);
+    let (low, high) = (low - margin, high + margin);
+
+    let mut panel = Panel::new(
+        Axis::new((low, high), DETUNING),
+        Axis::new((0.0, top), AMPLITUDE),
+    )
+    .heading(
+        "Backbone: phase resonance of the centre of mass",
+        &caption(p, found.lock.g),
+    )
+    .legend(SeriesLabelPosition::UpperRight);
+    add_backbones(&mut panel, p, (low, high), (0.0, top));
+    let decay = found.decay.iter().map(|one| one.point).step_by(THINNED);
+    let decay = decay.map(|point| (point.sigma, point.c));
+    let inside = decay.filter(|(sigma, _)| (low..=high).contains(sigma));
+    decay_points(&mut panel, inside, DECAY_LABEL);
+    locked_point(&mut panel, (found.lock.sigma, found.lock.c));
+    Figure::single(panel)
+}
+
+/// The right branch of the backbone, by theory and exact, each with its stability, as far as it lies in the ranges.
+pub fn add_backbones(panel: &mut Panel, p: &Dimensionless, x: (f64, f64), y: (f64, f64)) {
+    let flow = SlowFlow::new(p.lambda, p.r);
+    let fold = flow.manifold.b_min();
+    let reach = flow.manifold.b(y.1, BranchSide::Right).unwrap_or(1.0);
+    let theory: Vec<Marked> = flow
+        .backbone(fold, reach, 400)
+        .iter()
+        .map(|point| ((point.sigma, point.c), point.stable()))
+        .collect();
+    let exact: Vec<Marked> = orbit::backbone(p, &Limits::default())
+        .map(|branch| branch.points)
+        .unwrap_or_default()
+        .iter()
+        .filter(|motion| motion.b >= fold)
+        .map(|motion| ((motion.sigma, motion.c), motion.stable))
+        .collect();
+    let labels = ["first-order theory, stable", "first-order theory, unstable"];
+    for piece in clipped(&theory, x, y) {
+        panel.pieces(&piece, [line(THEORY, 20), line(UNSTABLE, 20)], labels);
+    }
+    let labels = ["exact orbits, stable", "exact orbits, unstable"];
+    for piece in clipped(&exact, x, y) {
+        let styles = [line(EXACT, 16), line(FAINT, 16)];
+        panel.pieces(&thinned(&piece, x, y), styles, labels);
+    }
+}

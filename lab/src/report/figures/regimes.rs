@@ -1,0 +1,150 @@
+//! The regime map: coloured cells, a letter on each region, and the theory's stable island.
+
+use plotters::style::{BLACK, WHITE};
+
+use crate::map::{Axis as MapAxis, Map, Range, outline};
+use crate::regime::Regime;
+use crate::report::figure::{Axis, DETUNING, Figure, FigureError, KeyEntry, Panel, Place, line};
+use crate::report::theme;
+
+/// Size of the figure, px, and how much of its width belongs to the axes; the key stands beside them.
+const SIZE: (u32, u32) = (980, 600);
+const WIDTH: u32 = 770;
+/// Regions narrower than this many cells get no letter.
+const NARROW: usize = 2;
+
+/// The map as SVG.
+///
+/// # Errors
+/// What the drawing library refuses.
+pub fn svg(map: &Map) -> Result<String, FigureError> {
+    // Cells lie side by side without a seam.
+    let text = figure(map).svg()?;
+    Ok(text.replace("<rect ", "<rect shape-rendering=\"crispEdges\" "))
+}
+
+fn figure(map: &Map) -> Figure {
+    let plan = &map.plan;
+    let axis = |range: &Range| {
+        let half = range.step() / 2.0;
+        Axis::new((range.from - half, range.to + half), label(range.axis))
+    };
+    let mut panel = Panel::new(axis(&plan.x), axis(&plan.y))
+        .at([0, 0, WIDTH, SIZE.1])
+        .heading("Regimes of the driven response", &caption(map));
+    for regime in Regime::SIMULATED {
+        panel.rectangles(stripes(map, regime), theme::regime(regime));
+    }
+    let segments = outline(plan);
+    panel.segments(segments.clone(), line(WHITE, 50));
+    panel.segments(segments, line(BLACK, 22));
+    for (regime, place) in letters(map) {
+        let ink = theme::on_regime(regime);
+        panel.centred_text(letter(regime).into(), place, 17, ink);
+    }
+    let shown = Regime::SIMULATED.into_iter();
+    let shown = shown.filter(|one| map.count(*one).0 > 0);
+    let mut key: Vec<KeyEntry> = shown
+        .map(|one| KeyEntry {
+            name: one.name(),
+            swatch: Some((theme::regime(one), letter(one), theme::on_regime(one))),
+        })
+        .collect();
+    key.push(KeyEntry {
+        name: "stable 1:1, theory",
+        swatch: None,
+    });
+    Figure::new(SIZE, vec![panel]).with_key(key)
+}
+
+fn caption(map: &Map) -> String {
+    let plan = &map.plan;
+    let held = [MapAxis::Sigma, MapAxis::G, MapAxis::R]
+        .into_iter()
+        .filter(|axis| plan.x.axis != *axis && plan.y.axis != *axis)
+        .map(|axis| match axis {
+            MapAxis::Sigma => format!(", σ = {:.4}", plan.sigma),
+            MapAxis::G => format!(", G = {:.3}", plan.scene.g),
+            MapAxis::R => format!(", r = {}", plan.scene.r),
+        });
+    format!(
+        "ε = {:.5}, λ = {:.3}{}; each cell from the same start, {} periods after it",
+        plan.scene.epsilon,
+        plan.scene.lambda,
+        held.collect::<String>(),
+        plan.settle
+    )
+}
+
+fn label(axis: MapAxis) -> &'static str {
+    match axis {
+        MapAxis::Sigma => DETUNING,
+        MapAxis::G => "base amplitude G = E/(b ε)",
+        MapAxis::R => "restitution coefficient r",
+    }
+}
+
+fn letter(regime: Regime) -> &'static str {
+    match regime {
+        Regime::NoImpacts => "O",
+        Regime::Symmetric => "S",
+        Regime::Asymmetric => "A",
+        Regime::Several => "n",
+        Regime::Modulated => "M",
+        Regime::Chaotic => "C",
+        Regime::Sticking => "K",
+        Regime::Other | Regime::Unresolved | Regime::Unknown => "?",
+    }
+}
+
+/// The cells of a regime, those side by side as one rectangle.
+fn stripes(map: &Map, regime: Regime) -> Vec<[Place; 2]> {
+    let (x, y) = (map.plan.x, map.plan.y);
+    let mut found = Vec::new();
+    for (row, cells) in map.cells.chunks(x.points).enumerate() {
+        let mut column = 0;
+        for run in cells.chunk_by(|one, other| one.point.regime == other.point.regime) {
+            if run[0].point.regime == regime {
+                let left = x.at(column) - x.step() / 2.0;
+                let right = x.at(column + run.len() - 1) + x.step() / 2.0;
+                let low = y.at(row) - y.step() / 2.0;
+                found.push([(left, low), (right, low + y.step())]);
+            }
+            column += run.len();
+        }
+    }
+    found
+}
+
+/// For each regime the place deepest inside it.
+fn letters(map: &Map) -> Vec<(Regime, Place)> {
+    let (columns, rows) = (map.plan.x.points, map.plan.y.points);
+    let at = |column: usize, row: usize| map.cells[row * columns + column].point.regime;
+    // How far a square about the cell reaches before it meets another regime or the border.
+    let depth = |column: usize, row: usize| {
+        let most = column
+            .min(row)
+            .min(columns - 1 - column)
+            .min(rows - 1 - row);
+        let alike = |reach: usize| {
+            (column - reach..=column + reach).all(|x| {
+                at(x, row - reach) == at(column, row) && at(x, row + reach) == at(column, row)
+            }) && (row - reach..=row + reach).all(|y| {
+                at(column - reach, y) == at(column, row) && at(column + reach, y) == at(column, row)
+            })
+        };
+        (1..=most).take_while(|reach| alike(*reach)).count()
+    };
+    Regime::SIMULATED
+        .into_iter()
+        .filter_map(|regime| {
+            let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
+            let (deepest, column, row) = cells
+                .filter(|(column, row)| at(*column, *row) == regime)
+                .map(|(column, row)| (depth(column, row), column, row))
+                .max_by_key(|one| one.0)?;
+            let place = (map.plan.x.at(column), map.plan.y.at(row));
+            (deepest >= NARROW).then_some((regime, place))
+        })
+        .collect()
+}

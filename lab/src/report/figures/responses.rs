@@ -1,0 +1,87 @@
+//! Frequency responses at several excitations, exact and first-order, with the backbone through their maxima.
+
+use plotters::chart::SeriesLabelPosition;
+use plotters::style::BLACK;
+
+use crate::orbit::{Branch, Response};
+use crate::report::figure::{
+    AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, clipped, line, thinned,
+};
+use crate::report::theme::{EXACT, FAINT, THEORY, UNSTABLE};
+use crate::scene::Dimensionless;
+use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};
+
+const POINTS: usize = 600;
+const DETUNINGS: (f64, f64) = (-5.0, 5.0);
+
+/// The exact responses and, for the same G, those of theory.
+pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
+    let flow = SlowFlow::new(p.lambda, p.r);
+    let top = responses
+        .iter()
+        .flat_map(|one| &one.symmetric.points)
+        .filter(|one| one.b > flow.manifold.b_min())
+        .fold(0.6, |most: f64, one| most.max(1.08 * one.c));
+    let (x, y) = (DETUNINGS, (0.0, top));
+    let list: Vec<String> = responses
+        .iter()
+        .map(|one| format!("{:.3}", one.g))
+        .collect();
+    let caption = format!(
+        "ε = {:.5}, λ = {:.3}, r = {}; G = {}; amplitudes over b",
+        p.epsilon,
+        p.lambda,
+        p.r,
+        list.join(", ")
+    );
+    let mut panel = Panel::new(Axis::new(x, DETUNING), Axis::new(y, AMPLITUDE))
+        .heading("Frequency responses and backbone", &caption)
+        .legend(SeriesLabelPosition::UpperRight);
+    for (n, response) in responses.iter().enumerate() {
+        let theory = flow.frequency_responses(response.g, POINTS);
+        let theory = theory.iter().map(|curve| {
+            let motions = curve.iter().map(|one| (one.sigma, one.motion));
+            let stable =
+                |one: crate::theory::Equilibrium| one.impacts_stable && one.slow_flow_stable;
+            motions
+                .map(|(sigma, one)| ((sigma, one.c), stable(one)))
+                .collect()
+        });
+        let styles = [line(THEORY, 12), line(UNSTABLE, 8)];
+        let labels = ["theory, stable", "theory, unstable"];
+        theory.for_each(|points: Vec<Marked>| {
+            for piece in clipped(&points, x, y) {
+                panel.pieces(&thinned(&piece, x, y), styles, labels);
+            }
+        });
+        let styles = [line(EXACT, 30), line(FAINT, 14)];
+        let labels = ["exact, stable", "exact, unstable"];
+        for branch in std::iter::once(&response.symmetric).chain(&response.asymmetric) {
+            for piece in clipped(&marked(branch), x, y) {
+                panel.pieces(&thinned(&piece, x, y), styles, labels);
+            }
+        }
+        // Each is named below its end on the left, where the figure is empty.
+        let stable = response.symmetric.points.iter().filter(|one| one.stable);
+        let end = stable.min_by(|one, other| one.sigma.total_cmp(&other.sigma));
+        if let Some(end) = end {
+            let left = end.sigma.clamp(x.0 + 0.7, x.1);
+            let place = (left, (0.1 - 0.035 * n as f64) * top);
+            panel.centred_text(format!("G = {:.3}", response.g), place, 14, BLACK);
+        }
+    }
+    let backbone: Vec<Marked> = flow
+        .backbone(flow.manifold.b_min(), 1.4 * B_SYMMETRY_BREAKING, POINTS)
+        .iter()
+        .map(|one| ((one.sigma, one.c), true))
+        .collect();
+    for piece in clipped(&backbone, x, y) {
+        panel.pieces(&piece, [line(BLACK, 24); 2], ["backbone, theory", ""]);
+    }
+    Figure::single(panel)
+}
+
+fn marked(branch: &Branch) -> Vec<Marked> {
+    let points = branch.points.iter();
+    points.map(|one| ((one.sigma, one.c), one.stable)).collect()
+}

@@ -1,0 +1,196 @@
+//! The files of a run: tables, figures and JSON, each complete or absent.
+
+use std::io::{self, Write};
+use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use thiserror::Error;
+
+use super::figure::FigureError;
+use super::figures::{backbone, manifold, regimes, tracked};
+use super::theme::dark;
+use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
+use crate::files::temporary;
+use crate::map::{Cell, Map, Point};
+
+/// Why the files of a run could not be written.
+#[derive(Debug, Error)]
+pub enum WriteError {
+    /// The file system refused.
+    #[error("cannot write {}: {source}", path.display())]
+    File {
+        /// What was being written.
+        path: PathBuf,
+        /// Why not.
+        source: io::Error,
+    },
+    /// A figure could not be drawn.
+    #[error(transparent)]
+    Figure(#[from] FigureError),
+    /// A table could not be written as CSV.
+    #[error("cannot write a table as CSV: {0}")]
+    Csv(#[from] csv::Error),
+    /// A result could not be written as JSON.
+    #[error("cannot write JSON: {0}")]
+    Json(#[from] serde_json::Error),
+}
+
+/// Writes `identification.json`, `backbone.csv`, `backbone.svg` and `sim.svg` into `out` and returns their paths.
+///
+/// All of it is made before the first file is written, and each file is complete or absent.
+///
+/// # Errors
+/// A folder or file that cannot be written.
+pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+    let files = [
+        ("identification.json", json(found)?),
+        ("backbone.csv", decay_csv(found)?),
+        ("backbone.svg", backbone::figure(found).svg()?),
+        ("sim.svg", manifold::figure(found).svg()?),
+    ];
+    write_files(out, &files)
+}
+
+/// Writes `map.csv`, `map.svg` and `map-dark.svg` into `out` and returns their paths, as [`write()`] does.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+    let figure = regimes::svg(map)?;
+    let files = [
+        ("map.csv", map_csv(map)?),
+        ("map-dark.svg", dark(&figure)),
+        ("map.svg", figure),
+    ];
+    write_files(out, &files)
+}
+
+/// Writes `tracked.json`, `tracked.csv` and `tracked.svg` into `out` and returns their paths, as [`write()`] does.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+    let files = [
+        ("tracked.json", json(found)?),
+        ("tracked.csv", tracked_csv(found)?),
+        ("tracked.svg", tracked::figure_with_drive(found).svg()?),
+    ];
+    write_files(out, &files)
+}
+
+/// Writes each file under a temporary name, and gives it its own once it is complete.
+pub(super) fn write_files<N: AsRef<str>>(
+    out: &Path,
+    files: &[(N, String)],
+) -> Result<Vec<PathBuf>, WriteError> {
+    let refused = |path: &Path| {
+        let path = path.to_path_buf();
+        move |source| WriteError::File { path, source }
+    };
+    std::fs::create_dir_all(out).map_err(refused(out))?;
+    let mut written = Vec::new();
+    for (name, text) in files {
+        let path = out.join(name.as_ref());
+        let mut file = temporary(out).map_err(refused(&path))?;
+        file.write_all(text.as_bytes()).map_err(refused(&path))?;
+        file.persist(&path)
+            .map_err(|error| refused(&path)(error.error))?;
+        written.push(path);
+    }
+    Ok(written)
+}
+
+pub(super) fn json(found: &impl Serialize) -> Result<String, WriteError> {
+    Ok(serde_json::to_string_pretty(found)? + "\n")
+}
+
+/// A table, one row an item.
+pub(super) fn csv<T: Serialize>(rows: impl IntoIterator<Item = T>) -> Result<String, WriteError> {
+    let mut writer = csv::Writer::from_writer(Vec::new());
+    for row in rows {
+        writer.serialize(row)?;
+    }
+    let bytes = writer.into_inner().map_err(|error| error.into_error());
+    let bytes = bytes.map_err(csv::Error::from)?;
+    Ok(String::from_utf8_lossy(&bytes).into_owned())
+}
+
+/// The points along a decay.
+pub(super) fn decay_csv(found: &Comparison) -> Result<String, WriteError> {
+    #[derive(Serialize)]
+    struct Theory {
+        sigma_theory: Option<f64>,
+    }
+    csv(found.decay.iter().map(|one| {
+        let sigma_theory = one.sigma_theory;
+        (one.point, Theory { sigma_theory })
+    }))
+}
+
+/// The points of a tracked backbone.
+fn tracked_csv(found: &TrackedComparison) -> Result<String, WriteError> {
+    #[derive(Serialize)]
+    struct Compared {
+        distance: Option<f64>,
+        sigma_less_exact: Option<f64>,
+        #[serde(rename = "G_less_exact")]
+        g_less_exact: Option<f64>,
+    }
+    csv(found.points.iter().map(|TrackedPoint { point, exact }| {
+        let compared = Compared {
+            distance: exact.map(|exact| exact.nearest),
+            sigma_less_exact: exact.and_then(|exact| exact.sigma),
+            g_less_exact: exact.and_then(|exact| exact.g),
+        };
+        (point, compared)
+    }))
+}
+
+/// The cells of a map.
+pub(super) fn map_csv(map: &Map) -> Result<String, WriteError> {
+    #[derive(Serialize)]
+    struct Row {
+        sigma: f64,
+        #[serde(rename = "G")]
+        g: f64,
+        r: f64,
+        regime: &'static str,
+        impacts_per_period: f64,
+        impacts: usize,
+        periods: u32,
+        synchrony: f64,
+        growth: Option<f64>,
+        theory_stable: bool,
+    }
+    let row = |cell: &Cell| {
+        let Cell {
+            sigma,
+            g,
+            r,
+            point,
+            theory_stable,
+        } = *cell;
+        let Point {
+            regime,
+            impacts_per_period,
+            impacts,
+            periods,
+            synchrony,
+            growth,
+        } = point;
+        let regime = regime.name();
+        Row {
+            sigma,
+            g,
+            r,
+            regime,
+            impacts_per_period,
+            impacts,
+            periods,
+            synchrony,
+            growth,
+            theory_stable,
+        }
+    };
+    csv(map.cells.iter().map(row))
+}

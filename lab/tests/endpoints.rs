@@ -1,0 +1,265 @@
+//! The endpoints of `vines identify`, as its users meet them: whatever stands behind them, the identified numbers agree.
+
+use std::env::consts::DLL_SUFFIX;
+use std::io::{BufRead, BufReader};
+use std::path::{Path, PathBuf};
+use std::process::{Child, Command, Output, Stdio};
+use std::sync::LazyLock;
+
+use serde_json::Value;
+use tempfile::TempDir;
+
+const PROGRAM: &str = env!("CARGO_BIN_EXE_vines");
+
+fn vines(arguments: &[&str]) -> Output {
+    Command::new(PROGRAM)
+        .args(arguments)
+        .output()
+        .expect("the program runs")
+}
+
+/// The two FMUs, built and packed once.
+static FMUS: LazyLock<TempDir> = LazyLock::new(|| {
+    let libraries = Path::new(PROGRAM).parent().unwrap();
+    let mut build = Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into()));
+    build.args([
+        "build",
+        "--quiet",
+        "--locked",
+        "-p",
+        "lovines",
+        "-p",
+        "phase-lock-fmu",
+    ]);
+    build.arg("--target-dir").arg(libraries.parent().unwrap());
+    if libraries.ends_with("release") {
+        build.arg("--release");
+    }
+    assert!(build.status().expect("cargo runs").success());
+    let folder = tempfile::tempdir().unwrap();
+    let (out, libraries) = (folder.path().to_str().unwrap(), libraries.to_str().unwrap());
+    let packed = vines(&["pack", "--out", out, "--libraries", libraries]);
+    assert!(packed.status.success(), "{DLL_SUFFIX}: {packed:?}");
+    folder
+});
+
+fn fmu(name: &str) -> PathBuf {
+    FMUS.path().join(name)
+}
+
+/// The default scene at twice its frequency, which locks and decays in a few seconds of real time.
+const QUICK: [&str; 8] = [
+    "plant.k=46720",
+    "plant.c=5.06",
+    "start.dq2=1.0",
+    "controller.samples_per_period=50",
+    "controller.bandwidth=0.3",
+    "controller.amplitude_drift=5e-4",
+    "record.hold_periods=10",
+    "record.decay_periods=25",
+];
+
+fn with_settings<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
+    let settings = QUICK.iter().flat_map(|setting| ["--set", setting]);
+    arguments.iter().copied().chain(settings).collect()
+}
+
+fn identified(endpoints: &[&str]) -> Value {
+    let folder = tempfile::tempdir().unwrap();
+    let out = [
+        "identify",
+        "--json",
+        "--out",
+        folder.path().to_str().unwrap(),
+    ];
+    let done = vines(&with_settings(&[&out, endpoints].concat()));
+    assert!(done.status.success(), "{endpoints:?}: {done:?}");
+    let found: Value = serde_json::from_slice(&done.stdout).unwrap();
+    println!("sigma = {} with {endpoints:?}", found["lock"]["sigma"]);
+    found
+}
+
+fn sigma(found: &Value) -> f64 {
+    found["lock"]["sigma"].as_f64().unwrap()
+}
+
+/// A server in a process of its own, with its address; it ends by itself, or where this is dropped.
+struct Server(Child, String);
+
+impl Server {
+    fn start(arguments: &[&str]) -> Self {
+        let listen = [
+            "--listen",
+            "127.0.0.1:0",
+            "--sessions",
+            "1",
+            "--duration",
+            "60",
+        ];
+        let mut child = Command::new(PROGRAM)
+            .args(with_settings(&[arguments, &listen].concat()))
+            .stdout(Stdio::piped())
+            .spawn()
+            .unwrap();
+        let mut line = String::new();
+        BufReader::with_capacity(1, child.stdout.as_mut().unwrap())
+            .read_line(&mut line)
+            .unwrap();
+        let address = line.trim().rsplit(' ').next().unwrap().to_string();
+        assert!(address.starts_with("udp://127.0.0.1:"), "{line}");
+        Self(child, address)
+    }
+
+    /// What it has printed since, once it has ended.
+    fn report(mut self) -> String {
+        let stdout = self.0.stdout.take().unwrap();
+        let report = std::io::read_to_string(stdout).unwrap();
+        assert!(self.0.wait().unwrap().success());
+        report
+    }
+}
+
+impl Drop for Server {
+    fn drop(&mut self) {
+        let _ = self.0.kill();
+        let _ = self.0.wait();
+    }
+}
+
+#[test]
+fn built_in_fmu_and_lock_step_network_give_the_same_bits() {
+    let (plant, controller) = (fmu("LoViNes.fmu"), fmu("PhaseLock.fmu"));
+    let (plant, controller) = (plant.to_str().unwrap(), controller.to_str().unwrap());
+    let direct = identified(&["--rig", "built-in"]);
+    assert_eq!(identified(&["--rig", plant]), direct);
+    assert_eq!(
+        identified(&["--rig", "built-in", "--controller", controller]),
+        direct
+    );
+    let rig = Server::start(&["rig", "--lock-step"]);
+    let peer = Server::start(&["controller"]);
+    assert_eq!(
+        identified(&["--rig", &rig.1, "--controller", &peer.1]),
+        direct
+    );
+    for server in [rig, peer] {
+        let report = server.report();
+        assert!(
+            report.contains("farewell") && report.contains("0 lost"),
+            "{report}"
+        );
+    }
+}
+
+#[test]
+fn a_rig_in_real_time_gives_the_same_sigma_within_5e_3() {
+    let direct = identified(&["--rig", "built-in"]);
+    let rig = Server::start(&["rig", "--json"]);
+    let found = identified(&["--rig", &rig.1]);
+    assert!((sigma(&found) - sigma(&direct)).abs() < 5e-3);
+    let report: Value = serde_json::from_str(&rig.report()).unwrap();
+    println!("{report}");
+    assert_eq!(report["ended"], "farewell");
+    let counted = report["punctuality"]["histogram"].as_array().unwrap();
+    let counted: u64 = counted.iter().map(|class| class.as_u64().unwrap()).sum();
+    assert_eq!(report["samples"].as_u64(), Some(counted));
+}
+
+/// The error must be one message on stderr that names the part, with nothing on stdout.
+fn fails(arguments: &[&str], code: i32, part: &str) {
+    let output = vines(arguments);
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(code), "{arguments:?}: {message}");
+    assert!(message.contains("error: "), "{message}");
+    assert!(message.contains(part), "`{part}` is not in: {message}");
+    assert!(output.stdout.is_empty());
+}
+
+#[test]
+fn a_door_that_leads_nowhere_is_named() {
+    fails(&["identify", "--rig", "no-such.fmu"], 2, "udp://HOST:PORT");
+    fails(
+        &["identify", "--controller", "tcp://127.0.0.1:1"],
+        2,
+        "built-in",
+    );
+    fails(&["identify", "--rig", "udp://127.0.0.1"], 2, "HOST:PORT");
+    let nobody = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let address = format!("udp://{}", nobody.local_addr().unwrap());
+    fails(&["identify", "--rig", &address], 1, "vines rig --listen");
+    fails(
+        &["identify", "--rig", "built-in", "--controller", &address],
+        1,
+        "vines controller --listen",
+    );
+}
+
+#[test]
+fn an_fmu_of_the_other_side_lacks_a_variable_which_is_named() {
+    let (plant, controller) = (fmu("LoViNes.fmu"), fmu("PhaseLock.fmu"));
+    fails(
+        &["identify", "--rig", controller.to_str().unwrap()],
+        1,
+        "`v`",
+    );
+    let arguments = [
+        "identify",
+        "--rig",
+        "built-in",
+        "--controller",
+        plant.to_str().unwrap(),
+    ];
+    fails(&arguments, 1, "`response`");
+}
+
+#[test]
+fn nothing_goes_beyond_this_machine_unless_told_to() {
+    for arguments in [
+        ["rig", "--listen", "0.0.0.0:0"],
+        ["controller", "--listen", "[::]:0"],
+        ["identify", "--rig", "udp://192.0.2.1:5510"],
+    ] {
+        fails(&arguments, 2, "--allow-remote");
+    }
+}
+
+#[test]
+fn a_port_in_use_is_named() {
+    let taken = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
+    let address = taken.local_addr().unwrap().to_string();
+    fails(&["rig", "--listen", &address], 1, &address);
+    fails(&["controller", "--listen", &address], 1, &address);
+}
+
+#[test]
+fn a_rig_of_another_scene_is_refused() {
+    let rig = Server::start(&["rig"]);
+    let coarser = ["--set", "controller.samples_per_period=40"];
+    fails(
+        &[&["identify", "--rig", &rig.1], &coarser[..]].concat(),
+        1,
+        "same scene",
+    );
+}
+
+#[test]
+fn a_server_ends_after_its_duration() {
+    let served = vines(&["rig", "--listen", "127.0.0.1:0", "--duration", "0.1"]);
+    assert!(served.status.success());
+    assert!(String::from_utf8_lossy(&served.stdout).contains("in real time"));
+}
+
+#[cfg(unix)]
+#[test]
+fn a_server_ends_in_order_on_a_signal() {
+    let server = Server::start(&["controller"]);
+    let pid = server.0.id().to_string();
+    assert!(
+        Command::new("kill")
+            .args(["-INT", &pid])
+            .status()
+            .unwrap()
+            .success()
+    );
+    assert_eq!(server.report(), "");
+}
