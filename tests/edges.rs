@@ -1,0 +1,164 @@
+//! The edges: no loss, extreme values, steps that are cut short, masters with irregular clocks.
+
+use lovines::plant::MOST_IMPACTS;
+use lovines::{Drive, Event, Parameters, Plant, State};
+use std::f64::consts::TAU;
+
+/// A particle without loss on a wall that presses on it, leaving it at `speed`.
+fn elastic(speed: f64) -> Plant {
+    let parameters = Parameters {
+        damping: 0.0,
+        ..Parameters::dimensionless(0.01, 0.0, 1.0)
+    };
+    // The base is displaced, so that the spring pulls the wall at w = +b against the particle.
+    let start = State {
+        q1: 0.0,
+        dq1: 0.0,
+        q2: -1.0,
+        dq2: -speed,
+    };
+    let mut plant = Plant::new(parameters, start).unwrap();
+    plant.begin(Drive::held(1.0)).unwrap();
+    plant
+}
+
+#[test]
+fn without_loss_the_particle_never_sticks_and_nothing_is_dissipated() {
+    for speed in [1.0, 1e-2, 1e-4, 1e-5] {
+        let mut plant = elastic(speed);
+        let before = plant.energy(1.0);
+        let outcome = plant.advance(Drive::held(1.0), 3.0).unwrap();
+        assert_eq!(
+            (outcome.stuck, plant.totals().dissipated),
+            (0, 0.0),
+            "{speed}"
+        );
+        assert!(outcome.impacts > 0, "{speed}");
+        let drift = (plant.energy(1.0) - before).abs() / before;
+        assert!(drift < 1e-11, "{speed}: {drift:e}");
+    }
+}
+
+#[test]
+fn a_step_that_is_cut_short_reports_how_far_it_came() {
+    // Hops of 2e-9 of the natural time: more of them than a step may follow.
+    let mut plant = elastic(1e-9);
+    let mut last = 0.0;
+    let outcome = plant
+        .advance_with(Drive::held(1.0), 1.0, |event| {
+            if let Event::Impact { t, .. } = event {
+                last = t;
+            }
+        })
+        .unwrap();
+    assert!(outcome.cut_short);
+    assert_eq!(outcome.impacts, MOST_IMPACTS);
+    assert_eq!((outcome.stuck, plant.totals().dissipated), (0, 0.0));
+    // 10^7 hops of 2e-9, nearly.
+    assert!((outcome.elapsed - 0.02).abs() < 1e-3, "{}", outcome.elapsed);
+    assert_eq!(plant.time(), outcome.elapsed);
+    assert_eq!(last, outcome.elapsed);
+    // The next step goes on from there.
+    let more = plant.advance(Drive::held(1.0), 1e-3).unwrap();
+    assert_eq!((more.elapsed, more.cut_short), (1e-3, false));
+}
+
+#[test]
+fn an_invalid_drive_or_step_is_refused_and_changes_nothing() {
+    let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
+    let start = State {
+        dq2: 0.5,
+        ..State::default()
+    };
+    let mut plant = Plant::new(parameters, start).unwrap();
+    let drive = Drive::harmonic(0.01, 1.0);
+    plant.advance(drive, 1.0).unwrap();
+    let before = (plant.state(), *plant.totals(), plant.time(), plant.base());
+    let signal = |signal| Drive {
+        signal,
+        ..Drive::default()
+    };
+    for (bad, named) in [
+        (Drive::harmonic(0.01, f64::INFINITY), "omega"),
+        (Drive::harmonic(0.01, 1e60), "omega"),
+        (Drive::harmonic(f64::NAN, 1.0), "E (amplitude"),
+        (signal([0.0, f64::NAN, 0.0, 0.0]), "der(e)"),
+        (signal([1e200, 0.0, 0.0, 0.0]), "e (base"),
+    ] {
+        let message = plant.advance(bad, 1.0).unwrap_err().to_string();
+        assert!(message.starts_with(named), "{message}");
+    }
+    for duration in [-1.0, f64::NAN, f64::INFINITY] {
+        let message = plant.advance(drive, duration).unwrap_err().to_string();
+        assert!(message.starts_with("duration"), "{message}");
+    }
+    assert_eq!(
+        (plant.state(), *plant.totals(), plant.time(), plant.base()),
+        before
+    );
+}
+
+#[test]
+fn steps_that_differ_in_their_last_digits_end_where_equal_ones_do() {
+    let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
+    let start = State {
+        q1: -0.42,
+        dq1: 0.01,
+        q2: -0.99,
+        dq2: -0.86,
+    };
+    let drive = Drive::harmonic(0.0084 * 1.1, 0.990_417);
+    let mut equal = Plant::new(parameters, start).unwrap();
+    let mut irregular = equal;
+    let step = 2f64.powi(-4);
+    let mut clock = 0.0;
+    for n in 1..=20_000 {
+        equal.advance(drive, step).unwrap();
+        // A master whose clock is a sum of rounded steps.
+        let jitter = if n % 20_000 == 0 {
+            0.0
+        } else {
+            1e-13 * f64::from(n % 7)
+        };
+        let next = f64::from(n) * step * (1.0 + jitter);
+        irregular.advance(drive, next - clock).unwrap();
+        clock = next;
+    }
+    let (a, b) = (equal.state(), irregular.state());
+    let worst = [a.q1 - b.q1, a.dq1 - b.dq1, a.q2 - b.q2, a.dq2 - b.dq2]
+        .iter()
+        .fold(0.0f64, |worst, x| worst.max(x.abs()));
+    assert_eq!(equal.totals().impacts, irregular.totals().impacts);
+    assert!(worst < 1e-11, "{worst:e}");
+}
+
+#[test]
+fn a_drive_that_changes_at_every_sample_gives_the_motion_of_the_plain_solver() {
+    let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
+    let start = State {
+        q1: -0.42,
+        dq1: 0.01,
+        q2: -0.99,
+        dq2: -0.86,
+    };
+    let mut fast = Plant::new(parameters, start).unwrap();
+    let mut plain = fast;
+    plain.set_fast_path(false);
+    let step = TAU / 100.0;
+    for n in 0..3000 {
+        let slow = (1e-3 * f64::from(n)).sin();
+        let drive = Drive {
+            signal: [1e-3 * slow, 1e-4 * slow, 0.0, 0.0],
+            ..Drive::harmonic(0.0084 * (1.1 + 0.1 * slow), 0.99 + 1e-3 * slow)
+        };
+        fast.advance(drive, step).unwrap();
+        plain.advance(drive, step).unwrap();
+    }
+    let (a, b) = (fast.state(), plain.state());
+    assert_eq!(fast.totals().impacts, plain.totals().impacts);
+    let off = (a.q1 - b.q1)
+        .abs()
+        .max((a.dq1 - b.dq1).abs())
+        .max((a.q2 - b.q2).abs());
+    assert!(off < 1e-12, "{off:e}");
+}
