@@ -158,13 +158,7 @@ const ROWS: &[(&str, &str, Run, Run)] = &[
         |n| steps(quiet(), n, |_| (drive(), STEP), sensors),
     ),
     (
-        "particle stuck: joint motion only",
-        "step of 1/100 period",
-        |n| accelerated(Accelerated::Stuck, n, STEP),
-        |n| accelerated(Accelerated::Free, n, STEP),
-    ),
-    (
-        "the same, hops of 1/300 period not followed",
+        "particle stuck: hops of 1/300 period not followed",
         "step of 1/100 period",
         |n| accelerated(Accelerated::Stuck, n, STEP),
         |n| accelerated(Accelerated::Hopping, n, STEP),
