@@ -424,7 +424,9 @@ fn arrive(
     let w = start.sample.w + (increment.y + start.drift * propagator.t);
     let slowness = 1.0 / (start.point.dy + increment.dy + start.drift);
     let first = (wall.sign() * start.half_width() - w) * slowness;
-    if !(first.abs() < 256.0 * coefficients.near) {
+    // Not so if it is not a number.
+    let is_near = first.abs() < 256.0 * coefficients.near;
+    if !is_near {
         return Err(propagator.t + first);
     }
     let nearby = Nearby::new(coefficients, amplitude, &start.point, &increment);
