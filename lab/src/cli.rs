@@ -4,7 +4,7 @@ mod backbone;
 mod chain;
 mod controller;
 mod decay;
-mod door;
+mod endpoint;
 mod failure;
 mod identify;
 mod map;

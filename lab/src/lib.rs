@@ -10,5 +10,5 @@ pub use vines_fmu as fmu;
 pub use vines_model::{map, numerics, orbit, regime, theory};
 pub use vines_net as net;
 pub use vines_testbench::{
-    backbone, comparison, estimators, experiment, identification, rig, scene, stages,
+    backbone, chain_effects, comparison, estimators, experiment, identification, rig, scene,
 };

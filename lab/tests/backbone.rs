@@ -16,8 +16,13 @@ fn scene(settings: &[&str]) -> Scene {
 
 fn tracked(settings: &[&str]) -> TrackedComparison {
     let scene = scene(settings);
-    let mut rig = Chain::new(Box::new(Simulated::new(&scene).unwrap()), &scene);
-    let mut controller = BuiltIn::for_backbone(&scene).unwrap();
+    let mut rig = Chain::new(
+        Box::new(Simulated::new(scene.plant, scene.start).unwrap()),
+        &scene.chain,
+        &scene.dimensionless(),
+        scene.controller.samples_per_period,
+    );
+    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
     let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
     let report = TrackedComparison::of(&tracked, &scene);
     println!(

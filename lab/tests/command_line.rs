@@ -70,7 +70,11 @@ fn a_person_gets_tables() {
 
 #[test]
 fn bad_input_ends_with_code_two_and_one_message() {
-    fails(&["orbit", "--set", "plant.r=1.5"], 2, "plant.r = 1.5");
+    fails(
+        &["orbit", "--set", "plant.r=1.5"],
+        2,
+        "r (coefficient of restitution) = 1.5",
+    );
     fails(&["orbit", "--set", "plant.rr=0.5"], 2, "`rr`");
     fails(&["orbit", "--set", "nonsense"], 2, "section.key=value");
     fails(&["theory", "--scene", "no-such.toml"], 2, "no-such.toml");
@@ -102,7 +106,11 @@ fn packing_refuses_what_it_cannot_pack_before_it_writes() {
     let pack = |option: &[&'static str]| [&["pack", "--out", out], option].concat();
     fails(&pack(&["--binary", "win64"]), 2, "PLATFORM=PATH");
     fails(&pack(&["--binary", "amiga=x.so"]), 2, "amiga");
-    fails(&pack(&["--set", "plant.r=2"]), 2, "plant.r = 2");
+    fails(
+        &pack(&["--set", "plant.r=2"]),
+        2,
+        "r (coefficient of restitution) = 2",
+    );
     fails(&pack(&["--portable"]), 2, "--portable cannot be done");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -5,8 +5,8 @@ use vines::experiment::{self, ExperimentError, Plan, Record};
 use vines::identification::{IdentificationError, Regime, identify};
 use vines::net::LinkError;
 use vines::rig::{
-    BuiltIn, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated,
-    Witness,
+    BuiltIn, Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors,
+    Simulated,
 };
 use vines::scene::{Override, Scene};
 
@@ -21,8 +21,8 @@ fn plan(scene: &Scene) -> Plan {
 }
 
 fn measure(scene: &Scene) -> Record {
-    let mut rig = Simulated::new(scene).unwrap();
-    let mut controller = BuiltIn::new(scene).unwrap();
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     experiment::run(&mut rig, &mut controller, &plan(scene), |_, _, _| {}).unwrap()
 }
 
@@ -101,7 +101,7 @@ impl Rig for Noise {
 #[test]
 fn noise_is_never_locked() {
     let scene = scene(&["record.lock_periods=300"]);
-    let mut controller = BuiltIn::new(&scene).unwrap();
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let outcome = experiment::run(&mut Noise(1), &mut controller, &plan(&scene), |_, _, _| {});
     assert!(matches!(outcome, Err(ExperimentError::NoLock { .. })));
 }
@@ -122,9 +122,9 @@ impl Rig for Mute {
 /// What is identified on a rig that does not tell its impacts.
 fn identified_mute(settings: &[&str]) -> Result<Comparison, IdentificationError> {
     let scene = scene(settings);
-    let mut rig = Mute(Simulated::new(&scene).unwrap());
-    assert_eq!(rig.witness().unwrap(), None::<Witness>);
-    let mut controller = BuiltIn::new(&scene).unwrap();
+    let mut rig = Mute(Simulated::new(scene.plant, scene.start).unwrap());
+    assert_eq!(rig.ground_truth().unwrap(), None::<GroundTruth>);
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let record = experiment::run(&mut rig, &mut controller, &plan(&scene), |_, _, _| {}).unwrap();
     Ok(Comparison::of(&identify(&record, &scene)?, &scene))
 }
@@ -215,7 +215,7 @@ fn an_experiment_takes_any_controller_and_records_every_stage() {
         "record.decay_periods=2",
         "record.window_periods=1.5",
     ]);
-    let mut rig = Simulated::new(&scene).unwrap();
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
     let drive = Drive {
         omega: 1.0,
         amplitude: 0.01,
@@ -237,8 +237,8 @@ fn an_experiment_takes_any_controller_and_records_every_stage() {
 fn limits_of_a_scene_reach_the_controller() {
     let run = |settings: &[&str]| {
         let scene = scene(settings);
-        let mut rig = Simulated::new(&scene).unwrap();
-        let mut controller = BuiltIn::new(&scene)?;
+        let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+        let mut controller = BuiltIn::new(&scene.controller_config())?;
         let mut drives = Vec::new();
         for _ in 0..4000 {
             let command = controller.sample(rig.sense().unwrap(), true).unwrap();

@@ -143,8 +143,8 @@ fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
 
 /// Where the lab's own loop locks.
 fn own_sigma(scene: &Scene) -> f64 {
-    let mut rig = Simulated::new(scene).unwrap();
-    let mut controller = BuiltIn::new(scene).unwrap();
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let plan = Plan::of(scene);
     let record = experiment::run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
     identify(&record, scene).unwrap().lock.sigma

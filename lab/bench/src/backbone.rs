@@ -6,7 +6,7 @@
 //! that little is left to settle.
 
 mod cycle;
-mod forecast;
+mod predictor;
 mod settle;
 mod track;
 

@@ -12,7 +12,7 @@ use thiserror::Error;
 use crate::comparison::COMPARED_ABOVE;
 use crate::experiment::{self, ExperimentError, Plan, Record, Sample};
 use crate::identification::decay_points;
-use crate::rig::{BuiltIn, Command, Drive, Gauss, Rig, RigError, Simulated};
+use crate::rig::{BuiltIn, Command, Drive, NormalDistribution, Rig, RigError, Simulated};
 use crate::scene::{Estimator, Scene};
 use vines_model::numerics::{mean, mean_square, try_bisection};
 
@@ -75,8 +75,8 @@ impl Decay {
     /// # Errors
     /// Settings that are refused, or no lock.
     pub fn of(scene: &Scene) -> Result<Self, EstimatorError> {
-        let mut rig = Simulated::new(scene)?;
-        let mut controller = BuiltIn::new(scene)?;
+        let mut rig = Simulated::new(scene.plant, scene.start)?;
+        let mut controller = BuiltIn::new(&scene.controller_config())?;
         let plan = Plan::of(scene);
         let held = Plan { decay: 0, ..plan };
         let mut record = experiment::run(&mut rig, &mut controller, &held, |_, _, _| {})?;
@@ -86,7 +86,7 @@ impl Decay {
                 time: record.samples.len() as f64 * plan.sample_time,
                 sensors: rig.sense()?,
                 command: Command::default(),
-                witness: rig.witness()?,
+                ground_truth: rig.ground_truth()?,
             });
             rig.advance(Drive::default(), plan.sample_time)?;
         }
@@ -123,9 +123,9 @@ impl Decay {
             let held = record.hold();
             let power = mean_square(held.iter().map(|s| s.sensors.response));
             let deviation = power.sqrt() * 10_f64.powf(-snr / 20.0);
-            let mut gauss = Gauss::new(seed);
+            let mut normal = NormalDistribution::new(seed);
             for sample in &mut record.samples[self.record.released..] {
-                sample.sensors.response += deviation * gauss.next();
+                sample.sensors.response += deviation * normal.next();
             }
         }
         record

@@ -2,7 +2,9 @@
 
 use thiserror::Error;
 
-use crate::rig::{Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Witness};
+use crate::rig::{
+    Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors,
+};
 use crate::scene::Scene;
 
 /// How long each stage may or shall last, in samples.
@@ -55,7 +57,7 @@ pub struct Sample {
     /// What the controller answered: the drive from now to the next sample.
     pub command: Command,
     /// What happens inside a simulated rig.
-    pub witness: Option<Witness>,
+    pub ground_truth: Option<GroundTruth>,
 }
 
 /// Everything that was measured.
@@ -134,7 +136,7 @@ pub fn run(
             time: samples.len() as f64 * plan.sample_time,
             sensors,
             command,
-            witness: rig.witness()?,
+            ground_truth: rig.ground_truth()?,
         });
         rig.advance(command.drive, plan.sample_time)?;
         Ok(command)

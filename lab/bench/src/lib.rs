@@ -4,10 +4,10 @@
 #![forbid(unsafe_code)]
 
 pub mod backbone;
+pub mod chain_effects;
 pub mod comparison;
 pub mod estimators;
 pub mod experiment;
 pub mod identification;
 pub mod rig;
 pub mod scene;
-pub mod stages;

@@ -9,11 +9,10 @@ mod simulated;
 
 pub use ::phase_lock::Move;
 pub use chain::Chain;
-pub(crate) use chain::Gauss;
+pub(crate) use chain::NormalDistribution;
 pub use error::{ControllerError, RigError};
 pub use phase_lock::BuiltIn;
-pub use phase_lock::configuration;
-pub use simulated::{Simulated, start_values};
+pub use simulated::Simulated;
 
 /// What the controller asks of the rig for the coming sample period.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -37,7 +36,7 @@ pub struct Sensors {
 
 /// What only a simulated rig can tell, beside its sensors.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Witness {
+pub struct GroundTruth {
     /// Impacts since the start.
     pub impacts: i64,
     /// Time of the last one, s.
@@ -74,7 +73,7 @@ pub trait Rig {
     ///
     /// # Errors
     /// As [`Rig::sense`].
-    fn witness(&mut self) -> Result<Option<Witness>, RigError> {
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         Ok(None)
     }
 }

@@ -2,6 +2,7 @@
 
 mod backbone;
 mod chain;
+mod configuration;
 mod controller;
 mod error;
 mod overrides;
@@ -15,12 +16,11 @@ use std::path::Path;
 use lovines::{Parameters, State};
 use serde::Serialize;
 
-pub use backbone::{Backbone, Feed};
+pub use backbone::{Backbone, Predictor};
 pub use chain::{Chain, RatioOf};
 pub use controller::Controller;
 pub use error::SceneError;
 pub use overrides::{Override, SyntaxError};
-pub(crate) use plant::symbols;
 pub use record::{Estimator, Record};
 pub use vines_model::Dimensionless;
 

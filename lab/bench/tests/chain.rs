@@ -1,8 +1,8 @@
 //! The measurement chain between rig and controller.
 
+use vines_testbench::chain_effects::{Effect, effect};
 use vines_testbench::rig::{Chain, Drive, Rig, RigError, Sensors, Simulated};
 use vines_testbench::scene::{Override, Scene};
-use vines_testbench::stages::{Effect, effect};
 
 fn scene(settings: &[&str]) -> Scene {
     let overrides: Vec<Override> = settings.iter().map(|s| s.parse().unwrap()).collect();
@@ -12,6 +12,11 @@ fn scene(settings: &[&str]) -> Scene {
 
 fn at(settings: &[&str]) -> Effect {
     effect("", &scene(settings)).unwrap()
+}
+
+fn chained(rig: impl Rig + 'static, scene: &Scene) -> Chain {
+    let samples = scene.controller.samples_per_period;
+    Chain::new(Box::new(rig), &scene.chain, &scene.dimensionless(), samples)
 }
 
 #[test]
@@ -45,8 +50,8 @@ fn a_delay_that_nobody_compensates_is_seen_and_one_common_to_both_sensors_is_not
 #[test]
 fn a_chain_that_is_off_gives_the_same_bits() {
     let scene = scene(&[]);
-    let bare = || Simulated::new(&scene).unwrap();
-    let (mut rig, mut behind) = (bare(), Chain::new(Box::new(bare()), &scene));
+    let bare = || Simulated::new(scene.plant, scene.start).unwrap();
+    let (mut rig, mut behind) = (bare(), chained(bare(), &scene));
     let drive = Drive {
         omega: 1.0,
         amplitude: 0.01,
@@ -78,7 +83,7 @@ impl Rig for Counter {
 
 #[test]
 fn a_delay_keeps_the_order_of_both_sensors_and_begins_in_silence() {
-    let mut chain = Chain::new(Box::new(Counter(0.0)), &scene(&["chain.delay=2"]));
+    let mut chain = chained(Counter(0.0), &scene(&["chain.delay=2"]));
     let read: Vec<_> = (0..5).map(|_| chain.sense().unwrap()).collect();
     let expected = [0.0, 0.0, 1.0, 2.0, 3.0];
     for (sensors, value) in read.iter().zip(expected) {
@@ -89,7 +94,7 @@ fn a_delay_keeps_the_order_of_both_sensors_and_begins_in_silence() {
 
 #[test]
 fn a_rig_without_an_input_for_samples_says_so() {
-    let mut chain = Chain::new(Box::new(Counter(0.0)), &scene(&["chain.hold=true"]));
+    let mut chain = chained(Counter(0.0), &scene(&["chain.hold=true"]));
     let refused = chain.advance(Drive::default(), 0.1).unwrap_err();
     assert!(matches!(refused, RigError::NoHold), "{refused}");
 }

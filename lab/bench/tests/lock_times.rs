@@ -25,8 +25,8 @@ fn periods(bandwidth: f64, tolerance: f64) -> f64 {
     ];
     let overrides: Vec<Override> = settings.iter().map(|s| s.parse().unwrap()).collect();
     let scene = Scene::load(None, &overrides).unwrap();
-    let mut rig = Simulated::new(&scene).unwrap();
-    let mut controller = BuiltIn::new(&scene).unwrap();
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let step = scene.sample_time();
     let mut turns = 0.0;
     while turns < 400.0 {

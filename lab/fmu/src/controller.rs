@@ -3,15 +3,14 @@
 use std::path::Path;
 
 use phase_lock::{Config, PARAMETERS, Value};
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Sensors, configuration};
-use vines_testbench::scene::Scene;
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Sensors};
 
 use crate::instance::{Fmu, FmuError, Kind, Reference};
 
 /// A controller FMU, stepped sample by sample.
 ///
 /// It needs the inputs `response` and `active` and the outputs `omega`, `E` and `settled`; `reference`, `drive` and `phase_error`
-/// are used where it has them. Of the scene's settings it gets those that it has a parameter for, by the names of
+/// are used where it has them. Of the configuration it gets what it has a parameter for, by the names of
 /// `PhaseLock.fmu`. At each sample its inputs are set, it is stepped by one sample time, and what it then puts out is
 /// the drive of that very sample period.
 pub struct FmuController {
@@ -28,20 +27,20 @@ pub struct FmuController {
 }
 
 impl FmuController {
-    /// Loads the controller at `path` and initialises it with the settings of the scene.
+    /// Loads the controller at `path` and initialises it with a configuration.
     ///
     /// # Errors
     /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
-    pub fn load(path: &Path, scene: &Scene) -> Result<Self, FmuError> {
+    pub fn load(path: &Path, config: &Config) -> Result<Self, FmuError> {
         let mut fmu = Fmu::load(path, "controller")?;
         let mut sensors = vec![fmu.need(Kind::Real, "response")?];
         sensors.extend(fmu.find(Kind::Real, "reference"));
         let active = fmu.need(Kind::Boolean, "active")?;
         let drive = [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?];
         let settled = fmu.need(Kind::Boolean, "settled")?;
-        fmu.start(&parameters(&configuration(scene)))?;
+        fmu.start(&parameters(config))?;
         Ok(Self {
-            sample_time: scene.sample_time(),
+            sample_time: config.sample_time,
             sensors,
             active,
             drive,

@@ -3,8 +3,7 @@
 use std::path::Path;
 
 use phase_lock::Value;
-use vines_testbench::rig::{Drive, Rig, RigError, Sensors, Witness, start_values};
-use vines_testbench::scene::Scene;
+use vines_testbench::rig::{Drive, GroundTruth, Rig, RigError, Sensors};
 
 use crate::instance::{Fmu, FmuError, Kind, Reference};
 
@@ -12,7 +11,7 @@ use crate::instance::{Fmu, FmuError, Kind, Reference};
 ///
 /// It needs the inputs `omega` and `E` and the output `v`; with the input `e` it can be driven by held samples, too. Where it has `base`, that is the reference sensor; where it has
 /// `impacts`, `impact_time`, `impact_velocity` and `der(q2)`, it tells its impacts. The parameters `M`, `k`, `c`, `m`, `b`, `r`
-/// and the start `q1`, `der(q1)`, `q2`, `der(q2)` are those of the scene, as far as the FMU has them.
+/// and the start `q1`, `der(q1)`, `q2`, `der(q2)` are set as far as the FMU has them.
 pub struct FmuRig {
     fmu: Fmu,
     inputs: [Reference; 2],
@@ -32,15 +31,18 @@ struct Inside {
 }
 
 impl FmuRig {
-    /// Loads the plant at `path` and initialises it with the parameters and the start of the scene.
+    /// Loads the plant at `path` and initialises it with parameters and a start, under the names of `LoViNes.fmu`.
     ///
     /// # Errors
     /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
-    pub fn load(path: &Path, scene: &Scene) -> Result<Self, FmuError> {
+    pub fn load(path: &Path, values: &[(&str, f64)]) -> Result<Self, FmuError> {
         let mut fmu = Fmu::load(path, "plant")?;
         let inputs = [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?];
         let response = fmu.need(Kind::Real, "v")?;
-        fmu.start(&start_values(scene).map(|(name, value)| (name, Value::Real(value))))?;
+        let values = values
+            .iter()
+            .map(|(name, value)| (*name, Value::Real(*value)));
+        fmu.start(&values.collect::<Vec<_>>())?;
         Ok(Self {
             inputs,
             held: fmu.find(Kind::Real, "e"),
@@ -99,7 +101,7 @@ impl Rig for FmuRig {
         Ok(self.fmu.step(step)?)
     }
 
-    fn witness(&mut self) -> Result<Option<Witness>, RigError> {
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         let Some(inside) = self.inside else {
             return Ok(None);
         };
@@ -109,7 +111,7 @@ impl Rig for FmuRig {
         let mut impacts = [0];
         self.fmu
             .ask(tell, |i| i.get_integer(&[inside.impacts], &mut impacts))?;
-        Ok(Some(Witness {
+        Ok(Some(GroundTruth {
             impacts: i64::from(impacts[0]),
             impact_time,
             impact_velocity,

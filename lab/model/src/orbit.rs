@@ -13,10 +13,10 @@ mod flight;
 mod impact_map;
 mod multipliers;
 mod oscillator;
+mod pattern;
 mod periodic;
 mod search;
 mod settle;
-mod shape;
 
 use serde::Serialize;
 
@@ -27,10 +27,10 @@ pub use continuation::{
 pub use convergence::{Convergence, Difference, convergence};
 pub use curves::{Response, backbone, response};
 pub use impact_map::{Bounce, ImpactMap};
+pub use pattern::{ImpactPattern, Unknowns};
 pub use periodic::{Condition, Periodic};
 pub use search::{exact_backbone, phase_resonant};
 pub use settle::settle;
-pub use shape::{Shape, Unknowns};
 
 /// An exact symmetric 1:1 orbit at phase resonance: the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -25,7 +25,7 @@ pub use decay::{Decay, DecayPoint};
 pub use epmc::Epmc;
 pub use equilibrium::Equilibrium;
 pub use manifold::{BranchSide, Manifold};
-pub use modulation::{Modulation, Walk};
+pub use modulation::{ImpactSequence, Modulation};
 pub use response::ResponsePoint;
 pub use slow_flow::{Coefficients, SlowFlow};
 pub use stability::{B_SYMMETRY_BREAKING, half_period_map, impacts_stable};

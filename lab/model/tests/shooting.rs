@@ -5,7 +5,7 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use vines_model::{
     Dimensionless,
     orbit::{
-        Bifurcation, Branch, Condition, Ended, Limits, Periodic, Shape, Unknowns,
+        Bifurcation, Branch, Condition, Ended, ImpactPattern, Limits, Periodic, Unknowns,
         asymmetric_branch, continue_both_ways, convergence, exact_backbone, phase_resonant, settle,
     },
     theory::{B_SYMMETRY_BREAKING, SlowFlow},
@@ -31,7 +31,7 @@ fn from_theory(scene: &Dimensionless, b: f64) -> Option<Periodic> {
     let conditions = [Condition::Excitation(scene.g), Condition::PhaseResonance];
     Periodic::find(
         scene,
-        &Shape::symmetric(),
+        &ImpactPattern::symmetric(),
         &Unknowns::from(guess),
         conditions,
     )
@@ -61,7 +61,7 @@ fn shooting_and_the_closed_form_agree_to_rounding() {
         let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
         let found = Periodic::find(
             &scene(1.1),
-            &Shape::symmetric(),
+            &ImpactPattern::symmetric(),
             &orbit.unknowns(),
             conditions,
         )
@@ -81,7 +81,13 @@ fn response(g: f64) -> (Dimensionless, Branch) {
     };
     let orbit = phase_resonant(&scene).into_iter().max_by(fastest).unwrap();
     let conditions = [Condition::Excitation(g), Condition::PhaseResonance];
-    let start = Periodic::find(&scene, &Shape::symmetric(), &orbit.unknowns(), conditions).unwrap();
+    let start = Periodic::find(
+        &scene,
+        &ImpactPattern::symmetric(),
+        &orbit.unknowns(),
+        conditions,
+    )
+    .unwrap();
     let branch = continue_both_ways(&scene, &start, Condition::Excitation(g), &Limits::default());
     (scene, branch)
 }
@@ -92,7 +98,7 @@ fn distance_of_plant(scene: &Dimensionless, motion: &Periodic, periods: u32) -> 
     let mut plant = scene.plant([q1, dq1, q2, dq2]).unwrap();
     let omega = 1.0 + scene.epsilon * motion.sigma;
     let drive = lovines::Drive::harmonic(scene.epsilon * motion.g, omega);
-    let whole = motion.shape.periods();
+    let whole = motion.pattern.periods();
     (0..periods).fold(0.0, |most, _| {
         for _ in 0..whole {
             plant.advance(drive, TAU / omega);
@@ -183,7 +189,13 @@ fn the_exact_backbone_continued_is_the_closed_form() {
         .find(|one| one.stable)
         .unwrap();
     let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
-    let start = Periodic::find(&scene, &Shape::symmetric(), &orbit.unknowns(), conditions).unwrap();
+    let start = Periodic::find(
+        &scene,
+        &ImpactPattern::symmetric(),
+        &orbit.unknowns(),
+        conditions,
+    )
+    .unwrap();
     let branch = continue_both_ways(
         &scene,
         &start,
@@ -219,7 +231,13 @@ fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
         .find(|one| one.c > 0.2)
         .unwrap();
     let conditions = [Condition::Sigma(mode.sigma), Condition::PhaseResonance];
-    let start = Periodic::find(&scene, &Shape::symmetric(), &mode.unknowns(), conditions).unwrap();
+    let start = Periodic::find(
+        &scene,
+        &ImpactPattern::symmetric(),
+        &mode.unknowns(),
+        conditions,
+    )
+    .unwrap();
     let limits = Limits {
         sigma: [-3.0, 0.5],
         points: 200,
@@ -259,9 +277,9 @@ fn motions_with_more_impacts_are_found_where_they_settle() {
         if let Some(motion) = settle(&scene, sigma, [0.0, 0.0, 0.0, 0.9], 800).unwrap() {
             assert!(motion.stable && distance_of_plant(&scene, &motion, 3) < 1e-9);
             patterns.push((
-                motion.shape.impacts(),
-                motion.shape.periods(),
-                motion.shape.mirrored,
+                motion.pattern.impacts(),
+                motion.pattern.periods(),
+                motion.pattern.mirrored,
             ));
         }
     }
@@ -276,7 +294,7 @@ fn a_motion_with_more_impacts_is_followed_like_any_other() {
     let motion = settle(&scene, -0.6, [0.0, 0.0, 0.0, 0.9], 800)
         .unwrap()
         .expect("a pattern");
-    assert!(motion.shape.impacts() > 2);
+    assert!(motion.pattern.impacts() > 2);
     let limits = Limits {
         points: 40,
         ..Limits::default()
@@ -289,8 +307,8 @@ fn a_motion_with_more_impacts_is_followed_like_any_other() {
         .collect();
     println!(
         "{} impacts in {} periods, followed through {} motions: {kinds:?}",
-        motion.shape.impacts(),
-        motion.shape.periods(),
+        motion.pattern.impacts(),
+        motion.pattern.periods(),
         branch.points.len()
     );
     assert!(branch.points.len() > 20);
@@ -316,7 +334,13 @@ fn a_branch_says_why_it_ended() {
         .find(|one| one.stable)
         .unwrap();
     let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
-    let start = Periodic::find(&scene, &Shape::symmetric(), &orbit.unknowns(), conditions).unwrap();
+    let start = Periodic::find(
+        &scene,
+        &ImpactPattern::symmetric(),
+        &orbit.unknowns(),
+        conditions,
+    )
+    .unwrap();
     let limits = Limits {
         points: 5,
         ..Limits::default()

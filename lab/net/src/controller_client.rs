@@ -63,7 +63,7 @@ impl NetController {
         }
         let reading = Reading {
             sensors,
-            witness: None,
+            ground_truth: None,
         };
         let mut frame = write_reading(self.client.frame(Kind::Sensors, self.at), &reading);
         frame.flags |= if active { flag::ACTIVE } else { 0 };

@@ -1,26 +1,29 @@
 //! The six values of a frame: readings or a drive.
 
 use super::frame::{Frame, Kind, flag};
-use vines_testbench::rig::{Command, Drive, Sensors, Witness};
+use vines_testbench::rig::{Command, Drive, GroundTruth, Sensors};
 
 /// Readings of a sample.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub(super) struct Reading {
     pub sensors: Sensors,
-    pub witness: Option<Witness>,
+    pub ground_truth: Option<GroundTruth>,
 }
 
 /// Writes readings into a frame.
 pub(super) fn write_reading(mut frame: Frame, reading: &Reading) -> Frame {
-    let Reading { sensors, witness } = reading;
+    let Reading {
+        sensors,
+        ground_truth,
+    } = reading;
     frame.kind = Kind::Sensors;
     if sensors.reference.is_some() {
         frame.flags |= flag::REFERENCE;
     }
-    if witness.is_some() {
-        frame.flags |= flag::WITNESS;
+    if ground_truth.is_some() {
+        frame.flags |= flag::GROUND_TRUTH;
     }
-    let inside = witness.unwrap_or_default();
+    let inside = ground_truth.unwrap_or_default();
     frame.values = [
         sensors.response,
         sensors.reference.unwrap_or(0.0),
@@ -47,7 +50,7 @@ pub(super) fn read_reading(frame: &Frame) -> Reading {
             response,
             reference: frame.has(flag::REFERENCE).then_some(reference),
         },
-        witness: frame.has(flag::WITNESS).then_some(Witness {
+        ground_truth: frame.has(flag::GROUND_TRUTH).then_some(GroundTruth {
             impacts: impacts as i64,
             impact_time,
             impact_velocity,
@@ -100,10 +103,10 @@ mod tests {
 
     proptest! {
         #[test]
-        fn readings_survive_the_frame(response: f64, reference: Option<f64>, witness: Option<(i32, f64, f64, f64)>) {
+        fn readings_survive_the_frame(response: f64, reference: Option<f64>, ground_truth: Option<(i32, f64, f64, f64)>) {
             let reading = Reading {
                 sensors: Sensors { response, reference },
-                witness: witness.map(|(impacts, impact_time, impact_velocity, particle_velocity)| Witness {
+                ground_truth: ground_truth.map(|(impacts, impact_time, impact_velocity, particle_velocity)| GroundTruth {
                     impacts: impacts.into(), impact_time, impact_velocity, particle_velocity,
                 }),
             };

@@ -8,7 +8,7 @@ use super::error::LinkError;
 use super::frame::{Frame, Kind};
 use super::payload::{Reading, read_reading, write_command};
 use super::sequence_window::{Arrival, SequenceWindow};
-use vines_testbench::rig::{Command, Drive, Rig, RigError, Sensors, Witness};
+use vines_testbench::rig::{Command, Drive, GroundTruth, Rig, RigError, Sensors};
 
 /// A rig at a network address.
 ///
@@ -125,7 +125,7 @@ impl Rig for NetRig {
         Ok(self.drive(drive, step)?)
     }
 
-    fn witness(&mut self) -> Result<Option<Witness>, RigError> {
-        Ok(self.reading()?.witness)
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        Ok(self.reading()?.ground_truth)
     }
 }

@@ -196,7 +196,7 @@ impl RigServer {
         self.session.horizon = run.at;
         let reading = Reading {
             sensors: run.rig.sense()?,
-            witness: run.rig.witness()?,
+            ground_truth: run.rig.ground_truth()?,
         };
         let mut frame = write_reading(self.session.answer(Kind::Sensors, run.at), &reading);
         if run.watchdog.is_latched() {

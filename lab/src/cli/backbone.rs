@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
 use super::{
-    door::{Door, OpenRig, ReachArguments},
+    endpoint::{Endpoint, OpenRig, ReachArguments},
     failure::Failure,
     json,
     scene_arguments::SceneArguments,
@@ -26,7 +26,7 @@ Examples:
   vines backbone                                          29 levels from C = 0.7 down to 0.14
   vines backbone --set backbone.C_to=0.2 --set backbone.points=11
   vines backbone --set chain.snr=40 --set chain.seed=7    with sensor noise
-  vines backbone --set backbone.feed='\"theory\"'           with theory for a forecast
+  vines backbone --set backbone.predictor='\"theory\"'           with theory as the predictor
   vines backbone --rig LoViNes.fmu --out out/fmu          another rig: an FMU, or udp://HOST:PORT
 
 Writes tracked.json, tracked.csv and tracked.svg.";
@@ -43,8 +43,8 @@ pub(super) struct Arguments {
     out: PathBuf,
 
     /// What is shaken: `built-in`, an FMU, or udp://HOST:PORT
-    #[arg(long, value_name = "DOOR", default_value = "built-in")]
-    rig: Door,
+    #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
+    rig: Endpoint,
 
     #[command(flatten)]
     reach: ReachArguments,
@@ -60,7 +60,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .filter_level(log::LevelFilter::Warn)
         .format_timestamp(None)
         .init();
-    let mut controller = BuiltIn::for_backbone(&scene).map_err(Failure::input)?;
+    let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(Failure::input)?;
     let OpenRig { mut rig, .. } = arguments.rig.rig(&scene, arguments.reach.reach())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let tracked = track(rig.as_mut(), &mut controller, &scene, |done, _| {

@@ -1,8 +1,8 @@
 //! `vines chain`: what each stage of the measurement chain costs and does.
 
 use clap::Args;
+use vines::chain_effects::{self, Effect};
 use vines::report::Table;
-use vines::stages::{self, Effect};
 
 use super::{failure::Failure, json, scene_arguments::SceneArguments};
 
@@ -29,7 +29,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let effects = stages::effects(|further| arguments.scene.load_with(further));
+    let effects = chain_effects::effects(|further| arguments.scene.load_with(further));
     let effects = effects.map_err(Failure::input)?;
     if arguments.json {
         return json(&effects);

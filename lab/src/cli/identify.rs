@@ -13,7 +13,7 @@ use vines::{
 };
 
 use super::{
-    door::{Door, OpenRig, ReachArguments},
+    endpoint::{Endpoint, OpenRig, ReachArguments},
     failure::Failure,
     json,
     pack::beside_this_program,
@@ -44,12 +44,12 @@ pub(super) struct Arguments {
 
     /// What is shaken: an FMU, `built-in`, or udp://HOST:PORT; without it, this program's plant FMU is packed into the
     /// results' folder
-    #[arg(long, value_name = "DOOR")]
-    rig: Option<Door>,
+    #[arg(long, value_name = "ENDPOINT")]
+    rig: Option<Endpoint>,
 
     /// What controls it: `built-in`, an FMU, or udp://HOST:PORT
-    #[arg(long, value_name = "DOOR", default_value = "built-in")]
-    controller: Door,
+    #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
+    controller: Endpoint,
 
     #[command(flatten)]
     reach: ReachArguments,
@@ -67,12 +67,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .init();
     let reach = arguments.reach.reach();
     // Settings are refused before anything is written or connected.
-    BuiltIn::new(&scene).map_err(Failure::input)?;
+    BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
     let (OpenRig { mut rig, pace }, fmus) = match &arguments.rig {
-        Some(door) => (door.rig(&scene, reach)?, Packed::at(&arguments.out)?),
+        Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&arguments.out)?),
         None => {
             let fmus = Packed::at(&arguments.out)?;
-            (Door::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
+            (Endpoint::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
         }
     };
     let mut controller = arguments.controller.controller(&scene, reach, pace)?;

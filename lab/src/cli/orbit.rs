@@ -152,10 +152,14 @@ fn settled(
     })?;
     let pattern = format!(
         "{} impacts in {} period{}{}",
-        motion.shape.impacts(),
-        motion.shape.periods(),
-        if motion.shape.periods() == 1 { "" } else { "s" },
-        if motion.shape.mirrored {
+        motion.pattern.impacts(),
+        motion.pattern.periods(),
+        if motion.pattern.periods() == 1 {
+            ""
+        } else {
+            "s"
+        },
+        if motion.pattern.mirrored {
             ", mirrored"
         } else {
             ""

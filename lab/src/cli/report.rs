@@ -63,7 +63,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     // Settings are refused before anything is run or written.
-    BuiltIn::new(&scene).map_err(Failure::input)?;
+    BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
     if arguments.x.axis == arguments.y.axis {
         return Err(Failure::input(format!(
             "--x and --y are both {}: take two of sigma, G and r",

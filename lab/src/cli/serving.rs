@@ -12,7 +12,7 @@ use std::{
 use clap::Args;
 use vines::net::{Session, resolve};
 
-use super::{door::ReachArguments, failure::Failure, print};
+use super::{endpoint::ReachArguments, failure::Failure, print};
 
 #[derive(Debug, Args)]
 pub(super) struct ServingArguments {

@@ -29,13 +29,14 @@ pub struct Subject {
 impl Subject {
     /// The plant of the scene, behind its measurement chain where it has one.
     fn rig(&self) -> Result<Box<dyn Rig>, InvalidValue> {
-        let plant = Simulated::new(&self.scene)?;
-        let rig: Box<dyn Rig> = Box::new(plant);
-        Ok(if self.scene.chain.is_on() {
-            Box::new(Chain::new(rig, &self.scene))
-        } else {
-            rig
-        })
+        let plant = Simulated::new(self.scene.plant, self.scene.start)?;
+        let scene = &self.scene;
+        Ok(Chain::around(
+            Box::new(plant),
+            &scene.chain,
+            &scene.dimensionless(),
+            scene.controller.samples_per_period,
+        ))
     }
 }
 

@@ -4,7 +4,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::cycle::Cycle;
-use super::forecast::{self, Known};
+use super::predictor::{self, Known};
 use super::settle::{Criterion, Estimate};
 use crate::experiment::Sample;
 use crate::identification::{Regime, classify, regime_by_response};
@@ -102,7 +102,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
             time: self.taken as f64 * self.sample_time,
             sensors,
             command,
-            witness: self.rig.witness()?,
+            ground_truth: self.rig.ground_truth()?,
         });
         self.taken += 1;
         self.rig.advance(command.drive, self.sample_time)?;
@@ -170,7 +170,7 @@ pub fn track(
                 sigma: point.sigma,
             })
             .collect();
-        let (g, sigma) = forecast::change(settings.feed, &known, level, &slow_flow);
+        let (g, sigma) = predictor::change(settings.predictor, &known, level, &slow_flow);
         bench.controller.hold_response(Move {
             response: level * d.b,
             duration: settings.move_periods * d.natural_period(),
@@ -246,7 +246,7 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         periods: bench.periods - start,
         regime: regime_by_response(averaged, scene),
         regime_by_impacts: bench.samples[0]
-            .witness
+            .ground_truth
             .map(|_| classify(averaged, bench.sample_time, said.omega).1),
         averaged: said.periods,
         settled: found.is_some(),

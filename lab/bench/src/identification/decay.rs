@@ -46,7 +46,7 @@ pub fn decay_points(record: &Record, scene: &Scene) -> Vec<DecayPoint> {
         .last()
         .map_or(d.omega0, |s| s.command.drive.omega);
     let half_period = std::f64::consts::PI / omega;
-    let end = if first.witness.is_some() {
+    let end = if first.ground_truth.is_some() {
         end_of_synchrony(&impacts(decay), half_period).unwrap_or(first.time)
     } else {
         f64::INFINITY
@@ -70,7 +70,7 @@ pub fn decay_points(record: &Record, scene: &Scene) -> Vec<DecayPoint> {
         .map(|piece| {
             let speeds: Option<Vec<f64>> = decay[piece.samples]
                 .iter()
-                .map(|s| s.witness.map(|w| w.particle_velocity.abs()))
+                .map(|s| s.ground_truth.map(|w| w.particle_velocity.abs()))
                 .collect();
             DecayPoint {
                 tau: d.omega0 * piece.time,

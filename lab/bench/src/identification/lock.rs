@@ -68,7 +68,7 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Lock {
     };
     let speeds: Option<Vec<f64>> = hold
         .iter()
-        .map(|s| s.witness.map(|w| w.particle_velocity.abs()))
+        .map(|s| s.ground_truth.map(|w| w.particle_velocity.abs()))
         .collect();
     let (impacts_per_period, regime) = match classify(hold, dt, omega) {
         (count, Regime::Unknown) => (count, regime_by_response(hold, scene)),

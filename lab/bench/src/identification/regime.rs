@@ -9,8 +9,11 @@ use crate::experiment::Sample;
 /// The impacts that the samples tell of; where several fell between two samples, the last one.
 #[must_use]
 pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
-    let witnesses: Vec<_> = samples.iter().filter_map(|sample| sample.witness).collect();
-    witnesses
+    let truths: Vec<_> = samples
+        .iter()
+        .filter_map(|sample| sample.ground_truth)
+        .collect();
+    truths
         .windows(2)
         .filter(|pair| pair[1].impacts > pair[0].impacts)
         .map(|pair| Impact {
@@ -23,8 +26,8 @@ pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
 /// Impacts per period of `omega` (rad/s) over the samples, and the regime they make.
 #[must_use]
 pub fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64, Regime) {
-    let mut witnesses = samples.iter().filter_map(|sample| sample.witness);
-    let (Some(first), Some(last)) = (witnesses.next(), witnesses.next_back()) else {
+    let mut truths = samples.iter().filter_map(|sample| sample.ground_truth);
+    let (Some(first), Some(last)) = (truths.next(), truths.next_back()) else {
         return (f64::NAN, Regime::Unknown);
     };
     let impacts = impacts(samples);

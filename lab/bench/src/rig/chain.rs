@@ -12,11 +12,11 @@ use std::collections::VecDeque;
 
 use converter::Converter;
 use filter::LowPass;
-pub(crate) use noise::Gauss;
+pub(crate) use noise::NormalDistribution;
 use noise::Sensor;
 
-use super::{Drive, Rig, RigError, Sensors, Witness};
-use crate::scene::Scene;
+use super::{Drive, GroundTruth, Rig, RigError, Sensors};
+use crate::scene::{Chain as Settings, Dimensionless};
 
 /// Largest deviation of a sampling instant, in standard deviations.
 const JITTER_MAX: f64 = 4.0;
@@ -27,7 +27,7 @@ pub struct Chain {
     response: Channel,
     base: Option<Channel>,
     output: Option<Converter>,
-    gauss: Gauss,
+    normal: NormalDistribution,
     /// Standard deviation of the sampling instants, in samples.
     jitter: f64,
     /// How far the present sampling instant lies behind its nominal time, in samples.
@@ -46,9 +46,9 @@ struct Channel {
 }
 
 impl Channel {
-    fn read(&mut self, value: f64, elapsed: f64, gauss: &mut Gauss) -> f64 {
+    fn read(&mut self, value: f64, elapsed: f64, normal: &mut NormalDistribution) -> f64 {
         let noisy = match &mut self.sensor {
-            Some(sensor) => sensor.read(value, gauss),
+            Some(sensor) => sensor.read(value, normal),
             None => value,
         };
         let filtered = match &mut self.filter {
@@ -60,21 +60,34 @@ impl Channel {
 }
 
 impl Chain {
-    /// The chain of the scene around `rig`.
+    /// The rig behind its chain, or the rig itself where the chain is off.
     #[must_use]
-    pub fn new(rig: Box<dyn Rig>, scene: &Scene) -> Self {
-        let settings = &scene.chain;
-        let d = scene.dimensionless();
+    pub fn around(
+        rig: Box<dyn Rig>,
+        settings: &Settings,
+        d: &Dimensionless,
+        samples_per_period: f64,
+    ) -> Box<dyn Rig> {
+        if settings.is_on() {
+            Box::new(Self::new(rig, settings, d, samples_per_period))
+        } else {
+            rig
+        }
+    }
+
+    /// The chain around `rig`; `d` has the units of its settings.
+    #[must_use]
+    pub fn new(
+        rig: Box<dyn Rig>,
+        settings: &Settings,
+        d: &Dimensionless,
+        samples_per_period: f64,
+    ) -> Self {
         // The power of a signal is what it was over about one period.
         let channel = |range: f64| Channel {
-            sensor: settings.snr.map(|snr| {
-                Sensor::new(
-                    snr,
-                    settings.snr_of,
-                    range,
-                    scene.controller.samples_per_period,
-                )
-            }),
+            sensor: settings
+                .snr
+                .map(|snr| Sensor::new(snr, settings.snr_of, range, samples_per_period)),
             filter: (settings.filter > 0.0).then(|| LowPass::new(settings.filter * d.omega0)),
             converter: Converter::new(settings.adc_bits, range),
         };
@@ -86,7 +99,7 @@ impl Chain {
             output: settings
                 .hold
                 .then(|| Converter::new(settings.dac_bits, base_range)),
-            gauss: Gauss::new(settings.seed),
+            normal: NormalDistribution::new(settings.seed),
             jitter: settings.jitter,
             late: 0.0,
             under_way: vec![Sensors::default(); settings.delay as usize].into(),
@@ -98,11 +111,11 @@ impl Chain {
 impl Rig for Chain {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let seen = self.rig.sense()?;
-        let (elapsed, gauss) = (self.elapsed, &mut self.gauss);
+        let (elapsed, normal) = (self.elapsed, &mut self.normal);
         self.elapsed = 0.0;
-        let response = self.response.read(seen.response, elapsed, gauss);
+        let response = self.response.read(seen.response, elapsed, normal);
         let reference = match (&mut self.base, seen.reference) {
-            (Some(channel), Some(value)) => Some(channel.read(value, elapsed, gauss)),
+            (Some(channel), Some(value)) => Some(channel.read(value, elapsed, normal)),
             _ => None,
         };
         self.under_way.push_back(Sensors {
@@ -119,7 +132,7 @@ impl Rig for Chain {
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         let late = if self.jitter > 0.0 {
-            self.jitter * self.gauss.next().clamp(-JITTER_MAX, JITTER_MAX)
+            self.jitter * self.normal.next().clamp(-JITTER_MAX, JITTER_MAX)
         } else {
             0.0
         };
@@ -132,7 +145,7 @@ impl Rig for Chain {
         }
     }
 
-    fn witness(&mut self) -> Result<Option<Witness>, RigError> {
-        self.rig.witness()
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        self.rig.ground_truth()
     }
 }

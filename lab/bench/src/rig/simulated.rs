@@ -1,9 +1,8 @@
 //! The plant itself as a rig, with no FMU in between.
 
-use lovines::{InvalidValue, Plant, State};
+use lovines::{InvalidValue, Parameters, Plant, State};
 
-use super::{Drive, Rig, RigError, Sensors, Witness};
-use crate::scene::{Scene, symbols};
+use super::{Drive, GroundTruth, Rig, RigError, Sensors};
 
 /// The plant, stepped directly.
 #[derive(Clone)]
@@ -12,24 +11,14 @@ pub struct Simulated {
 }
 
 impl Simulated {
-    /// The plant of the scene at its start.
+    /// A plant at its start.
     ///
     /// # Errors
     /// A parameter or a start that makes no sense.
-    pub fn new(scene: &Scene) -> Result<Self, InvalidValue> {
-        Ok(Self {
-            plant: Plant::new(scene.plant, scene.start)?,
-        })
+    pub fn new(parameters: Parameters, start: State) -> Result<Self, InvalidValue> {
+        let plant = Plant::new(parameters, start)?;
+        Ok(Self { plant })
     }
-}
-
-/// Parameters and start of the plant, under the names of the FMU's variables.
-#[must_use]
-pub fn start_values(scene: &Scene) -> [(&'static str, f64); 10] {
-    let [mass, k, c, m, b, r] = symbols(&scene.plant);
-    let State { q1, dq1, q2, dq2 } = scene.start;
-    let [q1, dq1] = [("q1", q1), ("der(q1)", dq1)];
-    [mass, k, c, m, b, r, q1, dq1, ("q2", q2), ("der(q2)", dq2)]
 }
 
 impl Rig for Simulated {
@@ -51,9 +40,9 @@ impl Rig for Simulated {
         Ok(())
     }
 
-    fn witness(&mut self) -> Result<Option<Witness>, RigError> {
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         let tally = self.plant.tally();
-        Ok(Some(Witness {
+        Ok(Some(GroundTruth {
             impacts: i64::try_from(tally.impacts).unwrap_or(i64::MAX),
             impact_time: tally.impact_time,
             impact_velocity: tally.impact_velocity,

@@ -7,7 +7,7 @@ use super::{Controller, SceneError, validate::Quantity};
 /// Where the frequency and the drive of the next level are foreseen from.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
-pub enum Feed {
+pub enum Predictor {
     /// From the points before it: a rig needs nothing else.
     Previous,
     /// From first-order theory, as the difference between the two levels.
@@ -45,7 +45,8 @@ pub struct Backbone {
     /// Largest standard error that noise may leave in the same.
     pub precision: f64,
     /// Where the next point's frequency and drive are foreseen from.
-    pub feed: Feed,
+    #[serde(alias = "feed")]
+    pub predictor: Predictor,
 }
 
 impl Default for Backbone {
@@ -61,7 +62,7 @@ impl Default for Backbone {
             dwell_max: 60,
             tolerance: 5e-4,
             precision: 1.2e-3,
-            feed: Feed::Previous,
+            predictor: Predictor::Previous,
         }
     }
 }

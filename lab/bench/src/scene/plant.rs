@@ -88,7 +88,7 @@ impl StartSection {
 }
 
 /// The parameters under their symbols, which are the names of the FMU's variables.
-pub(crate) fn symbols(plant: &Parameters) -> [(&'static str, f64); 6] {
+pub(super) fn symbols(plant: &Parameters) -> [(&'static str, f64); 6] {
     [
         ("M", plant.primary_mass),
         ("k", plant.stiffness),

@@ -8,8 +8,8 @@ use nalgebra::{Matrix4, Matrix6, SVector};
 use serde::Serialize;
 
 use super::{
+    pattern::{Returned, Unknowns, follow},
     periodic::{Condition, Periodic, newton},
-    shape::{Returned, Unknowns, follow},
 };
 use crate::Dimensionless;
 use crate::numerics::try_bisection;
@@ -111,7 +111,7 @@ struct Curve<'a> {
 
 impl Curve<'_> {
     fn tangent(&self, x: &Unknowns, towards: &Unknowns) -> Option<Unknowns> {
-        let returned = follow(self.scene, &self.start.shape, x)?;
+        let returned = follow(self.scene, &self.start.pattern, x)?;
         let mut matrix = Matrix6::zeros();
         matrix.fixed_rows_mut::<4>(0).copy_from(&returned.by);
         matrix.set_row(4, &self.condition.value(x, &returned).1);
@@ -128,7 +128,7 @@ impl Curve<'_> {
         let ahead = x + tangent * step;
         let found = newton(
             self.scene,
-            &self.start.shape,
+            &self.start.pattern,
             ahead,
             |x, returned: &Returned| {
                 let plane = (tangent.dot(&(x - ahead)), tangent.transpose());
@@ -139,7 +139,7 @@ impl Curve<'_> {
     }
 
     fn motion(&self, x: &Unknowns) -> Option<Periodic> {
-        Periodic::at(self.scene, &self.start.shape, x)
+        Periodic::at(self.scene, &self.start.pattern, x)
     }
 
     /// Where the number of multipliers outside the unit circle changes within a step.
@@ -157,7 +157,7 @@ impl Curve<'_> {
             Bifurcation::Torus
         } else if re > 0.0 {
             Bifurcation::Fold
-        } else if self.start.shape.mirrored {
+        } else if self.start.pattern.mirrored {
             Bifurcation::SymmetryBreaking
         } else {
             Bifurcation::PeriodDoubling
@@ -222,7 +222,7 @@ pub fn continue_from(
         branch.points.push(motion);
         // A whole turn of the phase is the same motion.
         let mut apart = next - origin;
-        apart[0] = super::shape::wrapped(apart[0]);
+        apart[0] = super::pattern::wrapped(apart[0]);
         let inside = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
         if branch.points.len() > 10 && apart.norm() < step && turned.dot(&first_tangent) > 0.9 {
             branch.ended = Ended::Closed;
@@ -279,7 +279,7 @@ pub fn asymmetric_branch(
     limits: &Limits,
 ) -> Option<Branch> {
     let symmetric = &breaking.motion;
-    let returned = follow(scene, &symmetric.shape, &symmetric.unknowns())?;
+    let returned = follow(scene, &symmetric.pattern, &symmetric.unknowns())?;
     // The direction that the half-period map turns into its opposite.
     let flipped = returned.monodromy + Matrix4::identity();
     let svd = flipped.svd(false, true);
@@ -287,7 +287,7 @@ pub fn asymmetric_branch(
     let mut towards = Unknowns::zeros();
     towards.fixed_rows_mut::<4>(0).copy_from(&aside);
     let doubled = Periodic {
-        shape: symmetric.shape.doubled(),
+        pattern: symmetric.pattern.doubled(),
         ..symmetric.clone()
     };
     let curve = Curve {

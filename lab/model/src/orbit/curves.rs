@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{
-    Bifurcation, Branch, Condition, Limits, Orbit, Periodic, Shape, asymmetric_branch,
+    Bifurcation, Branch, Condition, ImpactPattern, Limits, Orbit, Periodic, asymmetric_branch,
     continue_both_ways, exact_backbone, phase_resonant,
 };
 use crate::Dimensionless;
@@ -26,7 +26,12 @@ fn right_branch(scene: &Dimensionless) -> Option<Periodic> {
     let fastest = |one: &Orbit, other: &Orbit| one.b.total_cmp(&other.b);
     let orbit = phase_resonant(scene).into_iter().max_by(fastest)?;
     let conditions = [Condition::Excitation(scene.g), Condition::PhaseResonance];
-    Periodic::find(scene, &Shape::symmetric(), &orbit.unknowns(), conditions)
+    Periodic::find(
+        scene,
+        &ImpactPattern::symmetric(),
+        &orbit.unknowns(),
+        conditions,
+    )
 }
 
 /// Detunings at which the backbone is met where no motion of it belongs to the scene's G.
@@ -43,7 +48,12 @@ fn at_any_excitation(scene: &Dimensionless) -> Option<Periodic> {
             .max_by(fastest)
             .filter(|one| one.b > right)?;
         let conditions = [Condition::Sigma(sigma), Condition::PhaseResonance];
-        Periodic::find(scene, &Shape::symmetric(), &orbit.unknowns(), conditions)
+        Periodic::find(
+            scene,
+            &ImpactPattern::symmetric(),
+            &orbit.unknowns(),
+            conditions,
+        )
     })
 }
 

@@ -5,7 +5,7 @@ use serde::Serialize;
 
 use super::{
     impact_map::{Bounce, ImpactMap},
-    shape::{Returned, Shape, Unknowns, follow, wrapped},
+    pattern::{ImpactPattern, Returned, Unknowns, follow, wrapped},
 };
 use crate::Dimensionless;
 
@@ -26,7 +26,8 @@ pub struct Periodic {
     #[serde(rename = "B")]
     pub b: f64,
     /// Its pattern.
-    pub shape: Shape,
+    #[serde(rename = "shape")]
+    pub pattern: ImpactPattern,
     /// The states just after the impacts of the map.
     pub bounces: Vec<Bounce>,
     /// Multipliers (real, imaginary) of the map, by rising modulus; those of a mirrored pattern are for half of its period.
@@ -70,19 +71,19 @@ const CONVERGED: f64 = 1e-12;
 const ROUNDS: usize = 30;
 
 impl Periodic {
-    /// The motion with the pattern `shape` near the unknowns `guess` that satisfies both conditions, by Newton's method with
+    /// The motion with the pattern `pattern` near the unknowns `guess` that satisfies both conditions, by Newton's method with
     /// analytic derivatives; None where that leaves the pattern or does not converge.
     #[must_use]
     pub fn find(
         scene: &Dimensionless,
-        shape: &Shape,
+        pattern: &ImpactPattern,
         guess: &Unknowns,
         conditions: [Condition; 2],
     ) -> Option<Self> {
-        let x = newton(scene, shape, *guess, |x, returned| {
+        let x = newton(scene, pattern, *guess, |x, returned| {
             conditions.map(|one| one.value(x, returned))
         })?;
-        Self::at(scene, shape, &x)
+        Self::at(scene, pattern, &x)
     }
 
     /// The unknowns of this motion: (phase, q1, q1', q2') after its first impact, sigma, G.
@@ -99,8 +100,8 @@ impl Periodic {
     }
 
     /// The motion at unknowns that close it.
-    pub(super) fn at(scene: &Dimensionless, shape: &Shape, x: &Unknowns) -> Option<Self> {
-        let returned = follow(scene, shape, x)?;
+    pub(super) fn at(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
+        let returned = follow(scene, pattern, x)?;
         let mut multipliers: [Complex<f64>; 4] = returned.monodromy.complex_eigenvalues().into();
         multipliers.sort_by(|one, other| one.norm().total_cmp(&other.norm()));
         let total: f64 = returned.durations.iter().sum();
@@ -116,7 +117,7 @@ impl Periodic {
             c: returned.v.norm(),
             gamma: wrapped(returned.v.arg()),
             b: travelled / total,
-            shape: shape.clone(),
+            pattern: pattern.clone(),
             bounces: returned.bounces,
             durations: returned.durations,
             stable: multipliers[3].norm() < 1.0,
@@ -149,7 +150,7 @@ impl Periodic {
     /// (q1, q1', q2, q2') where the base is at `phase`, rad, in the motion's first period.
     fn state_at(&self, map: &ImpactMap, phase: f64) -> Option<[f64; 4]> {
         // The bounces of the whole period; a mirrored pattern's other half is minus the first.
-        let half = self.shape.half_periods as f64 * std::f64::consts::PI;
+        let half = self.pattern.half_periods as f64 * std::f64::consts::PI;
         let mirror = |bounce: &Bounce| Bounce {
             phase: bounce.phase + half,
             q1: -bounce.q1,
@@ -159,7 +160,7 @@ impl Periodic {
         };
         let mut bounces = self.bounces.clone();
         let mut period = half;
-        if self.shape.mirrored {
+        if self.pattern.mirrored {
             bounces.extend(self.bounces.iter().map(mirror));
             period = 2.0 * half;
         }
@@ -181,12 +182,12 @@ impl Periodic {
 /// Newton's method for the four equations of closing and two more.
 pub(super) fn newton(
     scene: &Dimensionless,
-    shape: &Shape,
+    pattern: &ImpactPattern,
     mut x: Unknowns,
     conditions: impl Fn(&Unknowns, &Returned) -> [(f64, RowSVector<f64, 6>); 2],
 ) -> Option<Unknowns> {
     for _ in 0..ROUNDS {
-        let returned = follow(scene, shape, &x)?;
+        let returned = follow(scene, pattern, &x)?;
         let mut matrix = Matrix6::zeros();
         let mut right = SVector::<f64, 6>::zeros();
         matrix.fixed_rows_mut::<4>(0).copy_from(&returned.by);

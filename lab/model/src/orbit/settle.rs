@@ -7,8 +7,8 @@ use lovines::{Drive, InvalidValue, State};
 
 use super::{
     impact_map::{Bounce, ImpactMap},
+    pattern::{ImpactPattern, Unknowns},
     periodic::{Condition, Periodic},
-    shape::{Shape, Unknowns},
 };
 use crate::Dimensionless;
 
@@ -44,7 +44,7 @@ fn settled(scene: &Dimensionless, sigma: f64, state: [f64; 4]) -> Option<Periodi
     let bounces: Vec<Bounce> = std::iter::successors(Some(first), |from| map.next(from))
         .take(2 * LONGEST)
         .collect();
-    let shape = pattern(&bounces)?;
+    let pattern = pattern(&bounces)?;
     let Bounce {
         phase,
         q1,
@@ -54,11 +54,11 @@ fn settled(scene: &Dimensionless, sigma: f64, state: [f64; 4]) -> Option<Periodi
     } = first;
     let guess = Unknowns::from([phase, q1, dq1, dq2, sigma, scene.g]);
     let conditions = [Condition::Sigma(sigma), Condition::Excitation(scene.g)];
-    Periodic::find(scene, &shape, &guess, conditions)
+    Periodic::find(scene, &pattern, &guess, conditions)
 }
 
 /// The shortest pattern that the bounces repeat.
-fn pattern(bounces: &[Bounce]) -> Option<Shape> {
+fn pattern(bounces: &[Bounce]) -> Option<ImpactPattern> {
     let first = bounces.first()?;
     let half = std::f64::consts::PI;
     (1..=LONGEST.min(bounces.len() - 1)).find_map(|n| {
@@ -74,7 +74,7 @@ fn pattern(bounces: &[Bounce]) -> Option<Shape> {
             sign * then.wall - first.wall,
         ];
         let same = half_periods > 0.0 && apart.iter().all(|one| one.abs() < SAME);
-        same.then(|| Shape {
+        same.then(|| ImpactPattern {
             walls: bounces[..n].iter().map(|one| one.wall).collect(),
             half_periods: half_periods as u32,
             mirrored,

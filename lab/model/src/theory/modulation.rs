@@ -50,8 +50,8 @@ impl SlowFlow {
         (g, sigma): (f64, f64),
         (c, gamma): (f64, f64),
         (b, psi): (f64, f64),
-    ) -> Walk {
-        Walk {
+    ) -> ImpactSequence {
+        ImpactSequence {
             rate: Complex::new(self.lambda / 2.0, sigma),
             restitution: (1.0 - self.manifold.dissipation) / (1.0 + self.manifold.dissipation),
             drive: Complex::new(0.0, -g / 2.0),
@@ -69,7 +69,7 @@ impl SlowFlow {
 
 /// The impacts one by one; made by [`SlowFlow::modulation`].
 #[derive(Debug, Clone)]
-pub struct Walk {
+pub struct ImpactSequence {
     /// `lambda/2 + i sigma`.
     rate: Complex<f64>,
     restitution: f64,
@@ -88,7 +88,7 @@ pub struct Walk {
 /// Steps per period in which the next contact is looked for.
 const STEPS: u32 = 256;
 
-impl Walk {
+impl ImpactSequence {
     /// Sign of the triangle wave's slope now; the wall ahead.
     fn slope(&self) -> f64 {
         if self.impacts.is_multiple_of(2) {
@@ -144,7 +144,7 @@ impl Walk {
     }
 }
 
-impl Iterator for Walk {
+impl Iterator for ImpactSequence {
     type Item = Modulation;
 
     fn next(&mut self) -> Option<Modulation> {

@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 
 use vines_net::{ControllerServer, ControllerService, RigServer, RigService, Session};
 use vines_testbench::rig::{
-    BuiltIn, Controller, Drive, Rig, RigError, Sensors, Simulated, Witness,
+    BuiltIn, Controller, Drive, GroundTruth, Rig, RigError, Sensors, Simulated,
 };
 use vines_testbench::scene::{Override, PAPER, Scene};
 
@@ -112,7 +112,7 @@ pub fn serve_rig(
 
 /// Serves the plant of the scene in lock-step.
 pub fn lock_step_rig(scene: &Scene) -> Served {
-    let plant = Simulated::new(scene).unwrap();
+    let plant = Simulated::new(scene.plant, scene.start).unwrap();
     serve_rig(service(scene, false, 5.0), move || {
         Ok(Box::new(plant.clone()))
     })
@@ -120,7 +120,10 @@ pub fn lock_step_rig(scene: &Scene) -> Served {
 
 /// Serves the plant of the scene in real time; the log contains every drive of the plant.
 pub fn paced_rig(scene: &Scene, silence: f64) -> (Served, Log) {
-    let (plant, log) = (Simulated::new(scene).unwrap(), Log::default());
+    let (plant, log) = (
+        Simulated::new(scene.plant, scene.start).unwrap(),
+        Log::default(),
+    );
     let copy = Arc::clone(&log);
     let served = serve_rig(service(scene, true, silence), move || {
         Ok(Box::new(Spy(plant.clone(), Arc::clone(&copy))))
@@ -130,7 +133,7 @@ pub fn paced_rig(scene: &Scene, silence: f64) -> (Served, Log) {
 
 /// Serves the controller of the scene.
 pub fn controller(scene: &Scene, silence: f64) -> Served {
-    let controller = BuiltIn::new(scene).unwrap();
+    let controller = BuiltIn::new(&scene.controller_config()).unwrap();
     serve_controller(scene, silence, move || Box::new(controller.clone()))
 }
 
@@ -166,8 +169,8 @@ impl Rig for Spy {
         self.0.advance(drive, step)
     }
 
-    fn witness(&mut self) -> Result<Option<Witness>, RigError> {
-        self.0.witness()
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        self.0.ground_truth()
     }
 }
 
@@ -185,10 +188,10 @@ pub fn shake(
     rig: &mut dyn Rig,
     scene: &Scene,
     samples: usize,
-) -> Result<Vec<(Sensors, Option<Witness>)>, RigError> {
+) -> Result<Vec<(Sensors, Option<GroundTruth>)>, RigError> {
     (0..samples)
         .map(|n| {
-            let told = (rig.sense()?, rig.witness()?);
+            let told = (rig.sense()?, rig.ground_truth()?);
             rig.advance(drive(n), scene.sample_time())?;
             Ok(told)
         })

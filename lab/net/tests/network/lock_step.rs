@@ -21,8 +21,8 @@ fn an_experiment_across_the_network_gives_the_same_bits() {
     ]);
     let direct = measure(
         &scene,
-        &mut Simulated::new(&scene).unwrap(),
-        &mut BuiltIn::new(&scene).unwrap(),
+        &mut Simulated::new(scene.plant, scene.start).unwrap(),
+        &mut BuiltIn::new(&scene.controller_config()).unwrap(),
     );
     let (rig_server, controller_server) = (lock_step_rig(&scene), controller(&scene, 5.0));
     let sample_time = scene.sample_time();
@@ -45,7 +45,12 @@ fn shaken(
     fate: impl FnMut(Kind, u64) -> Fate + Send + 'static,
 ) -> (Counters, Counters, u64) {
     let scene = scene(&[]);
-    let direct = shake(&mut Simulated::new(&scene).unwrap(), &scene, samples).unwrap();
+    let direct = shake(
+        &mut Simulated::new(scene.plant, scene.start).unwrap(),
+        &scene,
+        samples,
+    )
+    .unwrap();
     let server = lock_step_rig(&scene);
     let proxy = Proxy::before(server.address, fate);
     let mut rig = NetRig::connect(proxy.address, scene.sample_time()).unwrap();

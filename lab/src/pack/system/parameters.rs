@@ -7,24 +7,21 @@ use phase_lock::{
     Value::{self, Boolean, Integer, Real},
 };
 
-use crate::{
-    pack::PackError,
-    rig::{configuration, start_values},
-    scene::Scene,
-};
+use crate::{pack::PackError, scene::Scene};
 
 type Named = (&'static str, Value);
 
 /// Parameters and start of the plant.
 pub(super) fn plant(scene: &Scene) -> Vec<Named> {
-    start_values(scene)
+    scene
+        .start_values()
         .map(|(name, value)| (name, Real(value)))
         .to_vec()
 }
 
 /// Parameters of the controller, which is armed from the start.
 pub(super) fn controller(scene: &Scene) -> Result<Vec<Named>, PackError> {
-    let config = configuration(scene);
+    let config = scene.controller_config();
     config.build()?;
     let parameters = PARAMETERS.iter().filter(|parameter| parameter.is_in_fmu());
     Ok(parameters

@@ -119,8 +119,8 @@ fn impacts(motion: &Periodic) -> Vec<(f64, f64, f64)> {
     let mut found: Vec<(f64, f64, f64)> = first
         .map(|one| (part(one.phase), one.q2(), one.wall))
         .collect();
-    if motion.shape.mirrored {
-        let half = f64::from(motion.shape.half_periods) / 2.0;
+    if motion.pattern.mirrored {
+        let half = f64::from(motion.pattern.half_periods) / 2.0;
         let second = motion.bounces.iter();
         found.extend(second.map(|one| (part(one.phase + half * TAU), -one.q2(), -one.wall)));
     }

@@ -20,7 +20,7 @@ pub(super) fn make(
     let mut section = Section::new("The experiment");
     let scene = &subject.scene;
     let mut rig = subject.rig()?;
-    let mut controller = BuiltIn::new(scene)?;
+    let mut controller = BuiltIn::new(&scene.controller_config())?;
     let plan = Plan::of(scene);
     let told = Cell::new(0.0);
     let record = experiment::run(rig.as_mut(), &mut controller, &plan, |stage, at, of| {

@@ -30,7 +30,7 @@ pub(super) fn make(
 ) -> Result<Section, SectionError> {
     let mut section = Section::new("The backbone, tracked with the loop closed");
     let scene = &subject.scene;
-    let mut controller = BuiltIn::for_backbone(scene)?;
+    let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let mut rig = subject.rig()?;
     let found = track(rig.as_mut(), &mut controller, scene, |at, of| {
         done(at as f64 / of.max(1) as f64);

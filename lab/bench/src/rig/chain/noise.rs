@@ -6,9 +6,9 @@ use rand_distr::{Distribution, StandardNormal};
 use crate::scene::RatioOf;
 
 /// Normally distributed numbers.
-pub struct Gauss(ChaCha8Rng);
+pub struct NormalDistribution(ChaCha8Rng);
 
-impl Gauss {
+impl NormalDistribution {
     pub fn new(seed: u64) -> Self {
         Self(ChaCha8Rng::seed_from_u64(seed))
     }
@@ -44,9 +44,9 @@ impl Sensor {
         }
     }
 
-    pub fn read(&mut self, value: f64, gauss: &mut Gauss) -> f64 {
+    pub fn read(&mut self, value: f64, normal: &mut NormalDistribution) -> f64 {
         self.power += self.follow * (value * value - self.power);
-        value + self.ratio * self.power.sqrt() * gauss.next()
+        value + self.ratio * self.power.sqrt() * normal.next()
     }
 }
 
@@ -56,11 +56,14 @@ mod tests {
 
     /// Power of the noise on a sine of amplitude 3, relative to that of the sine, dB.
     fn measured(of: RatioOf) -> f64 {
-        let (mut sensor, mut gauss) = (Sensor::new(40.0, of, 30.0, 100.0), Gauss::new(7));
+        let (mut sensor, mut normal) = (
+            Sensor::new(40.0, of, 30.0, 100.0),
+            NormalDistribution::new(7),
+        );
         let mut noise = 0.0;
         for n in 0..200_000 {
             let value = 3.0 * (f64::from(n) * 0.0628).sin();
-            let added = sensor.read(value, &mut gauss) - value;
+            let added = sensor.read(value, &mut normal) - value;
             noise += if n < 1000 { 0.0 } else { added * added };
         }
         10.0 * (4.5 / (noise / 199_000.0)).log10()
@@ -75,7 +78,7 @@ mod tests {
 
     #[test]
     fn the_same_seed_gives_the_same_noise() {
-        let first = |seed| Gauss::new(seed).next();
+        let first = |seed| NormalDistribution::new(seed).next();
         assert_eq!(first(3), first(3));
         assert_ne!(first(3), first(4));
     }

@@ -83,7 +83,7 @@ pub struct Effect {
 
 /// Why a stage could not be looked at.
 #[derive(Debug, Error)]
-pub enum StageError {
+pub enum ChainEffectError {
     /// The plant refuses a parameter or the start.
     #[error(transparent)]
     Plant(#[from] InvalidValue),
@@ -112,7 +112,7 @@ const TIMINGS: usize = 60;
 /// A scene that is refused, or one that the plant or the controller refuses.
 pub fn effects(
     mut load: impl FnMut(&[Override]) -> Result<Scene, SceneError>,
-) -> Result<Vec<Effect>, StageError> {
+) -> Result<Vec<Effect>, ChainEffectError> {
     STAGES
         .iter()
         .map(|(name, settings)| {
@@ -134,21 +134,18 @@ struct Bench {
 }
 
 impl Bench {
-    fn new(scene: &Scene) -> Result<Self, StageError> {
-        let plant = Simulated::new(scene)?;
-        let rig: Box<dyn Rig> = if scene.chain.is_on() {
-            Box::new(Chain::new(Box::new(plant), scene))
-        } else {
-            Box::new(plant)
-        };
+    fn new(scene: &Scene) -> Result<Self, ChainEffectError> {
+        let plant = Simulated::new(scene.plant, scene.start)?;
+        let (d, samples) = (scene.dimensionless(), scene.controller.samples_per_period);
+        let rig = Chain::around(Box::new(plant), &scene.chain, &d, samples);
         Ok(Self {
             rig,
-            controller: BuiltIn::new(scene)?,
+            controller: BuiltIn::new(&scene.controller_config())?,
             sample_time: scene.sample_time(),
         })
     }
 
-    fn sample(&mut self) -> Result<Sample, StageError> {
+    fn sample(&mut self) -> Result<Sample, ChainEffectError> {
         let sensors = self.rig.sense()?;
         let command = self.controller.sample(sensors, true)?;
         self.rig.advance(command.drive, self.sample_time)?;
@@ -156,12 +153,12 @@ impl Bench {
             time: 0.0,
             sensors,
             command,
-            witness: None,
+            ground_truth: None,
         })
     }
 
     /// Runs for so many samples; how long that takes.
-    fn run(&mut self, samples: usize) -> Result<Duration, StageError> {
+    fn run(&mut self, samples: usize) -> Result<Duration, ChainEffectError> {
         let begin = Instant::now();
         for _ in 0..samples {
             self.sample()?;
@@ -174,7 +171,7 @@ impl Bench {
 ///
 /// # Errors
 /// As [`effects`].
-pub fn effect(name: &'static str, scene: &Scene) -> Result<Effect, StageError> {
+pub fn effect(name: &'static str, scene: &Scene) -> Result<Effect, ChainEffectError> {
     let d = scene.dimensionless();
     let mut bench = Bench::new(scene)?;
     let settle = (SETTLE * scene.controller.samples_per_period) as usize;

@@ -12,9 +12,9 @@ use vines::{
 
 use super::failure::Failure;
 
-/// What stands behind a door, as written on the command line.
+/// What stands behind an endpoint, as written on the command line.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) enum Door {
+pub(super) enum Endpoint {
     /// `built-in`: this program's own, with nothing in between.
     BuiltIn,
     /// The path of an FMU.
@@ -23,7 +23,7 @@ pub(super) enum Door {
     Udp(String),
 }
 
-impl FromStr for Door {
+impl FromStr for Endpoint {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
@@ -50,28 +50,29 @@ pub(super) struct OpenRig {
     pub pace: Option<f64>,
 }
 
-impl Door {
-    /// The rig behind this door.
+impl Endpoint {
+    /// The rig behind this endpoint.
     pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
         let mut pace = None;
         let rig: Box<dyn Rig> = match self {
-            Self::BuiltIn => Box::new(Simulated::new(scene).map_err(Failure::input)?),
-            Self::Fmu(file) => Box::new(FmuRig::load(file, scene).map_err(Failure::run)?),
+            Self::BuiltIn => {
+                Box::new(Simulated::new(scene.plant, scene.start).map_err(Failure::input)?)
+            }
+            Self::Fmu(file) => {
+                Box::new(FmuRig::load(file, &scene.start_values()).map_err(Failure::run)?)
+            }
             Self::Udp(address) => {
                 let rig = NetRig::connect(resolve(address, scope)?, scene.sample_time())?;
                 pace = rig.pace();
                 Box::new(rig)
             }
         };
-        let rig = if scene.chain.is_on() {
-            Box::new(Chain::new(rig, scene))
-        } else {
-            rig
-        };
+        let (d, samples) = (scene.dimensionless(), scene.controller.samples_per_period);
+        let rig = Chain::around(rig, &scene.chain, &d, samples);
         Ok(OpenRig { rig, pace })
     }
 
-    /// The controller behind this door, beside a rig of that `pace`.
+    /// The controller behind this endpoint, beside a rig of that `pace`.
     pub(super) fn controller(
         &self,
         scene: &Scene,
@@ -79,8 +80,12 @@ impl Door {
         pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
         Ok(match self {
-            Self::BuiltIn => Box::new(BuiltIn::new(scene).map_err(Failure::input)?),
-            Self::Fmu(file) => Box::new(FmuController::load(file, scene).map_err(Failure::run)?),
+            Self::BuiltIn => {
+                Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?)
+            }
+            Self::Fmu(file) => Box::new(
+                FmuController::load(file, &scene.controller_config()).map_err(Failure::run)?,
+            ),
             Self::Udp(address) => {
                 let peer = resolve(address, scope)?;
                 Box::new(NetController::connect(peer, scene.sample_time(), pace)?)

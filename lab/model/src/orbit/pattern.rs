@@ -10,7 +10,7 @@ use crate::Dimensionless;
 
 /// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Shape {
+pub struct ImpactPattern {
     /// Walls hit, one after another, over the map; the first is the one the motion starts from.
     pub walls: Vec<f64>,
     /// Half periods of the base over the map: even, but for a mirrored pattern, where it is odd.
@@ -19,7 +19,7 @@ pub struct Shape {
     pub mirrored: bool,
 }
 
-impl Shape {
+impl ImpactPattern {
     /// Two impacts per period, half a period apart: symmetric 1:1.
     #[must_use]
     pub fn symmetric() -> Self {
@@ -94,24 +94,28 @@ pub(super) struct Returned {
 }
 
 /// Follows the pattern from the unknowns `x`; None where the impacts come in another pattern, or graze.
-pub(super) fn follow(scene: &Dimensionless, shape: &Shape, x: &Unknowns) -> Option<Returned> {
+pub(super) fn follow(
+    scene: &Dimensionless,
+    pattern: &ImpactPattern,
+    x: &Unknowns,
+) -> Option<Returned> {
     let (sigma, g) = (x[4], x[5]);
     let omega = 1.0 + scene.epsilon * sigma;
     if !(omega > 0.0 && omega.is_finite() && g.is_finite()) {
         return None;
     }
     let map = ImpactMap::new(scene, omega, g);
-    let mut at = Bounce::from_vector(&x.fixed_rows::<4>(0).into(), shape.walls[0]);
+    let mut at = Bounce::from_vector(&x.fixed_rows::<4>(0).into(), pattern.walls[0]);
     let start = at.vector();
     let mut by = ByAll::identity();
     let mut sum = Complex::new(0.0, 0.0);
     let mut sum_by = [RowByAll::zeros(); 2];
     let (mut bounces, mut durations) = (Vec::new(), Vec::new());
-    for n in 0..shape.walls.len() {
+    for n in 0..pattern.walls.len() {
         let step = map.step(&at)?;
-        let wall = match shape.walls.get(n + 1) {
+        let wall = match pattern.walls.get(n + 1) {
             Some(wall) => *wall,
-            None => shape.sign() * shape.walls[0],
+            None => pattern.sign() * pattern.walls[0],
         };
         if step.next.wall != wall {
             return None;
@@ -135,15 +139,15 @@ pub(super) fn follow(scene: &Dimensionless, shape: &Shape, x: &Unknowns) -> Opti
         sum_by[1] += impulse_by * phasor.im + phase_by * phasor.re;
     }
 
-    let mut residual = at.vector() * shape.sign() - start;
-    residual[0] = at.phase - start[0] - shape.turn();
-    by.fixed_rows_mut::<3>(1).scale_mut(shape.sign());
+    let mut residual = at.vector() * pattern.sign() - start;
+    residual[0] = at.phase - start[0] - pattern.turn();
+    by.fixed_rows_mut::<3>(1).scale_mut(pattern.sign());
     let monodromy: Matrix4<f64> = by.fixed_columns::<4>(0).into();
     by.fixed_columns_mut::<4>(0)
         .copy_from(&(monodromy - Matrix4::identity()));
     by.column_mut(4).scale_mut(scene.epsilon);
 
-    let harmonic = Harmonic::new(scene, &map, shape);
+    let harmonic = Harmonic::new(scene, &map, pattern);
     let (v, v_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
     Some(Returned {
         residual,
@@ -164,7 +168,7 @@ struct Harmonic {
 
 impl Harmonic {
     /// Each coefficient with its derivative by Omega.
-    fn new(scene: &Dimensionless, map: &ImpactMap, shape: &Shape) -> Self {
+    fn new(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern) -> Self {
         let omega = map.omega;
         let zeta = scene.epsilon * scene.lambda / 2.0;
         let compliance = map.oscillator.compliance(omega);
@@ -175,7 +179,7 @@ impl Harmonic {
             (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;
         // (2i/duration) times the response to a force through the oscillator, less that of a free mass: the impulse on the
         // particle is the opposite one.
-        let weight = Complex::new(0.0, 2.0 * omega / shape.turn());
+        let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
         let inner = compliance + 1.0 / (omega * omega);
         let inner_by = compliance_by - 2.0 / omega.powi(3);
         Self {

@@ -1,6 +1,6 @@
 //! What the next level will take, as far as it can be foreseen.
 
-use crate::scene::Feed;
+use crate::scene::Predictor;
 use vines_model::theory::{BranchSide, SlowFlow};
 
 /// A working point: response amplitude, drive amplitude, detuning; dimensionless.
@@ -12,11 +12,11 @@ pub struct Known {
 }
 
 /// Change of `(G, sigma)` from the last known point to the level `c`; zeros where nothing is known.
-pub fn change(feed: Feed, known: &[Known], c: f64, slow_flow: &SlowFlow) -> (f64, f64) {
+pub fn change(feed: Predictor, known: &[Known], c: f64, slow_flow: &SlowFlow) -> (f64, f64) {
     match (feed, known) {
-        (Feed::None, _) | (_, []) => (0.0, 0.0),
-        (Feed::Theory, [.., last]) => by_theory(slow_flow, last.c, c).unwrap_or((0.0, 0.0)),
-        (Feed::Previous, _) => extrapolate(&known[known.len().saturating_sub(3)..], c),
+        (Predictor::None, _) | (_, []) => (0.0, 0.0),
+        (Predictor::Theory, [.., last]) => by_theory(slow_flow, last.c, c).unwrap_or((0.0, 0.0)),
+        (Predictor::Previous, _) => extrapolate(&known[known.len().saturating_sub(3)..], c),
     }
 }
 
@@ -63,7 +63,7 @@ mod tests {
     #[test]
     fn three_points_foresee_a_parabola_exactly() {
         let before = [0.7, 0.65, 0.6].map(known);
-        let (g, sigma) = change(Feed::Previous, &before, 0.55, &slow_flow());
+        let (g, sigma) = change(Predictor::Previous, &before, 0.55, &slow_flow());
         assert!((g - (known(0.55).g - known(0.6).g)).abs() < 1e-12);
         assert!((sigma + 0.1).abs() < 1e-12);
     }
@@ -71,7 +71,7 @@ mod tests {
     #[test]
     fn one_point_foresees_no_change() {
         assert_eq!(
-            change(Feed::Previous, &[known(0.7)], 0.6, &slow_flow()),
+            change(Predictor::Previous, &[known(0.7)], 0.6, &slow_flow()),
             (0.0, 0.0)
         );
     }
@@ -79,11 +79,14 @@ mod tests {
     #[test]
     fn theory_foresees_the_difference_between_two_levels() {
         let flow = slow_flow();
-        let (g, sigma) = change(Feed::Theory, &[known(0.5)], 0.4, &flow);
+        let (g, sigma) = change(Predictor::Theory, &[known(0.5)], 0.4, &flow);
         let expected = flow.backbone_sigma(0.4, BranchSide::Right).unwrap()
             - flow.backbone_sigma(0.5, BranchSide::Right).unwrap();
         assert!((sigma - expected).abs() < 1e-12 && g < 0.0);
         // Below the fold it has nothing to say.
-        assert_eq!(change(Feed::Theory, &[known(0.5)], 0.1, &flow), (0.0, 0.0));
+        assert_eq!(
+            change(Predictor::Theory, &[known(0.5)], 0.1, &flow),
+            (0.0, 0.0)
+        );
     }
 }

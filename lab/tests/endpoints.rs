@@ -1,4 +1,4 @@
-//! The doors of `vines identify`, as its users meet them: whatever stands behind them, the identified numbers agree.
+//! The endpoints of `vines identify`, as its users meet them: whatever stands behind them, the identified numbers agree.
 
 use std::env::consts::DLL_SUFFIX;
 use std::io::{BufRead, BufReader};
@@ -64,7 +64,7 @@ fn with_settings<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
     arguments.iter().copied().chain(settings).collect()
 }
 
-fn identified(doors: &[&str]) -> Value {
+fn identified(endpoints: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
     let out = [
         "identify",
@@ -72,10 +72,10 @@ fn identified(doors: &[&str]) -> Value {
         "--out",
         folder.path().to_str().unwrap(),
     ];
-    let done = vines(&with_settings(&[&out, doors].concat()));
-    assert!(done.status.success(), "{doors:?}: {done:?}");
+    let done = vines(&with_settings(&[&out, endpoints].concat()));
+    assert!(done.status.success(), "{endpoints:?}: {done:?}");
     let found: Value = serde_json::from_slice(&done.stdout).unwrap();
-    println!("sigma = {} with {doors:?}", found["lock"]["sigma"]);
+    println!("sigma = {} with {endpoints:?}", found["lock"]["sigma"]);
     found
 }
 
