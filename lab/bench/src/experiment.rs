@@ -60,6 +60,17 @@ pub struct Sample {
     pub ground_truth: Option<GroundTruth>,
 }
 
+/// Phases of the drive at the samples, rad, from `start` at the first.
+#[must_use]
+pub fn drive_phases(samples: &[Sample], sample_time: f64, start: f64) -> Vec<f64> {
+    let advance = |phase: &mut f64, sample: &Sample| {
+        let now = *phase;
+        *phase += sample.command.drive.omega * sample_time;
+        Some(now)
+    };
+    samples.iter().scan(start, advance).collect()
+}
+
 /// Everything that was measured.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Record {

@@ -5,6 +5,7 @@
 //! the oscillator alternating impulses of known size, whose periodic response is closed form. What is left at a
 //! given frequency is one quadratic for B. No first-order approximation is made anywhere.
 
+mod branch;
 mod candidate;
 mod continuation;
 mod convergence;
@@ -13,6 +14,7 @@ mod flight;
 mod impact_map;
 mod multipliers;
 mod oscillator;
+mod particle_flight;
 mod pattern;
 mod periodic;
 mod search;
@@ -20,10 +22,8 @@ mod settle;
 
 use serde::Serialize;
 
-pub use continuation::{
-    Bifurcation, Branch, Ended, Limits, Special, asymmetric_branch, continue_both_ways,
-    continue_from,
-};
+pub use branch::{Bifurcation, Branch, Ended, Limits, Special};
+pub use continuation::{asymmetric_branch, continue_both_ways, continue_from};
 pub use convergence::{Convergence, Difference, convergence};
 pub use curves::{Response, backbone, response};
 pub use impact_map::{Bounce, ImpactMap};

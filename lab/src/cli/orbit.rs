@@ -95,26 +95,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         );
     }
     if arguments.convergence {
-        let study = convergence(&scene, HALVINGS).ok_or_else(|| {
-            Failure::run(format!(
-                "theory or exact orbits have no stable phase-resonant solution at G = {} (dimensionless)",
-                scene.g
-            ))
-        })?;
-        return shown(
-            &scene,
-            "Theory less exact orbit",
-            &study,
-            arguments.json,
-            || {
-                let rows = study.rows.iter().map(|row| {
-                    [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}"))
-                });
-                let [sigma, c, b] = study.slopes;
-                Table::new(["epsilon", "sigma", "C", "B"]).rows(rows).text()
-                    + &format!("\nExponent of epsilon: sigma {sigma:.3}, C {c:.3}, B {b:.3}\n")
-            },
-        );
+        return converged(&scene, arguments.json);
     }
     let orbits = phase_resonant(&scene);
     if arguments.json {
@@ -126,6 +107,28 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         parameters(&scene),
         listing(&scene, &orbits)
     ))
+}
+
+/// The convergence of the theory towards the exact orbits.
+fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
+    let study = convergence(scene, HALVINGS).ok_or_else(|| {
+        Failure::run(format!(
+            "theory or exact orbits have no stable phase-resonant solution at G = {} (dimensionless)",
+            scene.g
+        ))
+    })?;
+    shown(scene, "Theory less exact orbit", &study, json, || {
+        let rows = study
+            .rows
+            .iter()
+            .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}")));
+        let [sigma, c, b] = study.slopes;
+        let table = Table::new(["epsilon", "sigma", "C", "B"]).rows(rows);
+        format!(
+            "{}\nExponent of epsilon: sigma {sigma:.3}, C {c:.3}, B {b:.3}\n",
+            table.text()
+        )
+    })
 }
 
 /// Periods that the motion is given to settle.
@@ -177,26 +180,31 @@ fn settled(
         );
     }
     shown(scene, "Exact orbit", &motion, arguments.json, || {
-        let Periodic {
-            sigma, c, b, gamma, ..
-        } = motion;
-        let multipliers = motion
-            .multipliers
-            .map(|[re, im]| format!("{re:.5}{im:+.5}i"));
-        let rows = motion.bounces.iter().map(|one| {
-            let phase = one.phase.to_degrees().rem_euclid(360.0);
-            let mut cells = vec![format!("{:+}", one.wall)];
-            cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
-            cells
-        });
-        let table = Table::new(["wall", "phase, degrees", "q1", "q1' after", "q2' after"]);
-        format!(
-            "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
-            gamma.to_degrees(),
-            multipliers.join(", "),
-            table.rows(rows).text()
-        )
+        described(&pattern, &motion)
     })
+}
+
+/// The motion and the states after its impacts.
+fn described(pattern: &str, motion: &Periodic) -> String {
+    let Periodic {
+        sigma, c, b, gamma, ..
+    } = motion;
+    let multipliers = motion
+        .multipliers
+        .map(|[re, im]| format!("{re:.5}{im:+.5}i"));
+    let rows = motion.bounces.iter().map(|one| {
+        let phase = one.phase.to_degrees().rem_euclid(360.0);
+        let mut cells = vec![format!("{:+}", one.wall)];
+        cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
+        cells
+    });
+    let table = Table::new(["wall", "phase, degrees", "q1", "q1' after", "q2' after"]).rows(rows);
+    format!(
+        "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
+        gamma.to_degrees(),
+        multipliers.join(", "),
+        table.text()
+    )
 }
 
 /// Halvings of epsilon in the convergence study.

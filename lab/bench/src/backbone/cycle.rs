@@ -3,7 +3,7 @@
 use nalgebra::{Complex, DVector};
 use vines_model::numerics::{HarmonicBasis, mean};
 
-use crate::experiment::Sample;
+use crate::experiment::{Sample, drive_phases};
 
 /// What the sensors said over one period of the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -29,15 +29,7 @@ impl Cycle {
         if samples.len() <= TERMS {
             return None;
         }
-        let mut turned = phase;
-        let phases: Vec<f64> = samples
-            .iter()
-            .map(|sample| {
-                let now = turned;
-                turned += sample.command.drive.omega * sample_time;
-                now
-            })
-            .collect();
+        let phases = drive_phases(samples, sample_time, phase);
         let basis = HarmonicBasis::new(&phases, 0, &[Some(0); 3]);
         let fitted = |value: fn(&Sample) -> f64| {
             basis.fit(&DVector::from_iterator(

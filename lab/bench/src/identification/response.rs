@@ -9,7 +9,7 @@ use nalgebra::DVector;
 use vines_model::numerics::{HarmonicBasis, mean, noise};
 use vines_model::regime::Regime;
 
-use crate::experiment::Sample;
+use crate::experiment::{Sample, drive_phases};
 use crate::scene::Scene;
 
 /// Share of the amplitude that may stay unexplained in a steady motion, where it is not noise.
@@ -44,15 +44,7 @@ impl Content {
     /// Fits the samples; `None` where they are too few or silent.
     fn of(samples: &[Sample], sample_time: f64) -> Option<Self> {
         let n = samples.len();
-        let mut phase = 0.0;
-        let phases: Vec<f64> = samples
-            .iter()
-            .map(|sample| {
-                let now = phase;
-                phase += sample.command.drive.omega * sample_time;
-                now
-            })
-            .collect();
+        let phases = drive_phases(samples, sample_time, 0.0);
         let basis = HarmonicBasis::new(&phases, 1, &HARMONICS);
         if n < 2 * basis.terms() {
             return None;

@@ -1,13 +1,13 @@
 //! The impact map: from the state just after an impact to that just after the next, with its derivatives (docs/theory.md, eqs. 24 and 25).
 //!
-//! Between impacts the motion is closed form. The next contact is found by steps that a bound of `|w''|` proves free of
-//! contact; they turn into Newton's as the wall comes near, so none is missed and the last is found to the last bits.
-//! The derivative goes through flight and impact: a disturbed motion meets the wall a little sooner or later (saltation).
+//! Between impacts the motion has a closed form. The derivative covers flight and impact: a disturbed motion reaches the wall a
+//! little earlier or later (saltation).
 
-use nalgebra::{Complex, Matrix2, RowSVector, SMatrix, Vector2, Vector4};
+use nalgebra::{Complex, RowSVector, SMatrix, Vector2, Vector4};
 use serde::Serialize;
 
 use super::oscillator::Oscillator;
+use super::particle_flight::Flight;
 use crate::Dimensionless;
 
 /// State just after an impact. The base displacement is `epsilon G sin(phase)` there, and the particle is at `q1 - wall`.
@@ -74,19 +74,12 @@ pub struct ImpactMap {
     epsilon: f64,
     r: f64,
     pub(super) oscillator: Oscillator,
-    zeta: f64,
+    pub(super) zeta: f64,
     pub(super) omega: f64,
     pub(super) g: f64,
     /// Harmonic response of q1 to the base, per G, and its derivative by Omega.
-    unit: [Complex<f64>; 2],
+    pub(super) unit: [Complex<f64>; 2],
 }
-
-/// A contact slower than this is a graze, where the map has no derivative.
-const GRAZING: f64 = 1e-9;
-/// Longest flight, periods.
-const LONGEST: f64 = 64.0;
-/// Most steps of a flight: far more than any needs, but for a chatter.
-const STEPS: usize = 4000;
 
 impl ImpactMap {
     /// The map of `scene` (but for its G) at the frequency `omega` over omega0 and the excitation `g`.
@@ -205,7 +198,7 @@ impl ImpactMap {
     }
 
     /// Harmonic response (q, q') at a phase of the base.
-    fn harmonic(&self, phase: f64) -> Vector2<f64> {
+    pub(super) fn harmonic(&self, phase: f64) -> Vector2<f64> {
         let z = self.turned(self.unit[0] * self.g, phase);
         Vector2::new(z.im, self.omega * z.re)
     }
@@ -232,94 +225,5 @@ impl ImpactMap {
             return Complex::new(0.0, 0.0);
         }
         z * Complex::from_polar(1.0, phase)
-    }
-}
-
-/// A flight of the particle.
-struct Flight<'a> {
-    map: &'a ImpactMap,
-    /// Where it begins: phase of the base, particle, and relative displacement and velocity.
-    phase: f64,
-    q2: f64,
-    dq2: f64,
-    w: f64,
-    dw: f64,
-    /// State of the free part of the oscillator's motion at the start.
-    free: Vector2<f64>,
-    /// Bound of `|w''|`.
-    curvature: f64,
-}
-
-impl<'a> Flight<'a> {
-    /// The flight after a bounce.
-    fn new(map: &'a ImpactMap, from: &Bounce) -> Self {
-        let state = [from.q1, from.dq1, from.q2(), from.dq2];
-        Self::between(map, from.phase, state, from.wall)
-    }
-
-    /// The flight from a state with the relative displacement `w`.
-    fn between(map: &'a ImpactMap, phase: f64, [q1, dq1, q2, dq2]: State, w: f64) -> Self {
-        let free = Vector2::new(q1, dq1) - map.harmonic(phase);
-        // Of the free motion q^2 + q'^2 never grows.
-        let driven = (map.unit[0] * map.g).norm() * map.omega * map.omega;
-        let driven = if map.g == 0.0 { 0.0 } else { driven };
-        Self {
-            map,
-            phase,
-            q2,
-            dq2,
-            w,
-            dw: dq1 - dq2,
-            free,
-            curvature: driven + free.norm() * (1.0 + 2.0 * map.zeta),
-        }
-    }
-
-    /// (q1, q1') at the time `t`.
-    fn primary(&self, t: f64) -> Vector2<f64> {
-        let propagator: Matrix2<f64> = self.map.oscillator.propagator(t);
-        propagator * self.free + self.map.harmonic(self.phase + self.map.omega * t)
-    }
-
-    /// Time and wall of the first contact.
-    fn contact(&self) -> Option<(f64, f64)> {
-        let horizon = LONGEST * std::f64::consts::TAU / self.map.omega;
-        let k = self.curvature;
-        if !k.is_finite() || k <= 0.0 {
-            return None;
-        }
-        // Time that surely passes before the wall at the distance `gap`, approached at `speed`, is met.
-        let free_for = |gap: f64, speed: f64| {
-            let root = (speed * speed + 2.0 * k * gap).sqrt();
-            if speed > 0.0 {
-                2.0 * gap / (speed + root)
-            } else {
-                (root - speed) / k
-            }
-        };
-        let (mut t, mut w, mut dw) = (0.0, self.w, self.dw);
-        if w.abs() >= 1.0 && w * dw >= 0.0 {
-            return None;
-        }
-        for _ in 0..STEPS {
-            let step = free_for(1.0 - w, dw).min(free_for(1.0 + w, -dw));
-            t += step;
-            if t > horizon {
-                return None;
-            }
-            let primary = self.primary(t);
-            w = primary[0] - self.q2 - self.dq2 * t;
-            dw = primary[1] - self.dq2;
-            let side = dw.signum();
-            let gap = 1.0 - side * w;
-            if gap <= 1e-15 || step <= 1e-16 * (1.0 + t) {
-                let fast = dw.abs() > GRAZING;
-                // Either wall is met in its own direction, and what rounding has left is made up for.
-                return fast.then(|| (t + gap / dw.abs(), side));
-            }
-            // What remains of the gap to the wall behind is none after a rounding beyond it.
-            w = w.clamp(-1.0, 1.0);
-        }
-        None
     }
 }

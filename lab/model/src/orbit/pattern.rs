@@ -5,7 +5,7 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Complex, Matrix4, Vector4};
 use serde::Serialize;
 
-use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll};
+use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll, Step};
 use crate::Dimensionless;
 
 /// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
@@ -122,15 +122,8 @@ pub(super) fn follow(
         }
         bounces.push(at);
         durations.push(step.duration);
-        // The chain rule; what the step depends on by itself are Omega and G.
-        let state: Matrix4<f64> = step.by.fixed_columns::<4>(0).into();
-        let mut chained = state * by;
-        let mut impulse_by = step.impulse_by.fixed_columns::<4>(0) * by;
-        for column in 4..6 {
-            chained.set_column(column, &(chained.column(column) + step.by.column(column)));
-            impulse_by[column] += step.impulse_by[column];
-        }
-        by = chained;
+        let impulse_by;
+        (by, impulse_by) = chained(&step, &by);
         at = step.next;
         let phasor = Complex::from_polar(1.0, -at.phase);
         sum += phasor * step.impulse;
@@ -158,6 +151,18 @@ pub(super) fn follow(
         durations,
         monodromy,
     })
+}
+
+/// The chain rule: derivatives of a step by the unknowns. The step itself also depends on Omega and G.
+fn chained(step: &Step, by: &ByAll) -> (ByAll, RowByAll) {
+    let state: Matrix4<f64> = step.by.fixed_columns::<4>(0).into();
+    let mut all = state * by;
+    let mut impulse_by = step.impulse_by.fixed_columns::<4>(0) * by;
+    for column in 4..6 {
+        all.set_column(column, &(all.column(column) + step.by.column(column)));
+        impulse_by[column] += step.impulse_by[column];
+    }
+    (all, impulse_by)
 }
 
 /// `V = direct G + impulses sum`: the base through the oscillator, and the impulses through oscillator and particle.
