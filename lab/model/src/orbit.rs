@@ -1,9 +1,9 @@
 //! Exact periodic orbits: symmetric 1:1 ones at phase resonance in closed form, all others by shooting on the impact map.
 //!
 //! Everything is dimensionless: lengths over b, velocities over `b omega0`, time `tau = omega0 t`. Half a period after an
-//! impact the state of a symmetric orbit is minus itself; the particle flies in straight lines at speed ±B, so the wall gives
-//! the oscillator alternating impulses of known size, whose periodic response is closed form. What is left at a
-//! given frequency is one quadratic for B. No first-order approximation is made anywhere.
+//! impact the state of a symmetric orbit is minus itself; the particle flies in straight lines at speed ±B, so the wall exerts
+//! alternating impulses of known size on the oscillator, and their periodic response has a closed form. At a given frequency
+//! one quadratic equation for B remains. There is no first-order approximation.
 
 mod branch;
 mod candidate;

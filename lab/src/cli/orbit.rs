@@ -27,7 +27,7 @@ Examples:
   vines orbit
   vines orbit --response --set excitation.G=1.6
   vines orbit --backbone --set plant.c=0 --set plant.r=1 --set excitation.G=0
-  vines orbit --sigma=-0.6 --set excitation.G=2.2   whatever settles there, here six impacts in two periods
+  vines orbit --sigma=-0.6 --set excitation.G=2.2   the orbit that settles there, here six impacts in two periods
   vines orbit --convergence                   how theory approaches the exact orbit
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
   vines orbit --scene scenes/dimensionless.toml --json";
@@ -39,7 +39,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
 
-    /// The orbit of any pattern that the scene's start settles into at this detuning; with --response, its response is followed
+    /// The orbit of any pattern that the scene's start leads to at this detuning; with --response, its frequency response
     #[arg(long, value_name = "SIGMA", allow_negative_numbers = true, conflicts_with_all = ["backbone", "convergence"])]
     sigma: Option<f64>,
 
@@ -51,7 +51,7 @@ pub(super) struct Arguments {
     #[arg(long, group = "what")]
     response: bool,
 
-    /// Theory less exact orbit at epsilon and its halvings, with the exponent that fits
+    /// Theory minus exact orbit at epsilon and its halvings, with the fitted exponent
     #[arg(long, group = "what")]
     convergence: bool,
 
@@ -117,7 +117,7 @@ fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
             scene.g
         ))
     })?;
-    shown(scene, "Theory less exact orbit", &study, json, || {
+    shown(scene, "Theory minus exact orbit", &study, json, || {
         let rows = study
             .rows
             .iter()
@@ -131,10 +131,10 @@ fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
     })
 }
 
-/// Periods that the motion is given to settle.
+/// Periods before the motion is evaluated.
 const SETTLE: usize = 1000;
 
-/// The motion that the start leads to at one detuning, of whatever pattern, or its frequency response.
+/// The motion that the start leads to at one detuning, or its frequency response.
 fn settled(
     arguments: &Arguments,
     scene: &Dimensionless,
@@ -149,8 +149,8 @@ fn settled(
     let motion = settle(scene, sigma, start, SETTLE).map_err(Failure::input)?;
     let motion = motion.ok_or_else(|| {
         Failure::run(format!(
-            "from the scene's start nothing settles at sigma = {sigma} (dimensionless) within {SETTLE} periods that repeats with \
-             impacts; see `vines map`"
+            "the scene's start leads to no repeating pattern of impacts at sigma = {sigma} (dimensionless) within {SETTLE} periods; \
+             see `vines map`"
         ))
     })?;
     let pattern = format!(
@@ -209,7 +209,7 @@ fn described(pattern: &str, motion: &Periodic) -> String {
 
 /// Halvings of epsilon in the convergence study.
 const HALVINGS: u32 = 7;
-/// Rows of a curve that a person is shown.
+/// Rows of a curve in a text table.
 const ROWS: usize = 24;
 
 fn shown(
@@ -279,7 +279,7 @@ fn curve(name: &str, branch: &Branch) -> String {
 fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
     if orbits.is_empty() {
         return if scene.g == 0.0 {
-            "  none: without excitation (G = 0) there is nothing to be in resonance with\n".into()
+            "  none: without excitation (G = 0) there is no resonance\n".into()
         } else {
             "  none between 0.2 and 3 omega0 at this excitation\n".into()
         };

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::periodic::Periodic;
 
-/// How far to go.
+/// Limits of a continuation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Limits {
     /// Range of sigma.
@@ -38,7 +38,7 @@ pub enum Ended {
     /// It came back to its start.
     #[serde(rename = "closed")]
     Closed,
-    /// Most points were taken.
+    /// The largest number of points was reached.
     #[serde(rename = "number of points")]
     Points,
     /// The pattern of impacts ends here: a graze, or impacts that accumulate.

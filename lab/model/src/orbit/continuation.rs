@@ -1,8 +1,8 @@
 //! Continuation of periodic motions by pseudo-arclength: through folds, stable and unstable parts alike (docs/theory.md, eq. 27).
 //!
-//! The unknowns are the state after an impact, sigma and G; four equations close the motion and one more chooses the curve:
+//! The unknowns are the state after an impact, sigma and G; four equations close the motion and one more selects the curve:
 //! fixed G for a frequency response, phase resonance for the backbone. The step follows the tangent and shrinks where the
-//! curve bends. A branch ends where its pattern of impacts does, at a graze.
+//! curve bends. A branch ends where its pattern of impacts ends, at a graze.
 
 use nalgebra::{Matrix4, Matrix6, SVector};
 
@@ -44,7 +44,7 @@ impl Curve<'_> {
         (length.is_finite() && length > 0.0).then(|| tangent / length)
     }
 
-    /// The curve's point where the plane at the end of a step of length `step` along the tangent cuts it.
+    /// The intersection of the curve with the plane at the end of a step along the tangent.
     fn correct(&self, x: &Unknowns, tangent: &Unknowns, step: f64) -> Option<Unknowns> {
         let ahead = x + tangent * step;
         let found = newton(
@@ -149,7 +149,7 @@ pub fn continue_from(
             branch.special.extend(curve.locate(last, &tangent, step));
         }
         branch.points.push(motion);
-        // A whole turn of the phase is the same motion.
+        // A phase difference of 2 pi is the same motion.
         let mut apart = next - origin;
         apart[0] = super::pattern::wrapped(apart[0]);
         if branch.points.len() > 10 && apart.norm() < step && turned.dot(&first_tangent) > 0.9 {
@@ -169,7 +169,7 @@ pub fn continue_from(
     branch
 }
 
-/// Follows the curve of `condition` through `start` both ways: first where sigma falls, last where it rises.
+/// Follows the curve of `condition` through `start` in both directions, from falling to rising sigma.
 #[must_use]
 pub fn continue_both_ways(
     scene: &Dimensionless,
@@ -195,7 +195,7 @@ pub fn continue_both_ways(
     }
 }
 
-/// Distance from the symmetric motion at which an asymmetric one is sought.
+/// Distance from the symmetric motion at which an asymmetric one is searched for.
 const ASIDE: f64 = 1e-3;
 
 /// The branch of asymmetric motions that leaves a symmetry breaking, along the curve of `condition`; the other one is its mirror image.
@@ -208,7 +208,7 @@ pub fn asymmetric_branch(
 ) -> Option<Branch> {
     let symmetric = &breaking.motion;
     let returned = follow(scene, &symmetric.pattern, &symmetric.unknowns())?;
-    // The direction that the half-period map turns into its opposite.
+    // The eigenvector of the half-period map for the multiplier -1.
     let flipped = returned.monodromy + Matrix4::identity();
     let svd = flipped.svd(false, true);
     let aside = svd.v_t?.row(svd.singular_values.imin()).transpose();

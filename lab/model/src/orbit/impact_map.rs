@@ -82,7 +82,7 @@ pub struct ImpactMap {
 }
 
 impl ImpactMap {
-    /// The map of `scene` (but for its G) at the frequency `omega` over omega0 and the excitation `g`.
+    /// The map of `scene` (except its G) at the frequency `omega` over omega0 and the excitation `g`.
     #[must_use]
     pub fn new(scene: &Dimensionless, omega: f64, g: f64) -> Self {
         let zeta = scene.epsilon * scene.lambda / 2.0;
@@ -103,7 +103,7 @@ impl ImpactMap {
         }
     }
 
-    /// The state just after the next impact; None where there is none within many periods, where it grazes, or where
+    /// The state just after the next impact; None if there is none within many periods, if it grazes, or if
     /// impacts accumulate.
     #[must_use]
     pub fn next(&self, from: &Bounce) -> Option<Bounce> {
@@ -154,7 +154,7 @@ impl ImpactMap {
 
         let unit_row = |n: usize| RowByAll::from_fn(|_, column| f64::from(u8::from(column == n)));
         let (by_q1, by_dq2) = (unit_row(1), unit_row(3));
-        // w = wall at the end of the flight tells by how much it lasts longer.
+        // The condition w = wall at the end gives the change of the flight time.
         let by_w = fixed.row(0) - by_q1 - by_dq2 * t;
         let t_by = by_w / -dw;
         let acceleration = self.oscillator.free_acceleration(q1, dq1) + self.force(end);
@@ -219,7 +219,7 @@ impl ImpactMap {
         Vector2::new(z.im, self.omega * z.re)
     }
 
-    /// Without any excitation there is no response either, not even at an undamped resonance.
+    /// Without excitation the response is zero, even at an undamped resonance.
     fn turned(&self, z: Complex<f64>, phase: f64) -> Complex<f64> {
         if z.is_nan() && self.g == 0.0 {
             return Complex::new(0.0, 0.0);

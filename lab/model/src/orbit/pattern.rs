@@ -1,4 +1,4 @@
-//! A pattern of impacts, and what closing it asks for: the return map, its derivative, and the first harmonic of v (docs/theory.md, eq. 26).
+//! A pattern of impacts and the equations that close it: the return map, its derivative, and the first harmonic of v (docs/theory.md, eq. 26).
 
 use std::f64::consts::{PI, TAU};
 
@@ -13,7 +13,7 @@ use crate::Dimensionless;
 pub struct ImpactPattern {
     /// Walls hit, one after another, over the map; the first is the one the motion starts from.
     pub walls: Vec<f64>,
-    /// Half periods of the base over the map: even, but for a mirrored pattern, where it is odd.
+    /// Half periods of the base over the map: even, except for a mirrored pattern, where it is odd.
     pub half_periods: u32,
     /// Minus itself after those half periods.
     pub mirrored: bool,
@@ -30,7 +30,7 @@ impl ImpactPattern {
         }
     }
 
-    /// The same pattern looked at over a whole period: what symmetry breaking leads to.
+    /// The same pattern over a whole period, as after symmetry breaking.
     #[must_use]
     pub fn doubled(&self) -> Self {
         let mut walls = self.walls.clone();
@@ -77,7 +77,7 @@ pub type Unknowns = nalgebra::SVector<f64, 6>;
 /// The return map of a pattern from one start.
 #[derive(Debug, Clone)]
 pub(super) struct Returned {
-    /// By how much the motion fails to close.
+    /// Closing error of the motion.
     pub residual: Vector4<f64>,
     /// Derivative of the residual by the unknowns.
     pub by: ByAll,
@@ -85,7 +85,7 @@ pub(super) struct Returned {
     pub v: Complex<f64>,
     /// Derivative of V by the unknowns, real and imaginary part.
     pub v_by: [RowByAll; 2],
-    /// The bounces over the map, the start included, the return not.
+    /// The bounces over the map, with the start and without the return.
     pub bounces: Vec<Bounce>,
     /// Time of flight after each.
     pub durations: Vec<f64>,
@@ -93,7 +93,7 @@ pub(super) struct Returned {
     pub monodromy: Matrix4<f64>,
 }
 
-/// Follows the pattern from the unknowns `x`; None where the impacts come in another pattern, or graze.
+/// Follows the pattern from the unknowns `x`; None if the impacts have another pattern or graze.
 pub(super) fn follow(
     scene: &Dimensionless,
     pattern: &ImpactPattern,
