@@ -5,12 +5,14 @@
 //! alternating impulses of known size on the oscillator, and their periodic response has a closed form. At a given frequency
 //! one quadratic equation for B remains. There is no first-order approximation.
 
+mod bounce;
 mod branch;
 mod candidate;
 mod continuation;
 mod convergence;
 mod curves;
 mod flight;
+mod forced_oscillator;
 mod impact_map;
 mod multipliers;
 mod oscillator;
@@ -22,11 +24,12 @@ mod settle;
 
 use serde::Serialize;
 
+pub use bounce::Bounce;
 pub use branch::{Bifurcation, Branch, Ended, Limits, Special};
 pub use continuation::{asymmetric_branch, continue_both_ways, continue_from};
 pub use convergence::{Convergence, Difference, convergence};
 pub use curves::{Response, backbone, response};
-pub use impact_map::{Bounce, ImpactMap};
+pub use impact_map::ImpactMap;
 pub use pattern::{ImpactPattern, Unknowns};
 pub use periodic::{Condition, Periodic};
 pub use search::{exact_backbone, phase_resonant};

@@ -5,7 +5,8 @@
 
 use nalgebra::{Matrix2, Vector2};
 
-use super::impact_map::{Bounce, ImpactMap, State};
+use super::bounce::{Bounce, State};
+use super::forced_oscillator::ForcedOscillator;
 
 /// A contact slower than this is a graze, where the map has no derivative.
 const GRAZING: f64 = 1e-9;
@@ -16,7 +17,7 @@ const STEPS: usize = 4000;
 
 /// A flight of the particle.
 pub(super) struct Flight<'a> {
-    map: &'a ImpactMap,
+    oscillator: &'a ForcedOscillator,
     /// Where it begins: phase of the base, particle, and relative displacement and velocity.
     pub(super) phase: f64,
     q2: f64,
@@ -31,43 +32,44 @@ pub(super) struct Flight<'a> {
 
 impl<'a> Flight<'a> {
     /// The flight after a bounce.
-    pub(super) fn new(map: &'a ImpactMap, from: &Bounce) -> Self {
+    pub(super) fn new(oscillator: &'a ForcedOscillator, from: &Bounce) -> Self {
         let state = [from.q1, from.dq1, from.q2(), from.dq2];
-        Self::between(map, from.phase, state, from.wall)
+        Self::between(oscillator, from.phase, state, from.wall)
     }
 
     /// The flight from a state with the relative displacement `w`.
     pub(super) fn between(
-        map: &'a ImpactMap,
+        oscillator: &'a ForcedOscillator,
         phase: f64,
         [q1, dq1, q2, dq2]: State,
         w: f64,
     ) -> Self {
-        let free = Vector2::new(q1, dq1) - map.harmonic(phase);
+        let free = Vector2::new(q1, dq1) - oscillator.harmonic(phase);
         // Of the free motion q^2 + q'^2 never grows.
-        let driven = (map.unit[0] * map.g).norm() * map.omega * map.omega;
-        let driven = if map.g == 0.0 { 0.0 } else { driven };
         Self {
-            map,
+            oscillator,
             phase,
             q2,
             dq2,
             w,
             dw: dq1 - dq2,
             free,
-            curvature: driven + free.norm() * (1.0 + 2.0 * map.zeta),
+            curvature: oscillator.acceleration() + free.norm() * (1.0 + 2.0 * oscillator.zeta),
         }
     }
 
     /// (q1, q1') at the time `t`.
     pub(super) fn primary(&self, t: f64) -> Vector2<f64> {
-        let propagator: Matrix2<f64> = self.map.oscillator.propagator(t);
-        propagator * self.free + self.map.harmonic(self.phase + self.map.omega * t)
+        let propagator: Matrix2<f64> = self.oscillator.free.propagator(t);
+        propagator * self.free
+            + self
+                .oscillator
+                .harmonic(self.phase + self.oscillator.omega * t)
     }
 
     /// Time and wall of the first contact.
     pub(super) fn contact(&self) -> Option<(f64, f64)> {
-        let horizon = LONGEST * std::f64::consts::TAU / self.map.omega;
+        let horizon = LONGEST * std::f64::consts::TAU / self.oscillator.omega;
         let k = self.curvature;
         if !k.is_finite() || k <= 0.0 {
             return None;

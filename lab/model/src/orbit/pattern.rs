@@ -5,7 +5,8 @@ use std::f64::consts::{PI, TAU};
 use nalgebra::{Complex, Matrix4, Vector4};
 use serde::Serialize;
 
-use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll, Step};
+use super::bounce::Bounce;
+use super::impact_map::{ByAll, ImpactMap, RowByAll, Step};
 use crate::Dimensionless;
 
 /// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
@@ -174,11 +175,11 @@ struct Harmonic {
 impl Harmonic {
     /// Each coefficient with its derivative by Omega.
     fn new(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern) -> Self {
-        let omega = map.omega;
+        let omega = map.oscillator.omega;
         let zeta = scene.epsilon * scene.lambda / 2.0;
-        let compliance = map.oscillator.compliance(omega);
+        let compliance = map.oscillator.free.compliance(omega);
         let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * zeta);
-        let force = map.oscillator.base_force(omega);
+        let force = map.oscillator.free.base_force(omega);
         let direct = force * compliance * scene.epsilon;
         let direct_by =
             (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;

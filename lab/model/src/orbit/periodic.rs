@@ -4,7 +4,8 @@ use nalgebra::{Complex, Matrix6, RowSVector, SVector};
 use serde::Serialize;
 
 use super::{
-    impact_map::{Bounce, ImpactMap},
+    bounce::Bounce,
+    impact_map::ImpactMap,
     pattern::{ImpactPattern, Returned, Unknowns, follow, wrapped},
 };
 use crate::Dimensionless;
@@ -168,7 +169,7 @@ impl Periodic {
         let last = bounces
             .iter()
             .min_by(|one, other| since(one).total_cmp(&since(other)))?;
-        Some(map.state(last, since(last) / map.omega))
+        Some(map.state(last, since(last) / map.oscillator.omega))
     }
 
     /// (q1, q1', q2, q2') where the base passes through zero, upwards: a start for the plant.

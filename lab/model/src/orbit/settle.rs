@@ -6,7 +6,8 @@ use std::f64::consts::TAU;
 use lovines::{Drive, InvalidValue, State};
 
 use super::{
-    impact_map::{Bounce, ImpactMap},
+    bounce::Bounce,
+    impact_map::ImpactMap,
     pattern::{ImpactPattern, Unknowns},
     periodic::{Condition, Periodic},
 };
