@@ -165,8 +165,8 @@ def growths(curves):
 
 
 GROWTH_NOTE = (
-    "Steady 1:1 motion. Periods: a step each; impacts: all in one step; samples: over 100 periods. The exponent is that "
-    "of the upper half of the range, in logarithms; the last column goes a thousand times further by it. Times "
+    "Steady 1:1 motion. Periods: a step each; impacts: all in one step; samples: over 100 periods. The exponent is "
+    "that of the upper half of the range, in logarithms; the last column goes a thousand times further by it. Times "
     "are medians of three rounds."
 )
 SAVINGS_NOTE = (
@@ -218,7 +218,7 @@ def notes(bench):
     yield "Truth, checked in this run: " + "; ".join(bench.truth_notes) + "."
     yield (
         "Every method is asked for the state after each step of the scene, and stops there as a co-simulation master "
-        "has it, on one thread. CVODE in C restarts at impacts and where the drive changes, and interpolates in between. "
+        "has it, on one thread. CVODE in C restarts at impacts and where the drive changes, and interpolates between. "
         "Just-in-time compilation (heyoka) and setting up are not in the times. Runs take turns in an "
         "order drawn anew each round. In the loop, all methods get the drive recorded from controller and plant."
     )

@@ -61,7 +61,7 @@ fn extreme_values_of_plant_and_drive_are_refused_at_once() {
     for (value, name) in [
         ("plant.c=1e300", "c (damping) = "),
         ("plant.M=1e-300", "M (primary mass) = "),
-        ("plant.k=1e100", "rad/s is refused"),
+        ("plant.k=1e101", "k (stiffness) = "),
         (
             "excitation.E=1e300",
             "E (amplitude of the base oscillator) = ",

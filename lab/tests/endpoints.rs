@@ -30,6 +30,8 @@ static FMUS: LazyLock<TempDir> = LazyLock::new(|| {
         "lovines",
         "-p",
         "phase-lock-fmu",
+        "--features",
+        "lovines/fmu",
     ]);
     build.arg("--target-dir").arg(libraries.parent().unwrap());
     if libraries.ends_with("release") {

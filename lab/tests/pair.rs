@@ -24,6 +24,7 @@ fn libraries() -> PathBuf {
     let mut build = Command::new(env!("CARGO"));
     build.args(["build", "--quiet", "--locked"]);
     build.args(["--package", "lovines", "--package", "phase-lock-fmu"]);
+    build.args(["--features", "lovines/fmu"]);
     if folder.ends_with("release") {
         build.arg("--release");
     }

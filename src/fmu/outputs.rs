@@ -73,7 +73,7 @@ impl LoViNes {
             state.dq2,
             state.q1 + self.epsilon * state.q2,
             w,
-            state.dq1 - state.dq2,
+            plant.relative_velocity(),
             plant.base_displacement(),
             f64::NAN,
             totals.impact_time,

@@ -21,8 +21,12 @@ const DAMPING_RATIOS: [f64; 15] = [
 /// Amplitudes of the base, half-widths; frequencies, omega0.
 const AMPLITUDES: [f64; 6] = [0.0, 1e-3, 0.1, 1.0, 30.0, 1e3];
 const FREQUENCIES: [f64; 9] = [1e-3, 0.03, 0.3, 1.0, 1.7, 10.0, 30.0, 300.0, 1e3];
-/// Natural periods that each drive is followed for, a step each; fewer once so many impacts or so much time have passed.
-const PERIODS: u32 = 20;
+/// Steps that each drive is followed for; fewer once so many impacts or so much time have passed. A step is a natural period, or
+/// [`CYCLES`] of the drive where those are shorter: the work is then scaled to a natural period.
+const STEPS: u32 = 20;
+const CYCLES: f64 = 10.0;
+/// Where only time is measured, no more drives are begun after so much of it for one damping ratio.
+const ENOUGH_TIME_PER_RATIO: Duration = Duration::from_secs(20);
 const ENOUGH_IMPACTS: u64 = 100_000;
 const ENOUGH_TIME: Duration = Duration::from_millis(200);
 
@@ -31,9 +35,9 @@ const ENOUGH_TIME: Duration = Duration::from_millis(200);
 struct Hardest {
     amplitude: f64,
     ratio: f64,
-    impacts: u64,
+    impacts: f64,
     ns: f64,
-    evaluations: Option<u64>,
+    evaluations: Option<f64>,
     /// Time and evaluations per impact, drive cycle or natural period, whichever are the most in that period.
     ns_per_unit: f64,
     per_unit: Option<f64>,
@@ -42,7 +46,7 @@ struct Hardest {
 impl Hardest {
     /// By evaluations where they are counted, else by time; one measure serves all drives.
     fn weight(&self) -> f64 {
-        self.evaluations.map_or(self.ns, |n| n as f64)
+        self.evaluations.unwrap_or(self.ns)
     }
 
     fn or(self, other: Self) -> Self {
@@ -79,21 +83,25 @@ fn hardest(zeta: f64, amplitude: f64, ratio: f64) -> Hardest {
     plant.begin(drive).expect("valid values");
     let mut worst = Hardest::default();
     let (began, mut impacts) = (Instant::now(), 0);
-    for _ in 0..PERIODS {
+    let steps_per_period = (ratio / CYCLES).max(1.0);
+    for _ in 0..STEPS {
         let before = Instant::now();
-        let outcome = plant.advance(drive, TAU).expect("valid values");
+        let outcome = plant
+            .advance(drive, TAU / steps_per_period)
+            .expect("valid values");
         black_box(plant.state());
-        let ns = before.elapsed().as_nanos() as f64;
-        let units = (outcome.impacts as f64).max(ratio).max(1.0);
-        let counted = evaluations(&outcome);
+        let ns = before.elapsed().as_nanos() as f64 * steps_per_period;
+        let in_a_period = outcome.impacts as f64 * steps_per_period;
+        let units = in_a_period.max(ratio).max(1.0);
+        let counted = evaluations(&outcome).map(|n| n as f64 * steps_per_period);
         worst = worst.or(Hardest {
             amplitude,
             ratio,
-            impacts: outcome.impacts,
+            impacts: in_a_period,
             ns,
             ns_per_unit: ns / units,
             evaluations: counted,
-            per_unit: counted.map(|n| n as f64 / units),
+            per_unit: counted.map(|n| n / units),
         });
         impacts += outcome.impacts;
         if impacts > ENOUGH_IMPACTS || began.elapsed() > ENOUGH_TIME {
@@ -114,25 +122,30 @@ pub fn sweep(long: bool, table: &mut Table) {
             .collect();
         // Where only time is measured, the drives go one by one: others on the same cores would be in the figures.
         let one = |&(amplitude, ratio): &(f64, f64)| hardest(zeta, amplitude, ratio);
-        let worst = if evaluations(&Outcome::default()).is_some() {
-            drives
-                .par_iter()
-                .map(one)
-                .reduce(Hardest::default, Hardest::or)
+        let (worst, followed) = if evaluations(&Outcome::default()).is_some() {
+            let worst = (drives.par_iter().map(one)).reduce(Hardest::default, Hardest::or);
+            (worst, drives.len())
         } else {
-            drives.iter().map(one).fold(Hardest::default(), Hardest::or)
+            let began = Instant::now();
+            let found: Vec<Hardest> = (drives.iter())
+                .take_while(|_| began.elapsed() < ENOUGH_TIME_PER_RATIO)
+                .map(one)
+                .collect();
+            let followed = found.len();
+            let worst = found.into_iter().fold(Hardest::default(), Hardest::or);
+            (worst, followed)
         };
-        rows.push((zeta, drives.len(), worst));
+        rows.push((zeta, drives.len(), followed, worst));
         table.progress(&format!("work at damping ratio {zeta}"));
     }
     let shown = |x: Option<f64>| x.map_or_else(|| "not counted".to_owned(), |x| format!("{x:.1}"));
     let lines: Vec<String> = (rows.iter())
-        .map(|(zeta, drives, w)| {
+        .map(|(zeta, drives, followed, w)| {
             let counted = w
                 .evaluations
-                .map_or_else(|| "not counted".to_owned(), |n| n.to_string());
+                .map_or_else(|| "not counted".to_owned(), |n| format!("{n:.0}"));
             format!(
-                "| {zeta:e} | {drives} | E = {:e} b, omega = {:e} omega0 | {} | {:.1} | {:.0} | {counted} | {} |",
+                "| {zeta:e} | {followed} of {drives} | E = {:e} b, omega = {:e} omega0 | {:.0} | {:.1} | {:.0} | {counted} | {} |",
                 w.amplitude,
                 w.ratio,
                 w.impacts,
@@ -143,12 +156,12 @@ pub fn sweep(long: bool, table: &mut Table) {
         })
         .collect();
     table.second(
-        "Work in a natural period (one step), at most, over all drives of a damping ratio. Per unit: per impact, drive cycle or \
+        "Work in a natural period, at most, over all drives of a damping ratio. Per unit: per impact, drive cycle or \
          natural period, whichever are the most.",
         "| damping ratio | drives | hardest drive | impacts | µs | ns per unit | evaluations | evaluations per unit |",
         &lines,
     );
-    for (zeta, drives, worst) in rows {
+    for (zeta, drives, _, worst) in rows {
         if let Some(per_unit) = worst.per_unit {
             table.row(
                 &format!(

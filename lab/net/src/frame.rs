@@ -48,7 +48,7 @@ pub mod flag {
     /// Sensors: there is a reference channel.
     pub const REFERENCE: u8 = 4;
     /// Sensors: the rig is a simulation, and its last four values describe the impacts.
-    pub const WITNESS: u8 = 8;
+    pub const GROUND_TRUTH: u8 = 8;
     /// Sensors or Drive, from a server: the drive has been shut down for this session.
     pub const SHUT_DOWN: u8 = 16;
     /// Welcome, of a rig: it runs in real time.

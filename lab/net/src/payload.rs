@@ -21,7 +21,7 @@ pub(super) fn write_reading(mut frame: Frame, reading: &Reading) -> Frame {
         frame.flags |= flag::REFERENCE;
     }
     if ground_truth.is_some() {
-        frame.flags |= flag::WITNESS;
+        frame.flags |= flag::GROUND_TRUTH;
     }
     let inside = ground_truth.unwrap_or_default();
     frame.values = [
@@ -50,7 +50,7 @@ pub(super) fn read_reading(frame: &Frame) -> Reading {
             response,
             reference: frame.has(flag::REFERENCE).then_some(reference),
         },
-        ground_truth: frame.has(flag::WITNESS).then_some(GroundTruth {
+        ground_truth: frame.has(flag::GROUND_TRUTH).then_some(GroundTruth {
             impacts: impacts as i64,
             impact_time,
             impact_velocity,

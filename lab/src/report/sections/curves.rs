@@ -44,16 +44,46 @@ pub(super) fn make(
         section.found("There is no exact phase-resonant 1:1 motion at this excitation.");
         return Ok(section);
     };
+    describe_backbone(&mut section, &curve);
+    if !found.is_empty() {
+        section.figure(
+            "responses",
+            "Frequency responses at several excitations: exact, first-order, and the backbone of the theory through their maxima. \
+             Where a response loses its symmetry, the asymmetric motions (blue, beside the dashed curve) take over.",
+            responses::figure(&p, &found).svg()?,
+        );
+    }
+    let changes = changes(&found);
+    if !changes.is_empty() {
+        section.table(
+            "Where the symmetric motions on the exact frequency responses change stability.",
+            changes,
+        );
+    }
+    if let Some(motion) = locked(&p, &found) {
+        let flow = SlowFlow::new(p.lambda, p.r);
+        let theory = flow.phase_resonant(p.g);
+        let theory = theory.iter().find(|one| one.stable());
+        section.figure(
+            "period",
+            "One period of the locked motion. Above: the primary mass with its walls, and the particle between them; circles \
+             mark the impacts. Below: centre of mass and relative displacement, exact and by first-order theory.",
+            period::figure(&p, motion, theory).svg()?,
+        );
+    }
+    section.attach("curves.csv", csv(table(&curve, &found))?);
+    Ok(section)
+}
+
+fn describe_backbone(section: &mut Section, curve: &Branch) {
     let special: Vec<String> = curve
         .special
         .iter()
         .map(|one| {
+            let Periodic { sigma, c, g, .. } = one.motion;
             format!(
-                "{} at σ = {:.4}, C = {:.4}, G = {:.4}",
-                name(one.kind),
-                one.motion.sigma,
-                one.motion.c,
-                one.motion.g
+                "{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}",
+                name(one.kind)
             )
         })
         .collect();
@@ -64,66 +94,42 @@ pub(super) fn make(
         if special.len() == 1 { "" } else { "s" }
     );
     section.words(
-        "These motions are exact: periodic orbits of the full equations, found by shooting on the impact map and followed by \
-         pseudo-arclength through folds and symmetry breaking, stable and unstable alike. No first-order approximation is made.",
+        "These motions are exact: periodic orbits of the full equations, found by shooting on the impact map. Pseudo-arclength \
+         continuation follows them through folds and symmetry breaking, stable or not. There is no first-order approximation.",
     );
+    let places = match special.len() {
+        0 => "nowhere".into(),
+        _ => special.join("; "),
+    };
     section.words(format!(
-        "Along the exact backbone, stability changes here: {}. Theory expects the breaking of symmetry at B = {B_SYMMETRY_BREAKING:.4} whatever r.",
-        if special.is_empty() { "nowhere".into() } else { special.join("; ") }
+        "Along the exact backbone, stability changes here: {places}. The theory predicts symmetry breaking at \
+         B = {B_SYMMETRY_BREAKING:.4} for every r."
     ));
-    if !found.is_empty() {
-        section.figure(
-            "responses",
-            "Frequency responses at several excitations: exact, first-order, and the backbone of theory through their maxima. \
-             Where a response loses its symmetry the asymmetric motions (blue, beside the dashed curve) take over.",
-            responses::figure(&p, &found).svg()?,
-        );
-    }
-    let rows: Vec<Vec<String>> = found
-        .iter()
-        .flat_map(|one| {
-            one.symmetric
-                .special
-                .iter()
-                .map(move |special| (one.g, special))
-        })
-        .map(|(g, special)| {
-            let Periodic { sigma, c, b, .. } = special.motion;
-            let mut cells = vec![format!("{g:.4}"), name(special.kind).into()];
-            cells.extend([sigma, c, b].map(|one| format!("{one:.5}")));
-            cells
-        })
-        .collect();
-    if !rows.is_empty() {
-        section.table(
-            "Where the symmetric motions on the exact frequency responses change stability.",
-            Table::new(["G", "what", "σ", "C", "B"]).rows(rows),
-        );
-    }
-    let flow = SlowFlow::new(p.lambda, p.r);
-    let theory = flow
-        .phase_resonant(p.g)
-        .into_iter()
-        .find(|one| one.stable());
-    let resonant =
-        |one: &&Periodic| (one.g - p.g).abs() + (one.gamma + std::f64::consts::FRAC_PI_2).abs();
-    let own = found.iter().find(|one| one.g == p.g).and_then(|one| {
-        let stable = one.symmetric.points.iter().filter(|one| one.stable);
-        stable.min_by(|a, b| resonant(a).total_cmp(&resonant(b)))
-    });
-    if let Some(motion) = own {
-        section.figure(
-            "period",
-            "One period of the motion that the loop locks. Above: primary mass with its walls, and the particle between them; circles \
-             mark the impacts. Below: centre of mass and relative displacement, exact and as first-order theory reconstructs them.",
-            period::figure(&p, motion, theory.as_ref()).svg()?,
-        );
-    }
-    section.attach("curves.csv", csv(table(&curve, &found))?);
-    Ok(section)
 }
 
-/// The scene's excitation, and some about it: from just above where stable motions begin to beyond symmetry breaking.
+/// Where stability changes on the responses.
+fn changes(found: &[Response]) -> Table {
+    let all = found
+        .iter()
+        .flat_map(|one| one.symmetric.special.iter().map(|special| (one.g, special)));
+    Table::new(["G", "what", "σ", "C", "B"]).rows(all.map(|(g, special)| {
+        let Periodic { sigma, c, b, .. } = special.motion;
+        let mut cells = vec![format!("{g:.4}"), name(special.kind).into()];
+        cells.extend([sigma, c, b].map(|one| format!("{one:.5}")));
+        cells
+    }))
+}
+
+/// The stable motion at the scene's excitation that is nearest to phase resonance.
+fn locked<'a>(p: &Dimensionless, found: &'a [Response]) -> Option<&'a Periodic> {
+    let distance =
+        |one: &Periodic| (one.g - p.g).abs() + (one.gamma + std::f64::consts::FRAC_PI_2).abs();
+    let response = found.iter().find(|one| one.g == p.g)?;
+    let stable = response.symmetric.points.iter().filter(|one| one.stable);
+    stable.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+}
+
+/// The scene's excitation, and others from just above the onset of stable motions to beyond symmetry breaking.
 fn excitations(p: &Dimensionless) -> Vec<f64> {
     let flow = SlowFlow::new(p.lambda, p.r);
     let breaking = flow.backbone_at(B_SYMMETRY_BREAKING).g;

@@ -5,13 +5,13 @@ use std::error::Error;
 
 use super::{SectionError, Subject};
 use crate::comparison::{COMPARED_ABOVE, Comparison};
-use crate::experiment::{self, Plan, Stage};
+use crate::experiment::{self, ExperimentError, Plan, Record, Stage};
 use crate::identification::identify;
 use crate::report::figures::{backbone, history, manifold};
 use crate::report::files::{decay_csv, json};
 use crate::report::section::Section;
 use crate::report::table::{Table, number};
-use crate::rig::BuiltIn;
+use crate::rig::{BuiltIn, Rig};
 
 pub(super) fn make(
     subject: &Subject,
@@ -21,22 +21,7 @@ pub(super) fn make(
     let scene = &subject.scene;
     let mut rig = subject.rig()?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let plan = Plan::of(scene);
-    let told = Cell::new(0.0);
-    let record = experiment::run(rig.as_mut(), &mut controller, &plan, |stage, at, of| {
-        let part = at as f64 / of.max(1) as f64;
-        // Most locks come long before the last moment allowed.
-        let part = match stage {
-            Stage::Locking => 0.6 * part,
-            Stage::Holding => 0.6 + 0.1 * part,
-            Stage::Decaying => 0.7 + 0.2 * part,
-        };
-        if part > told.get() + 0.01 {
-            told.set(part);
-            done(part);
-        }
-    });
-    let record = match record {
+    let record = match recorded(rig.as_mut(), &mut controller, &Plan::of(scene), done) {
         Ok(record) => record,
         Err(error) => return Ok(without_backbone(section, &error)),
     };
@@ -47,9 +32,9 @@ pub(super) fn make(
     describe(&mut section, &found, scene.controller.phase_target);
     section.figure(
         "history",
-        "Amplitude and frequency over time. Left: the loop seeks phase resonance and holds it; measured once a period. Right: the \
-         drive is off, and the motion decays along the backbone until the impacts lose synchrony at the fold. \
-         Times count in periods 2π/ω₀ of the oscillator alone.",
+        "Amplitude and frequency over time. Left: the loop searches for phase resonance and holds it; measured once per period. Right: \
+         the drive is off, and the motion decays along the backbone until the impacts lose synchrony at the fold. \
+         Times are in periods 2π/ω₀ of the oscillator alone.",
         history::figure(&record, scene, &found).svg()?,
     );
     section.figure(
@@ -67,6 +52,29 @@ pub(super) fn make(
     Ok(section)
 }
 
+/// Runs the experiment and reports its progress in steps of a hundredth.
+fn recorded(
+    rig: &mut dyn Rig,
+    controller: &mut BuiltIn,
+    plan: &Plan,
+    done: &(dyn Fn(f64) + Sync),
+) -> Result<Record, ExperimentError> {
+    let reported = Cell::new(0.0);
+    experiment::run(rig, controller, plan, |stage, at, of| {
+        let part = at as f64 / of.max(1) as f64;
+        // Most locks come long before the time limit.
+        let part = match stage {
+            Stage::Locking => 0.6 * part,
+            Stage::Holding => 0.6 + 0.1 * part,
+            Stage::Decaying => 0.7 + 0.2 * part,
+        };
+        if part > reported.get() + 0.01 {
+            reported.set(part);
+            done(part);
+        }
+    })
+}
+
 fn without_backbone(mut section: Section, error: &dyn Error) -> Section {
     section.found(format!("The experiment gave no backbone: {error}."));
     section
@@ -79,58 +87,20 @@ fn describe(section: &mut Section, found: &Comparison, target: f64) {
         lock.periods_to_lock, lock.sigma, lock.c, lock.regime
     );
     section.words(format!(
-        "A sampled phase-locked loop drove the base at G = {:.4} and sought the frequency at which the centre of mass {} it by {} degrees. It settled after {:.0} periods with {:.3} impacts per period and a phase error of {:.1e} degrees. A \
-         phase lock alone proves nothing, for the linear mode locks just as well: the impacts alternate between the walls at even \
-         intervals, so this is the symmetric 1:1 regime.",
+        "A sampled phase-locked loop drove the base at G = {:.4} and searched for the frequency at which the centre of mass {} the \
+         base by {} degrees. It settled after {:.0} periods with {:.3} impacts per period and a phase error of {:.1e} degrees. A phase \
+         lock alone is not sufficient evidence, because the linear mode locks as well. Here the impacts alternate between the walls at \
+         even intervals: this is the symmetric 1:1 regime.",
         lock.g,
         if target <= 0.0 { "lags" } else { "leads" },
         target.abs(),
         lock.periods_to_lock, lock.impacts_per_period, lock.phase_error_deg
     ));
-    let cells = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
-        let b = b.map_or("–".into(), number);
-        [name.to_string(), number(sigma), number(c), b]
-    };
-    let mut rows = vec![cells("measured at the lock", lock.sigma, lock.c, lock.b)];
-    if let Some(exact) = &found.exact {
-        rows.push(cells("exact orbit", exact.sigma, exact.c, Some(exact.b)));
-        section.budget(
-            "lock, measured against the exact orbit",
-            format!(
-                "{:.1e} in σ, {:.3} % in C",
-                (lock.sigma - exact.sigma).abs(),
-                100.0 * (lock.c / exact.c - 1.0).abs()
-            ),
-            "The loop is released as soon as its drifts are below the limits of the scene; left to settle longer it comes closer.",
-        );
-    }
-    if let Some(theory) = &found.theory {
-        rows.push(cells(
-            "first-order theory",
-            theory.sigma,
-            theory.c,
-            Some(theory.b),
-        ));
-        if let Some(exact) = &found.exact {
-            section.budget(
-                "theory against the exact orbit, at the lock",
-                format!(
-                    "{:.3} in σ, {:.1} % in C",
-                    (theory.sigma - exact.sigma).abs(),
-                    100.0 * (theory.c / exact.c - 1.0).abs()
-                ),
-                "Theory is of first order in ε; the convergence study below shows that the distance shrinks as ε.",
-            );
-        }
-    }
-    section.table(
-        "The locked point. σ: detuning, C: amplitude of v over b, B: particle speed over b ω₀.",
-        Table::new(["", "σ", "C", "B"]).rows(rows),
-    );
+    describe_lock(section, found);
     if let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) {
         section.words(format!(
-            "Then the drive was switched off. The motion decayed from C = {:.4} to C = {:.4}, where the impacts lost synchrony; on its \
-             way it passed along the backbone, {} points of which were identified.",
+            "Then the drive was switched off. The motion decayed from C = {:.4} to C = {:.4}, where the impacts lost synchrony. \
+             During the decay it moved along the backbone, and {} points of the backbone were identified.",
             first.point.c,
             last.point.c,
             found.decay.len()
@@ -140,14 +110,50 @@ fn describe(section: &mut Section, found: &Comparison, target: f64) {
         section.budget(
             "decay against theory",
             format!("RMS {rms:.4} in σ over C > {COMPARED_ABOVE}"),
-            "Theory and exact orbits are for steady motions; this one loses several per cent of its amplitude in every period. \
-             The distance is of first order in ε, too.",
+            "Theory and exact orbits describe steady motions; this one loses several per cent of its amplitude in every period. \
+             This difference is also of first order in ε.",
         );
     }
     section.budget(
         "plant",
         "1e-13 relative".into(),
-        "Between events its motion is a closed formula, with no step-size error: tests compare it with 40-digit arithmetic \
+        "Between events the motion is computed in closed form, without a step-size error. Tests compare it with 40-digit arithmetic \
          (8e-14 over 200 periods and 400 impacts).",
+    );
+}
+
+/// The locked point beside exact orbit and theory.
+fn describe_lock(section: &mut Section, found: &Comparison) {
+    let lock = &found.lock;
+    let cells = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
+        let b = b.map_or("–".into(), number);
+        [name.to_string(), number(sigma), number(c), b]
+    };
+    let mut rows = vec![cells("measured at the lock", lock.sigma, lock.c, lock.b)];
+    let percent = |c: f64, reference: f64| 100.0 * (c / reference - 1.0).abs();
+    if let Some(exact) = &found.exact {
+        rows.push(cells("exact orbit", exact.sigma, exact.c, Some(exact.b)));
+        let sigma = (lock.sigma - exact.sigma).abs();
+        section.budget(
+            "lock, measured against the exact orbit",
+            format!("{sigma:.1e} in σ, {:.3} % in C", percent(lock.c, exact.c)),
+            "The loop is released as soon as its drifts are below the limits of the scene; a longer wait brings it closer.",
+        );
+    }
+    if let Some(theory) = &found.theory {
+        let (sigma, c, b) = (theory.sigma, theory.c, theory.b);
+        rows.push(cells("first-order theory", sigma, c, Some(b)));
+    }
+    if let (Some(theory), Some(exact)) = (&found.theory, &found.exact) {
+        let sigma = (theory.sigma - exact.sigma).abs();
+        section.budget(
+            "theory against the exact orbit, at the lock",
+            format!("{sigma:.3} in σ, {:.1} % in C", percent(theory.c, exact.c)),
+            "The theory is of first order in ε; the convergence study below shows that the difference shrinks as ε.",
+        );
+    }
+    section.table(
+        "The locked point. σ: detuning, C: amplitude of v over b, B: particle speed over b ω₀.",
+        Table::new(["", "σ", "C", "B"]).rows(rows),
     );
 }

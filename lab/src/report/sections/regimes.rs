@@ -3,7 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::{SectionError, Subject};
-use crate::map::{Axis, Plan};
+use crate::map::{Axis, Map, Plan};
 use crate::orbit::phase_resonant;
 use crate::regime::Regime;
 use crate::report::figures::regimes;
@@ -11,7 +11,7 @@ use crate::report::files::map_csv;
 use crate::report::section::Section;
 use crate::report::table::Table;
 
-/// Periods that pass, and periods recorded.
+/// Periods before the record, and periods recorded.
 const PERIODS: (usize, usize) = (400, 100);
 
 pub(super) fn make(
@@ -44,18 +44,36 @@ pub(super) fn make(
         let n = count.fetch_add(1, Ordering::Relaxed) + 1;
         done(n as f64 / all as f64);
     })?;
+    describe(&mut section, &map);
+    section.figure(
+        "regimes",
+        "The regime map. The line is the border of the island in which first-order theory has a stable symmetric 1:1 motion.",
+        regimes::svg(&map)?,
+    );
+    section.budget(
+        "regime map",
+        "one start per cell".into(),
+        "Where several regimes are stable, the start decides. Cells at a border may still be in a transient, \
+         and chaos that ends only after thousands of periods counts as lasting.",
+    );
+    section.attach("regimes.csv", map_csv(&map)?);
+    Ok(section)
+}
+
+fn describe(section: &mut Section, map: &Map) {
+    let all = map.cells.len();
     let inside = map.cells.iter().filter(|one| one.theory_stable).count();
     let (_, agree) = map.count(Regime::Symmetric);
     let percent = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
     section.finding = format!(
-        "Of {all} cells of the map, {inside} lie where theory has a stable symmetric 1:1 motion; {:.0} % of these show it.",
+        "Of {all} cells of the map, {inside} lie where the theory has a stable symmetric 1:1 motion; {:.0} % of these show it.",
         percent(agree, inside)
     );
     section.words(format!(
-        "Each cell of the map over {x} and {y} is one plant, driven from the scene's start at a fixed frequency. After {} periods \
-         the impacts of the next {} are classified: by the pattern that repeats; where none does, the response is modulated if it is captured \
-         into 1:1 resonance and lost again, or if a small disturbance does not grow, and chaotic otherwise.",
-        PERIODS.0, PERIODS.1
+        "Each cell of the map over {} and {} is one plant, driven from the scene's start at a fixed frequency. After {} periods, \
+         the impacts of the next {} periods are classified by the pattern that repeats. Without such a pattern, the response is \
+         modulated if it is captured into 1:1 resonance and lost again, or if a small disturbance does not grow; otherwise it is chaotic.",
+        map.plan.x, map.plan.y, PERIODS.0, PERIODS.1
     ));
     let rows = Regime::SIMULATED.into_iter().map(|regime| {
         let (cells, here) = map.count(regime);
@@ -66,28 +84,15 @@ pub(super) fn make(
             format!("{:.1} %", percent(here, inside)),
         ]
     });
+    let headings = [
+        "regime",
+        "cells",
+        "share",
+        "share inside the theory's island",
+    ];
     section.table(
         "How often each regime occurs.",
-        Table::new([
-            "regime",
-            "cells",
-            "share",
-            "share inside the theory's island",
-        ])
-        .rows(rows),
+        Table::new(headings).rows(rows),
     );
     section.words(section.finding.clone());
-    section.figure(
-        "regimes",
-        "The regime map. The line is the border of the island where first-order theory has a stable symmetric 1:1 motion.",
-        regimes::svg(&map)?,
-    );
-    section.budget(
-        "regime map",
-        "one start per cell".into(),
-        "Where several regimes are stable the start decides. Cells at a border may still be in a transient, \
-         and chaos that ends only after thousands of periods is taken for lasting.",
-    );
-    section.attach("regimes.csv", map_csv(&map)?);
-    Ok(section)
 }

@@ -55,20 +55,20 @@ pub(super) fn make(
         tracked.periods_per_point()
     );
     section.words(format!(
-        "A decay is not a steady motion, and its points lie off the backbone for that. Here the loop holds the response at one level \
-         after another and waits until it is still; the drive does what it must. {} Of these points {in_regime} are in the symmetric 1:1 regime.",
+        "A decay is not a steady motion, so its points lie off the backbone. Here the loop holds the response at one level after \
+         another until it has settled, and the amplitude of the drive follows. {} Of these points, {in_regime} are in the symmetric 1:1 regime.",
         section.finding
     ));
     section.figure(
         "tracked-backbone",
-        "The backbone as tracked with the loop closed, with the exact curve and first-order theory.",
+        "The backbone tracked with the loop closed, the exact curve and first-order theory.",
         figure::figure(&tracked).svg()?,
     );
     if let Some(worst) = tracked.worst() {
         section.budget(
             "tracked backbone against the exact one",
             format!("at most {worst:.1e} in C, σ and G"),
-            "Largest of the three differences, to the place on the exact curve where that is least, over all points.",
+            "Largest of the three differences from the nearest place on the exact curve, over all points.",
         );
     }
     let rows = tracked.points.iter().map(|one| Row {
