@@ -10,8 +10,8 @@ import pytest
 from component import FMICallException
 
 BAD_PLANTS = [
-    ({"M": -1}, ["M", "-1 kg", "above 0"]),
-    ({"k": 0}, ["k", "0 N/m", "above 0"]),
+    ({"M": -1}, ["M", "-1 kg", "from 1e-100 to 1e100"]),
+    ({"k": 0}, ["k", "0 N/m", "from 1e-100 to 1e100"]),
     ({"c": -0.5}, ["c", "-0.5 N.s/m", "0 or above"]),
     ({"m": nan}, ["m", "NaN", "kg", "finite number"]),
     ({"b": inf}, ["b", "inf", "m", "finite number"]),
