@@ -135,7 +135,7 @@ fn values_that_make_no_sense_are_named_with_unit_and_range() {
                 "from 1e-100 to 1e100",
             ],
         ),
-        ("plant.c=-0.1", ["c (damping) = -0.1 N", "0 or above"]),
+        ("plant.c=-0.1", ["c (damping) = -0.1 N", "from 0 to 1e100"]),
         (
             "plant.r=0",
             ["r (coefficient of restitution) = 0", "at most 1"],
