@@ -171,19 +171,10 @@ impl FastPath {
         let mut start = Start::new(moving, point);
         let found = match self.as_before(&mut start, left) {
             Some(found) => found,
-            // A particle that is slow against the time left may never meet a wall.
-            None if start.sample.dw.abs() * left < start.half_width()
-                && self.is_contact_free(moving, &point, left) =>
-            {
-                Found::Free(left)
-            }
-            None => {
-                start.sample.ddw = start.acceleration(&self.coefficients, &point);
-                match self.hop(&start, left) {
-                    Some(hop) => Found::Contact(hop),
-                    None => self.march(&start, left, None),
-                }
-            }
+            None => match out_of_reach(&self.coefficients, &start) {
+                Some(t) if t > self.coefficients.stretch => Found::Free(t),
+                _ => self.look(&mut start, left),
+            },
         };
         match found {
             Found::Contact(arrival) if arrival.t.value() <= left => self.land(moving, &arrival),
@@ -200,6 +191,16 @@ impl FastPath {
                 Next::ContactFree(left)
             }
             Found::Nothing => Next::Search,
+        }
+    }
+
+    /// A short hop, or a march.
+    #[inline(always)]
+    fn look(&mut self, start: &mut Start, left: f64) -> Found {
+        start.sample.ddw = start.acceleration(&self.coefficients, &start.point);
+        match self.hop(start, left) {
+            Some(hop) => Found::Contact(hop),
+            None => self.march(start, left, None),
         }
     }
 
@@ -344,6 +345,26 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
         && slope.abs().max(point.dy.abs()) <= fastest
 }
 
+/// How long the particle stays where the primary mass, at its largest displacement, cannot reach it with a wall, s.
+///
+/// That displacement is at most the amplitude of the steady response and that of the free motion, which never grows.
+#[inline(always)]
+fn out_of_reach(coefficients: &Coefficients, start: &Start) -> Option<f64> {
+    let amplitude = start.base.drive.amplitude;
+    let steady = coefficients.forcing.steady()? * amplitude;
+    let (b, particle) = (start.half_width(), start.point.y - start.sample.w);
+    let room = b * (1.0 - 1e-9) - particle.abs() - steady.l1_norm();
+    if room <= 0.0 || start.base.drive.signal[1] != 0.0 {
+        return None;
+    }
+    let (cos, sin) = start.point.phasor;
+    let y = start.point.y - (steady.re * sin + steady.im * cos);
+    let dy = start.point.dy - coefficients.omega * (steady.re * cos - steady.im * sin);
+    let omega0 = start.rig.alone.omega0;
+    let room = room - (y * y + (dy / omega0) * (dy / omega0)).sqrt();
+    (room > 0.0).then(|| room / start.masses.particle.abs())
+}
+
 /// Whether no wall is met between a mark and a predicted contact.
 #[inline(always)]
 fn verified(start: &Start, from: &Mark, predicted: &Predicted) -> bool {
@@ -424,9 +445,9 @@ fn arrive(
     let w = start.sample.w + (increment.y + start.drift * propagator.t);
     let slowness = 1.0 / (start.point.dy + increment.dy + start.drift);
     let first = (wall.sign() * start.half_width() - w) * slowness;
-    // Not so if it is not a number.
-    let is_near = first.abs() < 256.0 * coefficients.near;
-    if !is_near {
+    // Not a number where the approach has no speed.
+    let close = first.abs() < 256.0 * coefficients.near;
+    if !close {
         return Err(propagator.t + first);
     }
     let nearby = Nearby::new(coefficients, amplitude, &start.point, &increment);
