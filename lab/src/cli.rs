@@ -35,8 +35,8 @@ Examples:
   vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
   vines orbit --response                       the exact frequency response, stable and unstable
   vines theory --scene scenes/dimensionless.toml --set plant.epsilon=0.0042
-  vines map                                    which regime where, over sigma and G
-  vines report --out report                    all of it on one page, with pictures
+  vines map                                    the regimes over sigma and G
+  vines report --out report                    everything on one page, with figures
   vines pack --out fmus                        write LoViNes.fmu and PhaseLock.fmu
   vines rig --listen 127.0.0.1:5510            serve the plant in real time, for identify --rig udp://127.0.0.1:5510
 
@@ -89,7 +89,7 @@ pub fn run() -> ExitCode {
     }
 }
 
-/// Prints to a reader that may have seen enough, such as `head`: that is no failure.
+/// Prints; a reader that closes early, such as `head`, is not a failure.
 fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {

@@ -1,4 +1,4 @@
-//! What a person and a program get to see: files, figures, tables, and one page with all of it.
+//! Results for people and programs: files, figures, tables, and one page with all of them.
 
 mod figure;
 mod figures;

@@ -106,10 +106,10 @@ fn noise_is_never_locked() {
     assert!(matches!(outcome, Err(ExperimentError::NoLock { .. })));
 }
 
-/// A rig that does not tell its impacts, as hardware would not.
-struct Mute(Simulated);
+/// A rig that does not report its impacts, as hardware would not.
+struct WithoutGroundTruth(Simulated);
 
-impl Rig for Mute {
+impl Rig for WithoutGroundTruth {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         self.0.sense()
     }
@@ -119,10 +119,10 @@ impl Rig for Mute {
     }
 }
 
-/// What is identified on a rig that does not tell its impacts.
-fn identified_mute(settings: &[&str]) -> Result<Comparison, IdentificationError> {
+/// What is identified on a rig that does not report its impacts.
+fn identified_without_ground_truth(settings: &[&str]) -> Result<Comparison, IdentificationError> {
     let scene = scene(settings);
-    let mut rig = Mute(Simulated::new(scene.plant, scene.start).unwrap());
+    let mut rig = WithoutGroundTruth(Simulated::new(scene.plant, scene.start).unwrap());
     assert_eq!(rig.ground_truth().unwrap(), None::<GroundTruth>);
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let record = experiment::run(&mut rig, &mut controller, &plan(&scene), |_, _, _| {}).unwrap();
@@ -130,8 +130,11 @@ fn identified_mute(settings: &[&str]) -> Result<Comparison, IdentificationError>
 }
 
 #[test]
-fn a_rig_that_does_not_tell_its_impacts_is_identified_from_its_response() {
-    let (mute, telling) = (identified_mute(&[]).unwrap(), identified(&[]));
+fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
+    let (mute, telling) = (
+        identified_without_ground_truth(&[]).unwrap(),
+        identified(&[]),
+    );
     assert_eq!(mute.lock.regime, Regime::Symmetric);
     assert!(mute.lock.impacts_per_period.is_nan());
     assert_eq!(mute.lock.sigma, telling.lock.sigma);
@@ -141,14 +144,14 @@ fn a_rig_that_does_not_tell_its_impacts_is_identified_from_its_response() {
     assert_eq!(mute.rms_sigma_error, telling.rms_sigma_error);
     let table = vines::report::summary::identification(&mute);
     assert!(
-        table.contains("symmetric 1:1, told from the response alone"),
+        table.contains("symmetric 1:1, determined from the response alone"),
         "{table}"
     );
 }
 
 #[test]
-fn the_linear_mode_of_a_rig_that_does_not_tell_its_impacts_is_refused() {
-    let refusal = identified_mute(&["start.dq2=0"]).unwrap_err();
+fn the_linear_mode_of_a_rig_that_does_not_report_its_impacts_is_refused() {
+    let refusal = identified_without_ground_truth(&["start.dq2=0"]).unwrap_err();
     let IdentificationError::Regime { regime, .. } = refusal else {
         panic!("{refusal}");
     };

@@ -1,9 +1,9 @@
-//! The backbone, tracked with the loop closed: the response is stepped from level to level, held there until it is still,
-//! and the drive and the frequency that this takes are measured.
+//! Tracking of the backbone with the loop closed: the controller holds the response at one level after another until it has
+//! settled, and the drive amplitude and the frequency are measured.
 //!
-//! Under a constant drive the response would relax over dozens of periods at every level. The controller holds
-//! the *response* instead, and the drive does what it must; what the points before tell of the next one is fed forward, so
-//! that little is left to settle.
+//! Under a constant drive, the response would take dozens of periods to settle at every level. The controller therefore controls
+//! the *response*, and the drive follows. A predictor computes drive and frequency of the next point from the points before, so that
+//! the loops have little to correct.
 
 mod cycle;
 mod predictor;

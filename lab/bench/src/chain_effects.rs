@@ -1,4 +1,4 @@
-//! What each stage of the measurement chain costs, and what it does to the locked point.
+//! The effect of each stage of the measurement chain on the locked point, and its run time.
 
 use std::time::{Duration, Instant};
 
@@ -13,7 +13,7 @@ use crate::experiment::Sample;
 use crate::rig::{BuiltIn, Chain, Controller, ControllerError, Rig, RigError, Simulated};
 use crate::scene::{Override, Scene, SceneError, SyntaxError};
 
-/// Stages and combinations of them that are looked at: a name, and what is set in `[chain]`.
+/// The stages and combinations under study: a name, and settings of `[chain]`.
 pub const STAGES: [(&str, &[&str]); 18] = [
     ("ideal", &[]),
     ("ADC 16 bits", &["adc_bits=16"]),
@@ -68,9 +68,9 @@ pub const STAGES: [(&str, &[&str]); 18] = [
 /// A stage and its effect; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Effect {
-    /// What is switched on.
+    /// Name of the stage.
     pub name: &'static str,
-    /// Detuning at which the loop rests.
+    /// Detuning at the lock.
     pub sigma: f64,
     /// Amplitude there.
     #[serde(rename = "C")]
@@ -81,7 +81,7 @@ pub struct Effect {
     pub sample_seconds: f64,
 }
 
-/// Why a stage could not be looked at.
+/// Why the effect of a stage could not be determined.
 #[derive(Debug, Error)]
 pub enum ChainEffectError {
     /// The plant refuses a parameter or the start.
@@ -90,7 +90,7 @@ pub enum ChainEffectError {
     /// The controller refuses a setting.
     #[error(transparent)]
     Configuration(#[from] ConfigError),
-    /// The scene does not take it.
+    /// The scene refuses a setting.
     #[error(transparent)]
     Scene(#[from] SceneError),
     /// The rig failed.
@@ -101,7 +101,7 @@ pub enum ChainEffectError {
     Controller(#[from] ControllerError),
 }
 
-/// Periods before the loop is looked at, periods looked at, and how often the time is taken.
+/// Periods before the measurement, periods measured, and number of timings.
 const SETTLE: f64 = 600.0;
 const LOOK: usize = 200;
 const TIMINGS: usize = 60;
@@ -157,7 +157,7 @@ impl Bench {
         })
     }
 
-    /// Runs for so many samples; how long that takes.
+    /// Runs for a number of samples and returns the time it takes.
     fn run(&mut self, samples: usize) -> Result<Duration, ChainEffectError> {
         let begin = Instant::now();
         for _ in 0..samples {
@@ -167,7 +167,7 @@ impl Bench {
     }
 }
 
-/// The effect of what the scene has switched on.
+/// The effect of the chain of the scene.
 ///
 /// # Errors
 /// As [`effects`].

@@ -17,10 +17,10 @@ pub use tracked::{TrackedComparison, TrackedPoint};
 
 /// Amplitudes above which the decay is compared with theory, C.
 ///
-/// Nearer to the fold (C = Cmin) the slow flow is no longer slow against a period.
+/// Nearer to the fold (C = Cmin) the slow flow is no longer slow compared with a period.
 pub const COMPARED_ABOVE: f64 = 0.2;
 
-/// Phase of the response at phase resonance, degrees: theory and exact orbits are for that one.
+/// Phase of the response at phase resonance, degrees: theory and exact orbits hold for it only.
 const PHASE_RESONANCE: f64 = -90.0;
 
 /// An identified system beside theory and exact orbits; dimensionless throughout.
@@ -30,14 +30,14 @@ pub struct Comparison {
     pub parameters: Dimensionless,
     /// The locked point as measured.
     pub lock: Lock,
-    /// First-order theory at the same G: the stable solution nearest to the lock; absent where the loop sought another phase
-    /// than that of resonance.
+    /// First-order theory at the same G: the stable solution nearest to the lock; absent if the phase target is not
+    /// phase resonance.
     pub theory: Option<BackbonePoint>,
     /// The exact phase-resonant orbit at the same G nearest to the lock; absent as above.
     pub exact: Option<Orbit>,
     /// The decay, from the release to the loss of synchrony, or to the fold where the rig does not report impacts.
     pub decay: Vec<ComparedPoint>,
-    /// RMS of decay sigma less theory, over the points with C > 0.2.
+    /// RMS of the decay's sigma minus theory, over the points with C > 0.2.
     pub rms_sigma_error: Option<f64>,
 }
 
@@ -68,7 +68,7 @@ impl Comparison {
             .into_iter()
             .filter(|_| at_resonance)
             .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
-        // A rig that does not report impacts cannot tell the loss of synchrony: the backbone ends at the fold.
+        // A rig that does not report impacts does not show the loss of synchrony; its decay is cut at the fold of the backbone.
         let lowest = if lock.impacts_per_period.is_nan() {
             flow.manifold.c_min()
         } else {
@@ -94,7 +94,7 @@ impl Comparison {
     }
 }
 
-/// RMS of sigma less theory over the points above [`COMPARED_ABOVE`]; `None` where there is none.
+/// RMS of sigma minus theory over the points above [`COMPARED_ABOVE`]; `None` where there is none.
 fn rms_sigma_error(points: &[ComparedPoint]) -> Option<f64> {
     let errors = points
         .iter()

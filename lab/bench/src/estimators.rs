@@ -1,8 +1,8 @@
-//! How well the estimators of the decay do: their bias on clean data, and what noise does to them.
+//! Accuracy of the estimators of the decay: their bias on clean data, and their sensitivity to noise.
 //!
-//! The truth they are measured against is the decay itself, known by finer means: the plant is stopped at every zero crossing of
-//! v, found to the last digits by advancing a copy of it in closed form. The time from a crossing to the next but one is the mean
-//! period between them. That involves no samples, no window and no model.
+//! The reference is the decay of the plant itself: the plant is stopped at every zero crossing of v, which is located to the last
+//! digits by advancing a copy of the plant in closed form. The time between every second crossing is the mean period between
+//! them. This reference uses no samples, no window and no model.
 
 use lovines::InvalidValue;
 use phase_lock::ConfigError;
@@ -30,17 +30,17 @@ pub struct Quality {
     pub estimator: Estimator,
     /// Window of the fit, periods.
     pub window: f64,
-    /// Signal-to-noise ratio relative to the held response, dB; none for clean data.
+    /// Signal-to-noise ratio relative to the held response, dB; absent for clean data.
     pub snr: Option<f64>,
-    /// RMS of sigma less the truth, over all seeds.
+    /// RMS error of sigma over all seeds.
     pub rms: f64,
-    /// Mean of the same.
+    /// Mean error of sigma.
     pub bias: f64,
-    /// How many points that is, per seed.
+    /// Number of points per seed.
     pub points: usize,
 }
 
-/// Why the estimators could not be looked at.
+/// Why the estimators could not be evaluated.
 #[derive(Debug, Error)]
 pub enum EstimatorError {
     /// The plant refuses a parameter or the start.
@@ -57,12 +57,12 @@ pub enum EstimatorError {
     Rig(#[from] RigError),
 }
 
-/// Steps per period in which a crossing is looked for.
+/// Steps per period in the search for crossings.
 const FINE: f64 = 200.0;
 /// Seeds over which noise is averaged.
 const SEEDS: u64 = 20;
 
-/// A decay of the plant: as recorded sample by sample, and as it truly is.
+/// A decay of the plant: the samples, and the reference.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Decay {
     record: Record,
@@ -70,7 +70,7 @@ pub struct Decay {
 }
 
 impl Decay {
-    /// Locks the plant of a scene, lets go, and records the decay both ways.
+    /// Locks the plant of a scene, releases it, and records the decay in both ways.
     ///
     /// # Errors
     /// Settings that are refused, or no lock.
@@ -93,8 +93,7 @@ impl Decay {
         Ok(Self { record, truth })
     }
 
-    /// How well an estimator does on it; `scene` names the estimator and its window. Noise of `snr` dB comes from so many
-    /// `seeds`.
+    /// Errors of the estimator of `scene` with its window. Noise of `snr` dB is averaged over this number of `seeds`.
     #[must_use]
     pub fn quality(&self, scene: &Scene, snr: Option<f64>, seeds: u64) -> Quality {
         let seeds = if snr.is_some() { seeds } else { 1 };
@@ -116,7 +115,7 @@ impl Decay {
         }
     }
 
-    /// The record with noise of one strength all along, relative to the held response.
+    /// The record with noise of constant power, relative to the held response.
     fn disturbed(&self, snr: Option<f64>, seed: u64) -> Record {
         let mut record = self.record.clone();
         if let Some(snr) = snr {
@@ -133,7 +132,7 @@ impl Decay {
 }
 
 impl Truth {
-    /// Of a rig from which the drive is taken away now.
+    /// The reference for a rig that is released now.
     fn of(mut rig: Simulated, scene: &Scene) -> Result<Self, RigError> {
         let d = scene.dimensionless();
         let step = d.natural_period() / FINE;
@@ -164,7 +163,7 @@ impl Truth {
         })
     }
 
-    /// Its detuning at `tau`, straight between the middles of two periods; `None` outside.
+    /// The detuning at `tau`, interpolated linearly between the middles of two periods; `None` outside.
     #[must_use]
     pub fn sigma(&self, tau: f64) -> Option<f64> {
         let after = self.points.partition_point(|point| point.0 < tau);
@@ -176,9 +175,9 @@ impl Truth {
     }
 }
 
-/// Windows of the fit that are looked at, periods.
+/// Windows of the fit under study, periods.
 const WINDOWS: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0];
-/// Noise that is looked at, dB.
+/// Noise levels under study, dB.
 const NOISE: [Option<f64>; 4] = [None, Some(60.0), Some(50.0), Some(40.0)];
 
 /// Every estimator with every window and noise, on the decay of one scene.

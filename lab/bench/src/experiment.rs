@@ -1,4 +1,4 @@
-//! The experiment: lock at phase resonance, hold, let go, record the decay.
+//! The experiment: lock at phase resonance, hold, release, record the decay.
 
 use thiserror::Error;
 
@@ -7,12 +7,12 @@ use crate::rig::{
 };
 use crate::scene::Scene;
 
-/// How long each stage may or shall last, in samples.
+/// Durations of the stages, in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Plan {
     /// Time from sample to sample, s.
     pub sample_time: f64,
-    /// Longest wait for the lock.
+    /// Time limit for the lock.
     pub lock: usize,
     /// How long the lock is held and recorded once it has settled.
     pub hold: usize,
@@ -21,7 +21,7 @@ pub struct Plan {
 }
 
 impl Plan {
-    /// The plan that a scene lays down.
+    /// The plan of a scene.
     #[must_use]
     pub fn of(scene: &Scene) -> Self {
         let sample_time = scene.sample_time();
@@ -39,7 +39,7 @@ impl Plan {
 /// The stage an experiment is in.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Stage {
-    /// The loop seeks phase resonance.
+    /// The loop searches for phase resonance.
     Locking,
     /// Phase resonance is held and measured.
     Holding,
@@ -54,10 +54,21 @@ pub struct Sample {
     pub time: f64,
     /// What the sensors read.
     pub sensors: Sensors,
-    /// What the controller answered: the drive from now to the next sample.
+    /// Output of the controller: the drive from this sample to the next.
     pub command: Command,
-    /// What happens inside a simulated rig.
+    /// The ground truth of a simulated rig.
     pub ground_truth: Option<GroundTruth>,
+}
+
+/// Phases of the drive at the samples, rad, from `start` at the first.
+#[must_use]
+pub fn drive_phases(samples: &[Sample], sample_time: f64, start: f64) -> Vec<f64> {
+    let advance = |phase: &mut f64, sample: &Sample| {
+        let now = *phase;
+        *phase += sample.command.drive.omega * sample_time;
+        Some(now)
+    };
+    samples.iter().scan(start, advance).collect()
 }
 
 /// Everything that was measured.
@@ -69,7 +80,7 @@ pub struct Record {
     pub samples: Vec<Sample>,
     /// Index of the sample at which the lock had settled.
     pub settled: usize,
-    /// Index of the sample from which on the drive is off.
+    /// Index of the first sample with the drive off.
     pub released: usize,
 }
 
@@ -102,7 +113,7 @@ pub enum ExperimentError {
          see record.lock_periods and the [controller] section"
     )]
     NoLock {
-        /// How long it was waited for, natural periods.
+        /// Time limit, natural periods.
         periods: f64,
         /// Last phase error, degrees.
         phase_error: f64,
@@ -111,7 +122,7 @@ pub enum ExperimentError {
     },
 }
 
-/// Runs the whole experiment; `progress` is told the stage, and how many samples of at most how many it has taken.
+/// Runs the whole experiment. `progress` receives the stage, the samples taken in it, and their largest number.
 ///
 /// # Errors
 /// A failure of the rig or of the controller, or no lock in the time allowed.
@@ -127,7 +138,7 @@ pub fn run(
         let command = match controller.sample(sensors, active) {
             Ok(command) => command,
             Err(error) => {
-                // The rig is not left driven by a controller that has failed; what it says to that changes nothing.
+                // A failed controller must not leave the rig driven. An error of the rig would not change the result.
                 let _ = rig.advance(Drive::default(), plan.sample_time);
                 return Err(error.into());
             }

@@ -21,7 +21,7 @@ pub use vines_model::regime::{Impact, Regime};
 /// Why a record cannot be identified.
 #[derive(Debug, Error)]
 pub enum IdentificationError {
-    /// The loop locked something else than the symmetric 1:1 regime.
+    /// The loop locked another regime than symmetric 1:1.
     #[error(
         "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the regime is {regime}, not symmetric 1:1 with two \
          impacts per period. Try another [start] (the particle must be moving) or another G"
@@ -34,7 +34,7 @@ pub enum IdentificationError {
         /// Amplitude at the lock.
         c: f64,
     },
-    /// A window with too few samples, or none that could be fitted.
+    /// No window of the decay could be evaluated.
     #[error("the decay holds no window of {periods} periods with synchronous impacts")]
     NoDecay {
         /// Window length asked for.

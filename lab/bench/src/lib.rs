@@ -1,5 +1,6 @@
 //! The test bench: a *scene* describes a rig, its excitation and how it is measured; an *experiment* couples a controller to
-//! a rig and records what the sensors read; *identification* says what the record means.
+//! a rig and records what the sensors read; *identification* evaluates the record, and
+//! *comparison* puts theory and exact orbits beside the result.
 
 #![forbid(unsafe_code)]
 

@@ -1,6 +1,5 @@
-//! The two sides of the bench: a *rig* takes a drive and yields sensor samples, a *controller* turns sensor samples into a
-//! drive. An experiment knows these two traits and nothing else, so that an FMU, a network peer or hardware can stand on
-//! either side.
+//! The two sides of the bench: a *rig* takes a drive and returns sensor samples, a *controller* turns sensor samples into a
+//! drive. An experiment uses only these two traits, so an FMU, a network peer or hardware can replace either side.
 
 mod chain;
 mod error;
@@ -21,7 +20,7 @@ pub struct Drive {
     pub omega: f64,
     /// Amplitude of the base motion, m.
     pub amplitude: f64,
-    /// The base displacement wanted now, m, for a rig that takes samples instead.
+    /// Present base displacement, m, for a rig that is driven by samples.
     pub displacement: f64,
 }
 
@@ -34,25 +33,25 @@ pub struct Sensors {
     pub reference: Option<f64>,
 }
 
-/// What only a simulated rig can tell, beside its sensors.
+/// What only a simulated rig knows, in addition to its sensors.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct GroundTruth {
     /// Impacts since the start.
     pub impacts: i64,
     /// Time of the last one, s.
     pub impact_time: f64,
-    /// Relative velocity just before the last one, m/s: its sign tells the wall.
+    /// Relative velocity just before the last one, m/s: its sign identifies the wall.
     pub impact_velocity: f64,
     /// Velocity of the particle, m/s.
     pub particle_velocity: f64,
 }
 
-/// Anything that can be shaken.
+/// A rig: anything that can be driven and measured.
 pub trait Rig {
     /// What the sensors read now.
     ///
     /// # Errors
-    /// The rig's own: a refused call, a lost connection.
+    /// Errors of the implementation: a refused call, a lost connection.
     fn sense(&mut self) -> Result<Sensors, RigError>;
 
     /// Drives the rig for one sample period of `step` seconds.
@@ -69,7 +68,7 @@ pub trait Rig {
         Err(RigError::NoHold)
     }
 
-    /// What happens inside, where the rig is a simulation.
+    /// The ground truth, if the rig is a simulation.
     ///
     /// # Errors
     /// As [`Rig::sense`].
@@ -78,29 +77,29 @@ pub trait Rig {
     }
 }
 
-/// What a controller puts out at a sample.
+/// Output of a controller at a sample.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Command {
     /// The drive for the coming sample period.
     pub drive: Drive,
     /// Phase of the response relative to the base, less the target, rad.
     pub phase_error: f64,
-    /// Phase, frequency and amplitude have been stationary for the controller's dwell.
+    /// Phase, frequency and amplitude have been stationary for the controller's dwell time.
     pub settled: bool,
 }
 
-/// Anything that can hold a rig at phase resonance.
+/// A controller: anything that can hold a rig at phase resonance.
 pub trait Controller {
-    /// Takes the sensors of one sample, and whether the drive is wanted; returns the drive.
+    /// Processes one sample; `active` switches the drive on. Returns the drive.
     ///
     /// # Errors
-    /// The controller's own: a refused call, a lost connection.
+    /// Errors of the implementation: a refused call, a lost connection.
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError>;
 
-    /// Holds the amplitude of the response from now on, and moves it as stated.
+    /// Controls the amplitude of the response from now on, and moves it as stated.
     ///
     /// # Errors
-    /// A controller that cannot do that, or not now.
+    /// A controller that cannot control the response, or cannot do so now.
     fn hold_response(&mut self, _to: Move) -> Result<(), ControllerError> {
         Err(ControllerError::NoResponseLoop)
     }

@@ -1,4 +1,4 @@
-//! Scenes: what is on the bench and what is done to it, read from TOML.
+//! Scenes: plant, excitation, controller, measurement chain and durations, read from TOML.
 
 mod backbone;
 mod chain;
@@ -45,7 +45,7 @@ pub struct Scene {
     pub record: Record,
     /// How the backbone is tracked, in units of b and in periods.
     pub backbone: Backbone,
-    /// What lies between rig and controller.
+    /// The measurement chain between rig and controller.
     pub chain: Chain,
 }
 
@@ -74,7 +74,7 @@ impl Scene {
             origin: origin.into(),
             message: error.to_string().trim_end().into(),
         };
-        // The file is checked by itself first: only its own text can tell the line of a mistake.
+        // The file is checked on its own first, so that an error can name the line.
         let sections: Sections = toml::from_str(text).map_err(syntax)?;
         let table = toml::from_str(text).map_err(syntax)?;
         overrides::merged(table, overrides)?

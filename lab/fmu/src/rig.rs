@@ -10,7 +10,7 @@ use crate::instance::{Fmu, FmuError, Kind, Reference};
 /// A plant FMU, stepped sample by sample.
 ///
 /// It needs the inputs `omega` and `E` and the output `v`; with the input `e` it can be driven by held samples, too. Where it has `base`, that is the reference sensor; where it has
-/// `impacts`, `impact_time`, `impact_velocity` and `der(q2)`, it tells its impacts. The parameters `M`, `k`, `c`, `m`, `b`, `r`
+/// `impacts`, `impact_time`, `impact_velocity` and `der(q2)`, it reports its impacts. The parameters `M`, `k`, `c`, `m`, `b`, `r`
 /// and the start `q1`, `der(q1)`, `q2`, `der(q2)` are set as far as the FMU has them.
 pub struct FmuRig {
     fmu: Fmu,
@@ -22,7 +22,7 @@ pub struct FmuRig {
     inside: Option<Inside>,
 }
 
-/// What tells the impacts.
+/// The variables of the ground truth.
 #[derive(Clone, Copy)]
 struct Inside {
     impacts: Reference,
@@ -105,12 +105,12 @@ impl Rig for FmuRig {
         let Some(inside) = self.inside else {
             return Ok(None);
         };
-        let tell = "tell its impacts";
+        let action = "report its impacts";
         let [impact_time, impact_velocity, particle_velocity] =
-            self.fmu.reals(tell, inside.reals)?;
+            self.fmu.reals(action, inside.reals)?;
         let mut impacts = [0];
         self.fmu
-            .ask(tell, |i| i.get_integer(&[inside.impacts], &mut impacts))?;
+            .ask(action, |i| i.get_integer(&[inside.impacts], &mut impacts))?;
         Ok(Some(GroundTruth {
             impacts: i64::from(impacts[0]),
             impact_time,

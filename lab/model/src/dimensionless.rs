@@ -3,7 +3,7 @@
 use lovines::{InvalidValue, Parameters, Plant, State};
 use serde::Serialize;
 
-/// What is left of a scene when lengths are measured in b and times in 1/omega0.
+/// The parameters of the dimensionless model, and the units of length and frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Dimensionless {
     /// Mass ratio `m/M`.
@@ -94,7 +94,7 @@ impl Dimensionless {
         self.omega0 * (1.0 + self.epsilon * sigma)
     }
 
-    /// Change of the angular frequency, rad/s, that goes with a change of sigma.
+    /// Change of the angular frequency, rad/s, for a change of sigma.
     #[must_use]
     pub fn omega_change(&self, sigma: f64) -> f64 {
         sigma * self.epsilon * self.omega0
@@ -103,7 +103,7 @@ impl Dimensionless {
     /// The plant of these numbers in dimensionless form, M = k = b = 1, at (q1, q1', q2, q2').
     ///
     /// # Errors
-    /// Parameters or a start that make no sense.
+    /// Invalid parameters or an invalid start.
     pub fn plant(&self, [q1, dq1, q2, dq2]: [f64; 4]) -> Result<Plant, InvalidValue> {
         let parameters = Parameters::dimensionless(self.epsilon, self.lambda, self.r);
         Plant::new(parameters, State { q1, dq1, q2, dq2 })

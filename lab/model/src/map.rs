@@ -1,8 +1,8 @@
-//! The regime map: what the response settles into over a grid of two parameters, from simulated impact sequences.
+//! The regime map: the regime of the response over a grid of two parameters, from simulated impact sequences.
 //!
-//! Every point of the grid is one plant, driven at a fixed frequency from the scene's start. What it does after its transient is
-//! classified from its impacts alone; only what does not repeat is looked at twice, for a disturbance that grows is chaos.
-//! Another start may lead elsewhere where several regimes are stable: the map is for this one.
+//! Every point of the grid is one plant, driven at a fixed frequency from the scene's start. After its transient, the
+//! regime is classified from the impacts. Without a repeating pattern, the growth of a disturbance distinguishes chaos from
+//! modulation. Where several regimes are stable, another start may lead to another regime.
 
 mod axis;
 mod grid;

@@ -1,18 +1,22 @@
 //! Exact periodic orbits: symmetric 1:1 ones at phase resonance in closed form, all others by shooting on the impact map.
 //!
 //! Everything is dimensionless: lengths over b, velocities over `b omega0`, time `tau = omega0 t`. Half a period after an
-//! impact the state of a symmetric orbit is minus itself; the particle flies in straight lines at speed ±B, so the wall gives
-//! the oscillator alternating impulses of known size, whose periodic response is closed form. What is left at a
-//! given frequency is one quadratic for B. No first-order approximation is made anywhere.
+//! impact the state of a symmetric orbit is minus itself; the particle flies in straight lines at speed ±B, so the wall exerts
+//! alternating impulses of known size on the oscillator, and their periodic response has a closed form. At a given frequency
+//! one quadratic equation for B remains. There is no first-order approximation.
 
+mod bounce;
+mod branch;
 mod candidate;
 mod continuation;
 mod convergence;
 mod curves;
 mod flight;
+mod forced_oscillator;
 mod impact_map;
 mod multipliers;
 mod oscillator;
+mod particle_flight;
 mod pattern;
 mod periodic;
 mod search;
@@ -20,13 +24,12 @@ mod settle;
 
 use serde::Serialize;
 
-pub use continuation::{
-    Bifurcation, Branch, Ended, Limits, Special, asymmetric_branch, continue_both_ways,
-    continue_from,
-};
+pub use bounce::Bounce;
+pub use branch::{Bifurcation, Branch, Ended, Limits, Special};
+pub use continuation::{asymmetric_branch, continue_both_ways, continue_from};
 pub use convergence::{Convergence, Difference, convergence};
 pub use curves::{Response, backbone, response};
-pub use impact_map::{Bounce, ImpactMap};
+pub use impact_map::ImpactMap;
 pub use pattern::{ImpactPattern, Unknowns};
 pub use periodic::{Condition, Periodic};
 pub use search::{exact_backbone, phase_resonant};

@@ -1,4 +1,4 @@
-//! Regimes, told from a sequence of impacts.
+//! Classification of regimes from a sequence of impacts.
 
 use std::f64::consts::{PI, TAU};
 use std::fmt::{self, Display, Formatter};
@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use crate::numerics::{mean, standard_deviation};
 
-/// What a response settles into.
+/// Regime of a response.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 pub enum Regime {
     /// The particle hits nothing: the linear mode.
@@ -38,7 +38,7 @@ pub enum Regime {
     /// Steady and off the linear mode; noise hides whether it is symmetric.
     #[serde(rename = "steady, symmetry unresolved")]
     Unresolved,
-    /// No data to tell it from.
+    /// No data to determine it from.
     #[serde(rename = "unknown")]
     Unknown,
 }
@@ -87,7 +87,7 @@ impl Display for Regime {
 pub struct Impact {
     /// When: s, or phase of the base in rad.
     pub time: f64,
-    /// Relative velocity just before; its sign tells the wall.
+    /// Relative velocity just before; its sign identifies the wall.
     pub velocity: f64,
 }
 
@@ -134,13 +134,13 @@ pub struct Pattern {
     pub impacts: usize,
     /// Periods of the base that it takes.
     pub periods: u32,
-    /// What that makes it.
+    /// The regime of that pattern.
     pub regime: Regime,
 }
 
 /// Longest pattern looked for, impacts.
 const LONGEST: usize = 96;
-/// Two impacts are the same within this, rad and relative velocity: far above what is left of a transient.
+/// Two impacts are the same within this, rad and relative velocity: far above the remainder of a transient.
 const SAME: f64 = 2e-3;
 
 /// The shortest pattern that all impacts repeat at least twice; times are phases of the base, rad.
@@ -167,7 +167,7 @@ pub fn pattern(impacts: &[Impact]) -> Option<Pattern> {
     })
 }
 
-/// Impacts in a row, on alternating walls, that make a capture into 1:1 resonance.
+/// Smallest number of consecutive impacts, on alternating walls, of a capture into 1:1 resonance.
 const CAPTURED: usize = 8;
 /// Deviation of an interval from half a period, rad, in a capture.
 const IN_STEP: f64 = 0.15 * PI;

@@ -15,11 +15,11 @@ use super::{
 };
 
 const HELP: &str = "\
-The response is held at one level after another, and the drive and the frequency that this takes are measured:
+Holds the response at one level after another, and measures the drive and the frequency:
   C         amplitude of the first harmonic of the centre of mass, over b
-  sigma     detuning (Omega - 1)/epsilon at which the response lags the base by a quarter turn
+  sigma     detuning (Omega - 1)/epsilon at which the response lags the base by 90 degrees
   G         base amplitude over b epsilon
-  averaged  periods of the last part of the dwell that the point is made from
+  averaged  periods at the end of the dwell that the point is averaged over
   distance  from the exact backbone: the largest of the differences in C, sigma and G
 
 Examples:
@@ -31,7 +31,7 @@ Examples:
 
 Writes tracked.json, tracked.csv and tracked.svg.";
 
-/// Track the backbone level by level, with the response held by the loop
+/// Track the backbone level by level, with the response controlled
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
@@ -42,7 +42,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
 
-    /// What is shaken: `built-in`, an FMU, or udp://HOST:PORT
+    /// The rig: `built-in`, an FMU, or udp://HOST:PORT
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     rig: Endpoint,
 
@@ -67,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         bar.set_position(done as u64);
     });
     bar.finish_and_clear();
-    // A rig across the network is told that this is all.
+    // Dropping the rig ends a network session.
     drop(rig);
     let found = TrackedComparison::of(&tracked.map_err(Failure::run)?, &scene);
     let files = report::write_tracked(&found, &arguments.out).map_err(Failure::run)?;

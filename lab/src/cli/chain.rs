@@ -1,4 +1,4 @@
-//! `vines chain`: what each stage of the measurement chain costs and does.
+//! `vines chain`: effect and run time of each stage of the measurement chain.
 
 use clap::Args;
 use vines::chain_effects::{self, Effect};
@@ -7,16 +7,16 @@ use vines::report::Table;
 use super::{failure::Failure, json, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
-Locks the plant through each stage of [chain] alone and through some of them together, and prints a Markdown table:
-  moves    against a chain without any of them, mean over 200 periods after 600
+Locks the plant with each stage of [chain] alone and with some combinations, and prints a Markdown table:
+  moves    difference from the ideal chain, mean over 200 periods after 600
   wanders  standard deviation of the drive's frequency from period to period
-  time     of a sample of plant, chain and controller, against the ideal chain
+  time     of a sample of plant, chain and controller, relative to the ideal chain
 
 Examples:
   vines chain
   vines chain --set controller.bandwidth=0.05";
 
-/// Show what each stage of the measurement chain costs and does to the locked point
+/// Show the effect of each stage of the measurement chain on the locked point, and its run time
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {

@@ -1,4 +1,4 @@
-//! `vines decay`: how well the estimators of the decay do.
+//! `vines decay`: accuracy of the estimators of the decay.
 
 use clap::Args;
 use vines::estimators::{self, Quality};
@@ -8,9 +8,9 @@ use vines::scene::Estimator;
 use super::{failure::Failure, json, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
-Locks the built-in plant, lets go, and estimates sigma along the decay with every estimator and window, on clean data and
-through noise (relative to the held response, the same all along; 20 seeds). Printed is the RMS of sigma less the truth over
-the points with C > 0.2. The truth is the time between zero crossings of the plant itself, found in closed form.
+Locks the built-in plant, releases it, and estimates sigma along the decay with every estimator and window, on clean data and
+with noise (of constant power, relative to the held response; 20 seeds). Prints the RMS error of sigma over the points with
+C > 0.2. The reference is the time between zero crossings of the plant itself, located in closed form.
 
 Examples:
   vines decay

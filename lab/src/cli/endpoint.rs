@@ -1,4 +1,4 @@
-//! `--rig` and `--controller`: what stands on either side of the bench.
+//! `--rig` and `--controller`: the implementations of the two sides of the bench.
 
 use std::{path::PathBuf, str::FromStr};
 
@@ -12,10 +12,10 @@ use vines::{
 
 use super::failure::Failure;
 
-/// What stands behind an endpoint, as written on the command line.
+/// An implementation, as written on the command line.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Endpoint {
-    /// `built-in`: this program's own, with nothing in between.
+    /// `built-in`: that of this program.
     BuiltIn,
     /// The path of an FMU.
     Fmu(PathBuf),
@@ -38,20 +38,20 @@ impl FromStr for Endpoint {
             Ok(Self::Fmu(file))
         } else {
             Err(format!(
-                "{text} is not there; give `built-in`, the path of an FMU, or udp://HOST:PORT"
+                "{text} does not exist; give `built-in`, the path of an FMU, or udp://HOST:PORT"
             ))
         }
     }
 }
 
-/// A rig, and the longest silence, s, that it bears where it runs in real time.
+/// A rig, and, in real time, the longest silence that it tolerates, s.
 pub(super) struct OpenRig {
     pub rig: Box<dyn Rig>,
     pub pace: Option<f64>,
 }
 
 impl Endpoint {
-    /// The rig behind this endpoint.
+    /// The rig of this endpoint.
     pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
         let mut pace = None;
         let rig: Box<dyn Rig> = match self {
@@ -72,7 +72,7 @@ impl Endpoint {
         Ok(OpenRig { rig, pace })
     }
 
-    /// The controller behind this endpoint, beside a rig of that `pace`.
+    /// The controller of this endpoint, for a rig of that `pace`.
     pub(super) fn controller(
         &self,
         scene: &Scene,
@@ -97,7 +97,7 @@ impl Endpoint {
 /// `--allow-remote`, which several commands share.
 #[derive(Debug, Args)]
 pub(super) struct ReachArguments {
-    /// Allow network addresses beyond this machine. Nobody is asked who they are: whoever reaches the address can drive the rig
+    /// Allow network addresses beyond this machine. There is no authentication: anyone who can reach the address can drive the rig
     #[arg(long)]
     allow_remote: bool,
 }

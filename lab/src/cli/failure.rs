@@ -1,10 +1,10 @@
-//! How a command fails: with one message and an exit code.
+//! The failure of a command: one message and an exit code.
 
 use std::fmt::{self, Display, Formatter};
 
 use vines::{net::LinkError, pack::PackError, scene::SceneError};
 
-/// One clear message, and whose fault it was.
+/// A message and an exit code.
 #[derive(Debug)]
 pub(super) struct Failure {
     code: u8,
@@ -20,7 +20,7 @@ impl Failure {
         }
     }
 
-    /// Something failed on the way: exit code 1.
+    /// A failure at run time: exit code 1.
     pub(super) fn run(message: impl Display) -> Self {
         Self {
             code: 1,

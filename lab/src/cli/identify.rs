@@ -42,12 +42,12 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
 
-    /// What is shaken: an FMU, `built-in`, or udp://HOST:PORT; without it, this program's plant FMU is packed into the
-    /// results' folder
+    /// The rig: `built-in`, an FMU, or udp://HOST:PORT [default: this program's plant FMU, packed into the
+    /// folder of the results]
     #[arg(long, value_name = "ENDPOINT")]
     rig: Option<Endpoint>,
 
-    /// What controls it: `built-in`, an FMU, or udp://HOST:PORT
+    /// The controller: `built-in`, an FMU, or udp://HOST:PORT
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     controller: Endpoint,
 
@@ -66,7 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .format_timestamp(None)
         .init();
     let reach = arguments.reach.reach();
-    // Settings are refused before anything is written or connected.
+    // Invalid settings are refused before anything is written or connected.
     BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
     let (OpenRig { mut rig, pace }, fmus) = match &arguments.rig {
         Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&arguments.out)?),
@@ -87,7 +87,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         },
     );
     bar.finish_and_clear();
-    // A rig across the network is told that this is all, before it has to wonder.
+    // Dropping rig and controller ends their network sessions.
     drop((rig, controller));
     let record = record.map_err(Failure::run)?;
     let found = identification::identify(&record, &scene).map_err(Failure::run)?;
@@ -101,14 +101,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     Ok(format!("{summary}\n{}", written(&files)))
 }
 
-/// This program's own FMUs: packed into a folder of their own inside the results' folder, and kept where the run succeeds.
+/// This program's FMUs: packed into a temporary folder inside the folder of the results, and kept if the run succeeds.
 struct Packed {
     folder: TempDir,
     out: PathBuf,
 }
 
 impl Packed {
-    /// A folder for them inside `out`, which is made if it is not there.
+    /// A folder for them inside `out`, which is created if it does not exist.
     fn at(out: &Path) -> Result<Self, Failure> {
         let refused = |error| Failure::input(format!("cannot write to {}: {error}", out.display()));
         std::fs::create_dir_all(out).map_err(refused)?;
@@ -125,7 +125,7 @@ impl Packed {
         Ok(pack::pack(&pack::components(), &libraries, self.folder.path())?.swap_remove(0))
     }
 
-    /// Puts them beside the results.
+    /// Moves them to the results.
     fn keep(self) -> Result<Vec<PathBuf>, Failure> {
         let mut kept = Vec::new();
         for component in pack::components() {
@@ -142,20 +142,20 @@ impl Packed {
     }
 }
 
-/// A bar on stderr; indicatif hides it where that is no terminal.
+/// A progress bar on stderr; indicatif hides it if that is not a terminal.
 fn progress_bar(plan: &Plan) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg:23} [{wide_bar}] {pos}/{len} samples")
+    let style = ProgressStyle::with_template("{msg:29} [{wide_bar}] {pos}/{len} samples")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(plan.lock as u64).with_style(style)
 }
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {
-    // A bar that moves a few hundred times is smooth; one that moves at every sample costs more than the experiment.
+    // Updating the bar at every sample would take longer than the experiment.
     if !done.is_multiple_of(64) && done != of {
         return;
     }
     let message = match stage {
-        Stage::Locking => "seeking phase resonance",
+        Stage::Locking => "searching for phase resonance",
         Stage::Holding => "holding the lock",
         Stage::Decaying => "recording the decay",
     };

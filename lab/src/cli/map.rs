@@ -47,7 +47,7 @@ pub(super) struct Arguments {
     )]
     x: Range,
 
-    /// Vertical axis, likewise
+    /// Vertical axis, in the same form
     #[arg(
         long,
         value_name = "AXIS=FIRST:LAST:POINTS",
@@ -55,11 +55,11 @@ pub(super) struct Arguments {
     )]
     y: Range,
 
-    /// Detuning where it is on no axis; without it, that of the scene's stable phase-resonant orbit, or 0
+    /// Detuning, if it is not on an axis [default: that of the scene's stable phase-resonant orbit, or 0]
     #[arg(long, value_name = "SIGMA", allow_negative_numbers = true)]
     sigma: Option<f64>,
 
-    /// Periods that pass before the record
+    /// Periods before the record
     #[arg(long, value_name = "PERIODS", default_value_t = 400)]
     settle: usize,
 

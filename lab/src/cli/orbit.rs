@@ -27,7 +27,7 @@ Examples:
   vines orbit
   vines orbit --response --set excitation.G=1.6
   vines orbit --backbone --set plant.c=0 --set plant.r=1 --set excitation.G=0
-  vines orbit --sigma=-0.6 --set excitation.G=2.2   whatever settles there, here six impacts in two periods
+  vines orbit --sigma=-0.6 --set excitation.G=2.2   the orbit that settles there, here six impacts in two periods
   vines orbit --convergence                   how theory approaches the exact orbit
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
   vines orbit --scene scenes/dimensionless.toml --json";
@@ -39,7 +39,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
 
-    /// The orbit of any pattern that the scene's start settles into at this detuning; with --response, its response is followed
+    /// The orbit of any pattern that the scene's start leads to at this detuning; with --response, its frequency response
     #[arg(long, value_name = "SIGMA", allow_negative_numbers = true, conflicts_with_all = ["backbone", "convergence"])]
     sigma: Option<f64>,
 
@@ -51,7 +51,7 @@ pub(super) struct Arguments {
     #[arg(long, group = "what")]
     response: bool,
 
-    /// Theory less exact orbit at epsilon and its halvings, with the exponent that fits
+    /// Theory minus exact orbit at epsilon and its halvings, with the fitted exponent
     #[arg(long, group = "what")]
     convergence: bool,
 
@@ -95,26 +95,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         );
     }
     if arguments.convergence {
-        let study = convergence(&scene, HALVINGS).ok_or_else(|| {
-            Failure::run(format!(
-                "theory or exact orbits have no stable phase-resonant solution at G = {} (dimensionless)",
-                scene.g
-            ))
-        })?;
-        return shown(
-            &scene,
-            "Theory less exact orbit",
-            &study,
-            arguments.json,
-            || {
-                let rows = study.rows.iter().map(|row| {
-                    [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}"))
-                });
-                let [sigma, c, b] = study.slopes;
-                Table::new(["epsilon", "sigma", "C", "B"]).rows(rows).text()
-                    + &format!("\nExponent of epsilon: sigma {sigma:.3}, C {c:.3}, B {b:.3}\n")
-            },
-        );
+        return converged(&scene, arguments.json);
     }
     let orbits = phase_resonant(&scene);
     if arguments.json {
@@ -128,10 +109,32 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     ))
 }
 
-/// Periods that the motion is given to settle.
+/// The convergence of the theory towards the exact orbits.
+fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
+    let study = convergence(scene, HALVINGS).ok_or_else(|| {
+        Failure::run(format!(
+            "theory or exact orbits have no stable phase-resonant solution at G = {} (dimensionless)",
+            scene.g
+        ))
+    })?;
+    shown(scene, "Theory minus exact orbit", &study, json, || {
+        let rows = study
+            .rows
+            .iter()
+            .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}")));
+        let [sigma, c, b] = study.slopes;
+        let table = Table::new(["epsilon", "sigma", "C", "B"]).rows(rows);
+        format!(
+            "{}\nExponent of epsilon: sigma {sigma:.3}, C {c:.3}, B {b:.3}\n",
+            table.text()
+        )
+    })
+}
+
+/// Periods before the motion is evaluated.
 const SETTLE: usize = 1000;
 
-/// The motion that the start leads to at one detuning, of whatever pattern, or its frequency response.
+/// The motion that the start leads to at one detuning, or its frequency response.
 fn settled(
     arguments: &Arguments,
     scene: &Dimensionless,
@@ -146,8 +149,8 @@ fn settled(
     let motion = settle(scene, sigma, start, SETTLE).map_err(Failure::input)?;
     let motion = motion.ok_or_else(|| {
         Failure::run(format!(
-            "from the scene's start nothing settles at sigma = {sigma} (dimensionless) within {SETTLE} periods that repeats with \
-             impacts; see `vines map`"
+            "the scene's start leads to no repeating pattern of impacts at sigma = {sigma} (dimensionless) within {SETTLE} periods; \
+             see `vines map`"
         ))
     })?;
     let pattern = format!(
@@ -177,31 +180,36 @@ fn settled(
         );
     }
     shown(scene, "Exact orbit", &motion, arguments.json, || {
-        let Periodic {
-            sigma, c, b, gamma, ..
-        } = motion;
-        let multipliers = motion
-            .multipliers
-            .map(|[re, im]| format!("{re:.5}{im:+.5}i"));
-        let rows = motion.bounces.iter().map(|one| {
-            let phase = one.phase.to_degrees().rem_euclid(360.0);
-            let mut cells = vec![format!("{:+}", one.wall)];
-            cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
-            cells
-        });
-        let table = Table::new(["wall", "phase, degrees", "q1", "q1' after", "q2' after"]);
-        format!(
-            "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
-            gamma.to_degrees(),
-            multipliers.join(", "),
-            table.rows(rows).text()
-        )
+        described(&pattern, &motion)
     })
+}
+
+/// The motion and the states after its impacts.
+fn described(pattern: &str, motion: &Periodic) -> String {
+    let Periodic {
+        sigma, c, b, gamma, ..
+    } = motion;
+    let multipliers = motion
+        .multipliers
+        .map(|[re, im]| format!("{re:.5}{im:+.5}i"));
+    let rows = motion.bounces.iter().map(|one| {
+        let phase = one.phase.to_degrees().rem_euclid(360.0);
+        let mut cells = vec![format!("{:+}", one.wall)];
+        cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
+        cells
+    });
+    let table = Table::new(["wall", "phase, degrees", "q1", "q1' after", "q2' after"]).rows(rows);
+    format!(
+        "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
+        gamma.to_degrees(),
+        multipliers.join(", "),
+        table.text()
+    )
 }
 
 /// Halvings of epsilon in the convergence study.
 const HALVINGS: u32 = 7;
-/// Rows of a curve that a person is shown.
+/// Rows of a curve in a text table.
 const ROWS: usize = 24;
 
 fn shown(
@@ -271,7 +279,7 @@ fn curve(name: &str, branch: &Branch) -> String {
 fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
     if orbits.is_empty() {
         return if scene.g == 0.0 {
-            "  none: without excitation (G = 0) there is nothing to be in resonance with\n".into()
+            "  none: without excitation (G = 0) there is no resonance\n".into()
         } else {
             "  none between 0.2 and 3 omega0 at this excitation\n".into()
         };

@@ -14,7 +14,7 @@ use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Runs the experiment, tracks the backbone, follows the exact curves, studies the convergence, maps the regimes, and writes
-report.html: one file that opens offline in any browser and prints well, in words, with all pictures and tables, the scene, and what
+report.html: one file that opens offline in any browser and prints well, in words, with all figures and tables, the scene, and what
 the numbers are worth. Beside it lie the pictures (SVG, for light and dark backgrounds) and tables.
 
 What an earlier run has left in the folder is taken over where scene, version and axes are the same.
@@ -24,7 +24,7 @@ Examples:
   vines report --out r07 --set plant.r=0.7
   vines report --out report --x sigma=-2:1:121 --y G=0.8:1.8:101    a finer map; the rest is taken over";
 
-/// Write a report on a scene: everything that the lab can find out, as one page
+/// Write a report on a scene: all results on one page
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
@@ -51,18 +51,18 @@ pub(super) struct Arguments {
     )]
     y: Range,
 
-    /// Take nothing over from an earlier run
+    /// Recompute everything, without the results of earlier runs
     #[arg(long)]
     fresh: bool,
 
-    /// Picture of run time against error to include, if it is there
+    /// Figure of run time against error to include, if the file exists
     #[arg(long, value_name = "SVG", default_value = "docs/work-precision.svg")]
     work_precision: PathBuf,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    // Settings are refused before anything is run or written.
+    // Invalid settings are refused before anything runs or is written.
     BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
     if arguments.x.axis == arguments.y.axis {
         return Err(Failure::input(format!(
@@ -98,17 +98,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .map(|finding| format!("- {finding}\n"))
         .collect();
     if !report.kept.is_empty() {
-        text += &format!(
-            "\nTaken over from an earlier run: {}\n",
-            report.kept.join(", ")
-        );
+        text += &format!("\nReused from an earlier run: {}\n", report.kept.join(", "));
     }
     let page = report
         .written
         .first()
         .map(|page| page.display().to_string());
     Ok(format!(
-        "{text}\nWritten: {} and {} pictures and tables\n",
+        "{text}\nWritten: {} and {} figures and tables\n",
         page.unwrap_or_default(),
         report.written.len() - 1
     ))

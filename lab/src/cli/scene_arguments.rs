@@ -11,7 +11,7 @@ pub(super) struct SceneArguments {
     #[arg(long, value_name = "FILE")]
     scene: Option<PathBuf>,
 
-    /// Replace one value of the scene, such as plant.r=0.7; may be given again
+    /// Replace one value of the scene, such as plant.r=0.7; may be repeated
     #[arg(long, value_name = "KEY=VALUE")]
     set: Vec<Override>,
 }

@@ -1,4 +1,4 @@
-//! `vines theory`: what the first-order theory says about a scene.
+//! `vines theory`: first-order theory of a scene.
 
 use clap::Args;
 use serde::Serialize;
@@ -70,7 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?.dimensionless();
     let flow = SlowFlow::new(scene.lambda, scene.r);
     let points = arguments.points as usize;
-    // From near the end of the left branch, where the particle stands still, to a little beyond the stable range.
+    // From near the end of the left branch, where the particle is at rest, to a little beyond the stable range.
     let highest = 1.2 * B_SYMMETRY_BREAKING;
     let solutions = flow.phase_resonant(scene.g);
     if let Some(sigma) = arguments.sigma.filter(|sigma| !sigma.is_finite()) {

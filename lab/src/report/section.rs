@@ -1,4 +1,4 @@
-//! What a report is made of: sections of words, figures and tables, with one finding and a few lines of the error budget each.
+//! The sections of a report: text, figures and tables, one finding, and lines of the error budget.
 
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +32,7 @@ pub enum Block {
 pub struct Attachment {
     /// Its name.
     pub name: String,
-    /// What is in it.
+    /// Its content.
     pub text: String,
 }
 
@@ -43,7 +43,7 @@ pub struct Budget {
     pub what: String,
     /// By how much.
     pub size: String,
-    /// Where that figure is from, and what it means.
+    /// Source and meaning of that number.
     pub why: String,
 }
 

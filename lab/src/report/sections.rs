@@ -1,4 +1,4 @@
-//! The sections of the report: each runs what it needs and says what was found.
+//! The sections of the report: each computes its results and describes them.
 
 mod curves;
 mod experiment;
@@ -17,7 +17,7 @@ use crate::map::{MapError, Range};
 use crate::rig::{Chain, Rig, Simulated};
 use crate::scene::Scene;
 
-/// What a report is about.
+/// The subject of a report.
 #[derive(Debug, Clone)]
 pub struct Subject {
     /// The scene.
@@ -27,7 +27,7 @@ pub struct Subject {
 }
 
 impl Subject {
-    /// The plant of the scene, behind its measurement chain where it has one.
+    /// The simulated plant of the scene, with its measurement chain.
     fn rig(&self) -> Result<Box<dyn Rig>, InvalidValue> {
         let plant = Simulated::new(self.scene.plant, self.scene.start)?;
         let scene = &self.scene;
@@ -63,10 +63,10 @@ impl From<FigureError> for SectionError {
     }
 }
 
-/// Makes one section; the callback is told how much of it is done, from 0 to 1.
+/// Computes one section; calls the callback with the fraction done, from 0 to 1.
 pub type Maker = fn(&Subject, &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError>;
 
-/// All sections in order, each with the name that its results are kept under.
+/// All sections in order, each with the name under which it is cached.
 pub const SECTIONS: [(&str, Maker); 5] = [
     ("experiment", experiment::make),
     ("tracking", tracking::make),

@@ -1,4 +1,4 @@
-//! The whole report: makes the sections that are not there yet, and the page and files from all of them.
+//! The whole report: computes the missing sections, and writes the page and the files.
 
 use std::path::{Path, PathBuf};
 
@@ -11,22 +11,22 @@ use super::page::page;
 use super::section::{Block, Section};
 use super::sections::{SECTIONS, SectionError, Subject};
 
-/// Folder of what is kept from run to run, inside the report's folder.
+/// Folder of cached sections, inside the folder of the report.
 const KEPT: &str = ".vines";
 
-/// A section as it is kept, with what it was made from.
+/// A cached section, with a hash of its input.
 #[derive(Serialize, Deserialize)]
 struct Kept {
     key: String,
     section: Section,
 }
 
-/// How far the report is.
+/// Progress of the report.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Progress<'a> {
     /// The section being made.
     pub section: &'a str,
-    /// How much of all is done, from 0 to 1.
+    /// Fraction of all sections, from 0 to 1.
     pub done: f64,
 }
 
@@ -35,14 +35,14 @@ pub struct Progress<'a> {
 pub struct Report {
     /// Files written; the page is the first.
     pub written: Vec<PathBuf>,
-    /// Sections taken over from an earlier run.
+    /// Sections reused from an earlier run.
     pub kept: Vec<&'static str>,
-    /// What was found, one sentence a section.
+    /// The findings, one sentence per section.
     pub findings: Vec<String>,
 }
 
 /// Writes the report on `subject` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. Sections
-/// made by an earlier run are taken over unless scene, version or axes have changed, or `fresh` asks for all anew.
+/// of an earlier run are reused unless scene, version or axes have changed, or `fresh` is set.
 ///
 /// # Errors
 /// A run that fails, or a file that cannot be written.
@@ -94,7 +94,7 @@ pub fn write_report(
     })
 }
 
-/// The section kept in a file, if it was made from the same.
+/// The section cached in a file, if its input is the same.
 fn found(file: &Path, key: &str) -> Option<Section> {
     let text = std::fs::read_to_string(file).ok()?;
     let kept: Kept = serde_json::from_str(&text).ok()?;

@@ -1,4 +1,4 @@
-//! The short tables that a person reads in a terminal.
+//! Summaries for a terminal.
 
 use super::table::{Table, number};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};

@@ -1,7 +1,6 @@
-//! Colours: what they are on white paper, and what becomes of them on a dark screen.
+//! Colours on white paper and on a dark screen.
 //!
-//! Those that lie beside each other differ in lightness, so that they are told apart in grey; every kind of line and mark differs
-//! in shape as well.
+//! Neighbouring colours differ in lightness, so that they remain distinct in grey; lines and marks also differ in shape.
 
 use plotters::style::RGBColor;
 
@@ -10,7 +9,7 @@ use crate::regime::Regime;
 pub const THEORY: RGBColor = RGBColor(40, 40, 40);
 pub const UNSTABLE: RGBColor = RGBColor(150, 150, 150);
 pub const EXACT: RGBColor = RGBColor(0, 114, 178);
-/// The unstable part of what is drawn in [`EXACT`].
+/// Unstable parts of curves in [`EXACT`].
 pub const FAINT: RGBColor = RGBColor(120, 170, 210);
 pub const DECAY: RGBColor = RGBColor(213, 94, 0);
 pub const LOCK: RGBColor = RGBColor(0, 0, 0);
@@ -30,7 +29,7 @@ pub fn regime(regime: Regime) -> RGBColor {
     }
 }
 
-/// The colour of a letter on it; what stays as it is on a dark screen needs a letter that stays, too.
+/// The colour of a letter on it. Where the cell colour is the same on dark screens, so is that of the letter.
 pub fn on_regime(regime: Regime) -> RGBColor {
     match regime {
         Regime::NoImpacts => RGBColor(0, 0, 0),
@@ -54,10 +53,10 @@ const DARK: [(&str, &str); 9] = [
     ("#1E2028", "#F2F2EE"),
 ];
 
-/// A picture for dark screens.
+/// A figure for dark screens.
 #[must_use]
 pub fn dark(svg: &str) -> String {
-    // Every colour stands in quotes, once changed it is not looked at again.
+    // Every colour is in quotes, and each is replaced once.
     svg.split('"')
         .map(|part| {
             let pair = DARK.iter().find(|(light, _)| *light == part);
@@ -67,7 +66,7 @@ pub fn dark(svg: &str) -> String {
         .join("\"")
 }
 
-/// Style rules that do the same to pictures inside a page.
+/// Style rules that do the same for figures inside a page.
 #[must_use]
 pub fn dark_rules() -> String {
     DARK.iter()

@@ -1,20 +1,20 @@
-//! One period of the drive, reduced to a few numbers.
+//! Harmonics of one period of the drive.
 
 use nalgebra::{Complex, DVector};
 use vines_model::numerics::{HarmonicBasis, mean};
 
-use crate::experiment::Sample;
+use crate::experiment::{Sample, drive_phases};
 
-/// What the sensors said over one period of the drive.
+/// Harmonics of the sensor signals over one period of the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Cycle {
     /// Mean frequency of the drive, rad/s.
     pub omega: f64,
     /// Harmonics 1 to 3 of the response relative to the drive's phase, m: `Im Σ a_h exp(i h phase)`.
     pub response: [Complex<f64>; 3],
-    /// Fundamental of the base, m: as measured where a sensor reads it, as commanded elsewhere.
+    /// Fundamental of the base, m: measured if a sensor reads it, otherwise commanded.
     pub base: Complex<f64>,
-    /// Phase error, rad: response less base less target.
+    /// Phase error, rad: response minus base minus target.
     pub phase_error: f64,
 }
 
@@ -29,15 +29,7 @@ impl Cycle {
         if samples.len() <= TERMS {
             return None;
         }
-        let mut turned = phase;
-        let phases: Vec<f64> = samples
-            .iter()
-            .map(|sample| {
-                let now = turned;
-                turned += sample.command.drive.omega * sample_time;
-                now
-            })
-            .collect();
+        let phases = drive_phases(samples, sample_time, phase);
         let basis = HarmonicBasis::new(&phases, 0, &[Some(0); 3]);
         let fitted = |value: fn(&Sample) -> f64| {
             basis.fit(&DVector::from_iterator(
@@ -57,7 +49,7 @@ impl Cycle {
         let phase_error = if measured {
             (response[0] * base.conj() * Complex::from_polar(1.0, -target)).arg()
         } else {
-            // The controller knows of delays.
+            // The controller compensates the delay.
             mean(|s| s.command.phase_error)
         };
         Some(Self {

@@ -1,4 +1,4 @@
-//! What the next level will take, as far as it can be foreseen.
+//! Prediction of the drive and the frequency at the next level.
 
 use crate::scene::Predictor;
 use vines_model::theory::{BranchSide, SlowFlow};
@@ -29,7 +29,7 @@ fn by_theory(slow_flow: &SlowFlow, from: f64, to: f64) -> Option<(f64, f64)> {
     Some((to.g - from.g, to.sigma - from.sigma))
 }
 
-/// The polynomial through up to three points, less its value at the last.
+/// The polynomial through up to three points, minus its value at the last.
 fn extrapolate(points: &[Known], c: f64) -> (f64, f64) {
     let (mut g, mut sigma) = (0.0, 0.0);
     for (i, point) in points.iter().enumerate() {
@@ -83,7 +83,7 @@ mod tests {
         let expected = flow.backbone_sigma(0.4, BranchSide::Right).unwrap()
             - flow.backbone_sigma(0.5, BranchSide::Right).unwrap();
         assert!((sigma - expected).abs() < 1e-12 && g < 0.0);
-        // Below the fold it has nothing to say.
+        // Below the fold the theory has no backbone.
         assert_eq!(
             change(Predictor::Theory, &[known(0.5)], 0.1, &flow),
             (0.0, 0.0)

@@ -1,16 +1,15 @@
-//! When a point is settled, and what it says.
+//! The criterion for a settled point, and the estimates of its drive and frequency.
 //!
-//! What still moves need not be waited for as long as it is accounted for. Near phase resonance the response obeys the balances
-//! `A' = g (E - E_R)` and `phase' = omega_R - omega - delta phase`, with `g = omega/2` for a structure shaken through its base and
+//! A point can be evaluated before the loops have settled completely, because near phase resonance the response obeys the balances
+//! `A' = g (E - E_R)` and `phase' = omega_R - omega - delta phase`, with `g = omega/2` for a base-excited structure and
 //! `delta = g E_R/A`: the drive `E_R` and the frequency `omega_R` of phase resonance are the slopes of straight lines in time,
 //!
 //! ```text
 //! integral of E - A/g = E_R t + const,      integral of (omega + delta phase) + phase = omega_R t + const
 //! ```
 //!
-//! whatever drive and frequency do meanwhile. A point is settled where these lines are straight: both halves of the periods
-//! agree to within a tolerance, or to within what is random from period to period where that hides it, and the slopes are known
-//! well enough.
+//! for any history of drive and frequency. A point is settled when these lines are straight and their slopes are accurate: both halves
+//! of the periods agree within a tolerance, or within the random scatter from period to period if that is larger.
 
 use vines_model::numerics::{Line, mean, noise, standard_deviation};
 
@@ -22,13 +21,13 @@ pub struct Criterion {
     /// Largest difference between both halves, and largest standard error, of the drive, relative, and of the frequency,
     /// relative to the damping rate.
     pub tolerance: f64,
-    /// Largest standard error of the same where noise is what remains.
+    /// Largest standard error of the same quantities where noise dominates.
     pub precision: f64,
     /// Fewest periods.
     pub fewest: usize,
 }
 
-/// What some periods say about phase resonance.
+/// Estimates of phase resonance from a number of periods.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Estimate {
     /// How many periods.
@@ -37,32 +36,32 @@ pub struct Estimate {
     pub response: f64,
     /// Amplitude of the base that holds it there, m.
     pub base: f64,
-    /// Frequency at which it does, rad/s.
+    /// Frequency of phase resonance, rad/s.
     pub omega: f64,
     /// Mean phase error, rad.
     pub phase_error: f64,
     /// Damping rate, rad/s.
     pub damping_rate: f64,
-    /// Standard deviation of the response's amplitude, relative, and of what is random in it.
+    /// Standard deviation of the response's amplitude, relative, and of its random part.
     pub spread: [f64; 2],
     /// Standard errors of the base, relative, and of the frequency, relative to the damping rate.
     pub errors: [f64; 2],
-    /// What is left of each line is random from period to period.
+    /// Whether the residuals of each line are random from period to period.
     pub random: [bool; 2],
 }
 
-/// Phase error, rad, up to which the balances are taken as linear.
+/// Phase error, rad, up to which the balances count as linear.
 const PHASE_RANGE: f64 = 0.1;
-/// Standard deviation of the response's amplitude, in units of the tolerance, up to which the backbone is taken as straight.
+/// Standard deviation of the response's amplitude, in units of the tolerance, up to which the backbone counts as straight.
 const SPREAD: f64 = 3.0;
 /// Fewest periods of a half.
 const HALF: usize = 3;
-/// Residuals count as random where third differences find at least this share of their standard deviation: they see all
-/// of what is white and next to nothing of what is smooth.
+/// Residuals count as random where third differences find at least this share of their standard deviation: they respond
+/// fully to white noise and hardly to smooth signals.
 const RANDOM_SHARE: f64 = 0.6;
 
 impl Criterion {
-    /// What the longest settled stretch at the end of `cycles` says, if there is one.
+    /// The estimate from the longest settled stretch at the end of `cycles`, if there is one.
     #[must_use]
     pub fn judge(&self, cycles: &[Cycle]) -> Option<Estimate> {
         (self.fewest.max(2 * HALF)..=cycles.len())
@@ -81,7 +80,7 @@ impl Criterion {
             (first.base - second.base) / whole.base,
             (first.omega - second.omega) / whole.damping_rate,
         ];
-        // A slope over half the periods is known eight times less well, in variance; the difference of two of them, sixteen.
+        // The variance of a slope over half the periods is eight times larger, that of the difference of two slopes sixteen times.
         let is_straight = |i: usize| {
             let (difference, error) = (differences[i].abs(), whole.errors[i]);
             let smooth = difference <= self.tolerance && error <= self.tolerance;
@@ -166,7 +165,7 @@ mod tests {
     /// Drive and frequency of phase resonance.
     const TRUTH: (f64, f64) = (0.02, 3.0);
 
-    /// Periods in which the loops still swing, with disturbances of `noise` on amplitude and phase.
+    /// Periods in which the loops still oscillate, with disturbances of `noise` on amplitude and phase.
     fn cycles(count: usize, swing: f64, noise: impl Fn(usize) -> f64) -> Vec<Cycle> {
         let (base, omega) = TRUTH;
         let period = std::f64::consts::TAU / omega;

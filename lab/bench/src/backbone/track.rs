@@ -1,4 +1,4 @@
-//! The tracker.
+//! The tracking of the backbone.
 
 use serde::Serialize;
 use thiserror::Error;
@@ -15,7 +15,7 @@ use vines_model::theory::SlowFlow;
 /// One point of the backbone; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Point {
-    /// Level wanted.
+    /// Target level.
     pub level: f64,
     /// Amplitude of the fundamental of v.
     #[serde(rename = "C")]
@@ -27,15 +27,15 @@ pub struct Point {
     pub g: f64,
     /// Mean phase error, degrees.
     pub phase_error_deg: f64,
-    /// Periods on the way here and held here.
+    /// Periods of the move to this level and at this level.
     pub periods: f64,
     /// Periods averaged.
     pub averaged: usize,
-    /// The point was settled; otherwise it was taken because time was up.
+    /// The point had settled; otherwise it was taken at the time limit.
     pub settled: bool,
-    /// The regime as a rig would tell it, from the response alone.
+    /// The regime determined from the response alone, as on a real rig.
     pub regime: Regime,
-    /// The regime as the impacts tell it, where the rig is a simulation.
+    /// The regime determined from the impacts, if the rig is a simulation.
     pub regime_by_impacts: Option<Regime>,
 }
 
@@ -64,14 +64,14 @@ pub enum TrackError {
         "no lock within {periods:.0} periods of the drive; see record.lock_periods and the [controller] section"
     )]
     NoLock {
-        /// How long it was waited for, periods.
+        /// Time limit, periods.
         periods: f64,
     },
 }
 
-/// Phase error, rad, below which the response is taken in hand.
+/// Phase error, rad, below which the control of the response begins.
 const NEAR: f64 = 0.35;
-/// Periods for which it must have been that small.
+/// Periods for which the phase error must have been that small.
 const NEAR_FOR: usize = 3;
 
 /// A bench that reads period by period.
@@ -93,7 +93,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
         let command = match self.controller.sample(sensors, true) {
             Ok(command) => command,
             Err(error) => {
-                // The rig is not left driven by a controller that has failed.
+                // A failed controller must not leave the rig driven.
                 let _ = self.rig.advance(Drive::default(), self.sample_time);
                 return Err(error.into());
             }
@@ -186,7 +186,7 @@ pub fn track(
     })
 }
 
-/// Lets the loop come near phase resonance under the drive that the controller starts with.
+/// Runs the loop until it is near phase resonance, with the initial drive amplitude.
 fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
     bench: &mut Bench<R, C>,
     most: f64,
@@ -208,7 +208,7 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
     Ok(())
 }
 
-/// Goes to the level and holds it until the point is still.
+/// Moves to the level and holds it until the point has settled.
 fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     bench: &mut Bench<R, C>,
     scene: &Scene,

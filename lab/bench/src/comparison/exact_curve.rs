@@ -1,4 +1,4 @@
-//! How far measured points lie from the exact backbone.
+//! Distance of measured points from the exact backbone.
 
 use serde::Serialize;
 
@@ -9,25 +9,25 @@ use vines_model::theory::SlowFlow;
 
 /// Frequencies at which the curve is computed over its whole range, ...
 const FREQUENCIES: usize = 3000;
-/// ... and about its lowest frequency, where it turns back, within so much of the detuning.
+/// ... and about its lowest frequency, where it turns back: number of frequencies, and range of the detuning.
 const TURN: (usize, f64) = (1200, 0.02);
-/// Particle speed up to which it is looked for: beyond symmetry breaking.
+/// Largest particle speed of the curve: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
-/// The exact backbone beyond the fold as a fine polygon, by rising particle speed.
+/// The exact backbone beyond the fold as a fine polygon, by increasing particle speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExactCurve {
     orbits: Vec<Orbit>,
 }
 
-/// A point less the exact backbone.
+/// Difference of a point from the exact backbone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Distance {
-    /// Largest of the differences in C, sigma and G to the place on the curve where that is least.
+    /// Largest of the differences in C, sigma and G, at the place on the curve where it is smallest.
     pub nearest: f64,
-    /// sigma less the curve's at the same C; absent outside of the curve.
+    /// Difference in sigma at the same C; absent outside the curve.
     pub sigma: Option<f64>,
-    /// G less the curve's at the same C; absent as above.
+    /// Difference in G at the same C; absent as above.
     #[serde(rename = "G")]
     pub g: Option<f64>,
 }
@@ -92,7 +92,7 @@ impl ExactCurve {
     }
 }
 
-/// Least over a segment of the largest difference. That is convex along the segment.
+/// Smallest value, over a segment, of the largest difference; it is convex along the segment.
 fn to_segment(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
     let largest = |x: f64| {
         (0..3)

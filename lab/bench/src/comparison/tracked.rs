@@ -26,7 +26,7 @@ pub struct TrackedComparison {
     pub exact: ExactCurve,
 }
 
-/// A point and its distance from the exact backbone; absent where there is none to compare with.
+/// A point and its distance from the exact backbone; absent without an exact backbone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct TrackedPoint {
     /// The point.

@@ -1,10 +1,10 @@
-//! Frequency and amplitude from zero crossings: for clean data, which need no model then.
+//! Frequency and amplitude from zero crossings: without a model, for clean data.
 
 use std::ops::Range;
 
 use vines_model::numerics::{bisection, mean_square};
 
-/// One period of a signal, from a zero crossing to the next but one.
+/// One period of a signal, between every second zero crossing.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Period {
     /// Its samples.
@@ -19,8 +19,8 @@ pub struct Period {
 
 /// All periods of `values`, one from every crossing on; samples are `sample_time` seconds apart.
 ///
-/// A crossing is found on the parabola through four samples' differences (a cubic), whose error at a hundred samples per period
-/// is below 1e-7 of a sample. Two crossings make a period, so that neither an offset nor even harmonics matter to first order.
+/// A crossing is located on the cubic through four samples; at a hundred samples per period its error is below 1e-7 of a sample.
+/// A period lasts two crossings, so an offset and even harmonics have no effect to first order.
 pub fn periods(values: &[f64], sample_time: f64) -> Vec<Period> {
     let crossings: Vec<f64> = (1..values.len().saturating_sub(2))
         .filter(|&n| (values[n] > 0.0) != (values[n + 1] > 0.0))

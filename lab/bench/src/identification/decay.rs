@@ -21,7 +21,7 @@ pub struct DecayPoint {
     /// Amplitude of the fundamental of v.
     #[serde(rename = "C")]
     pub c: f64,
-    /// Particle speed; absent where the rig does not tell.
+    /// Particle speed; absent if the rig does not report it.
     #[serde(rename = "B")]
     pub b: Option<f64>,
     /// Detuning.
@@ -40,7 +40,7 @@ pub fn decay_points(record: &Record, scene: &Scene) -> Vec<DecayPoint> {
     let Some(first) = decay.first() else {
         return Vec::new();
     };
-    // The command of the last held sample: the frequency to start from.
+    // Initial frequency: the command of the last held sample.
     let omega = record
         .hold()
         .last()
@@ -83,7 +83,7 @@ pub fn decay_points(record: &Record, scene: &Scene) -> Vec<DecayPoint> {
         .collect()
 }
 
-/// What an estimator makes of some samples: amplitude (m) and frequency (rad/s) at a time (s) since the release.
+/// An estimate from some samples: amplitude (m) and frequency (rad/s) at a time (s) since the release.
 struct Piece {
     samples: Range<usize>,
     time: f64,
@@ -91,7 +91,7 @@ struct Piece {
     omega: f64,
 }
 
-/// A window of so many periods slides along; each starts from the frequency of the one before, the first from `omega`.
+/// Fits in a sliding window of `periods`. Each fit starts from the frequency of the one before, the first from `omega`.
 fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<Piece> {
     let period = TAU / omega / dt;
     let window = (periods * period).round() as usize + 1;

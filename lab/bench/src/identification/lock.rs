@@ -14,7 +14,7 @@ use crate::scene::Scene;
 /// The locked point as measured over the hold; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lock {
-    /// Base amplitude over `b epsilon`, as the reference sensor read it (as commanded where there is none).
+    /// Base amplitude over `b epsilon`, measured if a sensor reads the base, otherwise commanded.
     #[serde(rename = "G")]
     pub g: f64,
     /// Detuning.
@@ -22,25 +22,25 @@ pub struct Lock {
     /// Amplitude of the fundamental of v over b.
     #[serde(rename = "C")]
     pub c: f64,
-    /// Mean particle speed over `b omega0`; absent where the rig does not tell.
+    /// Mean particle speed over `b omega0`; absent if the rig does not report it.
     #[serde(rename = "B")]
     pub b: Option<f64>,
-    /// Phase of v relative to the base, less the target, degrees.
+    /// Phase of v relative to the base, minus the target, degrees.
     pub phase_error_deg: f64,
     /// From the start to the settled lock, in periods of the locked motion.
     pub periods_to_lock: f64,
-    /// Impacts per period; no number where the rig does not tell them.
+    /// Impacts per period; NaN if the rig does not report them.
     pub impacts_per_period: f64,
-    /// What the particle does: by its impacts, or by the response alone where the rig does not tell them.
+    /// The regime: from the impacts, or from the response alone if the rig does not report them.
     pub regime: Regime,
 }
 
 impl Lock {
-    /// How many impacts there are per period, or that the regime was told without them.
+    /// The number of impacts per period, or the note that the regime was determined without it.
     #[must_use]
     pub fn impacts(&self) -> String {
         if self.impacts_per_period.is_nan() {
-            "told from the response alone".into()
+            "determined from the response alone".into()
         } else {
             format!("{:.3} impacts per period", self.impacts_per_period)
         }

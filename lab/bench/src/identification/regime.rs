@@ -6,7 +6,7 @@ use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
 use crate::experiment::Sample;
 
-/// The impacts that the samples tell of; where several fell between two samples, the last one.
+/// The impacts in the samples; of several between two samples, the last one.
 #[must_use]
 pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
     let truths: Vec<_> = samples
@@ -35,7 +35,7 @@ pub fn classify(samples: &[Sample], sample_time: f64, omega: f64) -> (f64, Regim
         return (0.0, Regime::NoImpacts);
     };
     let (span, period) = (to.time - from.time, TAU / omega);
-    // Counted from impact to impact, so that the ends of the record take no part.
+    // Counted from impact to impact, so that the ends of the record have no influence.
     let count = (last.impacts - first.impacts) as f64;
     let per_period = if span > 0.0 {
         (count - 1.0) * period / span

@@ -1,31 +1,31 @@
-//! The regime from the response alone, as a rig must tell it.
+//! The regime from the response alone, as on a real rig.
 //!
-//! The centre of mass moves smoothly, so impacts leave little in it: while the particle flies to and fro at the speed `B`, its triangle
-//! wave drives the harmonic of odd order n of v to the amplitude `4 epsilon B/(pi n^2 (n^2 - 1))`. Uneven impacts
-//! bring in even harmonics. Irregular impacts let amplitude and phase wander, which no harmonic explains. And what holds the motion
-//! without impacts is known: the linear mode, at `omega0` with the drive `c omega A/k`.
+//! The centre of mass moves smoothly, so impacts have little effect on it. The triangle wave of a particle with the speed `B`
+//! excites the harmonic of odd order n of v to the amplitude `4 epsilon B/(pi n^2 (n^2 - 1))`. Uneven impacts add even
+//! harmonics. Irregular impacts make amplitude and phase fluctuate, which leaves a residual. The motion without impacts is
+//! the linear mode: it needs the frequency `omega0` and the drive `c omega A/k`.
 
 use nalgebra::DVector;
 use vines_model::numerics::{HarmonicBasis, mean, noise};
 use vines_model::regime::Regime;
 
-use crate::experiment::Sample;
+use crate::experiment::{Sample, drive_phases};
 use crate::scene::Scene;
 
-/// Share of the amplitude that may stay unexplained in a steady motion, where it is not noise.
+/// Largest residual of a steady motion, relative to the amplitude, unless it is noise.
 const STEADY: f64 = 3e-3;
-/// What is unexplained is noise if it changes from sample to sample: third differences then see at least this share of it.
+/// A residual counts as noise if third differences find at least this share of it.
 const NOISE_SHARE: f64 = 0.5;
-/// How many standard errors a harmonic must have.
+/// Smallest significant harmonic, in standard errors.
 const SIGNIFICANT: f64 = 4.0;
-/// Share of the third harmonic expected that the second may have in a symmetric motion.
+/// Largest second harmonic of a symmetric motion, relative to the expected third.
 const EVEN_SHARE: f64 = 0.5;
-/// Shares of the damping rate (frequency) and of the drive within which a motion is the linear mode's.
+/// Deviations within which a motion counts as the linear mode: of the frequency, relative to the damping rate, and of the drive.
 const LINEAR: [f64; 2] = [0.1, 0.05];
-/// Degrees of the amplitudes of the harmonics in time: the fundamental may bend, the others are constant.
+/// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.
 const HARMONICS: [Option<usize>; 5] = [Some(2), Some(0), Some(0), Some(0), Some(0)];
 
-/// What the response is made of, relative to its fundamental.
+/// Harmonic content of the response, relative to its fundamental.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Content {
     /// Amplitude of the fundamental, m.
@@ -35,24 +35,16 @@ struct Content {
     third: f64,
     /// Standard error of either.
     error: f64,
-    /// RMS of what is left, relative, and how much of that looks like noise.
+    /// RMS of the residual, relative, and its part that is noise.
     rest: f64,
     noise: f64,
 }
 
 impl Content {
-    /// Fits the samples; `None` where they are too few or silent.
+    /// Fits the samples; `None` for too few samples or no motion.
     fn of(samples: &[Sample], sample_time: f64) -> Option<Self> {
         let n = samples.len();
-        let mut phase = 0.0;
-        let phases: Vec<f64> = samples
-            .iter()
-            .map(|sample| {
-                let now = phase;
-                phase += sample.command.drive.omega * sample_time;
-                now
-            })
-            .collect();
+        let phases = drive_phases(samples, sample_time, 0.0);
         let basis = HarmonicBasis::new(&phases, 1, &HARMONICS);
         if n < 2 * basis.terms() {
             return None;
@@ -76,8 +68,8 @@ impl Content {
     }
 }
 
-/// The regime that the response of these samples tells: of the rig only what a linear test at small amplitude gives is used
-/// (`omega0`, `c`, `k`), and the mass ratio for how much of a third harmonic to expect.
+/// The regime determined from the response of these samples. Of the rig, this uses only the results of a linear test at small
+/// amplitude (`omega0`, `c`, `k`) and the mass ratio, from which the expected third harmonic follows.
 #[must_use]
 pub fn regime_by_response(samples: &[Sample], scene: &Scene) -> Regime {
     let Some(content) = Content::of(samples, scene.sample_time()) else {
@@ -89,7 +81,7 @@ pub fn regime_by_response(samples: &[Sample], scene: &Scene) -> Regime {
     if is_linear(samples, content.amplitude, scene) {
         return Regime::NoImpacts;
     }
-    // The particle's speed is about b omega: what matters is the order of magnitude.
+    // The particle's speed is about b omega; the order of magnitude is sufficient.
     let expected = 4.0 * scene.dimensionless().amplitude(1.0)
         / (72.0 * std::f64::consts::PI * content.amplitude);
     let significant = SIGNIFICANT * content.error;
@@ -102,7 +94,7 @@ pub fn regime_by_response(samples: &[Sample], scene: &Scene) -> Regime {
     }
 }
 
-/// Frequency and drive are those that the linear mode needs at this amplitude.
+/// Whether frequency and drive are those of the linear mode at this amplitude.
 fn is_linear(samples: &[Sample], amplitude: f64, scene: &Scene) -> bool {
     let (plant, omega0) = (&scene.plant, scene.dimensionless().omega0);
     let omega = mean(samples.iter().map(|s| s.command.drive.omega));

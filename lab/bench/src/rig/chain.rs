@@ -1,8 +1,8 @@
-//! The measurement chain around any rig: what lies between its motion and the numbers that a controller sees, and between
-//! the controller's numbers and the base.
+//! The measurement chain around any rig: from the motion to the samples that the controller reads, and from the controller's
+//! output to the base.
 //!
-//! Inputs pass sensor noise, anti-alias filter, converter and delay, in that order; the output is held from sample to sample
-//! and quantised. Each stage is absent unless the scene's `[chain]` asks for it.
+//! An input passes sensor noise, anti-alias filter, converter and delay, in that order. The output is held from sample to sample
+//! and quantised. `[chain]` in the scene switches each stage on.
 
 mod converter;
 mod filter;
@@ -30,15 +30,15 @@ pub struct Chain {
     normal: NormalDistribution,
     /// Standard deviation of the sampling instants, in samples.
     jitter: f64,
-    /// How far the present sampling instant lies behind its nominal time, in samples.
+    /// Delay of the present sampling instant relative to its nominal time, in samples.
     late: f64,
-    /// Readings under way; the oldest is seen next.
+    /// Delayed readings; the oldest is returned next.
     under_way: VecDeque<Sensors>,
     /// Time since the last reading, s.
     elapsed: f64,
 }
 
-/// The way of one input.
+/// The stages of one input.
 struct Channel {
     sensor: Option<Sensor>,
     filter: Option<LowPass>,
@@ -83,7 +83,7 @@ impl Chain {
         d: &Dimensionless,
         samples_per_period: f64,
     ) -> Self {
-        // The power of a signal is what it was over about one period.
+        // The power of a signal is averaged over about one period.
         let channel = |range: f64| Channel {
             sensor: settings
                 .snr
@@ -123,7 +123,7 @@ impl Rig for Chain {
             reference,
         });
         let mut oldest = self.under_way.pop_front().unwrap_or_default();
-        // Before the first reading arrives the channel is silent, not missing.
+        // Until the first delayed reading arrives, the channel reads zero.
         if oldest.reference.is_none() && reference.is_some() {
             oldest.reference = Some(0.0);
         }

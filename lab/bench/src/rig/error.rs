@@ -5,18 +5,18 @@ use std::error::Error;
 use phase_lock::ConfigError;
 use thiserror::Error;
 
-/// An error of what stands behind a rig or a controller: an FMU, a link to a peer.
+/// The error of an implementation: of an FMU, or of a link to a peer.
 type Cause = Box<dyn Error + Send + Sync>;
 
 /// Why a rig cannot go on.
 #[derive(Debug, Error)]
 pub enum RigError {
-    /// What stands behind the rig failed.
+    /// The implementation of the rig failed: an FMU, a link to a peer.
     #[error("the rig: {0}")]
     Failed(#[source] Cause),
     /// The rig cannot be driven by held samples.
     #[error(
-        "the rig takes frequency and amplitude only, not samples of the base displacement as chain.hold asks"
+        "the rig accepts frequency and amplitude only, not the samples of the base displacement that chain.hold = true sends"
     )]
     NoHold,
 }
@@ -24,11 +24,13 @@ pub enum RigError {
 /// Why a controller cannot go on.
 #[derive(Debug, Error)]
 pub enum ControllerError {
-    /// What stands behind the controller failed.
+    /// The implementation of the controller failed: an FMU, a link to a peer.
     #[error("the controller: {0}")]
     Failed(#[source] Cause),
-    /// The controller holds the drive only.
-    #[error("the controller cannot hold the amplitude of the response; the built-in one can")]
+    /// The controller cannot control the response.
+    #[error(
+        "the controller cannot hold the amplitude of the response; use the built-in controller"
+    )]
     NoResponseLoop,
     /// The controller refused a value.
     #[error("the controller: {0}")]
@@ -36,7 +38,7 @@ pub enum ControllerError {
 }
 
 impl RigError {
-    /// The error of what stands behind the rig, if it is an `E`.
+    /// The error of the implementation, if it is an `E`.
     #[must_use]
     pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
         match self {
@@ -47,7 +49,7 @@ impl RigError {
 }
 
 impl ControllerError {
-    /// The error of what stands behind the controller, if it is an `E`.
+    /// The error of the implementation, if it is an `E`.
     #[must_use]
     pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
         match self {

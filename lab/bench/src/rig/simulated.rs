@@ -1,4 +1,4 @@
-//! The plant itself as a rig, with no FMU in between.
+//! The simulated plant as a rig, without an FMU.
 
 use lovines::{InvalidValue, Parameters, Plant, State};
 
@@ -14,7 +14,7 @@ impl Simulated {
     /// A plant at its start.
     ///
     /// # Errors
-    /// A parameter or a start that makes no sense.
+    /// An invalid parameter or start.
     pub fn new(parameters: Parameters, start: State) -> Result<Self, InvalidValue> {
         let plant = Plant::new(parameters, start)?;
         Ok(Self { plant })

@@ -4,15 +4,15 @@ use serde::{Deserialize, Serialize};
 
 use super::{Controller, SceneError, validate::Quantity};
 
-/// Where the frequency and the drive of the next level are foreseen from.
+/// What predicts the frequency and the drive at the next level.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Predictor {
-    /// From the points before it: a rig needs nothing else.
+    /// The points before it; works on any rig.
     Previous,
-    /// From first-order theory, as the difference between the two levels.
+    /// First-order theory: the difference between the two levels.
     Theory,
-    /// Not at all: the loops find them.
+    /// Nothing: the loops find them.
     None,
 }
 
@@ -33,18 +33,18 @@ pub struct Backbone {
     pub g_max: f64,
     /// Bandwidth of the detector while tracking, in units of omega0.
     pub bandwidth: f64,
-    /// How long the way from one level to the next takes, periods.
+    /// Duration of the move from one level to the next, periods.
     pub move_periods: f64,
     /// Fewest periods that a point is averaged over.
     pub dwell_min: u32,
     /// Periods after which a point is taken, settled or not.
     pub dwell_max: u32,
-    /// How well both halves of the periods averaged must agree, where noise does not hide it: in the drive, relative, and in
+    /// Largest difference between the two halves of the averaged periods where noise is negligible: of the drive, relative, and of
     /// the frequency, relative to the damping rate.
     pub tolerance: f64,
-    /// Largest standard error that noise may leave in the same.
+    /// Largest standard error of the same quantities where noise dominates.
     pub precision: f64,
-    /// Where the next point's frequency and drive are foreseen from.
+    /// What predicts the next point's frequency and drive.
     #[serde(alias = "feed")]
     pub predictor: Predictor,
 }

@@ -4,17 +4,17 @@ use serde::{Deserialize, Serialize};
 
 use super::{Controller, SceneError, validate::Quantity};
 
-/// What a signal-to-noise ratio is relative to.
+/// Reference of a signal-to-noise ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum RatioOf {
-    /// The signal as it is: the noise follows its power.
+    /// The present signal: the noise is proportional to its RMS.
     Signal,
     /// A sine that fills the range of the channel: the noise is the same at every level.
     Range,
 }
 
-/// What stands between the rig and the controller, as far as it is switched on.
+/// The stages between the rig and the controller; each can be switched off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Chain {
@@ -22,15 +22,15 @@ pub struct Chain {
     pub adc_bits: u32,
     /// Resolution of the output, bits; 0 for an ideal one. Needs `hold`.
     pub dac_bits: u32,
-    /// Range of the response channel, ± so much, over b; beyond it is cut off.
+    /// Range of the response channel, ± this value, over b; readings saturate there.
     pub response_range: f64,
-    /// Range of the base channel and of the output, ± so much, over `b epsilon`.
+    /// Range of the base channel and of the output, ± this value, over `b epsilon`.
     pub base_range: f64,
     /// The base follows held samples instead of an oscillator in the rig.
     pub hold: bool,
-    /// Signal-to-noise ratio of the sensors, dB; none without it.
+    /// Signal-to-noise ratio of the sensors, dB; absent: no noise.
     pub snr: Option<f64>,
-    /// What that is relative to.
+    /// Reference of that ratio.
     pub snr_of: RatioOf,
     /// Seed of noise and jitter.
     pub seed: u64,
@@ -42,7 +42,7 @@ pub struct Chain {
     pub delay: u32,
     /// Whether a sensor reads the base.
     pub reference: bool,
-    /// Whether the controller is told the delay from the drive to the sensors. It uses that where no sensor reads the base.
+    /// Whether the controller knows the delay from the drive to the sensors. It needs the delay where no sensor reads the base.
     pub compensate: bool,
 }
 
@@ -91,8 +91,8 @@ impl Chain {
             || !reference
     }
 
-    /// What the controller is told of the delay from the drive to the sensors, in units of 1/omega0, for samples
-    /// `step` apart: a held sample is late by half a sample in the mean.
+    /// Delay from the drive to the sensors that the controller compensates, in units of 1/omega0, for samples `step` apart: on
+    /// average, a held sample lags by half a sample.
     #[must_use]
     pub fn stated_delay(&self, step: f64) -> f64 {
         if !self.compensate {

@@ -1,4 +1,4 @@
-//! A scene's settings in SI units, as plant and controller take them.
+//! A scene's settings in SI units, in the form that plant and controller use.
 
 use lovines::State;
 use phase_lock::{Config, LockCriterion};
@@ -15,7 +15,7 @@ impl Scene {
         [mass, k, c, m, b, r, q1, dq1, ("q2", q2), ("der(q2)", dq2)]
     }
 
-    /// The controller that locks at the scene's excitation.
+    /// Configuration of the controller for the scene's excitation.
     #[must_use]
     pub fn controller_config(&self) -> Config {
         let d = self.dimensionless();
@@ -51,7 +51,7 @@ impl Scene {
         }
     }
 
-    /// The controller that holds the response at the levels of `[backbone]`, with the largest drive and the bandwidth given there.
+    /// Configuration of the controller for tracking: with the largest drive and the bandwidth of `[backbone]`.
     #[must_use]
     pub fn backbone_config(&self) -> Config {
         let d = self.dimensionless();

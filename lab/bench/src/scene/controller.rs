@@ -13,7 +13,7 @@ use super::{SceneError, validate::Quantity};
 pub struct Controller {
     /// Samples per natural period `2 pi/omega0`.
     pub samples_per_period: f64,
-    /// Bandwidth of the phase detector, in units of omega0: the one tuning knob, from which the loop's gains follow.
+    /// Bandwidth of the phase detector, in units of omega0: the only tuning parameter; the gains of the loop follow from it.
     pub bandwidth: f64,
     /// Frequency at the start, in units of omega0.
     pub omega_start: f64,
@@ -34,18 +34,18 @@ pub struct Controller {
     /// Largest drive allowed, base amplitude over `b epsilon`; 0 for none.
     #[serde(rename = "G_max")]
     pub g_max: f64,
-    /// Reading of the response above which the drive is taken away, over b; 0 for none.
+    /// Response above which the drive is shut down, over b; 0 for no limit.
     #[serde(rename = "C_max")]
     pub c_max: f64,
-    /// Time of a ramp of the drive to its amplitude, also down after a fault, natural periods; 0 to jump.
+    /// Duration of the ramp of the drive to its amplitude, and to zero after a fault, natural periods; 0 to jump.
     pub ramp_periods: f64,
-    /// Time of a ramp of the drive down to nothing at the release, natural periods; 0 to switch off at once.
+    /// Duration of the ramp of the drive to zero at the release, natural periods; 0 to switch off at once.
     pub release_periods: f64,
     /// Largest change of the frequency in a natural period, in units of omega0; 0 for none.
     pub omega_rate: f64,
-    /// Longest time from the end of the ramp to the lock, natural periods; 0 for ever.
+    /// Longest time from the end of the ramp to the lock, natural periods; 0 for no limit.
     pub acquire_periods: f64,
-    /// Delay of the rig from the drive to the sensors, samples, beside that of `[chain]`; used where no sensor reads the base.
+    /// Delay of the rig from the drive to the sensors, samples, in addition to that of `[chain]`; used where no sensor reads the base.
     pub delay: f64,
 }
 

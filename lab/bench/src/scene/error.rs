@@ -1,4 +1,4 @@
-//! What can be wrong with a scene.
+//! Errors of a scene.
 
 use std::path::PathBuf;
 
@@ -6,7 +6,7 @@ use lovines::InvalidValue;
 
 use super::SyntaxError;
 
-/// A scene that cannot be used; the message is one that a person can act on.
+/// Why a scene cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
     /// The file could not be read.
@@ -14,7 +14,7 @@ pub enum SceneError {
     Read {
         /// The file asked for.
         path: PathBuf,
-        /// What the system said.
+        /// Error of the system.
         source: std::io::Error,
     },
     /// Not TOML, an unknown key or a value of the wrong type; the message shows the line.
@@ -48,7 +48,7 @@ pub enum SceneError {
         /// What is allowed.
         allowed: String,
     },
-    /// A plant or a start that makes no sense.
+    /// The plant refuses a parameter or the start.
     #[error("[plant] or [start]: {0}")]
     Plant(#[from] InvalidValue),
     /// Keys that are missing or do not go together.

@@ -105,7 +105,8 @@ impl Override {
     }
 }
 
-/// The sections of `table` with the overrides applied one by one, so that a mistake is blamed on the argument that made it.
+/// The sections of `table` with the overrides applied one by one, so that an error names the
+/// argument that caused it.
 pub(super) fn merged(
     mut table: Table,
     overrides: &[Override],

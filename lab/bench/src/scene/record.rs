@@ -4,13 +4,13 @@ use serde::{Deserialize, Serialize};
 
 use super::{Controller, SceneError, validate::Quantity};
 
-/// How frequency and amplitude along the decay are found.
+/// How frequency and amplitude along the decay are estimated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Estimator {
     /// Least squares over a sliding window: a fundamental and its third harmonic, their amplitudes and phases drifting linearly.
     Fit,
-    /// Zero crossings, a period each: for clean data.
+    /// Zero crossings, one estimate per period: for clean data.
     Crossings,
 }
 
@@ -18,7 +18,7 @@ pub enum Estimator {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Record {
-    /// Longest wait for the lock, natural periods.
+    /// Time limit for the lock, natural periods.
     pub lock_periods: f64,
     /// How long the settled lock is held and measured, natural periods.
     pub hold_periods: f64,
@@ -26,7 +26,7 @@ pub struct Record {
     pub decay_periods: f64,
     /// Window of the fit along the decay, periods of the motion.
     pub window_periods: f64,
-    /// How frequency and amplitude along the decay are found.
+    /// How frequency and amplitude along the decay are estimated.
     pub estimator: Estimator,
 }
 
@@ -42,7 +42,7 @@ impl Default for Record {
     }
 }
 
-/// Most samples of one record: some 2 GiB in memory.
+/// Most samples of one record: about 2 GiB in memory.
 const MOST_SAMPLES: f64 = 2e7;
 
 impl Record {

@@ -23,7 +23,7 @@ impl Quantity {
         self.check(self.value >= 0.0, "must be zero or positive, and finite")
     }
 
-    /// `ok` may be anything for a value that is not finite: that is never allowed.
+    /// A value that is not finite is refused whatever `ok` says.
     pub(super) fn check(self, ok: bool, allowed: impl Into<String>) -> Result<(), SceneError> {
         if ok && self.value.is_finite() {
             return Ok(());

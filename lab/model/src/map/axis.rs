@@ -5,7 +5,7 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
-/// What an axis is about.
+/// Quantity of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Axis {
     /// Detuning.
@@ -31,13 +31,13 @@ impl Display for Axis {
 /// An axis with the values it takes; parse it from `sigma=-4:4:81` (first : last : how many).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Range {
-    /// What it is about.
+    /// Its quantity.
     pub axis: Axis,
     /// First value.
     pub from: f64,
     /// Last value.
     pub to: f64,
-    /// How many, at equal distances.
+    /// Number of values, at equal distances.
     pub points: usize,
 }
 

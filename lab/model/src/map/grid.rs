@@ -14,12 +14,12 @@ use crate::Dimensionless;
 use crate::regime::Regime;
 use crate::theory::SlowFlow;
 
-/// What to map.
+/// Settings of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Plan {
-    /// The numbers that are on no axis.
+    /// Parameters that are not on an axis.
     pub scene: Dimensionless,
-    /// Detuning where it is on no axis.
+    /// Detuning, if it is not on an axis.
     pub sigma: f64,
     /// Start (q1, q1', q2, q2'), dimensionless.
     pub start: [f64; 4],
@@ -43,7 +43,7 @@ pub struct Cell {
     pub g: f64,
     /// Restitution coefficient.
     pub r: f64,
-    /// What was found.
+    /// Result.
     #[serde(flatten)]
     pub point: Point,
     /// First-order theory has a stable symmetric 1:1 motion here.
@@ -53,23 +53,25 @@ pub struct Cell {
 /// The map, row by row from the smallest y, each from the smallest x.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Map {
-    /// What was asked for.
+    /// Its settings.
     pub plan: Plan,
-    /// What was found.
+    /// Result.
     pub cells: Vec<Cell>,
 }
 
 /// Why a map cannot be made.
 #[derive(Debug, Error)]
 pub enum MapError {
-    /// Twice the same axis.
+    /// Both axes have the same quantity.
     #[error("both axes are {0}: take two of sigma, G and r")]
     SameAxis(Axis),
     /// No period is recorded, or so few that nothing can repeat.
-    #[error("{0} recorded periods are too few to see a pattern: at least 20 are needed")]
+    #[error("{0} recorded periods are too few to find a pattern: at least 20 are needed")]
     TooShort(usize),
-    /// A frequency that is none.
-    #[error("sigma = {sigma} (dimensionless) is a frequency of {omega} omega0: it must be above 0")]
+    /// Not a positive frequency.
+    #[error(
+        "sigma = {sigma} (dimensionless) gives the frequency {omega} omega0, which must be above 0"
+    )]
     Frequency {
         /// The detuning.
         sigma: f64,
@@ -127,10 +129,10 @@ impl Plan {
         Ok(())
     }
 
-    /// Runs all cells on all cores; `done` is told after each.
+    /// Runs all cells on all cores; calls `done` after each.
     ///
     /// # Errors
-    /// Axes, times or values that make no sense.
+    /// Invalid axes, times or values.
     pub fn run(&self, done: impl Fn() + Sync) -> Result<Map, MapError> {
         self.check()?;
         let cells = (0..self.cells())

@@ -5,7 +5,7 @@ use std::convert::Infallible;
 use super::grid::Plan;
 use crate::numerics::try_bisection;
 
-/// Fine cells across the picture, each way.
+/// Fine cells across the map, in each direction.
 const FINE: usize = 100;
 
 /// Fraction of a fine cell to which its border is found.

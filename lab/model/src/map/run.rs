@@ -1,4 +1,4 @@
-//! One point of the map: a plant is driven, its impacts are written down and classified.
+//! One point of the map: a plant is driven, and its impacts are recorded and classified.
 
 use std::f64::consts::TAU;
 
@@ -8,32 +8,32 @@ use serde::Serialize;
 use crate::Dimensionless;
 use crate::regime::{Impact, Pattern, Regime, pattern, synchrony};
 
-/// What was found at one point.
+/// Result at one point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Point {
-    /// What the response settled into.
+    /// Regime of the response.
     pub regime: Regime,
     /// Impacts per period of the base.
     pub impacts_per_period: f64,
-    /// Impacts of the pattern that repeats; 0 where none was seen.
+    /// Impacts of the pattern that repeats; 0 without a pattern.
     pub impacts: usize,
     /// Periods of the base that it takes; 0 likewise.
     pub periods: u32,
     /// Share of the impacts that belong to captures into 1:1 resonance: at least eight in a row on alternating walls, half a
     /// period apart within 15 %.
     pub synchrony: f64,
-    /// Growth of a small disturbance per period, as a natural logarithm; absent where a pattern was seen, or the particle sticks.
+    /// Growth of a small disturbance per period, as a natural logarithm; absent with a pattern, or if the particle sticks.
     pub growth: Option<f64>,
 }
 
 /// Growth per period, as a natural logarithm, above which a motion is chaotic: a disturbance grows e-fold within 20 periods.
 /// Over the periods that it is measured for, a growth that is only linear in time stays below.
 const CHAOS: f64 = 0.05;
-/// A motion without growth that does not repeat may not have settled yet: it is given more time, so many times at most.
+/// A motion without growth and without a pattern may not have settled yet: largest number of repetitions.
 const ROUNDS: usize = 6;
-/// Where a disturbance still shrinks this fast then, the motion repeats, but in a pattern longer than those looked for.
+/// If disturbances still shrink this fast after them, the motion repeats with a pattern longer than those in the search.
 const SHRINKING: f64 = -0.005;
-/// The particle sticks where it comes to rest once in so many periods or more; now and then it does so in chaos, too.
+/// Largest number of periods per stick in the sticking regime; a chaotic motion also sticks occasionally.
 const STICKING: usize = 10;
 /// From this share of captured impacts on a motion is modulated, whether or not disturbances grow. On the default map, irregular
 /// cells have either less than a tenth or, in one connected region below and beside the island, mostly a third and more.
@@ -44,11 +44,11 @@ const DISTURBANCE: f64 = 1e-8;
 const FOLLOWED: usize = 150;
 
 /// Drives the dimensionless plant of `scene` at the detuning `sigma` from `start` = (q1, q1', q2, q2'), lets `settle`
-/// periods pass, and classifies the impacts of the next `record` periods. Where these neither repeat nor let a disturbance grow
-/// or stay, it waits and looks again.
+/// periods pass, and classifies the impacts of the next `record` periods. While they have no pattern and disturbances shrink, the
+/// observation is repeated.
 ///
 /// # Errors
-/// Parameters or a start that make no sense.
+/// Invalid parameters or an invalid start.
 pub fn observe(
     scene: &Dimensionless,
     sigma: f64,
@@ -98,7 +98,7 @@ pub fn observe(
     }
 }
 
-/// The impacts of so many periods, and how often the particle came to rest on a wall or was at rest when they began.
+/// The impacts of a number of periods, and how often the particle stuck to a wall, including at the beginning.
 fn recorded(plant: &mut Plant, drive: Drive, periods: usize) -> (Vec<Impact>, usize) {
     let mut impacts = Vec::new();
     let mut rests = usize::from(plant.contact().is_some());
@@ -120,7 +120,7 @@ fn numbers(plant: &Plant) -> [f64; 4] {
     [q1, dq1, q2, dq2]
 }
 
-/// Mean growth per period of the distance between the plant and a twin, which is brought near again after every period
+/// Mean growth per period of the distance between the plant and a twin, which is rescaled after every period
 /// (Benettin et al., Meccanica 15, 1980). Both start anew at every passage of the base through zero.
 fn growth(scene: &Dimensionless, drive: Drive, plant: &Plant) -> f64 {
     let period = TAU / drive.omega;
@@ -130,7 +130,7 @@ fn growth(scene: &Dimensionless, drive: Drive, plant: &Plant) -> f64 {
     for _ in 0..FOLLOWED {
         let there: [f64; 4] = std::array::from_fn(|n| here[n] + apart[n]);
         let there_mirrored: [f64; 4] = std::array::from_fn(|n| here[n] - apart[n]);
-        // A twin outside its cavity is put on the other side.
+        // A twin outside its cavity is mirrored.
         let (Ok(mut one), Ok(mut other)) = (
             scene.plant(here),
             scene.plant(there).or_else(|_| scene.plant(there_mirrored)),

@@ -2,7 +2,7 @@
 
 use nalgebra::{Complex, DMatrix, DVector, Dyn, linalg::QR};
 
-/// What a signal is made of at given phases: a polynomial, and harmonics whose amplitudes are polynomials in time.
+/// Basis functions at given phases: a polynomial, and harmonics whose amplitudes are polynomials in time.
 ///
 /// Time runs from -1 at the first sample to 1 at the last. The factors serve any number of signals.
 pub struct HarmonicBasis {
@@ -12,7 +12,7 @@ pub struct HarmonicBasis {
     columns: Vec<usize>,
 }
 
-/// A signal in such a basis.
+/// The coefficients of a signal in such a basis.
 pub struct HarmonicFit {
     coefficients: DVector<f64>,
     columns: Vec<usize>,
@@ -53,8 +53,8 @@ impl HarmonicBasis {
         self.matrix.ncols()
     }
 
-    /// The best fit of `values`, one for each phase; `None` for fewer values than unknowns, or phases that cannot tell the
-    /// terms apart.
+    /// The best fit of `values`, one for each phase; `None` for fewer values than unknowns, or phases for which the
+    /// terms are not independent.
     #[must_use]
     pub fn fit(&self, values: &DVector<f64>) -> Option<HarmonicFit> {
         if self.matrix.nrows() < self.terms() {
@@ -70,7 +70,7 @@ impl HarmonicBasis {
         })
     }
 
-    /// What a fit leaves of the values.
+    /// The residual of a fit.
     #[must_use]
     pub fn residual(&self, values: &DVector<f64>, fit: &HarmonicFit) -> DVector<f64> {
         values - &self.matrix * &fit.coefficients

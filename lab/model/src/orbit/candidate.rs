@@ -3,11 +3,11 @@
 //! Time starts at an impact on the wall w = +1; complex amplitudes Z stand for `Im(Z exp(i Omega tau))`.
 //!
 //! - The particle turns from -B to +B, so `w'- = 2 B (1 + epsilon)/(1 + r)` and the oscillator's velocity jumps by -2 epsilon B.
-//! - `q2 = -pi B/(2 Omega)` at the impact, since half a period later it is at the opposite point.
+//! - `q2 = -pi B/(2 Omega)` at the impact, because half a period later it is at the opposite point.
 //! - `q1 = y - 2 epsilon B p`, with the harmonic y of amplitude Y and p the periodic response to impulses of alternating sign.
 //! - `w = 1` and `w' = w'-` at the impact then give `Im Y = 1 + alpha B` and `Re Y = beta B`.
 //! - Phase resonance, `Re(V conj(F)) = 0` for the harmonic V of v and the base's harmonic F, is quadratic in B and free of G;
-//!   `G = |F|/epsilon` follows. So the exact backbone is a curve parametrised by its frequency.
+//!   `G = |F|/epsilon` follows. The exact backbone is therefore parametrised by its frequency.
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -1,97 +1,18 @@
 //! Continuation of periodic motions by pseudo-arclength: through folds, stable and unstable parts alike (docs/theory.md, eq. 27).
 //!
-//! The unknowns are the state after an impact, sigma and G; four equations close the motion and one more chooses the curve:
+//! The unknowns are the state after an impact, sigma and G; four equations close the motion and one more selects the curve:
 //! fixed G for a frequency response, phase resonance for the backbone. The step follows the tangent and shrinks where the
-//! curve bends. A branch ends where its pattern of impacts does, at a graze.
+//! curve bends. A branch ends where its pattern of impacts ends, at a graze.
 
 use nalgebra::{Matrix4, Matrix6, SVector};
-use serde::Serialize;
 
 use super::{
+    branch::{Bifurcation, Branch, Ended, Limits, Special},
     pattern::{Returned, Unknowns, follow},
     periodic::{Condition, Periodic, newton},
 };
 use crate::Dimensionless;
 use crate::numerics::try_bisection;
-
-/// How far to go.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Limits {
-    /// Range of sigma.
-    pub sigma: [f64; 2],
-    /// Range of G.
-    pub g: [f64; 2],
-    /// Most points.
-    pub points: usize,
-    /// Longest step in the space of the unknowns.
-    pub step: f64,
-}
-
-impl Default for Limits {
-    /// Detunings from -6 to 6, G up to 10, 2000 points at most 0.05 apart.
-    fn default() -> Self {
-        Self {
-            sigma: [-6.0, 6.0],
-            g: [-1e-6, 10.0],
-            points: 2000,
-            step: 0.05,
-        }
-    }
-}
-
-/// Why a branch ended.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Ended {
-    /// It left the range of sigma or G.
-    #[serde(rename = "left the range")]
-    Range,
-    /// It came back to its start.
-    #[serde(rename = "closed")]
-    Closed,
-    /// Most points were taken.
-    #[serde(rename = "number of points")]
-    Points,
-    /// The pattern of impacts ends here: a graze, or impacts that accumulate.
-    #[serde(rename = "graze")]
-    Graze,
-}
-
-/// How stability changes at a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Bifurcation {
-    /// A multiplier passes +1: the frequency response turns back.
-    #[serde(rename = "fold")]
-    Fold,
-    /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
-    #[serde(rename = "symmetry breaking")]
-    SymmetryBreaking,
-    /// A multiplier of the whole period passes -1.
-    #[serde(rename = "period doubling")]
-    PeriodDoubling,
-    /// A complex pair leaves the unit circle (Neimark-Sacker): modulation begins.
-    #[serde(rename = "torus")]
-    Torus,
-}
-
-/// A point where stability changes.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Special {
-    /// What happens.
-    pub kind: Bifurcation,
-    /// The motion there.
-    pub motion: Periodic,
-}
-
-/// A continued curve.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Branch {
-    /// Its motions in order.
-    pub points: Vec<Periodic>,
-    /// Where stability changes, in order.
-    pub special: Vec<Special>,
-    /// Why it ended.
-    pub ended: Ended,
-}
 
 /// Steps below this end a branch.
 const SHORTEST: f64 = 1e-7;
@@ -123,7 +44,7 @@ impl Curve<'_> {
         (length.is_finite() && length > 0.0).then(|| tangent / length)
     }
 
-    /// The curve's point where the plane at the end of a step of length `step` along the tangent cuts it.
+    /// The intersection of the curve with the plane at the end of a step along the tangent.
     fn correct(&self, x: &Unknowns, tangent: &Unknowns, step: f64) -> Option<Unknowns> {
         let ahead = x + tangent * step;
         let found = newton(
@@ -136,6 +57,19 @@ impl Curve<'_> {
             },
         )?;
         ((found - ahead).norm() <= step.abs()).then_some(found)
+    }
+
+    /// The next point, its tangent and its motion; None where the step must shrink.
+    fn advance(
+        &self,
+        x: &Unknowns,
+        tangent: &Unknowns,
+        step: f64,
+    ) -> Option<(Unknowns, Unknowns, Periodic)> {
+        let next = self.correct(x, tangent, step)?;
+        let turned = self.tangent(&next, tangent)?;
+        let motion = self.motion(&next)?;
+        (turned.dot(tangent) >= STRAIGHT).then_some((next, turned, motion))
     }
 
     fn motion(&self, x: &Unknowns) -> Option<Periodic> {
@@ -206,12 +140,7 @@ pub fn continue_from(
             branch.ended = Ended::Points;
             return branch;
         }
-        let advanced = curve.correct(&x, &tangent, step).and_then(|next| {
-            let turned = curve.tangent(&next, &tangent)?;
-            let motion = curve.motion(&next)?;
-            (turned.dot(&tangent) >= STRAIGHT).then_some((next, turned, motion))
-        });
-        let Some((next, turned, motion)) = advanced else {
+        let Some((next, turned, motion)) = curve.advance(&x, &tangent, step) else {
             step /= 2.0;
             continue;
         };
@@ -220,15 +149,14 @@ pub fn continue_from(
             branch.special.extend(curve.locate(last, &tangent, step));
         }
         branch.points.push(motion);
-        // A whole turn of the phase is the same motion.
+        // A phase difference of 2 pi is the same motion.
         let mut apart = next - origin;
         apart[0] = super::pattern::wrapped(apart[0]);
-        let inside = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
         if branch.points.len() > 10 && apart.norm() < step && turned.dot(&first_tangent) > 0.9 {
             branch.ended = Ended::Closed;
             return branch;
         }
-        if !inside(next[4], limits.sigma) || !inside(next[5], limits.g) {
+        if !limits.contain(next[4], next[5]) {
             branch.ended = Ended::Range;
             return branch;
         }
@@ -241,7 +169,7 @@ pub fn continue_from(
     branch
 }
 
-/// Follows the curve of `condition` through `start` both ways: first where sigma falls, last where it rises.
+/// Follows the curve of `condition` through `start` in both directions, from falling to rising sigma.
 #[must_use]
 pub fn continue_both_ways(
     scene: &Dimensionless,
@@ -267,7 +195,7 @@ pub fn continue_both_ways(
     }
 }
 
-/// Distance from the symmetric motion at which an asymmetric one is sought.
+/// Distance from the symmetric motion at which an asymmetric one is searched for.
 const ASIDE: f64 = 1e-3;
 
 /// The branch of asymmetric motions that leaves a symmetry breaking, along the curve of `condition`; the other one is its mirror image.
@@ -280,7 +208,7 @@ pub fn asymmetric_branch(
 ) -> Option<Branch> {
     let symmetric = &breaking.motion;
     let returned = follow(scene, &symmetric.pattern, &symmetric.unknowns())?;
-    // The direction that the half-period map turns into its opposite.
+    // The eigenvector of the half-period map for the multiplier -1.
     let flipped = returned.monodromy + Matrix4::identity();
     let svd = flipped.svd(false, true);
     let aside = svd.v_t?.row(svd.singular_values.imin()).transpose();

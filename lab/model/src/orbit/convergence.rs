@@ -29,8 +29,8 @@ pub struct Convergence {
     pub slopes: [f64; 3],
 }
 
-/// Compares the stable phase-resonant solutions of theory and exact orbits at the scene's mass ratio and at so many halvings of
-/// it, with lambda, r and G as they are; None where one of them has no stable solution, or there is nothing to fit.
+/// Compares the stable phase-resonant solutions of theory and exact orbits at the scene's mass ratio and at this number of halvings of
+/// it, with constant lambda, r and G; None where one of them has no stable solution, or there is nothing to fit.
 #[must_use]
 pub fn convergence(scene: &Dimensionless, halvings: u32) -> Option<Convergence> {
     let theory = SlowFlow::new(scene.lambda, scene.r)

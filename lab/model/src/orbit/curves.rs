@@ -1,4 +1,4 @@
-//! The curves of a scene: its exact backbone, and its exact frequency response with what branches off.
+//! The curves of a scene: its exact backbone, and its exact frequency response with the branches of asymmetric motions.
 
 use serde::Serialize;
 
@@ -34,10 +34,10 @@ fn right_branch(scene: &Dimensionless) -> Option<Periodic> {
     )
 }
 
-/// Detunings at which the backbone is met where no motion of it belongs to the scene's G.
+/// Detunings at which the backbone is searched for if it has no motion at the scene's G.
 const MET_AT: [f64; 6] = [-1.0, -0.7, -1.4, -0.5, -2.0, 0.0];
 
-/// A phase-resonant motion on the right branch, whatever G it needs: none without damping and losses.
+/// A phase-resonant motion on the right branch, at any G (zero without damping and losses).
 fn at_any_excitation(scene: &Dimensionless) -> Option<Periodic> {
     let right = Manifold::new(scene.r).b_min();
     MET_AT.into_iter().find_map(|sigma| {
@@ -57,7 +57,7 @@ fn at_any_excitation(scene: &Dimensionless) -> Option<Periodic> {
     })
 }
 
-/// The exact backbone: through the scene's phase-resonant motion, or where it has none through another. Without damping and with
+/// The exact backbone, through the scene's phase-resonant motion or, without one, through another. Without damping and with
 /// r = 1 it is the conservative nonlinear mode.
 #[must_use]
 pub fn backbone(scene: &Dimensionless, limits: &Limits) -> Option<Branch> {
@@ -93,7 +93,7 @@ pub fn response(scene: &Dimensionless, limits: &Limits) -> Option<Response> {
     })
 }
 
-/// Whether a branch comes as close to a motion as its own points are apart.
+/// Whether a branch passes a motion within the distance of its own points.
 fn passes(branch: &Branch, motion: &Periodic) -> bool {
     branch.points.windows(2).any(|pair| {
         let apart =

@@ -7,7 +7,7 @@ use nalgebra::Complex;
 use super::{candidate::Candidate, oscillator::Oscillator};
 use crate::Dimensionless;
 
-/// Below this width an interval that is neither proven inside nor seen outside counts as grazing the wall.
+/// Narrower intervals that are neither proven inside nor found outside count as grazing the wall.
 const GRAZING: f64 = 1e-9;
 
 /// Half a period of relative motion w, from the impact at w = +1 to the one at w = -1.
@@ -46,7 +46,7 @@ impl<'a> Flight<'a> {
         harmonic - 2.0 * self.epsilon * b * impulses - b * (t - FRAC_PI_2 / omega)
     }
 
-    /// Proves `|w| <= 1` from the bound of `|w''|`, or finds that it does not hold.
+    /// Whether `|w| <= 1`, proven from the bound of `|w''|`.
     pub(super) fn stays_inside(&self) -> bool {
         let duration = PI / self.candidate.omega;
         // w moves away from the walls at both ends, for at least these times.

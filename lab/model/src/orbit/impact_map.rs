@@ -1,52 +1,14 @@
 //! The impact map: from the state just after an impact to that just after the next, with its derivatives (docs/theory.md, eqs. 24 and 25).
 //!
-//! Between impacts the motion is closed form. The next contact is found by steps that a bound of `|w''|` proves free of
-//! contact; they turn into Newton's as the wall comes near, so none is missed and the last is found to the last bits.
-//! The derivative goes through flight and impact: a disturbed motion meets the wall a little sooner or later (saltation).
+//! Between impacts the motion has a closed form. The derivative covers flight and impact: a disturbed motion reaches the wall a
+//! little earlier or later (saltation).
 
-use nalgebra::{Complex, Matrix2, RowSVector, SMatrix, Vector2, Vector4};
-use serde::Serialize;
+use nalgebra::{RowSVector, SMatrix};
 
-use super::oscillator::Oscillator;
+use super::bounce::{Bounce, State};
+use super::forced_oscillator::ForcedOscillator;
+use super::particle_flight::Flight;
 use crate::Dimensionless;
-
-/// State just after an impact. The base displacement is `epsilon G sin(phase)` there, and the particle is at `q1 - wall`.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Bounce {
-    /// Phase of the base, rad; it grows from impact to impact.
-    pub phase: f64,
-    /// Displacement of the primary mass over b.
-    pub q1: f64,
-    /// Velocity of the primary mass over `b omega0`.
-    pub dq1: f64,
-    /// Velocity of the particle over `b omega0`.
-    pub dq2: f64,
-    /// The wall that was hit: +1 for w = +1, -1 for w = -1.
-    pub wall: f64,
-}
-
-impl Bounce {
-    pub(super) fn vector(&self) -> Vector4<f64> {
-        Vector4::new(self.phase, self.q1, self.dq1, self.dq2)
-    }
-
-    pub(super) fn from_vector(x: &Vector4<f64>, wall: f64) -> Self {
-        let [phase, q1, dq1, dq2] = (*x).into();
-        Self {
-            phase,
-            q1,
-            dq1,
-            dq2,
-            wall,
-        }
-    }
-
-    /// Displacement of the particle over b.
-    #[must_use]
-    pub fn q2(&self) -> f64 {
-        self.q1 - self.wall
-    }
-}
 
 /// Derivative of four state variables by (phase, q1, q1', q2', Omega, G) where it began.
 pub(super) type ByAll = SMatrix<f64, 4, 6>;
@@ -65,63 +27,42 @@ pub(super) struct Step {
     pub impulse_by: RowByAll,
 }
 
-/// Dimensionless positions and velocities (q1, q1', q2, q2').
-pub(super) type State = [f64; 4];
-
 /// The map at one frequency and excitation.
 #[derive(Debug, Clone, Copy)]
 pub struct ImpactMap {
     epsilon: f64,
     r: f64,
-    pub(super) oscillator: Oscillator,
-    zeta: f64,
-    pub(super) omega: f64,
-    pub(super) g: f64,
-    /// Harmonic response of q1 to the base, per G, and its derivative by Omega.
-    unit: [Complex<f64>; 2],
+    pub(super) oscillator: ForcedOscillator,
 }
 
-/// A contact slower than this is a graze, where the map has no derivative.
-const GRAZING: f64 = 1e-9;
-/// Longest flight, periods.
-const LONGEST: f64 = 64.0;
-/// Most steps of a flight: far more than any needs, but for a chatter.
-const STEPS: usize = 4000;
-
 impl ImpactMap {
-    /// The map of `scene` (but for its G) at the frequency `omega` over omega0 and the excitation `g`.
+    /// The map of `scene` (except its G) at the frequency `omega` over omega0 and the excitation `g`.
     #[must_use]
     pub fn new(scene: &Dimensionless, omega: f64, g: f64) -> Self {
-        let zeta = scene.epsilon * scene.lambda / 2.0;
-        let oscillator = Oscillator::new(zeta);
-        let (force, compliance) = (oscillator.base_force(omega), oscillator.compliance(omega));
-        let unit = force * compliance * scene.epsilon;
-        let stiffness_by = Complex::new(-2.0 * omega, 2.0 * zeta);
-        let unit_by =
-            (Complex::new(0.0, 2.0 * zeta) * scene.epsilon - unit * stiffness_by) * compliance;
         Self {
             epsilon: scene.epsilon,
             r: scene.r,
-            oscillator,
-            zeta,
-            omega,
-            g,
-            unit: [unit, unit_by],
+            oscillator: ForcedOscillator::new(scene, omega, g),
         }
     }
 
-    /// The state just after the next impact; None where there is none within many periods, where it grazes, or where
+    /// The state just after the next impact; None if there is none within many periods, if it grazes, or if
     /// impacts accumulate.
     #[must_use]
     pub fn next(&self, from: &Bounce) -> Option<Bounce> {
-        self.landed(&Flight::new(self, from))
+        self.landed(&Flight::new(&self.oscillator, from))
     }
 
     /// The state just after the first impact that follows from (q1, q1', q2, q2') at a phase of the base, rad, with the
     /// particle inside its cavity; None as for [`Self::next`].
     #[must_use]
     pub fn first(&self, phase: f64, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
-        self.landed(&Flight::between(self, phase, [q1, dq1, q2, dq2], q1 - q2))
+        self.landed(&Flight::between(
+            &self.oscillator,
+            phase,
+            [q1, dq1, q2, dq2],
+            q1 - q2,
+        ))
     }
 
     fn landed(&self, flight: &Flight) -> Option<Bounce> {
@@ -130,7 +71,7 @@ impl ImpactMap {
         let dw = dq1 - flight.dq2;
         let particle = (1.0 + self.r) / (1.0 + self.epsilon);
         Some(Bounce {
-            phase: flight.phase + self.omega * duration,
+            phase: flight.phase + self.oscillator.omega * duration,
             q1,
             dq1: dq1 - self.epsilon * particle * dw,
             dq2: flight.dq2 + particle * dw,
@@ -140,20 +81,21 @@ impl ImpactMap {
 
     /// The same with its derivatives.
     pub(super) fn step(&self, from: &Bounce) -> Option<Step> {
-        let flight = Flight::new(self, from);
+        let flight = Flight::new(&self.oscillator, from);
         let (t, wall) = flight.contact()?;
         let [q1, dq1] = flight.primary(t).into();
         let dw = dq1 - from.dq2;
         let particle = (1.0 + self.r) / (1.0 + self.epsilon);
 
         // (q1, q1') just before the impact, at a fixed time of flight.
-        let end = from.phase + self.omega * t;
-        let propagator = self.oscillator.propagator(t);
+        let end = from.phase + self.oscillator.omega * t;
+        let propagator = self.oscillator.free.propagator(t);
         let mut fixed = SMatrix::<f64, 2, 6>::zeros();
-        let by_phase = self.by_phase(end) - propagator * self.by_phase(from.phase);
-        let by_omega =
-            self.by_omega(end) + self.by_phase(end) * t - propagator * self.by_omega(from.phase);
-        let by_g = self.by_g(end) - propagator * self.by_g(from.phase);
+        let by_phase =
+            self.oscillator.by_phase(end) - propagator * self.oscillator.by_phase(from.phase);
+        let by_omega = self.oscillator.by_omega(end) + self.oscillator.by_phase(end) * t
+            - propagator * self.oscillator.by_omega(from.phase);
+        let by_g = self.oscillator.by_g(end) - propagator * self.oscillator.by_g(from.phase);
         fixed.set_column(0, &by_phase);
         fixed.fixed_view_mut::<2, 2>(0, 1).copy_from(&propagator);
         fixed.set_column(4, &by_omega);
@@ -161,13 +103,14 @@ impl ImpactMap {
 
         let unit_row = |n: usize| RowByAll::from_fn(|_, column| f64::from(u8::from(column == n)));
         let (by_q1, by_dq2) = (unit_row(1), unit_row(3));
-        // w = wall at the end of the flight tells by how much it lasts longer.
+        // The condition w = wall at the end gives the change of the flight time.
         let by_w = fixed.row(0) - by_q1 - by_dq2 * t;
         let t_by = by_w / -dw;
-        let acceleration = self.oscillator.free_acceleration(q1, dq1) + self.force(end);
+        let acceleration =
+            self.oscillator.free.free_acceleration(q1, dq1) + self.oscillator.force(end);
         let q1_by = fixed.row(0) + t_by * dq1;
         let dq1_by = fixed.row(1) + t_by * acceleration;
-        let phase_by = unit_row(0) + unit_row(4) * t + t_by * self.omega;
+        let phase_by = unit_row(0) + unit_row(4) * t + t_by * self.oscillator.omega;
         let dw_by = dq1_by - by_dq2;
 
         let impulse = -self.epsilon * particle;
@@ -194,132 +137,7 @@ impl ImpactMap {
 
     /// State at the time `t` after a bounce, before the next.
     pub(super) fn state(&self, from: &Bounce, t: f64) -> State {
-        let [q1, dq1] = Flight::new(self, from).primary(t).into();
+        let [q1, dq1] = Flight::new(&self.oscillator, from).primary(t).into();
         [q1, dq1, from.q2() + from.dq2 * t, from.dq2]
-    }
-
-    /// Force of the base on the primary mass.
-    fn force(&self, phase: f64) -> f64 {
-        let amplitude = self.oscillator.base_force(self.omega) * (self.epsilon * self.g);
-        (amplitude * Complex::from_polar(1.0, phase)).im
-    }
-
-    /// Harmonic response (q, q') at a phase of the base.
-    fn harmonic(&self, phase: f64) -> Vector2<f64> {
-        let z = self.turned(self.unit[0] * self.g, phase);
-        Vector2::new(z.im, self.omega * z.re)
-    }
-
-    fn by_phase(&self, phase: f64) -> Vector2<f64> {
-        let z = self.turned(self.unit[0] * self.g, phase);
-        Vector2::new(z.re, -self.omega * z.im)
-    }
-
-    fn by_omega(&self, phase: f64) -> Vector2<f64> {
-        let z = self.turned(self.unit[0] * self.g, phase);
-        let slope = self.turned(self.unit[1] * self.g, phase);
-        Vector2::new(slope.im, z.re + self.omega * slope.re)
-    }
-
-    fn by_g(&self, phase: f64) -> Vector2<f64> {
-        let z = self.turned(self.unit[0], phase);
-        Vector2::new(z.im, self.omega * z.re)
-    }
-
-    /// Without any excitation there is no response either, not even at an undamped resonance.
-    fn turned(&self, z: Complex<f64>, phase: f64) -> Complex<f64> {
-        if z.is_nan() && self.g == 0.0 {
-            return Complex::new(0.0, 0.0);
-        }
-        z * Complex::from_polar(1.0, phase)
-    }
-}
-
-/// A flight of the particle.
-struct Flight<'a> {
-    map: &'a ImpactMap,
-    /// Where it begins: phase of the base, particle, and relative displacement and velocity.
-    phase: f64,
-    q2: f64,
-    dq2: f64,
-    w: f64,
-    dw: f64,
-    /// State of the free part of the oscillator's motion at the start.
-    free: Vector2<f64>,
-    /// Bound of `|w''|`.
-    curvature: f64,
-}
-
-impl<'a> Flight<'a> {
-    /// The flight after a bounce.
-    fn new(map: &'a ImpactMap, from: &Bounce) -> Self {
-        let state = [from.q1, from.dq1, from.q2(), from.dq2];
-        Self::between(map, from.phase, state, from.wall)
-    }
-
-    /// The flight from a state with the relative displacement `w`.
-    fn between(map: &'a ImpactMap, phase: f64, [q1, dq1, q2, dq2]: State, w: f64) -> Self {
-        let free = Vector2::new(q1, dq1) - map.harmonic(phase);
-        // Of the free motion q^2 + q'^2 never grows.
-        let driven = (map.unit[0] * map.g).norm() * map.omega * map.omega;
-        let driven = if map.g == 0.0 { 0.0 } else { driven };
-        Self {
-            map,
-            phase,
-            q2,
-            dq2,
-            w,
-            dw: dq1 - dq2,
-            free,
-            curvature: driven + free.norm() * (1.0 + 2.0 * map.zeta),
-        }
-    }
-
-    /// (q1, q1') at the time `t`.
-    fn primary(&self, t: f64) -> Vector2<f64> {
-        let propagator: Matrix2<f64> = self.map.oscillator.propagator(t);
-        propagator * self.free + self.map.harmonic(self.phase + self.map.omega * t)
-    }
-
-    /// Time and wall of the first contact.
-    fn contact(&self) -> Option<(f64, f64)> {
-        let horizon = LONGEST * std::f64::consts::TAU / self.map.omega;
-        let k = self.curvature;
-        if !k.is_finite() || k <= 0.0 {
-            return None;
-        }
-        // Time that surely passes before the wall at the distance `gap`, approached at `speed`, is met.
-        let free_for = |gap: f64, speed: f64| {
-            let root = (speed * speed + 2.0 * k * gap).sqrt();
-            if speed > 0.0 {
-                2.0 * gap / (speed + root)
-            } else {
-                (root - speed) / k
-            }
-        };
-        let (mut t, mut w, mut dw) = (0.0, self.w, self.dw);
-        if w.abs() >= 1.0 && w * dw >= 0.0 {
-            return None;
-        }
-        for _ in 0..STEPS {
-            let step = free_for(1.0 - w, dw).min(free_for(1.0 + w, -dw));
-            t += step;
-            if t > horizon {
-                return None;
-            }
-            let primary = self.primary(t);
-            w = primary[0] - self.q2 - self.dq2 * t;
-            dw = primary[1] - self.dq2;
-            let side = dw.signum();
-            let gap = 1.0 - side * w;
-            if gap <= 1e-15 || step <= 1e-16 * (1.0 + t) {
-                let fast = dw.abs() > GRAZING;
-                // Either wall is met in its own direction, and what rounding has left is made up for.
-                return fast.then(|| (t + gap / dw.abs(), side));
-            }
-            // What remains of the gap to the wall behind is none after a rounding beyond it.
-            w = w.clamp(-1.0, 1.0);
-        }
-        None
     }
 }

@@ -26,7 +26,7 @@ fn flight(candidate: &Candidate, oscillator: &Oscillator) -> Matrix4<f64> {
     map
 }
 
-/// Disturbances through an impact, which a disturbed motion meets a little sooner or later:
+/// Disturbances through an impact, which a disturbed motion reaches a little earlier or later:
 /// `R + (f+ - R f-) n/(n f-)` with the jump R, the fields f before and after, and the normal n of the wall.
 fn saltation(
     scene: &Dimensionless,

@@ -1,11 +1,12 @@
-//! A pattern of impacts, and what closing it asks for: the return map, its derivative, and the first harmonic of v (docs/theory.md, eq. 26).
+//! A pattern of impacts and the equations that close it: the return map, its derivative, and the first harmonic of v (docs/theory.md, eq. 26).
 
 use std::f64::consts::{PI, TAU};
 
 use nalgebra::{Complex, Matrix4, Vector4};
 use serde::Serialize;
 
-use super::impact_map::{Bounce, ByAll, ImpactMap, RowByAll};
+use super::bounce::Bounce;
+use super::impact_map::{ByAll, ImpactMap, RowByAll, Step};
 use crate::Dimensionless;
 
 /// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
@@ -13,7 +14,7 @@ use crate::Dimensionless;
 pub struct ImpactPattern {
     /// Walls hit, one after another, over the map; the first is the one the motion starts from.
     pub walls: Vec<f64>,
-    /// Half periods of the base over the map: even, but for a mirrored pattern, where it is odd.
+    /// Half periods of the base over the map: even, except for a mirrored pattern, where it is odd.
     pub half_periods: u32,
     /// Minus itself after those half periods.
     pub mirrored: bool,
@@ -30,7 +31,7 @@ impl ImpactPattern {
         }
     }
 
-    /// The same pattern looked at over a whole period: what symmetry breaking leads to.
+    /// The same pattern over a whole period, as after symmetry breaking.
     #[must_use]
     pub fn doubled(&self) -> Self {
         let mut walls = self.walls.clone();
@@ -77,7 +78,7 @@ pub type Unknowns = nalgebra::SVector<f64, 6>;
 /// The return map of a pattern from one start.
 #[derive(Debug, Clone)]
 pub(super) struct Returned {
-    /// By how much the motion fails to close.
+    /// Closing error of the motion.
     pub residual: Vector4<f64>,
     /// Derivative of the residual by the unknowns.
     pub by: ByAll,
@@ -85,7 +86,7 @@ pub(super) struct Returned {
     pub v: Complex<f64>,
     /// Derivative of V by the unknowns, real and imaginary part.
     pub v_by: [RowByAll; 2],
-    /// The bounces over the map, the start included, the return not.
+    /// The bounces over the map, with the start and without the return.
     pub bounces: Vec<Bounce>,
     /// Time of flight after each.
     pub durations: Vec<f64>,
@@ -93,7 +94,7 @@ pub(super) struct Returned {
     pub monodromy: Matrix4<f64>,
 }
 
-/// Follows the pattern from the unknowns `x`; None where the impacts come in another pattern, or graze.
+/// Follows the pattern from the unknowns `x`; None if the impacts have another pattern or graze.
 pub(super) fn follow(
     scene: &Dimensionless,
     pattern: &ImpactPattern,
@@ -122,15 +123,8 @@ pub(super) fn follow(
         }
         bounces.push(at);
         durations.push(step.duration);
-        // The chain rule; what the step depends on by itself are Omega and G.
-        let state: Matrix4<f64> = step.by.fixed_columns::<4>(0).into();
-        let mut chained = state * by;
-        let mut impulse_by = step.impulse_by.fixed_columns::<4>(0) * by;
-        for column in 4..6 {
-            chained.set_column(column, &(chained.column(column) + step.by.column(column)));
-            impulse_by[column] += step.impulse_by[column];
-        }
-        by = chained;
+        let impulse_by;
+        (by, impulse_by) = chained(&step, &by);
         at = step.next;
         let phasor = Complex::from_polar(1.0, -at.phase);
         sum += phasor * step.impulse;
@@ -160,6 +154,18 @@ pub(super) fn follow(
     })
 }
 
+/// The chain rule: derivatives of a step by the unknowns. The step itself also depends on Omega and G.
+fn chained(step: &Step, by: &ByAll) -> (ByAll, RowByAll) {
+    let state: Matrix4<f64> = step.by.fixed_columns::<4>(0).into();
+    let mut all = state * by;
+    let mut impulse_by = step.impulse_by.fixed_columns::<4>(0) * by;
+    for column in 4..6 {
+        all.set_column(column, &(all.column(column) + step.by.column(column)));
+        impulse_by[column] += step.impulse_by[column];
+    }
+    (all, impulse_by)
+}
+
 /// `V = direct G + impulses sum`: the base through the oscillator, and the impulses through oscillator and particle.
 struct Harmonic {
     direct: [Complex<f64>; 2],
@@ -169,11 +175,11 @@ struct Harmonic {
 impl Harmonic {
     /// Each coefficient with its derivative by Omega.
     fn new(scene: &Dimensionless, map: &ImpactMap, pattern: &ImpactPattern) -> Self {
-        let omega = map.omega;
+        let omega = map.oscillator.omega;
         let zeta = scene.epsilon * scene.lambda / 2.0;
-        let compliance = map.oscillator.compliance(omega);
+        let compliance = map.oscillator.free.compliance(omega);
         let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * zeta);
-        let force = map.oscillator.base_force(omega);
+        let force = map.oscillator.free.base_force(omega);
         let direct = force * compliance * scene.epsilon;
         let direct_by =
             (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;

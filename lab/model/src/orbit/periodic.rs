@@ -1,10 +1,11 @@
-//! A periodic motion of any pattern: what it is, how stable it is, and the Newton iteration that finds it.
+//! A periodic motion of any pattern, its stability, and the Newton iteration that finds it.
 
 use nalgebra::{Complex, Matrix6, RowSVector, SVector};
 use serde::Serialize;
 
 use super::{
-    impact_map::{Bounce, ImpactMap},
+    bounce::Bounce,
+    impact_map::ImpactMap,
     pattern::{ImpactPattern, Returned, Unknowns, follow, wrapped},
 };
 use crate::Dimensionless;
@@ -38,7 +39,7 @@ pub struct Periodic {
     pub(super) durations: Vec<f64>,
 }
 
-/// Two equations that choose a motion beside its four of closing.
+/// An equation that selects a motion, in addition to the four that close it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Condition {
     /// sigma has this value.
@@ -66,13 +67,13 @@ impl Condition {
     }
 }
 
-/// Newton's corrections end below this size.
+/// Size of the last Newton correction.
 const CONVERGED: f64 = 1e-12;
 const ROUNDS: usize = 30;
 
 impl Periodic {
     /// The motion with the pattern `pattern` near the unknowns `guess` that satisfies both conditions, by Newton's method with
-    /// analytic derivatives; None where that leaves the pattern or does not converge.
+    /// analytic derivatives; None if the iteration leaves the pattern or does not converge.
     #[must_use]
     pub fn find(
         scene: &Dimensionless,
@@ -99,7 +100,7 @@ impl Periodic {
         Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
     }
 
-    /// The motion at unknowns that close it.
+    /// The motion at unknowns that satisfy the closing equations.
     pub(super) fn at(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
         let returned = follow(scene, pattern, x)?;
         let mut multipliers: [Complex<f64>; 4] = returned.monodromy.complex_eigenvalues().into();
@@ -168,7 +169,7 @@ impl Periodic {
         let last = bounces
             .iter()
             .min_by(|one, other| since(one).total_cmp(&since(other)))?;
-        Some(map.state(last, since(last) / map.omega))
+        Some(map.state(last, since(last) / map.oscillator.omega))
     }
 
     /// (q1, q1', q2, q2') where the base passes through zero, upwards: a start for the plant.
@@ -179,7 +180,7 @@ impl Periodic {
     }
 }
 
-/// Newton's method for the four equations of closing and two more.
+/// Newton's method for the four closing equations and two more.
 pub(super) fn newton(
     scene: &Dimensionless,
     pattern: &ImpactPattern,

@@ -1,4 +1,4 @@
-//! Finding every phase-resonant orbit of a scene, by its frequency.
+//! Search for all phase-resonant orbits of a scene, over frequency.
 
 use super::{
     Orbit,
@@ -11,13 +11,13 @@ use crate::numerics::{bisection, golden_section};
 
 /// Frequencies searched, over omega0.
 const SEARCHED: [f64; 2] = [0.2, 3.0];
-/// Points of the search; they crowd around omega0, where the detuning is of order one.
+/// Points of the search; they are dense around omega0, where the detuning is of order one.
 const POINTS: usize = 30_000;
 
 /// All exact symmetric 1:1 orbits at phase resonance at the scene's G, by rising C; empty where there are none.
 ///
 /// Frequencies between 0.2 and 3 omega0 are searched on a grid of about 0.001 in the detuning where that is of
-/// order one, and every root is polished to the last bit.
+/// order one, and every root is refined to the last bit.
 #[must_use]
 pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
     let grid = grid(scene.epsilon);
@@ -32,7 +32,7 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
     orbits
 }
 
-/// The exact backbone: all phase-resonant orbits at the frequency `omega` (over omega0), whatever G they need.
+/// The exact backbone: all phase-resonant orbits at the frequency `omega` (over omega0), at any G.
 ///
 /// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.
 #[must_use]
@@ -57,7 +57,7 @@ fn grid(epsilon: f64) -> Vec<f64> {
 fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
     let Candidate { omega, b, c, g, .. } = *candidate;
     let sizes = [b, c, g];
-    // Without dissipation no base motion is needed, and there is nothing to lag behind.
+    // Without dissipation no base motion is needed, and no phase lag is defined.
     let conservative = g < 1e-12;
     let physical = sizes.iter().all(|size| size.is_finite())
         && b > 0.0
@@ -81,7 +81,7 @@ fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
     })
 }
 
-/// One of the two branches of candidates, looked at as G over frequency.
+/// One of the two branches of candidates, as G over frequency.
 struct Branch<'a> {
     scene: &'a Dimensionless,
     branch: usize,
@@ -120,7 +120,7 @@ impl Branch<'_> {
         found
     }
 
-    /// The points (omega, excess) where the branch exists, with the ends of its stretches added; NaN separates them.
+    /// The points (omega, excess) where the branch exists, with the ends of its intervals added; NaN separates them.
     fn stretches(&self, grid: &[f64]) -> Vec<[f64; 2]> {
         let mut points: Vec<[f64; 2]> = Vec::with_capacity(grid.len());
         let mut last: Option<(f64, bool)> = None;

@@ -1,27 +1,28 @@
-//! Where the motion settles: the plant is driven past its transient, the impacts that follow are followed until their pattern
-//! repeats, and the motion is polished.
+//! The stable motion that a start leads to: the plant is driven past its transient, the shortest repeating pattern of its impacts is
+//! found, and Newton's method refines the motion.
 
 use std::f64::consts::TAU;
 
 use lovines::{Drive, InvalidValue, State};
 
 use super::{
-    impact_map::{Bounce, ImpactMap},
+    bounce::Bounce,
+    impact_map::ImpactMap,
     pattern::{ImpactPattern, Unknowns},
     periodic::{Condition, Periodic},
 };
 use crate::Dimensionless;
 
-/// Two states this close count as the same before polishing.
+/// States closer than this count as equal before the refinement.
 const SAME: f64 = 1e-6;
-/// Longest pattern looked for, impacts.
+/// Longest pattern in the search, impacts.
 const LONGEST: usize = 32;
 
-/// The stable periodic motion that `start` = (q1, q1', q2, q2') has led to after so many periods at the detuning `sigma` and
-/// the scene's G; None where nothing repeats, nothing hits, or the particle sticks.
+/// The stable periodic motion that `start` = (q1, q1', q2, q2') leads to after `periods` at the detuning `sigma` and
+/// the scene's G; None without a repeating pattern, without impacts, or if the particle sticks.
 ///
 /// # Errors
-/// Parameters or a start that make no sense.
+/// Invalid parameters or an invalid start.
 pub fn settle(
     scene: &Dimensionless,
     sigma: f64,

@@ -1,4 +1,4 @@
-//! Activation: how strong an excitation must be before there is a 1:1 regime.
+//! Activation: the smallest excitation of a 1:1 regime.
 
 use serde::Serialize;
 
@@ -76,7 +76,7 @@ fn smallest(
         .map(|n| low + step * (f64::from(n) + 0.5))
         .filter(|b| wanted(*b))
         .min_by(|one, other| f(*one).total_cmp(&f(*other)))?;
-    // The minimum lies inside the neighbouring cells, or at the edge of what is wanted.
+    // The minimum lies inside the neighbouring cells, or at the edge of the region of interest.
     let edge = |end: f64| {
         let end = end.clamp(low, high);
         if wanted(end) {

@@ -31,7 +31,7 @@ pub struct BackbonePoint {
 }
 
 impl BackbonePoint {
-    /// Stable in both senses: a phase-locked loop can rest here.
+    /// Stable in both senses: a phase-locked loop can settle here.
     #[must_use]
     pub fn stable(&self) -> bool {
         self.impacts_stable && self.slow_flow_stable
@@ -63,13 +63,13 @@ impl SlowFlow {
         self.lambda + 2.0 * FRAC_2_PI * r * through_b
     }
 
-    /// The detuning sigma_R that goes with the amplitude `c` on a branch; None below the fold.
+    /// The detuning sigma_R at the amplitude `c` on a branch; None below the fold.
     #[must_use]
     pub fn backbone_sigma(&self, c: f64, side: BranchSide) -> Option<f64> {
         self.manifold.b(c, side).map(|b| self.free_detuning(b))
     }
 
-    /// All phase-resonant solutions at the excitation `g`, on both branches, by rising B.
+    /// All phase-resonant solutions at the excitation `g`, on both branches, by increasing B.
     ///
     /// `(G C)^2 = (lambda C^2 + (4/pi) R B^2)^2` (eq. 17) is a quartic in B.
     #[must_use]

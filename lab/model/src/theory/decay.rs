@@ -18,14 +18,14 @@ pub struct DecayPoint {
     /// Particle speed over `b omega0`.
     #[serde(rename = "B")]
     pub b: f64,
-    /// Detuning of the motion: the backbone's.
+    /// Detuning of the motion, equal to that of the backbone.
     pub sigma: f64,
 }
 
 /// The free decay from one particle speed on the right branch down to the fold.
 ///
 /// `D1 C~ = -loss(B)` becomes `D1 B = -loss(B) dB/dC~`, and `tau1` is the integral of `(2 K B - pi)/loss(B)`
-/// with `K = R^2 + pi^2/4`: a logarithm and an arc tangent, as the loss is quadratic in B.
+/// with `K = R^2 + pi^2/4`: a logarithm and an arc tangent, because the loss is quadratic in B.
 #[derive(Debug, Clone, Copy)]
 pub struct Decay {
     flow: SlowFlow,
@@ -42,7 +42,7 @@ const GAUSS: [(f64, f64); 3] = [
 const PANELS: u32 = 64;
 
 impl SlowFlow {
-    /// The free decay from the particle speed `b`; None left of the fold, and without any dissipation.
+    /// The free decay from the particle speed `b`; None left of the fold, or without dissipation.
     #[must_use]
     pub fn decay(&self, b: f64) -> Option<Decay> {
         let dissipates = self.lambda > 0.0 || self.manifold.dissipation > 0.0;
@@ -86,7 +86,7 @@ impl Decay {
             .collect()
     }
 
-    /// Phase, rad, by which v has turned ahead of `omega0 t` when the particle speed has fallen to `b`: the integral of sigma
+    /// Phase, rad, by which v leads `omega0 t` when the particle speed has fallen to `b`: the integral of sigma
     /// over tau1 (docs/theory.md, eq. 21), by Gauss' rule on panels; its integrand is smooth.
     #[must_use]
     pub fn turned(&self, b: f64) -> f64 {

@@ -47,7 +47,7 @@ impl Manifold {
         self.dissipation / self.curvature().sqrt()
     }
 
-    /// Amplitude C that goes with the particle speed `b`.
+    /// Amplitude C at the particle speed `b`.
     #[must_use]
     pub fn c(&self, b: f64) -> f64 {
         (self.dissipation * b).hypot(1.0 - FRAC_PI_2 * b)

@@ -1,7 +1,7 @@
 //! Modulation off the manifold: from impact to impact, towards the manifold and along it.
 //!
-//! Between impacts B and psi stay, and `Z = C exp(i gamma)` obeys a linear equation, so the walk is closed form but for
-//! the instants of the impacts. This is where the fast approach to the manifold is seen, and how a slow flow ends.
+//! Between impacts B and psi are constant, and `Z = C exp(i gamma)` obeys a linear equation, so the sequence has a closed form except for
+//! the times of the impacts. It shows the fast approach to the manifold and the end of the slow flow.
 
 use std::f64::consts::{FRAC_2_PI, FRAC_PI_2, PI, TAU};
 
@@ -41,8 +41,8 @@ impl SlowFlow {
     /// of the particle's triangle wave, begun where that rises through zero (`Omega tau = -psi`), at the mass ratio `epsilon`
     /// (0 keeps C and gamma: the fast map alone), the excitation `g` and the detuning `sigma` (docs/theory.md, eqs. 7 and 8).
     ///
-    /// Ends where the walls cease to alternate or B ceases to be positive: the two impacts per period are lost, and these
-    /// variables with them.
+    /// Ends when the impacts stop alternating between the walls or B is no longer positive: without two impacts per period these
+    /// variables have no meaning.
     #[must_use]
     pub fn modulation(
         &self,
@@ -85,7 +85,7 @@ pub struct ImpactSequence {
     lost: bool,
 }
 
-/// Steps per period in which the next contact is looked for.
+/// Steps per period in the search for the next contact.
 const STEPS: u32 = 256;
 
 impl ImpactSequence {
@@ -104,7 +104,7 @@ impl ImpactSequence {
         let exponent = self.rate * tau1;
         let source = Complex::from_polar(2.0 * FRAC_2_PI * self.b, self.psi) * Complex::i() / 2.0
             + self.drive;
-        // (1 - exp(-x))/x, by its series where that would cancel.
+        // (1 - exp(-x))/x, by its series where the difference would cancel.
         let grown = if exponent.norm() < 1e-2 {
             let mut term = Complex::new(1.0, 0.0);
             (2..9).fold(term, |sum, n| {

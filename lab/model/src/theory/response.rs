@@ -1,7 +1,7 @@
 //! Frequency responses: all equilibria at one excitation, as closed curves.
 //!
-//! At a particle speed B the two detunings at which it occurs are closed form, so that B parametrises each curve, and the
-//! places where it turns are where `loss = G C`: the points of the backbone.
+//! The two detunings at which a particle speed B occurs have a closed form, so B parametrises each curve. Its turning points are at
+//! `loss = G C`, the points of the backbone.
 
 use std::f64::consts::{PI, TAU};
 
@@ -21,7 +21,7 @@ pub struct ResponsePoint {
 
 impl SlowFlow {
     /// The detunings at which the excitation `g` holds the particle speed `b`, and the phase of v there, rad:
-    /// `sigma = sigma_R ± sqrt(G^2 C^2 - loss^2)/(2 C^2)` (docs/theory.md, eq. 15); None where `g` is too weak.
+    /// `sigma = sigma_R ± sqrt(G^2 C^2 - loss^2)/(2 C^2)` (docs/theory.md, eq. 15); None if `g` is too small.
     #[must_use]
     pub fn detunings(&self, g: f64, b: f64) -> Option<[(f64, f64); 2]> {
         let c = self.manifold.c(b);
@@ -39,7 +39,7 @@ impl SlowFlow {
     }
 
     /// The frequency responses at the excitation `g`: closed curves over all B > 0, each of `points` points from its
-    /// smallest C on one side to its largest and back. Where B would fall to 0 the curve starts there, at C = 1.
+    /// smallest C on one side to its largest and back. A curve that reaches B = 0 starts there, at C = 1.
     #[must_use]
     pub fn frequency_responses(&self, g: f64, points: usize) -> Vec<Vec<ResponsePoint>> {
         let mut ends: Vec<f64> = self.equilibrium_speeds(g, None);
@@ -60,7 +60,7 @@ impl SlowFlow {
                 let turn = TAU * n as f64 / steps;
                 let b = low + (high - low) * 0.5 * (1.0 - turn.cos());
                 let b = b.clamp(low, high).max(1e-9);
-                // The square root is lost in rounding at the very ends: they are phase-resonant.
+                // Rounding may make the square root imaginary at the ends, which are phase-resonant.
                 let [left, right] = self
                     .detunings(g, b)
                     .unwrap_or_else(|| [(self.free_detuning(b), -PI / 2.0); 2]);

@@ -38,7 +38,7 @@ impl SlowFlow {
         }
     }
 
-    /// `lambda C^2 + (4/pi) R B^2`: what damping and impacts take from C^2 per unit of tau1 (eq. 11).
+    /// `lambda C^2 + (4/pi) R B^2`: dissipation of C^2 by damping and impacts per unit of tau1 (eq. 11).
     #[must_use]
     pub fn loss(&self, b: f64) -> f64 {
         self.lambda * self.manifold.c(b).powi(2)

@@ -23,7 +23,7 @@ pub fn figure(found: &Comparison) -> Figure {
     let top = (1.25 * found.lock.c).max(TOP);
     let reach = slow_flow.manifold.b(top, BranchSide::Right).unwrap_or(1.0);
     let theory = slow_flow.backbone(slow_flow.manifold.b_min(), reach, 400);
-    // Below the fold there is no backbone, and the frequency of what is left of the motion goes anywhere.
+    // Below the fold there is no backbone, and the frequency of the remaining motion is arbitrary.
     let fold = slow_flow.manifold.c_min();
     let above = found.decay.iter().map(|one| one.point);
     let sigmas = theory.iter().map(|point| point.sigma);

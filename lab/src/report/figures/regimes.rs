@@ -97,7 +97,7 @@ fn letter(regime: Regime) -> &'static str {
     }
 }
 
-/// The cells of a regime, those side by side as one rectangle.
+/// The cells of a regime, with neighbours in a row merged.
 fn stripes(map: &Map, regime: Regime) -> Vec<[Place; 2]> {
     let (x, y) = (map.plan.x, map.plan.y);
     let mut found = Vec::new();
@@ -116,11 +116,11 @@ fn stripes(map: &Map, regime: Regime) -> Vec<[Place; 2]> {
     found
 }
 
-/// For each regime the place deepest inside it.
+/// For each regime, the place farthest from its border.
 fn letters(map: &Map) -> Vec<(Regime, Place)> {
     let (columns, rows) = (map.plan.x.points, map.plan.y.points);
     let at = |column: usize, row: usize| map.cells[row * columns + column].point.regime;
-    // How far a square about the cell reaches before it meets another regime or the border.
+    // Largest half-width of a square around the cell that contains no other regime.
     let depth = |column: usize, row: usize| {
         let most = column
             .min(row)

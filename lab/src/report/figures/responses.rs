@@ -5,11 +5,11 @@ use plotters::style::BLACK;
 
 use crate::orbit::{Branch, Response};
 use crate::report::figure::{
-    AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, clipped, line, thinned,
+    AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, Place, clipped, line, thinned,
 };
 use crate::report::theme::{EXACT, FAINT, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
-use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};
+use crate::theory::{B_SYMMETRY_BREAKING, ResponsePoint, SlowFlow};
 
 const POINTS: usize = 600;
 const DETUNINGS: (f64, f64) = (-5.0, 5.0);
@@ -38,30 +38,8 @@ pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
         .heading("Frequency responses and backbone", &caption)
         .legend(SeriesLabelPosition::UpperRight);
     for (n, response) in responses.iter().enumerate() {
-        let theory = flow.frequency_responses(response.g, POINTS);
-        let theory = theory.iter().map(|curve| {
-            let motions = curve.iter().map(|one| (one.sigma, one.motion));
-            let stable =
-                |one: crate::theory::Equilibrium| one.impacts_stable && one.slow_flow_stable;
-            motions
-                .map(|(sigma, one)| ((sigma, one.c), stable(one)))
-                .collect()
-        });
-        let styles = [line(THEORY, 12), line(UNSTABLE, 8)];
-        let labels = ["theory, stable", "theory, unstable"];
-        theory.for_each(|points: Vec<Marked>| {
-            for piece in clipped(&points, x, y) {
-                panel.pieces(&thinned(&piece, x, y), styles, labels);
-            }
-        });
-        let styles = [line(EXACT, 30), line(FAINT, 14)];
-        let labels = ["exact, stable", "exact, unstable"];
-        for branch in std::iter::once(&response.symmetric).chain(&response.asymmetric) {
-            for piece in clipped(&marked(branch), x, y) {
-                panel.pieces(&thinned(&piece, x, y), styles, labels);
-            }
-        }
-        // Each is named below its end on the left, where the figure is empty.
+        add_response(&mut panel, &flow, response, (x, y));
+        // The label is below the left end of the curve, where the figure is empty.
         let stable = response.symmetric.points.iter().filter(|one| one.stable);
         let end = stable.min_by(|one, other| one.sigma.total_cmp(&other.sigma));
         if let Some(end) = end {
@@ -79,6 +57,29 @@ pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
         panel.pieces(&piece, [line(BLACK, 24); 2], ["backbone, theory", ""]);
     }
     Figure::single(panel)
+}
+
+/// One response, by theory and exact.
+fn add_response(panel: &mut Panel, flow: &SlowFlow, response: &Response, (x, y): (Place, Place)) {
+    let styles = [line(THEORY, 12), line(UNSTABLE, 8)];
+    for curve in flow.frequency_responses(response.g, POINTS) {
+        let mark = |one: &ResponsePoint| {
+            let stable = one.motion.impacts_stable && one.motion.slow_flow_stable;
+            ((one.sigma, one.motion.c), stable)
+        };
+        let points: Vec<Marked> = curve.iter().map(mark).collect();
+        for piece in clipped(&points, x, y) {
+            let labels = ["theory, stable", "theory, unstable"];
+            panel.pieces(&thinned(&piece, x, y), styles, labels);
+        }
+    }
+    let styles = [line(EXACT, 30), line(FAINT, 14)];
+    for branch in std::iter::once(&response.symmetric).chain(&response.asymmetric) {
+        for piece in clipped(&marked(branch), x, y) {
+            let labels = ["exact, stable", "exact, unstable"];
+            panel.pieces(&thinned(&piece, x, y), styles, labels);
+        }
+    }
 }
 
 fn marked(branch: &Branch) -> Vec<Marked> {

@@ -10,7 +10,8 @@ pub struct Converter {
 }
 
 impl Converter {
-    /// Of so many bits (0: ideal, without range or steps) from `-range` to `range` less one step, as two's complement has it.
+    /// A converter with this number of bits (0: ideal, without range or steps), from `-range` to `range` minus one step, as in
+    /// two's complement.
     pub fn new(bits: u32, range: f64) -> Self {
         if bits == 0 {
             return Self {

@@ -2,8 +2,8 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
-/// A Butterworth low pass of second order, `y'' + sqrt(2) wc y' + wc^2 y = wc^2 u`, exact for a signal that goes straight
-/// from sample to sample.
+/// A Butterworth low pass of second order, `y'' + sqrt(2) wc y' + wc^2 y = wc^2 u`, exact for a signal that is
+/// linear between samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LowPass {
     cut_off: f64,
@@ -14,7 +14,7 @@ pub struct LowPass {
 }
 
 impl LowPass {
-    /// With the cut-off `cut_off`, rad/s, at rest.
+    /// A filter at rest with the cut-off frequency `cut_off`, rad/s.
     pub fn new(cut_off: f64) -> Self {
         Self {
             cut_off,
@@ -29,7 +29,7 @@ impl LowPass {
         if elapsed > 0.0 {
             let rise = (input - self.input) / elapsed;
             let rate = FRAC_1_SQRT_2 * self.cut_off;
-            // On a ramp the output follows late by sqrt(2)/wc; what is left of the start rings off.
+            // On a ramp the output lags by sqrt(2)/wc; the initial transient decays.
             let lag = SQRT_2 / self.cut_off * rise;
             let cosine = self.output - (self.input - lag);
             let sine = (self.slope - rise) / rate + cosine;

@@ -1,4 +1,4 @@
-//! Noise of the sensors, the same for the same seed on every machine.
+//! Sensor noise; reproducible on every machine for the same seed.
 
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
@@ -13,7 +13,7 @@ impl NormalDistribution {
         Self(ChaCha8Rng::seed_from_u64(seed))
     }
 
-    /// The next, of mean 0 and standard deviation 1.
+    /// The next number, with mean 0 and standard deviation 1.
     pub fn next(&mut self) -> f64 {
         StandardNormal.sample(&mut self.0)
     }
@@ -21,17 +21,17 @@ impl NormalDistribution {
 
 /// Adds white noise to a signal.
 pub struct Sensor {
-    /// Standard deviation of the noise over the effective value of the signal.
+    /// Standard deviation of the noise relative to the RMS of the signal.
     ratio: f64,
     /// Mean square of the signal.
     power: f64,
-    /// Share by which the mean square follows; 0 for one that is given.
+    /// Weight of a new sample in the running mean square; 0 for a fixed one.
     follow: f64,
 }
 
 impl Sensor {
-    /// With the signal-to-noise ratio `snr` (dB) relative to the signal, whose power is told from about the last `memory`
-    /// samples, or to a sine that fills `range`.
+    /// A sensor with the signal-to-noise ratio `snr` (dB), relative to the mean power of about the last `memory` samples, or to
+    /// a sine that fills `range`.
     pub fn new(snr: f64, of: RatioOf, range: f64, memory: f64) -> Self {
         let (power, follow) = match of {
             RatioOf::Signal => (0.0, 1.0 / memory),
@@ -72,7 +72,7 @@ mod tests {
     #[test]
     fn noise_has_the_power_that_was_asked_for() {
         assert!((measured(RatioOf::Signal) - 40.0).abs() < 0.1);
-        // The range is ten times the signal: 20 dB less of it.
+        // The range is ten times the signal, so the ratio is 20 dB lower.
         assert!((measured(RatioOf::Range) - 20.0).abs() < 0.1);
     }
 

@@ -1,0 +1,92 @@
+//! A continued curve: its limits, its motions, and where its stability changes.
+
+use serde::Serialize;
+
+use super::periodic::Periodic;
+
+/// Limits of a continuation.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Limits {
+    /// Range of sigma.
+    pub sigma: [f64; 2],
+    /// Range of G.
+    pub g: [f64; 2],
+    /// Most points.
+    pub points: usize,
+    /// Longest step in the space of the unknowns.
+    pub step: f64,
+}
+
+impl Default for Limits {
+    /// Detunings from -6 to 6, G up to 10, 2000 points at most 0.05 apart.
+    fn default() -> Self {
+        Self {
+            sigma: [-6.0, 6.0],
+            g: [-1e-6, 10.0],
+            points: 2000,
+            step: 0.05,
+        }
+    }
+}
+
+/// Why a branch ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Ended {
+    /// It left the range of sigma or G.
+    #[serde(rename = "left the range")]
+    Range,
+    /// It came back to its start.
+    #[serde(rename = "closed")]
+    Closed,
+    /// The largest number of points was reached.
+    #[serde(rename = "number of points")]
+    Points,
+    /// The pattern of impacts ends here: a graze, or impacts that accumulate.
+    #[serde(rename = "graze")]
+    Graze,
+}
+
+/// How stability changes at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Bifurcation {
+    /// A multiplier passes +1: the frequency response turns back.
+    #[serde(rename = "fold")]
+    Fold,
+    /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
+    #[serde(rename = "symmetry breaking")]
+    SymmetryBreaking,
+    /// A multiplier of the whole period passes -1.
+    #[serde(rename = "period doubling")]
+    PeriodDoubling,
+    /// A complex pair leaves the unit circle (Neimark-Sacker): modulation begins.
+    #[serde(rename = "torus")]
+    Torus,
+}
+
+/// A point where stability changes.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Special {
+    /// What happens.
+    pub kind: Bifurcation,
+    /// The motion there.
+    pub motion: Periodic,
+}
+
+/// A continued curve.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Branch {
+    /// Its motions in order.
+    pub points: Vec<Periodic>,
+    /// Where stability changes, in order.
+    pub special: Vec<Special>,
+    /// Why it ended.
+    pub ended: Ended,
+}
+
+impl Limits {
+    /// Whether a motion lies in the ranges.
+    pub(super) fn contain(&self, sigma: f64, g: f64) -> bool {
+        let inside = |value: f64, [low, high]: [f64; 2]| (low..=high).contains(&value);
+        inside(sigma, self.sigma) && inside(g, self.g)
+    }
+}
