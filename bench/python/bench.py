@@ -249,7 +249,9 @@ def main():
         help=f"four scenes ({', '.join(QUICK)}), one or two settings of a method; under two minutes",
     )
     parser.add_argument(
-        "--keep", action="store_true", help="renew docs/performance.*, docs/work-precision.svg and the ratios in docs/plant.md"
+        "--keep",
+        action="store_true",
+        help="renew docs/performance.*, docs/work-precision.svg and the ratios in docs/plant.md",
     )
     parser.add_argument(
         "--out", type=Path, default=Path("out/bench"), help="folder for tables and picture (default %(default)s)"
