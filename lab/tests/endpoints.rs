@@ -213,7 +213,7 @@ fn an_fmu_of_the_other_side_lacks_a_variable_which_is_named() {
 }
 
 #[test]
-fn nothing_goes_beyond_this_machine_unless_told_to() {
+fn nothing_leaves_this_machine_without_permission() {
     for arguments in [
         ["rig", "--listen", "0.0.0.0:0"],
         ["controller", "--listen", "[::]:0"],

@@ -1,4 +1,4 @@
-//! Scenes: what they resolve to, and how mistakes are told.
+//! Scenes: their values, and the messages for mistakes.
 
 use std::path::Path;
 
@@ -164,7 +164,7 @@ fn a_start_on_the_wall_is_allowed() {
 }
 
 #[test]
-fn missing_and_mixed_keys_are_told() {
+fn missing_and_mixed_keys_are_reported() {
     let parse = |text| complaint(Scene::parse("my.toml", text, &[]));
     says(&parse(""), &["my.toml", "[plant] has no", "epsilon"]);
     says(&parse("[plant]\nM = 1\nr = 0.5"), &["[plant] has no `k`"]);
