@@ -146,7 +146,8 @@ build_platform() (
             ;;
     esac
     CARGO_ENCODED_RUSTFLAGS=$(IFS=$'\x1f'; printf '%s' "${flags[*]}")
-    export CARGO_ENCODED_RUSTFLAGS
+    # Without increments: the same bytes wherever and whenever they are built.
+    export CARGO_ENCODED_RUSTFLAGS CARGO_INCREMENTAL=0
     say "Building for $platform ($kind toolchain, $with linker) ..."
     cargo "$verb" "${options[@]}" --target "$triple" || fail "cargo could not build for $platform"
 )

@@ -65,7 +65,7 @@ fn through_40_db_of_sensor_noise_points_lie_within_5e_3() {
         let report = tracked(&["chain.snr=40"]);
         assert!(report.worst().unwrap() <= 5e-3);
         assert!(report.periods_per_point() <= 25.0);
-        // Forty decibels hide harmonics of 3e-4, but nothing else is told instead.
+        // At 40 dB, harmonics of 3e-4 are hidden, but no other regime is reported.
         for one in &report.points {
             let regime = one.point.regime;
             assert!(
@@ -107,7 +107,7 @@ fn beyond_symmetry_breaking_both_ways_of_telling_the_regime_say_so() {
 }
 
 #[test]
-fn the_linear_mode_is_told_from_the_impacting_one_by_the_response() {
+fn the_response_alone_distinguishes_the_linear_mode_from_the_impacting_one() {
     let report = tracked(&[
         "start.dq2=0",
         "backbone.C_from=0.6",
@@ -121,7 +121,7 @@ fn the_linear_mode_is_told_from_the_impacting_one_by_the_response() {
 }
 
 #[test]
-fn below_the_fold_the_motion_is_told_to_be_irregular_and_not_settled() {
+fn below_the_fold_the_motion_is_reported_as_irregular_and_not_settled() {
     let report = tracked(&[
         "backbone.C_from=0.5",
         "backbone.C_to=0.11",

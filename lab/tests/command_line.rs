@@ -187,7 +187,7 @@ fn curves_and_settled_orbits_come_as_json_too() {
 }
 
 #[test]
-fn a_map_is_written_as_table_and_pictures() {
+fn a_map_is_written_as_table_and_figures() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
     let output = vines(&[

@@ -18,9 +18,11 @@ fn vines(arguments: &[&str]) -> Output {
         .expect("the program runs")
 }
 
-/// The two FMUs, built and packed once.
+/// The two FMUs, built and packed once. The folder is that of the tests in `tests/boundary`.
 static FMUS: LazyLock<TempDir> = LazyLock::new(|| {
-    let libraries = Path::new(PROGRAM).parent().unwrap();
+    let profile = Path::new(PROGRAM).parent().unwrap();
+    let target = profile.parent().unwrap().join("libraries");
+    let libraries = target.join(profile.file_name().unwrap());
     let mut build = Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into()));
     build.args([
         "build",
@@ -33,8 +35,8 @@ static FMUS: LazyLock<TempDir> = LazyLock::new(|| {
         "--features",
         "lovines/fmu",
     ]);
-    build.arg("--target-dir").arg(libraries.parent().unwrap());
-    if libraries.ends_with("release") {
+    build.arg("--target-dir").arg(target);
+    if profile.ends_with("release") {
         build.arg("--release");
     }
     assert!(build.status().expect("cargo runs").success());
@@ -215,7 +217,7 @@ fn an_fmu_of_the_other_side_lacks_a_variable_which_is_named() {
 }
 
 #[test]
-fn nothing_goes_beyond_this_machine_unless_told_to() {
+fn nothing_leaves_this_machine_without_permission() {
     for arguments in [
         ["rig", "--listen", "0.0.0.0:0"],
         ["controller", "--listen", "[::]:0"],

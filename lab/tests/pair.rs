@@ -18,19 +18,21 @@ use vines::scene::Scene;
 const PERIODS: f64 = 330.0;
 const HOLD_PERIODS: f64 = 20.0;
 
-/// The libraries of this build; cargo makes one of the two only where it is asked for.
+/// The libraries of this build; cargo makes one of the two only where it is asked for. The folder is that of the tests in
+/// `tests/boundary`.
 fn libraries() -> PathBuf {
-    let folder = Path::new(env!("CARGO_BIN_EXE_vines")).parent().unwrap();
+    let profile = Path::new(env!("CARGO_BIN_EXE_vines")).parent().unwrap();
+    let target = profile.parent().unwrap().join("libraries");
     let mut build = Command::new(env!("CARGO"));
     build.args(["build", "--quiet", "--locked"]);
     build.args(["--package", "lovines", "--package", "phase-lock-fmu"]);
     build.args(["--features", "lovines/fmu"]);
-    if folder.ends_with("release") {
+    if profile.ends_with("release") {
         build.arg("--release");
     }
-    build.arg("--target-dir").arg(folder.parent().unwrap());
+    build.arg("--target-dir").arg(&target);
     assert!(build.status().expect("cargo runs").success());
-    folder.into()
+    target.join(profile.file_name().unwrap())
 }
 
 /// One FMU of the pair.

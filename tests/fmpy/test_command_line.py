@@ -15,9 +15,9 @@ RESULTS = {"LoViNes.fmu", "identification.json", "backbone.csv", "backbone.svg",
 BAD_INPUT = {
     "plant.rr=0.5": "rr",
     "nonsense": "section.key=value",
-    "plant.r=2": "r = 2",
-    "plant.M=-1": "M = -1",
-    "plant.k=nan": "k = NaN",
+    "plant.r=2": "r (coefficient of restitution) = 2",
+    "plant.M=-1": "M (primary mass) = -1",
+    "plant.k=nan": "k (stiffness) = NaN",
     "start.q2=0.02": "q2",
     "controller.bandwidth=-1": "bandwidth",
 }

@@ -10,11 +10,11 @@ import pytest
 from component import FMICallException
 
 BAD_PLANTS = [
-    ({"M": -1}, ["M", "-1 kg", "above 0"]),
-    ({"k": 0}, ["k", "0 N/m", "above 0"]),
-    ({"c": -0.5}, ["c", "-0.5 N.s/m", "0 or above"]),
-    ({"m": nan}, ["m", "NaN", "kg", "finite number"]),
-    ({"b": inf}, ["b", "inf", "m", "finite number"]),
+    ({"M": -1}, ["M", "-1 kg", "from 1e-100 to 1e100"]),
+    ({"k": 0}, ["k", "0 N/m", "from 1e-100 to 1e100"]),
+    ({"c": -0.5}, ["c", "-0.5 N.s/m", "from 0 to 1e100"]),
+    ({"m": nan}, ["m", "NaN", "kg", "from 1e-100 to 1e100"]),
+    ({"b": inf}, ["b", "inf", "m", "from 1e-100 to 1e100"]),
     ({"r": 1.5}, ["r", "1.5", "above 0 and at most 1"]),
     ({"r": 0}, ["r", "0", "above 0 and at most 1"]),
     ({"q2": 0.02}, ["q1 - q2", "-0.02 m", "cavity", "-b to b"]),

@@ -1,6 +1,6 @@
 //! The dimensionless numbers of a scene.
 
-use lovines::{InvalidValue, Parameters, Plant, State};
+use lovines::{Drive, InvalidValue, Parameters, Plant, State};
 use serde::Serialize;
 
 /// The parameters of the dimensionless model, and the units of length and frequency.
@@ -98,6 +98,12 @@ impl Dimensionless {
     #[must_use]
     pub fn omega_change(&self, sigma: f64) -> f64 {
         sigma * self.epsilon * self.omega0
+    }
+
+    /// The drive of the dimensionless plant at the detuning `sigma`.
+    #[must_use]
+    pub fn drive(&self, sigma: f64) -> Drive {
+        Drive::harmonic(self.epsilon * self.g, 1.0 + self.epsilon * sigma)
     }
 
     /// The plant of these numbers in dimensionless form, M = k = b = 1, at (q1, q1', q2, q2').

@@ -14,15 +14,14 @@ use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Runs the experiment, tracks the backbone, follows the exact curves, studies the convergence, maps the regimes, and writes
-report.html: one file that opens offline in any browser and prints well, in words, with all figures and tables, the scene, and what
-the numbers are worth. Beside it lie the pictures (SVG, for light and dark backgrounds) and tables.
+report.html: one file that opens offline in any browser and prints well, with text, figures, tables, the scene and an error budget. The figures (SVG, for light and dark backgrounds) and tables are also written as files.
 
-What an earlier run has left in the folder is taken over where scene, version and axes are the same.
+Sections of an earlier run in the folder are reused if scene, version and axes are the same.
 
 Examples:
   vines report --out report
   vines report --out r07 --set plant.r=0.7
-  vines report --out report --x sigma=-2:1:121 --y G=0.8:1.8:101    a finer map; the rest is taken over";
+  vines report --out report --x sigma=-2:1:121 --y G=0.8:1.8:101    a finer map; the rest is reused";
 
 /// Write a report on a scene: all results on one page
 #[derive(Debug, Args)]

@@ -3,7 +3,7 @@
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::sync::Once;
+use std::sync::LazyLock;
 
 use libloading::Library;
 
@@ -50,12 +50,12 @@ impl Fmu {
     /// If it cannot be built.
     #[must_use]
     pub fn path(name: &str) -> PathBuf {
-        build();
+        let folder = build();
         let library = match name {
             "LoViNes" => "lovines",
             _ => "phase_lock_fmu",
         };
-        folder().join(format!("{DLL_PREFIX}{library}{DLL_SUFFIX}"))
+        folder.join(format!("{DLL_PREFIX}{library}{DLL_SUFFIX}"))
     }
 
     /// Both libraries as an FMU holds them, `LoViNes` and `PhaseLock` with the platform's suffix, from one folder.
@@ -96,7 +96,7 @@ impl Fmu {
     }
 }
 
-/// The folder of this profile: two above a test in `deps`, one above a program.
+/// The folder of this profile, for instance `target/debug`: two above a test in `deps`, one above a program.
 fn folder() -> PathBuf {
     let program = std::env::current_exe().expect("a program knows where it is");
     let inside = |path: &Path| path.ends_with("deps") || path.ends_with("examples");
@@ -105,22 +105,30 @@ fn folder() -> PathBuf {
     above.unwrap_or(folder).to_owned()
 }
 
-/// Cargo builds no shared library for the sake of a test of another package: so it is asked to.
-fn build() {
-    static BUILD: Once = Once::new();
-    BUILD.call_once(|| {
+/// Cargo builds no shared library for the sake of a test of another package: so it is asked to. It builds in a folder of its own,
+/// `target/libraries`: with the features of these two packages alone it would replace the plant that other tests are linked
+/// with.
+fn build() -> PathBuf {
+    static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
+        let profile = folder();
+        let target = profile.parent().expect("a profile is in a folder");
+        let libraries = target.join("libraries");
         let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
         let mut command = Command::new(cargo);
         command.args(["build", "--quiet", "-p", "lovines", "-p", "phase-lock-fmu"]);
         command.args(["--features", "lovines/fmu"]);
         command.arg("--manifest-path");
         command.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.toml"));
-        command.arg("--target-dir");
-        command.arg(folder().parent().expect("a profile is in a folder"));
-        if folder().ends_with("release") {
+        command.arg("--target-dir").arg(&libraries);
+        let name = if profile.ends_with("release") {
             command.arg("--release");
-        }
+            "release"
+        } else {
+            "debug"
+        };
         let status = command.status().expect("cargo runs");
         assert!(status.success(), "the libraries could not be built");
+        libraries.join(name)
     });
+    FOLDER.clone()
 }

@@ -77,11 +77,13 @@ fn a_rate_whose_powers_are_no_numbers_is_not_followed() {
         (&[(2, 1e300)], "N.s/m is refused"),
         (&[(0, 1e-90), (1, 1e100)], "rad/s is refused"),
         (&[(2, 1e60)], "rad/s is refused"),
+        (&[(8, -1e300)], "rad/s is refused"),
     ] {
         refused_start(values, what);
     }
     // omega, with a step that is short beside it.
-    let m = with(&[(8, -1e300)]);
+    let m = with(&[]);
+    m.well(m.set_real(8, -1e300));
     assert_eq!(timed(&m, "an absurd rate", 1e-300), Status::Error);
     assert!(m.heard()[0].text.contains("rad/s is refused"));
     let m = with(&[(2, 1e50)]);

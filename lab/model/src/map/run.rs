@@ -55,13 +55,12 @@ pub fn observe(
     start: [f64; 4],
     (settle, record): (usize, usize),
 ) -> Result<Point, InvalidValue> {
-    let omega = 1.0 + scene.epsilon * sigma;
-    let drive = Drive::harmonic(scene.epsilon * scene.g, omega);
+    let drive = scene.drive(sigma);
     let mut plant = scene.plant(start)?;
     let mut round = 0;
     loop {
         for _ in 0..settle {
-            plant.advance(drive, TAU / omega)?;
+            plant.advance(drive, TAU / drive.omega)?;
         }
         let (impacts, rests) = recorded(&mut plant, drive, record)?;
         let found = |regime, pattern: Option<Pattern>, growth| Point {

@@ -3,7 +3,7 @@
 
 use std::f64::consts::TAU;
 
-use lovines::{Drive, InvalidValue, State};
+use lovines::{InvalidValue, State};
 
 use super::{
     bounce::Bounce,
@@ -30,10 +30,9 @@ pub fn settle(
     periods: usize,
 ) -> Result<Option<Periodic>, InvalidValue> {
     let mut plant = scene.plant(start)?;
-    let omega = 1.0 + scene.epsilon * sigma;
-    let drive = Drive::harmonic(scene.epsilon * scene.g, omega);
+    let drive = scene.drive(sigma);
     for _ in 0..periods {
-        plant.advance(drive, TAU / omega)?;
+        plant.advance(drive, TAU / drive.omega)?;
     }
     let State { q1, dq1, q2, dq2 } = plant.state();
     Ok(settled(scene, sigma, [q1, dq1, q2, dq2]))
