@@ -158,7 +158,7 @@ impl Phase {
         (self.0, self.1)
     }
 
-    /// The phase later by `angle` (in [0, 2π), with its rounding error) and by `more`, which is small.
+    /// The phase later by `angle` (from -2π to 2π, with its rounding error) and by `more`, which is small.
     #[inline(always)]
     pub(crate) fn rotated(self, angle: (f64, f64), more: f64) -> Self {
         let turn = angle.0 + more;
@@ -173,31 +173,12 @@ impl Phase {
         }
     }
 
-    /// The phase `t` seconds later at `omega`, brought back to [0, 2π) without losing digits to the number of turns.
+    /// The phase `t` seconds later at `omega`, without losing digits to the number of turns.
     pub fn advanced(self, omega: f64, t: f64) -> Self {
-        let (turned, product_error) = product(omega, t);
-        let (sum, sum_error) = two_sum(turned, self.0);
-        let turns = libm::floor(sum / TAU.0);
-        let mut error = self.1 + product_error + sum_error;
-        let mut rest = sum;
-        if turns != 0.0 {
-            let (whole, whole_error) = product(turns, TAU.0);
-            // The two are close, so that their difference is exact (Sterbenz) but for many turns, where it is nearly so.
-            rest = sum - whole;
-            error -= whole_error + turns * TAU.1;
-        }
-        let (mut rest, mut error) = two_sum(rest, error);
-        if rest < 0.0 || rest >= TAU.0 {
-            // The quotient was a last digit off: one turn more or less.
-            let turn = if rest < 0.0 { 1.0 } else { -1.0 };
-            let (turned, lost) = two_sum(rest, turn * TAU.0);
-            (rest, error) = two_sum(turned, error + lost + turn * TAU.1);
-            // -1e-17 + 2π rounds to 2π itself, which is 0.
-            if !(0.0..TAU.0).contains(&rest) {
-                (rest, error) = (0.0, 0.0);
-            }
-        }
-        Self(rest, error)
+        let (angle, error) = product(omega, t);
+        let rest = libm::fmod(angle, TAU.0);
+        let turns = libm::round((angle - rest) / TAU.0);
+        self.rotated((rest, error - turns * TAU.1), 0.0)
     }
 }
 

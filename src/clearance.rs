@@ -189,16 +189,6 @@ fn first_root(gap: f64, closing: f64, acceleration: f64) -> Option<f64> {
     }
 }
 
-/// How long a wall is certainly clear after it has ceased to push: speed and acceleration relative to it are 0 then, and
-/// the gap grows as `opening h³/6`; its fourth derivative is at most `fourth`. Half of the opening is kept in hand.
-pub fn clear_after_release(opening: f64, fourth: f64) -> f64 {
-    if opening > 0.0 {
-        2.0 * opening / fourth
-    } else {
-        0.0
-    }
-}
-
 #[cfg(test)]
 #[path = "../tests/unit/clearance.rs"]
 mod tests;

@@ -1,6 +1,6 @@
 //! The particle's free flight between the walls, up to the first instant it touches one.
 
-use crate::clearance::{Bounds, Gap, clear_after_release, first_closure};
+use crate::clearance::{Bounds, Gap, first_closure};
 use crate::contact::Wall;
 use crate::segment::{Derivatives, Segment, Series, nearby, velocity_change};
 
@@ -113,14 +113,17 @@ impl Flight {
     }
 
     /// How long the wall that has just ceased to push is certainly out of reach, and the other one too.
+    ///
+    /// Speed and acceleration relative to the first are 0, and its gap grows as `opening h³/6`. Half of the opening is kept as a margin.
     fn clear_of(&self, wall: Wall) -> f64 {
         let d = self.motion.derivatives_at_start();
         let window = 2.0 / self.motion.fastest();
         let fourth = d[4].abs() + window * self.motion.fifth_derivative_bound(&d, window);
-        let clear = clear_after_release(-wall.sign() * d[3], fourth);
+        let opening = (-wall.sign() * d[3]).max(0.0);
+        let fourth = fourth.max(f64::MIN_POSITIVE);
         let other = self.gap(wall.other(), (0.0, 0.0), &d);
         let jerk = |h| self.motion.third_derivative_bound(&d, h);
-        clear.min(other.certainly_open(window, jerk))
+        (2.0 * opening / fourth).min(other.certainly_open(window, jerk))
     }
 }
 

@@ -22,10 +22,9 @@ pub type Derivatives = [f64; 7];
 #[derive(Clone, Copy, Debug)]
 pub struct Segment {
     oscillator: Oscillator,
-    forcing: Forcing,
     base: BaseMotion,
-    /// `E e^{i phase}` at the start, for a frequency 0 or above; `None` where the oscillator is not driven.
-    phasor: Option<Complex64>,
+    /// `E e^{i phase}` at the start, for a frequency 0 or above, and the response to it; `None` where it is not driven.
+    driven: Option<(Complex64, Forcing)>,
     /// The polynomial that follows the signal.
     follower: [f64; 4],
     /// Where the follower is the signal itself: the forcing by its curvature and jerk, m/s² and m/s³.
@@ -43,16 +42,11 @@ impl Segment {
         } else {
             follower(oscillator, base.drive.signal)
         };
-        let phasor = phasor(&base);
-        let forcing = match phasor {
-            Some(_) => Forcing::new(oscillator, base.drive.omega.abs()),
-            None => Forcing::default(),
-        };
+        let forcing = || Forcing::new(oscillator, base.drive.omega.abs());
         Self {
             oscillator: *oscillator,
-            forcing,
             base,
-            phasor,
+            driven: phasor(&base).map(|phasor| (phasor, forcing())),
             follower,
             pushed,
             x0,
@@ -62,7 +56,14 @@ impl Segment {
 
     /// The fastest rate in the motion, 1/s.
     pub fn fastest(&self) -> f64 {
-        self.oscillator.fastest.max(self.forcing.omega)
+        self.oscillator.fastest.max(self.omega())
+    }
+
+    /// The frequency of the base, rad/s, 0 or above; 0 where it has none.
+    fn omega(&self) -> f64 {
+        self.driven
+            .as_ref()
+            .map_or(0.0, |(_, forcing)| forcing.omega)
     }
 
     /// Position (m) and velocity (m/s) after `t` seconds, and the base oscillator's phasor then.
@@ -77,10 +78,10 @@ impl Segment {
             x += steady * once + growing * twice;
             v += steady * free.xv + growing * once;
         }
-        let Some(z) = self.phasor else {
+        let Some((z, forcing)) = &self.driven else {
             return (x, v, Complex64::ZERO);
         };
-        let response = self.forcing.response(t, &free, decayed);
+        let response = forcing.response(t, &free, decayed);
         x += (z * response.position).im;
         v += (z * response.velocity).im;
         (x, v, z * response.base)
@@ -100,7 +101,7 @@ impl Segment {
 
     /// Position and its derivatives at the start.
     pub fn derivatives_at_start(&self) -> Derivatives {
-        let phasor = self.phasor.unwrap_or_default();
+        let phasor = self.driven.map_or(Complex64::ZERO, |(phasor, _)| phasor);
         self.by_equation(self.x0, self.v0, phasor, 0.0)
     }
 
@@ -111,7 +112,7 @@ impl Segment {
             ..
         } = self.oscillator;
         let [u0, u1, u2, u3] = self.base.drive.signal;
-        let omega = self.forcing.omega;
+        let omega = self.omega();
         let omega2 = omega * omega;
         let (sin, cos) = (phasor.im, omega * phasor.re);
         let base = [
@@ -146,9 +147,8 @@ impl Segment {
     fn bound<const N: usize>(&self, d: &Derivatives, window: f64, signal: f64) -> f64 {
         let oscillator = &self.oscillator;
         let mut forcing = signal;
-        if let Some(z) = self.phasor {
-            let amplitude = libm::fabs(z.re) + libm::fabs(z.im);
-            forcing += amplitude * self.forcing.strength.l1_norm() * power::<N>(self.forcing.omega);
+        if let Some((z, driven)) = &self.driven {
+            forcing += z.l1_norm() * driven.strength.l1_norm() * power::<N>(driven.omega);
         }
         // The last factor covers the rounding of this very bound.
         (oscillator.ceiling(d[N], d[N + 1]) + window * oscillator.reach * forcing) * (1.0 + 1e-12)
@@ -163,11 +163,11 @@ impl Segment {
         } = self.oscillator;
         let mut base = [0.0; DEGREE];
         base[..4].copy_from_slice(&self.base.drive.signal);
-        if let Some(z) = self.phasor {
+        if let Some((z, forcing)) = self.driven {
             let mut term = z;
             for (n, b) in base.iter_mut().enumerate() {
                 *b += term.im;
-                let scale = self.forcing.omega / (n as f64 + 1.0);
+                let scale = forcing.omega / (n as f64 + 1.0);
                 term = Complex64::new(-term.im * scale, term.re * scale);
             }
         }
@@ -193,9 +193,8 @@ impl Segment {
     pub fn at(&self, series: &Series, t: f64) -> Instant {
         if t <= series.reach {
             let (dx, dv) = series.departure(t);
-            let phasor = self
-                .phasor
-                .map_or(Complex64::ZERO, |z| z * rotation(self.forcing.omega, t));
+            let turned = |(z, forcing): (Complex64, Forcing)| z * rotation(forcing.omega, t);
+            let phasor = self.driven.map_or(Complex64::ZERO, turned);
             let derivatives =
                 self.by_equation(self.x0 + (self.v0 * t + dx), self.v0 + dv, phasor, t);
             Instant {

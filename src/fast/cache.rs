@@ -82,12 +82,12 @@ impl Cache {
             n
         } else {
             self.oldest = (self.oldest + 1) % FLIGHTS as u8;
-            self.flights[usize::from(self.oldest)] = Propagator::rounded(oscillator, t);
+            self.flights[usize::from(self.oldest)] = Propagator::new(oscillator, t, false);
             self.oldest
         };
         let propagator = &mut self.flights[usize::from(n)];
         if self.regular && !propagator.exact {
-            *propagator = Propagator::exact(oscillator, propagator.t);
+            *propagator = Propagator::new(oscillator, propagator.t, true);
         }
         self.followers[usize::from(self.last)] = n;
         self.last = n;
@@ -112,7 +112,7 @@ impl Cache {
         let lengths = [coefficients.stretch, coefficients.stretch / FINE as f64];
         for (propagator, t) in self.march.iter_mut().zip(lengths) {
             if propagator.t != t {
-                *propagator = Propagator::exact(oscillator, t);
+                *propagator = Propagator::new(oscillator, t, true);
             }
             propagator.prepare(oscillator, coefficients);
         }
@@ -169,10 +169,9 @@ impl Keys {
             ..Default::default()
         };
         fast.cache = Cache {
-            flights: self.flights.map(|(t, exact)| match (kept(t), exact) {
-                (false, _) => Propagator::default(),
-                (true, false) => Propagator::rounded(oscillator, t),
-                (true, true) => Propagator::exact(oscillator, t),
+            flights: self.flights.map(|(t, exact)| {
+                let kept = kept(t).then(|| Propagator::new(oscillator, t, exact));
+                kept.unwrap_or_default()
             }),
             followers: self.followers,
             last: self.last,

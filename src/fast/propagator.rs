@@ -69,23 +69,19 @@ pub(super) fn forced(amplitude: f64, (cos, sin): (f64, f64), k: Complex64) -> f6
 }
 
 impl Propagator {
-    /// The propagator over `t` seconds, for a few uses.
-    pub fn rounded(oscillator: &Oscillator, t: f64) -> Self {
-        let Transition { xx, xv, vx, vv } = oscillator.transition(t);
-        let (xx, vv) = (xx - 1.0, vv - 1.0);
+    /// The propagator over `t` seconds, `exact` beyond rounding or not.
+    pub fn new(oscillator: &Oscillator, t: f64, exact: bool) -> Self {
+        let free = if exact {
+            oscillator.split_increment(t)
+        } else {
+            let Transition { xx, xv, vx, vv } = oscillator.transition(t);
+            let (xx, vv) = (xx - 1.0, vv - 1.0);
+            (Transition { xx, xv, vx, vv }, Transition::default())
+        };
         Self {
             t,
-            free: (Transition { xx, xv, vx, vv }, Transition::default()),
-            ..Self::default()
-        }
-    }
-
-    /// The propagator over `t` seconds, for many uses.
-    pub fn exact(oscillator: &Oscillator, t: f64) -> Self {
-        Self {
-            t,
-            free: oscillator.split_increment(t),
-            exact: true,
+            free,
+            exact,
             ..Self::default()
         }
     }

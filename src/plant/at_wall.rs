@@ -5,6 +5,7 @@ use super::{Event, Plant};
 use crate::arithmetic::Sum;
 use crate::contact::{Contact, Resolution, Wall};
 use crate::oscillator::Oscillator;
+use crate::segment::Segment;
 
 /// A hop lower than this fraction of the half-width cannot be told from contact in double precision.
 const LOWEST_HOP: f64 = 1.0 / (1u64 << 56) as f64;
@@ -62,16 +63,9 @@ impl Plant {
 
     /// Acceleration of `wall` towards the particle while the primary mass moves alone, and its rounding error, m/s².
     fn pressing(&self, wall: Wall, velocity: f64) -> (f64, f64) {
-        let Oscillator {
-            delta,
-            omega0_squared,
-            ..
-        } = self.rig.alone;
-        let drive = &self.base.drive;
-        let (cos, sin) = self.fast.phasor();
-        let stretch = self.masses.x.value() - (drive.signal[0] + drive.amplitude * sin);
-        let slip = velocity - (drive.signal[1] + drive.amplitude * drive.omega * cos);
-        let acceleration = -2.0 * delta * slip - omega0_squared * stretch;
+        let start = (self.masses.x.value(), velocity);
+        let motion = Segment::new(&self.rig.alone, self.base, start);
+        let acceleration = motion.derivatives_at_start()[2];
         (
             wall.sign() * acceleration,
             self.acceleration_error(velocity),
