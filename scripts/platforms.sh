@@ -131,6 +131,8 @@ build_platform() (
             ;;
     esac
     flags+=("--remap-path-prefix=$("${RUSTC:-rustc}" --print sysroot)=rust")
+    # Cargo gives rustc relative paths of sources inside the folder that it is called in.
+    flags+=("--remap-path-prefix=$RUST_WEB/usr=rust")
     verb=build
     case $with in
         mingw)
