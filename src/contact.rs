@@ -114,12 +114,6 @@ impl ImpactLaw {
         }
     }
 
-    /// Duration of infinitely many impacts that begin with this rebound speed under a constant pressing acceleration:
-    /// `2 u/a (1 + r + r² + ...)`, s; infinite for `r = 1`.
-    pub fn chatter_duration(&self, speed: f64, pressing: f64) -> f64 {
-        2.0 * speed / (pressing * (1.0 - self.restitution))
-    }
-
     /// The particle is at `wall` with velocities of primary mass and particle and a relative velocity. If it approaches, Newton's
     /// law reverses the relative velocity and reduces it by `r`. If then `rests` holds for the velocity of the primary mass and
     /// the speed away from the wall, both go on as one mass. Momentum is conserved.
@@ -144,8 +138,7 @@ impl ImpactLaw {
             touch.primary = primary - (head * relative + tail * relative);
             touch.relative = -r * relative;
             touch.particle = touch.primary - touch.relative;
-            touch.dissipated =
-                self.half_relative_mass * ((1.0 - r) * (1.0 + r)) * (relative * relative);
+            touch.dissipated = self.half_relative_mass * ((1.0 - r) * (1.0 + r)) * (relative * relative);
         }
         if rests(touch.primary, -wall.sign() * touch.relative) {
             touch.dissipated += self.half_relative_mass * touch.relative * touch.relative;
@@ -161,8 +154,7 @@ impl ImpactLaw {
     #[inline(always)]
     pub(crate) fn certainly_leaves(&self, speed: f64, largest: f64, r: &Resolution) -> bool {
         speed * speed > 2.0 * r.lowest_hop * largest
-            && (self.restitution <= LIVELY
-                || 2.0 * speed * r.fastest > SHORTEST_LIVELY_HOP * largest)
+            && (self.restitution <= LIVELY || 2.0 * speed * r.fastest > SHORTEST_LIVELY_HOP * largest)
     }
 
     /// Whether the particle that leaves a wall at `speed` is in truth at rest on it; the wall accelerates towards it with
@@ -181,11 +173,10 @@ impl ImpactLaw {
             return false;
         }
         let low = 0.5 * speed * speed <= r.lowest_hop * pressing;
-        let over_soon = self.chatter_duration(speed, pressing) <= r.longest_chatter
+        let over_soon = 2.0 * speed / (pressing * (1.0 - self.restitution)) <= r.longest_chatter
             || speed * r.fastest <= SHORTEST_HOP * pressing
             || self.restitution == 1.0;
-        let lively =
-            self.restitution > LIVELY && 2.0 * speed * r.fastest <= SHORTEST_LIVELY_HOP * pressing;
+        let lively = self.restitution > LIVELY && 2.0 * speed * r.fastest <= SHORTEST_LIVELY_HOP * pressing;
         lively || (low && over_soon)
     }
 }

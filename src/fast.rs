@@ -9,12 +9,15 @@
 //! Everything kept between steps lives in [`Cache`], and each entry carries its key: the time it belongs to and
 //! the frequency of the base. An entry whose key differs is not used; nothing else invalidates it.
 
+mod arrival;
 mod cache;
 mod coefficients;
 mod flight;
 mod hop;
+mod march;
 mod propagator;
 mod short_step;
+mod start;
 mod verify;
 
 use crate::arithmetic::Sum;
@@ -52,9 +55,9 @@ pub(crate) struct Moving<'a> {
 }
 
 /// Predictions, and what they are made from.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct FastPath {
-    pub enabled: bool,
+    pub disabled: bool,
     /// No contact for this time from now on, s.
     contact_free: f64,
     /// `e^{i phase}` of the base: cosine and sine.
@@ -64,20 +67,6 @@ pub(crate) struct FastPath {
     coefficients: Coefficients,
     cache: Cache,
     evaluations: u64,
-}
-
-impl Default for FastPath {
-    fn default() -> Self {
-        Self {
-            enabled: true,
-            contact_free: 0.0,
-            phasor: (1.0, 0.0),
-            rotations: 0,
-            coefficients: Coefficients::default(),
-            cache: Cache::default(),
-            evaluations: 0,
-        }
-    }
 }
 
 impl FastPath {
@@ -101,7 +90,7 @@ impl FastPath {
     /// The parameters were changed.
     pub fn parameters_changed(&mut self, base: &BaseMotion) {
         *self = Self {
-            enabled: self.enabled,
+            disabled: self.disabled,
             ..Self::default()
         };
         self.state_changed(base);
@@ -145,7 +134,7 @@ impl FastPath {
     /// Takes a step whose propagator is cached, if it meets no contact. Returns whether it was taken.
     #[inline]
     pub fn step(&mut self, moving: &mut Moving, duration: f64) -> bool {
-        if duration != self.cache.step.t || !self.enabled {
+        if duration != self.cache.step.t || self.disabled {
             return false;
         }
         let start = self.point(moving);
@@ -209,8 +198,7 @@ impl FastPath {
         let fastest = oscillator.fastest.max(drive.omega.abs());
         if t == duration && self.cache.repeats(oscillator, &drive, duration) {
             self.take_step(moving, start);
-        } else if t * fastest <= short_step::LONGEST || u2 != 0.0 || u3 != 0.0 || drive.omega < 0.0
-        {
+        } else if t * fastest <= short_step::LONGEST || u2 != 0.0 || u3 != 0.0 || drive.omega < 0.0 {
             let (x, v) = (moving.masses.x.value(), moving.masses.v.value());
             let segment = Segment::new(oscillator, *moving.base, (x, v));
             let (dx, dv) = segment.departure(t);

@@ -3,9 +3,7 @@
 //! `x'' + 2 delta x' + omega0² x = 0`. Position and velocity after `t` are a linear map of those now; the map's four
 //! entries are written so that none loses digits at any damping ratio, however near to critical.
 
-use crate::arithmetic::{
-    divided, plus, product, quotient, sincos_of_product, split_coefficient, times, two_sum,
-};
+use crate::arithmetic::{divided, plus, product, quotient, sincos_of_product, split_coefficient, times, two_sum};
 use crate::overdamped::APART;
 use num_complex::Complex64;
 
@@ -71,13 +69,6 @@ impl Transition {
     }
 }
 
-/// A transition whose entries are known with their rounding errors, as the sum of two.
-fn split(entries: [(f64, f64); 4]) -> (Transition, Transition) {
-    let [xx, xv, vx, vv] = entries.map(split_coefficient);
-    let part = |xx, xv, vx, vv| Transition { xx, xv, vx, vv };
-    (part(xx.0, xv.0, vx.0, vv.0), part(xx.1, xv.1, vx.1, vv.1))
-}
-
 impl Oscillator {
     /// Coefficients of the oscillator of this mass (kg), stiffness (N/m) and damping (N·s/m).
     pub fn new(mass: f64, stiffness: f64, damping: f64) -> Self {
@@ -100,11 +91,7 @@ impl Oscillator {
             let half_gap = libm::sqrt(-discriminant);
             let fast = -(delta + half_gap);
             let slow = omega0_squared / fast;
-            let regime = Regime::Overdamped {
-                slow,
-                fast,
-                half_gap,
-            };
+            let regime = Regime::Overdamped { slow, fast, half_gap };
             (regime, -1.0 / fast, -fast)
         };
         Self {
@@ -153,57 +140,36 @@ impl Oscillator {
                 let turned = Complex64::new(decay * cos, decay * sin);
                 (self.oscillating(omega_d, turned.im, turned.re), turned)
             }
-            Regime::Overdamped {
-                slow,
-                fast,
-                half_gap,
-            } => (self.overdamped(t, slow, fast, half_gap), Complex64::ZERO),
+            Regime::Overdamped { slow, fast, half_gap } => (self.overdamped(t, slow, fast, half_gap), Complex64::ZERO),
         }
     }
 
     /// What the free motion over `t` seconds adds to position and velocity, as the sum of two maps: for a transition that is
-    /// used many times.
+    /// used many times. A rounded one would be a steady source or sink of energy, and shift the phase.
     ///
-    /// A rounded transition would be a steady source or sink of energy, small as it is. What is left here is an error of the
-    /// frequency, which leaves the energy as it is. An overdamped motion dies out too fast for that to matter; its second map is
-    /// zero.
-    pub(crate) fn split_increment(&self, t: f64) -> (Transition, Transition) {
-        let Regime::Oscillating { omega_d } = self.regime else {
-            let Transition { xx, xv, vx, vv } = self.transition(t);
-            let (xx, vv) = (xx - 1.0, vv - 1.0);
-            return (Transition { xx, xv, vx, vv }, Transition::default());
-        };
-        let (sin, cos) = self.sincos(omega_d, t);
-        // How far the rounded sine and cosine are off the unit circle.
-        let (cos2, sin2) = (product(cos, cos), product(sin, sin));
-        let (sum, error) = two_sum(cos2.0, sin2.0);
-        let outside = (sum - 1.0) + (error + cos2.1 + sin2.1);
-        let decay = two_sum(1.0, libm::expm1(-self.delta * t));
-        let radius = (decay.0, decay.1 - 0.5 * outside * decay.0);
-        let (cos, sin) = (times((cos, 0.0), radius), times((sin, 0.0), radius));
-        let quotient = sin.0 / omega_d;
-        let (got, got_error) = product(quotient, omega_d);
-        let omega_d = (omega_d, self.omega_d_error);
-        let lost = (sin.0 - got) - got_error + sin.1 - quotient * omega_d.1;
-        let s = (quotient, lost / omega_d.0);
-        let leaning = times((self.delta, 0.0), s);
-        // `omega0²` for this very `omega_d`: that is what the transition keeps.
-        let stiffness = plus(times(omega_d, omega_d), product(self.delta, self.delta));
-        let pull = times(stiffness, s);
-        let change = plus(cos, (-1.0, 0.0));
-        let entries = [
-            plus(change, leaning),
-            s,
-            (-pull.0, -pull.1),
-            plus(change, (-leaning.0, -leaning.1)),
-        ];
-        split(entries)
+    /// In double-double arithmetic: a Taylor series over a time that is short against every rate, doubled as often as needed.
+    pub(crate) fn exact_increment(&self, t: f64) -> (Transition, Transition) {
+        let doublings = libm::ceil(libm::log2(2.0 * self.fastest * t)).max(0.0);
+        let mut increment = self.short_increment(t * libm::exp2(-doublings));
+        for _ in 0..doublings as u32 {
+            // `(1 + A)² = 1 + 2 A + A²`, which keeps the relative accuracy of a small `A`.
+            let [xx, xv, vx, vv] = increment;
+            let squared = |a, b, c, d| plus(times(a, b), times(c, d));
+            let square = [
+                squared(xx, xx, xv, vx),
+                squared(xx, xv, xv, vv),
+                squared(vx, xx, vv, vx),
+                squared(vx, xv, vv, vv),
+            ];
+            increment = core::array::from_fn(|n| plus(square[n], (2.0 * increment[n].0, 2.0 * increment[n].1)));
+        }
+        let [xx, xv, vx, vv] = increment.map(split_coefficient);
+        let part = |xx, xv, vx, vv| Transition { xx, xv, vx, vv };
+        (part(xx.0, xv.0, vx.0, vv.0), part(xx.1, xv.1, vx.1, vv.1))
     }
 
-    /// As [`Self::split_increment`] for a time that is short against every rate (`fastest t <= 1/2`), with the relative
-    /// accuracy of each entry kept: equal steps add up neither rounding errors nor phase. A Taylor series in double-double
-    /// arithmetic.
-    pub(crate) fn split_short_increment(&self, t: f64) -> (Transition, Transition) {
+    /// The same over a short time, each entry with its rounding error.
+    fn short_increment(&self, t: f64) -> [(f64, f64); 4] {
         const DEGREE: usize = 26;
         let damping = times((2.0 * self.delta, self.errors.0), (t, 0.0));
         let spring = times((self.omega0_squared, self.errors.1), product(t, t));
@@ -211,10 +177,7 @@ impl Oscillator {
         let column = |first: [(f64, f64); 2]| {
             let (mut c, mut x, mut v) = (first, (0.0, 0.0), (0.0, 0.0));
             for n in 2..DEGREE {
-                let sum = plus(
-                    times(damping, times(c[1], ((n - 1) as f64, 0.0))),
-                    times(spring, c[0]),
-                );
+                let sum = plus(times(damping, times(c[1], ((n - 1) as f64, 0.0))), times(spring, c[0]));
                 let (next, error) = divided(sum, ((n - 1) * n) as f64);
                 c = [c[1], (-next, -error)];
                 x = plus(x, c[1]);
@@ -225,7 +188,7 @@ impl Oscillator {
         let (xx, vx) = column([(1.0, 0.0), (0.0, 0.0)]);
         let (xv, vv) = column([(0.0, 0.0), (1.0, 0.0)]);
         let (one, t2) = ((1.0, 0.0), (t, 0.0));
-        split([xx, times(plus(one, xv), t2), divided(vx, t), vv])
+        [xx, times(plus(one, xv), t2), divided(vx, t), vv]
     }
 
     /// The transition from `exp(-delta t) sin(omega_d t)` and `exp(-delta t) cos(omega_d t)`.

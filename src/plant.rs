@@ -148,10 +148,7 @@ pub(crate) struct Masses {
 /// The plant: parameters, what follows from them, and the state.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(into = "snapshot::Snapshot", from = "snapshot::Snapshot")
-)]
+#[cfg_attr(feature = "serde", serde(into = "snapshot::Snapshot", from = "snapshot::Snapshot"))]
 pub struct Plant {
     rig: Rig,
     contact: Contact,
@@ -225,7 +222,7 @@ impl Plant {
     /// Switches the fast path on (default) or off. Without it every contact is found by the plain solver's certified search:
     /// the test oracle of the fast path.
     pub fn set_fast_path(&mut self, on: bool) {
-        self.fast.enabled = on;
+        self.fast.disabled = !on;
     }
 
     /// Changes the parameters from now on; displacements, velocities and totals stay. A change of masses or half-width has
@@ -318,8 +315,6 @@ impl Plant {
         let p = &self.rig.parameters;
         let State { q1, dq1, dq2, .. } = self.state();
         let stretch = q1 - displacement;
-        0.5 * (p.primary_mass * dq1 * dq1
-            + p.particle_mass * dq2 * dq2
-            + p.stiffness * stretch * stretch)
+        0.5 * (p.primary_mass * dq1 * dq1 + p.particle_mass * dq2 * dq2 + p.stiffness * stretch * stretch)
     }
 }

@@ -1,7 +1,7 @@
 //! What is kept between steps. Each entry is used only if its key matches.
 
 use super::coefficients::Coefficients;
-use super::flight::FINE;
+use super::march::FINE;
 use super::propagator::Propagator;
 use super::short_step::ShortStep;
 use crate::base_motion::Drive;
@@ -47,11 +47,7 @@ impl Cache {
 
     /// The propagator that followed the last one before, if flights have been regular.
     #[inline(always)]
-    pub fn expected(
-        &mut self,
-        oscillator: &Oscillator,
-        coefficients: &Coefficients,
-    ) -> Option<&Propagator> {
+    pub fn expected(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) -> Option<&Propagator> {
         if !self.regular {
             return None;
         }
@@ -67,12 +63,7 @@ impl Cache {
 
     /// A propagator at a time near `t`: one that is kept, or a new one at `t`.
     #[inline]
-    pub fn near(
-        &mut self,
-        oscillator: &Oscillator,
-        coefficients: &Coefficients,
-        t: f64,
-    ) -> &Propagator {
+    pub fn near(&mut self, oscillator: &Oscillator, coefficients: &Coefficients, t: f64) -> &Propagator {
         let is_near = |n: u8| (self.flights[usize::from(n)].t - t).abs() < coefficients.near;
         let expected = self.followers[usize::from(self.last)];
         self.regular = is_near(expected);
@@ -95,12 +86,7 @@ impl Cache {
     }
 
     #[inline(always)]
-    fn ready(
-        &mut self,
-        oscillator: &Oscillator,
-        coefficients: &Coefficients,
-        n: u8,
-    ) -> &Propagator {
+    fn ready(&mut self, oscillator: &Oscillator, coefficients: &Coefficients, n: u8) -> &Propagator {
         let propagator = &mut self.flights[usize::from(n) % FLIGHTS];
         propagator.prepare(oscillator, coefficients);
         propagator
@@ -123,7 +109,7 @@ impl Cache {
 #[cfg(feature = "serde")]
 #[derive(serde::Serialize, serde::Deserialize)]
 pub(crate) struct Keys {
-    enabled: bool,
+    disabled: bool,
     contact_free: f64,
     phasor: (f64, f64),
     rotations: u32,
@@ -142,14 +128,12 @@ impl Keys {
     pub fn of(fast: &super::FastPath) -> Self {
         let cache = &fast.cache;
         Self {
-            enabled: fast.enabled,
+            disabled: fast.disabled,
             contact_free: fast.contact_free,
             phasor: fast.phasor,
             rotations: fast.rotations,
             step: cache.step.t,
-            flights: cache
-                .flights
-                .map(|propagator| (propagator.t, propagator.exact)),
+            flights: cache.flights.map(|propagator| (propagator.t, propagator.exact)),
             followers: cache.followers,
             last: cache.last,
             regular: cache.regular,
@@ -162,7 +146,7 @@ impl Keys {
     pub fn restore(&self, oscillator: &Oscillator) -> super::FastPath {
         let kept = |t: f64| !t.is_nan();
         let mut fast = super::FastPath {
-            enabled: self.enabled,
+            disabled: self.disabled,
             contact_free: self.contact_free,
             phasor: self.phasor,
             rotations: self.rotations,

@@ -10,9 +10,10 @@ pub(super) const NEAR: f64 = 1.0 / 2048.0;
 const STRETCH: f64 = 1.5;
 
 /// What follows from an oscillator and a frequency.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Coefficients {
-    /// The key, rad/s; NaN before the first use.
+    /// The key, rad/s; none before the first use.
+    key: Option<f64>,
     pub omega: f64,
     pub forcing: Forcing,
     /// Farthest distance from a propagator's time, s.
@@ -23,23 +24,11 @@ pub(super) struct Coefficients {
     pub taylor: [[f64; 4]; 4],
 }
 
-impl Default for Coefficients {
-    fn default() -> Self {
-        Self {
-            omega: f64::NAN,
-            forcing: Forcing::default(),
-            near: 0.0,
-            stretch: 0.0,
-            taylor: [[0.0; 4]; 4],
-        }
-    }
-}
-
 impl Coefficients {
     /// Makes these the coefficients for `omega`, rad/s, 0 or above.
     #[inline(always)]
     pub fn prepare(&mut self, oscillator: &Oscillator, omega: f64) {
-        if self.omega != omega {
+        if self.key != Some(omega) {
             *self = Self::new(oscillator, omega);
         }
     }
@@ -53,18 +42,14 @@ impl Coefficients {
             ..
         } = *oscillator;
         // `f'' = -omega² f`: every derivative is a combination of the same four numbers.
-        let (mut last, mut now) = (
-            [0.0, 1.0, 0.0, 0.0],
-            [-omega0_squared, -2.0 * delta, 1.0, 0.0],
-        );
+        let (mut last, mut now) = ([0.0, 1.0, 0.0, 0.0], [-omega0_squared, -2.0 * delta, 1.0, 0.0]);
         let mut forcing = [1.0, 0.0];
         let mut factorial = 1.0;
         let taylor = [2.0, 3.0, 4.0, 5.0].map(|n| {
             factorial *= n;
             let term = now.map(|c: f64| c / factorial);
             forcing = [-omega * omega * forcing[1], forcing[0]];
-            let mut next: [f64; 4] =
-                core::array::from_fn(|i| -2.0 * delta * now[i] - omega0_squared * last[i]);
+            let mut next: [f64; 4] = core::array::from_fn(|i| -2.0 * delta * now[i] - omega0_squared * last[i]);
             next[2] += forcing[0];
             next[3] += forcing[1];
             (last, now) = (now, next);
@@ -72,6 +57,7 @@ impl Coefficients {
         });
         let rate = fastest.max(omega);
         Self {
+            key: Some(omega),
             omega,
             forcing: Forcing::new(oscillator, omega),
             near: NEAR / rate,

@@ -5,7 +5,8 @@
 //! the first contact; the other wall is out of reach if the height `u²/(2a)` is below the half-width.
 
 use super::FastPath;
-use super::flight::{Arrival, Start};
+use super::arrival::Arrival;
+use super::start::Start;
 use crate::arithmetic::Sum;
 use crate::contact::Wall;
 use crate::segment::Segment;
@@ -30,18 +31,12 @@ impl FastPath {
             && about * fastest <= LONGEST
             && 1.25 * about < left
             && speed * speed < pressing * b;
-        if short {
-            self.short_hop(start, about)
-        } else {
-            None
-        }
+        if short { self.short_hop(start, about) } else { None }
     }
 
     #[inline(never)]
     fn short_hop(&mut self, start: &Start, about: f64) -> Option<Arrival> {
-        let Start {
-            rig, base, masses, ..
-        } = start;
+        let Start { rig, base, masses, .. } = start;
         let wall = if masses.w.value() > 0.0 {
             Wall::Plus
         } else {
@@ -63,8 +58,7 @@ impl FastPath {
             h = 2.0 * speed / (pressing + h * (j + h * (k + h * (l + h * n))));
         }
         let fifth = d4 / 24.0 + h * (d5 / 120.0 + h * (d6 / 720.0));
-        let gained =
-            h * (d[2] + h * (d3 / 2.0 + h * (d4 / 6.0 + h * (d5 / 24.0 + h * d6 / 120.0))));
+        let gained = h * (d[2] + h * (d3 / 2.0 + h * (d4 / 6.0 + h * (d5 / 24.0 + h * d6 / 120.0))));
         let moved = h * (d[1] + h * (d[2] / 2.0 + h * (d3 / 6.0 + h * fifth)));
         let phase = base.phase.advanced(base.drive.omega, h);
         let (sin, cos) = libm::sincos(phase.radians());

@@ -30,18 +30,10 @@ impl<F: FnMut(Event)> Step<F> {
         Sum::from(self.duration).minus(self.left).value()
     }
 
-    pub fn released(&mut self, wall: Wall) {
-        self.outcome.released += 1;
-        let t = self.now();
-        (self.on_event)(Event::Released { t, wall });
-    }
-
     /// Whether time is left and the step is not to be cut short.
     fn goes_on(&self) -> bool {
-        let Outcome {
-            impacts, released, ..
-        } = self.outcome;
-        self.left.value() > 0.0 && impacts < MOST_IMPACTS && released < MOST_RELEASES
+        let done = &self.outcome;
+        self.left.value() > 0.0 && done.impacts < MOST_IMPACTS && done.released < MOST_RELEASES
     }
 }
 
@@ -110,8 +102,7 @@ impl Plant {
         let jumps = drive.signal[0] != before.signal[0] || drive.amplitude != before.amplitude;
         if self.begun && jumps {
             let sin = self.fast.phasor().1;
-            let jump =
-                (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
+            let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
             if jump != 0.0 {
                 let kick = 2.0 * self.rig.alone.delta * jump;
                 self.masses.v = self.masses.v.plus(kick);
@@ -121,8 +112,12 @@ impl Plant {
             }
         }
         self.base.drive = drive;
-        self.begun = true;
-        self.fast.drive_changed();
+        if self.begun {
+            self.fast.drive_changed();
+        } else {
+            self.begun = true;
+            self.fast.state_changed(&self.base);
+        }
     }
 
     /// Follows the motion from event to event to the end of the step.
@@ -213,7 +208,9 @@ impl Plant {
         step.left = step.left.plus(-stay.t);
         if stay.released {
             self.contact = Contact::Released(wall);
-            step.released(wall);
+            step.outcome.released += 1;
+            let t = step.now();
+            (step.on_event)(Event::Released { t, wall });
         }
     }
 
