@@ -3,9 +3,11 @@
 #![forbid(unsafe_code)]
 
 mod controller;
+mod error;
 mod instance;
 mod rig;
 
 pub use controller::FmuController;
+pub use error::{CallError, LoadError};
 pub use instance::{FmuError, Kind};
 pub use rig::FmuRig;
