@@ -34,7 +34,10 @@ pub enum LoadError {
     /// The FMU cannot be instantiated.
     #[error("the FMU cannot be instantiated; its own message has been logged")]
     Instantiate,
-    /// The file cannot be read, or the library cannot be loaded.
+    /// The library cannot be loaded, or lacks a function.
+    #[error("the library of the FMU cannot be loaded: {0}")]
+    Library(fmi::Error),
+    /// The file cannot be read.
     #[error(transparent)]
     Fmi(fmi::Error),
 }
@@ -52,7 +55,8 @@ impl From<fmi::Error> for LoadError {
                 architecture: arch,
             },
             Error::Instantiation => Self::Instantiate,
-            other => Self::Fmi(other),
+            Error::LibLoading { .. } => Self::Library(error),
+            _ => Self::Fmi(error),
         }
     }
 }
