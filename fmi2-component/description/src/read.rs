@@ -5,10 +5,7 @@ use std::str::FromStr;
 use roxmltree::{Document, Node};
 
 use crate::error::Error;
-use crate::{
-    Content, DefaultExperiment, Description, Kind, ModelStructure, ScalarVariable, SimpleType,
-    Unknown,
-};
+use crate::{Content, DefaultExperiment, Description, Kind, ModelStructure, ScalarVariable, SimpleType, Unknown};
 
 pub(crate) fn description(xml: &str) -> Result<Description, Error> {
     let document = Document::parse(xml)?;
@@ -35,18 +32,15 @@ pub(crate) fn description(xml: &str) -> Result<Description, Error> {
         number_of_event_indicators: number(root, "numberOfEventIndicators")?.unwrap_or(0),
         model_exchange: identifier("ModelExchange")?,
         co_simulation: identifier("CoSimulation")?,
-        default_experiment: child(root, "DefaultExperiment").map_or_else(
-            DefaultExperiment::default,
-            |experiment| DefaultExperiment {
+        default_experiment: child(root, "DefaultExperiment").map_or_else(DefaultExperiment::default, |experiment| {
+            DefaultExperiment {
                 start_time: text(experiment, "startTime"),
                 stop_time: text(experiment, "stopTime"),
                 step_size: text(experiment, "stepSize"),
-            },
-        ),
+            }
+        }),
         units: names("UnitDefinitions").collect::<Result<_, _>>()?,
-        types: list("TypeDefinitions")
-            .map(simple_type)
-            .collect::<Result<_, _>>()?,
+        types: list("TypeDefinitions").map(simple_type).collect::<Result<_, _>>()?,
         categories: names("LogCategories").collect::<Result<_, _>>()?,
         variables: list("ModelVariables")
             .filter(|element| element.has_tag_name("ScalarVariable"))
@@ -132,9 +126,7 @@ fn structure(element: Node) -> Result<ModelStructure, Error> {
     })
 }
 
-pub(crate) fn elements<'a, 'i>(
-    node: Node<'a, 'i>,
-) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
+pub(crate) fn elements<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
     node.children().filter(Node::is_element)
 }
 

@@ -50,10 +50,7 @@ impl From<fmi::Error> for LoadError {
             Error::ArchiveStructure(text) => Self::Archive(text),
             Error::Schema(source) => Self::Description(source),
             Error::UnsupportedFmuType(_) => Self::NoCoSimulation,
-            Error::UnsupportedPlatform { os, arch } => Self::Platform {
-                os,
-                architecture: arch,
-            },
+            Error::UnsupportedPlatform { os, arch } => Self::Platform { os, architecture: arch },
             Error::Instantiation => Self::Instantiate,
             Error::LibLoading { .. } => Self::Library(error),
             _ => Self::Fmi(error),

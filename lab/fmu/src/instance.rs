@@ -161,10 +161,7 @@ impl Fmu {
         }
         if !missing.is_empty() {
             let path = self.path.display();
-            log::warn!(
-                "{path} has no {}; it uses its own values instead",
-                missing.join(", ")
-            );
+            log::warn!("{path} has no {}; it uses its own values instead", missing.join(", "));
         }
         self.ask("start", |i| {
             i.setup_experiment(None, 0.0, None)?;
@@ -217,9 +214,7 @@ fn open(path: &Path, name: &str) -> Result<(Fmi2Import, InstanceCS), LoadError> 
     }
     let import: Fmi2Import = fmi::import::from_path(path)?;
     let co_simulation = import.model_description().co_simulation.as_ref();
-    let identifier = &co_simulation
-        .ok_or(LoadError::NoCoSimulation)?
-        .model_identifier;
+    let identifier = &co_simulation.ok_or(LoadError::NoCoSimulation)?.model_identifier;
     let library = import.shared_lib_path(identifier)?;
     if !import.archive_path().join(&library).is_file() {
         return Err(LoadError::NoLibrary(library));
