@@ -1,4 +1,4 @@
-//! Both FMUs coupled in co-simulation, with the delay of one sample that it has.
+//! Both FMUs coupled in co-simulation through the `fmi` crate, with the delay of one sample that co-simulation has.
 
 use std::{
     fs,
@@ -7,7 +7,9 @@ use std::{
     process::Command,
 };
 
-use fmi2_import::{Fmu, Instance};
+use fmi::fmi2::import::Fmi2Import;
+use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
+use fmi::traits::FmiImport;
 use vines::experiment::{self, Plan};
 use vines::identification::identify;
 use vines::pack::pack_bench;
@@ -37,15 +39,17 @@ fn libraries() -> PathBuf {
 
 /// One FMU of the pair.
 struct Part {
-    instance: Instance,
+    instance: InstanceCS,
+    import: Fmi2Import,
 }
 
 impl Part {
     /// Loads the FMU and starts it with the values that the system file binds to it.
     fn start(out: &Path, file: &str, bound: &str) -> Self {
-        let fmu = Fmu::open(&out.join(file)).unwrap();
+        let import: Fmi2Import = fmi::import::from_path(out.join(file)).unwrap();
         let mut part = Self {
-            instance: Instance::new(fmu, file).unwrap(),
+            instance: import.instantiate_cs(file, false, true).unwrap(),
+            import,
         };
         for (name, kind, value) in values(&out.join("bench.ssp"), bound) {
             let reference = [part.find(&name)];
@@ -57,12 +61,16 @@ impl Part {
             }
             .unwrap();
         }
-        part.instance.initialize().unwrap();
+        let instance = &mut part.instance;
+        instance.setup_experiment(None, 0.0, None).unwrap();
+        instance.enter_initialization_mode().unwrap();
+        instance.exit_initialization_mode().unwrap();
         part
     }
 
     fn find(&self, name: &str) -> u32 {
-        let variable = self.instance.description().variable(name);
+        let variables = &self.import.model_description().model_variables.variables;
+        let variable = variables.iter().find(|variable| variable.name == name);
         variable.expect("the FMU has the variable").value_reference
     }
 
@@ -78,7 +86,7 @@ impl Part {
 
     fn advance(&mut self, inputs: [u32; 2], values: [f64; 2], time: f64, step: f64) {
         self.instance.set_real(&inputs, &values).unwrap();
-        self.instance.do_step(time, step).unwrap();
+        self.instance.do_step(time, step, true).unwrap();
     }
 }
 

@@ -1,7 +1,7 @@
 //! Reader of `modelDescription.xml` (FMI 2.0, clause 2.2).
 //!
-//! The only reader of this project: the build step checks descriptions with it, the importer finds variables, and the lab
-//! writes the documentation of an FMU. Values are kept as text, because their types follow from the element.
+//! The build step checks descriptions with it, and the lab writes the documentation of an FMU. Values are kept as text,
+//! because their types follow from the element.
 #![forbid(unsafe_code)]
 
 mod error;

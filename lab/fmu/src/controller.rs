@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use fmi::fmi2::instance::Common;
 use phase_lock::{Config, PARAMETERS, Value};
 use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Sensors};
 

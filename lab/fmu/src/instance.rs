@@ -1,11 +1,17 @@
-//! An FMU as part of the bench: finds its variables by name, and keeps its time.
+//! An FMU as part of the bench: the `fmi` crate loads it; its variables are found by name, and its time is kept.
 
 use std::path::{Path, PathBuf};
 
-use fmi2_import::{CallError, Instance, LoadError};
+use fmi::fmi2::Fmi2Error;
+use fmi::fmi2::import::Fmi2Import;
+use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
+use fmi::schema::fmi2::ScalarVariableElement;
+use fmi::traits::FmiImport;
 use phase_lock::Value;
 use thiserror::Error;
 use vines_testbench::rig::{ControllerError, RigError};
+
+use crate::error::{CallError, LoadError};
 
 /// Reason why an FMU cannot be used, or cannot continue.
 #[derive(Debug, Error)]
@@ -65,12 +71,14 @@ pub enum Kind {
     Boolean,
 }
 
-impl From<Kind> for fmi2_import::Kind {
-    fn from(kind: Kind) -> Self {
-        match kind {
-            Kind::Real => Self::Real,
-            Kind::Integer => Self::Integer,
-            Kind::Boolean => Self::Boolean,
+impl Kind {
+    /// The type of a variable, if it is one of the three.
+    fn of(element: &ScalarVariableElement) -> Option<Self> {
+        match element {
+            ScalarVariableElement::Real(_) => Some(Self::Real),
+            ScalarVariableElement::Integer(_) => Some(Self::Integer),
+            ScalarVariableElement::Boolean(_) => Some(Self::Boolean),
+            _ => None,
         }
     }
 }
@@ -92,11 +100,14 @@ impl std::fmt::Display for Kind {
 }
 
 /// Value reference of a variable.
-pub(super) type Reference = u32;
+pub(super) type Reference = <Fmi2Import as FmiImport>::ValueRef;
 
 /// A loaded FMU at its simulated time.
 pub(super) struct Fmu {
-    instance: Instance,
+    // Dropped before the unpacked library.
+    instance: InstanceCS,
+    /// The description, and the folder with the unpacked FMU.
+    import: Fmi2Import,
     path: PathBuf,
     time: f64,
 }
@@ -104,13 +115,13 @@ pub(super) struct Fmu {
 impl Fmu {
     /// Loads the FMU at `path`; `name` is its name in log messages.
     pub fn load(path: &Path, name: &str) -> Result<Self, FmuError> {
-        let failed = |source| FmuError::Load {
+        let (import, instance) = open(path, name).map_err(|source| FmuError::Load {
             path: path.into(),
             source,
-        };
-        let fmu = fmi2_import::Fmu::open(path).map_err(failed)?;
+        })?;
         Ok(Self {
-            instance: Instance::new(fmu, name).map_err(failed)?,
+            instance,
+            import,
             path: path.into(),
             time: 0.0,
         })
@@ -118,8 +129,9 @@ impl Fmu {
 
     /// The variable of that name and kind, if there is one.
     pub fn find(&self, kind: Kind, name: &str) -> Option<Reference> {
-        let variable = self.instance.description().variable(name)?;
-        (variable.kind() == Some(kind.into())).then_some(variable.value_reference)
+        let variables = &self.import.model_description().model_variables.variables;
+        let variable = variables.iter().find(|variable| variable.name == name)?;
+        (Kind::of(&variable.elem) == Some(kind)).then_some(variable.value_reference)
     }
 
     /// The variable of that name and kind.
@@ -151,13 +163,18 @@ impl Fmu {
             let path = self.path.display();
             log::warn!("{path} has no {}; it uses its own values instead", missing.join(", "));
         }
-        self.ask("start", Instance::initialize)
+        self.ask("start", |i| {
+            i.setup_experiment(None, 0.0, None)?;
+            i.enter_initialization_mode()?;
+            i.exit_initialization_mode()?;
+            Ok(())
+        })
     }
 
     /// One step of `step` seconds.
     pub fn step(&mut self, step: f64) -> Result<(), FmuError> {
         let time = self.time;
-        self.ask("advance", |i| i.do_step(time, step))?;
+        self.ask("advance", |i| i.do_step(time, step, true))?;
         self.time += step;
         Ok(())
     }
@@ -177,13 +194,51 @@ impl Fmu {
     pub fn ask<T>(
         &mut self,
         action: &'static str,
-        call: impl FnOnce(&mut Instance) -> Result<T, CallError>,
+        call: impl FnOnce(&mut InstanceCS) -> Result<T, Fmi2Error>,
     ) -> Result<T, FmuError> {
-        call(&mut self.instance).map_err(|source| FmuError::Refused {
+        call(&mut self.instance).map_err(|error| FmuError::Refused {
             path: self.path.clone(),
             action,
             time: self.time,
-            source,
+            source: error.into(),
         })
+    }
+}
+
+/// Unpacks the FMU at `path` and instantiates it for co-simulation, with logging on.
+fn open(path: &Path, name: &str) -> Result<(Fmi2Import, InstanceCS), LoadError> {
+    // The crate would report another version as an error of the XML.
+    let version = fmi::import::peek_descr_path(path)?.fmi_version;
+    if version != "2.0" {
+        return Err(LoadError::Version(version));
+    }
+    let import: Fmi2Import = fmi::import::from_path(path)?;
+    let co_simulation = import.model_description().co_simulation.as_ref();
+    let identifier = &co_simulation.ok_or(LoadError::NoCoSimulation)?.model_identifier;
+    let library = import.shared_lib_path(identifier)?;
+    if !import.archive_path().join(&library).is_file() {
+        return Err(LoadError::NoLibrary(library));
+    }
+    let instance = import.instantiate_cs(name, false, true)?;
+    Ok((import, instance))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_that_is_not_an_archive_is_refused() {
+        let path = Path::new(concat!(env!("CARGO_MANIFEST_DIR"), "/Cargo.toml"));
+        let error = Fmu::load(path, "rig").err().unwrap();
+        let FmuError::Load { source, .. } = &error else {
+            panic!("{error}");
+        };
+        assert!(matches!(source, LoadError::Archive(_)), "{error}");
+        let message = error.to_string();
+        assert!(
+            message.contains("Cargo.toml") && message.contains("zip archive"),
+            "{message}"
+        );
     }
 }

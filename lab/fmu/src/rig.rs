@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use fmi::fmi2::instance::Common;
 use phase_lock::Value;
 use vines_testbench::rig::{Drive, GroundTruth, Rig, RigError, Sensors};
 
