@@ -6,7 +6,7 @@ use std::fmt;
 #[derive(Clone, Debug, PartialEq)]
 pub enum Error {
     /// The text is not XML.
-    Xml(roxmltree::Error),
+    Xml(String),
     /// The root element is not `fmiModelDescription`.
     Root(String),
     /// An element lacks an attribute.
@@ -53,6 +53,12 @@ impl std::error::Error for Error {}
 
 impl From<roxmltree::Error> for Error {
     fn from(error: roxmltree::Error) -> Self {
-        Self::Xml(error)
+        Self::Xml(error.to_string())
+    }
+}
+
+impl From<serde_xml_rs::Error> for Error {
+    fn from(error: serde_xml_rs::Error) -> Self {
+        Self::Xml(error.to_string())
     }
 }

@@ -7,6 +7,7 @@
 mod error;
 mod names;
 mod read;
+mod xml;
 
 pub use error::Error;
 pub use names::unknown_names;
@@ -186,6 +187,29 @@ mod tests {
             (0, Some("2"))
         );
         assert!(description.variable("depth").is_none());
+    }
+
+    #[test]
+    fn every_attribute_is_read() {
+        let xml = r#"<fmiModelDescription fmiVersion="2.0" modelName="n" guid="g" description="d" version="v"
+            numberOfEventIndicators="3"><ModelExchange modelIdentifier="me"/><CoSimulation modelIdentifier="cs"/>
+            <UnitDefinitions><Unit name="m"/></UnitDefinitions>
+            <TypeDefinitions><SimpleType name="L"><Real unit="m"/></SimpleType></TypeDefinitions>
+            <LogCategories><Category name="c"/></LogCategories>
+            <DefaultExperiment startTime="1" stopTime="2" stepSize="3"/>
+            <ModelVariables><ScalarVariable name="x" valueReference="7" description="t" causality="output"
+            variability="continuous" initial="exact"><Real declaredType="L" unit="m" start="4" min="5" max="6"
+            nominal="8" derivative="1"/></ScalarVariable></ModelVariables>
+            <ModelStructure><Outputs><Unknown index="1" dependencies="2" dependenciesKind="fixed"/></Outputs>
+            <Derivatives><Unknown index="1"/></Derivatives><InitialUnknowns><Unknown index="1"/></InitialUnknowns>
+            </ModelStructure></fmiModelDescription>"#;
+        let read = format!("{:?}", Description::parse(xml).unwrap());
+        // What is absent would be None, 0 or empty.
+        let optional = read.replace("dependencies: None, dependencies_kind: None", "");
+        for absent in ["None", "\"\"", "[]", ": 0,"] {
+            let of_type = optional.replacen("declared_type: None, unit: Some(\"m\"), start: None, min: None, max: None, nominal: None, derivative: None", "", 1);
+            assert!(!of_type.contains(absent), "{absent}: {read}");
+        }
     }
 
     #[test]

@@ -2,173 +2,161 @@
 
 use std::str::FromStr;
 
-use roxmltree::{Document, Node};
+use roxmltree::Document;
 
 use crate::error::Error;
+use crate::xml;
 use crate::{
     Content, DefaultExperiment, Description, Kind, ModelStructure, ScalarVariable, SimpleType,
     Unknown,
 };
 
-pub(crate) fn description(xml: &str) -> Result<Description, Error> {
-    let document = Document::parse(xml)?;
-    let root = document.root_element();
-    if !root.has_tag_name("fmiModelDescription") {
-        return Err(Error::Root(root.tag_name().name().to_owned()));
+pub(crate) fn description(text: &str) -> Result<Description, Error> {
+    let document = Document::parse(text)?;
+    let name = document.root_element().tag_name().name();
+    if name != "fmiModelDescription" {
+        return Err(Error::Root(name.to_owned()));
     }
-    let list = |name| {
-        let list = child(root, name);
-        list.into_iter().flat_map(|list| elements(list))
-    };
-    let identifier = |name| {
-        child(root, name)
-            .map(|interface| required(interface, "modelIdentifier"))
+    let root: xml::Description = serde_xml_rs::from_str(text)?;
+    let whole = "fmiModelDescription";
+    let identifier = |interface: Option<xml::Interface>, element: &str| {
+        interface
+            .map(|i| required(i.model_identifier, element, "modelIdentifier"))
             .transpose()
     };
-    let names = |name| list(name).map(|element| required(element, "name"));
-    Ok(Description {
-        fmi_version: required(root, "fmiVersion")?,
-        model_name: required(root, "modelName")?,
-        guid: text(root, "guid").unwrap_or_default(),
-        description: text(root, "description").unwrap_or_default(),
-        version: text(root, "version").unwrap_or_default(),
-        number_of_event_indicators: number(root, "numberOfEventIndicators")?.unwrap_or(0),
-        model_exchange: identifier("ModelExchange")?,
-        co_simulation: identifier("CoSimulation")?,
-        default_experiment: child(root, "DefaultExperiment").map_or_else(
-            DefaultExperiment::default,
-            |experiment| DefaultExperiment {
-                start_time: text(experiment, "startTime"),
-                stop_time: text(experiment, "stopTime"),
-                step_size: text(experiment, "stepSize"),
-            },
-        ),
-        units: names("UnitDefinitions").collect::<Result<_, _>>()?,
-        types: list("TypeDefinitions")
-            .map(simple_type)
-            .collect::<Result<_, _>>()?,
-        categories: names("LogCategories").collect::<Result<_, _>>()?,
-        variables: list("ModelVariables")
-            .filter(|element| element.has_tag_name("ScalarVariable"))
-            .map(variable)
-            .collect::<Result<_, _>>()?,
-        structure: child(root, "ModelStructure")
-            .map(structure)
-            .transpose()?
-            .unwrap_or_default(),
-    })
-}
-
-fn simple_type(element: Node) -> Result<SimpleType, Error> {
-    Ok(SimpleType {
-        name: required(element, "name")?,
-        content: contents(element)?,
-    })
-}
-
-fn variable(element: Node) -> Result<ScalarVariable, Error> {
-    Ok(ScalarVariable {
-        name: required(element, "name")?,
-        value_reference: number(element, "valueReference")?.ok_or_else(|| Error::Missing {
-            element: label(element),
-            attribute: "valueReference",
-        })?,
-        description: text(element, "description").unwrap_or_default(),
-        causality: text(element, "causality"),
-        variability: text(element, "variability"),
-        initial: text(element, "initial"),
-        content: contents(element)?,
-    })
-}
-
-fn contents(element: Node) -> Result<Vec<Content>, Error> {
-    elements(element)
-        .filter_map(|inner| Some((kind(inner.tag_name().name())?, inner)))
-        .map(|(kind, inner)| {
-            Ok(Content {
-                kind,
-                declared_type: text(inner, "declaredType"),
-                unit: text(inner, "unit"),
-                start: text(inner, "start"),
-                min: text(inner, "min"),
-                max: text(inner, "max"),
-                nominal: text(inner, "nominal"),
-                derivative: number(inner, "derivative")?,
-            })
-        })
-        .collect()
-}
-
-fn kind(element: &str) -> Option<Kind> {
-    Some(match element {
-        "Real" => Kind::Real,
-        "Integer" => Kind::Integer,
-        "Boolean" => Kind::Boolean,
-        "String" => Kind::String,
-        "Enumeration" => Kind::Enumeration,
-        _ => return None,
-    })
-}
-
-fn structure(element: Node) -> Result<ModelStructure, Error> {
-    let unknowns = |name| {
-        let list = child(element, name).into_iter();
-        let unknowns = list.flat_map(|list| elements(list)).map(|unknown| {
-            Ok(Unknown {
-                index: number(unknown, "index")?.ok_or_else(|| Error::Missing {
-                    element: label(unknown),
-                    attribute: "index",
-                })?,
-                dependencies: text(unknown, "dependencies"),
-                dependencies_kind: text(unknown, "dependenciesKind"),
-            })
-        });
-        unknowns.collect::<Result<_, Error>>()
+    let names = |list: Vec<xml::Named>, element: &'static str| {
+        let names = list
+            .into_iter()
+            .map(|named| required(named.name, element, "name"));
+        names.collect::<Result<Vec<_>, _>>()
     };
-    Ok(ModelStructure {
-        outputs: unknowns("Outputs")?,
-        derivatives: unknowns("Derivatives")?,
-        initial_unknowns: unknowns("InitialUnknowns")?,
+    let events = root.number_of_event_indicators;
+    Ok(Description {
+        fmi_version: required(root.fmi_version, whole, "fmiVersion")?,
+        model_name: required(root.model_name, whole, "modelName")?,
+        guid: root.guid.unwrap_or_default(),
+        description: root.description.unwrap_or_default(),
+        version: root.version.unwrap_or_default(),
+        number_of_event_indicators: number(events, whole, "numberOfEventIndicators")?.unwrap_or(0),
+        model_exchange: identifier(root.model_exchange, "ModelExchange")?,
+        co_simulation: identifier(root.co_simulation, "CoSimulation")?,
+        default_experiment: DefaultExperiment {
+            start_time: root.default_experiment.start_time,
+            stop_time: root.default_experiment.stop_time,
+            step_size: root.default_experiment.step_size,
+        },
+        units: names(root.unit_definitions.units, "Unit")?,
+        types: each(root.type_definitions.types, simple_type)?,
+        categories: names(root.log_categories.categories, "Category")?,
+        variables: each(root.model_variables.variables, variable)?,
+        structure: ModelStructure {
+            outputs: each(root.model_structure.outputs.unknowns, unknown)?,
+            derivatives: each(root.model_structure.derivatives.unknowns, unknown)?,
+            initial_unknowns: each(root.model_structure.initial_unknowns.unknowns, unknown)?,
+        },
     })
 }
 
-pub(crate) fn elements<'a, 'i>(
-    node: Node<'a, 'i>,
-) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
-    node.children().filter(Node::is_element)
+fn each<T, U>(list: Vec<T>, read: fn(T) -> Result<U, Error>) -> Result<Vec<U>, Error> {
+    list.into_iter().map(read).collect()
 }
 
-pub(crate) fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
-    elements(node).find(|element| element.has_tag_name(name))
+fn simple_type(element: xml::SimpleType) -> Result<SimpleType, Error> {
+    let label = label("SimpleType", element.name.as_deref());
+    let lists = [
+        (Kind::Real, element.real),
+        (Kind::Integer, element.integer),
+        (Kind::Boolean, element.boolean),
+        (Kind::String, element.string),
+        (Kind::Enumeration, element.enumeration),
+    ];
+    Ok(SimpleType {
+        name: required(element.name, &label, "name")?,
+        content: contents(lists, &label)?,
+    })
+}
+
+fn variable(element: xml::ScalarVariable) -> Result<ScalarVariable, Error> {
+    let label = label("ScalarVariable", element.name.as_deref());
+    let lists = [
+        (Kind::Real, element.real),
+        (Kind::Integer, element.integer),
+        (Kind::Boolean, element.boolean),
+        (Kind::String, element.string),
+        (Kind::Enumeration, element.enumeration),
+    ];
+    let reference = number(element.value_reference, &label, "valueReference")?;
+    Ok(ScalarVariable {
+        name: required(element.name, &label, "name")?,
+        value_reference: reference.ok_or_else(|| missing(&label, "valueReference"))?,
+        description: element.description.unwrap_or_default(),
+        causality: element.causality,
+        variability: element.variability,
+        initial: element.initial,
+        content: contents(lists, &label)?,
+    })
+}
+
+/// The elements of each type inside a variable or a declared type.
+type Lists = [(Kind, Vec<xml::Content>); 5];
+
+fn contents(lists: Lists, label: &str) -> Result<Vec<Content>, Error> {
+    let all = lists
+        .into_iter()
+        .flat_map(|(kind, list)| list.into_iter().map(move |c| (kind, c)));
+    all.map(|(kind, content)| {
+        Ok(Content {
+            kind,
+            declared_type: content.declared_type,
+            unit: content.unit,
+            start: content.start,
+            min: content.min,
+            max: content.max,
+            nominal: content.nominal,
+            derivative: number(content.derivative, label, "derivative")?,
+        })
+    })
+    .collect()
+}
+
+fn unknown(element: xml::Unknown) -> Result<Unknown, Error> {
+    let index = number(element.index, "Unknown", "index")?;
+    Ok(Unknown {
+        index: index.ok_or_else(|| missing("Unknown", "index"))?,
+        dependencies: element.dependencies,
+        dependencies_kind: element.dependencies_kind,
+    })
 }
 
 /// The element and its name, for messages.
-pub(crate) fn label(element: Node) -> String {
-    let tag = element.tag_name().name();
-    match element.attribute("name") {
-        Some(name) => format!("{tag} {name}"),
-        None => tag.to_owned(),
+pub(crate) fn label(tag: &str, name: Option<&str>) -> String {
+    name.map_or_else(|| tag.to_owned(), |name| format!("{tag} {name}"))
+}
+
+fn missing(element: &str, attribute: &'static str) -> Error {
+    Error::Missing {
+        element: element.to_owned(),
+        attribute,
     }
 }
 
-fn text(element: Node, attribute: &str) -> Option<String> {
-    element.attribute(attribute).map(str::to_owned)
+fn required(
+    value: Option<String>,
+    element: &str,
+    attribute: &'static str,
+) -> Result<String, Error> {
+    value.ok_or_else(|| missing(element, attribute))
 }
 
-fn required(element: Node, attribute: &'static str) -> Result<String, Error> {
-    text(element, attribute).ok_or_else(|| Error::Missing {
-        element: label(element),
+fn number<T: FromStr>(
+    value: Option<String>,
+    element: &str,
+    attribute: &'static str,
+) -> Result<Option<T>, Error> {
+    let parsed = value.as_deref().map(|value| value.trim().parse());
+    parsed.transpose().map_err(|_| Error::Number {
+        element: element.to_owned(),
         attribute,
-    })
-}
-
-fn number<T: FromStr>(element: Node, attribute: &'static str) -> Result<Option<T>, Error> {
-    let Some(value) = element.attribute(attribute) else {
-        return Ok(None);
-    };
-    value.trim().parse().map(Some).map_err(|_| Error::Number {
-        element: label(element),
-        attribute,
-        value: value.to_owned(),
+        value: value.clone().unwrap_or_default(),
     })
 }
