@@ -76,9 +76,7 @@ fn settled(sigma: f64, g: f64) -> Scene {
         ..lock()
     };
     let mut plant = scene.plant();
-    plant
-        .advance(scene.drive(), 1000.0 * scene.period())
-        .unwrap();
+    plant.advance(scene.drive(), 1000.0 * scene.period()).unwrap();
     let s = plant.state();
     Scene {
         start: [s.q1, s.dq1, s.q2, s.dq2],
@@ -132,9 +130,7 @@ impl Scene {
     fn compare(&self, steps: usize, step: f64) -> Option<u64> {
         let mut baseline = self.baseline();
         for _ in 0..steps {
-            baseline
-                .advance(black_box(self.amplitude), self.omega, step)
-                .ok()?;
+            baseline.advance(black_box(self.amplitude), self.omega, step).ok()?;
             black_box((baseline.q1, baseline.q2));
         }
         Some(baseline.impacts)
@@ -157,9 +153,7 @@ impl Scene {
         let step = self.period() / SAMPLES as f64;
         for n in 0..PERIODS * SAMPLES {
             let drive = self.retuned(n);
-            baseline
-                .advance(black_box(drive.amplitude), drive.omega, step)
-                .ok()?;
+            baseline.advance(black_box(drive.amplitude), drive.omega, step).ok()?;
             black_box((baseline.q1, baseline.q2));
         }
         Some((PERIODS * SAMPLES) as u64)
@@ -232,11 +226,8 @@ fn cases() -> Vec<Case> {
     let long = |scene: Scene| -> Box<dyn Fn() -> u64> {
         Box::new(move || scene.follow(1, PERIODS as f64 * scene.period(), states))
     };
-    let long_brent = |scene: Scene| -> Option<Brent> {
-        Some(Box::new(move || {
-            scene.compare(1, PERIODS as f64 * scene.period())
-        }))
-    };
+    let long_brent =
+        |scene: Scene| -> Option<Brent> { Some(Box::new(move || scene.compare(1, PERIODS as f64 * scene.period()))) };
     let (at_lock, empty) = (lock(), quiet());
     let period = at_lock.period();
     add(LOCK, "impact", "", long(at_lock), long_brent(at_lock));
@@ -279,9 +270,7 @@ fn cases() -> Vec<Case> {
         "sample",
         "",
         Box::new(move || count(at_lock.follow(samples, sample, sensors))),
-        Some(Box::new(move || {
-            at_lock.compare(samples, sample).map(count)
-        })),
+        Some(Box::new(move || at_lock.compare(samples, sample).map(count))),
     );
     add(
         "no impact, 100 samples per period",
@@ -369,9 +358,7 @@ fn table(cases: &[Case]) {
     let plant: Vec<f64> = plant.into_iter().map(median).collect();
     let lock = cases.iter().position(|case| case.name == LOCK);
     let lock = plant[lock.expect("the case of the lock")];
-    println!(
-        "\nMedians of {runs} runs each, taking turns; a lock is the cost of an impact in `{LOCK}`."
-    );
+    println!("\nMedians of {runs} runs each, taking turns; a lock is the cost of an impact in `{LOCK}`.");
     println!(
         "{:70} {:>10} {:>8} {:>10} {:>12}  accepted",
         "case", "ns", "locks", "Brent ns", "Brent/plant"

@@ -83,12 +83,7 @@ fn pressed(hopping: bool, n: u32, step: f64) {
     let mut plant = Plant::new(parameters, start).expect("a scene");
     for k in 0..n {
         let t = f64::from(k) * step;
-        let signal = [
-            0.5 * acceleration * t * t,
-            acceleration * t,
-            0.5 * acceleration,
-            0.0,
-        ];
+        let signal = [0.5 * acceleration * t * t, acceleration * t, 0.5 * acceleration, 0.0];
         plant
             .advance(
                 black_box(Drive {
@@ -126,14 +121,7 @@ const ROWS: &[(&str, &str, Run, Run)] = &[
     (
         "no excitation: no forced terms",
         "step of the plain solver",
-        |n| {
-            steps(
-                plain(quiet()),
-                n,
-                |_| (Drive::harmonic(0.0, OMEGA), STEP),
-                nothing,
-            )
-        },
+        |n| steps(plain(quiet()), n, |_| (Drive::harmonic(0.0, OMEGA), STEP), nothing),
         |n| steps(plain(quiet()), n, |_| (drive(), STEP), nothing),
     ),
     (
@@ -178,14 +166,7 @@ const ROWS: &[(&str, &str, Run, Run)] = &[
         "step length unchanged: its coefficients reused",
         "step of 1/100 period, v and base read",
         |n| steps(quiet(), n, |_| (drive(), STEP), sensors),
-        |n| {
-            steps(
-                quiet(),
-                n,
-                |k| (drive(), STEP + 1e-9 * f64::from(k)),
-                sensors,
-            )
-        },
+        |n| steps(quiet(), n, |k| (drive(), STEP + 1e-9 * f64::from(k)), sensors),
     ),
     (
         "outputs when asked for: none",
@@ -206,12 +187,7 @@ const ROWS: &[(&str, &str, Run, Run)] = &[
             steps(
                 steady(),
                 1,
-                |_| {
-                    (
-                        Drive::harmonic(0.0084 * 1.1, OMEGA),
-                        f64::from(n / 2) * PERIOD,
-                    )
-                },
+                |_| (Drive::harmonic(0.0084 * 1.1, OMEGA), f64::from(n / 2) * PERIOD),
                 nothing,
             )
         },
@@ -219,11 +195,9 @@ const ROWS: &[(&str, &str, Run, Run)] = &[
             let mut impacts: Vec<Event> = Vec::new();
             let duration = f64::from(n / 2) * PERIOD;
             steady()
-                .advance_with(
-                    black_box(Drive::harmonic(0.0084 * 1.1, OMEGA)),
-                    duration,
-                    |event| impacts.push(event),
-                )
+                .advance_with(black_box(Drive::harmonic(0.0084 * 1.1, OMEGA)), duration, |event| {
+                    impacts.push(event)
+                })
                 .unwrap();
             black_box(impacts);
         },
@@ -236,29 +210,16 @@ fn sensors(plant: &Plant) {
 
 fn all(plant: &Plant) {
     sensors(plant);
-    black_box((
-        plant.state(),
-        plant.relative_displacement(),
-        plant.relative_velocity(),
-    ));
+    black_box((plant.state(), plant.relative_displacement(), plant.relative_velocity()));
     black_box(plant.energy(plant.base_displacement()));
 }
 
 /// Instructions of a run, as valgrind counts them.
 fn counted(row: usize, without: bool, n: u32) -> Result<u64, String> {
     let output = Command::new("valgrind")
-        .args([
-            "--tool=cachegrind",
-            "--cache-sim=no",
-            "--cachegrind-out-file=/dev/null",
-        ])
+        .args(["--tool=cachegrind", "--cache-sim=no", "--cachegrind-out-file=/dev/null"])
         .arg(current_exe().map_err(|e| e.to_string())?)
-        .args([
-            "run",
-            &row.to_string(),
-            &without.to_string(),
-            &n.to_string(),
-        ])
+        .args(["run", &row.to_string(), &without.to_string(), &n.to_string()])
         .output()
         .map_err(|e| format!("valgrind: {e}; install it"))?;
     let text = String::from_utf8_lossy(&output.stderr);

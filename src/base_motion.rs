@@ -64,26 +64,14 @@ impl Drive {
         const NAMES: [(&str, &str); 4] = [
             ("e (base displacement signal)", "m"),
             ("der(e) (slope of the base signal)", "m/s"),
-            (
-                "der(e, 2)/2 (second-order coefficient of the base signal)",
-                "m/s^2",
-            ),
-            (
-                "der(e, 3)/6 (third-order coefficient of the base signal)",
-                "m/s^3",
-            ),
+            ("der(e, 2)/2 (second-order coefficient of the base signal)", "m/s^2"),
+            ("der(e, 3)/6 (third-order coefficient of the base signal)", "m/s^3"),
         ];
         for (value, (name, unit)) in self.signal.into_iter().zip(NAMES) {
             InvalidValue::unless(value.abs() <= LARGEST, name, value, unit, ALLOWED)?;
         }
         let name = "E (amplitude of the base oscillator)";
-        InvalidValue::unless(
-            self.amplitude.abs() <= LARGEST,
-            name,
-            self.amplitude,
-            "m",
-            ALLOWED,
-        )?;
+        InvalidValue::unless(self.amplitude.abs() <= LARGEST, name, self.amplitude, "m", ALLOWED)?;
         InvalidValue::unless(
             self.omega.abs() <= FASTEST,
             "omega (frequency of the base oscillator)",

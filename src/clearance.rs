@@ -109,11 +109,7 @@ pub fn first_closure<const N: usize>(
             };
             return (Some(closure), looks);
         }
-        tiny_steps = if step * fastest < TINY {
-            tiny_steps + 1
-        } else {
-            0
-        };
+        tiny_steps = if step * fastest < TINY { tiny_steps + 1 } else { 0 };
         let mut least = t * f64::EPSILON;
         if tiny_steps > MOST_TINY_STEPS {
             // A gap that has no digits left, and neither closes nor opens, would hold the march for ever: move on by a time
@@ -139,8 +135,8 @@ impl Gap {
         let mut safe = 0.0f64;
         let limit = window;
         // No bound reaches beyond where the gap would close with no jerk at all.
-        let mut window = first_root(self.gap, self.closing, self.acceleration)
-            .map_or(limit, |root| limit.min(1.5 * root));
+        let mut window =
+            first_root(self.gap, self.closing, self.acceleration).map_or(limit, |root| limit.min(1.5 * root));
         // A shorter window has a smaller remainder: down to the one that the answer itself asks for.
         for _ in 0..MOST_WINDOWS {
             safe = safe.max(self.open_within(window, jerk(window)));

@@ -144,8 +144,7 @@ impl ImpactLaw {
             touch.primary = primary - (head * relative + tail * relative);
             touch.relative = -r * relative;
             touch.particle = touch.primary - touch.relative;
-            touch.dissipated =
-                self.half_relative_mass * ((1.0 - r) * (1.0 + r)) * (relative * relative);
+            touch.dissipated = self.half_relative_mass * ((1.0 - r) * (1.0 + r)) * (relative * relative);
         }
         if rests(touch.primary, -wall.sign() * touch.relative) {
             touch.dissipated += self.half_relative_mass * touch.relative * touch.relative;
@@ -161,8 +160,7 @@ impl ImpactLaw {
     #[inline(always)]
     pub(crate) fn certainly_leaves(&self, speed: f64, largest: f64, r: &Resolution) -> bool {
         speed * speed > 2.0 * r.lowest_hop * largest
-            && (self.restitution <= LIVELY
-                || 2.0 * speed * r.fastest > SHORTEST_LIVELY_HOP * largest)
+            && (self.restitution <= LIVELY || 2.0 * speed * r.fastest > SHORTEST_LIVELY_HOP * largest)
     }
 
     /// Whether the particle that leaves a wall at `speed` is in truth at rest on it; the wall accelerates towards it with
@@ -184,8 +182,7 @@ impl ImpactLaw {
         let over_soon = self.chatter_duration(speed, pressing) <= r.longest_chatter
             || speed * r.fastest <= SHORTEST_HOP * pressing
             || self.restitution == 1.0;
-        let lively =
-            self.restitution > LIVELY && 2.0 * speed * r.fastest <= SHORTEST_LIVELY_HOP * pressing;
+        let lively = self.restitution > LIVELY && 2.0 * speed * r.fastest <= SHORTEST_LIVELY_HOP * pressing;
         lively || (low && over_soon)
     }
 }

@@ -209,8 +209,7 @@ impl FastPath {
         let fastest = oscillator.fastest.max(drive.omega.abs());
         if t == duration && self.cache.repeats(oscillator, &drive, duration) {
             self.take_step(moving, start);
-        } else if t * fastest <= short_step::LONGEST || u2 != 0.0 || u3 != 0.0 || drive.omega < 0.0
-        {
+        } else if t * fastest <= short_step::LONGEST || u2 != 0.0 || u3 != 0.0 || drive.omega < 0.0 {
             let (x, v) = (moving.masses.x.value(), moving.masses.v.value());
             let segment = Segment::new(oscillator, *moving.base, (x, v));
             let (dx, dv) = segment.departure(t);

@@ -71,12 +71,7 @@ const DERIVATIVES: u32 = 3;
 /// A step whose events are logged.
 #[cold]
 #[inline(never)]
-fn logging(
-    plant: &mut Plant,
-    drive: Drive,
-    step: f64,
-    on_event: impl FnMut(Event),
-) -> Result<Outcome, InvalidValue> {
+fn logging(plant: &mut Plant, drive: Drive, step: f64, on_event: impl FnMut(Event)) -> Result<Outcome, InvalidValue> {
     plant.advance_with(drive, step, on_event)
 }
 
@@ -156,10 +151,7 @@ impl LoViNes {
             return Err(too_long(step, rate));
         }
         // However short the step: slopes become forces.
-        if !self
-            .reach
-            .holds_base(&self.drive, step.max(1.0 / self.fastest))
-        {
+        if !self.reach.holds_base(&self.drive, step.max(1.0 / self.fastest)) {
             return Err(too_far(&self.drive));
         }
         self.longest.set(step);
@@ -246,11 +238,7 @@ impl Component for LoViNes {
     #[inline(always)]
     fn get_real(&self, variable: Real) -> f64 {
         let kept = self.outputs.get(variable);
-        if kept.is_nan() {
-            self.work_out(variable)
-        } else {
-            kept
-        }
+        if kept.is_nan() { self.work_out(variable) } else { kept }
     }
 
     #[inline]
@@ -344,13 +332,7 @@ impl Component for LoViNes {
         Ok(())
     }
 
-    fn set_real_input_derivative(
-        &mut self,
-        variable: Real,
-        order: u32,
-        value: f64,
-        log: &Log,
-    ) -> Result<(), Refusal> {
+    fn set_real_input_derivative(&mut self, variable: Real, order: u32, value: f64, log: &Log) -> Result<(), Refusal> {
         let name = variable.variable().name;
         if order > DERIVATIVES {
             return Err(Refusal::error(format!(

@@ -62,9 +62,7 @@ impl Forcing {
     /// Coefficients for `omega` (rad/s), 0 or above.
     pub fn new(oscillator: &Oscillator, omega: f64) -> Self {
         let Oscillator {
-            delta,
-            omega0_squared,
-            ..
+            delta, omega0_squared, ..
         } = *oscillator;
         let strength = Complex64::new(omega0_squared, 2.0 * delta * omega);
         let (square, error) = product(omega, omega);
@@ -82,11 +80,7 @@ impl Forcing {
             },
             _ => Form::Steady(strength / detuned),
         };
-        Self {
-            omega,
-            strength,
-            form,
-        }
+        Self { omega, strength, form }
     }
 
     /// `H`, where the first form is used.

@@ -3,9 +3,7 @@
 //! `x'' + 2 delta x' + omega0² x = 0`. Position and velocity after `t` are a linear map of those now; the map's four
 //! entries are written so that none loses digits at any damping ratio, however near to critical.
 
-use crate::arithmetic::{
-    divided, plus, product, quotient, sincos_of_product, split_coefficient, times, two_sum,
-};
+use crate::arithmetic::{divided, plus, product, quotient, sincos_of_product, split_coefficient, times, two_sum};
 use crate::overdamped::APART;
 use num_complex::Complex64;
 
@@ -100,11 +98,7 @@ impl Oscillator {
             let half_gap = libm::sqrt(-discriminant);
             let fast = -(delta + half_gap);
             let slow = omega0_squared / fast;
-            let regime = Regime::Overdamped {
-                slow,
-                fast,
-                half_gap,
-            };
+            let regime = Regime::Overdamped { slow, fast, half_gap };
             (regime, -1.0 / fast, -fast)
         };
         Self {
@@ -153,11 +147,7 @@ impl Oscillator {
                 let turned = Complex64::new(decay * cos, decay * sin);
                 (self.oscillating(omega_d, turned.im, turned.re), turned)
             }
-            Regime::Overdamped {
-                slow,
-                fast,
-                half_gap,
-            } => (self.overdamped(t, slow, fast, half_gap), Complex64::ZERO),
+            Regime::Overdamped { slow, fast, half_gap } => (self.overdamped(t, slow, fast, half_gap), Complex64::ZERO),
         }
     }
 
@@ -211,10 +201,7 @@ impl Oscillator {
         let column = |first: [(f64, f64); 2]| {
             let (mut c, mut x, mut v) = (first, (0.0, 0.0), (0.0, 0.0));
             for n in 2..DEGREE {
-                let sum = plus(
-                    times(damping, times(c[1], ((n - 1) as f64, 0.0))),
-                    times(spring, c[0]),
-                );
+                let sum = plus(times(damping, times(c[1], ((n - 1) as f64, 0.0))), times(spring, c[0]));
                 let (next, error) = divided(sum, ((n - 1) * n) as f64);
                 c = [c[1], (-next, -error)];
                 x = plus(x, c[1]);

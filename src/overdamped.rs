@@ -20,11 +20,9 @@ impl OverdampedRates {
     /// The rates of `oscillator`, if it is overdamped and they are far apart.
     pub fn of(oscillator: &Oscillator) -> Option<Self> {
         match oscillator.regime {
-            Regime::Overdamped {
-                slow,
-                fast,
-                half_gap,
-            } if half_gap > APART * oscillator.delta => Some(Self { slow, fast }),
+            Regime::Overdamped { slow, fast, half_gap } if half_gap > APART * oscillator.delta => {
+                Some(Self { slow, fast })
+            }
             _ => None,
         }
     }

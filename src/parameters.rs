@@ -43,8 +43,7 @@ impl Parameters {
 
     /// The fastest rate that the free motion can have, 1/s: of oscillation, or of creep where damping is heavy.
     pub fn fastest_rate(&self) -> f64 {
-        self.natural_frequency()
-            .max(self.damping / self.primary_mass)
+        self.natural_frequency().max(self.damping / self.primary_mass)
     }
 
     /// Mass ratio `epsilon = m/M`.
@@ -64,13 +63,7 @@ impl Parameters {
     pub fn validate(&self) -> Result<(), InvalidValue> {
         let positive = |name, value: f64, unit| {
             let allowed = "a number from 1e-100 to 1e100";
-            InvalidValue::unless(
-                (1e-100..=1e100).contains(&value),
-                name,
-                value,
-                unit,
-                allowed,
-            )
+            InvalidValue::unless((1e-100..=1e100).contains(&value), name, value, unit, allowed)
         };
         positive("M (primary mass)", self.primary_mass, "kg")?;
         positive("k (stiffness)", self.stiffness, "N/m")?;
@@ -142,10 +135,7 @@ impl fmt::Display for InvalidValue {
             allowed,
         } = self;
         let space = if unit.is_empty() { "" } else { " " };
-        write!(
-            f,
-            "{name} = {value}{space}{unit} is refused; allowed is {allowed}"
-        )
+        write!(f, "{name} = {value}{space}{unit} is refused; allowed is {allowed}")
     }
 }
 

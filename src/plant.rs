@@ -148,10 +148,7 @@ pub(crate) struct Masses {
 /// The plant: parameters, what follows from them, and the state.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(
-    feature = "serde",
-    serde(into = "snapshot::Snapshot", from = "snapshot::Snapshot")
-)]
+#[cfg_attr(feature = "serde", serde(into = "snapshot::Snapshot", from = "snapshot::Snapshot"))]
 pub struct Plant {
     rig: Rig,
     contact: Contact,
@@ -318,8 +315,6 @@ impl Plant {
         let p = &self.rig.parameters;
         let State { q1, dq1, dq2, .. } = self.state();
         let stretch = q1 - displacement;
-        0.5 * (p.primary_mass * dq1 * dq1
-            + p.particle_mass * dq2 * dq2
-            + p.stiffness * stretch * stretch)
+        0.5 * (p.primary_mass * dq1 * dq1 + p.particle_mass * dq2 * dq2 + p.stiffness * stretch * stretch)
     }
 }

@@ -61,9 +61,7 @@ impl Segment {
 
     /// The frequency of the base, rad/s, 0 or above; 0 where it has none.
     fn omega(&self) -> f64 {
-        self.driven
-            .as_ref()
-            .map_or(0.0, |(_, forcing)| forcing.omega)
+        self.driven.as_ref().map_or(0.0, |(_, forcing)| forcing.omega)
     }
 
     /// Position (m) and velocity (m/s) after `t` seconds, and the base oscillator's phasor then.
@@ -107,9 +105,7 @@ impl Segment {
 
     fn by_equation(&self, x: f64, v: f64, phasor: Complex64, t: f64) -> Derivatives {
         let Oscillator {
-            delta,
-            omega0_squared,
-            ..
+            delta, omega0_squared, ..
         } = self.oscillator;
         let [u0, u1, u2, u3] = self.base.drive.signal;
         let omega = self.omega();
@@ -125,8 +121,7 @@ impl Segment {
         ];
         let mut d = [x, v, 0.0, 0.0, 0.0, 0.0, 0.0];
         for n in 2..d.len() {
-            d[n] =
-                -2.0 * delta * (d[n - 1] - base[n - 1]) - omega0_squared * (d[n - 2] - base[n - 2]);
+            d[n] = -2.0 * delta * (d[n - 1] - base[n - 1]) - omega0_squared * (d[n - 2] - base[n - 2]);
         }
         d
     }
@@ -157,9 +152,7 @@ impl Segment {
     /// The Taylor series about the start.
     pub fn series(&self) -> Series {
         let Oscillator {
-            delta,
-            omega0_squared,
-            ..
+            delta, omega0_squared, ..
         } = self.oscillator;
         let mut base = [0.0; DEGREE];
         base[..4].copy_from_slice(&self.base.drive.signal);
@@ -195,8 +188,7 @@ impl Segment {
             let (dx, dv) = series.departure(t);
             let turned = |(z, forcing): (Complex64, Forcing)| z * rotation(forcing.omega, t);
             let phasor = self.driven.map_or(Complex64::ZERO, turned);
-            let derivatives =
-                self.by_equation(self.x0 + (self.v0 * t + dx), self.v0 + dv, phasor, t);
+            let derivatives = self.by_equation(self.x0 + (self.v0 * t + dx), self.v0 + dv, phasor, t);
             Instant {
                 departure: (dx, dv),
                 derivatives,

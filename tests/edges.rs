@@ -28,11 +28,7 @@ fn without_loss_the_particle_never_sticks_and_nothing_is_dissipated() {
         let mut plant = elastic(speed);
         let before = plant.energy(1.0);
         let outcome = plant.advance(Drive::held(1.0), 3.0).unwrap();
-        assert_eq!(
-            (outcome.stuck, plant.totals().dissipated),
-            (0, 0.0),
-            "{speed}"
-        );
+        assert_eq!((outcome.stuck, plant.totals().dissipated), (0, 0.0), "{speed}");
         assert!(outcome.impacts > 0, "{speed}");
         let drift = (plant.energy(1.0) - before).abs() / before;
         assert!(drift < 1e-11, "{speed}: {drift:e}");
@@ -92,10 +88,7 @@ fn an_invalid_drive_or_step_is_refused_and_changes_nothing() {
         let message = plant.advance(drive, duration).unwrap_err().to_string();
         assert!(message.starts_with("duration"), "{message}");
     }
-    assert_eq!(
-        (plant.state(), *plant.totals(), plant.time(), plant.base()),
-        before
-    );
+    assert_eq!((plant.state(), *plant.totals(), plant.time(), plant.base()), before);
 }
 
 #[test]
@@ -115,11 +108,7 @@ fn steps_that_differ_in_their_last_digits_end_where_equal_ones_do() {
     for n in 1..=20_000 {
         equal.advance(drive, step).unwrap();
         // A master whose clock is a sum of rounded steps.
-        let jitter = if n % 20_000 == 0 {
-            0.0
-        } else {
-            1e-13 * f64::from(n % 7)
-        };
+        let jitter = if n % 20_000 == 0 { 0.0 } else { 1e-13 * f64::from(n % 7) };
         let next = f64::from(n) * step * (1.0 + jitter);
         irregular.advance(drive, next - clock).unwrap();
         clock = next;
@@ -156,9 +145,6 @@ fn a_drive_that_changes_at_every_sample_gives_the_motion_of_the_plain_solver() {
     }
     let (a, b) = (fast.state(), plain.state());
     assert_eq!(fast.totals().impacts, plain.totals().impacts);
-    let off = (a.q1 - b.q1)
-        .abs()
-        .max((a.dq1 - b.dq1).abs())
-        .max((a.q2 - b.q2).abs());
+    let off = (a.q1 - b.q1).abs().max((a.dq1 - b.dq1).abs()).max((a.q2 - b.q2).abs());
     assert!(off < 1e-12, "{off:e}");
 }

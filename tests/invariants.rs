@@ -117,15 +117,8 @@ fn a_grazing_overshoot_of_1e_13_is_caught_and_an_undershoot_is_not_reported() {
             plant.totals().impacts
         };
         for step in [2.0, 0.5, 0.01] {
-            assert!(
-                impacts(1.0 + delta, step) > 0,
-                "overshoot {delta:e} in steps of {step}"
-            );
-            assert_eq!(
-                impacts(1.0 - delta, step),
-                0,
-                "undershoot {delta:e} in steps of {step}"
-            );
+            assert!(impacts(1.0 + delta, step) > 0, "overshoot {delta:e} in steps of {step}");
+            assert_eq!(impacts(1.0 - delta, step), 0, "undershoot {delta:e} in steps of {step}");
         }
     }
 }
@@ -152,13 +145,7 @@ fn a_particle_at_rest_on_the_wall_is_held_let_go_and_caught_again() {
             wall: Wall::Plus
         }
     ));
-    assert!(matches!(
-        events[1],
-        Event::Released {
-            wall: Wall::Plus,
-            ..
-        }
-    ));
+    assert!(matches!(events[1], Event::Released { wall: Wall::Plus, .. }));
     assert!(matches!(events[2], Event::Impact { .. }));
     // Undamped it would let go when the acceleration of the joint mass is 0, a quarter of its period on; damping delays that.
     let Event::Released { t, .. } = events[1] else {
@@ -171,10 +158,7 @@ fn a_particle_at_rest_on_the_wall_is_held_let_go_and_caught_again() {
 fn at_rest_nothing_happens_for_a_million_periods() {
     let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
     for q2 in [0.0, 1.0, -1.0] {
-        let start = State {
-            q2,
-            ..State::default()
-        };
+        let start = State { q2, ..State::default() };
         let mut plant = Plant::new(parameters, start).unwrap();
         plant.advance(Drive::default(), 6.3e6).unwrap();
         assert_eq!(plant.state(), start);

@@ -4,11 +4,7 @@ use lovines::{Drive, Parameters, Plant, State, Wall};
 use serde_json::Value;
 
 fn number(value: &Value) -> f64 {
-    value
-        .as_str()
-        .expect("a decimal string")
-        .parse()
-        .expect("a number")
+    value.as_str().expect("a decimal string").parse().expect("a number")
 }
 
 /// Largest error of any state after any step.
@@ -20,12 +16,7 @@ fn worst_error(scene: &str) -> f64 {
     let text = std::fs::read_to_string(path).expect("reference data");
     let reference: Value = serde_json::from_str(&text).expect("JSON");
     let at = |key: &str| number(&reference[key]);
-    let x0: Vec<f64> = reference["x0"]
-        .as_array()
-        .unwrap()
-        .iter()
-        .map(number)
-        .collect();
+    let x0: Vec<f64> = reference["x0"].as_array().unwrap().iter().map(number).collect();
     let parameters = Parameters::dimensionless(at("eps"), at("lam"), at("r"));
     let start = State {
         q1: x0[0],
@@ -40,20 +31,13 @@ fn worst_error(scene: &str) -> f64 {
         plant.advance(drive, at("step")).unwrap();
         let s = plant.state();
         let mut error = 0.0f64;
-        for (got, want) in [s.q1, s.dq1, s.q2, s.dq2]
-            .iter()
-            .zip(&row.as_array().unwrap()[1..5])
-        {
+        for (got, want) in [s.q1, s.dq1, s.q2, s.dq2].iter().zip(&row.as_array().unwrap()[1..5]) {
             error = error.max((got - number(want)).abs());
         }
         let stuck = plant.contact().map_or(0.0, Wall::sign);
         assert_eq!(stuck, row[6].as_f64().unwrap(), "{scene}: contact");
         if scene != "chatter" {
-            assert_eq!(
-                plant.totals().impacts,
-                row[5].as_u64().unwrap(),
-                "{scene}: impacts"
-            );
+            assert_eq!(plant.totals().impacts, row[5].as_u64().unwrap(), "{scene}: impacts");
         }
         worst = worst.max(error);
     }

@@ -77,16 +77,10 @@ pub fn measure(folder: &Path, what: &str, budget: f64, most: f64) -> Result<Valu
                 scene.step_by_step(PERIODS * count, scene.period / count as f64)
             }),
             _ => {
-                return Err(format!(
-                    "{what}: there are periods, impacts and samples per period"
-                ));
+                return Err(format!("{what}: there are periods, impacts and samples per period"));
             }
         };
-        let grown = if what == "impacts" {
-            work as f64
-        } else {
-            count as f64
-        };
+        let grown = if what == "impacts" { work as f64 } else { count as f64 };
         points.push([grown, ns, work as f64]);
         size *= 10f64.sqrt();
     }

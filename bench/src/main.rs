@@ -76,29 +76,17 @@ fn answer(folder: &Path, request: &str) -> Result<serde_json::Value, String> {
             limit,
         } => {
             let scene = Scene::load(folder, &scene)?;
-            let (budget, limit) = (
-                Duration::from_secs_f64(budget),
-                Duration::from_secs_f64(limit),
-            );
+            let (budget, limit) = (Duration::from_secs_f64(budget), Duration::from_secs_f64(limit));
             let answer = methods::measure_named(&method, &scene, setting, &checks, budget, limit)?;
             serde_json::to_value(answer).map_err(wrong)
         }
-        Request::Growth {
-            growth,
-            budget,
-            most,
-        } => growth::measure(folder, &growth, budget, most),
+        Request::Growth { growth, budget, most } => growth::measure(folder, &growth, budget, most),
         Request::Profile { profile } => profile::of(&Scene::load(folder, &profile)?),
         Request::Record { record } => Ok(json!({"drives": closed_loop::record(record)})),
-        Request::Loop {
-            closed_loop,
-            budget,
-        } => Ok(closed_loop::measure(closed_loop, budget)),
-        Request::Map {
-            map_g,
-            sigmas,
-            effort,
-        } => serde_json::to_value(map::row(map_g, &sigmas, &effort)?).map_err(wrong),
+        Request::Loop { closed_loop, budget } => Ok(closed_loop::measure(closed_loop, budget)),
+        Request::Map { map_g, sigmas, effort } => {
+            serde_json::to_value(map::row(map_g, &sigmas, &effort)?).map_err(wrong)
+        }
         Request::Methods { methods } => Ok(json!(methods.then_some(methods::NAMES))),
     }
 }
@@ -120,8 +108,7 @@ fn main() -> std::io::Result<()> {
         .unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
     for line in std::io::stdin().lock().lines() {
         let line = line?;
-        let answer =
-            answer(Path::new(&folder), &line).unwrap_or_else(|error| json!({"error": error}));
+        let answer = answer(Path::new(&folder), &line).unwrap_or_else(|error| json!({"error": error}));
         let mut out = std::io::stdout().lock();
         writeln!(out, "{answer}")?;
         out.flush()?;

@@ -117,9 +117,7 @@ impl Axis {
     /// The values.
     pub fn values(&self) -> Vec<f64> {
         let step = (self.to - self.from) / (self.points - 1).max(1) as f64;
-        (0..self.points)
-            .map(|n| self.from + step * n as f64)
-            .collect()
+        (0..self.points).map(|n| self.from + step * n as f64).collect()
     }
 }
 
@@ -140,9 +138,7 @@ impl std::str::FromStr for Axis {
             _ => (None, None, None),
         };
         match (from, to, points) {
-            (Some(from), Some(to), Some(points @ 1..=500)) if from <= to => {
-                Ok(Self { from, to, points })
-            }
+            (Some(from), Some(to), Some(points @ 1..=500)) if from <= to => Ok(Self { from, to, points }),
             _ => Err(wrong()),
         }
     }
@@ -179,10 +175,7 @@ mod tests {
             assert!(cell.ratio > 0.0 && cell.brent_ns.is_some());
         }
         let rare = row(0.1, &[-4.0], &short()).expect("a row");
-        assert_eq!(
-            (rare.cells[0].regime, rare.cells[0].unit),
-            (cell::RARE, "period")
-        );
+        assert_eq!((rare.cells[0].regime, rare.cells[0].unit), (cell::RARE, "period"));
     }
 
     #[test]

@@ -56,13 +56,7 @@ pub struct Answer {
 
 /// Runs the scene for about `budget`, once at least; a run that lasts longer than `limit` is given up. `checks` are the steps,
 /// counted from 1, after which the state is kept.
-pub fn measure<M: Method>(
-    scene: &Scene,
-    setting: f64,
-    checks: &[usize],
-    budget: Duration,
-    limit: Duration,
-) -> Answer {
+pub fn measure<M: Method>(scene: &Scene, setting: f64, checks: &[usize], budget: Duration, limit: Duration) -> Answer {
     let mut answer = Answer::default();
     let began = Instant::now();
     while answer.ns.is_empty() || (began.elapsed() < budget && answer.ns.len() < 1000) {

@@ -59,10 +59,7 @@ pub fn measure_named(
         #[cfg(feature = "diffsol")]
         "diffsol-bdf" => measure::<diffsol::Bdf>,
         _ => {
-            return Err(format!(
-                "there is no method {name}; there are {}",
-                NAMES.join(", ")
-            ));
+            return Err(format!("there is no method {name}; there are {}", NAMES.join(", ")));
         }
     };
     Ok(measure(scene, setting, checks, budget, limit))
@@ -87,10 +84,7 @@ mod tests {
         assert_eq!(answer.failure, None, "{method} in {scene}");
         let states = answer.states.last().expect("the state at the end");
         let error = |(n, x): (usize, &f64)| {
-            let truth: f64 = last[n + 1]
-                .as_str()
-                .and_then(|x| x.parse().ok())
-                .expect("a number");
+            let truth: f64 = last[n + 1].as_str().and_then(|x| x.parse().ok()).expect("a number");
             (x - truth).abs()
         };
         states.iter().enumerate().map(error).fold(0.0, f64::max)

@@ -65,9 +65,7 @@ impl Scene {
         };
         let wrong = |e: serde_json::Error| format!("{name}: {e}");
         let all: serde_json::Value = serde_json::from_str(&read("scenes.json")?).map_err(wrong)?;
-        let written = all
-            .get(name)
-            .ok_or_else(|| format!("there is no scene {name}"))?;
+        let written = all.get(name).ok_or_else(|| format!("there is no scene {name}"))?;
         let scene: Written = serde_json::from_value(written.clone()).map_err(wrong)?;
         let steps = match &scene.drives {
             None => {

@@ -29,18 +29,8 @@ pub struct Stalled;
 /// The free oscillation about the particular solution: two amplitudes, by the sign of `zeta - 1`.
 #[derive(Clone, Copy, Debug)]
 enum Free {
-    Under {
-        delta: f64,
-        omega: f64,
-        a: f64,
-        b: f64,
-    },
-    Over {
-        first: f64,
-        second: f64,
-        a: f64,
-        b: f64,
-    },
+    Under { delta: f64, omega: f64, a: f64, b: f64 },
+    Over { first: f64, second: f64, a: f64, b: f64 },
 }
 
 /// The motion of the primary mass from an instant on.
@@ -61,11 +51,7 @@ impl Motion {
         let (sin, cos) = (self.omega * t + self.phase).sin_cos();
         let x = self.p * sin + self.q * cos;
         let v = self.omega * (self.p * cos - self.q * sin);
-        if self.secular {
-            (x * t, v * t + x)
-        } else {
-            (x, v)
-        }
+        if self.secular { (x * t, v * t + x) } else { (x, v) }
     }
 
     fn new(rig: &Rig, amplitude: f64, omega: f64, phase: f64, from: f64, x: f64, v: f64) -> Self {
@@ -139,12 +125,7 @@ impl Motion {
                 let y = decay * (a * cos + b * sin);
                 (y, decay * omega * (b * cos - a * sin) - delta * y)
             }
-            Free::Over {
-                first,
-                second,
-                a,
-                b,
-            } => {
+            Free::Over { first, second, a, b } => {
                 let (fast, slow) = (a * (first * h).exp(), b * (second * h).exp());
                 (fast + slow, first * fast + second * slow)
             }
@@ -240,9 +221,7 @@ impl Baseline {
 
     fn motion(&self) -> Motion {
         let (amplitude, omega) = self.drive;
-        Motion::new(
-            &self.rig, amplitude, omega, self.phase, self.time, self.q1, self.dq1,
-        )
+        Motion::new(&self.rig, amplitude, omega, self.phase, self.time, self.q1, self.dq1)
     }
 
     fn impact(&mut self, time: f64, x: f64, v: f64, wall: f64) {

@@ -162,12 +162,7 @@ impl AmplitudeLoop {
     /// One sample. `reading` is the measured response amplitude, m, or `None` if it is not valid: then only the feedforward
     /// acts. Returns the drive amplitude, m, which differs from `before` at most by the ramp's rate, and the shift of the
     /// frequency, rad/s.
-    pub fn follow(
-        &self,
-        state: &mut AmplitudeState,
-        before: f64,
-        reading: Option<f64>,
-    ) -> (f64, f64) {
+    pub fn follow(&self, state: &mut AmplitudeState, before: f64, reading: Option<f64>) -> (f64, f64) {
         let (progress, growth) = state.advance();
         state.expected += self.detector_step * (state.setpoint - state.expected);
         let planned = state.integral + progress * state.trajectory.amplitude;

@@ -36,10 +36,8 @@ impl Config {
     }
 
     fn check_frequencies(&self) -> Result<(), ConfigError> {
-        Quantity::new("omega_max", self.omega_max, "rad/s").check(
-            self.omega_max > self.omega_min,
-            "a finite number above omega_min",
-        )?;
+        Quantity::new("omega_max", self.omega_max, "rad/s")
+            .check(self.omega_max > self.omega_min, "a finite number above omega_min")?;
         Quantity::new("omega_start", self.omega_start, "rad/s").check(
             (self.omega_min..=self.omega_max).contains(&self.omega_start),
             "between omega_min and omega_max",
@@ -51,10 +49,8 @@ impl Config {
             self.amplitude <= self.amplitude_limit(),
             "a finite number, 0 or above and at most amplitude_max",
         )?;
-        Quantity::new("base_bandwidth", self.base_bandwidth, "rad/s").check(
-            self.base_bandwidth <= self.bandwidth,
-            "between 0 and bandwidth",
-        )
+        Quantity::new("base_bandwidth", self.base_bandwidth, "rad/s")
+            .check(self.base_bandwidth <= self.bandwidth, "between 0 and bandwidth")
     }
 
     fn check_detector(&self) -> Result<(), ConfigError> {

@@ -183,8 +183,7 @@ impl PhaseLock {
             }
             LoopState::Ramping => {
                 filter.go_to(frequency, omega_start);
-                state.ready = drive.ramp(&mut state.drive, self.config.amplitude)
-                    && frequency.omega == omega_start;
+                state.ready = drive.ramp(&mut state.drive, self.config.amplitude) && frequency.omega == omega_start;
             }
             LoopState::Acquiring | LoopState::Locked => self.close_loop(state, measured),
             LoopState::LockLost | LoopState::Tripped => {
@@ -210,9 +209,9 @@ impl PhaseLock {
             let reading = state.channels.response.amplitude();
             let near = measured.valid && measured.error.abs() < PHASE_RANGE;
             let before = state.drive.amplitude;
-            let (amplitude, shift) =
-                self.amplitude_loop
-                    .follow(amplitude_loop, before, near.then_some(reading));
+            let (amplitude, shift) = self
+                .amplitude_loop
+                .follow(amplitude_loop, before, near.then_some(reading));
             state.drive.amplitude = amplitude;
             filter.shift(&mut state.frequency, shift);
             state.ready = amplitude_loop.has_arrived();
@@ -241,9 +240,7 @@ impl PhaseLock {
                 amplitude: state.channels.response.amplitude(),
                 valid: measured.valid,
             };
-            state.lost = self
-                .stationarity
-                .update(&mut state.dwell, &reading, period_ends);
+            state.lost = self.stationarity.update(&mut state.dwell, &reading, period_ends);
         }
     }
 

@@ -126,11 +126,7 @@ mod tests {
         let mut oscillator = Oscillator::default();
         let mut worst = 0.0_f64;
         for n in 0..10_000 {
-            detector.update(
-                &mut estimate,
-                signal(oscillator.phase()),
-                oscillator.rotor(),
-            );
+            detector.update(&mut estimate, signal(oscillator.phase()), oscillator.rotor());
             oscillator.advance(omega, sample_time);
             if n >= 9_900 {
                 let (amplitude, phase) = (estimate.amplitude(), estimate.argument());
@@ -152,11 +148,7 @@ mod tests {
 
     #[test]
     fn the_adaptive_filter_rejects_an_offset() {
-        let error = ripple(
-            Detector::Adaptive,
-            |phase| 5.0 + libm::sin(phase),
-            (1.0, 0.0),
-        );
+        let error = ripple(Detector::Adaptive, |phase| 5.0 + libm::sin(phase), (1.0, 0.0));
         assert!(error < 1e-12, "{error}");
     }
 

@@ -30,11 +30,7 @@ pub struct Coefficients {
 impl Harmonics {
     /// Order of the highest harmonic.
     pub fn highest(&self) -> usize {
-        if self.odd_only {
-            2 * self.count - 1
-        } else {
-            self.count
-        }
+        if self.odd_only { 2 * self.count - 1 } else { self.count }
     }
 
     /// Number of coefficients: the offset, and two per harmonic.
@@ -52,11 +48,7 @@ impl Harmonics {
     /// Least mean squares (LMS): every coefficient moves down the gradient of the squared residual. All harmonics and the
     /// offset share one residual, so that no component causes ripple in another.
     pub fn update(&self, c: &mut Coefficients, sample: f64, rotor: Complex) -> f64 {
-        let stride = if self.odd_only {
-            rotor.times(rotor)
-        } else {
-            rotor
-        };
+        let stride = if self.odd_only { rotor.times(rotor) } else { rotor };
         let mut rotors = [Complex::default(); MAX_HARMONICS];
         let mut next = rotor;
         let mut estimate = c.offset;

@@ -31,10 +31,7 @@ pub struct Frequency {
 impl Frequency {
     /// The state at a constant frequency, rad/s.
     pub fn at(omega: f64) -> Self {
-        Self {
-            integral: omega,
-            omega,
-        }
+        Self { integral: omega, omega }
     }
 }
 

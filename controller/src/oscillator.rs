@@ -42,9 +42,7 @@ mod tests {
     fn a_million_binary_steps_return_to_exactly_zero() {
         let mut oscillator = Oscillator::default();
         let step = TAU / 128.0;
-        let wraps = (0..1 << 20)
-            .filter(|_| oscillator.advance(step, 1.0))
-            .count();
+        let wraps = (0..1 << 20).filter(|_| oscillator.advance(step, 1.0)).count();
         assert_eq!(wraps, 1 << 13);
         assert_eq!(oscillator.phase(), 0.0);
     }

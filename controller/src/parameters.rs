@@ -214,21 +214,13 @@ mod tests {
             .expect("a parameter")
             .set(&mut config, Value::Integer(-3))
             .expect_err("an integer is refused");
-        assert_eq!(
-            (refused.name, refused.value, refused.unit),
-            ("delay", -3.0, "s")
-        );
+        assert_eq!((refused.name, refused.value, refused.unit), ("delay", -3.0, "s"));
     }
 
     #[test]
     fn a_whole_number_out_of_range_is_refused_at_once() {
         let mut config = Config::for_resonance(55.0, 1e-4);
-        for (name, value) in [
-            ("harmonics", 9),
-            ("harmonics", -1),
-            ("lock.dwell", 0),
-            ("detector", 3),
-        ] {
+        for (name, value) in [("harmonics", 9), ("harmonics", -1), ("lock.dwell", 0), ("detector", 3)] {
             let refused = Parameter::find(name)
                 .expect("a parameter")
                 .set(&mut config, Value::Integer(value));

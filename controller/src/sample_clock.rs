@@ -24,10 +24,7 @@ impl SampleClock {
     /// A clock at time 0 with no sample taken; `sample_time` in s, above 0.
     #[must_use]
     pub const fn new(sample_time: f64) -> Self {
-        Self {
-            sample_time,
-            taken: 0,
-        }
+        Self { sample_time, taken: 0 }
     }
 
     /// Number of samples taken so far.

@@ -93,11 +93,9 @@ impl Sensing {
         let fault = self.fault(input.response, channel);
         // The detectors ignore an invalid reading and keep their estimates.
         if fault != Some(Fault::Sensor) {
-            self.detector
-                .update(&mut state.response, input.response, drive.rotor);
+            self.detector.update(&mut state.response, input.response, drive.rotor);
             if let Some(reading) = channel {
-                self.detector
-                    .update(&mut state.reference, reading, drive.rotor);
+                self.detector.update(&mut state.reference, reading, drive.rotor);
             }
         }
         let reference = if channel.is_some() {
@@ -113,10 +111,7 @@ impl Sensing {
             fault,
             error: if measurable { wrap(error) } else { 0.0 },
             reference_amplitude: reference.amplitude,
-            valid: measurable
-                && reference.valid
-                && amplitude >= self.response_min
-                && self.is_coherent(response),
+            valid: measurable && reference.valid && amplitude >= self.response_min && self.is_coherent(response),
             has_sensor: channel.is_some(),
         }
     }

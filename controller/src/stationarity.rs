@@ -88,9 +88,7 @@ impl Dwell {
     /// Means over the complete blocks: frequency, rad/s, and response amplitude, m.
     pub fn means(&self) -> Option<(f64, f64)> {
         let complete = &self.blocks[BLOCKS - self.complete..];
-        let mean = |value: fn(&Block) -> f64| {
-            complete.iter().map(value).sum::<f64>() / self.complete as f64
-        };
+        let mean = |value: fn(&Block) -> f64| complete.iter().map(value).sum::<f64>() / self.complete as f64;
         (self.complete > 0).then(|| (mean(|block| block.omega), mean(|block| block.amplitude)))
     }
 }
@@ -249,8 +247,7 @@ mod tests {
     #[test]
     fn the_lock_is_lost_only_beyond_the_wider_tolerance() {
         let mut dwell = Dwell::default();
-        let mut is_lost =
-            |error| CRITERION.update(&mut dwell, &Reading { error, ..CONSTANT }, true);
+        let mut is_lost = |error| CRITERION.update(&mut dwell, &Reading { error, ..CONSTANT }, true);
         assert!(!is_lost(0.05) && !is_lost(-0.09));
         assert!(is_lost(0.11));
     }

@@ -68,9 +68,7 @@ impl LoopState {
     /// The next state, and the fault that caused it.
     pub(crate) fn next(self, conditions: &Conditions) -> (Self, Option<Fault>) {
         match self {
-            Self::Ramping | Self::Acquiring | Self::Locked if !conditions.active => {
-                (Self::ShutDown, None)
-            }
+            Self::Ramping | Self::Acquiring | Self::Locked if !conditions.active => (Self::ShutDown, None),
             Self::LockLost | Self::Tripped if !conditions.active => (Self::Idle, None),
             Self::LockLost | Self::Tripped => (self, None),
             Self::Idle | Self::ShutDown if !conditions.active => (self, None),
@@ -171,9 +169,6 @@ mod tests {
             ..ACTIVE
         };
         assert_eq!(LoopState::Locked.next(&conditions).0, LoopState::LockLost);
-        assert_eq!(
-            LoopState::Acquiring.next(&conditions).0,
-            LoopState::Acquiring
-        );
+        assert_eq!(LoopState::Acquiring.next(&conditions).0, LoopState::Acquiring);
     }
 }

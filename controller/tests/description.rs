@@ -72,11 +72,7 @@ fn the_fmu_starts_as_the_core_would_for_the_same_resonance() {
             Value::Integer(expected) => expected.into(),
             Value::Boolean(expected) => {
                 let start = attribute(variable(name), "start");
-                assert_eq!(
-                    start,
-                    Some(if expected { "true" } else { "false" }),
-                    "{name}"
-                );
+                assert_eq!(start, Some(if expected { "true" } else { "false" }), "{name}");
                 continue;
             }
         };
@@ -95,10 +91,6 @@ fn start_values_lie_in_the_ranges_of_the_core() {
             continue;
         }
         let start = number(variable(parameter.name), "start").expect("a start value");
-        assert!(
-            parameter.range.contains(start),
-            "{} = {start}",
-            parameter.name
-        );
+        assert!(parameter.range.contains(start), "{} = {start}", parameter.name);
     }
 }

@@ -15,17 +15,12 @@ fn ramps_stay_within_their_rates() {
         ..config()
     });
     let Config {
-        sample_time,
-        amplitude,
-        ..
+        sample_time, amplitude, ..
     } = *bench.controller.config();
     let mut before = bench.sample();
     for _ in 0..60_000 {
         let output = bench.sample();
-        let (omega, level) = (
-            output.omega - before.omega,
-            output.amplitude - before.amplitude,
-        );
+        let (omega, level) = (output.omega - before.omega, output.amplitude - before.amplitude);
         assert!(omega.abs() <= 0.5 * sample_time * (1.0 + 1e-9));
         assert!(level.abs() <= amplitude * sample_time / 2.0 * (1.0 + 1e-9));
         before = output;

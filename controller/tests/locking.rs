@@ -40,10 +40,7 @@ fn locks_with_either_detector() {
             ..config()
         });
         let (_, output) = bench.run_to_lock(2000).expect("a lock");
-        assert!(
-            relative(output.frequency, OMEGA_0) < 1e-4,
-            "{detector:?} {output:?}"
-        );
+        assert!(relative(output.frequency, OMEGA_0) < 1e-4, "{detector:?} {output:?}");
     }
 }
 
@@ -96,10 +93,7 @@ fn follows_a_resonance_that_moves() {
     for _ in 0..500 * 100 {
         bench.resonator.omega_0 -= 1e-5 * OMEGA_0 / 100.0;
         let output = bench.sample();
-        assert!(
-            output.locked && output.phase_error.abs() < 0.02,
-            "{output:?}"
-        );
+        assert!(output.locked && output.phase_error.abs() < 0.02, "{output:?}");
     }
     assert!(relative(bench.run(400).frequency, 0.995 * OMEGA_0) < 1e-5);
 }
@@ -109,10 +103,7 @@ fn retuning_keeps_the_lock_and_settles_again() {
     let mut bench = Bench::new(config());
     bench.run_to_lock(2000).expect("a lock");
     let target = bench.controller.config().phase_target;
-    bench
-        .controller
-        .retune(0.9 * AMPLITUDE, target)
-        .expect("within limits");
+    bench.controller.retune(0.9 * AMPLITUDE, target).expect("within limits");
     let output = bench.sample();
     assert!(output.locked && !output.settled);
     let output = bench.run(400);
@@ -132,10 +123,7 @@ fn the_base_amplitude_is_controlled_if_base_bandwidth_is_positive() {
         let (q, base) = (bench.resonator.q, 0.8 * bench.resonator.base);
         output = bench.sample_reading(q, Some(base));
     }
-    assert!(
-        relative(output.amplitude, AMPLITUDE / 0.8) < 1e-6,
-        "{output:?}"
-    );
+    assert!(relative(output.amplitude, AMPLITUDE / 0.8) < 1e-6, "{output:?}");
     assert!(output.locked);
 }
 
@@ -180,10 +168,7 @@ fn periods_to_lock_over_bandwidth() {
                 locked.get_or_insert(f64::from(n) / 100.0);
             }
         }
-        println!(
-            "{ratio:10} {:22.1} {locked:?}",
-            f64::from(last_outside) / 100.0
-        );
+        println!("{ratio:10} {:22.1} {locked:?}", f64::from(last_outside) / 100.0);
         assert!(locked.is_some(), "{ratio}");
     }
 }

@@ -72,24 +72,15 @@ fn an_invalid_reading_ramps_the_drive_down_and_latches() {
             bench.run_to_lock(2000).expect("a lock");
             let before = bench.sample().amplitude;
             let output = bench.sample_reading(response, Some(reference));
-            assert_eq!(
-                (output.state, output.fault),
-                (LoopState::Tripped, Some(Fault::Sensor))
-            );
-            assert!(
-                output.amplitude < before && output.amplitude > 0.9 * before,
-                "gradual"
-            );
+            assert_eq!((output.state, output.fault), (LoopState::Tripped, Some(Fault::Sensor)));
+            assert!(output.amplitude < before && output.amplitude > 0.9 * before, "gradual");
             let output = bench.run(100);
             assert_eq!((output.state, output.amplitude), (LoopState::Tripped, 0.0));
             bench.active = false;
             assert_eq!(bench.sample().state, LoopState::Idle);
             bench.active = true;
             assert_eq!(bench.sample().fault, None);
-            assert!(
-                bench.run_to_lock(2000).is_some(),
-                "armed again, it locks again"
-            );
+            assert!(bench.run_to_lock(2000).is_some(), "armed again, it locks again");
         }
     }
 }
@@ -111,9 +102,7 @@ fn acquiring_times_out() {
         acquire_timeout: 0.5,
         ..config()
     });
-    let states: Vec<_> = (0..600)
-        .map(|_| bench.sample_reading(0.0, None).state)
-        .collect();
+    let states: Vec<_> = (0..600).map(|_| bench.sample_reading(0.0, None).state).collect();
     assert_eq!(states[400], LoopState::Acquiring);
     assert_eq!(states[599], LoopState::Tripped);
     assert_eq!(bench.sample().fault, Some(Fault::TimedOut));
@@ -150,10 +139,7 @@ fn a_disturbance_between_the_two_tolerances_does_not_unlock() {
         unlock_tolerance,
         ..
     } = bench.controller.config().lock;
-    assert!(
-        largest > phase_tolerance && largest < unlock_tolerance,
-        "{largest}"
-    );
+    assert!(largest > phase_tolerance && largest < unlock_tolerance, "{largest}");
 }
 
 #[test]
@@ -170,10 +156,7 @@ fn the_drive_is_switched_off_at_once_or_with_a_ramp_as_configured() {
         assert!((output.amplitude / AMPLITUDE - expected).abs() < 1e-3);
         let after = bench.run(200);
         assert_eq!(after.amplitude, 0.0);
-        assert!(
-            (after.omega - before.omega).abs() < 0.1,
-            "the frequency stays constant"
-        );
+        assert!((after.omega - before.omega).abs() < 0.1, "the frequency stays constant");
     }
 }
 

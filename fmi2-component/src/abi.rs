@@ -19,31 +19,24 @@ mod strings;
 mod types;
 mod values;
 
-pub use derivatives::{
-    get_directional_derivative, get_real_output_derivatives, set_real_input_derivatives,
-};
+pub use derivatives::{get_directional_derivative, get_real_output_derivatives, set_real_input_derivatives};
 pub use experiment::{
-    cancel_step, do_step, enter_initialization_mode, exit_initialization_mode, reset,
-    setup_experiment, terminate,
+    cancel_step, do_step, enter_initialization_mode, exit_initialization_mode, reset, setup_experiment, terminate,
 };
 pub use fmu_state::{
-    deserialize_fmu_state, free_fmu_state, get_fmu_state, serialize_fmu_state,
-    serialized_fmu_state_size, set_fmu_state,
+    deserialize_fmu_state, free_fmu_state, get_fmu_state, serialize_fmu_state, serialized_fmu_state_size, set_fmu_state,
 };
 pub use instantiate::{free_instance, instantiate};
 pub use logging::set_debug_logging;
 pub use model_exchange::{
-    completed_integrator_step, enter_continuous_time_mode, enter_event_mode, get_continuous_states,
-    get_derivatives, get_event_indicators, get_nominals_of_continuous_states, new_discrete_states,
-    not_for_co_simulation, set_continuous_states, set_time,
+    completed_integrator_step, enter_continuous_time_mode, enter_event_mode, get_continuous_states, get_derivatives,
+    get_event_indicators, get_nominals_of_continuous_states, new_discrete_states, not_for_co_simulation,
+    set_continuous_states, set_time,
 };
-pub use status::{
-    get_boolean_status, get_integer_status, get_real_status, get_status, get_string_status,
-};
+pub use status::{get_boolean_status, get_integer_status, get_real_status, get_status, get_string_status};
 pub use strings::{get_string, set_string};
 pub use types::{
-    CBoolean, CComponent, CFmuState, CString, CValueReference, CallbackFunctions, EventInfo,
-    TYPES_PLATFORM, VERSION,
+    CBoolean, CComponent, CFmuState, CString, CValueReference, CallbackFunctions, EventInfo, TYPES_PLATFORM, VERSION,
 };
 pub use values::{get_boolean, get_integer, get_real, set_boolean, set_integer, set_real};
 

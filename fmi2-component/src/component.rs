@@ -146,11 +146,7 @@ pub trait Component: Clone + Send + 'static {
     ///
     /// # Errors
     /// Orders that the component does not know; by default all.
-    fn get_real_output_derivative(
-        &self,
-        variable: RealOf<Self>,
-        order: u32,
-    ) -> Result<f64, Refusal> {
+    fn get_real_output_derivative(&self, variable: RealOf<Self>, order: u32) -> Result<f64, Refusal> {
         Err(Refusal::error(format!(
             "derivative {order} of {} is not known; the component has no output derivatives",
             variable.variable().name
@@ -162,11 +158,7 @@ pub trait Component: Clone + Send + 'static {
     ///
     /// # Errors
     /// Pairs that the component has no derivative of; by default all.
-    fn partial_derivative(
-        &self,
-        unknown: RealOf<Self>,
-        known: RealOf<Self>,
-    ) -> Result<f64, Refusal> {
+    fn partial_derivative(&self, unknown: RealOf<Self>, known: RealOf<Self>) -> Result<f64, Refusal> {
         Err(Refusal::error(format!(
             "the derivative of {} by {} is not known; the component has no directional derivatives",
             unknown.variable().name,

@@ -70,9 +70,7 @@ impl<C: Component> Instance<C> {
     pub fn refresh(&mut self) -> Result<(), Refusal> {
         let session = &mut self.session;
         if session.stale {
-            session
-                .component
-                .initialise(session.start_time, &self.log)?;
+            session.component.initialise(session.start_time, &self.log)?;
             session.stale = false;
         }
         Ok(())
@@ -103,10 +101,7 @@ impl<C: Component> Instance<C> {
     /// Sets values, all or none: where `set` is refused, the component is what it was before.
     #[cold]
     #[inline(never)]
-    pub fn change(
-        &mut self,
-        set: impl FnOnce(&mut C) -> Result<(), Refusal>,
-    ) -> Result<(), Refusal> {
+    pub fn change(&mut self, set: impl FnOnce(&mut C) -> Result<(), Refusal>) -> Result<(), Refusal> {
         let mut changed = self.session.component.clone();
         set(&mut changed)?;
         self.session.component = changed;
@@ -144,15 +139,12 @@ impl<C: Component> Instance<C> {
     #[inline]
     fn check_step(&self, time: f64, step: f64) -> Result<(), Refusal> {
         let &Session {
-            time: own,
-            stop_time,
-            ..
+            time: own, stop_time, ..
         } = &self.session;
         let size = if own.abs() > step { own.abs() } else { step };
         let tolerance = CLOCK_TOLERANCE * size;
         let end = time + step;
-        let in_order = (time - own).abs() <= tolerance
-            && end - stop_time <= tolerance + CLOCK_TOLERANCE * end.abs();
+        let in_order = (time - own).abs() <= tolerance && end - stop_time <= tolerance + CLOCK_TOLERANCE * end.abs();
         // NaN compares false, and an infinite step makes an infinite end.
         let sane = step >= 0.0 && end <= f64::MAX;
         if !(sane && in_order) {
@@ -167,18 +159,14 @@ impl<C: Component> Instance<C> {
 fn out_of_order((time, step): (f64, f64), own: f64, stop_time: f64) -> Refusal {
     let tolerance = CLOCK_TOLERANCE * own.abs().max(step);
     Refusal::error(if !(0.0..=f64::MAX).contains(&step) {
-        format!(
-            "communicationStepSize = {step} s is refused; allowed is a finite number of at least 0"
-        )
+        format!("communicationStepSize = {step} s is refused; allowed is a finite number of at least 0")
     } else if (time - own).abs() <= tolerance {
         format!(
             "a step from {time} s to {} s is refused; the experiment was set up to end at stopTime = {stop_time} s",
             time + step
         )
     } else {
-        format!(
-            "currentCommunicationPoint = {time} s is refused; the last step has ended at {own} s"
-        )
+        format!("currentCommunicationPoint = {time} s is refused; the last step has ended at {own} s")
     })
 }
 

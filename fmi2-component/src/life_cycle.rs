@@ -206,13 +206,7 @@ mod tests {
         let mut text = format!("| `fmi2…` | {} |\n", states.join(" | "));
         text += &format!("|---|{}\n", ":-:|".repeat(states.len()));
         for function in Function::ALL {
-            let marks = State::ALL.map(|s| {
-                if function.legal_in().contains(s) {
-                    "x"
-                } else {
-                    ""
-                }
-            });
+            let marks = State::ALL.map(|s| if function.legal_in().contains(s) { "x" } else { "" });
             text += &format!("| {} | {} |\n", function.name(), marks.join(" | "));
         }
         text

@@ -26,10 +26,7 @@ pub struct Category {
 impl Category {
     /// The category at `index` of the description's list, which has at most 64.
     pub const fn new(index: u32, name: &'static str) -> Self {
-        Self {
-            name,
-            bit: 1 << index,
-        }
+        Self { name, bit: 1 << index }
     }
 }
 
@@ -176,10 +173,7 @@ impl Log {
 
 /// The text as a printf format which prints it: `%` is doubled. So is `#`, which encloses variable references in FMI.
 fn printf_safe(text: &str) -> CString {
-    let text = text
-        .replace('%', "%%")
-        .replace('#', "##")
-        .replace('\0', "\u{fffd}");
+    let text = text.replace('%', "%%").replace('#', "##").replace('\0', "\u{fffd}");
     CString::new(text).unwrap_or_default()
 }
 
@@ -189,10 +183,7 @@ mod tests {
 
     #[test]
     fn text_is_safe_as_a_printf_format() {
-        assert_eq!(
-            printf_safe("100 %n #r1# \0").to_str(),
-            Ok("100 %%n ##r1## \u{fffd}")
-        );
+        assert_eq!(printf_safe("100 %n #r1# \0").to_str(), Ok("100 %%n ##r1## \u{fffd}"));
     }
 
     #[test]

@@ -24,10 +24,7 @@ pub(crate) fn serialise<C: Component>(session: &Session<C>) -> Result<Vec<u8>, R
 }
 
 /// The session that `bytes` hold; refuses anything that [`serialise`] of the same model has not written.
-pub(crate) fn deserialise<C: Component>(
-    bytes: &[u8],
-    select: Select<C>,
-) -> Result<Session<C>, Refusal> {
+pub(crate) fn deserialise<C: Component>(bytes: &[u8], select: Select<C>) -> Result<Session<C>, Refusal> {
     let Some((header, body)) = bytes.split_at_checked(HEADER) else {
         return Err(Refusal::error(format!(
             "the serialised state has {} bytes; expected are more than {HEADER}",

@@ -109,8 +109,7 @@ impl<T> Variable<T> {
 
     /// Whether a master may set it while its integrator runs: continuous inputs.
     pub const fn settable_in_continuous_time(&self) -> bool {
-        matches!(self.causality, Causality::Input)
-            && matches!(self.variability, Variability::Continuous)
+        matches!(self.causality, Causality::Input) && matches!(self.variability, Variability::Continuous)
     }
 
     /// Whether its value is the component's to compute, not the master's to set.

@@ -61,19 +61,10 @@ fn call(c: Raw, dice: &mut Dice, states: &mut [Raw; 2], time: &mut f64) -> Statu
             11 => fmi2GetString(c, pointer, count, strings.as_mut_ptr()),
             12 => fmi2SetString(c, pointer, count, strings.as_ptr()),
             13 => fmi2GetFMUstate(c, known),
-            14 => fmi2SetFMUstate(
-                c,
-                dice.pick(&[*known, null_mut(), without_provenance_mut(3)]),
-            ),
+            14 => fmi2SetFMUstate(c, dice.pick(&[*known, null_mut(), without_provenance_mut(3)])),
             15 => fmi2FreeFMUstate(c, known),
             16 => fmi2SetRealInputDerivatives(c, pointer, count, integers.as_ptr(), reals.as_ptr()),
-            17 => fmi2GetRealOutputDerivatives(
-                c,
-                pointer,
-                count,
-                integers.as_ptr(),
-                reals.as_mut_ptr(),
-            ),
+            17 => fmi2GetRealOutputDerivatives(c, pointer, count, integers.as_ptr(), reals.as_mut_ptr()),
             18 => fmi2GetRealStatus(c, dice.roll(5) as i32, reals.as_mut_ptr()),
             19 => fmi2SetDebugLogging(c, integers[0], count.min(2), strings.as_ptr()),
             20 => fmi2DeSerializeFMUstate(c, vr.as_ptr().cast(), 8, known),
@@ -101,12 +92,7 @@ fn calls_in_any_order_are_answered_and_every_error_has_a_reason() {
             let status = call(master.c, dice, &mut states, &mut time);
             assert_ne!(status, Status::Fatal, "{:?}", master.heard());
             if status == Status::Error {
-                assert!(
-                    master
-                        .heard()
-                        .iter()
-                        .any(|line| line.status == Status::Error)
-                );
+                assert!(master.heard().iter().any(|line| line.status == Status::Error));
             }
         }
     }

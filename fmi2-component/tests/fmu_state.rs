@@ -13,8 +13,7 @@ const LEVEL: u32 = 3;
 
 fn read_back(master: &Master, bytes: &[u8]) -> (Status, Raw) {
     let mut state = null_mut();
-    let status =
-        unsafe { fmi2DeSerializeFMUstate(master.c, bytes.as_ptr(), bytes.len(), &mut state) };
+    let status = unsafe { fmi2DeSerializeFMUstate(master.c, bytes.as_ptr(), bytes.len(), &mut state) };
     (status, state)
 }
 
@@ -112,10 +111,7 @@ fn null_and_a_small_buffer_are_dealt_with() {
         fmi2GetFMUstate(c, &mut state);
         assert_eq!(fmi2SerializedFMUstateSize(c, state, null_mut()), Error);
         master.heard();
-        assert_eq!(
-            fmi2SerializeFMUstate(c, state, [0; 4].as_mut_ptr(), 4),
-            Error
-        );
+        assert_eq!(fmi2SerializeFMUstate(c, state, [0; 4].as_mut_ptr(), 4), Error);
         master.heard_one(&["size = 4 is too small"]);
         assert_eq!(fmi2SerializeFMUstate(c, state, null_mut(), 4096), Error);
     }

@@ -11,12 +11,7 @@ use fmi2_example_tank::variables::GUID;
 use master::*;
 
 /// Instantiates and frees; answers whether there was an instance, and the log.
-fn try_out(
-    name: *const c_char,
-    kind: c_int,
-    guid: *const c_char,
-    location: &CStr,
-) -> (bool, Vec<Line>) {
+fn try_out(name: *const c_char, kind: c_int, guid: *const c_char, location: &CStr) -> (bool, Vec<Line>) {
     let mut lines = Vec::new();
     let functions = callbacks(&mut lines);
     let c = unsafe { fmi2Instantiate(name, kind, guid, location.as_ptr(), &functions, 0, 0) };
@@ -121,11 +116,7 @@ fn a_category_is_heard_when_it_is_switched_on() {
         assert_eq!(log[0].category, "logEvents");
         assert_eq!(log[0].text, "A \"tank\" is 100%% full", "a printf format");
     }
-    for (on, names) in [
-        (1, &[c"logStatusError"][..]),
-        (0, &[]),
-        (0, &[c"logEvents"]),
-    ] {
+    for (on, names) in [(1, &[c"logStatusError"][..]), (0, &[]), (0, &[c"logEvents"])] {
         let (status, log) = overflow(|c| choose(c, on, names));
         assert_eq!((status, log.len()), (Status::Ok, 0));
     }

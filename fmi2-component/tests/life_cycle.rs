@@ -13,12 +13,8 @@ type Call = (&'static str, fn(Raw) -> Status);
 fn calls() -> Vec<Call> {
     unsafe {
         vec![
-            ("SetupExperiment", |c| {
-                fmi2SetupExperiment(c, 0, 0.0, 0.0, 0, 0.0)
-            }),
-            ("EnterInitializationMode", |c| {
-                fmi2EnterInitializationMode(c)
-            }),
+            ("SetupExperiment", |c| fmi2SetupExperiment(c, 0, 0.0, 0.0, 0, 0.0)),
+            ("EnterInitializationMode", |c| fmi2EnterInitializationMode(c)),
             ("ExitInitializationMode", |c| fmi2ExitInitializationMode(c)),
             ("Terminate", |c| fmi2Terminate(c)),
             ("DoStep", |c| fmi2DoStep(c, 0.0, 0.1, 1)),
@@ -34,30 +30,18 @@ fn calls() -> Vec<Call> {
             ("GetStatus", |c| fmi2GetStatus(c, 0, &mut Status::Ok)),
             ("GetRealStatus", |c| fmi2GetRealStatus(c, 2, &mut 0.0)),
             ("GetBooleanStatus", |c| fmi2GetBooleanStatus(c, 3, &mut 0)),
-            ("GetStringStatus", |c| {
-                fmi2GetStringStatus(c, 1, &mut std::ptr::null())
-            }),
+            ("GetStringStatus", |c| fmi2GetStringStatus(c, 1, &mut std::ptr::null())),
             ("EnterEventMode", |c| fmi2EnterEventMode(c)),
-            ("NewDiscreteStates", |c| {
-                fmi2NewDiscreteStates(c, null_mut())
-            }),
-            ("EnterContinuousTimeMode", |c| {
-                fmi2EnterContinuousTimeMode(c)
-            }),
+            ("NewDiscreteStates", |c| fmi2NewDiscreteStates(c, null_mut())),
+            ("EnterContinuousTimeMode", |c| fmi2EnterContinuousTimeMode(c)),
             ("CompletedIntegratorStep", |c| {
                 fmi2CompletedIntegratorStep(c, 1, &mut 0, &mut 0)
             }),
             ("SetTime", |c| fmi2SetTime(c, 0.0)),
-            ("SetContinuousStates", |c| {
-                fmi2SetContinuousStates(c, &0.0, 1)
-            }),
+            ("SetContinuousStates", |c| fmi2SetContinuousStates(c, &0.0, 1)),
             ("GetDerivatives", |c| fmi2GetDerivatives(c, &mut 0.0, 1)),
-            ("GetEventIndicators", |c| {
-                fmi2GetEventIndicators(c, &mut 0.0, 1)
-            }),
-            ("GetContinuousStates", |c| {
-                fmi2GetContinuousStates(c, &mut 0.0, 1)
-            }),
+            ("GetEventIndicators", |c| fmi2GetEventIndicators(c, &mut 0.0, 1)),
+            ("GetContinuousStates", |c| fmi2GetContinuousStates(c, &mut 0.0, 1)),
             ("GetNominalsOfContinuousStates", |c| {
                 fmi2GetNominalsOfContinuousStates(c, &mut 0.0, 1)
             }),
@@ -100,12 +84,7 @@ fn fail(master: &Master) {
 
 const READ: [&str; 3] = ["GetReal", "GetInteger", "GetBoolean"];
 const WRITE: [&str; 2] = ["SetReal", "SetBoolean"];
-const ASK: [&str; 4] = [
-    "GetStatus",
-    "GetRealStatus",
-    "GetBooleanStatus",
-    "GetStringStatus",
-];
+const ASK: [&str; 4] = ["GetStatus", "GetRealStatus", "GetBooleanStatus", "GetStringStatus"];
 
 #[test]
 fn an_instance_can_be_set_up() {
@@ -137,10 +116,7 @@ fn a_terminated_instance_can_be_read() {
         start(master);
         unsafe { fmi2Terminate(master.c) };
     };
-    legal_here(
-        terminate,
-        &[&["GetRealOutputDerivatives"][..], &READ, &ASK].concat(),
-    );
+    legal_here(terminate, &[&["GetRealOutputDerivatives"][..], &READ, &ASK].concat());
 }
 
 #[test]
@@ -173,10 +149,7 @@ fn a_discarded_step_changes_nothing_and_wants_to_end() {
     let (mut time, mut wants_to_end, mut status) = (f64::NAN, 0, Status::Ok);
     unsafe {
         assert_eq!(fmi2GetRealStatus(master.c, 2, &mut time), Status::Ok);
-        assert_eq!(
-            fmi2GetBooleanStatus(master.c, 3, &mut wants_to_end),
-            Status::Ok
-        );
+        assert_eq!(fmi2GetBooleanStatus(master.c, 3, &mut wants_to_end), Status::Ok);
         assert_eq!(fmi2GetStatus(master.c, 0, &mut status), Status::Ok);
     }
     assert_eq!((time, wants_to_end, status), (1.0, 1, Status::Discard));
@@ -229,12 +202,7 @@ fn a_step_may_lead_past_the_stop_time_by_rounding_only() {
 #[test]
 fn an_experiment_without_sense_is_refused() {
     let master = Master::new(GUID);
-    for (start, stop) in [
-        (f64::NAN, 1.0),
-        (f64::INFINITY, 1.0),
-        (0.0, f64::NAN),
-        (2.0, 1.0),
-    ] {
+    for (start, stop) in [(f64::NAN, 1.0), (f64::INFINITY, 1.0), (0.0, f64::NAN), (2.0, 1.0)] {
         let status = unsafe { fmi2SetupExperiment(master.c, 0, 0.0, start, 1, stop) };
         assert_eq!(status, Status::Error);
         master.heard_one(&["is refused"]);

@@ -7,8 +7,7 @@ use std::ptr::null_mut;
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 
 use fmi2_component::{
-    Causality, Component, Initial, Key, Log, Model, Occasions, Refusal, Status, Variability,
-    Variable,
+    Causality, Component, Initial, Key, Log, Model, Occasions, Refusal, Status, Variability, Variable,
 };
 use master::*;
 
@@ -159,10 +158,7 @@ fn a_panic_is_logged_and_ends_the_instance_only() {
     assert_fatal(&master);
 
     let master = in_mood(PANIC_ON_GET);
-    assert_eq!(
-        unsafe { fmi2GetInteger(master.c, &0, 1, &mut 0) },
-        Status::Fatal
-    );
+    assert_eq!(unsafe { fmi2GetInteger(master.c, &0, 1, &mut 0) }, Status::Fatal);
     master.heard_one(&["fmi2GetInteger", "got 100%%"]);
     assert_fatal(&master);
     assert_eq!(other.step(0.0, 1.0), Status::Ok);
@@ -186,10 +182,7 @@ fn after_an_error_in_a_step_values_can_be_read_and_the_instance_reset() {
     let master = in_mood(ERROR_ON_STEP);
     assert_eq!(master.step(0.0, 1.0), Status::Error);
     master.heard_one(&["cannot go on"]);
-    assert_eq!(
-        unsafe { fmi2GetInteger(master.c, &0, 1, &mut 0) },
-        Status::Ok
-    );
+    assert_eq!(unsafe { fmi2GetInteger(master.c, &0, 1, &mut 0) }, Status::Ok);
     assert_eq!(master.step(0.0, 1.0), Status::Error);
     master.heard_one(&["illegal in state error"]);
     assert_eq!(unsafe { fmi2Reset(master.c) }, Status::Ok);
@@ -202,10 +195,7 @@ fn what_a_component_does_not_provide_is_refused() {
     let (mut state, mut size) = (null_mut(), 0);
     unsafe {
         assert_eq!(fmi2GetFMUstate(master.c, &mut state), Status::Ok);
-        assert_eq!(
-            fmi2SerializedFMUstateSize(master.c, state, &mut size),
-            Status::Error
-        );
+        assert_eq!(fmi2SerializedFMUstateSize(master.c, state, &mut size), Status::Error);
         master.heard_one(&["cannot be serialised"]);
         assert_eq!(fmi2GetReal(master.c, &0, 1, &mut 0.0), Status::Error);
         master.heard_one(&["value reference 0 is unknown", "known are []"]);
@@ -232,9 +222,8 @@ fn a_logger_cannot_call_back_into_its_instance() {
     let mut functions = callbacks(null_mut());
     let call_back: unsafe extern "C" fn(_, _, _, _, _) = call_back;
     // SAFETY: as for the logger of `master`.
-    functions.logger = Some(unsafe {
-        std::mem::transmute::<*const (), fmi2_component::Logger>(call_back as *const ())
-    });
+    functions.logger =
+        Some(unsafe { std::mem::transmute::<*const (), fmi2_component::Logger>(call_back as *const ()) });
     unsafe {
         let (name, guid) = (c"one".as_ptr(), c"moody".as_ptr());
         let c = fmi2Instantiate(name, 1, guid, std::ptr::null(), &functions, 0, 0);

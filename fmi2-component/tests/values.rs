@@ -52,27 +52,12 @@ fn outputs_are_right_in_initialization_mode_however_often_inputs_are_set() {
 #[test]
 fn causality_and_variability_say_when_a_variable_may_be_set() {
     let master = Master::new(GUID);
-    for (vr, expected) in [
-        (AREA, Ok),
-        (HEIGHT, Ok),
-        (INFLOW, Ok),
-        (LEVEL, Ok),
-        (RATE, Error),
-    ] {
+    for (vr, expected) in [(AREA, Ok), (HEIGHT, Ok), (INFLOW, Ok), (LEVEL, Ok), (RATE, Error)] {
         assert_eq!(master.set_real(vr, 0.5), expected);
     }
-    master.heard_one(&[
-        "der(level) cannot be set in state instantiated",
-        "initial Calculated",
-    ]);
+    master.heard_one(&["der(level) cannot be set in state instantiated", "initial Calculated"]);
     unsafe { fmi2EnterInitializationMode(master.c) };
-    for (vr, expected) in [
-        (AREA, Ok),
-        (HEIGHT, Ok),
-        (INFLOW, Ok),
-        (LEVEL, Ok),
-        (RATE, Error),
-    ] {
+    for (vr, expected) in [(AREA, Ok), (HEIGHT, Ok), (INFLOW, Ok), (LEVEL, Ok), (RATE, Error)] {
         assert_eq!(master.set_real(vr, 0.5), expected);
     }
     unsafe { fmi2ExitInitializationMode(master.c) };
@@ -84,11 +69,7 @@ fn causality_and_variability_say_when_a_variable_may_be_set() {
 #[test]
 fn a_number_that_is_not_finite_is_refused_by_name_and_unit() {
     let master = Master::ready(GUID);
-    for (wrong, text) in [
-        (f64::NAN, "NaN"),
-        (f64::INFINITY, "inf"),
-        (f64::NEG_INFINITY, "-inf"),
-    ] {
+    for (wrong, text) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (f64::NEG_INFINITY, "-inf")] {
         assert_eq!(master.set_real(INFLOW, wrong), Error);
         master.heard_one(&["inflow", text, "m3/s", "finite"]);
     }
@@ -111,10 +92,7 @@ fn nothing_is_set_where_one_of_several_is_wrong() {
         ([INFLOW, AREA], [1.0, 1.0]),
         ([INFLOW, INFLOW], [1.0, f64::NAN]),
     ] {
-        assert_eq!(
-            unsafe { fmi2SetReal(master.c, vr.as_ptr(), 2, values.as_ptr()) },
-            Error
-        );
+        assert_eq!(unsafe { fmi2SetReal(master.c, vr.as_ptr(), 2, values.as_ptr()) }, Error);
         assert_eq!(master.bytes(), before);
     }
 }
@@ -236,20 +214,11 @@ fn derivatives_have_orders_and_causalities() {
     master.set_real(INFLOW, 3.0);
     let mut value = f64::NAN;
     unsafe {
-        assert_eq!(
-            fmi2GetRealOutputDerivatives(c, &LEVEL, 1, &1, &mut value),
-            Ok
-        );
+        assert_eq!(fmi2GetRealOutputDerivatives(c, &LEVEL, 1, &1, &mut value), Ok);
         assert_eq!(value, 1.5);
-        assert_eq!(
-            fmi2GetRealOutputDerivatives(c, &LEVEL, 1, &0, &mut value),
-            Error
-        );
+        assert_eq!(fmi2GetRealOutputDerivatives(c, &LEVEL, 1, &0, &mut value), Error);
         master.heard_one(&["derivative 0 of level is refused"]);
-        assert_eq!(
-            fmi2GetRealOutputDerivatives(c, &INFLOW, 1, &1, &mut value),
-            Error
-        );
+        assert_eq!(fmi2GetRealOutputDerivatives(c, &INFLOW, 1, &1, &mut value), Error);
         master.heard_one(&["inflow", "expected is an output"]);
         assert_eq!(fmi2SetRealInputDerivatives(c, &INFLOW, 1, &1, &0.0), Error);
         master.heard_one(&["takes no input derivatives"]);

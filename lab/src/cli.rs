@@ -106,10 +106,7 @@ fn yes_no(value: bool) -> String {
 
 /// The paths that were written, in one line.
 fn written(paths: &[PathBuf]) -> String {
-    let files: Vec<String> = paths
-        .iter()
-        .map(|path| path.display().to_string())
-        .collect();
+    let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     format!("Written: {}\n", files.join(", "))
 }
 

@@ -61,11 +61,7 @@ struct File {
 /// # Errors
 /// A library that is missing, for another platform, of another version or not an FMI 2.0 component, and failures of the
 /// file system.
-pub fn pack(
-    components: &[Component],
-    libraries: &Libraries,
-    out: &Path,
-) -> Result<Vec<PathBuf>, PackError> {
+pub fn pack(components: &[Component], libraries: &Libraries, out: &Path) -> Result<Vec<PathBuf>, PackError> {
     keep(out, &fmu::all(components, libraries)?)
 }
 
@@ -73,11 +69,7 @@ pub fn pack(
 ///
 /// # Errors
 /// As [`pack`], and a scene whose controller settings make no sense.
-pub fn pack_bench(
-    scene: &Scene,
-    libraries: &Libraries,
-    out: &Path,
-) -> Result<Vec<PathBuf>, PackError> {
+pub fn pack_bench(scene: &Scene, libraries: &Libraries, out: &Path) -> Result<Vec<PathBuf>, PackError> {
     let mut files = fmu::all(&components(), libraries)?;
     files.push(system::file(scene, &files)?);
     keep(out, &files)
@@ -94,14 +86,12 @@ fn keep(out: &Path, files: &[File]) -> Result<Vec<PathBuf>, PackError> {
     for file in files {
         let path = out.join(&file.name);
         let mut kept = temporary(out).map_err(|source| failed(out, source))?;
-        kept.write_all(&file.content)
-            .map_err(|source| failed(&path, source))?;
+        kept.write_all(&file.content).map_err(|source| failed(&path, source))?;
         finished.push((kept, path));
     }
     let mut written = Vec::new();
     for (file, path) in finished {
-        file.persist(&path)
-            .map_err(|error| failed(&path, error.error))?;
+        file.persist(&path).map_err(|error| failed(&path, error.error))?;
         written.push(path);
     }
     Ok(written)

@@ -3,9 +3,7 @@
 use vines::backbone::{TrackError, track};
 use vines::comparison::TrackedComparison;
 use vines::identification::Regime;
-use vines::rig::{
-    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated,
-};
+use vines::rig::{BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated};
 use vines::scene::{Override, Scene};
 
 fn scene(settings: &[&str]) -> Scene {
@@ -68,10 +66,7 @@ fn through_40_db_of_sensor_noise_points_lie_within_5e_3() {
         // At 40 dB, harmonics of 3e-4 are hidden, but no other regime is reported.
         for one in &report.points {
             let regime = one.point.regime;
-            assert!(
-                matches!(regime, Regime::Symmetric | Regime::Unresolved),
-                "{regime}"
-            );
+            assert!(matches!(regime, Regime::Symmetric | Regime::Unresolved), "{regime}");
         }
     }
 }
@@ -90,11 +85,7 @@ fn theory_can_make_the_forecast_and_a_loop_without_any_needs_longer() {
 
 #[test]
 fn beyond_symmetry_breaking_both_ways_of_telling_the_regime_say_so() {
-    let report = tracked(&[
-        "backbone.C_from=0.6",
-        "backbone.C_to=0.8",
-        "backbone.points=3",
-    ]);
+    let report = tracked(&["backbone.C_from=0.6", "backbone.C_to=0.8", "backbone.points=3"]);
     let regimes: Vec<_> = report
         .points
         .iter()
@@ -122,11 +113,7 @@ fn the_response_alone_distinguishes_the_linear_mode_from_the_impacting_one() {
 
 #[test]
 fn below_the_fold_the_motion_is_reported_as_irregular_and_not_settled() {
-    let report = tracked(&[
-        "backbone.C_from=0.5",
-        "backbone.C_to=0.11",
-        "backbone.points=4",
-    ]);
+    let report = tracked(&["backbone.C_from=0.5", "backbone.C_to=0.11", "backbone.points=4"]);
     let last = report.points[3].point;
     assert!(!last.settled);
     assert_eq!(

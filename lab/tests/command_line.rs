@@ -62,10 +62,7 @@ fn extreme_values_of_plant_and_drive_are_refused_at_once() {
         ("plant.c=1e300", "c (damping) = "),
         ("plant.M=1e-300", "M (primary mass) = "),
         ("plant.k=1e101", "k (stiffness) = "),
-        (
-            "excitation.E=1e300",
-            "E (amplitude of the base oscillator) = ",
-        ),
+        ("excitation.E=1e300", "E (amplitude of the base oscillator) = "),
     ] {
         for command in commands {
             let began = Instant::now();
@@ -87,11 +84,7 @@ fn a_person_gets_tables() {
         assert!(text.contains("sigma") && text.contains("stable"), "{text}");
     }
     let none = vines(&["orbit", "--set", "excitation.G=0"]).stdout;
-    assert!(
-        String::from_utf8(none)
-            .unwrap()
-            .contains("without excitation")
-    );
+    assert!(String::from_utf8(none).unwrap().contains("without excitation"));
 }
 
 #[test]
@@ -132,11 +125,7 @@ fn packing_refuses_what_it_cannot_pack_before_it_writes() {
     let pack = |option: &[&'static str]| [&["pack", "--out", out], option].concat();
     fails(&pack(&["--binary", "win64"]), 2, "PLATFORM=PATH");
     fails(&pack(&["--binary", "amiga=x.so"]), 2, "amiga");
-    fails(
-        &pack(&["--set", "plant.r=2"]),
-        2,
-        "r (coefficient of restitution) = 2",
-    );
+    fails(&pack(&["--set", "plant.r=2"]), 2, "r (coefficient of restitution) = 2");
     fails(&pack(&["--portable"]), 2, "--portable cannot be done");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
@@ -158,27 +147,11 @@ fn curves_and_settled_orbits_come_as_json_too() {
     ];
     let mode = json(&mode);
     let points = mode["points"].as_array().unwrap();
-    assert!(
-        points.len() > 100
-            && points
-                .iter()
-                .all(|one| one["G"].as_f64().unwrap().abs() < 1e-9)
-    );
+    assert!(points.len() > 100 && points.iter().all(|one| one["G"].as_f64().unwrap().abs() < 1e-9));
     let response = json(&["orbit", "--response", "--json", "--set", "excitation.G=1.6"]);
-    assert!(
-        response["symmetric"]["special"]
-            .as_array()
-            .map_or(0, Vec::len)
-            >= 3
-    );
+    assert!(response["symmetric"]["special"].as_array().map_or(0, Vec::len) >= 3);
     assert_eq!(response["asymmetric"].as_array().map(Vec::len), Some(1));
-    let settled = json(&[
-        "orbit",
-        "--sigma=-0.6",
-        "--json",
-        "--set",
-        "excitation.G=2.2",
-    ]);
+    let settled = json(&["orbit", "--sigma=-0.6", "--json", "--set", "excitation.G=2.2"]);
     assert_eq!(settled["bounces"].as_array().map(Vec::len), Some(6));
     let study = json(&["orbit", "--convergence", "--json"]);
     assert!((study["slopes"][0].as_f64().unwrap() - 1.0).abs() < 0.05);
@@ -209,33 +182,15 @@ fn a_map_is_written_as_table_and_figures() {
     );
     let rows = std::fs::read_to_string(folder.path().join("map.csv")).unwrap();
     assert_eq!(rows.lines().count(), 1 + 12);
-    assert!(rows.starts_with(
-        "sigma,G,r,regime,impacts_per_period,impacts,periods,synchrony,growth,theory_stable"
-    ));
+    assert!(rows.starts_with("sigma,G,r,regime,impacts_per_period,impacts,periods,synchrony,growth,theory_stable"));
 }
 
 #[test]
 fn absurd_curves_and_maps_are_refused() {
     fails(&["orbit", "--sigma=-1000"], 2, "above 0");
-    fails(
-        &["orbit", "--sigma=-1", "--set", "excitation.G=0.6"],
-        1,
-        "vines map",
-    );
-    fails(
-        &["orbit", "--response", "--set", "excitation.G=0.1"],
-        1,
-        "G = 0.1",
-    );
+    fails(&["orbit", "--sigma=-1", "--set", "excitation.G=0.6"], 1, "vines map");
+    fails(&["orbit", "--response", "--set", "excitation.G=0.1"], 1, "G = 0.1");
     fails(&["theory", "--sigma=nan"], 2, "finite");
-    fails(
-        &["map", "--x", "G=1:2:3", "--y", "G=1:2:3"],
-        2,
-        "both axes are G",
-    );
-    fails(
-        &["report", "--x", "r=0.5:1:3", "--y", "r=0.5:1:3"],
-        2,
-        "both r",
-    );
+    fails(&["map", "--x", "G=1:2:3", "--y", "G=1:2:3"], 2, "both axes are G");
+    fails(&["report", "--x", "r=0.5:1:3", "--y", "r=0.5:1:3"], 2, "both r");
 }

@@ -70,12 +70,7 @@ fn with_settings<'a>(arguments: &[&'a str]) -> Vec<&'a str> {
 
 fn identified(endpoints: &[&str]) -> Value {
     let folder = tempfile::tempdir().unwrap();
-    let out = [
-        "identify",
-        "--json",
-        "--out",
-        folder.path().to_str().unwrap(),
-    ];
+    let out = ["identify", "--json", "--out", folder.path().to_str().unwrap()];
     let done = vines(&with_settings(&[&out, endpoints].concat()));
     assert!(done.status.success(), "{endpoints:?}: {done:?}");
     let found: Value = serde_json::from_slice(&done.stdout).unwrap();
@@ -92,14 +87,7 @@ struct Server(Child, String);
 
 impl Server {
     fn start(arguments: &[&str]) -> Self {
-        let listen = [
-            "--listen",
-            "127.0.0.1:0",
-            "--sessions",
-            "1",
-            "--duration",
-            "60",
-        ];
+        let listen = ["--listen", "127.0.0.1:0", "--sessions", "1", "--duration", "60"];
         let mut child = Command::new(PROGRAM)
             .args(with_settings(&[arguments, &listen].concat()))
             .stdout(Stdio::piped())
@@ -136,22 +124,13 @@ fn built_in_fmu_and_lock_step_network_give_the_same_bits() {
     let (plant, controller) = (plant.to_str().unwrap(), controller.to_str().unwrap());
     let direct = identified(&["--rig", "built-in"]);
     assert_eq!(identified(&["--rig", plant]), direct);
-    assert_eq!(
-        identified(&["--rig", "built-in", "--controller", controller]),
-        direct
-    );
+    assert_eq!(identified(&["--rig", "built-in", "--controller", controller]), direct);
     let rig = Server::start(&["rig", "--lock-step"]);
     let peer = Server::start(&["controller"]);
-    assert_eq!(
-        identified(&["--rig", &rig.1, "--controller", &peer.1]),
-        direct
-    );
+    assert_eq!(identified(&["--rig", &rig.1, "--controller", &peer.1]), direct);
     for server in [rig, peer] {
         let report = server.report();
-        assert!(
-            report.contains("farewell") && report.contains("0 lost"),
-            "{report}"
-        );
+        assert!(report.contains("farewell") && report.contains("0 lost"), "{report}");
     }
 }
 
@@ -182,11 +161,7 @@ fn fails(arguments: &[&str], code: i32, part: &str) {
 #[test]
 fn a_door_that_leads_nowhere_is_named() {
     fails(&["identify", "--rig", "no-such.fmu"], 2, "udp://HOST:PORT");
-    fails(
-        &["identify", "--controller", "tcp://127.0.0.1:1"],
-        2,
-        "built-in",
-    );
+    fails(&["identify", "--controller", "tcp://127.0.0.1:1"], 2, "built-in");
     fails(&["identify", "--rig", "udp://127.0.0.1"], 2, "HOST:PORT");
     let nobody = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     let address = format!("udp://{}", nobody.local_addr().unwrap());
@@ -201,18 +176,8 @@ fn a_door_that_leads_nowhere_is_named() {
 #[test]
 fn an_fmu_of_the_other_side_lacks_a_variable_which_is_named() {
     let (plant, controller) = (fmu("LoViNes.fmu"), fmu("PhaseLock.fmu"));
-    fails(
-        &["identify", "--rig", controller.to_str().unwrap()],
-        1,
-        "`v`",
-    );
-    let arguments = [
-        "identify",
-        "--rig",
-        "built-in",
-        "--controller",
-        plant.to_str().unwrap(),
-    ];
+    fails(&["identify", "--rig", controller.to_str().unwrap()], 1, "`v`");
+    let arguments = ["identify", "--rig", "built-in", "--controller", plant.to_str().unwrap()];
     fails(&arguments, 1, "`response`");
 }
 
@@ -258,12 +223,6 @@ fn a_server_ends_after_its_duration() {
 fn a_server_ends_in_order_on_a_signal() {
     let server = Server::start(&["controller"]);
     let pid = server.0.id().to_string();
-    assert!(
-        Command::new("kill")
-            .args(["-INT", &pid])
-            .status()
-            .unwrap()
-            .success()
-    );
+    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
     assert_eq!(server.report(), "");
 }

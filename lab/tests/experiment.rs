@@ -5,8 +5,7 @@ use vines::experiment::{self, ExperimentError, Plan, Record};
 use vines::identification::{IdentificationError, Regime, identify};
 use vines::net::LinkError;
 use vines::rig::{
-    BuiltIn, Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors,
-    Simulated,
+    BuiltIn, Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors, Simulated,
 };
 use vines::scene::{Override, Scene};
 
@@ -44,10 +43,7 @@ fn the_lock_is_the_exact_orbit_within_5e_3_in_sigma_and_half_a_percent_in_amplit
 
 #[test]
 fn a_longer_wait_brings_the_lock_closer_to_the_exact_orbit() {
-    let strict = [
-        "controller.amplitude_drift=1e-8",
-        "controller.frequency_drift=1e-9",
-    ];
+    let strict = ["controller.amplitude_drift=1e-8", "controller.frequency_drift=1e-9"];
     let found = identified(&strict);
     let exact = found.exact.unwrap();
     let (sigma, c) = (found.lock.sigma - exact.sigma, found.lock.c / exact.c - 1.0);
@@ -131,10 +127,7 @@ fn identified_without_ground_truth(settings: &[&str]) -> Result<Comparison, Iden
 
 #[test]
 fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
-    let (mute, telling) = (
-        identified_without_ground_truth(&[]).unwrap(),
-        identified(&[]),
-    );
+    let (mute, telling) = (identified_without_ground_truth(&[]).unwrap(), identified(&[]));
     assert_eq!(mute.lock.regime, Regime::Symmetric);
     assert!(mute.lock.impacts_per_period.is_nan());
     assert_eq!(mute.lock.sigma, telling.lock.sigma);
@@ -224,8 +217,7 @@ fn an_experiment_takes_any_controller_and_records_every_stage() {
         amplitude: 0.01,
         displacement: 0.0,
     };
-    let record =
-        experiment::run(&mut rig, &mut OpenLoop(drive), &plan(&scene), |_, _, _| {}).unwrap();
+    let record = experiment::run(&mut rig, &mut OpenLoop(drive), &plan(&scene), |_, _, _| {}).unwrap();
     // The sample at which the lock had settled opens the hold.
     assert_eq!((record.hold().len(), record.decay().len()), (301, 200));
     assert!(

@@ -18,9 +18,7 @@ fn component() -> Component {
         library: "tiny",
         package: "tiny-fmu",
         feature: None,
-        description: format!(
-            "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"Tiny\" guid=\"{GUID}\"/>"
-        ),
+        description: format!("<fmiModelDescription fmiVersion=\"2.0\" modelName=\"Tiny\" guid=\"{GUID}\"/>"),
     }
 }
 
@@ -31,9 +29,7 @@ fn library(folder: &Path) -> PathBuf {
 /// Builds a shared library that exports one function and holds a guid.
 fn build(folder: &Path, function: &str, guid: &str) {
     let source = folder.join("tiny.rs");
-    let code = format!(
-        "#[unsafe(no_mangle)] pub extern \"C\" fn {function}() -> *const u8 {{ \"{guid}\".as_ptr() }}"
-    );
+    let code = format!("#[unsafe(no_mangle)] pub extern \"C\" fn {function}() -> *const u8 {{ \"{guid}\".as_ptr() }}");
     fs::write(&source, code).unwrap();
     let rustc = std::env::var_os("RUSTC").unwrap_or("rustc".into());
     let status = Command::new(rustc)
@@ -63,11 +59,7 @@ fn a_component_is_packed_with_its_library_in_its_platforms_folder() {
     let out = folder.path().join("new/out");
     let written = pack(&[component()], &folder.path().into(), &out).unwrap();
     assert_eq!(written, [out.join("Tiny.fmu")]);
-    assert_eq!(
-        fs::read_dir(&out).unwrap().count(),
-        1,
-        "no temporary file is left"
-    );
+    assert_eq!(fs::read_dir(&out).unwrap().count(), 1, "no temporary file is left");
 
     let mut zip = zip::ZipArchive::new(fs::File::open(&written[0]).unwrap()).unwrap();
     let mut description = String::new();
@@ -85,11 +77,7 @@ fn a_missing_library_is_named_with_the_way_to_build_it() {
     let folder = tempfile::tempdir().unwrap();
     let message = complaint(folder.path());
     let path = library(folder.path()).display().to_string();
-    for part in [
-        path.as_str(),
-        "cargo build --release -p tiny-fmu",
-        "--libraries",
-    ] {
+    for part in [path.as_str(), "cargo build --release -p tiny-fmu", "--libraries"] {
         assert!(message.contains(part), "{message}");
     }
 }
@@ -202,16 +190,9 @@ fn a_library_in_the_place_of_another_platform_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     build(folder.path(), "fmi2Instantiate", GUID);
     let running = Platform::running();
-    let other = if running.folder == "win32" {
-        "linux32"
-    } else {
-        "win32"
-    };
+    let other = if running.folder == "win32" { "linux32" } else { "win32" };
     let message = complaint_of(folder.path(), &with_other(folder.path(), other));
-    assert!(
-        message.contains(running.name) && message.contains(other),
-        "{message}"
-    );
+    assert!(message.contains(running.name) && message.contains(other), "{message}");
 }
 
 #[test]
@@ -227,10 +208,7 @@ fn a_library_that_belongs_to_no_component_is_refused() {
 
 #[test]
 fn an_unknown_platform_is_named_with_those_there_are() {
-    for (argument, part) in [
-        ("win64", "PLATFORM=PATH"),
-        ("amiga=x.so", "linux64, linux32"),
-    ] {
+    for (argument, part) in [("win64", "PLATFORM=PATH"), ("amiga=x.so", "linux64, linux32")] {
         let message = argument.parse::<Binary>().expect_err("a mistake");
         assert!(message.contains(part), "{message}");
     }

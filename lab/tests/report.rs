@@ -10,10 +10,7 @@ use vines::{
 
 fn subject(settings: &[&str]) -> Subject {
     // An early lock is good enough here.
-    let early = [
-        "controller.amplitude_drift=1e-3",
-        "controller.dwell_periods=5",
-    ];
+    let early = ["controller.amplitude_drift=1e-3", "controller.dwell_periods=5"];
     let settings = early.iter().chain(settings);
     let overrides: Vec<Override> = settings.map(|s| s.parse().unwrap()).collect();
     let text = include_str!("../../scenes/dimensionless.toml");
@@ -24,7 +21,8 @@ fn subject(settings: &[&str]) -> Subject {
 }
 
 fn write(subject: &Subject, out: &Path) -> Report {
-    let precision = "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\"><rect width=\"9\" height=\"9\"/></svg>";
+    let precision =
+        "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\"><rect width=\"9\" height=\"9\"/></svg>";
     write_report(subject, out, false, Some(precision), &|_| {}).unwrap()
 }
 
@@ -83,11 +81,7 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
     }
     // Nothing is fetched: no address but the names of XML's vocabularies.
     let fetched = html.replace("http://www.w3.org/2000/svg", "");
-    assert!(
-        !fetched.contains("http://")
-            && !fetched.contains("https://")
-            && !fetched.contains("<script")
-    );
+    assert!(!fetched.contains("http://") && !fetched.contains("https://") && !fetched.contains("<script"));
 
     // A second run takes everything over, and a changed map only what it does not concern.
     let second = write(&subject, folder.path());
@@ -112,10 +106,7 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
     let print = folder.path().join("report.pdf");
     let (console, _) = browser(
         &page,
-        &[
-            &format!("--print-to-pdf={}", print.display()),
-            "--no-pdf-header-footer",
-        ],
+        &[&format!("--print-to-pdf={}", print.display()), "--no-pdf-header-footer"],
     )
     .unwrap();
     assert!(!console.contains("CONSOLE"), "{console}");
@@ -134,10 +125,5 @@ fn a_scene_that_locks_nothing_gets_an_honest_report() {
         "{}",
         section.finding
     );
-    assert!(
-        section
-            .blocks
-            .iter()
-            .all(|block| matches!(block, Block::Words(_)))
-    );
+    assert!(section.blocks.iter().all(|block| matches!(block, Block::Words(_))));
 }

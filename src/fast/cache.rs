@@ -47,11 +47,7 @@ impl Cache {
 
     /// The propagator that followed the last one before, if flights have been regular.
     #[inline(always)]
-    pub fn expected(
-        &mut self,
-        oscillator: &Oscillator,
-        coefficients: &Coefficients,
-    ) -> Option<&Propagator> {
+    pub fn expected(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) -> Option<&Propagator> {
         if !self.regular {
             return None;
         }
@@ -67,12 +63,7 @@ impl Cache {
 
     /// A propagator at a time near `t`: one that is kept, or a new one at `t`.
     #[inline]
-    pub fn near(
-        &mut self,
-        oscillator: &Oscillator,
-        coefficients: &Coefficients,
-        t: f64,
-    ) -> &Propagator {
+    pub fn near(&mut self, oscillator: &Oscillator, coefficients: &Coefficients, t: f64) -> &Propagator {
         let is_near = |n: u8| (self.flights[usize::from(n)].t - t).abs() < coefficients.near;
         let expected = self.followers[usize::from(self.last)];
         self.regular = is_near(expected);
@@ -95,12 +86,7 @@ impl Cache {
     }
 
     #[inline(always)]
-    fn ready(
-        &mut self,
-        oscillator: &Oscillator,
-        coefficients: &Coefficients,
-        n: u8,
-    ) -> &Propagator {
+    fn ready(&mut self, oscillator: &Oscillator, coefficients: &Coefficients, n: u8) -> &Propagator {
         let propagator = &mut self.flights[usize::from(n) % FLIGHTS];
         propagator.prepare(oscillator, coefficients);
         propagator
@@ -147,9 +133,7 @@ impl Keys {
             phasor: fast.phasor,
             rotations: fast.rotations,
             step: cache.step.t,
-            flights: cache
-                .flights
-                .map(|propagator| (propagator.t, propagator.exact)),
+            flights: cache.flights.map(|propagator| (propagator.t, propagator.exact)),
             followers: cache.followers,
             last: cache.last,
             regular: cache.regular,

@@ -53,18 +53,14 @@ impl Coefficients {
             ..
         } = *oscillator;
         // `f'' = -omega² f`: every derivative is a combination of the same four numbers.
-        let (mut last, mut now) = (
-            [0.0, 1.0, 0.0, 0.0],
-            [-omega0_squared, -2.0 * delta, 1.0, 0.0],
-        );
+        let (mut last, mut now) = ([0.0, 1.0, 0.0, 0.0], [-omega0_squared, -2.0 * delta, 1.0, 0.0]);
         let mut forcing = [1.0, 0.0];
         let mut factorial = 1.0;
         let taylor = [2.0, 3.0, 4.0, 5.0].map(|n| {
             factorial *= n;
             let term = now.map(|c: f64| c / factorial);
             forcing = [-omega * omega * forcing[1], forcing[0]];
-            let mut next: [f64; 4] =
-                core::array::from_fn(|i| -2.0 * delta * now[i] - omega0_squared * last[i]);
+            let mut next: [f64; 4] = core::array::from_fn(|i| -2.0 * delta * now[i] - omega0_squared * last[i]);
             next[2] += forcing[0];
             next[3] += forcing[1];
             (last, now) = (now, next);

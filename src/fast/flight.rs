@@ -59,11 +59,7 @@ impl<'a> Start<'a> {
     /// The wall that the particle is approaching.
     #[inline(always)]
     fn wall_ahead(&self) -> Wall {
-        if self.sample.dw > 0.0 {
-            Wall::Plus
-        } else {
-            Wall::Minus
-        }
+        if self.sample.dw > 0.0 { Wall::Plus } else { Wall::Minus }
     }
 
     /// Relative motion at a point of the flight, `t` seconds on.
@@ -81,8 +77,7 @@ impl<'a> Start<'a> {
     pub(super) fn acceleration(&self, coefficients: &Coefficients, point: &Point) -> f64 {
         let oscillator = &self.rig.alone;
         let (f, _) = coefficients.forcing_at(point.phasor);
-        self.base.drive.amplitude * f
-            - (oscillator.omega0_squared * point.y + 2.0 * oscillator.delta * point.dy)
+        self.base.drive.amplitude * f - (oscillator.omega0_squared * point.y + 2.0 * oscillator.delta * point.dy)
     }
 
     /// Its rate of change at a mark, m/s³.
@@ -253,8 +248,7 @@ impl FastPath {
     /// divided once.
     #[inline(never)]
     fn march(&mut self, start: &Start, left: f64, predicted: Option<&Predicted>) -> Found {
-        self.cache
-            .prepare_march(&start.rig.alone, &self.coefficients);
+        self.cache.prepare_march(&start.rig.alone, &self.coefficients);
         let mut from = Mark {
             t: 0.0,
             point: start.point,
@@ -263,8 +257,7 @@ impl FastPath {
         let mut fine = 0;
         for _ in 0..MOST_STRETCHES {
             if let Some(predicted) = predicted
-                && predicted.arrival.t.value() - from.t
-                    <= LONGEST_STRETCH * self.coefficients.stretch
+                && predicted.arrival.t.value() - from.t <= LONGEST_STRETCH * self.coefficients.stretch
                 && verified(start, &from, predicted)
             {
                 self.cache.confirm();
@@ -337,11 +330,7 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
         && u3 == 0.0
         && base.drive.omega >= 0.0
         && oscillator.delta <= HEAVIEST * oscillator.omega0
-        && offset
-            .abs()
-            .max(base.drive.amplitude.abs())
-            .max(point.y.abs())
-            <= widest
+        && offset.abs().max(base.drive.amplitude.abs()).max(point.y.abs()) <= widest
         && slope.abs().max(point.dy.abs()) <= fastest
 }
 
@@ -385,11 +374,7 @@ fn stretch(coefficients: &Coefficients, start: &Start, from: &Mark, to: &Mark) -
             Stretch::Unknown
         };
     }
-    let wall = if to.sample.w > 0.0 {
-        Wall::Plus
-    } else {
-        Wall::Minus
-    };
+    let wall = if to.sample.w > 0.0 { Wall::Plus } else { Wall::Minus };
     let shape = |mark: &Mark| {
         let Sample { w, dw, ddw } = mark.sample;
         let jerk = start.jerk(coefficients, mark);
@@ -434,12 +419,7 @@ fn crossing(target: f64, from: [f64; 4], to: [f64; 4]) -> Option<f64> {
 /// From the propagator's time on the motion is its Taylor polynomial, and the root the polynomial's reversed series (P. Henrici,
 /// "Applied and Computational Complex Analysis" I, Wiley 1974, section 1.7).
 #[inline(always)]
-fn arrive(
-    coefficients: &Coefficients,
-    propagator: &Propagator,
-    start: &Start,
-    wall: Wall,
-) -> Result<Predicted, f64> {
+fn arrive(coefficients: &Coefficients, propagator: &Propagator, start: &Start, wall: Wall) -> Result<Predicted, f64> {
     let amplitude = start.base.drive.amplitude;
     let increment = propagator.increment(amplitude, &start.point);
     let w = start.sample.w + (increment.y + start.drift * propagator.t);

@@ -30,18 +30,12 @@ impl FastPath {
             && about * fastest <= LONGEST
             && 1.25 * about < left
             && speed * speed < pressing * b;
-        if short {
-            self.short_hop(start, about)
-        } else {
-            None
-        }
+        if short { self.short_hop(start, about) } else { None }
     }
 
     #[inline(never)]
     fn short_hop(&mut self, start: &Start, about: f64) -> Option<Arrival> {
-        let Start {
-            rig, base, masses, ..
-        } = start;
+        let Start { rig, base, masses, .. } = start;
         let wall = if masses.w.value() > 0.0 {
             Wall::Plus
         } else {
@@ -63,8 +57,7 @@ impl FastPath {
             h = 2.0 * speed / (pressing + h * (j + h * (k + h * (l + h * n))));
         }
         let fifth = d4 / 24.0 + h * (d5 / 120.0 + h * (d6 / 720.0));
-        let gained =
-            h * (d[2] + h * (d3 / 2.0 + h * (d4 / 6.0 + h * (d5 / 24.0 + h * d6 / 120.0))));
+        let gained = h * (d[2] + h * (d3 / 2.0 + h * (d4 / 6.0 + h * (d5 / 24.0 + h * d6 / 120.0))));
         let moved = h * (d[1] + h * (d[2] / 2.0 + h * (d3 / 6.0 + h * fifth)));
         let phase = base.phase.advanced(base.drive.omega, h);
         let (sin, cos) = libm::sincos(phase.radians());

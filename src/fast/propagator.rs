@@ -104,9 +104,7 @@ impl Propagator {
             vv: 1.0 + (head.vv + tail.vv),
         };
         let decayed = match oscillator.regime {
-            Regime::Oscillating { omega_d } => {
-                Complex64::new(free.xx - oscillator.delta * free.xv, omega_d * free.xv)
-            }
+            Regime::Oscillating { omega_d } => Complex64::new(free.xx - oscillator.delta * free.xv, omega_d * free.xv),
             Regime::Overdamped { .. } => Complex64::ZERO,
         };
         let omega = coefficients.omega;
@@ -152,13 +150,7 @@ impl Propagator {
 
     /// What is added to `start` at a time near that of the propagator, `h` seconds later.
     #[inline(always)]
-    pub fn shortly(
-        &self,
-        coefficients: &Coefficients,
-        amplitude: f64,
-        start: &Point,
-        h: f64,
-    ) -> Increment {
+    pub fn shortly(&self, coefficients: &Coefficients, amplitude: f64, start: &Point, h: f64) -> Increment {
         let increment = self.increment(amplitude, start);
         if h == 0.0 {
             return increment;
@@ -179,12 +171,7 @@ pub(super) struct Nearby {
 
 impl Nearby {
     #[inline(always)]
-    pub fn new(
-        coefficients: &Coefficients,
-        amplitude: f64,
-        start: &Point,
-        at_propagator: &Increment,
-    ) -> Self {
+    pub fn new(coefficients: &Coefficients, amplitude: f64, start: &Point, at_propagator: &Increment) -> Self {
         let (f, df) = coefficients.forcing_at(at_propagator.phasor);
         let (f, df) = (amplitude * f, amplitude * df);
         let (y, dy) = (start.y + at_propagator.y, start.dy + at_propagator.dy);

@@ -83,9 +83,8 @@ impl ShortStep {
         let (angle, error) = self.angle;
         let square = angle * angle;
         // The Taylor series of sine and cosine, from the last term to the first.
-        let sum = |divisors: [f64; 6]| {
-            (divisors.iter().rev()).fold(1.0, |sum, divisor| 1.0 - square * (1.0 / divisor) * sum)
-        };
+        let sum =
+            |divisors: [f64; 6]| (divisors.iter().rev()).fold(1.0, |sum, divisor| 1.0 - square * (1.0 / divisor) * sum);
         let cos = sum([2.0, 12.0, 30.0, 56.0, 90.0, 132.0]);
         let sin = angle * sum([6.0, 20.0, 42.0, 72.0, 110.0, 156.0]);
         self.rotation = (cos - error * sin, sin + error * cos);
@@ -94,12 +93,7 @@ impl ShortStep {
 
     /// What one step adds to `start` under `drive`.
     #[inline(always)]
-    pub fn increment(
-        &mut self,
-        oscillator: &Oscillator,
-        drive: &Drive,
-        start: &Point,
-    ) -> Increment {
+    pub fn increment(&mut self, oscillator: &Oscillator, drive: &Drive, start: &Point) -> Increment {
         if self.omega != drive.omega {
             self.respond(oscillator, drive.omega);
         }
@@ -121,24 +115,16 @@ impl ShortStep {
 
 /// `G_n(t)`: the response from rest to a base displacement `t^n/n!`, from its Taylor series.
 fn moment(oscillator: &Oscillator, n: usize, t: f64) -> f64 {
-    let (damping, spring) = (
-        2.0 * oscillator.delta * t,
-        oscillator.omega0_squared * t * t,
-    );
+    let (damping, spring) = (2.0 * oscillator.delta * t, oscillator.omega0_squared * t * t);
     let factorial = |n: usize| (1..=n).fold(1.0, |product, k| product * k as f64);
     // Coefficients times powers of t.
     let base = |k: usize| {
-        if k == n {
-            t.powi(n as i32) / factorial(n)
-        } else {
-            0.0
-        }
+        if k == n { t.powi(n as i32) / factorial(n) } else { 0.0 }
     };
     let (mut before, mut last, mut sum) = (0.0, 0.0, 0.0);
     for k in 0..n + 16 {
         let k1 = (k + 1) as f64;
-        let next =
-            (spring * (base(k) - before) + damping * k1 * (base(k + 1) - last)) / (k1 * (k1 + 1.0));
+        let next = (spring * (base(k) - before) + damping * k1 * (base(k + 1) - last)) / (k1 * (k1 + 1.0));
         sum += next;
         (before, last) = (last, next);
     }

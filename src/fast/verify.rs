@@ -59,12 +59,7 @@ fn speed_squared(oscillator: &Oscillator, at: &Point) -> f64 {
 /// Whether `w'` certainly keeps its sign for `t` seconds: the particle drifts faster than the primary mass can move. Then the wall
 /// ahead is met once, and the other one is left behind.
 #[inline(always)]
-pub(super) fn is_monotone(
-    oscillator: &Oscillator,
-    drive: &Drive,
-    start: &Point,
-    (drift, t): (f64, f64),
-) -> bool {
+pub(super) fn is_monotone(oscillator: &Oscillator, drive: &Drive, start: &Point, (drift, t): (f64, f64)) -> bool {
     let spare = drift.abs() - forcing(oscillator, drive, t) * t;
     spare > 0.0 && spare * spare * (1.0 - 1e-9) > speed_squared(oscillator, start)
 }

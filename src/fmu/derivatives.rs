@@ -129,11 +129,7 @@ impl LoViNes {
 }
 
 /// The instant with a derivative along `known`.
-fn perturbed(
-    now: &Instant<f64>,
-    known: Real,
-    reduced_are_states: bool,
-) -> Result<Instant<Dual>, Refusal> {
+fn perturbed(now: &Instant<f64>, known: Real, reduced_are_states: bool) -> Result<Instant<Dual>, Refusal> {
     let along = |variable: Real, value: f64| Dual {
         value,
         slope: f64::from(u8::from(variable == known)),

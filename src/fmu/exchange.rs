@@ -20,9 +20,7 @@ impl LoViNes {
             Real::impact_time => hybrid.totals().impact_time,
             Real::impact_velocity => hybrid.totals().impact_velocity,
             Real::dissipated => hybrid.totals().dissipated,
-            _ => {
-                (self.setting(variable)).unwrap_or_else(|| of_instant(&hybrid.instant(), variable))
-            }
+            _ => (self.setting(variable)).unwrap_or_else(|| of_instant(&hybrid.instant(), variable)),
         }
     }
 

@@ -38,9 +38,7 @@ impl<F: FnMut(Event)> Step<F> {
 
     /// Whether time is left and the step is not to be cut short.
     fn goes_on(&self) -> bool {
-        let Outcome {
-            impacts, released, ..
-        } = self.outcome;
+        let Outcome { impacts, released, .. } = self.outcome;
         self.left.value() > 0.0 && impacts < MOST_IMPACTS && released < MOST_RELEASES
     }
 }
@@ -110,8 +108,7 @@ impl Plant {
         let jumps = drive.signal[0] != before.signal[0] || drive.amplitude != before.amplitude;
         if self.begun && jumps {
             let sin = self.fast.phasor().1;
-            let jump =
-                (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
+            let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
             if jump != 0.0 {
                 let kick = 2.0 * self.rig.alone.delta * jump;
                 self.masses.v = self.masses.v.plus(kick);

@@ -66,24 +66,18 @@ impl Plant {
         let start = (self.masses.x.value(), velocity);
         let motion = Segment::new(&self.rig.alone, self.base, start);
         let acceleration = motion.derivatives_at_start()[2];
-        (
-            wall.sign() * acceleration,
-            self.acceleration_error(velocity),
-        )
+        (wall.sign() * acceleration, self.acceleration_error(velocity))
     }
 
     /// An upper bound of the acceleration's magnitude, m/s²: the sum of its terms.
     #[inline(always)]
     fn acceleration_bound(&self, velocity: f64) -> f64 {
         let Oscillator {
-            delta,
-            omega0_squared,
-            ..
+            delta, omega0_squared, ..
         } = self.rig.alone;
         let drive = &self.base.drive;
         let position = self.masses.x.value().abs() + drive.signal[0].abs() + drive.amplitude.abs();
-        let velocity =
-            velocity.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
+        let velocity = velocity.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
         (omega0_squared * position + 2.0 * delta * velocity) * (1.0 + 1e-9)
     }
 

@@ -73,15 +73,14 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
         let mut ahead = plant;
         ahead
             .advance_with(plant.base().drive, panel, |event| {
-                let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) =
-                    event;
+                let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) = event;
                 first.get_or_insert(t);
             })
             .expect("a valid step");
         let length = first.unwrap_or(panel);
         let mut gone = 0.0;
-        let nodes = (NODES.iter().rev().map(|(x, weight)| (-x, weight)))
-            .chain(NODES.iter().map(|(x, weight)| (*x, weight)));
+        let nodes =
+            (NODES.iter().rev().map(|(x, weight)| (-x, weight))).chain(NODES.iter().map(|(x, weight)| (*x, weight)));
         for (x, weight) in nodes {
             let t = 0.5 * length * (1.0 + x);
             go(&mut plant, t - gone);
@@ -123,7 +122,5 @@ pub fn walk(scene: &Scene, panels: u32) -> Walk {
 /// Advances under the drive as it stands.
 fn go(plant: &mut Plant, duration: f64) {
     let drive = plant.base().drive;
-    plant
-        .advance(drive, duration.max(0.0))
-        .expect("a valid step");
+    plant.advance(drive, duration.max(0.0)).expect("a valid step");
 }

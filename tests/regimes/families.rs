@@ -16,9 +16,7 @@ pub fn damping_ratios() -> Vec<f64> {
     let near = [1e-2, 1e-4, 1e-6, 1e-8, 1e-10, 1e-12, 1e-14, 2.3e-16];
     let below = near.iter().map(|d| 1.0 - d);
     let above = near.iter().rev().map(|d| 1.0 + d);
-    let light = [
-        0.0, 1e-300, 1e-30, 1e-16, 1e-12, 1e-8, 1e-6, 1e-4, 5e-4, 1e-2, 0.1,
-    ];
+    let light = [0.0, 1e-300, 1e-30, 1e-16, 1e-12, 1e-8, 1e-6, 1e-4, 5e-4, 1e-2, 0.1];
     let around_half = [0.4999, 0.5, 0.5001, 0.8];
     let heavy = [1.005, 1.0051, 1.1, 2.0, 30.0, 1e3];
     (light.into_iter())
@@ -32,8 +30,7 @@ pub fn damping_ratios() -> Vec<f64> {
 
 fn near_zero() -> impl Iterator<Item = f64> {
     [
-        1e-16, 2.3e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5,
-        1e-4, 1e-3, 1e-2, 1e-1,
+        1e-16, 2.3e-16, 1e-15, 1e-14, 1e-13, 1e-12, 1e-11, 1e-10, 1e-9, 1e-8, 1e-7, 1e-6, 1e-5, 1e-4, 1e-3, 1e-2, 1e-1,
     ]
     .into_iter()
     .flat_map(|d| [-d, d])
@@ -78,15 +75,11 @@ pub fn all() -> Vec<Family> {
     let mut families = vec![
         family(
             "free, damping ratio 0 to 1000",
-            every(1).flat_map(|z| {
-                [MOVING, (1.0, 0.0), (0.0, 1.0)].map(|s| unit(z, Drive::default(), s))
-            }),
+            every(1).flat_map(|z| [MOVING, (1.0, 0.0), (0.0, 1.0)].map(|s| unit(z, Drive::default(), s))),
         ),
         family(
             "harmonic, damping ratio 0 to 1000",
-            every(1).flat_map(|z| {
-                [0.3, 1.7, 40.0].map(|omega| unit(z, Drive::harmonic(0.3, omega), MOVING))
-            }),
+            every(1).flat_map(|z| [0.3, 1.7, 40.0].map(|omega| unit(z, Drive::harmonic(0.3, omega), MOVING))),
         ),
         family(
             "omega across the resonance, 1e-16 to 0.1 off, damping ratio 0 to 1e-4",
@@ -104,31 +97,25 @@ pub fn all() -> Vec<Family> {
         ),
         family(
             "the same, particle stuck",
-            tiny.into_iter().flat_map(|z| {
-                near_zero().map(move |d| rig(z, 1e-4, 1.0 + d, 3.807 + 0.032, MOVING))
-            }),
+            tiny.into_iter()
+                .flat_map(|z| near_zero().map(move |d| rig(z, 1e-4, 1.0 + d, 3.807 + 0.032, MOVING))),
         ),
         family(
             "omega 0 to 1e-2, both signs",
             every(4).flat_map(|z| {
-                [
-                    0.0, 1e-300, -1e-300, 1e-100, -1e-30, 1e-16, -1e-12, 1e-8, -1e-4, 1e-2,
-                ]
-                .map(move |omega| unit(z, Drive::harmonic(0.3, omega), AT_REST))
+                [0.0, 1e-300, -1e-300, 1e-100, -1e-30, 1e-16, -1e-12, 1e-8, -1e-4, 1e-2]
+                    .map(move |omega| unit(z, Drive::harmonic(0.3, omega), AT_REST))
             }),
         ),
         family(
             "omega negative",
             every(2).flat_map(|z| {
-                [-1.0, -0.7, -1.0 - 1e-12]
-                    .map(move |omega| unit(z, Drive::harmonic(0.3, omega), MOVING))
+                [-1.0, -0.7, -1.0 - 1e-12].map(move |omega| unit(z, Drive::harmonic(0.3, omega), MOVING))
             }),
         ),
         family(
             "E = 0 with omega at the resonance, 0, and not",
-            every(4).flat_map(|z| {
-                [1.0, 0.0, 0.7].map(move |omega| unit(z, Drive::harmonic(0.0, omega), MOVING))
-            }),
+            every(4).flat_map(|z| [1.0, 0.0, 0.7].map(move |omega| unit(z, Drive::harmonic(0.0, omega), MOVING))),
         ),
     ];
     let names = [
@@ -150,11 +137,7 @@ pub fn all() -> Vec<Family> {
             name,
             every(1).flat_map(move |z| {
                 let last = if z < 0.2 { resonant } else { full };
-                [
-                    unit(z, alone, AT_REST),
-                    unit(z, full, AT_REST),
-                    unit(z, last, MOVING),
-                ]
+                [unit(z, alone, AT_REST), unit(z, full, AT_REST), unit(z, last, MOVING)]
             }),
         ));
     }

@@ -115,12 +115,7 @@ fn follow(case: &Case) -> (f64, u64) {
         assert_eq!(plant.totals().impacts, truth.impacts, "{case:?}");
         let s = plant.state();
         let (q2, dq2) = truth.particle;
-        let pairs = [
-            (s.q1, truth.z[0]),
-            (s.dq1, truth.z[1]),
-            (s.q2, q2),
-            (s.dq2, dq2),
-        ];
+        let pairs = [(s.q1, truth.z[0]), (s.dq1, truth.z[1]), (s.q2, q2), (s.dq2, dq2)];
         for (got, want) in pairs {
             let error = number(want - got).abs() / number(want).abs().max(1.0);
             worst = worst.max(error);

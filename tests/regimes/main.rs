@@ -17,9 +17,7 @@ const LIMIT: f64 = 1e-12;
 
 #[test]
 fn no_regime_loses_digits() {
-    println!(
-        "| family | cases | up to 1 period | 10 | 100 | 1000 | hardest |\n|---|---|---|---|---|---|---|"
-    );
+    println!("| family | cases | up to 1 period | 10 | 100 | 1000 | hardest |\n|---|---|---|---|---|---|---|");
     let mut failed = Vec::new();
     for Family { name, cases } in families::all() {
         let mut worst = Worst::default();

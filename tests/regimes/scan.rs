@@ -61,8 +61,7 @@ impl Size {
         let dbase = du + drive.amplitude * drive.omega * cos;
         let most = |a: f64, b: f64, c: f64| a.max(b.abs()).max(c);
         self.displacement = most(self.displacement, base, q.hypot(dq / self.fast));
-        self.velocity =
-            most(self.velocity, dbase, dq.hypot(q * self.slow)).max(base.abs() * self.slow);
+        self.velocity = most(self.velocity, dbase, dq.hypot(q * self.slow)).max(base.abs() * self.slow);
     }
 
     /// The larger of the errors of displacement and velocity.

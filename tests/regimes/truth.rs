@@ -34,10 +34,7 @@ impl System {
     /// The equation for this mass (kg), stiffness (N/m) and damping (N·s/m).
     pub fn new(mass: f64, stiffness: f64, damping: f64, drive: &Drive) -> Self {
         let mut rates = [[zero(); SIZE]; SIZE];
-        let (spring, damper) = (
-            TwoFloat::new_div(stiffness, mass),
-            TwoFloat::new_div(damping, mass),
-        );
+        let (spring, damper) = (TwoFloat::new_div(stiffness, mass), TwoFloat::new_div(damping, mass));
         let (amplitude, omega) = (drive.amplitude, drive.omega);
         rates[0][1] = TwoFloat::from(1.0);
         rates[1] = [

@@ -82,13 +82,8 @@ impl Worst {
 
     pub fn rows(&self, table: &mut Table) {
         let among = format!("all {} scenes", self.scenes);
-        let mut row =
-            |what: &str, figure: f64, allowed: f64| table.row(what, &among, figure, allowed);
-        row(
-            "energy grows without excitation by, relative",
-            self.growth,
-            1e-12,
-        );
+        let mut row = |what: &str, figure: f64, allowed: f64| table.row(what, &among, figure, allowed);
+        row("energy grows without excitation by, relative", self.growth, 1e-12);
         row(
             "energy and dissipated energy miss, undamped, relative",
             self.missing,
@@ -96,16 +91,8 @@ impl Worst {
         );
         row("panics", self.panics as f64, 0.0);
         row("states that are not numbers", self.not_a_number as f64, 0.0);
-        row(
-            "impacts from behind a wall or not counted",
-            self.miscounted as f64,
-            0.0,
-        );
-        row(
-            "rigs at rest, particle at a wall, that move",
-            self.stirred as f64,
-            0.0,
-        );
+        row("impacts from behind a wall or not counted", self.miscounted as f64, 0.0);
+        row("rigs at rest, particle at a wall, that move", self.stirred as f64, 0.0);
         row(
             "outside the cavity inside steps by, in half-widths",
             self.outside_within,
@@ -116,11 +103,7 @@ impl Worst {
             self.too_close as f64,
             0.0,
         );
-        row(
-            "impacts in a period, at most",
-            self.impacts_per_period.0,
-            f64::INFINITY,
-        );
+        row("impacts in a period, at most", self.impacts_per_period.0, f64::INFINITY);
         row(
             "advances cut short before their 10^7 impacts",
             self.cut_short_early as f64,
@@ -131,11 +114,7 @@ impl Worst {
             self.cut_short as f64,
             f64::INFINITY,
         );
-        row(
-            "runs with other bits the second time",
-            self.other_bits as f64,
-            0.0,
-        );
+        row("runs with other bits the second time", self.other_bits as f64, 0.0);
     }
 }
 

@@ -104,10 +104,7 @@ pub fn both_ways(n: usize, table: &mut Table) {
     };
     let all = (0..n)
         .into_par_iter()
-        .map_init(
-            || strategy().boxed(),
-            |strategy, number| graze(&draw(strategy, number)),
-        )
+        .map_init(|| strategy().boxed(), |strategy, number| graze(&draw(strategy, number)))
         .reduce(Grazes::default, |a, b| Grazes {
             scenes: a.scenes + b.scenes,
             missed: a.missed + b.missed,

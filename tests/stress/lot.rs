@@ -68,12 +68,7 @@ fn strategy(kind: &str) -> BoxedStrategy<Scene> {
                 s
             })
             .boxed(),
-        _ => (
-            with_any_loss(true),
-            -1.0..1.0f64,
-            -1.0..1.0f64,
-            -1.0..1.0f64,
-        )
+        _ => (with_any_loss(true), -1.0..1.0f64, -1.0..1.0f64, -1.0..1.0f64)
             .prop_map(|(mut s, u1, u2, u3)| {
                 // Of the order of the half-width at the end of a step, or of the scene where that is long.
                 let t = s.step.max(1.0);
@@ -164,10 +159,7 @@ pub fn scenes(n: usize, table: &mut Table) {
                 worst = worst.and(one);
             }
             if count > PORTION {
-                table.progress(&format!(
-                    "{} of {count} scenes, {kind}",
-                    count.min(begin + PORTION)
-                ));
+                table.progress(&format!("{} of {count} scenes, {kind}", count.min(begin + PORTION)));
             }
         }
         table.progress(&format!("{kind}: {worst:?}"));

@@ -40,9 +40,7 @@ pub fn chatter(table: &mut Table) {
         ..State::default()
     };
     let mut plant = Plant::new(Parameters::dimensionless(0.05, 1.0, 0.4), start).unwrap();
-    let outcome = plant
-        .advance(Drive::harmonic(1.5, 0.6), 1e6 * TAU / 0.6)
-        .unwrap();
+    let outcome = plant.advance(Drive::harmonic(1.5, 0.6), 1e6 * TAU / 0.6).unwrap();
     table.row(
         "one step of 10^6 periods with chatter and rest: impacts, at most",
         if outcome.cut_short {

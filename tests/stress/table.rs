@@ -30,14 +30,9 @@ impl Table {
                 format!("{x:.1e}")
             }
         };
-        println!(
-            "| {what} | {among} | {} | {} |",
-            short(figure),
-            short(allowed)
-        );
+        println!("| {what} | {among} | {} | {} |", short(figure), short(allowed));
         if figure > allowed || figure.is_nan() {
-            self.broken
-                .push(format!("{what}: {figure:e} is above {allowed:e}"));
+            self.broken.push(format!("{what}: {figure:e} is above {allowed:e}"));
         }
     }
 

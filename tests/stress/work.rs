@@ -50,11 +50,7 @@ impl Hardest {
     }
 
     fn or(self, other: Self) -> Self {
-        let mut more = if other.weight() > self.weight() {
-            other
-        } else {
-            self
-        };
+        let mut more = if other.weight() > self.weight() { other } else { self };
         more.ns_per_unit = self.ns_per_unit.max(other.ns_per_unit);
         more.per_unit = match (self.per_unit, other.per_unit) {
             (Some(a), Some(b)) => Some(a.max(b)),
@@ -86,9 +82,7 @@ fn hardest(zeta: f64, amplitude: f64, ratio: f64) -> Hardest {
     let steps_per_period = (ratio / CYCLES).max(1.0);
     for _ in 0..STEPS {
         let before = Instant::now();
-        let outcome = plant
-            .advance(drive, TAU / steps_per_period)
-            .expect("valid values");
+        let outcome = plant.advance(drive, TAU / steps_per_period).expect("valid values");
         black_box(plant.state());
         let ns = before.elapsed().as_nanos() as f64 * steps_per_period;
         let in_a_period = outcome.impacts as f64 * steps_per_period;
@@ -164,9 +158,7 @@ pub fn sweep(long: bool, table: &mut Table) {
     for (zeta, drives, _, worst) in rows {
         if let Some(per_unit) = worst.per_unit {
             table.row(
-                &format!(
-                    "damping ratio {zeta:e}: evaluations per impact, drive cycle or natural period"
-                ),
+                &format!("damping ratio {zeta:e}: evaluations per impact, drive cycle or natural period"),
                 &format!("{drives} drives"),
                 per_unit,
                 MOST_EVALUATIONS,
@@ -226,13 +218,7 @@ fn slow_anew(n: u32) -> Drive {
     Drive::harmonic(1e-3, 0.3 + 1e-6 * f64::from(n % 7))
 }
 
-const fn simple(
-    what: &'static str,
-    zeta: f64,
-    particle: Particle,
-    step: f64,
-    drive: fn(u32) -> Drive,
-) -> Simple {
+const fn simple(what: &'static str, zeta: f64, particle: Particle, step: f64, drive: fn(u32) -> Drive) -> Simple {
     Simple {
         what,
         zeta,
@@ -281,9 +267,7 @@ impl Simple {
         let mut plant = Plant::new(rig(self.zeta), start).expect("valid values");
         plant.begin((self.drive)(0)).expect("valid values");
         // The first step decides about the contact.
-        plant
-            .advance((self.drive)(0), self.step)
-            .expect("valid values");
+        plant.advance((self.drive)(0), self.step).expect("valid values");
         plant
     }
 

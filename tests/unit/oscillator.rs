@@ -33,10 +33,7 @@ fn no_entry_loses_digits_across_critical_damping() {
             let m = o.transition(t);
             let reference = by_series(&o, t);
             let scale = [1.0, o.reach.min(t), o.fastest.min(1.0 / t), 1.0];
-            for (got, (want, scale)) in [m.xx, m.xv, m.vx, m.vv]
-                .iter()
-                .zip(reference.iter().zip(scale))
-            {
+            for (got, (want, scale)) in [m.xx, m.xv, m.vx, m.vv].iter().zip(reference.iter().zip(scale)) {
                 let error = (got - want).abs() / scale;
                 assert!(error < 2e-14, "zeta {zeta}, t {t}: {got} {want} {error:e}");
             }

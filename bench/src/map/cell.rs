@@ -93,9 +93,7 @@ impl Settled {
             drive,
             brent: Some(brent_baseline(RIG, state, time(TIMED_TOLERANCE))),
             regime: found.regime.name(),
-            pattern: found
-                .pattern
-                .map_or((0, 0), |one| (one.impacts, one.periods)),
+            pattern: found.pattern.map_or((0, 0), |one| (one.impacts, one.periods)),
             impacts_per_period: 0.0,
             difference: repeats.then(|| difference(state, drive)).flatten(),
             plant,
@@ -125,9 +123,7 @@ impl Settled {
 
     fn run_brent(&mut self, periods: u32) {
         let Some(mut brent) = self.brent else { return };
-        let Drive {
-            amplitude, omega, ..
-        } = self.drive;
+        let Drive { amplitude, omega, .. } = self.drive;
         let duration = f64::from(periods) * TAU / omega;
         let began = Instant::now();
         let ended = brent.advance(std::hint::black_box(amplitude), omega, duration);
@@ -268,9 +264,7 @@ fn difference(state: [f64; 4], drive: Drive) -> Option<f64> {
     }
     let there = [brent.q1, brent.dq1, brent.q2, brent.dq2];
     let here = numbers(&plant.state());
-    (0..4)
-        .map(|n| ((there[n] - here[n]) / scale(n)).abs())
-        .reduce(f64::max)
+    (0..4).map(|n| ((there[n] - here[n]) / scale(n)).abs()).reduce(f64::max)
 }
 
 fn begin([q1, dq1, q2, dq2]: [f64; 4], drive: Drive) -> Result<Plant, String> {
@@ -296,11 +290,7 @@ fn time(radians: f64) -> f64 {
 
 /// Unit of the n-th state.
 fn scale(n: usize) -> f64 {
-    if n.is_multiple_of(2) {
-        RIG.half_width
-    } else {
-        speed()
-    }
+    if n.is_multiple_of(2) { RIG.half_width } else { speed() }
 }
 
 fn distance(one: &[f64; 4], other: &[f64; 4]) -> f64 {

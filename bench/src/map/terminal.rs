@@ -140,9 +140,7 @@ fn picture(rows: &[Vec<Cell>]) -> String {
 }
 
 fn line(cell: &Cell) -> String {
-    let number = |x: Option<f64>, digits: usize| {
-        x.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$e}"))
-    };
+    let number = |x: Option<f64>, digits: usize| x.map_or_else(|| "-".to_owned(), |x| format!("{x:.digits$e}"));
     format!(
         "sigma {:7.4} G {:6.4} {:14} {:6.2} impacts per period {:9.1} ns per {} ratio {:7.2} Brent {} ns difference {}\n",
         cell.sigma,
@@ -171,11 +169,7 @@ fn summary(cells: &[Cell], brent_too: bool) -> String {
         text += "  Brent/plant";
     }
     text += "  targets (median, worst)\n";
-    for regime in Regime::SIMULATED
-        .map(|one| one.name())
-        .into_iter()
-        .chain([RARE])
-    {
+    for regime in Regime::SIMULATED.map(|one| one.name()).into_iter().chain([RARE]) {
         let cells: Vec<&Cell> = cells.iter().filter(|c| c.regime == regime).collect();
         let middle = |value: fn(&Cell) -> Option<f64>| {
             median(cells.iter().filter_map(|c| value(c)).collect()).unwrap_or(f64::NAN)
@@ -200,19 +194,11 @@ fn summary(cells: &[Cell], brent_too: bool) -> String {
             difference.map_or_else(|| "-".to_owned(), |x| format!("{x:.1e}")),
         );
         if counted {
-            let worst = cells
-                .iter()
-                .filter_map(|c| c.evaluations)
-                .fold(0.0, f64::max);
+            let worst = cells.iter().filter_map(|c| c.evaluations).fold(0.0, f64::max);
             let _ = write!(text, "  {:19.2} {worst:6.2}", middle(|c| c.evaluations));
         }
         if brent_too {
-            let times = median(
-                cells
-                    .iter()
-                    .filter_map(|c| Some(c.brent_ns? / c.ns))
-                    .collect(),
-            );
+            let times = median(cells.iter().filter_map(|c| Some(c.brent_ns? / c.ns)).collect());
             let shown = times.map_or_else(|| "-".to_owned(), |x| format!("{x:.2}"));
             let _ = write!(text, "  {shown:>11}");
         }

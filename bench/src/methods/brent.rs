@@ -35,9 +35,7 @@ impl Method for Brent {
         let ended = self.0.advance(step.amplitude, step.omega, step.duration);
         ended.map_err(|_| {
             let (t, n) = (self.0.elapsed, self.0.impacts);
-            Failure(format!(
-                "stalled in the step from t = {t:.3} on, after {n} impacts"
-            ))
+            Failure(format!("stalled in the step from t = {t:.3} on, after {n} impacts"))
         })
     }
 

@@ -11,14 +11,7 @@ pub fn rebound(p: &Parameters, v1: f64, v2: f64) -> (f64, f64) {
 }
 
 /// The acceleration of the primary mass under `e = amplitude sin(angle)`.
-pub fn acceleration(
-    p: &Parameters,
-    amplitude: f64,
-    omega: f64,
-    angle: f64,
-    q1: f64,
-    v1: f64,
-) -> f64 {
+pub fn acceleration(p: &Parameters, amplitude: f64, omega: f64, angle: f64, q1: f64, v1: f64) -> f64 {
     let (sin, cos) = angle.sin_cos();
     let (e, de) = (amplitude * sin, amplitude * omega * cos);
     (p.stiffness * (e - q1) + p.damping * (de - v1)) / p.primary_mass

@@ -33,21 +33,15 @@ impl Method for Moreau {
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         let p = &self.p;
-        let fastest = p
-            .natural_frequency()
-            .max(step.omega)
-            .max(p.damping / p.primary_mass);
-        let count = (step.duration * fastest / TAU * self.steps_per_period)
-            .round()
-            .max(1.0);
+        let fastest = p.natural_frequency().max(step.omega).max(p.damping / p.primary_mass);
+        let count = (step.duration * fastest / TAU * self.steps_per_period).round().max(1.0);
         let h = step.duration / count;
         let inverse_mass = 1.0 / p.primary_mass + 1.0 / p.particle_mass;
         let [mut q1, mut v1, mut q2, mut v2] = self.y;
         for _ in 0..count as u64 {
             let (middle1, middle2) = (q1 + 0.5 * h * v1, q2 + 0.5 * h * v2);
             let angle = self.angle + 0.5 * step.omega * h;
-            let mut free1 =
-                v1 + h * acceleration(p, step.amplitude, step.omega, angle, middle1, v1);
+            let mut free1 = v1 + h * acceleration(p, step.amplitude, step.omega, angle, middle1, v1);
             let mut free2 = v2;
             let w = middle1 - middle2;
             if w.abs() >= p.half_width {

@@ -6,12 +6,9 @@ use crate::method::{Failure, Method};
 use crate::scene::{Scene, Step};
 
 pub fn begin(scene: &Scene) -> Result<Plant, Failure> {
-    let mut plant =
-        Plant::new(scene.parameters, scene.state()).map_err(|e| Failure(e.to_string()))?;
+    let mut plant = Plant::new(scene.parameters, scene.state()).map_err(|e| Failure(e.to_string()))?;
     if let Some(first) = scene.steps.first() {
-        plant
-            .begin(first.drive())
-            .map_err(|e| Failure(e.to_string()))?;
+        plant.begin(first.drive()).map_err(|e| Failure(e.to_string()))?;
     }
     Ok(plant)
 }

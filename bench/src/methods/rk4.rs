@@ -25,24 +25,11 @@ impl Rk4 {
     fn after(&self, step: &Step, h: f64) -> [f64; 4] {
         let [q1, v1, q2, v2] = self.y;
         let a = |t: f64, q: f64, v: f64| {
-            acceleration(
-                &self.p,
-                step.amplitude,
-                step.omega,
-                self.angle + step.omega * t,
-                q,
-                v,
-            )
+            acceleration(&self.p, step.amplitude, step.omega, self.angle + step.omega * t, q, v)
         };
         let (k1, l1) = (v1, a(0.0, q1, v1));
-        let (k2, l2) = (
-            v1 + 0.5 * h * l1,
-            a(0.5 * h, q1 + 0.5 * h * k1, v1 + 0.5 * h * l1),
-        );
-        let (k3, l3) = (
-            v1 + 0.5 * h * l2,
-            a(0.5 * h, q1 + 0.5 * h * k2, v1 + 0.5 * h * l2),
-        );
+        let (k2, l2) = (v1 + 0.5 * h * l1, a(0.5 * h, q1 + 0.5 * h * k1, v1 + 0.5 * h * l1));
+        let (k3, l3) = (v1 + 0.5 * h * l2, a(0.5 * h, q1 + 0.5 * h * k2, v1 + 0.5 * h * l2));
         let (k4, l4) = (v1 + h * l3, a(h, q1 + h * k3, v1 + h * l3));
         [
             q1 + h / 6.0 * (k1 + 2.0 * (k2 + k3) + k4),
@@ -80,9 +67,7 @@ impl Method for Rk4 {
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
         let fastest = self.p.natural_frequency().max(step.omega);
-        let count = (step.duration * fastest / TAU * self.steps_per_period)
-            .round()
-            .max(1.0);
+        let count = (step.duration * fastest / TAU * self.steps_per_period).round().max(1.0);
         let h = step.duration / count;
         for _ in 0..count as u64 {
             let mut left = h;

@@ -5,9 +5,7 @@ use core::ffi::{c_char, c_int};
 use phase_lock::{Config, ConfigError};
 
 use crate::message;
-use crate::types::{
-    PhaseLockConfig, PhaseLockController, PhaseLockInput, PhaseLockMove, PhaseLockOutput, Stored,
-};
+use crate::types::{PhaseLockConfig, PhaseLockController, PhaseLockInput, PhaseLockMove, PhaseLockOutput, Stored};
 
 const SUCCESS: c_int = 0;
 const INVALID_VALUE: c_int = 1;

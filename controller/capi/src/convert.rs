@@ -2,9 +2,7 @@
 
 use phase_lock::{Config, Detector, Fault, Input, LoopState, Move, Output};
 
-use crate::types::{
-    PhaseLockConfig, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOutput, PhaseLockStage,
-};
+use crate::types::{PhaseLockConfig, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOutput, PhaseLockStage};
 
 // In C, `harmonics = 0` selects the demodulator; every other parameter is a field of the same name.
 macro_rules! read {

@@ -8,9 +8,7 @@ use phase_lock::{Config, Input, Move, Output};
 
 /// Runs a command; its output.
 fn run(command: &mut Command) -> String {
-    let output = command
-        .output()
-        .unwrap_or_else(|error| panic!("{command:?}: {error}"));
+    let output = command.output().unwrap_or_else(|error| panic!("{command:?}: {error}"));
     let said = String::from_utf8_lossy(&output.stderr);
     assert!(output.status.success(), "{command:?}: {said}");
     String::from_utf8(output.stdout).unwrap()
@@ -84,9 +82,7 @@ fn by_the_core() -> String {
             .unwrap();
         }
     }
-    text + "5 1\n"
-        + "1 omega_max = 66.468 rad/s is refused; allowed is a finite number above omega_min\n"
-        + "-1\n"
+    text + "5 1\n" + "1 omega_max = 66.468 rad/s is refused; allowed is a finite number above omega_min\n" + "-1\n"
 }
 
 #[test]
@@ -96,14 +92,7 @@ fn a_c_program_locks_a_resonator_with_the_bits_of_the_core() {
     let program = folder.path().join("resonator");
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     run(Command::new("cc")
-        .args([
-            "-std=c99",
-            "-Wall",
-            "-Wextra",
-            "-Werror",
-            "-O2",
-            "-ffp-contract=off",
-        ])
+        .args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-ffp-contract=off"])
         .arg("-I")
         .arg(here.join("include"))
         .arg(here.join("tests/resonator.c"))

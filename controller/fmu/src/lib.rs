@@ -4,9 +4,7 @@
 #![forbid(unsafe_code)]
 
 use fmi2_component::{Archive, Component, Key, Log, Refusal};
-use phase_lock::{
-    Config, Input, LoopState, Output, Parameter, PhaseLock, SampleClock, State, Value,
-};
+use phase_lock::{Config, Input, LoopState, Output, Parameter, PhaseLock, SampleClock, State, Value};
 use variables::{Boolean, Integer, Model, Real, category};
 
 mod signal;
@@ -51,9 +49,7 @@ const MAX_SAMPLES: f64 = 1e7;
 impl Controller {
     /// Whether the first sample has been taken. Until then parameters may change together.
     fn is_stepping(&self) -> bool {
-        self.running
-            .as_ref()
-            .is_some_and(|running| running.clock.taken() > 0)
+        self.running.as_ref().is_some_and(|running| running.clock.taken() > 0)
     }
 
     fn output(&self) -> Option<&Output> {
@@ -95,8 +91,7 @@ impl Component for Controller {
 
     fn get_real(&self, variable: Real) -> f64 {
         let value = |get: fn(&Output) -> f64| self.output().map_or(0.0, get);
-        let frequency =
-            |get: fn(&Output) -> f64| self.output().map_or(self.config.omega_start, get);
+        let frequency = |get: fn(&Output) -> f64| self.output().map_or(self.config.omega_start, get);
         match variable {
             Real::response => self.response.value,
             Real::reference => self.reference.value,
@@ -198,10 +193,7 @@ impl Component for Controller {
         }
         let sample_time = self.config.sample_time;
         let begin = time - running.start_time;
-        for (name, signal) in [
-            ("response", &mut self.response),
-            ("reference", &mut self.reference),
-        ] {
+        for (name, signal) in [("response", &mut self.response), ("reference", &mut self.reference)] {
             signal.begin(begin, step, LONGEST_STEP * sample_time);
             if step > sample_time * (1.0 + EARLY) && !signal.is_given() {
                 log.warn_once(
@@ -216,11 +208,7 @@ impl Component for Controller {
         for sample in running.clock.take(begin + step) {
             let elapsed = sample as f64 * sample_time - begin;
             // This communication point is on the sample grid up to rounding: the controller takes the value itself.
-            let elapsed = if elapsed <= EARLY * sample_time {
-                0.0
-            } else {
-                elapsed
-            };
+            let elapsed = if elapsed <= EARLY * sample_time { 0.0 } else { elapsed };
             let input = Input {
                 response: self.response.at(elapsed),
                 reference: Some(self.reference.at(elapsed)),
@@ -242,13 +230,7 @@ impl Component for Controller {
         Ok(())
     }
 
-    fn set_real_input_derivative(
-        &mut self,
-        variable: Real,
-        order: u32,
-        value: f64,
-        _log: &Log,
-    ) -> Result<(), Refusal> {
+    fn set_real_input_derivative(&mut self, variable: Real, order: u32, value: f64, _log: &Log) -> Result<(), Refusal> {
         let signal = match variable {
             Real::response => &mut self.response,
             Real::reference => &mut self.reference,

@@ -37,10 +37,7 @@ impl Structure {
 }
 
 fn settled() -> (Structure, AmplitudeState) {
-    let structure = Structure {
-        a: 1.0,
-        reading: 1.0,
-    };
+    let structure = Structure { a: 1.0, reading: 1.0 };
     (structure, AmplitudeState::constant(1.0, DELTA / GAIN))
 }
 
@@ -70,13 +67,7 @@ fn an_expected_change_of_the_drive_reduces_the_control_error() {
         omega: 0.0,
     };
     let expected = worst(to, 0);
-    let unexpected = worst(
-        Move {
-            amplitude: 0.0,
-            ..to
-        },
-        0,
-    );
+    let unexpected = worst(Move { amplitude: 0.0, ..to }, 0);
     assert!(
         expected < 2e-3 && unexpected > 4.0 * expected,
         "{expected} {unexpected}"
@@ -130,8 +121,6 @@ fn the_shifts_of_the_frequency_add_up_to_the_expected_change() {
         },
         DT,
     );
-    let shifted: f64 = (0..400)
-        .map(|_| control.follow(&mut state, 0.0, Some(1.0)).1)
-        .sum();
+    let shifted: f64 = (0..400).map(|_| control.follow(&mut state, 0.0, Some(1.0)).1).sum();
     assert!((shifted + 0.7).abs() < 1e-12);
 }

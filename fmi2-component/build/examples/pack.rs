@@ -26,18 +26,13 @@ const PLATFORM: (&str, &str) = if cfg!(target_os = "macos") {
 
 fn pack(description: &str, library: &str, folder: &str) -> Result<(), Box<dyn Error>> {
     let xml = fmi2_component_build::describe(&fs::read_to_string(description)?)?;
-    let (_, rest) = xml
-        .split_once("modelIdentifier=\"")
-        .ok_or("no modelIdentifier")?;
+    let (_, rest) = xml.split_once("modelIdentifier=\"").ok_or("no modelIdentifier")?;
     let identifier = rest.split('"').next().unwrap_or_default();
     let (platform, suffix) = PLATFORM;
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, content) in [
         ("modelDescription.xml".to_owned(), xml.clone().into_bytes()),
-        (
-            format!("binaries/{platform}/{identifier}.{suffix}"),
-            fs::read(library)?,
-        ),
+        (format!("binaries/{platform}/{identifier}.{suffix}"), fs::read(library)?),
     ] {
         zip.start_file(name, SimpleFileOptions::DEFAULT)?;
         zip.write_all(&content)?;

@@ -54,23 +54,16 @@ attribute! {
 
 /// The values of `initial` that a causality and a variability allow, the default first; none where the standard forbids
 /// the pair. `None` stands for the attribute being absent.
-pub(crate) fn allowed(
-    causality: Causality,
-    variability: Variability,
-) -> &'static [Option<Initial>] {
+pub(crate) fn allowed(causality: Causality, variability: Variability) -> &'static [Option<Initial>] {
     use Causality as C;
     use Initial::{Approx, Calculated, Exact};
     use Variability as V;
     match (causality, variability) {
         (C::Output | C::Local, V::Constant) => &[Some(Exact)],
         (C::Parameter, V::Fixed | V::Tunable) => &[Some(Exact)],
-        (C::CalculatedParameter | C::Local, V::Fixed | V::Tunable) => {
-            &[Some(Calculated), Some(Approx)]
-        }
+        (C::CalculatedParameter | C::Local, V::Fixed | V::Tunable) => &[Some(Calculated), Some(Approx)],
         (C::Input, V::Discrete | V::Continuous) | (C::Independent, V::Continuous) => &[None],
-        (C::Output | C::Local, V::Discrete | V::Continuous) => {
-            &[Some(Calculated), Some(Exact), Some(Approx)]
-        }
+        (C::Output | C::Local, V::Discrete | V::Continuous) => &[Some(Calculated), Some(Exact), Some(Approx)],
         _ => &[],
     }
 }

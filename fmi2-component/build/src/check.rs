@@ -34,9 +34,7 @@ fn identity(description: &Description, table: &Table, faults: &mut Vec<String>) 
         faults.push("CoSimulation is missing".into());
     } else if !identifier_like(&table.identifier) {
         let name = &table.identifier;
-        faults.push(format!(
-            "modelIdentifier is {name:?}; expected is a C identifier"
-        ));
+        faults.push(format!("modelIdentifier is {name:?}; expected is a C identifier"));
     }
     if let (Some(exchange), Some(steps)) = (&description.model_exchange, &description.co_simulation)
         && exchange != steps
@@ -68,9 +66,7 @@ fn unique(table: &Table, faults: &mut Vec<String>) {
         let mut identifiers = HashMap::new();
         for variable in table.of(kind) {
             let Variable {
-                name,
-                value_reference,
-                ..
+                name, value_reference, ..
             } = variable;
             if let Some(other) = references.insert(value_reference, name) {
                 faults.push(format!(
@@ -79,9 +75,7 @@ fn unique(table: &Table, faults: &mut Vec<String>) {
             }
             let variant = identifier(name);
             if let Some(other) = identifiers.insert(variant.clone(), name) {
-                faults.push(format!(
-                    "{other} and {name} would both be the Rust variant {variant}"
-                ));
+                faults.push(format!("{other} and {name} would both be the Rust variant {variant}"));
             }
         }
     }
@@ -107,8 +101,7 @@ fn legal(v: &Variable) -> Result<(), String> {
             v.kind
         ));
     }
-    let needs_start = matches!(v.initial, Some(Initial::Exact | Initial::Approx))
-        || causality == Causality::Input;
+    let needs_start = matches!(v.initial, Some(Initial::Exact | Initial::Approx)) || causality == Causality::Input;
     if needs_start && v.start.is_none() {
         return Err("a start value is needed".into());
     }
@@ -171,20 +164,10 @@ fn structure(description: &Description, table: &Table, faults: &mut Vec<String>)
     }
 
     if description.model_exchange.is_some() {
-        states(
-            &derivatives,
-            table,
-            initial_unknowns,
-            &structure.derivatives,
-            faults,
-        );
+        states(&derivatives, table, initial_unknowns, &structure.derivatives, faults);
     }
 
-    let lists = [
-        &structure.outputs,
-        &structure.derivatives,
-        &structure.initial_unknowns,
-    ];
+    let lists = [&structure.outputs, &structure.derivatives, &structure.initial_unknowns];
     for unknown in lists.into_iter().flatten() {
         dependencies(unknown, table, faults);
     }
@@ -201,9 +184,7 @@ fn states(
     for &(derivative, state) in derivatives {
         let name = &table.variables[derivative - 1].name;
         if listed.iter().filter(|u| u.index == derivative).count() != 1 {
-            faults.push(format!(
-                "Derivatives must list {name} (index {derivative}) once"
-            ));
+            faults.push(format!("Derivatives must list {name} (index {derivative}) once"));
         }
         for place in [derivative, state] {
             let computed = (place.checked_sub(1))
@@ -229,13 +210,7 @@ impl Table {
     }
 }
 
-fn exactly(
-    list: &str,
-    expected: &[usize],
-    unknowns: &[Unknown],
-    table: &Table,
-    faults: &mut Vec<String>,
-) {
+fn exactly(list: &str, expected: &[usize], unknowns: &[Unknown], table: &Table, faults: &mut Vec<String>) {
     for place in expected {
         if unknowns.iter().filter(|u| u.index == *place).count() != 1 {
             let name = &table.variables[place - 1].name;

@@ -38,8 +38,8 @@ pub(crate) fn guid(table: &Table) -> String {
 
 /// The description with another GUID; every other byte stays.
 pub(crate) fn replace(xml: &str, guid: &str) -> Result<String, Error> {
-    let value = guid_value(xml)
-        .ok_or_else(|| Error::Faults(vec!["fmiModelDescription has no attribute guid".into()]))?;
+    let value =
+        guid_value(xml).ok_or_else(|| Error::Faults(vec!["fmiModelDescription has no attribute guid".into()]))?;
     Ok([&xml[..value.start], guid, &xml[value.end..]].concat())
 }
 

@@ -47,11 +47,7 @@ pub fn generate(path: impl AsRef<Path>) {
     println!("cargo:rerun-if-changed={}", path.display());
     if let Err(error) = try_generate(path) {
         let reason = std::error::Error::source(&error).map(|source| format!(": {source}"));
-        panic!(
-            "{} is refused\n{error}{}\n",
-            path.display(),
-            reason.unwrap_or_default()
-        );
+        panic!("{} is refused\n{error}{}\n", path.display(), reason.unwrap_or_default());
     }
 }
 

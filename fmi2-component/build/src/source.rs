@@ -133,12 +133,7 @@ impl ::fmi2_component::Key for {kind:?} {{
 }
 
 /// How a variable is found by its value reference: by its place in a table, unless that would be mostly holes.
-fn find(
-    out: &mut String,
-    kind: Kind,
-    variables: &[&Variable],
-    variants: &[String],
-) -> std::fmt::Result {
+fn find(out: &mut String, kind: Kind, variables: &[&Variable], variants: &[String]) -> std::fmt::Result {
     let named = || variables.iter().map(|v| v.value_reference).zip(variants);
     let places = variables.iter().map(|v| v.value_reference as usize + 1);
     let places = places.max().unwrap_or(0);
@@ -150,8 +145,7 @@ fn find(
     if places <= 4 * variables.len() + 64 {
         let mut table = vec!["::core::option::Option::None".to_owned(); places];
         for (reference, variant) in named() {
-            table[reference as usize] =
-                format!("::core::option::Option::Some({kind:?}::{variant})");
+            table[reference as usize] = format!("::core::option::Option::Some({kind:?}::{variant})");
         }
         let entries = table.join(", ");
         writeln!(

@@ -127,12 +127,7 @@ fn read(v: &ScalarVariable, types: &[SimpleType]) -> Result<Variable, String> {
     })
 }
 
-fn named<T>(
-    attribute: &str,
-    text: &str,
-    parse: fn(&str) -> Option<T>,
-    names: &[&str],
-) -> Result<T, String> {
+fn named<T>(attribute: &str, text: &str, parse: fn(&str) -> Option<T>, names: &[&str]) -> Result<T, String> {
     parse(text).ok_or_else(|| {
         let names = names.join(", ");
         format!("{attribute} is {text:?}; there are {names}")
@@ -161,22 +156,15 @@ fn content(v: &ScalarVariable, types: &[SimpleType]) -> Result<Resolved, String>
     }
 }
 
-fn resolve<T: FromStr + Debug>(
-    kind: Kind,
-    own: &Content,
-    types: &[SimpleType],
-) -> Result<Resolved, String> {
-    let declared =
-        match &own.declared_type {
-            None => None,
-            Some(name) => {
-                let declared = types.iter().find(|t| t.name == *name);
-                let declared = declared.and_then(|t| t.content.iter().find(|c| c.kind == own.kind));
-                Some(declared.ok_or_else(|| {
-                    format!("TypeDefinitions has no {name:?} of the variable's type")
-                })?)
-            }
-        };
+fn resolve<T: FromStr + Debug>(kind: Kind, own: &Content, types: &[SimpleType]) -> Result<Resolved, String> {
+    let declared = match &own.declared_type {
+        None => None,
+        Some(name) => {
+            let declared = types.iter().find(|t| t.name == *name);
+            let declared = declared.and_then(|t| t.content.iter().find(|c| c.kind == own.kind));
+            Some(declared.ok_or_else(|| format!("TypeDefinitions has no {name:?} of the variable's type"))?)
+        }
+    };
     let inherited = |attribute: &str, get: fn(&Content) -> Option<&String>| {
         get(own)
             .or_else(|| declared.and_then(get))
@@ -185,10 +173,7 @@ fn resolve<T: FromStr + Debug>(
     };
     Ok(Resolved {
         kind,
-        unit: own
-            .unit
-            .clone()
-            .or_else(|| declared.and_then(|d| d.unit.clone())),
+        unit: own.unit.clone().or_else(|| declared.and_then(|d| d.unit.clone())),
         // A declared type has no start value.
         start: own
             .start

@@ -83,10 +83,7 @@ fn an_enumeration_is_an_integer() {
         r#"<SimpleType name="Length">"#,
         r#"<SimpleType name="Fill"><Enumeration><Item name="part" value="1"/><Item name="full" value="2"/></Enumeration></SimpleType><SimpleType name="Length">"#,
     );
-    let xml = xml.replace(
-        r#"<Integer/>"#,
-        r#"<Enumeration declaredType="Fill" max="2"/>"#,
-    );
+    let xml = xml.replace(r#"<Integer/>"#, r#"<Enumeration declaredType="Fill" max="2"/>"#);
     let source = source_of(&xml).unwrap();
     assert!(entry(&source, "overflows").contains("max: Some(2)"));
     assert!(source.contains("pub enum Integer {"));
@@ -107,11 +104,7 @@ fn variants_are_named_as_their_variables() {
 
 #[test]
 fn a_misspelt_name_is_refused_and_not_taken_for_absent() {
-    refused(
-        r#"variability="tunable""#,
-        r#"varability="tunable""#,
-        "varability",
-    );
+    refused(r#"variability="tunable""#, r#"varability="tunable""#, "varability");
     refused(r#"unit="m2" start"#, r#"units="m2" start"#, "units");
     refused("<Integer/>", "<Int/>", "Int");
     refused(
@@ -119,16 +112,8 @@ fn a_misspelt_name_is_refused_and_not_taken_for_absent() {
         r#"initial="exactly""#,
         "there are exact, approx, calculated",
     );
-    refused(
-        r#"causality="input""#,
-        r#"causality="inputs""#,
-        "calculatedParameter",
-    );
-    refused(
-        r#"dependencies="1 3 7""#,
-        r#"dependences="1 3 7""#,
-        "dependences",
-    );
+    refused(r#"causality="input""#, r#"causality="inputs""#, "calculatedParameter");
+    refused(r#"dependencies="1 3 7""#, r#"dependences="1 3 7""#, "dependences");
 }
 
 #[test]
@@ -163,21 +148,13 @@ fn causality_variability_and_initial_must_go_together() {
         r#"causality="parameter" variability="fixed" initial="calculated""#,
         "cannot have initial",
     );
-    refused(
-        "<Integer/>",
-        "<Integer start='0'/>",
-        "start value is not allowed",
-    );
+    refused("<Integer/>", "<Integer start='0'/>", "start value is not allowed");
     refused(
         r#"unit="m2" start="2""#,
         r#"unit="m2""#,
         "area: a start value is needed",
     );
-    refused(
-        r#" variability="discrete""#,
-        "",
-        "only a Real can be continuous",
-    );
+    refused(r#" variability="discrete""#, "", "only a Real can be continuous");
     refused(r#"start="2""#, r#"start="inf""#, "finite");
 }
 
@@ -198,11 +175,7 @@ fn the_model_structure_must_list_outputs_and_initial_unknowns() {
         "<InitialUnknowns>\n      <Unknown index=\"4\"",
         "InitialUnknowns must list der(level)",
     );
-    refused(
-        r#"dependencies="1 3 7""#,
-        r#"dependencies="1 3 70""#,
-        "dependency 70",
-    );
+    refused(r#"dependencies="1 3 7""#, r#"dependencies="1 3 70""#, "dependency 70");
     refused(
         r#"dependencies="1 3 7""#,
         r#"dependencies="1 3 7" dependenciesKind="fixed""#,
@@ -252,9 +225,6 @@ fn the_guid_follows_the_variables_and_not_the_words() {
 fn a_description_to_be_packed_has_the_derived_guid() {
     let packed = describe(TANK).unwrap();
     let guid = guid_of(TANK).unwrap();
-    assert_eq!(
-        packed,
-        change(r#"guid="derived""#, &format!("guid=\"{guid}\""))
-    );
+    assert_eq!(packed, change(r#"guid="derived""#, &format!("guid=\"{guid}\"")));
     assert_eq!(guid_of(&packed).unwrap(), guid);
 }

@@ -182,10 +182,7 @@ mod tests {
         assert_eq!(level.kind(), Some(Kind::Real));
         assert_eq!(level.content[0].declared_type.as_deref(), Some("Length"));
         let area = description.variable("area").expect("a variable");
-        assert_eq!(
-            (area.value_reference, area.content[0].start.as_deref()),
-            (0, Some("2"))
-        );
+        assert_eq!((area.value_reference, area.content[0].start.as_deref()), (0, Some("2")));
         assert!(description.variable("depth").is_none());
     }
 

@@ -21,14 +21,7 @@ const VARIABLE: Known = Known {
         "initial",
         "canHandleMultipleSetPerTimeInstant",
     ],
-    elements: &[
-        "Real",
-        "Integer",
-        "Boolean",
-        "String",
-        "Enumeration",
-        "Annotations",
-    ],
+    elements: &["Real", "Integer", "Boolean", "String", "Enumeration", "Annotations"],
 };
 
 const TYPE: Known = Known {

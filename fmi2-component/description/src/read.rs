@@ -6,10 +6,7 @@ use roxmltree::Document;
 
 use crate::error::Error;
 use crate::xml;
-use crate::{
-    Content, DefaultExperiment, Description, Kind, ModelStructure, ScalarVariable, SimpleType,
-    Unknown,
-};
+use crate::{Content, DefaultExperiment, Description, Kind, ModelStructure, ScalarVariable, SimpleType, Unknown};
 
 pub(crate) fn description(text: &str) -> Result<Description, Error> {
     let document = Document::parse(text)?;
@@ -25,9 +22,7 @@ pub(crate) fn description(text: &str) -> Result<Description, Error> {
             .transpose()
     };
     let names = |list: Vec<xml::Named>, element: &'static str| {
-        let names = list
-            .into_iter()
-            .map(|named| required(named.name, element, "name"));
+        let names = list.into_iter().map(|named| required(named.name, element, "name"));
         names.collect::<Result<Vec<_>, _>>()
     };
     let events = root.number_of_event_indicators;
@@ -140,19 +135,11 @@ fn missing(element: &str, attribute: &'static str) -> Error {
     }
 }
 
-fn required(
-    value: Option<String>,
-    element: &str,
-    attribute: &'static str,
-) -> Result<String, Error> {
+fn required(value: Option<String>, element: &str, attribute: &'static str) -> Result<String, Error> {
     value.ok_or_else(|| missing(element, attribute))
 }
 
-fn number<T: FromStr>(
-    value: Option<String>,
-    element: &str,
-    attribute: &'static str,
-) -> Result<Option<T>, Error> {
+fn number<T: FromStr>(value: Option<String>, element: &str, attribute: &'static str) -> Result<Option<T>, Error> {
     let parsed = value.as_deref().map(|value| value.trim().parse());
     parsed.transpose().map_err(|_| Error::Number {
         element: element.to_owned(),

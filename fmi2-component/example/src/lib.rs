@@ -24,11 +24,7 @@ pub struct Tank {
 
 impl Tank {
     fn rate(&self) -> f64 {
-        if self.valve {
-            self.inflow / self.area
-        } else {
-            0.0
-        }
+        if self.valve { self.inflow / self.area } else { 0.0 }
     }
 }
 
@@ -113,10 +109,7 @@ impl Component for Tank {
         }
         if level > self.height && self.level < self.height {
             self.overflows += 1;
-            log.tell(
-                category::logEvents,
-                format_args!("{} is 100% full", self.label),
-            );
+            log.tell(category::logEvents, format_args!("{} is 100% full", self.label));
         }
         self.level = level.min(self.height);
         Ok(())

@@ -31,10 +31,7 @@ impl Fmu {
         if description.fmi_version != "2.0" {
             return Err(LoadError::Version(description.fmi_version));
         }
-        Ok(Self {
-            folder,
-            description,
-        })
+        Ok(Self { folder, description })
     }
 
     /// The description.

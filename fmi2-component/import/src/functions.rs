@@ -9,8 +9,7 @@ use libloading::Library;
 pub(crate) type Component = *mut c_void;
 
 /// `fmi2CallbackLogger`.
-pub(crate) type Logger =
-    unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
+pub(crate) type Logger = unsafe extern "C" fn(*mut c_void, *const c_char, c_int, *const c_char, *const c_char, ...);
 
 /// `fmi2CallbackFunctions`.
 #[repr(C)]

@@ -50,9 +50,7 @@ macro_rules! values {
             assert_eq!(references.len(), values.len());
             let (references, count) = (references.as_ptr(), references.len());
             // SAFETY: the component is valid, and both arrays have `count` elements.
-            status(unsafe {
-                (self.functions.$c_set)(self.component, references, count, values.as_ptr())
-            })
+            status(unsafe { (self.functions.$c_set)(self.component, references, count, values.as_ptr()) })
         }
 
         /// Reads variables by their value references.
@@ -66,9 +64,7 @@ macro_rules! values {
             assert_eq!(references.len(), values.len());
             let (references, count) = (references.as_ptr(), references.len());
             // SAFETY: the component is valid, and both arrays have `count` elements.
-            status(unsafe {
-                (self.functions.$c_get)(self.component, references, count, values.as_mut_ptr())
-            })
+            status(unsafe { (self.functions.$c_get)(self.component, references, count, values.as_mut_ptr()) })
         }
     };
 }
@@ -148,20 +144,8 @@ impl Instance {
     }
 
     values!(set_real, fmi2SetReal, get_real, fmi2GetReal, f64);
-    values!(
-        set_integer,
-        fmi2SetInteger,
-        get_integer,
-        fmi2GetInteger,
-        i32
-    );
-    values!(
-        set_boolean,
-        fmi2SetBoolean,
-        get_boolean,
-        fmi2GetBoolean,
-        i32
-    );
+    values!(set_integer, fmi2SetInteger, get_integer, fmi2GetInteger, i32);
+    values!(set_boolean, fmi2SetBoolean, get_boolean, fmi2GetBoolean, i32);
 }
 
 fn status(status: c_int) -> Result<(), CallError> {

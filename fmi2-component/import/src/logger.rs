@@ -46,9 +46,7 @@ unsafe fn lossy(text: *const c_char) -> String {
         return String::new();
     }
     // SAFETY: not NULL, and the caller's contract.
-    unsafe { CStr::from_ptr(text) }
-        .to_string_lossy()
-        .into_owned()
+    unsafe { CStr::from_ptr(text) }.to_string_lossy().into_owned()
 }
 
 #[cfg(test)]
@@ -73,15 +71,7 @@ mod tests {
         // SAFETY: the arguments match the format.
         unsafe {
             let message = c"%s = %d %%".as_ptr();
-            fmi2_import_logger(
-                environment,
-                c"a".as_ptr(),
-                3,
-                null(),
-                message,
-                c"x".as_ptr(),
-                42,
-            );
+            fmi2_import_logger(environment, c"a".as_ptr(), 3, null(), message, c"x".as_ptr(), 42);
             fmi2_import_logger(environment, c"a".as_ptr(), 3, null(), null());
         }
         let heard = HEARD.lock().unwrap();

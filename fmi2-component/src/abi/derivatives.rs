@@ -138,12 +138,7 @@ fn is_discrete<C: Component>(reference: CValueReference) -> bool {
         && (is_output::<IntegerOf<C>>(reference) || is_output::<BooleanOf<C>>(reference))
 }
 
-fn check<K: Key>(
-    key: K,
-    order: c_int,
-    causality: Causality,
-    expected: &str,
-) -> Result<(), Refusal> {
+fn check<K: Key>(key: K, order: c_int, causality: Causality, expected: &str) -> Result<(), Refusal> {
     let variable = key.variable();
     if variable.causality != causality {
         return Err(Refusal::error(format!(

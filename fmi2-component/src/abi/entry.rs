@@ -89,9 +89,7 @@ fn refuse<C>(instance: &mut Instance<C>, name: &str, refusal: &Refusal) -> Statu
         instance.session.state = State::Fatal;
     }
     let status = refusal.status();
-    instance
-        .log
-        .reason(status, &format!("{name}: {}", refusal.message()));
+    instance.log.reason(status, &format!("{name}: {}", refusal.message()));
     status
 }
 

@@ -57,8 +57,7 @@ pub unsafe fn instantiate<C: Component>(
         ),
     };
     // SAFETY: as above; the callbacks are callable during this call at least.
-    unsafe { self::log::<C>(functions, name) }
-        .reason(status, &format!("fmi2Instantiate: {reason}"));
+    unsafe { self::log::<C>(functions, name) }.reason(status, &format!("fmi2Instantiate: {reason}"));
     ptr::null_mut()
 }
 
@@ -71,21 +70,12 @@ pub unsafe fn free_instance<C: Component>(component: CComponent) {
 unsafe fn log<C: Component>(functions: &CallbackFunctions, name: &CStr) -> Log {
     let categories = C::Model::CATEGORIES;
     // SAFETY: the contract is passed on.
-    unsafe {
-        Log::new(
-            functions.logger,
-            functions.component_environment,
-            name,
-            categories,
-        )
-    }
+    unsafe { Log::new(functions.logger, functions.component_environment, name, categories) }
 }
 
 fn check_name(name: &CStr) -> Result<(), Refusal> {
     if name.is_empty() {
-        return Err(Refusal::error(
-            "instanceName is NULL or empty; expected is a name",
-        ));
+        return Err(Refusal::error("instanceName is NULL or empty; expected is a name"));
     }
     Ok(())
 }

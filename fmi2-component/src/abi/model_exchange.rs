@@ -28,21 +28,11 @@ pub unsafe fn enter_event_mode<C: ModelExchange>(component: CComponent) -> Statu
         Ok(())
     };
     // SAFETY: the contract is passed on.
-    unsafe {
-        enter(
-            component,
-            Function::EnterEventMode,
-            "fmi2EnterEventMode",
-            body,
-        )
-    }
+    unsafe { enter(component, Function::EnterEventMode, "fmi2EnterEventMode", body) }
 }
 
 /// `fmi2NewDiscreteStates`.
-pub unsafe fn new_discrete_states<C: ModelExchange>(
-    component: CComponent,
-    info: *mut EventInfo,
-) -> Status {
+pub unsafe fn new_discrete_states<C: ModelExchange>(component: CComponent, info: *mut EventInfo) -> Status {
     let body = |instance: &mut Instance<C>| {
         // SAFETY: NULL or one writable place, by contract.
         let place = unsafe { place(info, "fmi2eventInfo") }?;
@@ -143,11 +133,7 @@ pub unsafe fn set_continuous_states<C: ModelExchange>(
 macro_rules! answers {
     ($function:ident, $c_name:literal, $legal:ident, $count:literal, $list:expr, $answer:expr) => {
         #[doc = concat!("`", $c_name, "`.")]
-        pub unsafe fn $function<C: ModelExchange>(
-            component: CComponent,
-            values: *mut f64,
-            count: usize,
-        ) -> Status {
+        pub unsafe fn $function<C: ModelExchange>(component: CComponent, values: *mut f64, count: usize) -> Status {
             let body = |instance: &mut Instance<C>| {
                 let list = $list;
                 counted($count, count, list.len())?;

@@ -11,11 +11,7 @@ const MOST: usize = 1 << 20;
 
 /// The elements of an array that is read.
 #[inline]
-pub(super) unsafe fn input<'a, T>(
-    pointer: *const T,
-    count: usize,
-    what: &str,
-) -> Result<&'a [T], Refusal> {
+pub(super) unsafe fn input<'a, T>(pointer: *const T, count: usize, what: &str) -> Result<&'a [T], Refusal> {
     if count == 0 {
         return Ok(&[]);
     }
@@ -81,10 +77,7 @@ pub(super) unsafe fn input_and_output<'a, T, U>(
 
 /// The place of a single answer.
 #[inline]
-pub(super) unsafe fn place<'a, T>(
-    pointer: *mut T,
-    what: &str,
-) -> Result<&'a mut MaybeUninit<T>, Refusal> {
+pub(super) unsafe fn place<'a, T>(pointer: *mut T, what: &str) -> Result<&'a mut MaybeUninit<T>, Refusal> {
     // SAFETY: passed on.
     unsafe { output(pointer, 1, what) }.map(|places| &mut places[0])
 }
@@ -107,11 +100,7 @@ fn check<T>(pointer: *const T, count: usize, what: &str) -> Result<(), Refusal> 
 }
 
 #[inline]
-fn check_both<T, U>(
-    (first, second): (*const T, *const U),
-    count: usize,
-    what: &[&str; 2],
-) -> Result<(), Refusal> {
+fn check_both<T, U>((first, second): (*const T, *const U), count: usize, what: &[&str; 2]) -> Result<(), Refusal> {
     let aligned = first.is_aligned() & second.is_aligned();
     if !aligned | first.is_null() | second.is_null() | (count > MOST) {
         return Err(refuse_one((first, second), count, what));
@@ -121,11 +110,7 @@ fn check_both<T, U>(
 
 #[cold]
 #[inline(never)]
-fn refuse_one<T, U>(
-    (first, second): (*const T, *const U),
-    count: usize,
-    what: &[&str; 2],
-) -> Refusal {
+fn refuse_one<T, U>((first, second): (*const T, *const U), count: usize, what: &[&str; 2]) -> Refusal {
     match check(first, count, what[0]) {
         Err(refusal) => refusal,
         Ok(()) => refuse(second.is_null(), count, what[1]),

@@ -19,11 +19,7 @@ const LAST_SUCCESSFUL_TIME: c_int = 2;
 const TERMINATED: c_int = 3;
 
 /// `fmi2GetStatus`: how the last step went.
-pub unsafe fn get_status<C: Component>(
-    component: CComponent,
-    kind: c_int,
-    value: *mut Status,
-) -> Status {
+pub unsafe fn get_status<C: Component>(component: CComponent, kind: c_int, value: *mut Status) -> Status {
     // SAFETY: the contract is passed on.
     unsafe {
         answer::<C, _>(
@@ -40,33 +36,21 @@ pub unsafe fn get_status<C: Component>(
 }
 
 /// `fmi2GetRealStatus`: the time that was reached.
-pub unsafe fn get_real_status<C: Component>(
-    component: CComponent,
-    kind: c_int,
-    value: *mut f64,
-) -> Status {
+pub unsafe fn get_real_status<C: Component>(component: CComponent, kind: c_int, value: *mut f64) -> Status {
     let kinds = (kind, LAST_SUCCESSFUL_TIME);
     // SAFETY: the contract is passed on.
     unsafe { answer::<C, _>(component, "fmi2GetRealStatus", kinds, value, |s| s.time) }
 }
 
 /// `fmi2GetIntegerStatus`: there is nothing of that type to be asked.
-pub unsafe fn get_integer_status<C: Component>(
-    component: CComponent,
-    kind: c_int,
-    value: *mut c_int,
-) -> Status {
+pub unsafe fn get_integer_status<C: Component>(component: CComponent, kind: c_int, value: *mut c_int) -> Status {
     let name = "fmi2GetIntegerStatus";
     // SAFETY: the contract is passed on.
     unsafe { answer::<C, _>(component, name, (kind, -1), value, |_| 0) }
 }
 
 /// `fmi2GetBooleanStatus`: whether the component wants to end, which it does once it has discarded a step.
-pub unsafe fn get_boolean_status<C: Component>(
-    component: CComponent,
-    kind: c_int,
-    value: *mut CBoolean,
-) -> Status {
+pub unsafe fn get_boolean_status<C: Component>(component: CComponent, kind: c_int, value: *mut CBoolean) -> Status {
     let name = "fmi2GetBooleanStatus";
     // SAFETY: the contract is passed on.
     unsafe {
@@ -77,18 +61,10 @@ pub unsafe fn get_boolean_status<C: Component>(
 }
 
 /// `fmi2GetStringStatus`: what is pending, which is nothing.
-pub unsafe fn get_string_status<C: Component>(
-    component: CComponent,
-    kind: c_int,
-    value: *mut CString,
-) -> Status {
+pub unsafe fn get_string_status<C: Component>(component: CComponent, kind: c_int, value: *mut CString) -> Status {
     let name = "fmi2GetStringStatus";
     // SAFETY: the contract is passed on.
-    unsafe {
-        answer::<C, _>(component, name, (kind, PENDING_STATUS), value, |_| {
-            c"".as_ptr()
-        })
-    }
+    unsafe { answer::<C, _>(component, name, (kind, PENDING_STATUS), value, |_| c"".as_ptr()) }
 }
 
 /// Answers the one kind of question that has an answer of type `T`.

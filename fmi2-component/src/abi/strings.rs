@@ -22,12 +22,7 @@ pub unsafe fn get_string<C: Component>(
 ) -> Status {
     let body = |instance: &mut Instance<C>| {
         // SAFETY: the arrays are as long as their count, by contract.
-        let (references, values) = unsafe {
-            (
-                input(references, count, "vr")?,
-                output(values, count, "value")?,
-            )
-        };
+        let (references, values) = unsafe { (input(references, count, "vr")?, output(values, count, "value")?) };
         if instance.session.stale {
             refresh_for::<C, StringOf<C>>(instance, references)?;
         }
@@ -53,20 +48,14 @@ pub unsafe fn set_string<C: Component>(
 ) -> Status {
     let body = |instance: &mut Instance<C>| {
         // SAFETY: the arrays are as long as their count, by contract.
-        let (references, values) = unsafe {
-            (
-                input(references, count, "vr")?,
-                input(values, count, "value")?,
-            )
-        };
+        let (references, values) = unsafe { (input(references, count, "vr")?, input(values, count, "value")?) };
         let mut settings = Vec::with_capacity(count);
         for (&reference, &value) in references.iter().zip(values) {
             let key = find::<StringOf<C>>(reference)?;
             instance.check_settable(key)?;
             // SAFETY: NULL or a C string, by the standard.
-            let value = unsafe { text(value) }.ok_or_else(|| {
-                Refusal::error(format!("{} = NULL; expected is text", key.variable().name))
-            })?;
+            let value = unsafe { text(value) }
+                .ok_or_else(|| Refusal::error(format!("{} = NULL; expected is text", key.variable().name)))?;
             settings.push((key, value));
         }
         instance.change(|component| {

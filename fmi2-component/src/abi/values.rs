@@ -98,8 +98,7 @@ unsafe fn get<C: Component, K: Key, T>(
 ) -> Status {
     let body = |instance: &mut Instance<C>| {
         // SAFETY: the arrays are as long as their count, by contract.
-        let (references, values) =
-            unsafe { input_and_output((references, values), count, &["vr", "value"]) }?;
+        let (references, values) = unsafe { input_and_output((references, values), count, &["vr", "value"]) }?;
         if instance.session.stale {
             refresh_for::<C, K>(instance, references)?;
         }
@@ -125,8 +124,7 @@ unsafe fn set<C: Component, K: Key, T>(
 ) -> Status {
     let body = |instance: &mut Instance<C>| {
         // SAFETY: the arrays are as long as their count, by contract.
-        let (references, values) =
-            unsafe { inputs((references, values), count, &["vr", "value"]) }?;
+        let (references, values) = unsafe { inputs((references, values), count, &["vr", "value"]) }?;
         // All are checked before the first is set.
         let mut common = Occasions::ALL;
         for (&reference, value) in references.iter().zip(values) {

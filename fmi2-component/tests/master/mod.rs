@@ -23,14 +23,7 @@ unsafe extern "C" {
     ) -> Raw;
     pub fn fmi2FreeInstance(c: Raw);
     pub fn fmi2SetDebugLogging(c: Raw, on: c_int, n: usize, names: *const *const c_char) -> Status;
-    pub fn fmi2SetupExperiment(
-        c: Raw,
-        td: c_int,
-        t: f64,
-        start: f64,
-        sd: c_int,
-        stop: f64,
-    ) -> Status;
+    pub fn fmi2SetupExperiment(c: Raw, td: c_int, t: f64, start: f64, sd: c_int, stop: f64) -> Status;
     pub fn fmi2EnterInitializationMode(c: Raw) -> Status;
     pub fn fmi2ExitInitializationMode(c: Raw) -> Status;
     pub fn fmi2Terminate(c: Raw) -> Status;
@@ -42,23 +35,13 @@ unsafe extern "C" {
     pub fn fmi2SetReal(c: Raw, vr: *const c_uint, n: usize, value: *const f64) -> Status;
     pub fn fmi2SetInteger(c: Raw, vr: *const c_uint, n: usize, value: *const c_int) -> Status;
     pub fn fmi2SetBoolean(c: Raw, vr: *const c_uint, n: usize, value: *const c_int) -> Status;
-    pub fn fmi2SetString(
-        c: Raw,
-        vr: *const c_uint,
-        n: usize,
-        value: *const *const c_char,
-    ) -> Status;
+    pub fn fmi2SetString(c: Raw, vr: *const c_uint, n: usize, value: *const *const c_char) -> Status;
     pub fn fmi2GetFMUstate(c: Raw, state: *mut Raw) -> Status;
     pub fn fmi2SetFMUstate(c: Raw, state: Raw) -> Status;
     pub fn fmi2FreeFMUstate(c: Raw, state: *mut Raw) -> Status;
     pub fn fmi2SerializedFMUstateSize(c: Raw, state: Raw, size: *mut usize) -> Status;
     pub fn fmi2SerializeFMUstate(c: Raw, state: Raw, bytes: *mut u8, size: usize) -> Status;
-    pub fn fmi2DeSerializeFMUstate(
-        c: Raw,
-        bytes: *const u8,
-        size: usize,
-        state: *mut Raw,
-    ) -> Status;
+    pub fn fmi2DeSerializeFMUstate(c: Raw, bytes: *const u8, size: usize, state: *mut Raw) -> Status;
     pub fn fmi2GetDirectionalDerivative(
         c: Raw,
         unknown: *const c_uint,
@@ -92,12 +75,7 @@ unsafe extern "C" {
     pub fn fmi2EnterEventMode(c: Raw) -> Status;
     pub fn fmi2NewDiscreteStates(c: Raw, info: *mut c_void) -> Status;
     pub fn fmi2EnterContinuousTimeMode(c: Raw) -> Status;
-    pub fn fmi2CompletedIntegratorStep(
-        c: Raw,
-        no_return: c_int,
-        e: *mut c_int,
-        t: *mut c_int,
-    ) -> Status;
+    pub fn fmi2CompletedIntegratorStep(c: Raw, no_return: c_int, e: *mut c_int, t: *mut c_int) -> Status;
     pub fn fmi2SetTime(c: Raw, time: f64) -> Status;
     pub fn fmi2SetContinuousStates(c: Raw, x: *const f64, n: usize) -> Status;
     pub fn fmi2GetDerivatives(c: Raw, dx: *mut f64, n: usize) -> Status;
@@ -161,8 +139,7 @@ impl Master {
         let guid = CString::new(guid).unwrap();
         let functions = callbacks(lines);
         // SAFETY: as the standard asks.
-        let c =
-            unsafe { fmi2Instantiate(c"one".as_ptr(), 1, guid.as_ptr(), null(), &functions, 0, 0) };
+        let c = unsafe { fmi2Instantiate(c"one".as_ptr(), 1, guid.as_ptr(), null(), &functions, 0, 0) };
         Self { c, lines }
     }
 
@@ -171,10 +148,7 @@ impl Master {
         let master = Self::new(guid);
         // SAFETY: the instance is alive; so below.
         unsafe {
-            assert_eq!(
-                fmi2SetupExperiment(master.c, 0, 0.0, 0.0, 0, 0.0),
-                Status::Ok
-            );
+            assert_eq!(fmi2SetupExperiment(master.c, 0, 0.0, 0.0, 0, 0.0), Status::Ok);
             assert_eq!(fmi2EnterInitializationMode(master.c), Status::Ok);
             assert_eq!(fmi2ExitInitializationMode(master.c), Status::Ok);
         }
@@ -201,10 +175,7 @@ impl Master {
 
     pub fn real(&self, vr: u32) -> f64 {
         let mut value = f64::NAN;
-        assert_eq!(
-            unsafe { fmi2GetReal(self.c, &vr, 1, &mut value) },
-            Status::Ok
-        );
+        assert_eq!(unsafe { fmi2GetReal(self.c, &vr, 1, &mut value) }, Status::Ok);
         value
     }
 
@@ -221,10 +192,7 @@ impl Master {
         let (mut state, mut size) = (null_mut(), 0);
         unsafe {
             assert_eq!(fmi2GetFMUstate(self.c, &mut state), Status::Ok);
-            assert_eq!(
-                fmi2SerializedFMUstateSize(self.c, state, &mut size),
-                Status::Ok
-            );
+            assert_eq!(fmi2SerializedFMUstateSize(self.c, state, &mut size), Status::Ok);
             let mut bytes = vec![0; size];
             assert_eq!(
                 fmi2SerializeFMUstate(self.c, state, bytes.as_mut_ptr(), size),

@@ -19,10 +19,7 @@ pub const STAGES: [(&str, &[&str]); 18] = [
     ("ADC 16 bits", &["adc_bits=16"]),
     ("ADC 12 bits", &["adc_bits=12"]),
     ("ADC 8 bits", &["adc_bits=8"]),
-    (
-        "held output, base not measured",
-        &["hold=true", "reference=false"],
-    ),
+    ("held output, base not measured", &["hold=true", "reference=false"]),
     (
         "the same, not compensated",
         &["hold=true", "reference=false", "compensate=false"],
@@ -32,36 +29,21 @@ pub const STAGES: [(&str, &[&str]); 18] = [
         "held output of 16 bits",
         &["hold=true", "reference=false", "dac_bits=16"],
     ),
-    (
-        "one sample late, base not measured",
-        &["delay=1", "reference=false"],
-    ),
+    ("one sample late, base not measured", &["delay=1", "reference=false"]),
     (
         "the same, not compensated",
         &["delay=1", "reference=false", "compensate=false"],
     ),
     ("one sample late, base measured", &["delay=1"]),
-    (
-        "five samples late, base not measured",
-        &["delay=5", "reference=false"],
-    ),
+    ("five samples late, base not measured", &["delay=5", "reference=false"]),
     ("anti-alias filter at 10 omega0", &["filter=10.0"]),
-    (
-        "the same, base not measured",
-        &["filter=10.0", "reference=false"],
-    ),
+    ("the same, base not measured", &["filter=10.0", "reference=false"]),
     ("noise at 60 dB", &["snr=60"]),
     ("noise at 40 dB", &["snr=40"]),
     ("jitter of 1 % of a sample", &["jitter=0.01"]),
     (
         "16 bits, held, one sample late",
-        &[
-            "adc_bits=16",
-            "dac_bits=16",
-            "hold=true",
-            "delay=1",
-            "reference=false",
-        ],
+        &["adc_bits=16", "dac_bits=16", "hold=true", "delay=1", "reference=false"],
     ),
 ];
 

@@ -167,10 +167,7 @@ impl Truth {
     #[must_use]
     pub fn sigma(&self, tau: f64) -> Option<f64> {
         let after = self.points.partition_point(|point| point.0 < tau);
-        let (from, to) = (
-            self.points.get(after.checked_sub(1)?)?,
-            self.points.get(after)?,
-        );
+        let (from, to) = (self.points.get(after.checked_sub(1)?)?, self.points.get(after)?);
         Some(from.1 + (tau - from.0) / (to.0 - from.0) * (to.1 - from.1))
     }
 }

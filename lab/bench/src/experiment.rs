@@ -2,9 +2,7 @@
 
 use thiserror::Error;
 
-use crate::rig::{
-    Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors,
-};
+use crate::rig::{Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors};
 use crate::scene::Scene;
 
 /// Durations of the stages, in samples.
@@ -163,8 +161,7 @@ pub fn run(
         settled += 1;
         if settled >= plan.lock {
             return Err(ExperimentError::NoLock {
-                periods: plan.lock as f64 * plan.sample_time * command.drive.omega
-                    / std::f64::consts::TAU,
+                periods: plan.lock as f64 * plan.sample_time * command.drive.omega / std::f64::consts::TAU,
                 phase_error: command.phase_error.to_degrees(),
                 omega: command.drive.omega,
             });

@@ -77,9 +77,7 @@ impl Scene {
         // The file is checked on its own first, so that an error can name the line.
         let sections: Sections = toml::from_str(text).map_err(syntax)?;
         let table = toml::from_str(text).map_err(syntax)?;
-        overrides::merged(table, overrides)?
-            .unwrap_or(sections)
-            .resolve(origin)
+        overrides::merged(table, overrides)?.unwrap_or(sections).resolve(origin)
     }
 
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.

@@ -37,11 +37,7 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most() {
 #[test]
 fn a_delay_that_nobody_compensates_is_seen_and_one_common_to_both_sensors_is_not() {
     let ideal = at(&[]);
-    let late = at(&[
-        "chain.delay=1",
-        "chain.reference=false",
-        "chain.compensate=false",
-    ]);
+    let late = at(&["chain.delay=1", "chain.reference=false", "chain.compensate=false"]);
     assert!((late.sigma - ideal.sigma + 0.078).abs() < 0.005);
     let both = at(&["chain.delay=1"]);
     assert!((both.sigma - ideal.sigma).abs() < 1e-6);

@@ -5,13 +5,7 @@ use vines_testbench::scene::{Override, Scene};
 
 /// Bandwidths, in units of omega0, and periods to a phase lock that are reported for this rule of gains on such a plant, twenty of
 /// them dwell (the tolerance of the phase is not).
-const REPORTED: [(f64, f64); 5] = [
-    (0.02, 234.0),
-    (0.05, 102.0),
-    (0.1, 55.0),
-    (0.2, 35.0),
-    (0.5, 25.0),
-];
+const REPORTED: [(f64, f64); 5] = [(0.02, 234.0), (0.05, 102.0), (0.1, 55.0), (0.2, 35.0), (0.5, 25.0)];
 
 /// Periods until the phase has stayed within `tolerance` degrees for twenty of them, whatever the amplitude does.
 fn periods(bandwidth: f64, tolerance: f64) -> f64 {

@@ -23,18 +23,13 @@ fn says(message: &str, parts: &[&str]) {
 }
 
 fn file(name: &str) -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR"))
-        .join("../../scenes")
-        .join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../scenes").join(name)
 }
 
 #[test]
 fn the_default_scene_is_the_paper_file() {
     let embedded = paper(&[]).unwrap();
-    assert_eq!(
-        embedded,
-        Scene::load(Some(&file("paper.toml")), &[]).unwrap()
-    );
+    assert_eq!(embedded, Scene::load(Some(&file("paper.toml")), &[]).unwrap());
     let numbers = embedded.dimensionless();
     assert!((numbers.epsilon - 0.0084).abs() < 1e-5, "{numbers:?}");
     assert!((numbers.lambda - 1.43).abs() < 5e-3, "{numbers:?}");
@@ -46,20 +41,14 @@ fn a_dimensionless_scene_is_its_own_model() {
     let scene = Scene::load(Some(&file("dimensionless.toml")), &[]).unwrap();
     let numbers = scene.dimensionless();
     assert_eq!((numbers.omega0, numbers.b), (1.0, 1.0));
-    assert_eq!(
-        (numbers.epsilon, scene.plant.damping),
-        (0.0084, 0.0084 * 1.43)
-    );
+    assert_eq!((numbers.epsilon, scene.plant.damping), (0.0084, 0.0084 * 1.43));
     assert!((numbers.lambda - 1.43).abs() < 1e-14 && (numbers.g - 1.1).abs() < 1e-14);
 }
 
 #[test]
 fn every_key_of_the_paper_file_has_its_default() {
     let scene = paper(&[]).unwrap();
-    assert_eq!(
-        scene.controller,
-        vines_testbench::scene::Controller::default()
-    );
+    assert_eq!(scene.controller, vines_testbench::scene::Controller::default());
     assert_eq!(scene.record, vines_testbench::scene::Record::default());
 }
 
@@ -99,10 +88,7 @@ fn an_unknown_key_is_named_with_those_allowed() {
         &complaint(paper(&["plant.mass=1"])),
         &["--set plant.mass=1", "`mass`", "`M`", "`r`"],
     );
-    says(
-        &complaint(paper(&["plants.r=1"])),
-        &["`plants`", "`plant`", "`record`"],
-    );
+    says(&complaint(paper(&["plants.r=1"])), &["`plants`", "`plant`", "`record`"]);
     let result = Scene::parse("my.toml", "[plant]\nM = 1\nkk = 2\n", &[]);
     says(&complaint(result), &["my.toml", "line 3", "`kk`", "`k`"]);
 }
@@ -116,34 +102,16 @@ fn a_value_of_the_wrong_type_is_named_with_its_line() {
 #[test]
 fn values_that_make_no_sense_are_named_with_unit_and_range() {
     for (argument, parts) in [
-        (
-            "plant.M=0",
-            ["M (primary mass) = 0 kg", "from 1e-100 to 1e100"],
-        ),
-        (
-            "plant.k=-1",
-            ["k (stiffness) = -1 N/m", "from 1e-100 to 1e100"],
-        ),
-        (
-            "plant.m=nan",
-            ["m (particle mass) = NaN kg", "from 1e-100 to 1e100"],
-        ),
+        ("plant.M=0", ["M (primary mass) = 0 kg", "from 1e-100 to 1e100"]),
+        ("plant.k=-1", ["k (stiffness) = -1 N/m", "from 1e-100 to 1e100"]),
+        ("plant.m=nan", ["m (particle mass) = NaN kg", "from 1e-100 to 1e100"]),
         (
             "plant.b=inf",
-            [
-                "b (half-width of the cavity) = inf m",
-                "from 1e-100 to 1e100",
-            ],
+            ["b (half-width of the cavity) = inf m", "from 1e-100 to 1e100"],
         ),
         ("plant.c=-0.1", ["c (damping) = -0.1 N", "from 0 to 1e100"]),
-        (
-            "plant.r=0",
-            ["r (coefficient of restitution) = 0", "at most 1"],
-        ),
-        (
-            "plant.r=1.01",
-            ["r (coefficient of restitution) = 1.01", "at most 1"],
-        ),
+        ("plant.r=0", ["r (coefficient of restitution) = 0", "at most 1"]),
+        ("plant.r=1.01", ["r (coefficient of restitution) = 1.01", "at most 1"]),
         ("start.q2=0.02", ["q1 - q2", "-0.02 m"]),
         (
             "start.q1=inf",
@@ -183,10 +151,7 @@ fn missing_and_mixed_keys_are_reported() {
     says(&parse("[plant]\nM = 1\nepsilon = 0.5"), &["mixes"]);
     let plant = "[plant]\nepsilon = 0.01\nlambda = 1\nr = 0.5\n";
     says(&parse(plant), &["neither of G"]);
-    says(
-        &parse(&format!("{plant}[excitation]\nG = 1\nE = 1")),
-        &["both of G"],
-    );
+    says(&parse(&format!("{plant}[excitation]\nG = 1\nE = 1")), &["both of G"]);
 }
 
 #[test]
@@ -197,13 +162,7 @@ fn a_missing_file_is_named() {
 
 #[test]
 fn an_argument_that_is_no_assignment_is_refused() {
-    for argument in [
-        "plant.r",
-        "r=0.7",
-        "plant.r=",
-        "plant.r=0.7 m",
-        "plant.r=1\nx=2",
-    ] {
+    for argument in ["plant.r", "r=0.7", "plant.r=", "plant.r=0.7 m", "plant.r=1\nx=2"] {
         assert!(argument.parse::<Override>().is_err(), "{argument}");
     }
 }

@@ -52,9 +52,7 @@ impl FmuController {
     }
 
     fn optional(&mut self, reference: Option<Reference>) -> Result<f64, FmuError> {
-        reference.map_or(Ok(0.0), |one| {
-            self.fmu.reals("give its outputs", [one]).map(|[x]| x)
-        })
+        reference.map_or(Ok(0.0), |one| self.fmu.reals("give its outputs", [one]).map(|[x]| x))
     }
 
     fn exchange(&mut self, sensors: Sensors, active: bool) -> Result<Command, FmuError> {
@@ -68,9 +66,8 @@ impl FmuController {
         self.fmu.step(self.sample_time)?;
         let [omega, amplitude] = self.fmu.reals("give its outputs", self.drive)?;
         let (reference, mut settled) = ([self.settled], [0]);
-        self.fmu.ask("give its outputs", |i| {
-            i.get_boolean(&reference, &mut settled)
-        })?;
+        self.fmu
+            .ask("give its outputs", |i| i.get_boolean(&reference, &mut settled))?;
         Ok(Command {
             drive: Drive {
                 omega,

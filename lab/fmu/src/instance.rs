@@ -149,10 +149,7 @@ impl Fmu {
         }
         if !missing.is_empty() {
             let path = self.path.display();
-            log::warn!(
-                "{path} has no {}; it uses its own values instead",
-                missing.join(", ")
-            );
+            log::warn!("{path} has no {}; it uses its own values instead", missing.join(", "));
         }
         self.ask("start", Instance::initialize)
     }

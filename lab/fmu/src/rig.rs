@@ -39,9 +39,7 @@ impl FmuRig {
         let mut fmu = Fmu::load(path, "plant")?;
         let inputs = [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?];
         let response = fmu.need(Kind::Real, "v")?;
-        let values = values
-            .iter()
-            .map(|(name, value)| (*name, Value::Real(*value)));
+        let values = values.iter().map(|(name, value)| (*name, Value::Real(*value)));
         fmu.start(&values.collect::<Vec<_>>())?;
         Ok(Self {
             inputs,
@@ -59,11 +57,7 @@ impl Inside {
         let real = |name| fmu.find(Kind::Real, name);
         Some(Self {
             impacts: fmu.find(Kind::Integer, "impacts")?,
-            reals: [
-                real("impact_time")?,
-                real("impact_velocity")?,
-                real("der(q2)")?,
-            ],
+            reals: [real("impact_time")?, real("impact_velocity")?, real("der(q2)")?],
         })
     }
 }
@@ -78,10 +72,7 @@ impl Rig for FmuRig {
             }
             None => (self.fmu.reals(read, [self.response])?[0], None),
         };
-        Ok(Sensors {
-            response,
-            reference,
-        })
+        Ok(Sensors { response, reference })
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
@@ -106,8 +97,7 @@ impl Rig for FmuRig {
             return Ok(None);
         };
         let action = "report its impacts";
-        let [impact_time, impact_velocity, particle_velocity] =
-            self.fmu.reals(action, inside.reals)?;
+        let [impact_time, impact_velocity, particle_velocity] = self.fmu.reals(action, inside.reals)?;
         let mut impacts = [0];
         self.fmu
             .ask(action, |i| i.get_integer(&[inside.impacts], &mut impacts))?;

@@ -83,11 +83,7 @@ impl Orbit {
     #[must_use]
     pub fn unknowns(&self) -> Unknowns {
         let AfterImpact {
-            phase,
-            q1,
-            dq1,
-            dq2,
-            ..
+            phase, q1, dq1, dq2, ..
         } = self.start;
         Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
     }

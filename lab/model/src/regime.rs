@@ -109,16 +109,11 @@ const COUNT: f64 = 0.05;
 /// `tolerance` ([`MEASURED`] or [`SIMULATED`]), asymmetric 1:1, or another one.
 #[must_use]
 pub fn one_to_one(impacts: &[Impact], per_period: f64, tolerance: f64) -> Regime {
-    let alternate = impacts
-        .windows(2)
-        .all(|pair| pair[0].on_other_wall(&pair[1]));
+    let alternate = impacts.windows(2).all(|pair| pair[0].on_other_wall(&pair[1]));
     if (per_period - 2.0).abs() > COUNT || !alternate {
         return Regime::Other;
     }
-    let intervals: Vec<f64> = impacts
-        .windows(2)
-        .map(|pair| pair[1].time - pair[0].time)
-        .collect();
+    let intervals: Vec<f64> = impacts.windows(2).map(|pair| pair[1].time - pair[0].time).collect();
     let spread = standard_deviation(&intervals) / mean(intervals.iter().copied());
     if spread <= tolerance {
         Regime::Symmetric
@@ -176,9 +171,8 @@ const IN_STEP: f64 = 0.15 * PI;
 /// period apart within 15 %. Times are phases of the base, rad.
 #[must_use]
 pub fn synchrony(impacts: &[Impact]) -> f64 {
-    let in_step = |one: &Impact, other: &Impact| {
-        one.on_other_wall(other) && (other.time - one.time - PI).abs() < IN_STEP
-    };
+    let in_step =
+        |one: &Impact, other: &Impact| one.on_other_wall(other) && (other.time - one.time - PI).abs() < IN_STEP;
     let captured: usize = impacts
         .chunk_by(in_step)
         .map(<[Impact]>::len)

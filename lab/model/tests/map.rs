@@ -45,10 +45,7 @@ fn each_regime_is_found_where_it_is_known_to_be() {
 #[test]
 fn just_below_the_fold_resonance_is_captured_and_lost() {
     let point = at(0.9, -1.1, MOVING);
-    println!(
-        "{:.0} % of the impacts are captured",
-        100.0 * point.synchrony
-    );
+    println!("{:.0} % of the impacts are captured", 100.0 * point.synchrony);
     assert_eq!(point.regime, Regime::Modulated);
     assert!(point.synchrony > 0.2 && point.impacts == 0);
 }
@@ -73,11 +70,7 @@ fn the_map_shows_the_island_of_the_theory() {
 #[test]
 fn cells_know_their_place_and_the_axes_may_be_any_two() {
     let map = plan("r=0.5:0.8:3", "G=1:1.2:2").run(|| {}).unwrap();
-    let places: Vec<_> = map
-        .cells
-        .iter()
-        .map(|cell| (cell.r, cell.g, cell.sigma))
-        .collect();
+    let places: Vec<_> = map.cells.iter().map(|cell| (cell.r, cell.g, cell.sigma)).collect();
     assert_eq!(places.len(), 6);
     assert_eq!(places[1], (0.65, 1.0, -1.1408));
     assert!((places[5].0 - 0.8).abs() < 1e-12 && places[5].1 == 1.2);
@@ -88,10 +81,7 @@ fn cells_know_their_place_and_the_axes_may_be_any_two() {
 #[test]
 fn the_default_scene_is_symmetric_at_its_exact_orbits_frequency() {
     let scene = Dimensionless::new(0.0084, 1.43, 0.65, 1.1);
-    let orbit = phase_resonant(&scene)
-        .into_iter()
-        .find(|one| one.stable)
-        .unwrap();
+    let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
     assert_eq!(at(1.1, orbit.sigma, MOVING).regime, Regime::Symmetric);
 }
 

@@ -34,10 +34,7 @@ fn orbits_match_the_references_to_all_their_digits() {
     }
     println!("largest deviation: sigma, C, B {state:.2e}, multipliers {multipliers:.2e}");
     assert!(state < 1e-10, "the references have ten digits: {state:e}");
-    assert!(
-        multipliers < 6e-7,
-        "the references have six digits: {multipliers:e}"
-    );
+    assert!(multipliers < 6e-7, "the references have six digits: {multipliers:e}");
 }
 
 #[test]
@@ -93,32 +90,18 @@ fn damping_of_the_oscillator_is_not_needed() {
         let loss = 0.5 / (1.0 + epsilon) * (1.0 - scene.r.powi(2)) * orbit.impact_velocity.powi(2);
         let power = loss * orbit.omega / std::f64::consts::PI;
         // q1 of first order differs from v: the drive acts on q1.
-        assert!(
-            (power / (orbit.g * orbit.c / 2.0) - 1.0).abs() < 0.05,
-            "{orbit:?}"
-        );
+        assert!((power / (orbit.g * orbit.c / 2.0) - 1.0).abs() < 0.05, "{orbit:?}");
     }
 }
 
 #[test]
 fn no_orbit_is_invented_where_the_excitation_is_too_weak() {
-    assert_eq!(
-        phase_resonant(&Dimensionless::new(0.0084, 1.43, 0.65, 0.2)),
-        []
-    );
-    assert_eq!(
-        phase_resonant(&Dimensionless::new(0.0084, 1.43, 0.65, 0.0)),
-        []
-    );
+    assert_eq!(phase_resonant(&Dimensionless::new(0.0084, 1.43, 0.65, 0.2)), []);
+    assert_eq!(phase_resonant(&Dimensionless::new(0.0084, 1.43, 0.65, 0.0)), []);
 }
 
 /// One classical Runge-Kutta step of the driven oscillator, independent of the closed form.
-fn step(
-    [q, dq]: [f64; 2],
-    tau: f64,
-    h: f64,
-    acceleration: impl Fn(f64, f64, f64) -> f64,
-) -> [f64; 2] {
+fn step([q, dq]: [f64; 2], tau: f64, h: f64, acceleration: impl Fn(f64, f64, f64) -> f64) -> [f64; 2] {
     let slope = |q: f64, dq: f64, tau: f64| [dq, acceleration(q, dq, tau)];
     let a = slope(q, dq, tau);
     let b = slope(q + h / 2.0 * a[0], dq + h / 2.0 * a[1], tau + h / 2.0);
@@ -130,12 +113,7 @@ fn step(
 
 #[test]
 fn an_integrated_orbit_is_minus_itself_after_half_a_period() {
-    for (lambda, r, g) in [
-        (1.43, 0.65, 1.1),
-        (1.43, 0.65, 1.0),
-        (0.0, 0.65, 0.5),
-        (1.43, 1.0, 1.1),
-    ] {
+    for (lambda, r, g) in [(1.43, 0.65, 1.1), (1.43, 0.65, 1.0), (0.0, 0.65, 0.5), (1.43, 1.0, 1.1)] {
         let scene = Dimensionless::new(0.0084, lambda, r, g);
         for orbit in phase_resonant(&scene) {
             let (epsilon, start) = (scene.epsilon, orbit.start);

@@ -5,8 +5,8 @@ use std::f64::consts::{FRAC_PI_2, TAU};
 use vines_model::{
     Dimensionless,
     orbit::{
-        Bifurcation, Branch, Condition, Ended, ImpactPattern, Limits, Periodic, Unknowns,
-        asymmetric_branch, continue_both_ways, convergence, exact_backbone, phase_resonant, settle,
+        Bifurcation, Branch, Condition, Ended, ImpactPattern, Limits, Periodic, Unknowns, asymmetric_branch,
+        continue_both_ways, convergence, exact_backbone, phase_resonant, settle,
     },
     theory::{B_SYMMETRY_BREAKING, SlowFlow},
 };
@@ -29,12 +29,7 @@ fn from_theory(scene: &Dimensionless, b: f64) -> Option<Periodic> {
     let dv = point.c * (phase - FRAC_PI_2).cos();
     let guess = [phase, v, dv - scene.epsilon * b, b, point.sigma, scene.g];
     let conditions = [Condition::Excitation(scene.g), Condition::PhaseResonance];
-    Periodic::find(
-        scene,
-        &ImpactPattern::symmetric(),
-        &Unknowns::from(guess),
-        conditions,
-    )
+    Periodic::find(scene, &ImpactPattern::symmetric(), &Unknowns::from(guess), conditions)
 }
 
 #[test]
@@ -59,13 +54,8 @@ fn shooting_from_the_theory_finds_the_references_to_1e_8() {
 fn shooting_and_the_closed_form_agree_to_rounding() {
     for orbit in phase_resonant(&scene(1.1)) {
         let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
-        let found = Periodic::find(
-            &scene(1.1),
-            &ImpactPattern::symmetric(),
-            &orbit.unknowns(),
-            conditions,
-        )
-        .expect("the motion");
+        let found = Periodic::find(&scene(1.1), &ImpactPattern::symmetric(), &orbit.unknowns(), conditions)
+            .expect("the motion");
         let apart = (found.sigma - orbit.sigma).abs() + (found.c - orbit.c).abs();
         assert!(apart < 1e-11, "{apart:e}");
         for (one, other) in found.moduli().iter().zip(orbit.multipliers) {
@@ -76,18 +66,10 @@ fn shooting_and_the_closed_form_agree_to_rounding() {
 
 fn response(g: f64) -> (Dimensionless, Branch) {
     let scene = scene(g);
-    let fastest = |one: &vines_model::orbit::Orbit, other: &vines_model::orbit::Orbit| {
-        one.b.total_cmp(&other.b)
-    };
+    let fastest = |one: &vines_model::orbit::Orbit, other: &vines_model::orbit::Orbit| one.b.total_cmp(&other.b);
     let orbit = phase_resonant(&scene).into_iter().max_by(fastest).unwrap();
     let conditions = [Condition::Excitation(g), Condition::PhaseResonance];
-    let start = Periodic::find(
-        &scene,
-        &ImpactPattern::symmetric(),
-        &orbit.unknowns(),
-        conditions,
-    )
-    .unwrap();
+    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
     let branch = continue_both_ways(&scene, &start, Condition::Excitation(g), &Limits::default());
     (scene, branch)
 }
@@ -105,9 +87,7 @@ fn distance_of_plant(scene: &Dimensionless, motion: &Periodic, periods: u32) -> 
         }
         let now = plant.state();
         let apart = [now.q1 - q1, now.dq1 - dq1, now.q2 - q2, now.dq2 - dq2];
-        apart
-            .iter()
-            .fold(most, |most: f64, one| most.max(one.abs()))
+        apart.iter().fold(most, |most: f64, one| most.max(one.abs()))
     })
 }
 
@@ -135,16 +115,8 @@ fn an_exact_response_passes_folds_and_phase_resonance() {
         let apart = distance_of_plant(&scene, motion, 2);
         assert!(apart < 1e-9, "{apart:e} at sigma = {}", motion.sigma);
     }
-    for fold in branch
-        .special
-        .iter()
-        .filter(|one| one.kind == Bifurcation::Fold)
-    {
-        let nearest = fold
-            .motion
-            .multipliers
-            .iter()
-            .map(|[re, im]| (re - 1.0).hypot(*im));
+    for fold in branch.special.iter().filter(|one| one.kind == Bifurcation::Fold) {
+        let nearest = fold.motion.multipliers.iter().map(|[re, im]| (re - 1.0).hypot(*im));
         assert!(nearest.fold(f64::MAX, f64::min) < 1e-4);
     }
 }
@@ -184,30 +156,11 @@ fn symmetry_breaks_near_the_theorys_speed_and_asymmetric_motions_leave_it() {
 #[test]
 fn the_exact_backbone_continued_is_the_closed_form() {
     let scene = scene(1.1);
-    let orbit = phase_resonant(&scene)
-        .into_iter()
-        .find(|one| one.stable)
-        .unwrap();
+    let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
     let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
-    let start = Periodic::find(
-        &scene,
-        &ImpactPattern::symmetric(),
-        &orbit.unknowns(),
-        conditions,
-    )
-    .unwrap();
-    let branch = continue_both_ways(
-        &scene,
-        &start,
-        Condition::PhaseResonance,
-        &Limits::default(),
-    );
-    assert!(
-        branch.points.len() > 40,
-        "{}: {:?}",
-        branch.points.len(),
-        branch.ended
-    );
+    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
+    let branch = continue_both_ways(&scene, &start, Condition::PhaseResonance, &Limits::default());
+    assert!(branch.points.len() > 40, "{}: {:?}", branch.points.len(), branch.ended);
     for motion in &branch.points {
         let closed = exact_backbone(&scene, 1.0 + scene.epsilon * motion.sigma);
         let nearest = closed
@@ -231,13 +184,7 @@ fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
         .find(|one| one.c > 0.2)
         .unwrap();
     let conditions = [Condition::Sigma(mode.sigma), Condition::PhaseResonance];
-    let start = Periodic::find(
-        &scene,
-        &ImpactPattern::symmetric(),
-        &mode.unknowns(),
-        conditions,
-    )
-    .unwrap();
+    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &mode.unknowns(), conditions).unwrap();
     let limits = Limits {
         sigma: [-3.0, 0.5],
         points: 200,
@@ -265,14 +212,7 @@ fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
 #[test]
 fn motions_with_more_impacts_are_found_where_they_settle() {
     let mut patterns = Vec::new();
-    for (g, sigma) in [
-        (1.1, -1.14),
-        (3.0, 0.5),
-        (4.0, 1.0),
-        (5.0, 1.5),
-        (6.0, 2.0),
-        (8.0, 2.0),
-    ] {
+    for (g, sigma) in [(1.1, -1.14), (3.0, 0.5), (4.0, 1.0), (5.0, 1.5), (6.0, 2.0), (8.0, 2.0)] {
         let scene = scene(g);
         if let Some(motion) = settle(&scene, sigma, [0.0, 0.0, 0.0, 0.9], 800).unwrap() {
             assert!(motion.stable && distance_of_plant(&scene, &motion, 3) < 1e-9);
@@ -300,11 +240,7 @@ fn a_motion_with_more_impacts_is_followed_like_any_other() {
         ..Limits::default()
     };
     let branch = continue_both_ways(&scene, &motion, Condition::Excitation(2.2), &limits);
-    let kinds: Vec<_> = branch
-        .special
-        .iter()
-        .map(|one| (one.kind, one.motion.sigma))
-        .collect();
+    let kinds: Vec<_> = branch.special.iter().map(|one| (one.kind, one.motion.sigma)).collect();
     println!(
         "{} impacts in {} periods, followed through {} motions: {kinds:?}",
         motion.pattern.impacts(),
@@ -329,18 +265,9 @@ fn theory_less_exact_shrinks_as_epsilon() {
 #[test]
 fn a_branch_says_why_it_ended() {
     let scene = scene(1.1);
-    let orbit = phase_resonant(&scene)
-        .into_iter()
-        .find(|one| one.stable)
-        .unwrap();
+    let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
     let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
-    let start = Periodic::find(
-        &scene,
-        &ImpactPattern::symmetric(),
-        &orbit.unknowns(),
-        conditions,
-    )
-    .unwrap();
+    let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
     let limits = Limits {
         points: 5,
         ..Limits::default()

@@ -66,13 +66,7 @@ fn the_backbone_agrees_with_its_form_in_k5_and_k6() {
 fn equilibria_rest_on_the_manifold_and_satisfy_k1_to_k6() {
     let (flow, manifold) = (flow(), Manifold::new(R));
     let mut seen = 0;
-    for (g, sigma) in [
-        (1.1, -1.0),
-        (1.1, -1.5),
-        (1.3, 0.2),
-        (1.6, -0.8),
-        (0.9, -1.2),
-    ] {
+    for (g, sigma) in [(1.1, -1.0), (1.1, -1.5), (1.3, 0.2), (1.6, -0.8), (0.9, -1.2)] {
         let k = flow.coefficients(sigma);
         for one in flow.equilibria(g, sigma) {
             seen += 1;
@@ -80,11 +74,7 @@ fn equilibria_rest_on_the_manifold_and_satisfy_k1_to_k6() {
             close(amplitude, 0.0, 1e-12);
             close(phase, 0.0, 1e-12);
             let square = one.c * one.c;
-            let sign = if one.branch == BranchSide::Right {
-                1.0
-            } else {
-                -1.0
-            };
+            let sign = if one.branch == BranchSide::Right { 1.0 } else { -1.0 };
             let root = sign * (square - manifold.c_min().powi(2)).max(0.0).sqrt();
             let (sine, cosine) = one.gamma.sin_cos();
             close(-g * one.c * sine, k.k1 * square + k.k2 * root + k.k3, 1e-9);
@@ -137,11 +127,7 @@ fn the_slope_of_the_excitation_is_its_difference_quotient() {
     for b in [0.3, 0.7, 1.0] {
         let h = 1e-6;
         let (plus, minus) = (flow.backbone_at(b + h), flow.backbone_at(b - h));
-        close(
-            flow.excitation_slope(b),
-            (plus.g - minus.g) / (plus.c - minus.c),
-            1e-7,
-        );
+        close(flow.excitation_slope(b), (plus.g - minus.g) / (plus.c - minus.c), 1e-7);
     }
 }
 
@@ -179,13 +165,7 @@ fn the_fast_map_is_stable_exactly_between_fold_and_symmetry_breaking() {
 
 #[test]
 fn the_decay_in_closed_form_follows_the_slow_flow() {
-    for (lambda, r) in [
-        (LAMBDA, R),
-        (0.0, R),
-        (LAMBDA, 1.0),
-        (1e-9, R),
-        (LAMBDA, 0.2),
-    ] {
+    for (lambda, r) in [(LAMBDA, R), (0.0, R), (LAMBDA, 1.0), (1e-9, R), (LAMBDA, 0.2)] {
         let flow = SlowFlow::new(lambda, r);
         let start = 1.0;
         let decay = flow.decay(start).expect("it dissipates");
@@ -214,13 +194,7 @@ fn a_decay_ends_at_the_fold() {
     close(end.c, Manifold::new(R).c_min(), 1e-8);
     assert!(decay.at(decay.duration() * 1.001).is_none() && decay.at(-1e-3).is_none());
     assert!(SlowFlow::new(0.0, 1.0).decay(0.9).is_none());
-    assert!(
-        SlowFlow::new(LAMBDA, 1.0)
-            .decay(0.9)
-            .unwrap()
-            .duration()
-            .is_infinite()
-    );
+    assert!(SlowFlow::new(LAMBDA, 1.0).decay(0.9).unwrap().duration().is_infinite());
 }
 
 #[test]
@@ -250,10 +224,7 @@ fn theory_and_exact_orbits_approach_each_other_as_epsilon() {
     let theory = flow().phase_resonant(1.1);
     let distance = |epsilon: f64| {
         let scene = Dimensionless::new(epsilon, LAMBDA, R, 1.1);
-        let exact = phase_resonant(&scene)
-            .into_iter()
-            .find(|orbit| orbit.stable)
-            .unwrap();
+        let exact = phase_resonant(&scene).into_iter().find(|orbit| orbit.stable).unwrap();
         let point = theory.iter().find(|point| point.stable()).unwrap();
         (exact.sigma - point.sigma).abs()
     };

@@ -45,13 +45,7 @@ fn a_motion_on_the_manifold_stays_at_an_impact() {
 
 #[test]
 fn the_jumps_linearised_are_the_half_period_map() {
-    for (r, b) in [
-        (0.65, 0.7),
-        (0.65, 0.9),
-        (0.65, 1.2),
-        (0.9, 0.8),
-        (0.3, 0.5),
-    ] {
+    for (r, b) in [(0.65, 0.7), (0.65, 0.9), (0.65, 1.2), (0.9, 0.8), (0.3, 0.5)] {
         let flow = SlowFlow::new(LAMBDA, r);
         let (gamma, h) = (0.3, 1e-6);
         let (c, psi) = (flow.manifold.c(b), flow.psi(b, gamma));
@@ -124,9 +118,7 @@ fn distance_from_slow_flow(epsilon: f64) -> f64 {
 fn past_the_fast_approach_the_impacts_follow_the_slow_flow_to_first_order() {
     let (coarse, fine) = (distance_from_slow_flow(4e-3), distance_from_slow_flow(5e-4));
     let slope = (coarse / fine).ln() / 8f64.ln();
-    println!(
-        "C of the walk less that of the slow flow: {coarse:.1e}, {fine:.1e}, as epsilon^{slope:.2}"
-    );
+    println!("C of the walk less that of the slow flow: {coarse:.1e}, {fine:.1e}, as epsilon^{slope:.2}");
     assert!((0.85..1.2).contains(&slope));
 }
 
@@ -179,13 +171,7 @@ fn every_point_of_a_frequency_response_is_an_equilibrium() {
 #[test]
 fn at_one_detuning_the_responses_cross_as_often_as_there_are_equilibria() {
     let flow = flow();
-    for (g, sigma) in [
-        (1.1, -1.0),
-        (1.3, 0.2),
-        (1.6, -0.8),
-        (1.1, 3.0),
-        (0.9, -1.2),
-    ] {
+    for (g, sigma) in [(1.1, -1.0), (1.3, 0.2), (1.6, -0.8), (1.1, 3.0), (0.9, -1.2)] {
         let crossings: usize = flow
             .frequency_responses(g, 4_001)
             .iter()
@@ -196,11 +182,7 @@ fn at_one_detuning_the_responses_cross_as_often_as_there_are_equilibria() {
                     .count()
             })
             .sum();
-        assert_eq!(
-            crossings,
-            flow.equilibria(g, sigma).len(),
-            "G = {g}, sigma = {sigma}"
-        );
+        assert_eq!(crossings, flow.equilibria(g, sigma).len(), "G = {g}, sigma = {sigma}");
     }
 }
 
@@ -213,15 +195,13 @@ fn the_backbone_passes_through_the_maxima_of_the_frequency_responses() {
             let g = fold.g + above;
             // The maximum over sigma by a search among all equilibria, which knows nothing of phase resonance.
             let highest = |sigma: f64| {
-                flow.equilibria(g, sigma)
-                    .iter()
-                    .fold(0.0, |most: f64, one| {
-                        if one.b > flow.manifold.b_min() {
-                            most.max(one.c)
-                        } else {
-                            most
-                        }
-                    })
+                flow.equilibria(g, sigma).iter().fold(0.0, |most: f64, one| {
+                    if one.b > flow.manifold.b_min() {
+                        most.max(one.c)
+                    } else {
+                        most
+                    }
+                })
             };
             let mut best = (-400..400)
                 .map(|n| f64::from(n) * 0.01)
@@ -253,14 +233,8 @@ fn the_activation_thresholds_are_where_equilibria_begin() {
         assert!(flow.equilibria(activation.existence - h, sigma).is_empty());
         assert!(!flow.equilibria(activation.existence + h, sigma).is_empty());
         let stable = activation.stable.expect("a stable motion at some G");
-        assert!(
-            !flow.has_stable_motion(stable - 1e-4, sigma),
-            "sigma = {sigma}"
-        );
-        assert!(
-            flow.has_stable_motion(stable + 1e-4, sigma),
-            "sigma = {sigma}"
-        );
+        assert!(!flow.has_stable_motion(stable - 1e-4, sigma), "sigma = {sigma}");
+        assert!(flow.has_stable_motion(stable + 1e-4, sigma), "sigma = {sigma}");
         assert!(activation.existence <= stable);
     }
     // From rest the linear resonance must reach the wall: C = G/lambda = 1.
@@ -294,11 +268,7 @@ fn a_waveform_meets_its_walls_and_bounces_as_restitution_says() {
         let after = (wave.w(t + h) - wave.w(t)) / h;
         close(after / before, -R, 1e-4);
         close(wave.q1(0.3) - wave.q2(0.3), wave.w(0.3), 1e-15);
-        close(
-            wave.q1(0.3) + scene.epsilon * wave.q2(0.3),
-            wave.v(0.3),
-            1e-15,
-        );
+        close(wave.q1(0.3) + scene.epsilon * wave.q2(0.3), wave.v(0.3), 1e-15);
     }
     close(triangle_wave(FRAC_PI_2), FRAC_PI_2, 1e-15);
     close(triangle_wave(PI + 0.2), -0.2, 1e-12);
@@ -308,15 +278,8 @@ fn a_waveform_meets_its_walls_and_bounces_as_restitution_says() {
 fn the_waveform_approaches_the_exact_motion_as_epsilon() {
     let distance = |epsilon: f64| {
         let scene = Dimensionless::new(epsilon, LAMBDA, R, 1.1);
-        let orbit = phase_resonant(&scene)
-            .into_iter()
-            .find(|one| one.stable)
-            .unwrap();
-        let point = flow()
-            .phase_resonant(1.1)
-            .into_iter()
-            .find(|one| one.stable())
-            .unwrap();
+        let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
+        let point = flow().phase_resonant(1.1).into_iter().find(|one| one.stable()).unwrap();
         let wave = Waveform::new(&scene, point.sigma, point.b, -FRAC_PI_2);
         // The exact particle's flight from the impact on w = +1, and the waveform's, both from their own impact on.
         let t = wave.impact_time();
@@ -330,9 +293,7 @@ fn the_waveform_approaches_the_exact_motion_as_epsilon() {
     };
     let (coarse, fine) = (distance(1e-2), distance(1e-3));
     let slope = (coarse / fine).log10();
-    println!(
-        "q2 of the waveform less the exact one: {coarse:.1e}, {fine:.1e}, as epsilon^{slope:.2}"
-    );
+    println!("q2 of the waveform less the exact one: {coarse:.1e}, {fine:.1e}, as epsilon^{slope:.2}");
     close(slope, 1.0, 0.1);
 }
 
@@ -354,10 +315,7 @@ fn a_decaying_motion_stays_between_its_walls() {
     for n in 0..4000 {
         let tau = end * f64::from(n) / 4000.0;
         let [v, w] = decay.motion(epsilon, 0.4, tau).unwrap();
-        assert!(
-            w.abs() <= 1.0 + 1e-9 && v.abs() < 1.0,
-            "tau = {tau}: v = {v}, w = {w}"
-        );
+        assert!(w.abs() <= 1.0 + 1e-9 && v.abs() < 1.0, "tau = {tau}: v = {v}, w = {w}");
         touched = touched.max(w.abs());
     }
     assert!(touched > 0.999);
@@ -369,9 +327,5 @@ fn the_stable_island_lies_between_fold_and_symmetry_breaking() {
     let flow = flow();
     let (b_min, sigma) = (Manifold::new(R).b_min(), -1.0);
     let within = flow.stable_at(sigma, 0.5 * (b_min + B_SYMMETRY_BREAKING));
-    assert!(
-        within
-            && !flow.stable_at(sigma, b_min - 0.01)
-            && !flow.stable_at(sigma, B_SYMMETRY_BREAKING + 0.01)
-    );
+    assert!(within && !flow.stable_at(sigma, b_min - 0.01) && !flow.stable_at(sigma, B_SYMMETRY_BREAKING + 0.01));
 }

@@ -28,9 +28,7 @@ pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
         .map_err(|error| failed(format!("{error}; expected is HOST:PORT")))?
         .collect();
     found.sort_by_key(SocketAddr::is_ipv6);
-    let address = *found
-        .first()
-        .ok_or_else(|| failed("the name has no address".into()))?;
+    let address = *found.first().ok_or_else(|| failed("the name has no address".into()))?;
     if scope == BindScope::Loopback && !is_loopback(address.ip()) {
         return Err(LinkError::Remote { address });
     }
@@ -50,12 +48,7 @@ mod tests {
         for here in ["127.0.0.1:5000", "udp://127.8.8.8:1", "[::1]:9"] {
             assert!(resolve(here, BindScope::Loopback).is_ok(), "{here}");
         }
-        for beyond in [
-            "0.0.0.0:5000",
-            "192.0.2.1:5000",
-            "[::]:5000",
-            "[2001:db8::1]:1",
-        ] {
+        for beyond in ["0.0.0.0:5000", "192.0.2.1:5000", "[::]:5000", "[2001:db8::1]:1"] {
             let refused = resolve(beyond, BindScope::Loopback).unwrap_err();
             assert!(refused.to_string().contains("--allow-remote"), "{refused}");
             assert!(resolve(beyond, BindScope::Remote).is_ok(), "{beyond}");
@@ -64,13 +57,7 @@ mod tests {
 
     #[test]
     fn text_that_is_not_an_address_is_named() {
-        for text in [
-            "",
-            "udp://",
-            "127.0.0.1",
-            "127.0.0.1:99999",
-            "127.0.0.1:rig",
-        ] {
+        for text in ["", "udp://", "127.0.0.1", "127.0.0.1:99999", "127.0.0.1:rig"] {
             let refused = resolve(text, BindScope::Remote).unwrap_err().to_string();
             assert!(refused.contains("HOST:PORT"), "{refused}");
         }

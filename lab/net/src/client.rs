@@ -38,11 +38,7 @@ pub(super) struct Client {
 
 impl Client {
     /// Opens a session with the rig, or the `controller`, at `peer`; `sample_time` in s.
-    pub fn connect(
-        peer: SocketAddr,
-        controller: bool,
-        sample_time: f64,
-    ) -> Result<Self, LinkError> {
+    pub fn connect(peer: SocketAddr, controller: bool, sample_time: f64) -> Result<Self, LinkError> {
         let session = RandomState::new().build_hasher().finish();
         let mut hello = Frame::new(Kind::Hello, session);
         hello.flags = if controller { flag::CONTROLLER } else { 0 };
@@ -185,11 +181,7 @@ impl Client {
         })
     }
 
-    fn filter(
-        &mut self,
-        datagram: Result<Frame, FrameError>,
-        from: SocketAddr,
-    ) -> Result<Option<Frame>, LinkError> {
+    fn filter(&mut self, datagram: Result<Frame, FrameError>, from: SocketAddr) -> Result<Option<Frame>, LinkError> {
         if from != self.peer {
             self.counters.foreign += 1;
             return Ok(None);
@@ -226,9 +218,7 @@ impl Drop for Client {
         }
         for _ in 0..FAREWELLS {
             // If this fails, the server's watchdog ends the session.
-            let _ = self
-                .socket
-                .send(&Frame::new(Kind::Farewell, self.session), self.peer);
+            let _ = self.socket.send(&Frame::new(Kind::Farewell, self.session), self.peer);
         }
     }
 }

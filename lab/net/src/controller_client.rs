@@ -32,11 +32,7 @@ impl NetController {
     ///
     /// # Errors
     /// A server that does not answer, refuses, or has another version.
-    pub fn connect(
-        peer: SocketAddr,
-        sample_time: f64,
-        pace: Option<f64>,
-    ) -> Result<Self, LinkError> {
+    pub fn connect(peer: SocketAddr, sample_time: f64, pace: Option<f64>) -> Result<Self, LinkError> {
         let mut client = Client::connect(peer, true, sample_time)?;
         if let Some(seconds) = pace {
             client.limit_silence(seconds);

@@ -105,12 +105,7 @@ impl ControllerServer {
         }
     }
 
-    fn answer(
-        &mut self,
-        run: &mut Run,
-        frame: &Frame,
-        arrival: Arrival,
-    ) -> Result<(), ControllerError> {
+    fn answer(&mut self, run: &mut Run, frame: &Frame, arrival: Arrival) -> Result<(), ControllerError> {
         let missing = match arrival {
             Arrival::New { missing } => missing,
             Arrival::Repeated => return Ok(self.session.send_again()?),

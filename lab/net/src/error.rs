@@ -38,9 +38,7 @@ pub enum LinkError {
         source: io::Error,
     },
     /// There is no answer.
-    #[error(
-        "no answer from udp://{peer} within {seconds} s: is `vines {role} --listen {peer}` running there?"
-    )]
+    #[error("no answer from udp://{peer} within {seconds} s: is `vines {role} --listen {peer}` running there?")]
     Unreachable {
         /// The address.
         peer: SocketAddr,
@@ -89,9 +87,7 @@ pub enum LinkError {
         time: f64,
     },
     /// A step whose length is not the sample time of the session.
-    #[error(
-        "the step of {step} s is not the sample time of the session with udp://{peer}, {sample_time} s"
-    )]
+    #[error("the step of {step} s is not the sample time of the session with udp://{peer}, {sample_time} s")]
     Step {
         /// The address.
         peer: SocketAddr,

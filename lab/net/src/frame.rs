@@ -145,9 +145,7 @@ impl Frame {
         if version != VERSION {
             return Err(FrameError::Version(version));
         }
-        let bytes: &[u8; SIZE] = bytes
-            .try_into()
-            .map_err(|_| FrameError::Size(bytes.len()))?;
+        let bytes: &[u8; SIZE] = bytes.try_into().map_err(|_| FrameError::Size(bytes.len()))?;
         let word = |at: usize| {
             let mut eight = [0; 8];
             eight.copy_from_slice(&bytes[at..at + 8]);
@@ -176,22 +174,16 @@ mod tests {
 
     fn frames() -> impl Strategy<Value = Frame> {
         let numbers = prop::array::uniform6(any::<u64>());
-        (
-            1u8..=6,
-            any::<u8>(),
-            any::<u64>(),
-            any::<u64>(),
-            any::<u64>(),
-            numbers,
-        )
-            .prop_map(|(kind, flags, session, sequence, time, values)| Frame {
+        (1u8..=6, any::<u8>(), any::<u64>(), any::<u64>(), any::<u64>(), numbers).prop_map(
+            |(kind, flags, session, sequence, time, values)| Frame {
                 kind: Kind::from_code(kind).unwrap(),
                 flags,
                 session,
                 sequence,
                 time: f64::from_bits(time),
                 values: values.map(f64::from_bits),
-            })
+            },
+        )
     }
 
     proptest! {
@@ -251,9 +243,6 @@ mod tests {
         let longer = [&b"VINE\x07\x00"[..], &[0; 100]].concat();
         assert_eq!(Frame::decode(&longer), Err(FrameError::Version(7)));
         assert_eq!(Frame::decode(b"VINE"), Err(FrameError::Magic));
-        assert_eq!(
-            Frame::decode(b"VINE\x01\x00 short"),
-            Err(FrameError::Size(12))
-        );
+        assert_eq!(Frame::decode(b"VINE\x01\x00 short"), Err(FrameError::Size(12)));
     }
 }

@@ -25,8 +25,7 @@ pub(super) struct FrameSocket {
 impl FrameSocket {
     /// A socket that listens on `address`; port 0 takes a free one.
     pub fn listen(address: SocketAddr) -> Result<Self, LinkError> {
-        let socket =
-            UdpSocket::bind(address).map_err(|source| LinkError::Listen { address, source })?;
+        let socket = UdpSocket::bind(address).map_err(|source| LinkError::Listen { address, source })?;
         Ok(Self { socket })
     }
 

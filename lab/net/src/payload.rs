@@ -12,10 +12,7 @@ pub(super) struct Reading {
 
 /// Writes readings into a frame.
 pub(super) fn write_reading(mut frame: Frame, reading: &Reading) -> Frame {
-    let Reading {
-        sensors,
-        ground_truth,
-    } = reading;
+    let Reading { sensors, ground_truth } = reading;
     frame.kind = Kind::Sensors;
     if sensors.reference.is_some() {
         frame.flags |= flag::REFERENCE;
@@ -70,14 +67,7 @@ pub(super) fn write_command(mut frame: Frame, command: &Command) -> Frame {
         amplitude,
         displacement,
     } = command.drive;
-    frame.values = [
-        omega,
-        amplitude,
-        displacement,
-        command.phase_error,
-        0.0,
-        0.0,
-    ];
+    frame.values = [omega, amplitude, displacement, command.phase_error, 0.0, 0.0];
     frame
 }
 

@@ -40,9 +40,7 @@ impl Display for Punctuality {
             1e3 * self.worst
         )?;
         for (n, count) in self.histogram.iter().enumerate() {
-            let class = CLASSES
-                .get(n)
-                .map_or("longer".into(), |end| format!("below {end}"));
+            let class = CLASSES.get(n).map_or("longer".into(), |end| format!("below {end}"));
             writeln!(f, "    {class:<13}{count:>10}")?;
         }
         Ok(())

@@ -157,10 +157,7 @@ impl RigServer {
         let drive = read_command(frame)?.drive;
         let nyquist = std::f64::consts::PI / self.service.sample_time;
         let largest = self.service.max_amplitude;
-        (drive.omega <= nyquist
-            && drive.amplitude <= largest
-            && drive.displacement.abs() <= largest)
-            .then_some(drive)
+        (drive.omega <= nyquist && drive.amplitude <= largest && drive.displacement.abs() <= largest).then_some(drive)
     }
 
     /// The deadline has passed: a sample is due, or the client is silent.
@@ -186,8 +183,7 @@ impl RigServer {
     }
 
     fn advance(&mut self, run: &mut Run) -> Result<(), RigError> {
-        run.rig
-            .advance(run.watchdog.drive(), self.service.sample_time)?;
+        run.rig.advance(run.watchdog.drive(), self.service.sample_time)?;
         run.at += 1;
         self.tell_reading(run)
     }
@@ -226,9 +222,7 @@ impl RigServer {
         };
         while run.pace.is_none() && !run.watchdog.is_down() {
             // An error of the rig changes nothing now: the session ends.
-            let _ = run
-                .rig
-                .advance(run.watchdog.drive(), self.service.sample_time);
+            let _ = run.rig.advance(run.watchdog.drive(), self.service.sample_time);
         }
         let counters = if ended == Ended::Silence {
             self.session.release()

@@ -93,8 +93,7 @@ impl ServerSession {
 
     /// Time since the last frame of the client.
     pub fn silence(&self) -> Duration {
-        self.session
-            .map_or(Duration::ZERO, |session| session.heard.elapsed())
+        self.session.map_or(Duration::ZERO, |session| session.heard.elapsed())
     }
 
     /// Waits for the next event until `deadline`. Frames that have arrived come first, but a flood of them cannot stop the
@@ -156,11 +155,7 @@ impl ServerSession {
         std::mem::take(&mut self.counters)
     }
 
-    fn sort(
-        &mut self,
-        datagram: Result<Frame, FrameError>,
-        from: SocketAddr,
-    ) -> Result<Option<Event>, LinkError> {
+    fn sort(&mut self, datagram: Result<Frame, FrameError>, from: SocketAddr) -> Result<Option<Event>, LinkError> {
         let frame = match datagram {
             Ok(frame) => frame,
             Err(error) => {
@@ -259,12 +254,7 @@ impl ServerSession {
         Ok(self.socket.send(&welcome, to)?)
     }
 
-    fn refuse(
-        &self,
-        session: u64,
-        reason: Refusal,
-        to: SocketAddr,
-    ) -> Result<Option<Event>, LinkError> {
+    fn refuse(&self, session: u64, reason: Refusal, to: SocketAddr) -> Result<Option<Event>, LinkError> {
         let refusal = reason.write(Frame::new(Kind::Refusal, session));
         self.socket.send(&refusal, to)?;
         Ok(None)

@@ -44,11 +44,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut server = ControllerServer::listen(arguments.serving.address()?, service)?;
     let (stop, tell) = arguments.serving.begin("controller", server.address()?)?;
     server
-        .serve(
-            || Ok(Box::new(first.clone()) as Box<dyn Controller>),
-            stop,
-            tell,
-        )
+        .serve(|| Ok(Box::new(first.clone()) as Box<dyn Controller>), stop, tell)
         .map_err(Failure::run)?;
     Ok(String::new())
 }

@@ -39,8 +39,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 
 /// One row per estimator and window, with a column for each noise level.
 fn table(qualities: &[Quality]) -> Table {
-    let rows = qualities
-        .chunk_by(|one, other| (one.estimator, one.window) == (other.estimator, other.window));
+    let rows = qualities.chunk_by(|one, other| (one.estimator, one.window) == (other.estimator, other.window));
     Table::new([
         "estimator",
         "window, periods",

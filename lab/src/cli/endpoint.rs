@@ -55,12 +55,8 @@ impl Endpoint {
     pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
         let mut pace = None;
         let rig: Box<dyn Rig> = match self {
-            Self::BuiltIn => {
-                Box::new(Simulated::new(scene.plant, scene.start).map_err(Failure::input)?)
-            }
-            Self::Fmu(file) => {
-                Box::new(FmuRig::load(file, &scene.start_values()).map_err(Failure::run)?)
-            }
+            Self::BuiltIn => Box::new(Simulated::new(scene.plant, scene.start).map_err(Failure::input)?),
+            Self::Fmu(file) => Box::new(FmuRig::load(file, &scene.start_values()).map_err(Failure::run)?),
             Self::Udp(address) => {
                 let rig = NetRig::connect(resolve(address, scope)?, scene.sample_time())?;
                 pace = rig.pace();
@@ -80,12 +76,8 @@ impl Endpoint {
         pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
         Ok(match self {
-            Self::BuiltIn => {
-                Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?)
-            }
-            Self::Fmu(file) => Box::new(
-                FmuController::load(file, &scene.controller_config()).map_err(Failure::run)?,
-            ),
+            Self::BuiltIn => Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?),
+            Self::Fmu(file) => Box::new(FmuController::load(file, &scene.controller_config()).map_err(Failure::run)?),
             Self::Udp(address) => {
                 let peer = resolve(address, scope)?;
                 Box::new(NetController::connect(peer, scene.sample_time(), pace)?)

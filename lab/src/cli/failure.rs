@@ -3,8 +3,8 @@
 use std::fmt::{self, Display, Formatter};
 
 use vines::{
-    backbone::TrackError, experiment::ExperimentError, net::LinkError, pack::PackError,
-    rig::RigError, scene::SceneError,
+    backbone::TrackError, experiment::ExperimentError, net::LinkError, pack::PackError, rig::RigError,
+    scene::SceneError,
 };
 
 /// A message and an exit code.

@@ -78,14 +78,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut controller = arguments.controller.controller(&scene, reach, pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(&plan);
-    let record = experiment::run(
-        rig.as_mut(),
-        controller.as_mut(),
-        &plan,
-        |stage, done, of| {
-            show(&bar, stage, done, of);
-        },
-    );
+    let record = experiment::run(rig.as_mut(), controller.as_mut(), &plan, |stage, done, of| {
+        show(&bar, stage, done, of);
+    });
     bar.finish_and_clear();
     // Dropping rig and controller ends their network sessions.
     drop((rig, controller));
@@ -132,9 +127,8 @@ impl Packed {
             let name = format!("{}.fmu", component.identifier);
             let (from, to) = (self.folder.path().join(&name), self.out.join(&name));
             if from.is_file() {
-                std::fs::rename(from, &to).map_err(|error| {
-                    Failure::run(format!("cannot write {}: {error}", to.display()))
-                })?;
+                std::fs::rename(from, &to)
+                    .map_err(|error| Failure::run(format!("cannot write {}: {error}", to.display())))?;
                 kept.push(to);
             }
         }

@@ -40,19 +40,11 @@ pub(super) struct Arguments {
     scene: SceneArguments,
 
     /// Horizontal axis: sigma, G or r, its first and last value, and how many
-    #[arg(
-        long,
-        value_name = "AXIS=FIRST:LAST:POINTS",
-        default_value = "sigma=-5:5:101"
-    )]
+    #[arg(long, value_name = "AXIS=FIRST:LAST:POINTS", default_value = "sigma=-5:5:101")]
     x: Range,
 
     /// Vertical axis, in the same form
-    #[arg(
-        long,
-        value_name = "AXIS=FIRST:LAST:POINTS",
-        default_value = "G=0.1:3:59"
-    )]
+    #[arg(long, value_name = "AXIS=FIRST:LAST:POINTS", default_value = "G=0.1:3:59")]
     y: Range,
 
     /// Detuning, if it is not on an axis [default: that of the scene's stable phase-resonant orbit, or 0]
@@ -128,12 +120,7 @@ fn summary(map: &Map) -> String {
             share(here, inside),
         ]
     });
-    let table = Table::new([
-        "regime",
-        "cells",
-        "share",
-        "inside the theory's stable island",
-    ]);
+    let table = Table::new(["regime", "cells", "share", "inside the theory's stable island"]);
     format!(
         "Regimes over {} and {}\n  {}\n\n{}",
         map.plan.x,

@@ -5,8 +5,8 @@ use std::fmt::Write;
 use clap::Args;
 use vines::{
     orbit::{
-        Bifurcation, Branch, Condition, Limits, Orbit, Periodic, backbone, continue_both_ways,
-        convergence, phase_resonant, response, settle,
+        Bifurcation, Branch, Condition, Limits, Orbit, Periodic, backbone, continue_both_ways, convergence,
+        phase_resonant, response, settle,
     },
     report::{Table, number, summary::parameters},
     scene::Dimensionless,
@@ -80,19 +80,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     }
     if arguments.response {
         let found = response(&scene, &Limits::default()).ok_or_else(none)?;
-        return shown(
-            &scene,
-            "Exact frequency response",
-            &found,
-            arguments.json,
-            || {
-                let asymmetric = found.asymmetric.iter();
-                curve("Symmetric 1:1", &found.symmetric)
-                    + &asymmetric
-                        .map(|branch| curve("Asymmetric", branch))
-                        .collect::<String>()
-            },
-        );
+        return shown(&scene, "Exact frequency response", &found, arguments.json, || {
+            let asymmetric = found.asymmetric.iter();
+            curve("Symmetric 1:1", &found.symmetric)
+                + &asymmetric.map(|branch| curve("Asymmetric", branch)).collect::<String>()
+        });
     }
     if arguments.convergence {
         return converged(&scene, arguments.json);
@@ -135,12 +127,7 @@ fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
 const SETTLE: usize = 1000;
 
 /// The motion that the start leads to at one detuning, or its frequency response.
-fn settled(
-    arguments: &Arguments,
-    scene: &Dimensionless,
-    sigma: f64,
-    start: [f64; 4],
-) -> Result<String, Failure> {
+fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<String, Failure> {
     if !(1.0 + scene.epsilon * sigma > 0.0 && sigma.is_finite()) {
         return Err(Failure::input(format!(
             "--sigma = {sigma} (dimensionless): it must be finite, and 1 + epsilon sigma above 0"
@@ -157,27 +144,15 @@ fn settled(
         "{} impacts in {} period{}{}",
         motion.pattern.impacts(),
         motion.pattern.periods(),
-        if motion.pattern.periods() == 1 {
-            ""
-        } else {
-            "s"
-        },
-        if motion.pattern.mirrored {
-            ", mirrored"
-        } else {
-            ""
-        }
+        if motion.pattern.periods() == 1 { "" } else { "s" },
+        if motion.pattern.mirrored { ", mirrored" } else { "" }
     );
     if arguments.response {
         let condition = Condition::Excitation(scene.g);
         let branch = continue_both_ways(scene, &motion, condition, &Limits::default());
-        return shown(
-            scene,
-            "Exact frequency response",
-            &branch,
-            arguments.json,
-            || curve(&pattern, &branch),
-        );
+        return shown(scene, "Exact frequency response", &branch, arguments.json, || {
+            curve(&pattern, &branch)
+        });
     }
     shown(scene, "Exact orbit", &motion, arguments.json, || {
         described(&pattern, &motion)
@@ -186,12 +161,8 @@ fn settled(
 
 /// The motion and the states after its impacts.
 fn described(pattern: &str, motion: &Periodic) -> String {
-    let Periodic {
-        sigma, c, b, gamma, ..
-    } = motion;
-    let multipliers = motion
-        .multipliers
-        .map(|[re, im]| format!("{re:.5}{im:+.5}i"));
+    let Periodic { sigma, c, b, gamma, .. } = motion;
+    let multipliers = motion.multipliers.map(|[re, im]| format!("{re:.5}{im:+.5}i"));
     let rows = motion.bounces.iter().map(|one| {
         let phase = one.phase.to_degrees().rem_euclid(360.0);
         let mut cells = vec![format!("{:+}", one.wall)];
@@ -235,30 +206,13 @@ fn curve(name: &str, branch: &Branch) -> String {
     );
     let row = |motion: &Periodic| -> Vec<String> {
         let largest = motion.moduli()[3];
-        let numbers = [
-            motion.sigma,
-            motion.g,
-            motion.c,
-            motion.gamma.to_degrees(),
-            motion.b,
-        ];
+        let numbers = [motion.sigma, motion.g, motion.c, motion.gamma.to_degrees(), motion.b];
         let mut cells: Vec<String> = numbers.map(number).into();
         cells.extend([number(largest), yes_no(motion.stable)]);
         cells
     };
-    let table = Table::new([
-        "sigma",
-        "G",
-        "C",
-        "phase, degrees",
-        "B",
-        "largest mult.",
-        "stable",
-    ]);
-    let thinned = branch
-        .points
-        .iter()
-        .step_by(branch.points.len().div_ceil(ROWS));
+    let table = Table::new(["sigma", "G", "C", "phase, degrees", "B", "largest mult.", "stable"]);
+    let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(ROWS));
     text += &table.rows(thinned.map(row)).text();
     for special in &branch.special {
         let what = match special.kind {
@@ -291,9 +245,7 @@ fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
         row.push(yes_no(orbit.stable));
         row
     });
-    Table::new([
-        "sigma", "Omega", "C", "B", "mult1", "mult2", "mult3", "mult4", "stable",
-    ])
-    .rows(rows)
-    .text()
+    Table::new(["sigma", "Omega", "C", "B", "mult1", "mult2", "mult3", "mult4", "stable"])
+        .rows(rows)
+        .text()
 }

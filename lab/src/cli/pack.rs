@@ -57,14 +57,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         others: arguments.binaries.clone(),
     };
     let written = pack_bench(&scene, &libraries, &arguments.out)?;
-    Ok(written
-        .iter()
-        .map(|path| format!("{}\n", path.display()))
-        .collect())
+    Ok(written.iter().map(|path| format!("{}\n", path.display())).collect())
 }
 
 pub(super) fn beside_this_program() -> Result<PathBuf, Failure> {
-    let program = std::env::current_exe()
-        .map_err(|error| Failure::run(format!("cannot tell where this program is: {error}")))?;
+    let program =
+        std::env::current_exe().map_err(|error| Failure::run(format!("cannot tell where this program is: {error}")))?;
     Ok(program.parent().map(PathBuf::from).unwrap_or_default())
 }

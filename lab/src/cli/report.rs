@@ -35,19 +35,11 @@ pub(super) struct Arguments {
     out: PathBuf,
 
     /// Horizontal axis of the regime map, as in `vines map`
-    #[arg(
-        long,
-        value_name = "AXIS=FIRST:LAST:POINTS",
-        default_value = "sigma=-5:5:101"
-    )]
+    #[arg(long, value_name = "AXIS=FIRST:LAST:POINTS", default_value = "sigma=-5:5:101")]
     x: Range,
 
     /// Vertical axis of the regime map
-    #[arg(
-        long,
-        value_name = "AXIS=FIRST:LAST:POINTS",
-        default_value = "G=0.1:3:59"
-    )]
+    #[arg(long, value_name = "AXIS=FIRST:LAST:POINTS", default_value = "G=0.1:3:59")]
     y: Range,
 
     /// Recompute everything, without the results of earlier runs
@@ -91,18 +83,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     )
     .map_err(Failure::run)?;
     bar.finish_and_clear();
-    let mut text: String = report
-        .findings
-        .iter()
-        .map(|finding| format!("- {finding}\n"))
-        .collect();
+    let mut text: String = report.findings.iter().map(|finding| format!("- {finding}\n")).collect();
     if !report.kept.is_empty() {
         text += &format!("\nReused from an earlier run: {}\n", report.kept.join(", "));
     }
-    let page = report
-        .written
-        .first()
-        .map(|page| page.display().to_string());
+    let page = report.written.first().map(|page| page.display().to_string());
     Ok(format!(
         "{text}\nWritten: {} and {} figures and tables\n",
         page.unwrap_or_default(),

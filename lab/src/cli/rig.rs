@@ -65,15 +65,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         max_amplitude: arguments.max_amplitude.unwrap_or(scene.plant.half_width),
     };
     let mut server = RigServer::listen(arguments.serving.address()?, service)?;
-    let mode = if service.paced {
-        "in real time"
-    } else {
-        "in lock-step"
-    };
-    let what = format!(
-        "rig, {mode}, {:.1} samples per second,",
-        1.0 / service.sample_time
-    );
+    let mode = if service.paced { "in real time" } else { "in lock-step" };
+    let what = format!("rig, {mode}, {:.1} samples per second,", 1.0 / service.sample_time);
     let (stop, tell) = arguments.serving.begin(&what, server.address()?)?;
     server
         .serve(|| Ok(Box::new(first.clone()) as Box<dyn Rig>), stop, tell)

@@ -56,8 +56,7 @@ impl ServingArguments {
         let end = self
             .duration
             .map(|seconds| Instant::now() + Duration::from_secs_f64(seconds));
-        let stop =
-            move || stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end);
+        let stop = move || stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end);
         let (json, sessions, mut served) = (self.json, self.sessions, 0);
         let tell = move |session: &Session| {
             let text = if json {

@@ -183,14 +183,7 @@ fn solutions(points: &[BackbonePoint]) -> String {
         row.extend([point.impacts_stable, point.slow_flow_stable].map(yes_no));
         row
     });
-    Table::new([
-        "branch",
-        "sigma",
-        "C",
-        "B",
-        "impacts stable",
-        "slow flow stable",
-    ])
-    .rows(rows)
-    .text()
+    Table::new(["branch", "sigma", "C", "B", "impacts stable", "slow flow stable"])
+        .rows(rows)
+        .text()
 }

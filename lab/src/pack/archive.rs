@@ -40,11 +40,7 @@ mod tests {
         let mut archive = zip::ZipArchive::new(Cursor::new(bytes)).unwrap();
         for (name, content) in entries {
             let mut read = Vec::new();
-            archive
-                .by_name(name)
-                .unwrap()
-                .read_to_end(&mut read)
-                .unwrap();
+            archive.by_name(name).unwrap().read_to_end(&mut read).unwrap();
             assert_eq!(read, content);
         }
     }

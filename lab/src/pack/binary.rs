@@ -42,20 +42,14 @@ pub(super) struct Fitted {
 }
 
 /// Finds the places of the others.
-pub(super) fn add(
-    fitted: &mut Vec<Fitted>,
-    others: &[Binary],
-    components: &[Component],
-) -> Result<(), PackError> {
+pub(super) fn add(fitted: &mut Vec<Fitted>, others: &[Binary], components: &[Component]) -> Result<(), PackError> {
     for other in others {
         let new = fit(other, components)?;
         let place = |one: &Fitted| (one.component, one.platform.folder);
         if fitted.iter().any(|one| place(one) == place(&new)) {
             let identifier = components[new.component].identifier;
             let folder = other.platform.folder;
-            return Err(other.refused(format!(
-                "would be the second {folder} library of {identifier}"
-            )));
+            return Err(other.refused(format!("would be the second {folder} library of {identifier}")));
         }
         fitted.push(new);
     }
@@ -70,15 +64,10 @@ fn fit(binary: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
     })?;
     let platform = binary.platform;
     if let Err(found) = platform.check(&content) {
-        return Err(binary.refused(format!(
-            "is {found}, but {} needs {}",
-            platform.folder, platform.name
-        )));
+        return Err(binary.refused(format!("is {found}, but {} needs {}", platform.folder, platform.name)));
     }
     if !exports(&content, "fmi2Instantiate") {
-        return Err(
-            binary.refused("has no function fmi2Instantiate, so it is no FMI 2.0 component")
-        );
+        return Err(binary.refused("has no function fmi2Instantiate, so it is no FMI 2.0 component"));
     }
     let belongs = |component: &Component| {
         let guid = component.guid();

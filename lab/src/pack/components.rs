@@ -30,8 +30,7 @@ impl Component {
 
     /// The description with the date at which the FMU was made, where there is one.
     pub(super) fn dated(&self, date: Option<&str>) -> String {
-        let (Some(date), Some((before, rest))) = (date, self.description.split_once("guid=\""))
-        else {
+        let (Some(date), Some((before, rest))) = (date, self.description.split_once("guid=\"")) else {
             return self.description.clone();
         };
         format!("{before}generationDateAndTime=\"{date}\" guid=\"{rest}")

@@ -15,9 +15,7 @@ pub(super) fn generation() -> Result<Option<String>, PackError> {
         Ok(text) if text.is_empty() => Ok(None),
         Ok(text) => format(&text).map(Some),
         Err(VarError::NotPresent) => Ok(None),
-        Err(VarError::NotUnicode(text)) => {
-            Err(PackError::Date(text.to_string_lossy().into_owned()))
-        }
+        Err(VarError::NotUnicode(text)) => Err(PackError::Date(text.to_string_lossy().into_owned())),
     }
 }
 
@@ -41,10 +39,7 @@ mod tests {
     fn what_is_no_number_of_seconds_is_refused() {
         for text in ["yesterday", "1.5", "99999999999999999"] {
             let message = format(text).expect_err("no date").to_string();
-            assert!(
-                message.contains(text) && message.contains("1700000000"),
-                "{message}"
-            );
+            assert!(message.contains(text) && message.contains("1700000000"), "{message}");
         }
     }
 }

@@ -190,10 +190,8 @@ mod tests {
             let page = std::str::from_utf8(&files[0].1).unwrap();
             for row in page.lines().filter(|line| line.starts_with("<tr><td>")) {
                 let cells: Vec<_> = row.split("</td><td>").collect();
-                let whole =
-                    ["impacts", "contact"].map(|name| format!("<tr><td><code>{name}</code>"));
-                let is_real =
-                    component.identifier == "LoViNes" && !whole.contains(&cells[0].into());
+                let whole = ["impacts", "contact"].map(|name| format!("<tr><td><code>{name}</code>"));
+                let is_real = component.identifier == "LoViNes" && !whole.contains(&cells[0].into());
                 assert!(!is_real || !cells[2].is_empty(), "{row}");
             }
         }

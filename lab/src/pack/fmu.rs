@@ -30,11 +30,7 @@ pub(super) fn all(components: &[Component], libraries: &Libraries) -> Result<Vec
 
 /// The libraries of this platform. Where masters look into two folders for them, they go into both, unless another library
 /// has been given for the second.
-fn own(
-    fitted: &mut Vec<Fitted>,
-    components: &[Component],
-    libraries: &Libraries,
-) -> Result<(), PackError> {
+fn own(fitted: &mut Vec<Fitted>, components: &[Component], libraries: &Libraries) -> Result<(), PackError> {
     let platform = Platform::running();
     let second = platform
         .also()
@@ -55,11 +51,7 @@ fn own(
     Ok(())
 }
 
-fn one(
-    component: &Component,
-    libraries: &[&Fitted],
-    date: Option<&str>,
-) -> Result<File, PackError> {
+fn one(component: &Component, libraries: &[&Fitted], date: Option<&str>) -> Result<File, PackError> {
     let identifier = component.identifier;
     let description = component.dated(date);
     let libraries: Vec<(String, &[u8])> = libraries
@@ -72,16 +64,8 @@ fn one(
         .collect();
     let pages = documentation(identifier, &description).map_err(PackError::Description)?;
     let mut entries = vec![("modelDescription.xml", description.as_bytes())];
-    entries.extend(
-        pages
-            .iter()
-            .map(|(name, page)| (name.as_str(), page.as_slice())),
-    );
-    entries.extend(
-        libraries
-            .iter()
-            .map(|(name, content)| (name.as_str(), *content)),
-    );
+    entries.extend(pages.iter().map(|(name, page)| (name.as_str(), page.as_slice())));
+    entries.extend(libraries.iter().map(|(name, content)| (name.as_str(), *content)));
     let name = format!("{identifier}.fmu");
     match archive::zip(&entries) {
         Ok(content) => Ok(File { name, content }),

@@ -13,11 +13,7 @@ use super::{
 };
 
 /// The bytes of the component's library in `folder`, if it is one for `platform` and belongs to the description.
-pub(super) fn read(
-    component: &Component,
-    folder: &Path,
-    platform: &Platform,
-) -> Result<Vec<u8>, PackError> {
+pub(super) fn read(component: &Component, folder: &Path, platform: &Platform) -> Result<Vec<u8>, PackError> {
     let build_options = component.build_options();
     let path = folder.join(format!("{DLL_PREFIX}{}{DLL_SUFFIX}", component.library));
     let bytes = std::fs::read(&path).map_err(|source| match source.kind() {
@@ -40,10 +36,7 @@ pub(super) fn read(
         });
     }
     if !exports(&bytes, "fmi2Instantiate") {
-        return Err(PackError::NotAComponent {
-            path,
-            build_options,
-        });
+        return Err(PackError::NotAComponent { path, build_options });
     }
     if component.guid().is_some_and(|guid| !mentions(&bytes, guid)) {
         let identifier = component.identifier;

@@ -27,18 +27,10 @@ use BinaryFormat::{Elf, MachO, Pe};
 const KNOWN: [Platform; 9] = [
     linux("linux64", "a 64-bit Linux library (ELF, x86-64)", X86_64),
     linux("linux32", "a 32-bit Linux library (ELF, x86)", I386),
-    linux(
-        "aarch64-linux",
-        "a 64-bit Linux library (ELF, ARM)",
-        Aarch64,
-    ),
+    linux("aarch64-linux", "a 64-bit Linux library (ELF, ARM)", Aarch64),
     windows("win64", "a 64-bit Windows library (PE, x86-64)", X86_64),
     windows("win32", "a 32-bit Windows library (PE, x86)", I386),
-    windows(
-        "aarch64-windows",
-        "a 64-bit Windows library (PE, ARM)",
-        Aarch64,
-    ),
+    windows("aarch64-windows", "a 64-bit Windows library (PE, ARM)", Aarch64),
     macos(DARWIN, "a macOS library (Mach-O, x86-64)", X86_64),
     macos("aarch64-darwin", "a macOS library (Mach-O, ARM)", Aarch64),
     macos(DARWIN, "a macOS library (Mach-O, ARM)", Aarch64),
@@ -97,8 +89,7 @@ impl Platform {
     /// Another folder in which masters look for the library of this platform, if there is one.
     pub(super) fn also(self) -> Option<Self> {
         KNOWN.into_iter().find(|other| {
-            other.folder != self.folder
-                && (other.format, other.architecture) == (self.format, self.architecture)
+            other.folder != self.folder && (other.format, other.architecture) == (self.format, self.architecture)
         })
     }
 
@@ -133,9 +124,7 @@ impl Platform {
         }
         let serves = |&(format, architecture): &(BinaryFormat, Architecture)| {
             let same = |one: &Self| one.format == format && one.architecture == architecture;
-            KNOWN
-                .iter()
-                .any(|one| one.folder == self.folder && same(one))
+            KNOWN.iter().any(|one| one.folder == self.folder && same(one))
         };
         match found.first() {
             _ if found.iter().any(serves) => Ok(()),

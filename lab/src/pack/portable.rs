@@ -22,9 +22,7 @@ pub const GLIBC: (u32, u32) = (2, 17);
 /// asks for a newer C library all the same.
 pub fn portable(components: &[Component]) -> Result<PathBuf, PackError> {
     if OS != "linux" {
-        return Err(failed(format!(
-            "it makes libraries for older Linux, and this is {OS}"
-        )));
+        return Err(failed(format!("it makes libraries for older Linux, and this is {OS}")));
     }
     let target = target_folder(components)?;
     if !succeeds(cargo().args(["zigbuild", "--help"])) {

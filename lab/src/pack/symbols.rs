@@ -39,9 +39,7 @@ fn one_exports(image: &[u8], function: &str) -> bool {
         return false;
     };
     exports.any(|export| match export.as_ref().map(object::Export::name) {
-        Ok(NameOrOrdinal::Name(name)) => {
-            name.strip_prefix(b"_").unwrap_or(name) == function.as_bytes()
-        }
+        Ok(NameOrOrdinal::Name(name)) => name.strip_prefix(b"_").unwrap_or(name) == function.as_bytes(),
         _ => false,
     })
 }

@@ -33,10 +33,7 @@ pub(super) fn file(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
         structure = structure.replace(&format!(" {attribute}=\"derived\""), &filled);
     }
 
-    let inside: Vec<String> = fmus
-        .iter()
-        .map(|fmu| format!("resources/{}", fmu.name))
-        .collect();
+    let inside: Vec<String> = fmus.iter().map(|fmu| format!("resources/{}", fmu.name)).collect();
     let mut entries = vec![
         ("SystemStructure.ssd", structure.as_bytes()),
         ("resources/plant.ssv", plant.as_bytes()),

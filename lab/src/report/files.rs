@@ -79,10 +79,7 @@ pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBu
 }
 
 /// Writes each file under a temporary name, and gives it its own once it is complete.
-pub(super) fn write_files<N: AsRef<str>>(
-    out: &Path,
-    files: &[(N, String)],
-) -> Result<Vec<PathBuf>, WriteError> {
+pub(super) fn write_files<N: AsRef<str>>(out: &Path, files: &[(N, String)]) -> Result<Vec<PathBuf>, WriteError> {
     let refused = |path: &Path| {
         let path = path.to_path_buf();
         move |source| WriteError::File { path, source }
@@ -93,8 +90,7 @@ pub(super) fn write_files<N: AsRef<str>>(
         let path = out.join(name.as_ref());
         let mut file = temporary(out).map_err(refused(&path))?;
         file.write_all(text.as_bytes()).map_err(refused(&path))?;
-        file.persist(&path)
-            .map_err(|error| refused(&path)(error.error))?;
+        file.persist(&path).map_err(|error| refused(&path)(error.error))?;
         written.push(path);
     }
     Ok(written)

@@ -11,9 +11,7 @@ pub fn parameters(p: &Dimensionless) -> String {
 }
 
 fn rig(p: &Dimensionless) -> String {
-    let Dimensionless {
-        epsilon, lambda, r, ..
-    } = p;
+    let Dimensionless { epsilon, lambda, r, .. } = p;
     format!("epsilon = {epsilon:.6}, lambda = {lambda:.4}, r = {r}")
 }
 
@@ -22,12 +20,7 @@ fn rig(p: &Dimensionless) -> String {
 pub fn identification(found: &Comparison) -> String {
     let lock = &found.lock;
     let row = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
-        [
-            name.to_string(),
-            number(sigma),
-            number(c),
-            b.map_or("-".into(), number),
-        ]
+        [name.to_string(), number(sigma), number(c), b.map_or("-".into(), number)]
     };
     let measured = row("measured at the lock", lock.sigma, lock.c, lock.b);
     let exact = found.exact.iter();
@@ -113,7 +106,9 @@ pub fn tracked(found: &TrackedComparison) -> String {
     ])
     .rows(rows);
     let worst = found.worst().map_or(String::new(), |worst| {
-        format!("Largest distance from the exact backbone (largest of the differences in C, sigma and G): {worst:.1e}\n")
+        format!(
+            "Largest distance from the exact backbone (largest of the differences in C, sigma and G): {worst:.1e}\n"
+        )
     });
     format!(
         "{}\n\n{}\n{} points in {:.0} periods, {:.1} of which before the loop held the response: {:.1} periods per point\n{worst}",

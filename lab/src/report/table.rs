@@ -87,9 +87,8 @@ impl Table {
 
     /// Which columns hold numbers only.
     fn numbers(&self) -> Vec<bool> {
-        let is_number = |cell: &str| {
-            ["–", "-", ""].contains(&cell) || cell.trim_end_matches(" %").parse::<f64>().is_ok()
-        };
+        let is_number =
+            |cell: &str| ["–", "-", ""].contains(&cell) || cell.trim_end_matches(" %").parse::<f64>().is_ok();
         (0..self.headings.len())
             .map(|n| self.rows.iter().all(|row| is_number(&row[n])))
             .collect()
@@ -107,16 +106,12 @@ mod tests {
     use super::*;
 
     fn table() -> Table {
-        Table::new(["what", "C"])
-            .rows([["a < b", "0.5"], ["c", "-10.25"]].map(|row| row.map(String::from)))
+        Table::new(["what", "C"]).rows([["a < b", "0.5"], ["c", "-10.25"]].map(|row| row.map(String::from)))
     }
 
     #[test]
     fn words_are_set_to_the_left_and_numbers_to_the_right() {
-        assert_eq!(
-            table().text(),
-            "  what        C\n  a < b     0.5\n  c      -10.25\n"
-        );
+        assert_eq!(table().text(), "  what        C\n  a < b     0.5\n  c      -10.25\n");
     }
 
     #[test]
@@ -130,10 +125,7 @@ mod tests {
     #[test]
     fn text_cannot_become_markup() {
         let html = table().html("\"x\" & y").into_string();
-        assert!(
-            html.contains("<caption>&quot;x&quot; &amp; y</caption>"),
-            "{html}"
-        );
+        assert!(html.contains("<caption>&quot;x&quot; &amp; y</caption>"), "{html}");
         assert!(
             html.contains("<td>a &lt; b</td><td class=\"number\">0.5</td>"),
             "{html}"

@@ -70,9 +70,7 @@ pub fn dark(svg: &str) -> String {
 #[must_use]
 pub fn dark_rules() -> String {
     DARK.iter()
-        .flat_map(|(light, dark)| {
-            ["fill", "stroke"].map(|what| format!("svg [{what}=\"{light}\"]{{{what}:{dark}}}"))
-        })
+        .flat_map(|(light, dark)| ["fill", "stroke"].map(|what| format!("svg [{what}=\"{light}\"]{{{what}:{dark}}}")))
         .collect()
 }
 
@@ -98,10 +96,7 @@ mod tests {
     #[test]
     fn colours_are_changed_once_each() {
         let light = r##"<g fill="#000000" stroke="#FFFFFF" x="3"/>"##;
-        assert_eq!(
-            dark(light),
-            r##"<g fill="#ECECEC" stroke="#14171A" x="3"/>"##
-        );
+        assert_eq!(dark(light), r##"<g fill="#ECECEC" stroke="#14171A" x="3"/>"##);
         assert!(dark_rules().contains(r##"svg [fill="#000000"]{fill:#ECECEC}"##));
     }
 }

@@ -82,13 +82,7 @@ impl Hybrid {
     /// The rig as it stands.
     pub fn instant(&self) -> Instant<f64> {
         let p = &self.parameters;
-        let States {
-            q1,
-            u1,
-            q2,
-            u2,
-            phase,
-        } = self.states;
+        let States { q1, u1, q2, u2, phase } = self.states;
         let instant = Instant {
             primary_mass: p.primary_mass,
             stiffness: p.stiffness,
@@ -158,8 +152,7 @@ impl Hybrid {
             on_event(Event::Released { t: 0.0, wall });
         } else if self.contact.is_none() {
             let now = self.instant();
-            let touched =
-                (Wall::BOTH.into_iter()).find(|&wall| self.gap(wall, &now) <= 0.5 * DEPTH);
+            let touched = (Wall::BOTH.into_iter()).find(|&wall| self.gap(wall, &now) <= 0.5 * DEPTH);
             if let Some(wall) = touched {
                 self.touch(wall, time, &mut on_event);
             }
@@ -233,11 +226,7 @@ impl Hybrid {
         });
         self.totals.add(&touch, time);
         if let Some(velocity) = touch.impact {
-            on_event(Event::Impact {
-                t: 0.0,
-                wall,
-                velocity,
-            });
+            on_event(Event::Impact { t: 0.0, wall, velocity });
         }
         if touch.stuck {
             self.contact = Some(wall);
@@ -260,10 +249,6 @@ impl Hybrid {
             fastest: self.parameters.fastest_rate(),
             elastic: false,
         };
-        law.rests(
-            speed,
-            (pressing, 0.5 * DEPTH * fast * fast / b),
-            &resolution,
-        )
+        law.rests(speed, (pressing, 0.5 * DEPTH * fast * fast / b), &resolution)
     }
 }

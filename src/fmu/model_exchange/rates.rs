@@ -48,9 +48,7 @@ impl Movement {
         let stretch = core::array::from_fn(|n| self.primary[n] - self.base[n]);
         let moving = |mass: f64, x: &Rates| mass * squared([x[1], x[2], x[3], x[4], 0.0], order);
         let spring = p.stiffness * squared(stretch, order);
-        0.5 * (moving(p.primary_mass, &self.primary)
-            + moving(p.particle_mass, &self.particle)
-            + spring)
+        0.5 * (moving(p.primary_mass, &self.primary) + moving(p.particle_mass, &self.particle) + spring)
     }
 }
 

@@ -196,14 +196,12 @@ fn cases() -> Vec<Case> {
         from_rust(QUIET, Inputs::Same, false),
     ));
     // SAFETY: arrays are as long as they are said to be; so below.
-    let set: fn(&Master, &mut [f64; 4]) = |rig, values| unsafe {
-        _ = (rig.f.fmi2SetReal)(rig.c, INPUTS.as_ptr(), 2, values.as_ptr())
-    };
+    let set: fn(&Master, &mut [f64; 4]) =
+        |rig, values| unsafe { _ = (rig.f.fmi2SetReal)(rig.c, INPUTS.as_ptr(), 2, values.as_ptr()) };
     let get: fn(&Master, &mut [f64; 4]) = |rig, values| unsafe {
         _ = (rig.f.fmi2GetReal)(rig.c, OUTPUTS.as_ptr(), 4, values.as_mut_ptr());
     };
-    let zero: fn(&Master, &mut [f64; 4]) =
-        |rig, _| unsafe { _ = (rig.f.fmi2DoStep)(rig.c, QUIET.step(), 0.0, 1) };
+    let zero: fn(&Master, &mut [f64; 4]) = |rig, _| unsafe { _ = (rig.f.fmi2DoStep)(rig.c, QUIET.step(), 0.0, 1) };
     let nothing: fn(&Master, &mut [f64; 4]) = |rig, _| unsafe {
         black_box((rig.f.fmi2GetVersion)());
     };

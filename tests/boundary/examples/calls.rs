@@ -24,8 +24,7 @@ fn main() {
     let mut time = 0.0;
     // SAFETY: arrays are as long as they are said to be; so in each of these.
     let set = || unsafe { (f.fmi2SetReal)(c, inputs.as_ptr(), 2, black_box(&drive).as_ptr()) };
-    let mut get =
-        || unsafe { (f.fmi2GetReal)(c, outputs.as_ptr(), 4, black_box(&mut read).as_mut_ptr()) };
+    let mut get = || unsafe { (f.fmi2GetReal)(c, outputs.as_ptr(), 4, black_box(&mut read).as_mut_ptr()) };
     let mut go = |step| {
         let status = unsafe { (f.fmi2DoStep)(c, time, step, 1) };
         time += step;

@@ -86,12 +86,7 @@ pub fn sequence(fmu: &Fmu, seed: u64) -> Tally {
         }
         tally.statuses[status as usize] += 1;
         let heard = master.heard();
-        let place = || {
-            format!(
-                "{} {interface:?}, seed {seed}, call {n}: {name}: {heard:?}",
-                fmu.name
-            )
-        };
+        let place = || format!("{} {interface:?}, seed {seed}, call {n}: {name}: {heard:?}", fmu.name);
         assert_ne!(status, Status::Fatal, "{}", place());
         if matches!(status, Status::Error | Status::Discard) {
             let reason = heard.iter().find(|line| line.status == status);

@@ -96,17 +96,7 @@ impl Master {
         let location = location.map_or(null(), CStr::as_ptr);
         let f = fmu.functions;
         // SAFETY: as the standard asks.
-        let c = unsafe {
-            (f.fmi2Instantiate)(
-                c"rig".as_ptr(),
-                kind,
-                guid.as_ptr(),
-                location,
-                &*functions,
-                0,
-                0,
-            )
-        };
+        let c = unsafe { (f.fmi2Instantiate)(c"rig".as_ptr(), kind, guid.as_ptr(), location, &*functions, 0, 0) };
         Self {
             c,
             f,
@@ -206,12 +196,7 @@ impl Master {
             self.well((f.fmi2GetFMUstate)(self.c, &mut state));
             self.well((f.fmi2SerializedFMUstateSize)(self.c, state, &mut size));
             let mut bytes = vec![0; size];
-            self.well((f.fmi2SerializeFMUstate)(
-                self.c,
-                state,
-                bytes.as_mut_ptr(),
-                size,
-            ));
+            self.well((f.fmi2SerializeFMUstate)(self.c, state, bytes.as_mut_ptr(), size));
             self.well((f.fmi2FreeFMUstate)(self.c, &mut state));
             bytes
         }

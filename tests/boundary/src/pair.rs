@@ -19,9 +19,7 @@ mod plant {
     pub const INPUTS: [u32; 2] = [8, 7];
     pub const SENSORS: [u32; 2] = [13, 16];
     pub const START_VELOCITY: u32 = 12;
-    pub const REALS: [u32; 18] = [
-        9, 10, 11, 12, 13, 14, 15, 16, 17, 19, 20, 22, 23, 24, 25, 26, 27, 28,
-    ];
+    pub const REALS: [u32; 18] = [9, 10, 11, 12, 13, 14, 15, 16, 17, 19, 20, 22, 23, 24, 25, 26, 27, 28];
     pub const INTEGERS: [u32; 2] = [18, 21];
 }
 
@@ -59,8 +57,7 @@ impl Pair {
         plant.start();
         let controller = Master::new(controller, Interface::CoSimulation);
         // SAFETY: one reference, one value.
-        let armed =
-            unsafe { (controller.f.fmi2SetBoolean)(controller.c, &controller::ACTIVE, 1, &1) };
+        let armed = unsafe { (controller.f.fmi2SetBoolean)(controller.c, &controller::ACTIVE, 1, &1) };
         controller.well(armed);
         controller.start();
         Self {
@@ -73,13 +70,8 @@ impl Pair {
 
     /// Hands values on, and takes a step of `step` s; answers the frequency of the drive, rad/s.
     pub fn step(&mut self, step: f64) -> f64 {
-        let Self {
-            plant, controller, ..
-        } = self;
-        let (sensed, drive) = (
-            reals(plant, plant::SENSORS),
-            reals(controller, controller::DRIVE),
-        );
+        let Self { plant, controller, .. } = self;
+        let (sensed, drive) = (reals(plant, plant::SENSORS), reals(controller, controller::DRIVE));
         set(controller, controller::INPUTS, sensed);
         set(plant, plant::INPUTS, drive);
         plant.well(plant.step(self.time, step));

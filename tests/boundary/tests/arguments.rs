@@ -26,15 +26,11 @@ fn refused(word: &str, call: impl Fn(&Master) -> Status) {
 
 #[test]
 fn null_arrays_are_refused() {
-    refused("vr is NULL", |m| unsafe {
-        (m.f.fmi2GetReal)(m.c, null(), 1, &mut 0.0)
-    });
+    refused("vr is NULL", |m| unsafe { (m.f.fmi2GetReal)(m.c, null(), 1, &mut 0.0) });
     refused("value is NULL", |m| unsafe {
         (m.f.fmi2GetReal)(m.c, &Q1, 1, null_mut())
     });
-    refused("value is NULL", |m| unsafe {
-        (m.f.fmi2SetReal)(m.c, &E, 1, null())
-    });
+    refused("value is NULL", |m| unsafe { (m.f.fmi2SetReal)(m.c, &E, 1, null()) });
     refused("FMUstate is NULL", |m| unsafe {
         (m.f.fmi2GetFMUstate)(m.c, null_mut())
     });
@@ -55,12 +51,8 @@ fn no_elements_are_no_error_even_without_arrays() {
 #[test]
 fn absurd_counts_are_refused() {
     for count in [usize::MAX, isize::MAX as usize, 1 << 32, 1 << 21] {
-        refused("count", |m| unsafe {
-            (m.f.fmi2SetReal)(m.c, &E, count, &0.0)
-        });
-        refused("count", |m| unsafe {
-            (m.f.fmi2GetReal)(m.c, &Q1, count, &mut 0.0)
-        });
+        refused("count", |m| unsafe { (m.f.fmi2SetReal)(m.c, &E, count, &0.0) });
+        refused("count", |m| unsafe { (m.f.fmi2GetReal)(m.c, &Q1, count, &mut 0.0) });
     }
 }
 
@@ -115,15 +107,9 @@ fn a_controller_tuned_to_nonsense_takes_no_part_of_it() {
 
 #[test]
 fn a_reference_of_another_type_is_refused() {
-    refused("type i32", |m| unsafe {
-        (m.f.fmi2GetInteger)(m.c, &Q1, 1, &mut 0)
-    });
-    refused("type bool", |m| unsafe {
-        (m.f.fmi2SetBoolean)(m.c, &E, 1, &1)
-    });
-    refused("type &str", |m| unsafe {
-        (m.f.fmi2GetString)(m.c, &E, 1, &mut null())
-    });
+    refused("type i32", |m| unsafe { (m.f.fmi2GetInteger)(m.c, &Q1, 1, &mut 0) });
+    refused("type bool", |m| unsafe { (m.f.fmi2SetBoolean)(m.c, &E, 1, &1) });
+    refused("type &str", |m| unsafe { (m.f.fmi2GetString)(m.c, &E, 1, &mut null()) });
 }
 
 #[test]
@@ -217,12 +203,7 @@ fn every_spelling_of_the_resource_location_is_fine() {
 
 #[test]
 fn another_guid_is_refused_by_name() {
-    for guid in [
-        "",
-        "derived",
-        "{00000000-0000-0000-0000-000000000000}",
-        "%n%s",
-    ] {
+    for guid in ["", "derived", "{00000000-0000-0000-0000-000000000000}", "%n%s"] {
         let m = Master::at(&Fmu::plant(), 1, guid, None);
         assert!(m.c.is_null());
         assert!(m.heard()[0].text.contains("do not belong together"));

@@ -37,10 +37,7 @@ fn read(xml: &str) -> Description {
     let nodes = |name: &'static str| document.descendants().filter(move |n| n.has_tag_name(name));
     let places = |wanted: &dyn Fn(roxmltree::Node) -> bool| -> Vec<usize> {
         let numbered = nodes("ScalarVariable").zip(1..);
-        numbered
-            .filter(|(n, _)| wanted(*n))
-            .map(|(_, i)| i)
-            .collect()
+        numbered.filter(|(n, _)| wanted(*n)).map(|(_, i)| i).collect()
     };
     let list = |name| nodes(name).flat_map(|n| n.children().filter(|c| c.has_tag_name("Unknown")));
     let index = |n: roxmltree::Node| n.attribute("index").unwrap().parse().unwrap();
@@ -48,12 +45,7 @@ fn read(xml: &str) -> Description {
     for name in ["Outputs", "Derivatives", "InitialUnknowns"] {
         let mut structure = Structure::new();
         for unknown in list(name) {
-            let words = |what| {
-                unknown
-                    .attribute(what)
-                    .unwrap_or_default()
-                    .split_whitespace()
-            };
+            let words = |what| unknown.attribute(what).unwrap_or_default().split_whitespace();
             let kinds = words("dependenciesKind").chain(std::iter::repeat("dependent"));
             for (known, kind) in words("dependencies").zip(kinds) {
                 structure.insert((index(unknown), known.parse().unwrap()), kind.to_owned());
@@ -139,10 +131,7 @@ fn compare(what: &str, seen: &BTreeSet<(usize, usize)>, declared: &Structure) {
     let declared: BTreeSet<_> = declared.keys().copied().collect();
     let missing: Vec<_> = seen.difference(&declared).collect();
     let idle: Vec<_> = declared.difference(seen).collect();
-    assert!(
-        missing.is_empty(),
-        "{what}: not declared (unknown, known): {missing:?}"
-    );
+    assert!(missing.is_empty(), "{what}: not declared (unknown, known): {missing:?}");
     assert!(
         idle.is_empty(),
         "{what}: declared and never seen (unknown, known): {idle:?}"
@@ -162,10 +151,7 @@ const AT_REST: [(u32, f64); 5] = [(4, 0.2), (9, -0.08), (10, 0.0), (11, -0.28), 
 fn plant(interface: Interface, rig: &[f64; 13], stuck: bool) -> Master {
     let m = Master::new(&Fmu::plant(), interface);
     let rest = if stuck { &AT_REST[..] } else { &[] };
-    for (vr, &value) in (0..)
-        .zip(rig)
-        .chain(rest.iter().map(|(vr, value)| (*vr, value)))
-    {
+    for (vr, &value) in (0..).zip(rig).chain(rest.iter().map(|(vr, value)| (*vr, value))) {
         m.well(m.set_real(vr, value));
     }
     m
@@ -189,10 +175,7 @@ fn initial_unknowns_of_the_plant() {
         for &known in [&d.parameters[..], &d.inputs, &d.starts].concat().iter() {
             let value = d.get(&m, known);
             let set = |value| d.set(&m, known, value);
-            seen.extend(
-                d.slopes(&m, &d.initial, known, (value, 1e-3 * value), set)
-                    .into_keys(),
-            );
+            seen.extend(d.slopes(&m, &d.initial, known, (value, 1e-3 * value), set).into_keys());
         }
     }
     compare("InitialUnknowns", &seen, &d.declared["InitialUnknowns"]);
@@ -256,10 +239,7 @@ fn outputs_and_derivatives_of_the_plant() {
         };
         for &[one, other] in alike {
             let (one, other) = (all[one][pair], all[other][pair]);
-            assert!(
-                (one - other).abs() < 1e-6,
-                "{pair:?} is not {kind}: {one}, {other}"
-            );
+            assert!((one - other).abs() < 1e-6, "{pair:?} is not {kind}: {one}, {other}");
         }
     }
 }
@@ -274,10 +254,7 @@ fn between_steps_velocities_of_the_plant_do_not_depend_on_its_inputs() {
     for &known in &d.inputs {
         let value = d.get(&m, known);
         let set = |value| d.set(&m, known, value);
-        seen.extend(
-            d.slopes(&m, &d.outputs, known, (value, 1e-3 * value), set)
-                .into_keys(),
-        );
+        seen.extend(d.slopes(&m, &d.outputs, known, (value, 1e-3 * value), set).into_keys());
     }
     // base and energy by e and E, and nothing else: the kick of a jump of e comes with the next step.
     assert_eq!(seen, BTreeSet::from([(17, 7), (17, 8), (23, 7), (23, 8)]));
@@ -300,10 +277,7 @@ fn unknowns_of_the_controller() {
                 _ => 1.0,
             };
             let set = |value| d.set(&m, known, value);
-            seen.extend(
-                d.slopes(&m, unknowns, known, (value, change), set)
-                    .into_keys(),
-            );
+            seen.extend(d.slopes(&m, unknowns, known, (value, change), set).into_keys());
         }
         seen
     };

@@ -48,10 +48,7 @@ fn compare(m: &Master, unknown: u32, known: u32, set: impl Fn(f64)) {
     set(value);
     let derivative = partial(m, unknown, known);
     let error = (derivative - quotient).abs() / (1.0 + quotient.abs());
-    assert!(
-        error < 1e-7,
-        "{unknown} by {known}: {derivative} is not {quotient}"
-    );
+    assert!(error < 1e-7, "{unknown} by {known}: {derivative} is not {quotient}");
 }
 
 fn in_initialization_mode(interface: Interface) -> Master {

@@ -75,10 +75,7 @@ fn instances_run_side_by_side_in_threads() {
 #[test]
 fn a_reset_instance_equals_a_fresh_one() {
     for fmu in [Fmu::plant(), Fmu::controller()] {
-        let (used, fresh) = (
-            Master::ready(&fmu),
-            Master::new(&fmu, Interface::CoSimulation),
-        );
+        let (used, fresh) = (Master::ready(&fmu), Master::new(&fmu, Interface::CoSimulation));
         steps(&used, 0, 100);
         // SAFETY: the instance is alive.
         used.well(unsafe { (used.f.fmi2Reset)(used.c) });
@@ -94,10 +91,7 @@ fn a_reset_instance_for_model_exchange_equals_a_fresh_one() {
     used.start();
     // SAFETY: the instance is alive; so below.
     unsafe {
-        used.well((used.f.fmi2NewDiscreteStates)(
-            used.c,
-            &mut Default::default(),
-        ));
+        used.well((used.f.fmi2NewDiscreteStates)(used.c, &mut Default::default()));
         used.well((used.f.fmi2Reset)(used.c));
     }
     assert_eq!(used.bytes(), fresh.bytes());

@@ -18,14 +18,7 @@ fn irregular_steps_lock_where_regular_ones_do() {
     let regular = lock(|| pair::SAMPLE_TIME);
     assert!(regular.locked);
     // Shortest and longest step, in sample times.
-    for (from, to) in [
-        (0.99, 0.99),
-        (0.7, 0.7),
-        (0.2, 1.0),
-        (0.5, 1.5),
-        (1.1, 1.1),
-        (1.7, 1.7),
-    ] {
+    for (from, to) in [(0.99, 0.99), (0.7, 0.7), (0.2, 1.0), (0.5, 1.5), (1.1, 1.1), (1.7, 1.7)] {
         for seed in 1..=2 {
             let found = lock(pair::irregular(from, to, seed));
             let off = (found.sigma - regular.sigma).abs();

@@ -61,10 +61,7 @@ fn an_ignored_input_derivative_is_warned_of_once() {
     let [warning] = warnings(&heard)[..] else {
         panic!("one warning expected: {heard:?}");
     };
-    assert!(
-        warning.contains("omega") && warning.contains("held"),
-        "{warning}"
-    );
+    assert!(warning.contains("omega") && warning.contains("held"), "{warning}");
 }
 
 #[test]
@@ -72,10 +69,7 @@ fn an_order_that_no_input_has_is_still_refused() {
     let m = Master::ready(&Fmu::plant());
     for reference in [E, OMEGA] {
         for order in [0, 4] {
-            assert_eq!(
-                set_input_derivative(&m, reference, order, 0.0),
-                Status::Error
-            );
+            assert_eq!(set_input_derivative(&m, reference, order, 0.0), Status::Error);
         }
     }
 }
@@ -135,10 +129,7 @@ fn a_step_beyond_the_stop_time_is_an_error() {
         assert_eq!(m.step(0.9, 0.2), Status::Error);
         let heard = m.heard();
         let last = heard.last().map(|line| line.text.as_str());
-        assert!(
-            last.is_some_and(|text| text.contains("stopTime = 1 s")),
-            "{heard:?}"
-        );
+        assert!(last.is_some_and(|text| text.contains("stopTime = 1 s")), "{heard:?}");
         // A step that is not begun has done no harm, and the sum of a master's steps may be off by its rounding.
         m.well(m.step(0.9, 0.1 + 5e-10));
     }
@@ -156,10 +147,7 @@ fn a_step_longer_than_the_sample_time_is_warned_of_once() {
         m.well(m.step(0.01 + f64::from(n) * 0.0004, 0.0004));
     }
     let heard = m.heard();
-    assert!(
-        warnings(&heard).is_empty(),
-        "every sample had its input: {heard:?}"
-    );
+    assert!(warnings(&heard).is_empty(), "every sample had its input: {heard:?}");
     for n in 0..5 {
         m.well(m.step(0.014 + f64::from(n) * 5.0, 5.0));
     }

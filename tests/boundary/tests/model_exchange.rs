@@ -52,10 +52,7 @@ fn each_mode_has_its_own_functions() {
     assert_eq!(m.step(0.0, 0.1), Status::Error);
     assert!(m.heard()[0].text.contains("one of co-simulation"));
     unsafe {
-        assert_eq!(
-            (m.f.fmi2CompletedIntegratorStep)(m.c, 1, &mut 0, &mut 0),
-            Status::Error
-        );
+        assert_eq!((m.f.fmi2CompletedIntegratorStep)(m.c, 1, &mut 0, &mut 0), Status::Error);
         assert!(m.heard()[0].text.contains("legal in Continuous-Time Mode"));
         m.well((m.f.fmi2EnterEventMode)(m.c));
         resolve(&m);
@@ -149,9 +146,7 @@ fn a_step_that_has_led_behind_a_wall_asks_for_an_event() {
     x[1] = -0.0100001;
     unsafe {
         m.well((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5));
-        m.well((m.f.fmi2CompletedIntegratorStep)(
-            m.c, 1, &mut event, &mut end,
-        ));
+        m.well((m.f.fmi2CompletedIntegratorStep)(m.c, 1, &mut event, &mut end));
     }
     assert_eq!((event, end), (1, 0));
     assert!(indicators(&m)[0] < 0.0);
@@ -163,14 +158,8 @@ fn states_without_sense_are_refused() {
     go_on(&m);
     let x = [0.0, f64::NAN, 0.0, 0.0, 0.0];
     unsafe {
-        assert_eq!(
-            (m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5),
-            Status::Discard
-        );
-        assert_eq!(
-            (m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 4),
-            Status::Error
-        );
+        assert_eq!((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 5), Status::Discard);
+        assert_eq!((m.f.fmi2SetContinuousStates)(m.c, x.as_ptr(), 4), Status::Error);
     }
     let heard = m.heard();
     assert!(heard[0].text.contains("finite") && heard[1].text.contains("expected is 5"));

@@ -61,11 +61,7 @@ fn what_is_read_does_not_depend_on_what_was_read_before() {
         change(5, SIGNAL, 1e-5 * f64::from(n % 3));
         change(7, K, 11_680.0 + f64::from(n % 6));
         change(11, R, 0.65 + 0.01 * f64::from(n % 2));
-        assert_eq!(
-            outputs(&m),
-            outputs(copy(&m, &other)),
-            "inputs set before step {n}"
-        );
+        assert_eq!(outputs(&m), outputs(copy(&m, &other)), "inputs set before step {n}");
         m.well(m.step(time, step));
     }
     assert!(m.impacts() > 5);

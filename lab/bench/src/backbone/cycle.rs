@@ -31,12 +31,8 @@ impl Cycle {
         }
         let phases = drive_phases(samples, sample_time, phase);
         let basis = HarmonicBasis::new(&phases, 0, &[Some(0); 3]);
-        let fitted = |value: fn(&Sample) -> f64| {
-            basis.fit(&DVector::from_iterator(
-                samples.len(),
-                samples.iter().map(value),
-            ))
-        };
+        let fitted =
+            |value: fn(&Sample) -> f64| basis.fit(&DVector::from_iterator(samples.len(), samples.iter().map(value)));
         let response = fitted(|s| s.sensors.response)?;
         let mean = |value: fn(&Sample) -> f64| mean(samples.iter().map(value));
         let measured = samples.iter().all(|s| s.sensors.reference.is_some());

@@ -34,9 +34,7 @@ fn extrapolate(points: &[Known], c: f64) -> (f64, f64) {
     let (mut g, mut sigma) = (0.0, 0.0);
     for (i, point) in points.iter().enumerate() {
         let others = points.iter().enumerate().filter(|(j, _)| *j != i);
-        let weight: f64 = others
-            .map(|(_, other)| (c - other.c) / (point.c - other.c))
-            .product();
+        let weight: f64 = others.map(|(_, other)| (c - other.c) / (point.c - other.c)).product();
         g += weight * point.g;
         sigma += weight * point.sigma;
     }
@@ -80,13 +78,10 @@ mod tests {
     fn theory_foresees_the_difference_between_two_levels() {
         let flow = slow_flow();
         let (g, sigma) = change(Predictor::Theory, &[known(0.5)], 0.4, &flow);
-        let expected = flow.backbone_sigma(0.4, BranchSide::Right).unwrap()
-            - flow.backbone_sigma(0.5, BranchSide::Right).unwrap();
+        let expected =
+            flow.backbone_sigma(0.4, BranchSide::Right).unwrap() - flow.backbone_sigma(0.5, BranchSide::Right).unwrap();
         assert!((sigma - expected).abs() < 1e-12 && g < 0.0);
         // Below the fold the theory has no backbone.
-        assert_eq!(
-            change(Predictor::Theory, &[known(0.5)], 0.1, &flow),
-            (0.0, 0.0)
-        );
+        assert_eq!(change(Predictor::Theory, &[known(0.5)], 0.1, &flow), (0.0, 0.0));
     }
 }

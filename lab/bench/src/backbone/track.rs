@@ -60,9 +60,7 @@ pub enum TrackError {
     #[error(transparent)]
     Controller(#[from] ControllerError),
     /// The loop did not come near phase resonance in the time allowed.
-    #[error(
-        "no lock within {periods:.0} periods of the drive; see record.lock_periods and the [controller] section"
-    )]
+    #[error("no lock within {periods:.0} periods of the drive; see record.lock_periods and the [controller] section")]
     NoLock {
         /// Time limit, periods.
         periods: f64,
@@ -124,9 +122,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
                     break;
                 }
             }
-            if let Some(cycle) =
-                Cycle::of(&self.samples[begin..], self.sample_time, phase, self.target)
-            {
+            if let Some(cycle) = Cycle::of(&self.samples[begin..], self.sample_time, phase, self.target) {
                 return Ok(cycle);
             }
         }
@@ -187,10 +183,7 @@ pub fn track(
 }
 
 /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
-fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
-    bench: &mut Bench<R, C>,
-    most: f64,
-) -> Result<(), TrackError> {
+fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(bench: &mut Bench<R, C>, most: f64) -> Result<(), TrackError> {
     let mut near = 0;
     while near < NEAR_FOR {
         if bench.periods >= most {

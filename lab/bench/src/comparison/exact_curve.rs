@@ -47,10 +47,7 @@ impl ExactCurve {
                 .filter(|orbit| orbit.b < SPEED_MAX)
         };
         let mut orbits: Vec<Orbit> = between(low, high, FREQUENCIES).collect();
-        let lowest = orbits
-            .iter()
-            .map(|orbit| orbit.sigma)
-            .fold(f64::MAX, f64::min);
+        let lowest = orbits.iter().map(|orbit| orbit.sigma).fold(f64::MAX, f64::min);
         let (steps, width) = TURN;
         orbits.extend(between(lowest - 0.1 * width, lowest + width, steps));
         orbits.sort_by(|a, b| a.b.total_cmp(&b.b));
@@ -119,9 +116,7 @@ mod tests {
         let distance = curve.distance(orbit.c, orbit.sigma, orbit.g).unwrap();
         assert!(distance.nearest < 1e-5, "{distance:?}");
         assert!(distance.sigma.unwrap().abs() < 1e-5 && distance.g.unwrap().abs() < 1e-5);
-        let off = curve
-            .distance(orbit.c, orbit.sigma + 0.01, orbit.g)
-            .unwrap();
+        let off = curve.distance(orbit.c, orbit.sigma + 0.01, orbit.g).unwrap();
         assert!((off.sigma.unwrap() - 0.01).abs() < 1e-5);
         assert!(off.nearest > 1e-3 && off.nearest < 0.01);
     }

@@ -60,9 +60,7 @@ mod tests {
     #[test]
     fn a_sine_has_its_frequency_and_its_amplitude_in_every_period() {
         let dt = 0.061;
-        let values: Vec<f64> = (0..1000)
-            .map(|n| 0.7 * (f64::from(n) * dt + 0.3).sin())
-            .collect();
+        let values: Vec<f64> = (0..1000).map(|n| 0.7 * (f64::from(n) * dt + 0.3).sin()).collect();
         let found = periods(&values, dt);
         assert!(found.len() > 15);
         for period in found {

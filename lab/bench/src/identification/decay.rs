@@ -41,10 +41,7 @@ pub fn decay_points(record: &Record, scene: &Scene) -> Vec<DecayPoint> {
         return Vec::new();
     };
     // Initial frequency: the command of the last held sample.
-    let omega = record
-        .hold()
-        .last()
-        .map_or(d.omega0, |s| s.command.drive.omega);
+    let omega = record.hold().last().map_or(d.omega0, |s| s.command.drive.omega);
     let half_period = std::f64::consts::PI / omega;
     let end = if first.ground_truth.is_some() {
         end_of_synchrony(&impacts(decay), half_period).unwrap_or(first.time)

@@ -9,10 +9,7 @@ use crate::experiment::Sample;
 /// The impacts in the samples; of several between two samples, the last one.
 #[must_use]
 pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
-    let truths: Vec<_> = samples
-        .iter()
-        .filter_map(|sample| sample.ground_truth)
-        .collect();
+    let truths: Vec<_> = samples.iter().filter_map(|sample| sample.ground_truth).collect();
     truths
         .windows(2)
         .filter(|pair| pair[1].impacts > pair[0].impacts)

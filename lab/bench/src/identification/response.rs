@@ -82,8 +82,7 @@ pub fn regime_by_response(samples: &[Sample], scene: &Scene) -> Regime {
         return Regime::NoImpacts;
     }
     // The particle's speed is about b omega; the order of magnitude is sufficient.
-    let expected = 4.0 * scene.dimensionless().amplitude(1.0)
-        / (72.0 * std::f64::consts::PI * content.amplitude);
+    let expected = 4.0 * scene.dimensionless().amplitude(1.0) / (72.0 * std::f64::consts::PI * content.amplitude);
     let significant = SIGNIFICANT * content.error;
     if content.second > significant.max(EVEN_SHARE * expected) {
         Regime::Asymmetric
@@ -101,6 +100,5 @@ fn is_linear(samples: &[Sample], amplitude: f64, scene: &Scene) -> bool {
     let drive = mean(samples.iter().map(|s| s.command.drive.amplitude));
     let needed = plant.damping * omega0 / plant.stiffness * amplitude;
     let damping_rate = 0.5 * omega * drive / amplitude;
-    (omega - omega0).abs() <= LINEAR[0] * damping_rate
-        && (drive - needed).abs() <= LINEAR[1] * drive
+    (omega - omega0).abs() <= LINEAR[0] * damping_rate && (drive - needed).abs() <= LINEAR[1] * drive
 }

@@ -62,12 +62,7 @@ impl Channel {
 impl Chain {
     /// The rig behind its chain, or the rig itself where the chain is off.
     #[must_use]
-    pub fn around(
-        rig: Box<dyn Rig>,
-        settings: &Settings,
-        d: &Dimensionless,
-        samples_per_period: f64,
-    ) -> Box<dyn Rig> {
+    pub fn around(rig: Box<dyn Rig>, settings: &Settings, d: &Dimensionless, samples_per_period: f64) -> Box<dyn Rig> {
         if settings.is_on() {
             Box::new(Self::new(rig, settings, d, samples_per_period))
         } else {
@@ -77,12 +72,7 @@ impl Chain {
 
     /// The chain around `rig`; `d` has the units of its settings.
     #[must_use]
-    pub fn new(
-        rig: Box<dyn Rig>,
-        settings: &Settings,
-        d: &Dimensionless,
-        samples_per_period: f64,
-    ) -> Self {
+    pub fn new(rig: Box<dyn Rig>, settings: &Settings, d: &Dimensionless, samples_per_period: f64) -> Self {
         // The power of a signal is averaged over about one period.
         let channel = |range: f64| Channel {
             sensor: settings
@@ -96,9 +86,7 @@ impl Chain {
             rig,
             response: channel(settings.response_range * d.b),
             base: settings.reference.then(|| channel(base_range)),
-            output: settings
-                .hold
-                .then(|| Converter::new(settings.dac_bits, base_range)),
+            output: settings.hold.then(|| Converter::new(settings.dac_bits, base_range)),
             normal: NormalDistribution::new(settings.seed),
             jitter: settings.jitter,
             late: 0.0,
@@ -118,10 +106,7 @@ impl Rig for Chain {
             (Some(channel), Some(value)) => Some(channel.read(value, elapsed, normal)),
             _ => None,
         };
-        self.under_way.push_back(Sensors {
-            response,
-            reference,
-        });
+        self.under_way.push_back(Sensors { response, reference });
         let mut oldest = self.under_way.pop_front().unwrap_or_default();
         // Until the first delayed reading arrives, the channel reads zero.
         if oldest.reference.is_none() && reference.is_some() {

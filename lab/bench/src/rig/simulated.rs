@@ -36,8 +36,7 @@ impl Rig for Simulated {
     }
 
     fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.plant
-            .advance(lovines::Drive::held(displacement), step)?;
+        self.plant.advance(lovines::Drive::held(displacement), step)?;
         Ok(())
     }
 

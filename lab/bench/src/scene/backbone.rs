@@ -78,16 +78,11 @@ impl Backbone {
     }
 
     pub(super) fn check(&self, controller: &Controller) -> Result<(), SceneError> {
-        for (key, level) in [
-            ("backbone.C_from", self.c_from),
-            ("backbone.C_to", self.c_to),
-        ] {
+        for (key, level) in [("backbone.C_from", self.c_from), ("backbone.C_to", self.c_to)] {
             Quantity::new(key, level, "(over b)").positive()?;
         }
-        Quantity::new("backbone.points", self.points.into(), "(levels)").check(
-            (1..=10_000).contains(&self.points),
-            "must be from 1 to 10000",
-        )?;
+        Quantity::new("backbone.points", self.points.into(), "(levels)")
+            .check((1..=10_000).contains(&self.points), "must be from 1 to 10000")?;
         Quantity::new("backbone.G_max", self.g_max, "(dimensionless)").positive()?;
         let widest = controller.bandwidth_max();
         Quantity::new("backbone.bandwidth", self.bandwidth, "(omega0)").check(

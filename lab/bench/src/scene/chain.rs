@@ -81,14 +81,7 @@ impl Chain {
             reference,
             ..
         } = *self;
-        adc_bits > 0
-            || dac_bits > 0
-            || hold
-            || snr.is_some()
-            || filter > 0.0
-            || jitter > 0.0
-            || delay > 0
-            || !reference
+        adc_bits > 0 || dac_bits > 0 || hold || snr.is_some() || filter > 0.0 || jitter > 0.0 || delay > 0 || !reference
     }
 
     /// Delay from the drive to the sensors that the controller compensates, in units of 1/omega0, for samples `step` apart: on
@@ -112,12 +105,8 @@ impl Chain {
     }
 
     pub(super) fn check(&self, controller: &Controller) -> Result<(), SceneError> {
-        for (key, bits) in [
-            ("chain.adc_bits", self.adc_bits),
-            ("chain.dac_bits", self.dac_bits),
-        ] {
-            Quantity::new(key, bits.into(), "bits")
-                .check(bits <= 32, "must be from 0 (ideal) to 32")?;
+        for (key, bits) in [("chain.adc_bits", self.adc_bits), ("chain.dac_bits", self.dac_bits)] {
+            Quantity::new(key, bits.into(), "bits").check(bits <= 32, "must be from 0 (ideal) to 32")?;
         }
         Quantity::new("chain.dac_bits", self.dac_bits.into(), "bits").check(
             self.dac_bits == 0 || self.hold,
@@ -126,8 +115,7 @@ impl Chain {
         Quantity::new("chain.response_range", self.response_range, "(over b)").positive()?;
         Quantity::new("chain.base_range", self.base_range, "(over b epsilon)").positive()?;
         if let Some(snr) = self.snr {
-            Quantity::new("chain.snr", snr, "dB")
-                .check((-40.0..=300.0).contains(&snr), "must be from -40 to 300")?;
+            Quantity::new("chain.snr", snr, "dB").check((-40.0..=300.0).contains(&snr), "must be from -40 to 300")?;
         }
         let nyquist = 0.5 * controller.samples_per_period;
         Quantity::new("chain.filter", self.filter, "(omega0)").check(
@@ -136,7 +124,6 @@ impl Chain {
         )?;
         Quantity::new("chain.jitter", self.jitter, "samples")
             .check((0.0..=0.1).contains(&self.jitter), "must be from 0 to 0.1")?;
-        Quantity::new("chain.delay", self.delay.into(), "samples")
-            .check(self.delay <= 1000, "must be from 0 to 1000")
+        Quantity::new("chain.delay", self.delay.into(), "samples").check(self.delay <= 1000, "must be from 0 to 1000")
     }
 }

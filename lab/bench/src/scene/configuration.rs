@@ -32,8 +32,7 @@ impl Scene {
             bandwidth: c.bandwidth * omega0,
             damping_rate: 0.5 * self.plant.damping / self.plant.primary_mass,
             phase_target: c.phase_target_radians(),
-            delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0
-                + c.delay * self.sample_time(),
+            delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0 + c.delay * self.sample_time(),
             amplitude_max: d.amplitude(c.g_max),
             response_max: c.c_max * self.plant.half_width,
             ramp_time: c.ramp_periods * period,

@@ -117,26 +117,14 @@ impl Controller {
             format!("must lie between omega_min = {low} and omega_max = {high}"),
         )?;
         let target = self.phase_target;
-        Quantity::new("controller.phase_target", target, "degrees").check(
-            target.abs() <= 180.0,
-            "must lie between -180 and 180 degrees",
-        )?;
+        Quantity::new("controller.phase_target", target, "degrees")
+            .check(target.abs() <= 180.0, "must lie between -180 and 180 degrees")?;
         let tolerance = self.phase_tolerance;
         Quantity::new("controller.phase_tolerance", tolerance, "degrees").positive()?;
         let drift = self.frequency_drift;
-        Quantity::new(
-            "controller.frequency_drift",
-            drift,
-            "(relative, per period)",
-        )
-        .positive()?;
+        Quantity::new("controller.frequency_drift", drift, "(relative, per period)").positive()?;
         let drift = self.amplitude_drift;
-        Quantity::new(
-            "controller.amplitude_drift",
-            drift,
-            "(relative, per period)",
-        )
-        .positive()?;
+        Quantity::new("controller.amplitude_drift", drift, "(relative, per period)").positive()?;
         let dwell = self.dwell_periods;
         Quantity::new("controller.dwell_periods", dwell.into(), "(periods)")
             .check((4..=400).contains(&dwell), "must be from 4 to 400")
@@ -146,26 +134,10 @@ impl Controller {
         for (key, value, unit) in [
             ("controller.G_max", self.g_max, "(over b epsilon)"),
             ("controller.C_max", self.c_max, "(over b)"),
-            (
-                "controller.ramp_periods",
-                self.ramp_periods,
-                "(natural periods)",
-            ),
-            (
-                "controller.release_periods",
-                self.release_periods,
-                "(natural periods)",
-            ),
-            (
-                "controller.omega_rate",
-                self.omega_rate,
-                "(omega0 per natural period)",
-            ),
-            (
-                "controller.acquire_periods",
-                self.acquire_periods,
-                "(natural periods)",
-            ),
+            ("controller.ramp_periods", self.ramp_periods, "(natural periods)"),
+            ("controller.release_periods", self.release_periods, "(natural periods)"),
+            ("controller.omega_rate", self.omega_rate, "(omega0 per natural period)"),
+            ("controller.acquire_periods", self.acquire_periods, "(natural periods)"),
             ("controller.delay", self.delay, "samples"),
         ] {
             Quantity::new(key, value, unit).not_negative()?;

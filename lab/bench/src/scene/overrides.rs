@@ -85,9 +85,7 @@ impl Override {
     }
 
     fn merge_into(&self, scene: &mut Table) -> Result<(), SceneError> {
-        let section = scene
-            .entry(&self.section)
-            .or_insert_with(|| Value::Table(Table::new()));
+        let section = scene.entry(&self.section).or_insert_with(|| Value::Table(Table::new()));
         let Value::Table(section) = section else {
             return Err(self.error(format!("`{}` is not a section", self.section)));
         };
@@ -107,10 +105,7 @@ impl Override {
 
 /// The sections of `table` with the overrides applied one by one, so that an error names the
 /// argument that caused it.
-pub(super) fn merged(
-    mut table: Table,
-    overrides: &[Override],
-) -> Result<Option<Sections>, SceneError> {
+pub(super) fn merged(mut table: Table, overrides: &[Override]) -> Result<Option<Sections>, SceneError> {
     let sets = |key| overrides.iter().find(|one| one.is("excitation", key));
     if let (Some(_), Some(second)) = (sets("G"), sets("E")) {
         return Err(second.error("excitation.G is set as well: set one of them"));

@@ -100,10 +100,7 @@ pub(super) fn symbols(plant: &Parameters) -> [(&'static str, f64); 6] {
 }
 
 /// Writes the parameters under their symbols.
-pub(super) fn serialize<S: Serializer>(
-    plant: &Parameters,
-    serializer: S,
-) -> Result<S::Ok, S::Error> {
+pub(super) fn serialize<S: Serializer>(plant: &Parameters, serializer: S) -> Result<S::Ok, S::Error> {
     let mut map = serializer.serialize_map(Some(6))?;
     for (symbol, value) in symbols(plant) {
         map.serialize_entry(symbol, &value)?;

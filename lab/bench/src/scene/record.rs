@@ -58,13 +58,8 @@ impl Record {
             (0.5..=self.decay_periods).contains(&self.window_periods),
             format!("must be from 0.5 to decay_periods = {}", self.decay_periods),
         )?;
-        let samples = controller.samples_per_period
-            * (self.lock_periods + self.hold_periods + self.decay_periods);
-        Quantity::new(
-            "samples_per_period times all periods of [record]",
-            samples,
-            "samples",
-        )
-        .check(samples <= MOST_SAMPLES, "must be at most 20 million")
+        let samples = controller.samples_per_period * (self.lock_periods + self.hold_periods + self.decay_periods);
+        Quantity::new("samples_per_period times all periods of [record]", samples, "samples")
+            .check(samples <= MOST_SAMPLES, "must be at most 20 million")
     }
 }

@@ -60,12 +60,7 @@ impl Range {
 
 impl Display for Range {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Range {
-            axis,
-            from,
-            to,
-            points,
-        } = self;
+        let Range { axis, from, to, points } = self;
         write!(f, "{axis}={from}:{to}:{points}")
     }
 }
@@ -99,9 +94,7 @@ impl FromStr for Range {
             .filter(|points| (2..=MOST).contains(points))
             .ok_or_else(|| format!("`{points}` is not a number of points from 2 to {MOST}"))?;
         if from >= to {
-            return Err(format!(
-                "{axis} from {from} to {to}: the first must be below the last"
-            ));
+            return Err(format!("{axis} from {from} to {to}: the first must be below the last"));
         }
         let allowed = match axis {
             Axis::Sigma => None,
@@ -109,15 +102,8 @@ impl FromStr for Range {
             Axis::R => (from <= 0.0 || to > 1.0).then_some("above 0 and at most 1"),
         };
         match allowed {
-            Some(allowed) => Err(format!(
-                "{axis} from {from} to {to} (dimensionless): must be {allowed}"
-            )),
-            None => Ok(Self {
-                axis,
-                from,
-                to,
-                points,
-            }),
+            Some(allowed) => Err(format!("{axis} from {from} to {to} (dimensionless): must be {allowed}")),
+            None => Ok(Self { axis, from, to, points }),
         }
     }
 }

@@ -69,9 +69,7 @@ pub enum MapError {
     #[error("{0} recorded periods are too few to find a pattern: at least 20 are needed")]
     TooShort(usize),
     /// Not a positive frequency.
-    #[error(
-        "sigma = {sigma} (dimensionless) gives the frequency {omega} omega0, which must be above 0"
-    )]
+    #[error("sigma = {sigma} (dimensionless) gives the frequency {omega} omega0, which must be above 0")]
     Frequency {
         /// The detuning.
         sigma: f64,
@@ -121,10 +119,7 @@ impl Plan {
         let lowest = self.at(self.x.from, self.y.from).0;
         let omega = 1.0 + self.scene.epsilon * lowest;
         if omega <= 0.0 {
-            return Err(MapError::Frequency {
-                sigma: lowest,
-                omega,
-            });
+            return Err(MapError::Frequency { sigma: lowest, omega });
         }
         Ok(())
     }
@@ -160,9 +155,6 @@ impl Map {
     #[must_use]
     pub fn count(&self, regime: Regime) -> (usize, usize) {
         let cells = || self.cells.iter().filter(|cell| cell.point.regime == regime);
-        (
-            cells().count(),
-            cells().filter(|cell| cell.theory_stable).count(),
-        )
+        (cells().count(), cells().filter(|cell| cell.theory_stable).count())
     }
 }

@@ -21,11 +21,7 @@ pub fn outline(plan: &Plan) -> Vec<[Place; 2]> {
     let y = |n: usize| plan.y.from + (plan.y.to - plan.y.from) * n as f64 / FINE as f64;
     let inside = |(x, y): Place| plan.theory_stable(x, y);
     let corners: Vec<Vec<bool>> = (0..=FINE)
-        .map(|row| {
-            (0..=FINE)
-                .map(|column| inside((x(column), y(row))))
-                .collect()
-        })
+        .map(|row| (0..=FINE).map(|column| inside((x(column), y(row)))).collect())
         .collect();
     let mut segments = Vec::new();
     for row in 0..FINE {
@@ -49,12 +45,7 @@ pub fn outline(plan: &Plan) -> Vec<[Place; 2]> {
 
 /// Where the border is crossed between two places, of which the first is inside or not.
 fn border(from: Place, to: Place, at_from: bool, inside: impl Fn(Place) -> bool) -> Place {
-    let at = |part: f64| {
-        (
-            from.0 + part * (to.0 - from.0),
-            from.1 + part * (to.1 - from.1),
-        )
-    };
+    let at = |part: f64| (from.0 + part * (to.0 - from.0), from.1 + part * (to.1 - from.1));
     let like_from = |part: f64| Ok::<_, Infallible>(inside(at(part)) == at_from);
     let Ok((_, end)) = try_bisection(0.0, 1.0, FINEST, like_from);
     at(end)

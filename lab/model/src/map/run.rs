@@ -98,11 +98,7 @@ pub fn observe(
 }
 
 /// The impacts of a number of periods, and how often the particle stuck to a wall, including at the beginning.
-fn recorded(
-    plant: &mut Plant,
-    drive: Drive,
-    periods: usize,
-) -> Result<(Vec<Impact>, usize), InvalidValue> {
+fn recorded(plant: &mut Plant, drive: Drive, periods: usize) -> Result<(Vec<Impact>, usize), InvalidValue> {
     let mut impacts = Vec::new();
     let mut rests = usize::from(plant.contact().is_some());
     for n in 0..periods {
@@ -153,17 +149,9 @@ fn growth(scene: &Dimensionless, drive: Drive, plant: &Plant) -> Result<f64, Inv
         counted += 1;
         apart = std::array::from_fn(|n| (then[n] - here[n]) * (DISTURBANCE / after));
     }
-    Ok(if counted == 0 {
-        0.0
-    } else {
-        sum / f64::from(counted)
-    })
+    Ok(if counted == 0 { 0.0 } else { sum / f64::from(counted) })
 }
 
 fn distance(one: &[f64; 4], other: &[f64; 4]) -> f64 {
-    one.iter()
-        .zip(other)
-        .map(|(a, b)| (a - b).powi(2))
-        .sum::<f64>()
-        .sqrt()
+    one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }

@@ -25,8 +25,7 @@ impl HarmonicBasis {
     pub fn new(phases: &[f64], trend: usize, harmonics: &[Option<usize>]) -> Self {
         let last = (phases.len().max(2) - 1) as f64;
         let time = |row: usize| 2.0 * row as f64 / last - 1.0;
-        let mut terms: Vec<(usize, usize, bool)> =
-            (0..=trend).map(|degree| (0, degree, true)).collect();
+        let mut terms: Vec<(usize, usize, bool)> = (0..=trend).map(|degree| (0, degree, true)).collect();
         let mut columns = Vec::new();
         for (n, degree) in harmonics.iter().enumerate() {
             columns.push(terms.len());

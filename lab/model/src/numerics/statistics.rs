@@ -24,9 +24,9 @@ pub fn standard_deviation(values: &[f64]) -> f64 {
 
 /// Smallest and largest of `start` and the values.
 pub fn range(start: (f64, f64), values: impl IntoIterator<Item = f64>) -> (f64, f64) {
-    values.into_iter().fold(start, |(low, high), value| {
-        (low.min(value), high.max(value))
-    })
+    values
+        .into_iter()
+        .fold(start, |(low, high), value| (low.min(value), high.max(value)))
 }
 
 /// `count` values from `from` to `to` at equal distances, both ends included.
@@ -38,9 +38,7 @@ pub fn equally_spaced(from: f64, to: f64, count: usize) -> impl Iterator<Item = 
 /// Standard deviation of the white noise on a smooth signal, from third differences; 0 for fewer than six values.
 #[must_use]
 pub fn noise(values: &[f64]) -> f64 {
-    let differences = values
-        .windows(4)
-        .map(|v| v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]);
+    let differences = values.windows(4).map(|v| v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]);
     if differences.len() < 3 {
         return 0.0;
     }

@@ -47,25 +47,15 @@ impl Curve<'_> {
     /// The intersection of the curve with the plane at the end of a step along the tangent.
     fn correct(&self, x: &Unknowns, tangent: &Unknowns, step: f64) -> Option<Unknowns> {
         let ahead = x + tangent * step;
-        let found = newton(
-            self.scene,
-            &self.start.pattern,
-            ahead,
-            |x, returned: &Returned| {
-                let plane = (tangent.dot(&(x - ahead)), tangent.transpose());
-                [self.condition.value(x, returned), plane]
-            },
-        )?;
+        let found = newton(self.scene, &self.start.pattern, ahead, |x, returned: &Returned| {
+            let plane = (tangent.dot(&(x - ahead)), tangent.transpose());
+            [self.condition.value(x, returned), plane]
+        })?;
         ((found - ahead).norm() <= step.abs()).then_some(found)
     }
 
     /// The next point, its tangent and its motion; None where the step must shrink.
-    fn advance(
-        &self,
-        x: &Unknowns,
-        tangent: &Unknowns,
-        step: f64,
-    ) -> Option<(Unknowns, Unknowns, Periodic)> {
+    fn advance(&self, x: &Unknowns, tangent: &Unknowns, step: f64) -> Option<(Unknowns, Unknowns, Periodic)> {
         let next = self.correct(x, tangent, step)?;
         let turned = self.tangent(&next, tangent)?;
         let motion = self.motion(&next)?;
@@ -171,12 +161,7 @@ pub fn continue_from(
 
 /// Follows the curve of `condition` through `start` in both directions, from falling to rising sigma.
 #[must_use]
-pub fn continue_both_ways(
-    scene: &Dimensionless,
-    start: &Periodic,
-    condition: Condition,
-    limits: &Limits,
-) -> Branch {
+pub fn continue_both_ways(scene: &Dimensionless, start: &Periodic, condition: Condition, limits: &Limits) -> Branch {
     let mut towards = Unknowns::zeros();
     towards[4] = 1.0;
     let mut up = continue_from(scene, start, condition, &towards, limits);

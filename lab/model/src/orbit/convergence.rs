@@ -43,11 +43,7 @@ pub fn convergence(scene: &Dimensionless, halvings: u32) -> Option<Convergence> 
             let exact = phase_resonant(&Dimensionless { epsilon, ..*scene })
                 .into_iter()
                 .filter(|orbit| orbit.stable)
-                .min_by(|one, other| {
-                    (one.b - theory.b)
-                        .abs()
-                        .total_cmp(&(other.b - theory.b).abs())
-                })?;
+                .min_by(|one, other| (one.b - theory.b).abs().total_cmp(&(other.b - theory.b).abs()))?;
             Some(Difference {
                 epsilon,
                 sigma: theory.sigma - exact.sigma,
@@ -57,11 +53,7 @@ pub fn convergence(scene: &Dimensionless, halvings: u32) -> Option<Convergence> 
         })
         .collect::<Option<_>>()?;
     let slope = |of: fn(&Difference) -> f64| slope(rows.iter().map(|row| (row.epsilon, of(row))));
-    let slopes = [
-        slope(|row| row.sigma),
-        slope(|row| row.c),
-        slope(|row| row.b),
-    ];
+    let slopes = [slope(|row| row.sigma), slope(|row| row.c), slope(|row| row.b)];
     (halvings > 0).then_some(Convergence { rows, slopes })
 }
 

@@ -3,8 +3,8 @@
 use serde::Serialize;
 
 use super::{
-    Bifurcation, Branch, Condition, ImpactPattern, Limits, Orbit, Periodic, asymmetric_branch,
-    continue_both_ways, exact_backbone, phase_resonant,
+    Bifurcation, Branch, Condition, ImpactPattern, Limits, Orbit, Periodic, asymmetric_branch, continue_both_ways,
+    exact_backbone, phase_resonant,
 };
 use crate::Dimensionless;
 use crate::theory::Manifold;
@@ -26,12 +26,7 @@ fn right_branch(scene: &Dimensionless) -> Option<Periodic> {
     let fastest = |one: &Orbit, other: &Orbit| one.b.total_cmp(&other.b);
     let orbit = phase_resonant(scene).into_iter().max_by(fastest)?;
     let conditions = [Condition::Excitation(scene.g), Condition::PhaseResonance];
-    Periodic::find(
-        scene,
-        &ImpactPattern::symmetric(),
-        &orbit.unknowns(),
-        conditions,
-    )
+    Periodic::find(scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions)
 }
 
 /// Detunings at which the backbone is searched for if it has no motion at the scene's G.
@@ -43,17 +38,9 @@ fn at_any_excitation(scene: &Dimensionless) -> Option<Periodic> {
     MET_AT.into_iter().find_map(|sigma| {
         let fastest = |one: &Orbit, other: &Orbit| one.b.total_cmp(&other.b);
         let met = exact_backbone(scene, 1.0 + scene.epsilon * sigma);
-        let orbit = met
-            .into_iter()
-            .max_by(fastest)
-            .filter(|one| one.b > right)?;
+        let orbit = met.into_iter().max_by(fastest).filter(|one| one.b > right)?;
         let conditions = [Condition::Sigma(sigma), Condition::PhaseResonance];
-        Periodic::find(
-            scene,
-            &ImpactPattern::symmetric(),
-            &orbit.unknowns(),
-            conditions,
-        )
+        Periodic::find(scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions)
     })
 }
 
@@ -62,12 +49,7 @@ fn at_any_excitation(scene: &Dimensionless) -> Option<Periodic> {
 #[must_use]
 pub fn backbone(scene: &Dimensionless, limits: &Limits) -> Option<Branch> {
     let start = right_branch(scene).or_else(|| at_any_excitation(scene))?;
-    Some(continue_both_ways(
-        scene,
-        &start,
-        Condition::PhaseResonance,
-        limits,
-    ))
+    Some(continue_both_ways(scene, &start, Condition::PhaseResonance, limits))
 }
 
 /// The exact frequency response through the scene's phase-resonant motion; None where it has none.
@@ -79,9 +61,7 @@ pub fn response(scene: &Dimensionless, limits: &Limits) -> Option<Response> {
     let mut asymmetric: Vec<Branch> = Vec::new();
     for special in &symmetric.special {
         // A branch that joins two symmetry breakings is found once.
-        let known = asymmetric
-            .iter()
-            .any(|branch| passes(branch, &special.motion));
+        let known = asymmetric.iter().any(|branch| passes(branch, &special.motion));
         if special.kind == Bifurcation::SymmetryBreaking && !known {
             asymmetric.extend(asymmetric_branch(scene, special, condition, limits));
         }
@@ -96,8 +76,7 @@ pub fn response(scene: &Dimensionless, limits: &Limits) -> Option<Response> {
 /// Whether a branch passes a motion within the distance of its own points.
 fn passes(branch: &Branch, motion: &Periodic) -> bool {
     branch.points.windows(2).any(|pair| {
-        let apart =
-            |one: &Periodic, other: &Periodic| (one.sigma - other.sigma).hypot(one.c - other.c);
+        let apart = |one: &Periodic, other: &Periodic| (one.sigma - other.sigma).hypot(one.c - other.c);
         apart(&pair[0], motion) <= apart(&pair[0], &pair[1])
     })
 }

@@ -50,11 +50,9 @@ impl<'a> Flight<'a> {
     pub(super) fn stays_inside(&self) -> bool {
         let duration = PI / self.candidate.omega;
         // w moves away from the walls at both ends, for at least these times.
-        let [start, end] = self.ends.map(|speed| {
-            (speed / self.curvature)
-                .min(1.0 / speed)
-                .min(duration / 2.0)
-        });
+        let [start, end] = self
+            .ends
+            .map(|speed| (speed / self.curvature).min(1.0 / speed).min(duration / 2.0));
         self.inside(start, duration - end)
     }
 

@@ -25,8 +25,7 @@ impl ForcedOscillator {
         let (force, compliance) = (free.base_force(omega), free.compliance(omega));
         let unit = force * compliance * scene.epsilon;
         let stiffness_by = Complex::new(-2.0 * omega, 2.0 * zeta);
-        let unit_by =
-            (Complex::new(0.0, 2.0 * zeta) * scene.epsilon - unit * stiffness_by) * compliance;
+        let unit_by = (Complex::new(0.0, 2.0 * zeta) * scene.epsilon - unit * stiffness_by) * compliance;
         Self {
             free,
             zeta,

@@ -57,12 +57,7 @@ impl ImpactMap {
     /// particle inside its cavity; None as for [`Self::next`].
     #[must_use]
     pub fn first(&self, phase: f64, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
-        self.landed(&Flight::between(
-            &self.oscillator,
-            phase,
-            [q1, dq1, q2, dq2],
-            q1 - q2,
-        ))
+        self.landed(&Flight::between(&self.oscillator, phase, [q1, dq1, q2, dq2], q1 - q2))
     }
 
     fn landed(&self, flight: &Flight) -> Option<Bounce> {
@@ -91,8 +86,7 @@ impl ImpactMap {
         let end = from.phase + self.oscillator.omega * t;
         let propagator = self.oscillator.free.propagator(t);
         let mut fixed = SMatrix::<f64, 2, 6>::zeros();
-        let by_phase =
-            self.oscillator.by_phase(end) - propagator * self.oscillator.by_phase(from.phase);
+        let by_phase = self.oscillator.by_phase(end) - propagator * self.oscillator.by_phase(from.phase);
         let by_omega = self.oscillator.by_omega(end) + self.oscillator.by_phase(end) * t
             - propagator * self.oscillator.by_omega(from.phase);
         let by_g = self.oscillator.by_g(end) - propagator * self.oscillator.by_g(from.phase);
@@ -106,20 +100,14 @@ impl ImpactMap {
         // The condition w = wall at the end gives the change of the flight time.
         let by_w = fixed.row(0) - by_q1 - by_dq2 * t;
         let t_by = by_w / -dw;
-        let acceleration =
-            self.oscillator.free.free_acceleration(q1, dq1) + self.oscillator.force(end);
+        let acceleration = self.oscillator.free.free_acceleration(q1, dq1) + self.oscillator.force(end);
         let q1_by = fixed.row(0) + t_by * dq1;
         let dq1_by = fixed.row(1) + t_by * acceleration;
         let phase_by = unit_row(0) + unit_row(4) * t + t_by * self.oscillator.omega;
         let dw_by = dq1_by - by_dq2;
 
         let impulse = -self.epsilon * particle;
-        let by = ByAll::from_rows(&[
-            phase_by,
-            q1_by,
-            dq1_by + dw_by * impulse,
-            by_dq2 + dw_by * particle,
-        ]);
+        let by = ByAll::from_rows(&[phase_by, q1_by, dq1_by + dw_by * impulse, by_dq2 + dw_by * particle]);
         Some(Step {
             next: Bounce {
                 phase: end,

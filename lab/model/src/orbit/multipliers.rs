@@ -28,11 +28,7 @@ fn flight(candidate: &Candidate, oscillator: &Oscillator) -> Matrix4<f64> {
 
 /// Disturbances through an impact, which a disturbed motion reaches a little earlier or later:
 /// `R + (f+ - R f-) n/(n f-)` with the jump R, the fields f before and after, and the normal n of the wall.
-fn saltation(
-    scene: &Dimensionless,
-    candidate: &Candidate,
-    oscillator: &Oscillator,
-) -> Matrix4<f64> {
+fn saltation(scene: &Dimensionless, candidate: &Candidate, oscillator: &Oscillator) -> Matrix4<f64> {
     let Dimensionless { epsilon, r, .. } = *scene;
     let Candidate { b, before, .. } = *candidate;
 

@@ -38,12 +38,7 @@ impl<'a> Flight<'a> {
     }
 
     /// The flight from a state with the relative displacement `w`.
-    pub(super) fn between(
-        oscillator: &'a ForcedOscillator,
-        phase: f64,
-        [q1, dq1, q2, dq2]: State,
-        w: f64,
-    ) -> Self {
+    pub(super) fn between(oscillator: &'a ForcedOscillator, phase: f64, [q1, dq1, q2, dq2]: State, w: f64) -> Self {
         let free = Vector2::new(q1, dq1) - oscillator.harmonic(phase);
         // Of the free motion q^2 + q'^2 never grows.
         Self {
@@ -61,10 +56,7 @@ impl<'a> Flight<'a> {
     /// (q1, q1') at the time `t`.
     pub(super) fn primary(&self, t: f64) -> Vector2<f64> {
         let propagator: Matrix2<f64> = self.oscillator.free.propagator(t);
-        propagator * self.free
-            + self
-                .oscillator
-                .harmonic(self.phase + self.oscillator.omega * t)
+        propagator * self.free + self.oscillator.harmonic(self.phase + self.oscillator.omega * t)
     }
 
     /// Time and wall of the first contact.

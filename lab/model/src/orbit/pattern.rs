@@ -95,11 +95,7 @@ pub(super) struct Returned {
 }
 
 /// Follows the pattern from the unknowns `x`; None if the impacts have another pattern or graze.
-pub(super) fn follow(
-    scene: &Dimensionless,
-    pattern: &ImpactPattern,
-    x: &Unknowns,
-) -> Option<Returned> {
+pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Returned> {
     let (sigma, g) = (x[4], x[5]);
     let omega = 1.0 + scene.epsilon * sigma;
     if !(omega > 0.0 && omega.is_finite() && g.is_finite()) {
@@ -181,8 +177,7 @@ impl Harmonic {
         let compliance_by = -compliance * compliance * Complex::new(-2.0 * omega, 2.0 * zeta);
         let force = map.oscillator.free.base_force(omega);
         let direct = force * compliance * scene.epsilon;
-        let direct_by =
-            (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;
+        let direct_by = (Complex::new(0.0, 2.0 * zeta) * compliance + force * compliance_by) * scene.epsilon;
         // (2i/duration) times the response to a force through the oscillator, less that of a free mass: the impulse on the
         // particle is the opposite one.
         let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
@@ -194,13 +189,7 @@ impl Harmonic {
         }
     }
 
-    fn of(
-        &self,
-        g: f64,
-        sum: Complex<f64>,
-        sum_by: &[RowByAll; 2],
-        epsilon: f64,
-    ) -> (Complex<f64>, [RowByAll; 2]) {
+    fn of(&self, g: f64, sum: Complex<f64>, sum_by: &[RowByAll; 2], epsilon: f64) -> (Complex<f64>, [RowByAll; 2]) {
         let zero_if_undriven = |z: Complex<f64>| {
             if g == 0.0 && z.is_nan() {
                 Complex::new(0.0, 0.0)
@@ -210,10 +199,7 @@ impl Harmonic {
         };
         let v = zero_if_undriven(self.direct[0] * g) + self.impulses[0] * sum;
         let a = self.impulses[0];
-        let mut by = [
-            sum_by[0] * a.re - sum_by[1] * a.im,
-            sum_by[0] * a.im + sum_by[1] * a.re,
-        ];
+        let mut by = [sum_by[0] * a.re - sum_by[1] * a.im, sum_by[0] * a.im + sum_by[1] * a.re];
         let own = [
             zero_if_undriven(self.direct[1] * g) + self.impulses[1] * sum,
             self.direct[0],

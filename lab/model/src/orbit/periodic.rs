@@ -91,11 +91,7 @@ impl Periodic {
     #[must_use]
     pub fn unknowns(&self) -> Unknowns {
         let Bounce {
-            phase,
-            q1,
-            dq1,
-            dq2,
-            ..
+            phase, q1, dq1, dq2, ..
         } = self.bounces[0];
         Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
     }

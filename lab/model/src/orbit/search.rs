@@ -26,9 +26,7 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
         .filter_map(|candidate| accept(scene, &candidate))
         .collect();
     orbits.sort_by(|one, other| one.c.total_cmp(&other.c));
-    orbits.dedup_by(|one, other| {
-        (one.sigma - other.sigma).abs() < 1e-9 && (one.b - other.b).abs() < 1e-9
-    });
+    orbits.dedup_by(|one, other| (one.sigma - other.sigma).abs() < 1e-9 && (one.b - other.b).abs() < 1e-9);
     orbits
 }
 
@@ -147,9 +145,7 @@ impl Branch<'_> {
         if a.is_nan() || b.is_nan() {
             return None;
         }
-        let (root, _) = bisection(a, b, |omega| {
-            self.excess(omega).is_some_and(|excess| excess > 0.0)
-        });
+        let (root, _) = bisection(a, b, |omega| self.excess(omega).is_some_and(|excess| excess > 0.0));
         let candidate = self.at(root)?;
         let close = (candidate.g - self.scene.g).abs() < 1e-7 * self.scene.g;
         close.then_some(candidate)
@@ -157,17 +153,11 @@ impl Branch<'_> {
 
     /// Two roots between grid points: the excess has an extremum there that reaches the other sign.
     fn pair_near_extremum(&self, a: f64, b: f64, sign: f64) -> Vec<Candidate> {
-        let distance = |omega| {
-            self.excess(omega)
-                .map_or(f64::INFINITY, |excess| sign * excess)
-        };
+        let distance = |omega| self.excess(omega).map_or(f64::INFINITY, |excess| sign * excess);
         let turn = golden_section(a, b, distance);
         if distance(turn) > 0.0 {
             return Vec::new();
         }
-        [self.root(a, turn), self.root(turn, b)]
-            .into_iter()
-            .flatten()
-            .collect()
+        [self.root(a, turn), self.root(turn, b)].into_iter().flatten().collect()
     }
 }

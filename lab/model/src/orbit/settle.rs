@@ -46,11 +46,7 @@ fn settled(scene: &Dimensionless, sigma: f64, state: [f64; 4]) -> Option<Periodi
         .collect();
     let pattern = pattern(&bounces)?;
     let Bounce {
-        phase,
-        q1,
-        dq1,
-        dq2,
-        ..
+        phase, q1, dq1, dq2, ..
     } = first;
     let guess = Unknowns::from([phase, q1, dq1, dq2, sigma, scene.g]);
     let conditions = [Condition::Sigma(sigma), Condition::Excitation(scene.g)];

@@ -66,11 +66,7 @@ impl SlowFlow {
 }
 
 /// Infimum of `f` over the open interval where `wanted` holds.
-fn smallest(
-    (low, high): (f64, f64),
-    wanted: impl Fn(f64) -> bool,
-    f: impl Fn(f64) -> f64,
-) -> Option<f64> {
+fn smallest((low, high): (f64, f64), wanted: impl Fn(f64) -> bool, f: impl Fn(f64) -> f64) -> Option<f64> {
     let step = (high - low) / f64::from(GRID);
     let best = (0..GRID)
         .map(|n| low + step * (f64::from(n) + 0.5))

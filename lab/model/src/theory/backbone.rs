@@ -83,8 +83,6 @@ impl SlowFlow {
     /// `points` samples of the backbone at equal steps of B, from `from` to `to`.
     #[must_use]
     pub fn backbone(&self, from: f64, to: f64, points: usize) -> Vec<BackbonePoint> {
-        equally_spaced(from, to, points)
-            .map(|b| self.backbone_at(b))
-            .collect()
+        equally_spaced(from, to, points).map(|b| self.backbone_at(b)).collect()
     }
 }

@@ -46,10 +46,7 @@ impl SlowFlow {
     #[must_use]
     pub fn decay(&self, b: f64) -> Option<Decay> {
         let dissipates = self.lambda > 0.0 || self.manifold.dissipation > 0.0;
-        (dissipates && b >= self.manifold.b_min()).then_some(Decay {
-            flow: *self,
-            start: b,
-        })
+        (dissipates && b >= self.manifold.b_min()).then_some(Decay { flow: *self, start: b })
     }
 }
 
@@ -91,14 +88,11 @@ impl Decay {
     #[must_use]
     pub fn turned(&self, b: f64) -> f64 {
         let curvature = self.flow.manifold.curvature();
-        let integrand =
-            |b: f64| self.flow.free_detuning(b) * (2.0 * curvature * b - PI) / self.flow.loss(b);
+        let integrand = |b: f64| self.flow.free_detuning(b) * (2.0 * curvature * b - PI) / self.flow.loss(b);
         let width = (self.start - b) / f64::from(PANELS);
         (0..PANELS)
             .map(|n| b + (f64::from(n) + 0.5) * width)
-            .flat_map(|middle| {
-                GAUSS.map(|(x, weight)| weight * integrand(middle + 0.5 * x * width))
-            })
+            .flat_map(|middle| GAUSS.map(|(x, weight)| weight * integrand(middle + 0.5 * x * width)))
             .sum::<f64>()
             * 0.5
             * width

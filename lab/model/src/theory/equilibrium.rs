@@ -4,9 +4,7 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 use serde::Serialize;
 
-use super::{
-    manifold::BranchSide, polynomial::real_roots, slow_flow::SlowFlow, stability::impacts_stable,
-};
+use super::{manifold::BranchSide, polynomial::real_roots, slow_flow::SlowFlow, stability::impacts_stable};
 
 /// A steady 1:1 motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -66,14 +64,10 @@ impl SlowFlow {
         let slope = self.manifold.slope(b);
         let (sine, cosine) = gamma.sin_cos();
         let loss_slope = self.lambda + 4.0 * FRAC_2_PI * r * b * slope;
-        let free_slope =
-            (FRAC_2_PI * (1.0 - 2.0 * FRAC_PI_2 * b) * slope - self.free_detuning(b)) / (c * c);
+        let free_slope = (FRAC_2_PI * (1.0 - 2.0 * FRAC_PI_2 * b) * slope - self.free_detuning(b)) / (c * c);
         let jacobian = [
             [-loss_slope - g * sine / (2.0 * c), -g * c * cosine],
-            [
-                free_slope + g * cosine / (4.0 * c.powi(3)),
-                g * sine / (2.0 * c),
-            ],
+            [free_slope + g * cosine / (4.0 * c.powi(3)), g * sine / (2.0 * c)],
         ];
         let trace = jacobian[0][0] + jacobian[1][1];
         let determinant = jacobian[0][0] * jacobian[1][1] - jacobian[0][1] * jacobian[1][0];

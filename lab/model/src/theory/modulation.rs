@@ -91,19 +91,14 @@ const STEPS: u32 = 256;
 impl ImpactSequence {
     /// Sign of the triangle wave's slope now; the wall ahead.
     fn slope(&self) -> f64 {
-        if self.impacts.is_multiple_of(2) {
-            1.0
-        } else {
-            -1.0
-        }
+        if self.impacts.is_multiple_of(2) { 1.0 } else { -1.0 }
     }
 
     /// `C exp(i gamma)` when the phase `Omega tau` has advanced by `ahead`, before the next impact (eq. 7).
     fn z_after(&self, ahead: f64) -> Complex<f64> {
         let tau1 = self.epsilon * ahead / self.omega;
         let exponent = self.rate * tau1;
-        let source = Complex::from_polar(2.0 * FRAC_2_PI * self.b, self.psi) * Complex::i() / 2.0
-            + self.drive;
+        let source = Complex::from_polar(2.0 * FRAC_2_PI * self.b, self.psi) * Complex::i() / 2.0 + self.drive;
         // (1 - exp(-x))/x, by its series where the difference would cancel.
         let grown = if exponent.norm() < 1e-2 {
             let mut term = Complex::new(1.0, 0.0);

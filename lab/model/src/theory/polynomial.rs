@@ -19,11 +19,7 @@ pub(super) fn real_roots(coefficients: &[f64]) -> Vec<f64> {
         .collect();
     // Cauchy's bound: no root is larger.
     let leading = coefficients[degree].abs();
-    let bound = 1.0
-        + coefficients
-            .iter()
-            .fold(0f64, |most, one| most.max(one.abs()))
-            / leading;
+    let bound = 1.0 + coefficients.iter().fold(0f64, |most, one| most.max(one.abs())) / leading;
 
     let mut ends = vec![-bound];
     ends.extend(real_roots(&derivative));
@@ -47,10 +43,7 @@ pub(super) fn real_roots(coefficients: &[f64]) -> Vec<f64> {
 }
 
 fn value(coefficients: &[f64], x: f64) -> f64 {
-    coefficients
-        .iter()
-        .rev()
-        .fold(0.0, |sum, one| sum * x + one)
+    coefficients.iter().rev().fold(0.0, |sum, one| sum * x + one)
 }
 
 /// The root between `a` and `b`, if the sign changes.

@@ -41,8 +41,7 @@ impl SlowFlow {
     /// `lambda C^2 + (4/pi) R B^2`: dissipation of C^2 by damping and impacts per unit of tau1 (eq. 11).
     #[must_use]
     pub fn loss(&self, b: f64) -> f64 {
-        self.lambda * self.manifold.c(b).powi(2)
-            + 2.0 * FRAC_2_PI * self.manifold.dissipation * b * b
+        self.lambda * self.manifold.c(b).powi(2) + 2.0 * FRAC_2_PI * self.manifold.dissipation * b * b
     }
 
     /// `(2/pi) B (1 - pi B/2)/C^2`: the detuning at which the motion rotates by itself (eq. 11).

@@ -7,9 +7,7 @@ use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
 use vines_net::{ControllerServer, ControllerService, RigServer, RigService, Session};
-use vines_testbench::rig::{
-    BuiltIn, Controller, Drive, GroundTruth, Rig, RigError, Sensors, Simulated,
-};
+use vines_testbench::rig::{BuiltIn, Controller, Drive, GroundTruth, Rig, RigError, Sensors, Simulated};
 use vines_testbench::scene::{Override, PAPER, Scene};
 
 /// A free port of this machine.
@@ -70,10 +68,7 @@ fn serve(
     body: impl FnOnce(Box<dyn Fn() -> bool>, Box<dyn FnMut(&Session)>) + Send + 'static,
 ) -> Served {
     let (stop, sessions) = (Arc::new(AtomicBool::new(false)), Arc::default());
-    let (flag, list) = (
-        Arc::clone(&stop),
-        Arc::<Mutex<Vec<Session>>>::clone(&sessions),
-    );
+    let (flag, list) = (Arc::clone(&stop), Arc::<Mutex<Vec<Session>>>::clone(&sessions));
     let end = Instant::now() + LONGEST;
     let thread = std::thread::spawn(move || {
         body(
@@ -100,10 +95,7 @@ pub fn service(scene: &Scene, paced: bool, silence: f64) -> RigService {
 }
 
 /// Serves any rig.
-pub fn serve_rig(
-    service: RigService,
-    make: impl FnMut() -> Result<Box<dyn Rig>, RigError> + Send + 'static,
-) -> Served {
+pub fn serve_rig(service: RigService, make: impl FnMut() -> Result<Box<dyn Rig>, RigError> + Send + 'static) -> Served {
     let mut server = RigServer::listen(ANYWHERE.parse().unwrap(), service).unwrap();
     serve(server.address().unwrap(), move |stop, tell| {
         server.serve(make, stop, tell).unwrap();
@@ -113,17 +105,12 @@ pub fn serve_rig(
 /// Serves the plant of the scene in lock-step.
 pub fn lock_step_rig(scene: &Scene) -> Served {
     let plant = Simulated::new(scene.plant, scene.start).unwrap();
-    serve_rig(service(scene, false, 5.0), move || {
-        Ok(Box::new(plant.clone()))
-    })
+    serve_rig(service(scene, false, 5.0), move || Ok(Box::new(plant.clone())))
 }
 
 /// Serves the plant of the scene in real time; the log contains every drive of the plant.
 pub fn paced_rig(scene: &Scene, silence: f64) -> (Served, Log) {
-    let (plant, log) = (
-        Simulated::new(scene.plant, scene.start).unwrap(),
-        Log::default(),
-    );
+    let (plant, log) = (Simulated::new(scene.plant, scene.start).unwrap(), Log::default());
     let copy = Arc::clone(&log);
     let served = serve_rig(service(scene, true, silence), move || {
         Ok(Box::new(Spy(plant.clone(), Arc::clone(&copy))))

@@ -44,11 +44,8 @@ fn the_last_valid_reading_replaces_a_lost_one_so_that_no_sample_is_missing() {
         (Kind::Sensors, 5) => Fate::Lose,
         _ => Fate::Pass,
     });
-    let mut peer =
-        NetController::connect(proxy.address, scene.sample_time(), Some(PATIENT)).unwrap();
-    let answers: Vec<Command> = (0..200)
-        .map(|n| peer.sample(reading(n), true).unwrap())
-        .collect();
+    let mut peer = NetController::connect(proxy.address, scene.sample_time(), Some(PATIENT)).unwrap();
+    let answers: Vec<Command> = (0..200).map(|n| peer.sample(reading(n), true).unwrap()).collect();
     println!("{}", peer.counters());
     assert!(peer.counters().held >= 15);
     // A held drive is that of an earlier sample, and never counts as settled.
@@ -62,12 +59,7 @@ fn the_last_valid_reading_replaces_a_lost_one_so_that_no_sample_is_missing() {
     // One reading per sample up to the last one that arrived; a lost one repeats the one before.
     let asked = asked.lock().unwrap();
     assert!(asked.len() >= 195);
-    assert!(
-        asked
-            .iter()
-            .enumerate()
-            .all(|(n, reading)| n as f64 - reading >= 0.0)
-    );
+    assert!(asked.iter().enumerate().all(|(n, reading)| n as f64 - reading >= 0.0));
 }
 
 #[test]
@@ -78,8 +70,7 @@ fn a_held_drive_is_zero_when_the_drive_is_not_requested() {
         Kind::Drive if n >= 10 => Fate::Lose,
         _ => Fate::Pass,
     });
-    let mut peer =
-        NetController::connect(proxy.address, scene.sample_time(), Some(PATIENT)).unwrap();
+    let mut peer = NetController::connect(proxy.address, scene.sample_time(), Some(PATIENT)).unwrap();
     for n in 0..20 {
         peer.sample(reading(n), true).unwrap();
     }
@@ -99,9 +90,7 @@ fn a_controller_that_stops_answering_is_a_permanent_error() {
     });
     for pace in [None, Some(0.3)] {
         let mut peer = NetController::connect(proxy.address, scene.sample_time(), pace).unwrap();
-        let error = (0..5000)
-            .find_map(|n| peer.sample(reading(n), true).err())
-            .unwrap();
+        let error = (0..5000).find_map(|n| peer.sample(reading(n), true).err()).unwrap();
         let Some(LinkError::Silent { .. }) = error.cause::<LinkError>() else {
             panic!("{error}");
         };

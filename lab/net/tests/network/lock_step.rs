@@ -15,10 +15,7 @@ fn measure(scene: &Scene, rig: &mut dyn Rig, controller: &mut dyn Controller) ->
 
 #[test]
 fn an_experiment_across_the_network_gives_the_same_bits() {
-    let scene = scene(&[
-        "controller.amplitude_drift=1e-3",
-        "controller.bandwidth=0.3",
-    ]);
+    let scene = scene(&["controller.amplitude_drift=1e-3", "controller.bandwidth=0.3"]);
     let direct = measure(
         &scene,
         &mut Simulated::new(scene.plant, scene.start).unwrap(),
@@ -28,8 +25,7 @@ fn an_experiment_across_the_network_gives_the_same_bits() {
     let sample_time = scene.sample_time();
     {
         let mut rig = NetRig::connect(rig_server.address, sample_time).unwrap();
-        let mut peer =
-            NetController::connect(controller_server.address, sample_time, None).unwrap();
+        let mut peer = NetController::connect(controller_server.address, sample_time, None).unwrap();
         assert_eq!(measure(&scene, &mut rig, &mut peer), direct);
     }
     for session in [rig_server.sessions(1), controller_server.sessions(1)] {
@@ -40,17 +36,9 @@ fn an_experiment_across_the_network_gives_the_same_bits() {
 
 /// Drives the plant through a proxy: the readings must equal those without a network. Returns the counters of client and
 /// server, and the number of datagrams that did not just pass.
-fn shaken(
-    samples: usize,
-    fate: impl FnMut(Kind, u64) -> Fate + Send + 'static,
-) -> (Counters, Counters, u64) {
+fn shaken(samples: usize, fate: impl FnMut(Kind, u64) -> Fate + Send + 'static) -> (Counters, Counters, u64) {
     let scene = scene(&[]);
-    let direct = shake(
-        &mut Simulated::new(scene.plant, scene.start).unwrap(),
-        &scene,
-        samples,
-    )
-    .unwrap();
+    let direct = shake(&mut Simulated::new(scene.plant, scene.start).unwrap(), &scene, samples).unwrap();
     let server = lock_step_rig(&scene);
     let proxy = Proxy::before(server.address, fate);
     let mut rig = NetRig::connect(proxy.address, scene.sample_time()).unwrap();
@@ -67,19 +55,13 @@ fn shaken(
 
 #[test]
 fn lost_frames_are_sent_again_and_change_no_bit() {
-    let (client, _, lost) = shaken(
-        600,
-        |_, n| if n % 40 == 7 { Fate::Lose } else { Fate::Pass },
-    );
+    let (client, _, lost) = shaken(600, |_, n| if n % 40 == 7 { Fate::Lose } else { Fate::Pass });
     assert!(lost > 20 && client.resent >= lost - 1);
 }
 
 #[test]
 fn repeated_frames_are_counted_and_change_no_bit() {
-    let (client, server, twice) = shaken(
-        600,
-        |_, n| if n % 5 == 3 { Fate::Repeat } else { Fate::Pass },
-    );
+    let (client, server, twice) = shaken(600, |_, n| if n % 5 == 3 { Fate::Repeat } else { Fate::Pass });
     assert!(twice > 200);
     assert!(client.repeated > 100 && server.repeated > 100);
 }
@@ -87,23 +69,14 @@ fn repeated_frames_are_counted_and_change_no_bit() {
 #[test]
 fn late_frames_are_counted_and_change_no_bit() {
     // A delayed frame passes after its repetition.
-    let (client, server, swapped) = shaken(
-        300,
-        |_, n| if n % 40 == 7 { Fate::Swap } else { Fate::Pass },
-    );
+    let (client, server, swapped) = shaken(300, |_, n| if n % 40 == 7 { Fate::Swap } else { Fate::Pass });
     assert!(swapped > 10);
     assert!(client.repeated + server.repeated >= swapped - 1);
 }
 
 #[test]
 fn corrupted_frames_are_counted_as_malformed_and_change_no_bit() {
-    let (client, server, corrupted) = shaken(300, |_, n| {
-        if n % 40 == 7 {
-            Fate::Corrupt
-        } else {
-            Fate::Pass
-        }
-    });
+    let (client, server, corrupted) = shaken(300, |_, n| if n % 40 == 7 { Fate::Corrupt } else { Fate::Pass });
     assert!(corrupted > 10);
     assert!(client.malformed + server.malformed >= corrupted - 1);
     assert!(client.malformed > 0 && server.malformed > 0);
@@ -111,8 +84,7 @@ fn corrupted_frames_are_counted_as_malformed_and_change_no_bit() {
 
 #[test]
 fn frames_of_another_sender_are_counted_as_foreign_and_change_no_bit() {
-    let (client, server, copied) =
-        shaken(600, |_, n| if n % 4 == 1 { Fate::Copy } else { Fate::Pass });
+    let (client, server, copied) = shaken(600, |_, n| if n % 4 == 1 { Fate::Copy } else { Fate::Pass });
     assert!(copied > 200);
     assert!(client.foreign > 100 && server.foreign > 100);
 }

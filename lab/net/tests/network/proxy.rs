@@ -39,22 +39,14 @@ pub struct Proxy {
 
 impl Proxy {
     /// Forwards to `server`. `fate` determines the treatment of the n-th frame in a direction; handshake and farewell pass.
-    pub fn before(
-        server: SocketAddr,
-        fate: impl FnMut(Kind, u64) -> Fate + Send + 'static,
-    ) -> Self {
+    pub fn before(server: SocketAddr, fate: impl FnMut(Kind, u64) -> Fate + Send + 'static) -> Self {
         let [front, back, stranger] = [(); 3].map(|()| {
             let socket = UdpSocket::bind("127.0.0.1:0").unwrap();
-            socket
-                .set_read_timeout(Some(Duration::from_millis(2)))
-                .unwrap();
+            socket.set_read_timeout(Some(Duration::from_millis(2))).unwrap();
             socket
         });
         let address = front.local_addr().unwrap();
-        let (stop, done) = (
-            Arc::new(AtomicBool::new(false)),
-            Arc::new(AtomicU64::new(0)),
-        );
+        let (stop, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
         let mut worker = Worker {
             fate,
             stranger,
@@ -86,11 +78,7 @@ impl Proxy {
                 }
             }
         });
-        Self {
-            address,
-            stop,
-            done,
-        }
+        Self { address, stop, done }
     }
 
     /// Number of datagrams with a treatment other than `Pass`.

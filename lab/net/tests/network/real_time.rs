@@ -33,11 +33,7 @@ fn shaken(fate: impl FnMut(Kind, u64) -> Fate + Send + 'static) -> (Counters, Se
     // Whatever the network did, the rig only got drives of this client, in their order.
     let driven = &drives[..399];
     assert!(driven.windows(2).all(|pair| pair[0].omega <= pair[1].omega));
-    assert!(
-        driven
-            .iter()
-            .all(|given| (0..400).any(|n| *given == drive(n)))
-    );
+    assert!(driven.iter().all(|given| (0..400).any(|n| *given == drive(n))));
     (client, session, drives)
 }
 
@@ -45,19 +41,13 @@ fn shaken(fate: impl FnMut(Kind, u64) -> Fate + Send + 'static) -> (Counters, Se
 fn the_rig_keeps_its_rate_and_reports_the_lateness_of_its_samples() {
     let (_, session, drives) = shaken(|_, _| Fate::Pass);
     let nominal = 1.0 / session.sample_time;
-    assert!(
-        (session.rate() / nominal - 1.0).abs() < 0.2,
-        "{}",
-        session.rate()
-    );
+    assert!((session.rate() / nominal - 1.0).abs() < 0.2, "{}", session.rate());
     let punctuality = session.punctuality.unwrap();
     assert_eq!(punctuality.histogram.iter().sum::<u64>(), session.samples);
     assert!(punctuality.missed <= session.samples && punctuality.worst >= 0.0);
     // After the farewell the drive ramps down.
     assert_eq!(drives.last().unwrap().amplitude, 0.0);
-    let steps = drives
-        .windows(2)
-        .map(|pair| pair[0].amplitude - pair[1].amplitude);
+    let steps = drives.windows(2).map(|pair| pair[0].amplitude - pair[1].amplitude);
     assert!(steps.fold(0.0, f64::max) < 1.5e-4 / f64::from(RAMP_SAMPLES));
 }
 
@@ -119,11 +109,7 @@ fn an_invalid_drive_is_refused_and_the_last_valid_one_held() {
         _ => Fate::Pass,
     });
     assert!(session.counters.malformed >= 35 && session.counters.held >= 35);
-    assert!(
-        drives
-            .iter()
-            .all(|drive| drive.amplitude <= 1e-4 && drive.omega < 52.0)
-    );
+    assert!(drives.iter().all(|drive| drive.amplitude <= 1e-4 && drive.omega < 52.0));
 }
 
 #[test]
@@ -189,10 +175,7 @@ fn a_rig_that_stops_answering_ends_the_experiment() {
     });
     let mut rig = NetRig::connect(proxy.address, scene.sample_time()).unwrap();
     let error = shake(&mut rig, &scene, 100).unwrap_err();
-    assert!(
-        matches!(error.cause(), Some(LinkError::Silent { .. })),
-        "{error}"
-    );
+    assert!(matches!(error.cause(), Some(LinkError::Silent { .. })), "{error}");
 }
 
 #[test]
@@ -205,8 +188,7 @@ fn a_controller_that_stops_answering_ramps_the_drive_of_the_rig_down() {
         _ => Fate::Pass,
     });
     let mut rig = NetRig::connect(rig_server.address, scene.sample_time()).unwrap();
-    let mut peer =
-        NetController::connect(proxy.address, scene.sample_time(), Some(PATIENT)).unwrap();
+    let mut peer = NetController::connect(proxy.address, scene.sample_time(), Some(PATIENT)).unwrap();
     let outcome = experiment::run(&mut rig, &mut peer, &Plan::of(&scene), |_, _, _| {});
     let Err(ExperimentError::Controller(error)) = outcome else {
         panic!("{outcome:?}");

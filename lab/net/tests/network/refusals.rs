@@ -24,9 +24,7 @@ fn another_version_is_named_with_both_numbers() {
     let address = other.local_addr().unwrap();
     let newer = std::thread::spawn(move || {
         let mut bytes = [0; 256];
-        other
-            .set_read_timeout(Some(Duration::from_secs(5)))
-            .unwrap();
+        other.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
         let (_, from) = other.recv_from(&mut bytes).unwrap();
         other
             .send_to(b"VINE\x02\x00 and what follows in version 2", from)
@@ -36,19 +34,14 @@ fn another_version_is_named_with_both_numbers() {
     newer.join().unwrap();
     assert!(matches!(error, LinkError::Version { theirs: 2, .. }));
     let text = error.to_string();
-    assert!(
-        text.contains("version 2") && text.contains("version 1"),
-        "{text}"
-    );
+    assert!(text.contains("version 2") && text.contains("version 1"), "{text}");
 }
 
 #[test]
 fn a_client_of_another_version_is_informed_of_the_version_of_the_server() {
     let server = lock_step_rig(&scene(&[]));
     let client = UdpSocket::bind("127.0.0.1:0").unwrap();
-    client
-        .set_read_timeout(Some(Duration::from_secs(5)))
-        .unwrap();
+    client.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
     client
         .send_to(b"VINE\x09\x00 hello from the future", server.address)
         .unwrap();
@@ -104,10 +97,7 @@ fn a_port_in_use_is_named() {
     let error = RigServer::listen(first.address, service(&scene, false, 1.0))
         .err()
         .unwrap();
-    assert!(
-        error.to_string().contains(&first.address.to_string()),
-        "{error}"
-    );
+    assert!(error.to_string().contains(&first.address.to_string()), "{error}");
     assert!(matches!(error, LinkError::Listen { .. }));
 }
 

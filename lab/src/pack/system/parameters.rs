@@ -57,10 +57,7 @@ pub(super) fn parameter_set(name: &str, values: &[Named]) -> String {
             Integer(number) => format!("<ssv:Integer value=\"{number}\"/>"),
             Boolean(truth) => format!("<ssv:Boolean value=\"{truth}\"/>"),
         };
-        let _ = writeln!(
-            text,
-            "    <ssv:Parameter name=\"{name}\">{value}</ssv:Parameter>"
-        );
+        let _ = writeln!(text, "    <ssv:Parameter name=\"{name}\">{value}</ssv:Parameter>");
     }
     text + "  </ssv:Parameters>\n</ssv:ParameterSet>\n"
 }

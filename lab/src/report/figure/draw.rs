@@ -55,9 +55,7 @@ impl Figure {
         }
         if let Some(panel) = self.panels.first().filter(|_| !self.key.is_empty()) {
             let left = panel.area[2];
-            let beside = area
-                .clone()
-                .shrink((px(left), 0), (px(width - left), px(height)));
+            let beside = area.clone().shrink((px(left), 0), (px(width - left), px(height)));
             draw_key(&beside, &self.key)?;
         }
         area.present()?;
@@ -167,9 +165,7 @@ impl Series {
                 let path = |pair: &[Place; 2]| PathElement::new(pair.to_vec(), style);
                 chart.draw_series(pairs.iter().map(path))?
             }
-            Kind::Rectangles(corners) => {
-                chart.draw_series(corners.iter().map(|one| Rectangle::new(*one, style)))?
-            }
+            Kind::Rectangles(corners) => chart.draw_series(corners.iter().map(|one| Rectangle::new(*one, style)))?,
             Kind::Text(text, place, size, centred) => {
                 let mut font = (FONT, px(*size)).into_text_style(area);
                 if *centred {
@@ -193,9 +189,7 @@ impl Series {
                 let radius = px(radius.min(5));
                 drawn.legend(move |(x, y)| Circle::new((x + at(15), y), radius, style))
             }
-            Kind::Crosses(_) => {
-                drawn.legend(move |(x, y)| Cross::new((x + at(15), y), px(6), style))
-            }
+            Kind::Crosses(_) => drawn.legend(move |(x, y)| Cross::new((x + at(15), y), px(6), style)),
             Kind::Square(_) => drawn.legend(move |(x, y)| square((x + at(15), y), style)),
             _ => drawn.legend(move |(x, y)| PathElement::new(vec![(x, y), (x + at(31), y)], style)),
         };

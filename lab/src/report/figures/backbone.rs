@@ -6,9 +6,7 @@ use super::{DECAY_LABEL, THINNED, decay_points, locked_point};
 use crate::comparison::Comparison;
 use crate::numerics::range;
 use crate::orbit::{self, Limits};
-use crate::report::figure::{
-    AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, caption, clipped, line, thinned,
-};
+use crate::report::figure::{AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, caption, clipped, line, thinned};
 use crate::report::theme::{EXACT, FAINT, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
 use crate::theory::{BranchSide, SlowFlow};
@@ -27,24 +25,17 @@ pub fn figure(found: &Comparison) -> Figure {
     let fold = slow_flow.manifold.c_min();
     let above = found.decay.iter().map(|one| one.point);
     let sigmas = theory.iter().map(|point| point.sigma);
-    let sigmas = sigmas.chain(
-        above
-            .filter(|point| point.c >= fold)
-            .map(|point| point.sigma),
-    );
+    let sigmas = sigmas.chain(above.filter(|point| point.c >= fold).map(|point| point.sigma));
     let (low, high) = range((f64::MAX, f64::MIN), sigmas);
     let margin = 0.06 * (high - low);
     let (low, high) = (low - margin, high + margin);
 
-    let mut panel = Panel::new(
-        Axis::new((low, high), DETUNING),
-        Axis::new((0.0, top), AMPLITUDE),
-    )
-    .heading(
-        "Backbone: phase resonance of the centre of mass",
-        &caption(p, found.lock.g),
-    )
-    .legend(SeriesLabelPosition::UpperRight);
+    let mut panel = Panel::new(Axis::new((low, high), DETUNING), Axis::new((0.0, top), AMPLITUDE))
+        .heading(
+            "Backbone: phase resonance of the centre of mass",
+            &caption(p, found.lock.g),
+        )
+        .legend(SeriesLabelPosition::UpperRight);
     add_backbones(&mut panel, p, (low, high), (0.0, top));
     let decay = found.decay.iter().map(|one| one.point).step_by(THINNED);
     let decay = decay.map(|point| (point.sigma, point.c));

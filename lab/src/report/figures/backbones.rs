@@ -15,32 +15,19 @@ const DETUNINGS: (f64, f64) = (-4.0, 4.0);
 
 /// The backbones, the scene's own emphasised.
 pub fn figure(p: &Dimensionless) -> Figure {
-    let mut values: Vec<f64> = OTHERS
-        .into_iter()
-        .filter(|r| (r - p.r).abs() > 0.09)
-        .collect();
+    let mut values: Vec<f64> = OTHERS.into_iter().filter(|r| (r - p.r).abs() > 0.09).collect();
     values.push(p.r);
     values.sort_by(f64::total_cmp);
     let caption = format!(
         "λ = {:.3}; amplitudes over b; first order in ε, at phase resonance",
         p.lambda
     );
-    let mut panel = Panel::new(
-        Axis::new(DETUNINGS, DETUNING),
-        Axis::new((0.0, TOP), AMPLITUDE),
-    )
-    .heading(
-        "Backbones for several coefficients of restitution r",
-        &caption,
-    )
-    .legend(SeriesLabelPosition::UpperRight);
+    let mut panel = Panel::new(Axis::new(DETUNINGS, DETUNING), Axis::new((0.0, TOP), AMPLITUDE))
+        .heading("Backbones for several coefficients of restitution r", &caption)
+        .legend(SeriesLabelPosition::UpperRight);
     for r in values {
         let own = r == p.r;
-        let (colour, width, size) = if own {
-            (EXACT, 34, 17)
-        } else {
-            (THEORY, 18, 14)
-        };
+        let (colour, width, size) = if own { (EXACT, 34, 17) } else { (THEORY, 18, 14) };
         let flow = SlowFlow::new(p.lambda, r);
         let points: Vec<Marked> = flow
             .backbone(1e-3, 1.5 * B_SYMMETRY_BREAKING, POINTS)
@@ -64,9 +51,7 @@ fn label_place(flow: &SlowFlow, points: &[Marked]) -> Place {
     if fold.c > 0.05 {
         return (fold.sigma.max(0.1) + 0.06, fold.c - 0.022);
     }
-    let right = points
-        .iter()
-        .filter(|one| one.0.0 > DETUNINGS.0 + 0.2 && one.0.0 < 0.0);
+    let right = points.iter().filter(|one| one.0.0 > DETUNINGS.0 + 0.2 && one.0.0 < 0.0);
     let left = right.min_by(|one, other| one.0.0.total_cmp(&other.0.0));
     left.map_or((0.0, 0.1), |one| (one.0.0, one.0.1 + 0.045))
 }

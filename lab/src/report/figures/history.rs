@@ -63,11 +63,7 @@ pub fn figure(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
         (2, (low - margin, high + margin), "detuning σ"),
     ];
     let panels = rows.into_iter().flat_map(|(row, range, label)| {
-        let (top, height) = if row == 1 {
-            (0, UPPER)
-        } else {
-            (UPPER, SIZE.1 - UPPER)
-        };
+        let (top, height) = if row == 1 { (0, UPPER) } else { (UPPER, SIZE.1 - UPPER) };
         let left = data.driven_panel(row, Axis::new(range, label));
         let right = data.decay_panel(row, range);
         [
@@ -88,10 +84,7 @@ impl Data<'_> {
             ..
         } = self.found;
         let end = 1.02 * self.driven.last().map_or(1.0, |one| one[0]);
-        let mut panel = Panel::new(
-            Axis::new((0.0, end), "time, in periods of the oscillator alone"),
-            y,
-        );
+        let mut panel = Panel::new(Axis::new((0.0, end), "time, in periods of the oscillator alone"), y);
         if row == 1 {
             let caption = caption(parameters, lock.g);
             panel = panel.heading("Seeking and holding phase resonance", &caption);

@@ -22,21 +22,15 @@ pub fn figure(found: &Comparison) -> Figure {
             .filter(|(c, _)| *c <= right)
             .collect()
     };
-    let mut panel = Panel::new(
-        Axis::new((0.0, right), AMPLITUDE),
-        Axis::new((0.0, TOP), SPEED),
-    )
-    .heading(
-        "Slow invariant manifold and the free decay on it",
-        &caption(&found.parameters, found.lock.g),
-    )
-    .legend(SeriesLabelPosition::UpperLeft);
+    let mut panel = Panel::new(Axis::new((0.0, right), AMPLITUDE), Axis::new((0.0, TOP), SPEED))
+        .heading(
+            "Slow invariant manifold and the free decay on it",
+            &caption(&found.parameters, found.lock.g),
+        )
+        .legend(SeriesLabelPosition::UpperLeft);
     let stable = between(manifold.b_min(), B_SYMMETRY_BREAKING);
     panel.curve(stable, line(THEORY, 20), "manifold, 1:1 impacts stable");
-    for unstable in [
-        between(0.0, manifold.b_min()),
-        between(B_SYMMETRY_BREAKING, TOP),
-    ] {
+    for unstable in [between(0.0, manifold.b_min()), between(B_SYMMETRY_BREAKING, TOP)] {
         panel.dashed(unstable, line(UNSTABLE, 20), "manifold, unstable");
     }
     let decay = found.decay.iter().map(|one| one.point).step_by(THINNED);

@@ -39,12 +39,7 @@ fn course(rows: &[[f64; 5]], what: impl Fn(&[f64; 5]) -> f64) -> Vec<Place> {
 }
 
 /// Primary mass with its walls, and the particle between them.
-fn displacements(
-    p: &Dimensionless,
-    motion: &Periodic,
-    rows: &[[f64; 5]],
-    impacts: &[(f64, f64, f64)],
-) -> Panel {
+fn displacements(p: &Dimensionless, motion: &Periodic, rows: &[[f64; 5]], impacts: &[(f64, f64, f64)]) -> Panel {
     let caption = format!(
         "ε = {:.5}, λ = {:.3}, r = {}, G = {:.3}, exact orbit at σ = {:.4}; lengths over b",
         p.epsilon, p.lambda, p.r, motion.g, motion.sigma
@@ -80,10 +75,7 @@ fn coordinates(
     let v = course(rows, |row| row[1] + p.epsilon * row[3]);
     let (_, high) = range((0.0, 1.0), v.iter().map(|(_, value)| value.abs()));
     let mut panel = Panel::new(
-        Axis::new(
-            (0.0, 1.0),
-            "time since the base passed zero upwards, in periods",
-        ),
+        Axis::new((0.0, 1.0), "time since the base passed zero upwards, in periods"),
         Axis::new((-1.15 * high, 1.9 * high), "v and w, over b"),
     )
     .legend(SeriesLabelPosition::UpperRight);
@@ -116,9 +108,7 @@ fn coordinates(
 fn impacts(motion: &Periodic) -> Vec<(f64, f64, f64)> {
     let part = |phase: f64| (phase / TAU).rem_euclid(1.0);
     let first = motion.bounces.iter();
-    let mut found: Vec<(f64, f64, f64)> = first
-        .map(|one| (part(one.phase), one.q2(), one.wall))
-        .collect();
+    let mut found: Vec<(f64, f64, f64)> = first.map(|one| (part(one.phase), one.q2(), one.wall)).collect();
     if motion.pattern.mirrored {
         let half = f64::from(motion.pattern.half_periods) / 2.0;
         let second = motion.bounces.iter();

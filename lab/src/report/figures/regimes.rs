@@ -122,16 +122,12 @@ fn letters(map: &Map) -> Vec<(Regime, Place)> {
     let at = |column: usize, row: usize| map.cells[row * columns + column].point.regime;
     // Largest half-width of a square around the cell that contains no other regime.
     let depth = |column: usize, row: usize| {
-        let most = column
-            .min(row)
-            .min(columns - 1 - column)
-            .min(rows - 1 - row);
+        let most = column.min(row).min(columns - 1 - column).min(rows - 1 - row);
         let alike = |reach: usize| {
-            (column - reach..=column + reach).all(|x| {
-                at(x, row - reach) == at(column, row) && at(x, row + reach) == at(column, row)
-            }) && (row - reach..=row + reach).all(|y| {
-                at(column - reach, y) == at(column, row) && at(column + reach, y) == at(column, row)
-            })
+            (column - reach..=column + reach)
+                .all(|x| at(x, row - reach) == at(column, row) && at(x, row + reach) == at(column, row))
+                && (row - reach..=row + reach)
+                    .all(|y| at(column - reach, y) == at(column, row) && at(column + reach, y) == at(column, row))
         };
         (1..=most).take_while(|reach| alike(*reach)).count()
     };

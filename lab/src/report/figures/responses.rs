@@ -4,9 +4,7 @@ use plotters::chart::SeriesLabelPosition;
 use plotters::style::BLACK;
 
 use crate::orbit::{Branch, Response};
-use crate::report::figure::{
-    AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, Place, clipped, line, thinned,
-};
+use crate::report::figure::{AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, Place, clipped, line, thinned};
 use crate::report::theme::{EXACT, FAINT, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
 use crate::theory::{B_SYMMETRY_BREAKING, ResponsePoint, SlowFlow};
@@ -23,10 +21,7 @@ pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
         .filter(|one| one.b > flow.manifold.b_min())
         .fold(0.6, |most: f64, one| most.max(1.08 * one.c));
     let (x, y) = (DETUNINGS, (0.0, top));
-    let list: Vec<String> = responses
-        .iter()
-        .map(|one| format!("{:.3}", one.g))
-        .collect();
+    let list: Vec<String> = responses.iter().map(|one| format!("{:.3}", one.g)).collect();
     let caption = format!(
         "ε = {:.5}, λ = {:.3}, r = {}; G = {}; amplitudes over b",
         p.epsilon,

@@ -29,16 +29,11 @@ pub fn figure_with_drive(tracked: &TrackedComparison) -> Figure {
 fn amplitude_panel(tracked: &TrackedComparison) -> Panel {
     let p = &tracked.parameters;
     let all = points(tracked);
-    let top = all
-        .clone()
-        .fold(0.5, |most: f64, one| most.max(1.15 * one.c));
+    let top = all.clone().fold(0.5, |most: f64, one| most.max(1.15 * one.c));
     let (low, high) = range((-1.6, 0.6), all.clone().map(|one| one.sigma));
     let x = (low - 0.1 * (high - low), high + 0.1 * (high - low));
     let (least, most) = range((f64::MAX, f64::MIN), all.clone().map(|one| one.g));
-    let text = caption(p, most).replace(
-        &format!("G = {most:.3}"),
-        &format!("G from {least:.3} to {most:.3}"),
-    );
+    let text = caption(p, most).replace(&format!("G = {most:.3}"), &format!("G from {least:.3} to {most:.3}"));
     let mut panel = Panel::new(Axis::new(x, DETUNING), Axis::new((0.0, top), AMPLITUDE))
         .heading("Backbone, tracked with the loop closed", &text)
         .legend(SeriesLabelPosition::UpperRight);
@@ -55,9 +50,7 @@ fn amplitude_panel(tracked: &TrackedComparison) -> Panel {
 fn drive_panel(tracked: &TrackedComparison) -> Panel {
     let p = &tracked.parameters;
     let all = points(tracked);
-    let top = all
-        .clone()
-        .fold(0.5, |most: f64, one| most.max(1.15 * one.c));
+    let top = all.clone().fold(0.5, |most: f64, one| most.max(1.15 * one.c));
     let flow = SlowFlow::new(p.lambda, p.r);
     let theory = flow.backbone(flow.manifold.b_min(), 1.3, 600);
     let theory = theory.iter().map(|one| (one.c, one.g));

@@ -27,10 +27,7 @@ struct Row {
     stable: bool,
 }
 
-pub(super) fn make(
-    subject: &Subject,
-    done: &(dyn Fn(f64) + Sync),
-) -> Result<Section, SectionError> {
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
     let mut section = Section::new("Exact periodic motions");
     let p = subject.scene.dimensionless();
     let limits = Limits::default();
@@ -81,10 +78,7 @@ fn describe_backbone(section: &mut Section, curve: &Branch) {
         .iter()
         .map(|one| {
             let Periodic { sigma, c, g, .. } = one.motion;
-            format!(
-                "{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}",
-                name(one.kind)
-            )
+            format!("{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}", name(one.kind))
         })
         .collect();
     section.finding = format!(
@@ -122,8 +116,7 @@ fn changes(found: &[Response]) -> Table {
 
 /// The stable motion at the scene's excitation that is nearest to phase resonance.
 fn locked<'a>(p: &Dimensionless, found: &'a [Response]) -> Option<&'a Periodic> {
-    let distance =
-        |one: &Periodic| (one.g - p.g).abs() + (one.gamma + std::f64::consts::FRAC_PI_2).abs();
+    let distance = |one: &Periodic| (one.g - p.g).abs() + (one.gamma + std::f64::consts::FRAC_PI_2).abs();
     let response = found.iter().find(|one| one.g == p.g)?;
     let stable = response.symmetric.points.iter().filter(|one| one.stable);
     stable.min_by(|a, b| distance(a).total_cmp(&distance(b)))
@@ -167,10 +160,7 @@ fn table(backbone: &Branch, responses: &[Response]) -> Vec<Row> {
     };
     let mut all = rows("backbone".into(), backbone);
     for response in responses {
-        all.extend(rows(
-            format!("response G={:.4}", response.g),
-            &response.symmetric,
-        ));
+        all.extend(rows(format!("response G={:.4}", response.g), &response.symmetric));
         for branch in &response.asymmetric {
             all.extend(rows(format!("asymmetric G={:.4}", response.g), branch));
         }

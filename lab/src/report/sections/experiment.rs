@@ -13,10 +13,7 @@ use crate::report::section::Section;
 use crate::report::table::{Table, number};
 use crate::rig::{BuiltIn, Rig};
 
-pub(super) fn make(
-    subject: &Subject,
-    done: &(dyn Fn(f64) + Sync),
-) -> Result<Section, SectionError> {
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
     let mut section = Section::new("The experiment");
     let scene = &subject.scene;
     let mut rig = subject.rig()?;

@@ -14,25 +14,15 @@ use crate::report::table::Table;
 /// Periods before the record, and periods recorded.
 const PERIODS: (usize, usize) = (400, 100);
 
-pub(super) fn make(
-    subject: &Subject,
-    done: &(dyn Fn(f64) + Sync),
-) -> Result<Section, SectionError> {
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
     let mut section = Section::new("Regimes of the driven response");
     let scene = subject.scene.dimensionless();
     let [x, y] = subject.map;
     let held = x.axis != Axis::Sigma && y.axis != Axis::Sigma;
-    let orbits = if held {
-        phase_resonant(&scene)
-    } else {
-        Vec::new()
-    };
+    let orbits = if held { phase_resonant(&scene) } else { Vec::new() };
     let plan = Plan {
         scene,
-        sigma: orbits
-            .iter()
-            .find(|one| one.stable)
-            .map_or(0.0, |one| one.sigma),
+        sigma: orbits.iter().find(|one| one.stable).map_or(0.0, |one| one.sigma),
         start: subject.scene.dimensionless_start(),
         x,
         y,
@@ -84,15 +74,7 @@ fn describe(section: &mut Section, map: &Map) {
             format!("{:.1} %", percent(here, inside)),
         ]
     });
-    let headings = [
-        "regime",
-        "cells",
-        "share",
-        "share inside the theory's island",
-    ];
-    section.table(
-        "How often each regime occurs.",
-        Table::new(headings).rows(rows),
-    );
+    let headings = ["regime", "cells", "share", "share inside the theory's island"];
+    section.table("How often each regime occurs.", Table::new(headings).rows(rows));
     section.words(section.finding.clone());
 }

@@ -24,10 +24,7 @@ struct Row {
     distance: Option<f64>,
 }
 
-pub(super) fn make(
-    subject: &Subject,
-    done: &(dyn Fn(f64) + Sync),
-) -> Result<Section, SectionError> {
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
     let mut section = Section::new("The backbone, tracked with the loop closed");
     let scene = &subject.scene;
     let mut controller = BuiltIn::new(&scene.backbone_config())?;

@@ -8,9 +8,7 @@ use fmi2_boundary::{Fmu, pair};
 
 fn main() {
     let mut arguments = std::env::args().skip(1);
-    let samples = arguments
-        .next()
-        .map_or(Ok(40_000), |text| text.parse::<u32>());
+    let samples = arguments.next().map_or(Ok(40_000), |text| text.parse::<u32>());
     let (Ok(samples), folder, None) = (samples, arguments.next(), arguments.next()) else {
         eprintln!("usage: couple [samples] [folder of LoViNes and PhaseLock as packed]");
         std::process::exit(2);

@@ -72,7 +72,5 @@ fn main() {
     }
     drop(running);
     watchdog.join().expect("the watchdog does not panic");
-    println!(
-        "no crash, no panic, every error with its reason, no illegal call that changed anything"
-    );
+    println!("no crash, no panic, every error with its reason, no illegal call that changed anything");
 }

@@ -35,10 +35,7 @@ impl LowPass {
             let sine = (self.slope - rise) / rate + cosine;
             let (sin, cos) = (rate * elapsed).sin_cos();
             let decay = (-rate * elapsed).exp();
-            let (ringing, quadrature) = (
-                decay * (cosine * cos + sine * sin),
-                decay * (sine * cos - cosine * sin),
-            );
+            let (ringing, quadrature) = (decay * (cosine * cos + sine * sin), decay * (sine * cos - cosine * sin));
             self.output = input - lag + ringing;
             self.slope = rise + rate * (quadrature - ringing);
         }
@@ -72,14 +69,8 @@ mod tests {
         for cut_off in [0.5, 1.0, 3.0, 20.0] {
             let (amplitude, lag) = response(cut_off);
             let x: f64 = 1.0 / cut_off;
-            assert!(
-                (amplitude - 1.0 / (1.0 + x.powi(4)).sqrt()).abs() < 1e-4,
-                "{cut_off}"
-            );
-            assert!(
-                (lag - (SQRT_2 * x).atan2(1.0 - x * x)).abs() < 1e-4,
-                "{cut_off}: {lag}"
-            );
+            assert!((amplitude - 1.0 / (1.0 + x.powi(4)).sqrt()).abs() < 1e-4, "{cut_off}");
+            assert!((lag - (SQRT_2 * x).atan2(1.0 - x * x)).abs() < 1e-4, "{cut_off}: {lag}");
         }
     }
 }

@@ -56,10 +56,7 @@ mod tests {
 
     /// Power of the noise on a sine of amplitude 3, relative to that of the sine, dB.
     fn measured(of: RatioOf) -> f64 {
-        let (mut sensor, mut normal) = (
-            Sensor::new(40.0, of, 30.0, 100.0),
-            NormalDistribution::new(7),
-        );
+        let (mut sensor, mut normal) = (Sensor::new(40.0, of, 30.0, 100.0), NormalDistribution::new(7));
         let mut noise = 0.0;
         for n in 0..200_000 {
             let value = 3.0 * (f64::from(n) * 0.0628).sin();

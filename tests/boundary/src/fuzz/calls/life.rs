@@ -14,18 +14,10 @@ impl Caller<'_> {
         let (c, f) = (self.master.c, &self.master.f);
         let categories = [c"logAll".as_ptr(), c"\xfe%s".as_ptr(), null()];
         let number = |dice: &mut Dice| {
-            if dice.one_in(4) {
-                dice.pick(&WILD)
-            } else {
-                0.0
-            }
+            if dice.one_in(4) { dice.pick(&WILD) } else { 0.0 }
         };
         // Mostly what is in order.
-        let wanted = if dice.one_in(4) {
-            dice.roll(6)
-        } else {
-            self.stage
-        };
+        let wanted = if dice.one_in(4) { dice.roll(6) } else { self.stage };
         // SAFETY: as the standard asks.
         let (name, status) = unsafe {
             match wanted {
@@ -37,14 +29,8 @@ impl Caller<'_> {
                         (f.fmi2SetupExperiment)(c, 1, number(dice), self.time, defined, stop),
                     )
                 }
-                1 => (
-                    "fmi2EnterInitializationMode",
-                    (f.fmi2EnterInitializationMode)(c),
-                ),
-                2 => (
-                    "fmi2ExitInitializationMode",
-                    (f.fmi2ExitInitializationMode)(c),
-                ),
+                1 => ("fmi2EnterInitializationMode", (f.fmi2EnterInitializationMode)(c)),
+                2 => ("fmi2ExitInitializationMode", (f.fmi2ExitInitializationMode)(c)),
                 3 | 4 => {
                     let (on, count) = (dice.roll(2) as c_int, dice.roll(4));
                     (
@@ -112,22 +98,10 @@ impl Caller<'_> {
         unsafe {
             match dice.roll(5) {
                 0 => ("fmi2GetStatus", (f.fmi2GetStatus)(c, kind, &mut status)),
-                1 => (
-                    "fmi2GetRealStatus",
-                    (f.fmi2GetRealStatus)(c, kind, &mut real),
-                ),
-                2 => (
-                    "fmi2GetIntegerStatus",
-                    (f.fmi2GetIntegerStatus)(c, kind, &mut integer),
-                ),
-                3 => (
-                    "fmi2GetBooleanStatus",
-                    (f.fmi2GetBooleanStatus)(c, kind, null_mut()),
-                ),
-                _ => (
-                    "fmi2GetStringStatus",
-                    (f.fmi2GetStringStatus)(c, kind, &mut string),
-                ),
+                1 => ("fmi2GetRealStatus", (f.fmi2GetRealStatus)(c, kind, &mut real)),
+                2 => ("fmi2GetIntegerStatus", (f.fmi2GetIntegerStatus)(c, kind, &mut integer)),
+                3 => ("fmi2GetBooleanStatus", (f.fmi2GetBooleanStatus)(c, kind, null_mut())),
+                _ => ("fmi2GetStringStatus", (f.fmi2GetStringStatus)(c, kind, &mut string)),
             }
         }
     }

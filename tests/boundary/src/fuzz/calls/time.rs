@@ -21,11 +21,7 @@ impl Caller<'_> {
             1 => dice.between(0.0, 10.0),
             _ => dice.between(0.0, 0.01),
         };
-        let time = if dice.one_in(12) {
-            dice.pick(&WILD)
-        } else {
-            self.time
-        };
+        let time = if dice.one_in(12) { dice.pick(&WILD) } else { self.time };
         let status = unsafe { (f.fmi2DoStep)(c, time, step, 0) };
         if status == Status::Ok {
             self.time = time + step;
@@ -50,32 +46,17 @@ impl Caller<'_> {
         unsafe {
             match dice.roll(12) {
                 0 => ("fmi2EnterEventMode", (f.fmi2EnterEventMode)(c)),
-                1..=2 => (
-                    "fmi2NewDiscreteStates",
-                    (f.fmi2NewDiscreteStates)(c, &mut info),
-                ),
-                3..=4 => (
-                    "fmi2EnterContinuousTimeMode",
-                    (f.fmi2EnterContinuousTimeMode)(c),
-                ),
+                1..=2 => ("fmi2NewDiscreteStates", (f.fmi2NewDiscreteStates)(c, &mut info)),
+                3..=4 => ("fmi2EnterContinuousTimeMode", (f.fmi2EnterContinuousTimeMode)(c)),
                 5 => (
                     "fmi2CompletedIntegratorStep",
                     (f.fmi2CompletedIntegratorStep)(c, 1, &mut event, &mut end),
                 ),
                 6 => ("fmi2SetTime", (f.fmi2SetTime)(c, values[0])),
-                7 => (
-                    "fmi2SetContinuousStates",
-                    (f.fmi2SetContinuousStates)(c, at, count),
-                ),
+                7 => ("fmi2SetContinuousStates", (f.fmi2SetContinuousStates)(c, at, count)),
                 8 => ("fmi2GetDerivatives", (f.fmi2GetDerivatives)(c, at, count)),
-                9 => (
-                    "fmi2GetEventIndicators",
-                    (f.fmi2GetEventIndicators)(c, at, count),
-                ),
-                10 => (
-                    "fmi2GetContinuousStates",
-                    (f.fmi2GetContinuousStates)(c, at, count),
-                ),
+                9 => ("fmi2GetEventIndicators", (f.fmi2GetEventIndicators)(c, at, count)),
+                10 => ("fmi2GetContinuousStates", (f.fmi2GetContinuousStates)(c, at, count)),
                 _ => (
                     "fmi2GetNominalsOfContinuousStates",
                     (f.fmi2GetNominalsOfContinuousStates)(c, at, count),

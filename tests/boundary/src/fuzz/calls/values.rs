@@ -34,41 +34,20 @@ impl Caller<'_> {
                 ),
                 4..=6 => (
                     "fmi2GetReal",
-                    (f.fmi2GetReal)(
-                        c,
-                        vr,
-                        count,
-                        if wrong {
-                            null_mut()
-                        } else {
-                            reals.as_mut_ptr()
-                        },
-                    ),
+                    (f.fmi2GetReal)(c, vr, count, if wrong { null_mut() } else { reals.as_mut_ptr() }),
                 ),
-                7 => (
-                    "fmi2SetInteger",
-                    (f.fmi2SetInteger)(c, vr, count, integers.as_ptr()),
-                ),
+                7 => ("fmi2SetInteger", (f.fmi2SetInteger)(c, vr, count, integers.as_ptr())),
                 8 => (
                     "fmi2GetInteger",
                     (f.fmi2GetInteger)(c, vr, count, integers.as_mut_ptr()),
                 ),
-                9 => (
-                    "fmi2SetBoolean",
-                    (f.fmi2SetBoolean)(c, vr, count, integers.as_ptr()),
-                ),
+                9 => ("fmi2SetBoolean", (f.fmi2SetBoolean)(c, vr, count, integers.as_ptr())),
                 10 => (
                     "fmi2GetBoolean",
                     (f.fmi2GetBoolean)(c, vr, count, integers.as_mut_ptr()),
                 ),
-                _ if wrong => (
-                    "fmi2GetString",
-                    (f.fmi2GetString)(c, vr, count, strings.as_mut_ptr()),
-                ),
-                _ => (
-                    "fmi2SetString",
-                    (f.fmi2SetString)(c, vr, count, strings.as_ptr()),
-                ),
+                _ if wrong => ("fmi2GetString", (f.fmi2GetString)(c, vr, count, strings.as_mut_ptr())),
+                _ => ("fmi2SetString", (f.fmi2SetString)(c, vr, count, strings.as_ptr())),
             }
         }
     }
@@ -90,13 +69,7 @@ impl Caller<'_> {
                 ),
                 1 => (
                     "fmi2GetRealOutputDerivatives",
-                    (f.fmi2GetRealOutputDerivatives)(
-                        c,
-                        vr,
-                        count,
-                        order.as_ptr(),
-                        values.as_mut_ptr(),
-                    ),
+                    (f.fmi2GetRealOutputDerivatives)(c, vr, count, order.as_ptr(), values.as_mut_ptr()),
                 ),
                 _ => (
                     "fmi2GetDirectionalDerivative",
