@@ -1,7 +1,7 @@
 //! The plant: linear oscillator, particle and walls, advanced from event to event in closed form.
 //!
-//! [`advance`] holds the loop over events. What comes next is either found by the plain solver, a certified search along one
-//! [`crate::segment::Segment`], or predicted and verified by the fast path ([`crate::fast`]).
+//! `advance` holds the loop over events. What comes next is either found by the plain solver, a certified search along one
+//! [`crate::segment::Segment`], or predicted and verified by the fast path (`crate::fast`).
 
 mod advance;
 mod at_wall;
