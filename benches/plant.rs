@@ -50,11 +50,7 @@ fn lock() -> Scene {
 
 /// The same rig, with a particle so slow that it meets no wall in a thousand periods.
 fn quiet() -> Scene {
-    Scene {
-        start: [0.0, 0.0, 0.0, 1e-6],
-        amplitude: 1e-3,
-        ..lock()
-    }
+    Scene { start: [0.0, 0.0, 0.0, 1e-6], amplitude: 1e-3, ..lock() }
 }
 
 /// A chatter into sticking and out of it.
@@ -78,10 +74,7 @@ fn settled(sigma: f64, g: f64) -> Scene {
     let mut plant = scene.plant();
     plant.advance(scene.drive(), 1000.0 * scene.period()).unwrap();
     let s = plant.state();
-    Scene {
-        start: [s.q1, s.dq1, s.q2, s.dq2],
-        ..scene
-    }
+    Scene { start: [s.q1, s.dq1, s.q2, s.dq2], ..scene }
 }
 
 impl Scene {
@@ -215,13 +208,7 @@ const LOCK: &str = "default lock, one long step";
 fn cases() -> Vec<Case> {
     let mut cases = Vec::new();
     let mut add = |name: &str, unit, target, run: Box<dyn Fn() -> u64>, brent: Option<Brent>| {
-        cases.push(Case {
-            name: name.to_owned(),
-            unit,
-            run,
-            brent,
-            target,
-        });
+        cases.push(Case { name: name.to_owned(), unit, run, brent, target });
     };
     let long = |scene: Scene| -> Box<dyn Fn() -> u64> {
         Box::new(move || scene.follow(1, PERIODS as f64 * scene.period(), states))

@@ -31,10 +31,7 @@ fn plain(mut plant: Plant) -> Plant {
 
 /// The default rig, dimensionless, with a particle so slow that it meets no wall.
 fn quiet() -> Plant {
-    let start = State {
-        dq2: 1e-6,
-        ..State::default()
-    };
+    let start = State { dq2: 1e-6, ..State::default() };
     Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), start).expect("a scene")
 }
 
@@ -85,13 +82,7 @@ fn pressed(hopping: bool, n: u32, step: f64) {
         let t = f64::from(k) * step;
         let signal = [0.5 * acceleration * t * t, acceleration * t, 0.5 * acceleration, 0.0];
         plant
-            .advance(
-                black_box(Drive {
-                    signal,
-                    ..Drive::default()
-                }),
-                step,
-            )
+            .advance(black_box(Drive { signal, ..Drive::default() }), step)
             .unwrap();
     }
     assert_eq!(plant.contact().is_some(), !hopping);

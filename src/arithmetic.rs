@@ -32,10 +32,7 @@ impl Sum {
     pub fn plus(self, number: f64) -> Self {
         let number = number + self.error;
         let value = self.value + number;
-        Self {
-            value,
-            error: number - (value - self.value),
-        }
+        Self { value, error: number - (value - self.value) }
     }
 
     /// This less another sum.

@@ -29,19 +29,12 @@ pub struct Drive {
 impl Drive {
     /// A harmonic base motion from the built-in oscillator alone.
     pub fn harmonic(amplitude: f64, omega: f64) -> Self {
-        Self {
-            amplitude,
-            omega,
-            ..Self::default()
-        }
+        Self { amplitude, omega, ..Self::default() }
     }
 
     /// A base displacement held at `displacement`, m.
     pub fn held(displacement: f64) -> Self {
-        Self {
-            signal: [displacement, 0.0, 0.0, 0.0],
-            ..Self::default()
-        }
+        Self { signal: [displacement, 0.0, 0.0, 0.0], ..Self::default() }
     }
 
     /// Checks every value.
@@ -111,10 +104,7 @@ impl BaseMotion {
     /// The same motion seen from `t` seconds later.
     pub fn after(&self, t: f64) -> Self {
         Self {
-            drive: Drive {
-                signal: shift(self.drive.signal, t),
-                ..self.drive
-            },
+            drive: Drive { signal: shift(self.drive.signal, t), ..self.drive },
             phase: self.phase.advanced(self.drive.omega, t),
         }
     }

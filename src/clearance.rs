@@ -101,12 +101,7 @@ pub fn first_closure<const N: usize>(
             step = step.min(open);
         }
         if let Some((h, which)) = nearest {
-            let closure = Closure {
-                t,
-                h,
-                which,
-                derivatives,
-            };
+            let closure = Closure { t, h, which, derivatives };
             return (Some(closure), looks);
         }
         tiny_steps = if step * fastest < TINY { tiny_steps + 1 } else { 0 };
@@ -115,10 +110,7 @@ pub fn first_closure<const N: usize>(
             // A gap that has no digits left, and neither closes nor opens, would hold the march for ever: move on by a time
             // in which nothing that can be told happens.
             let blurred = gaps.map(|gap| {
-                let gap = Gap {
-                    gap: gap.gap + resolution,
-                    ..gap
-                };
+                let gap = Gap { gap: gap.gap + resolution, ..gap };
                 bounds.open(&gap, &derivatives, window)
             });
             least = blurred.into_iter().fold(window, f64::min).max(least);

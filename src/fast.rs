@@ -89,10 +89,7 @@ impl FastPath {
 
     /// The parameters were changed.
     pub fn parameters_changed(&mut self, base: &BaseMotion) {
-        *self = Self {
-            disabled: self.disabled,
-            ..Self::default()
-        };
+        *self = Self { disabled: self.disabled, ..Self::default() };
         self.state_changed(base);
     }
 
@@ -203,11 +200,7 @@ impl FastPath {
             let segment = Segment::new(oscillator, *moving.base, (x, v));
             let (dx, dv) = segment.departure(t);
             let phase = moving.base.phase.advanced(drive.omega, t);
-            let increment = Increment {
-                y: dx + (v - u1) * t,
-                dy: dv,
-                phasor: self.phasor,
-            };
+            let increment = Increment { y: dx + (v - u1) * t, dy: dv, phasor: self.phasor };
             self.apply(moving, &increment, phase, t);
             self.resynchronise(phase);
             self.contact_free -= t;

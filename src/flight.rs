@@ -35,12 +35,7 @@ pub struct Landing {
 impl Flight {
     /// A flight of a particle at `w` (m) with velocity `w'` (m/s) relative to the primary mass in `motion`.
     pub fn new(motion: Segment, start: (f64, f64), half_width: f64) -> Self {
-        Self {
-            series: motion.series(),
-            motion,
-            start,
-            half_width,
-        }
+        Self { series: motion.series(), motion, start, half_width }
     }
 
     /// Follows the flight to its first contact, or for `limit` seconds if there is none.
@@ -70,10 +65,7 @@ impl Flight {
                     evaluations: looks,
                 }
             }
-            None => Landing {
-                evaluations: looks + 1,
-                ..self.unhindered(limit)
-            },
+            None => Landing { evaluations: looks + 1, ..self.unhindered(limit) },
         }
     }
 

@@ -61,9 +61,7 @@ pub struct Response {
 impl Forcing {
     /// Coefficients for `omega` (rad/s), 0 or above.
     pub fn new(oscillator: &Oscillator, omega: f64) -> Self {
-        let Oscillator {
-            delta, omega0_squared, ..
-        } = *oscillator;
+        let Oscillator { delta, omega0_squared, .. } = *oscillator;
         let strength = Complex64::new(omega0_squared, 2.0 * delta * omega);
         let (square, error) = product(omega, omega);
         let detuned = Complex64::new((omega0_squared - square) - error, strength.im);
@@ -103,11 +101,7 @@ impl Forcing {
                 gain * (first - second)
             }
         };
-        Response {
-            base,
-            position,
-            velocity: self.velocity(position, free.xv),
-        }
+        Response { base, position, velocity: self.velocity(position, free.xv) }
     }
 
     /// `K' = i omega K + F xv`: the response to the slope of the base motion, and to its jump from rest.

@@ -221,12 +221,7 @@ impl Oscillator {
             let mean = 0.5 * (e_slow + e_fast);
             (mean + self.delta * s, mean - self.delta * s)
         };
-        Transition {
-            xx,
-            xv: s,
-            vx: -self.omega0_squared * s,
-            vv,
-        }
+        Transition { xx, xv: s, vx: -self.omega0_squared * s, vv }
     }
 }
 

@@ -116,24 +116,14 @@ impl InvalidValue {
         if valid {
             Ok(())
         } else {
-            Err(Self {
-                name,
-                value,
-                unit,
-                allowed,
-            })
+            Err(Self { name, value, unit, allowed })
         }
     }
 }
 
 impl fmt::Display for InvalidValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self {
-            name,
-            value,
-            unit,
-            allowed,
-        } = self;
+        let Self { name, value, unit, allowed } = self;
         let space = if unit.is_empty() { "" } else { " " };
         write!(f, "{name} = {value}{space}{unit} is refused; allowed is {allowed}")
     }

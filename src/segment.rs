@@ -104,9 +104,7 @@ impl Segment {
     }
 
     fn by_equation(&self, x: f64, v: f64, phasor: Complex64, t: f64) -> Derivatives {
-        let Oscillator {
-            delta, omega0_squared, ..
-        } = self.oscillator;
+        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
         let [u0, u1, u2, u3] = self.base.drive.signal;
         let omega = self.omega();
         let omega2 = omega * omega;
@@ -151,9 +149,7 @@ impl Segment {
 
     /// The Taylor series about the start.
     pub fn series(&self) -> Series {
-        let Oscillator {
-            delta, omega0_squared, ..
-        } = self.oscillator;
+        let Oscillator { delta, omega0_squared, .. } = self.oscillator;
         let mut base = [0.0; DEGREE];
         base[..4].copy_from_slice(&self.base.drive.signal);
         if let Some((z, forcing)) = self.driven {
@@ -171,10 +167,7 @@ impl Segment {
             let damping = 2.0 * delta * n1 * (c[n + 1] - base[n + 1]);
             c[n + 2] = -(damping + omega0_squared * (c[n] - base[n])) / (n1 * n2);
         }
-        Series {
-            coefficients: c,
-            reach: SERIES_REACH / self.fastest(),
-        }
+        Series { coefficients: c, reach: SERIES_REACH / self.fastest() }
     }
 
     /// `x - x0 - v0 t` (m) and `v - v0` (m/s) after `t` seconds.
@@ -189,10 +182,7 @@ impl Segment {
             let turned = |(z, forcing): (Complex64, Forcing)| z * rotation(forcing.omega, t);
             let phasor = self.driven.map_or(Complex64::ZERO, turned);
             let derivatives = self.by_equation(self.x0 + (self.v0 * t + dx), self.v0 + dv, phasor, t);
-            Instant {
-                departure: (dx, dv),
-                derivatives,
-            }
+            Instant { departure: (dx, dv), derivatives }
         } else {
             let derivatives = self.derivatives(t);
             let [x, v, ..] = derivatives;

@@ -6,17 +6,9 @@ use std::f64::consts::TAU;
 
 /// A particle without loss on a wall that presses on it, leaving it at `speed`.
 fn elastic(speed: f64) -> Plant {
-    let parameters = Parameters {
-        damping: 0.0,
-        ..Parameters::dimensionless(0.01, 0.0, 1.0)
-    };
+    let parameters = Parameters { damping: 0.0, ..Parameters::dimensionless(0.01, 0.0, 1.0) };
     // The base is displaced, so that the spring pulls the wall at w = +b against the particle.
-    let start = State {
-        q1: 0.0,
-        dq1: 0.0,
-        q2: -1.0,
-        dq2: -speed,
-    };
+    let start = State { q1: 0.0, dq1: 0.0, q2: -1.0, dq2: -speed };
     let mut plant = Plant::new(parameters, start).unwrap();
     plant.begin(Drive::held(1.0)).unwrap();
     plant
@@ -62,18 +54,12 @@ fn a_step_that_is_cut_short_reports_how_far_it_came() {
 #[test]
 fn an_invalid_drive_or_step_is_refused_and_changes_nothing() {
     let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
-    let start = State {
-        dq2: 0.5,
-        ..State::default()
-    };
+    let start = State { dq2: 0.5, ..State::default() };
     let mut plant = Plant::new(parameters, start).unwrap();
     let drive = Drive::harmonic(0.01, 1.0);
     plant.advance(drive, 1.0).unwrap();
     let before = (plant.state(), *plant.totals(), plant.time(), plant.base());
-    let signal = |signal| Drive {
-        signal,
-        ..Drive::default()
-    };
+    let signal = |signal| Drive { signal, ..Drive::default() };
     for (bad, named) in [
         (Drive::harmonic(0.01, f64::INFINITY), "omega"),
         (Drive::harmonic(0.01, 1e60), "omega"),
@@ -94,12 +80,7 @@ fn an_invalid_drive_or_step_is_refused_and_changes_nothing() {
 #[test]
 fn steps_that_differ_in_their_last_digits_end_where_equal_ones_do() {
     let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
-    let start = State {
-        q1: -0.42,
-        dq1: 0.01,
-        q2: -0.99,
-        dq2: -0.86,
-    };
+    let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
     let drive = Drive::harmonic(0.0084 * 1.1, 0.990_417);
     let mut equal = Plant::new(parameters, start).unwrap();
     let mut irregular = equal;
@@ -124,12 +105,7 @@ fn steps_that_differ_in_their_last_digits_end_where_equal_ones_do() {
 #[test]
 fn a_drive_that_changes_at_every_sample_gives_the_motion_of_the_plain_solver() {
     let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
-    let start = State {
-        q1: -0.42,
-        dq1: 0.01,
-        q2: -0.99,
-        dq2: -0.86,
-    };
+    let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
     let mut fast = Plant::new(parameters, start).unwrap();
     let mut plain = fast;
     plain.set_fast_path(false);

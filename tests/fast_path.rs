@@ -25,12 +25,7 @@ fn distance(a: &Plant, b: &Plant) -> f64 {
 fn crossings_meet_the_impacts_of_the_plain_search() {
     for (lambda, r, omega) in [(1.43, 0.65, 0.990_417), (0.8, 0.5, 0.994), (2.0, 0.8, 0.985)] {
         let parameters = Parameters::dimensionless(0.0084, lambda, r);
-        let start = State {
-            q1: -0.42,
-            dq1: 0.01,
-            q2: -0.99,
-            dq2: -0.86,
-        };
+        let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
         let drive = Drive::harmonic(0.0084 * 1.1, omega);
         let mut fast = Plant::new(parameters, start).unwrap();
         let mut searched = plain(&fast);

@@ -70,12 +70,7 @@ proptest! {
 #[test]
 fn one_long_step_and_many_short_ones_end_in_the_same_state() {
     let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
-    let start = State {
-        q1: -0.42,
-        dq1: 0.01,
-        q2: -0.99,
-        dq2: -0.86,
-    };
+    let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
     let drive = Drive::harmonic(0.0084 * 1.1, 0.990_417);
     // 2^-4 is exact, so that both runs mean the same instant: a thousand periods, 100 steps each.
     let (step, steps) = (0.0625, 101_504);
@@ -97,19 +92,11 @@ fn one_long_step_and_many_short_ones_end_in_the_same_state() {
 #[test]
 fn a_grazing_overshoot_of_1e_13_is_caught_and_an_undershoot_is_not_reported() {
     // Undamped and unforced: q1 = A cos t, the particle at rest at the centre; the first extreme is at t = π.
-    let parameters = Parameters {
-        damping: 0.0,
-        ..Parameters::dimensionless(0.01, 0.0, 0.65)
-    };
+    let parameters = Parameters { damping: 0.0, ..Parameters::dimensionless(0.01, 0.0, 0.65) };
     for exponent in 2..=13 {
         let delta = 10f64.powi(-exponent);
         let impacts = |amplitude: f64, step: f64| {
-            let start = State {
-                q1: 0.0,
-                dq1: amplitude,
-                q2: 0.0,
-                dq2: 0.0,
-            };
+            let start = State { q1: 0.0, dq1: amplitude, q2: 0.0, dq2: 0.0 };
             let mut plant = Plant::new(parameters, start).unwrap();
             for _ in 0..(2.0 / step) as usize {
                 plant.advance(Drive::default(), step).unwrap();
@@ -127,24 +114,13 @@ fn a_grazing_overshoot_of_1e_13_is_caught_and_an_undershoot_is_not_reported() {
 fn a_particle_at_rest_on_the_wall_is_held_let_go_and_caught_again() {
     // The base is dragged: the wall pushes the particle, then draws away from it.
     let parameters = Parameters::dimensionless(0.1, 1.0, 0.3);
-    let start = State {
-        q1: 0.0,
-        dq1: 0.0,
-        q2: -1.0,
-        dq2: 0.0,
-    };
+    let start = State { q1: 0.0, dq1: 0.0, q2: -1.0, dq2: 0.0 };
     let mut plant = Plant::new(parameters, start).unwrap();
     let mut events = Vec::new();
     plant
         .advance_with(Drive::held(2.0), 60.0, |event| events.push(event))
         .unwrap();
-    assert!(matches!(
-        events[0],
-        Event::Stuck {
-            t: 0.0,
-            wall: Wall::Plus
-        }
-    ));
+    assert!(matches!(events[0], Event::Stuck { t: 0.0, wall: Wall::Plus }));
     assert!(matches!(events[1], Event::Released { wall: Wall::Plus, .. }));
     assert!(matches!(events[2], Event::Impact { .. }));
     // Undamped it would let go when the acceleration of the joint mass is 0, a quarter of its period on; damping delays that.

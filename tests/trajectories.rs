@@ -18,12 +18,7 @@ fn worst_error(scene: &str) -> f64 {
     let at = |key: &str| number(&reference[key]);
     let x0: Vec<f64> = reference["x0"].as_array().unwrap().iter().map(number).collect();
     let parameters = Parameters::dimensionless(at("eps"), at("lam"), at("r"));
-    let start = State {
-        q1: x0[0],
-        dq1: x0[1],
-        q2: x0[2],
-        dq2: x0[3],
-    };
+    let start = State { q1: x0[0], dq1: x0[1], q2: x0[2], dq2: x0[3] };
     let drive = Drive::harmonic(at("eps") * at("G"), at("Om"));
     let mut plant = Plant::new(parameters, start).unwrap();
     let mut worst = 0.0f64;

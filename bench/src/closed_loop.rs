@@ -14,10 +14,7 @@ const LAMBDA: f64 = 1.43;
 /// Runs the pair for so many periods of the free oscillation; `see` gets what drives the plant, sample by sample.
 fn run(periods: usize, mut see: impl FnMut(f64, f64)) -> Plant {
     let parameters = Parameters::dimensionless(EPSILON, LAMBDA, 0.65);
-    let start = State {
-        dq2: 0.9,
-        ..State::default()
-    };
+    let start = State { dq2: 0.9, ..State::default() };
     let mut plant = Plant::new(parameters, start).expect("the scene makes sense");
     let lock = Config {
         sample_time: TAU / SAMPLES as f64,

@@ -67,14 +67,7 @@ enum Request {
 fn answer(folder: &Path, request: &str) -> Result<serde_json::Value, String> {
     let wrong = |e: serde_json::Error| e.to_string();
     match serde_json::from_str(request).map_err(wrong)? {
-        Request::Run {
-            scene,
-            method,
-            setting,
-            checks,
-            budget,
-            limit,
-        } => {
+        Request::Run { scene, method, setting, checks, budget, limit } => {
             let scene = Scene::load(folder, &scene)?;
             let (budget, limit) = (Duration::from_secs_f64(budget), Duration::from_secs_f64(limit));
             let answer = methods::measure_named(&method, &scene, setting, &checks, budget, limit)?;

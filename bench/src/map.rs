@@ -102,17 +102,9 @@ pub struct Axis {
 
 impl Axis {
     /// As the regime map has it, with fewer points.
-    pub const SIGMA: Self = Self {
-        from: -5.0,
-        to: 5.0,
-        points: 33,
-    };
+    pub const SIGMA: Self = Self { from: -5.0, to: 5.0, points: 33 };
     /// Likewise.
-    pub const G: Self = Self {
-        from: 0.1,
-        to: 3.0,
-        points: 21,
-    };
+    pub const G: Self = Self { from: 0.1, to: 3.0, points: 21 };
 
     /// The values.
     pub fn values(&self) -> Vec<f64> {
@@ -149,12 +141,7 @@ mod tests {
     use super::*;
 
     fn short() -> Effort {
-        Effort {
-            periods: 20,
-            brent_periods: 20,
-            runs: 3,
-            ..Effort::default()
-        }
+        Effort { periods: 20, brent_periods: 20, runs: 3, ..Effort::default() }
     }
 
     #[test]

@@ -78,11 +78,7 @@ impl Scene {
             }
             Some(file) => {
                 let drives: Vec<[f64; 2]> = serde_json::from_str(&read(file)?).map_err(wrong)?;
-                let step = |[amplitude, omega]: [f64; 2]| Step {
-                    amplitude,
-                    omega,
-                    duration: scene.step,
-                };
+                let step = |[amplitude, omega]: [f64; 2]| Step { amplitude, omega, duration: scene.step };
                 drives.into_iter().map(step).collect()
             }
         };

@@ -55,12 +55,7 @@ impl Motion {
     }
 
     fn new(rig: &Rig, amplitude: f64, omega: f64, phase: f64, from: f64, x: f64, v: f64) -> Self {
-        let Rig {
-            primary_mass: m,
-            stiffness: k,
-            damping: c,
-            ..
-        } = *rig;
+        let Rig { primary_mass: m, stiffness: k, damping: c, .. } = *rig;
         let (detuning, damping) = (k - m * omega * omega, c * omega);
         let square = detuning * detuning + damping * damping;
         let secular = square == 0.0 && amplitude != 0.0;
@@ -77,12 +72,7 @@ impl Motion {
         let delta = 0.5 * c / m;
         let mut motion = Self {
             from,
-            free: Free::Under {
-                delta,
-                omega: 0.0,
-                a: 0.0,
-                b: 0.0,
-            },
+            free: Free::Under { delta, omega: 0.0, a: 0.0, b: 0.0 },
             p,
             q,
             secular,
@@ -94,23 +84,13 @@ impl Motion {
         let square = k / m - delta * delta;
         motion.free = if square > 0.0 {
             let omega = square.sqrt();
-            Free::Under {
-                delta,
-                omega,
-                a: y,
-                b: (dy + delta * y) / omega,
-            }
+            Free::Under { delta, omega, a: y, b: (dy + delta * y) / omega }
         } else {
             let root = (-square).sqrt();
             let first = -delta - root;
             let second = k / m / first;
             let a = (dy - second * y) / (first - second);
-            Free::Over {
-                first,
-                second,
-                a,
-                b: y - a,
-            }
+            Free::Over { first, second, a, b: y - a }
         };
         motion
     }
@@ -194,10 +174,7 @@ impl Baseline {
             let wall = b.copysign(reached);
             // A flight begins on a wall: the root there is not looked for again.
             let low = if h == 0.0 { 1e-9 * grid } else { h };
-            let mut convergency = SimpleConvergency {
-                eps: self.tolerance,
-                max_iter: 100,
-            };
+            let mut convergency = SimpleConvergency { eps: self.tolerance, max_iter: 100 };
             let Ok(hit) = find_root_brent(low, after, |h| w(h) - wall, &mut convergency) else {
                 return Err(Stalled);
             };
@@ -225,12 +202,7 @@ impl Baseline {
     }
 
     fn impact(&mut self, time: f64, x: f64, v: f64, wall: f64) {
-        let Rig {
-            primary_mass,
-            particle_mass,
-            restitution,
-            ..
-        } = self.rig;
+        let Rig { primary_mass, particle_mass, restitution, .. } = self.rig;
         let momentum = primary_mass * v + particle_mass * self.dq2;
         let total = primary_mass + particle_mass;
         let separation = -restitution * (v - self.dq2);

@@ -79,10 +79,7 @@ impl AmplitudeState {
     /// A constant setpoint: the present reading `response`, m, at the drive `amplitude`, m.
     pub fn constant(response: f64, amplitude: f64) -> Self {
         Self {
-            trajectory: Move {
-                response,
-                ..Move::default()
-            },
+            trajectory: Move { response, ..Move::default() },
             from: response,
             samples: 0,
             taken: 0,

@@ -76,11 +76,7 @@ impl PhaseLock {
     /// # Errors
     /// A value out of range; then nothing changes.
     pub fn retune(&mut self, amplitude: f64, phase_target: f64) -> Result<(), ConfigError> {
-        let tuned = Config {
-            amplitude,
-            phase_target,
-            ..self.config
-        };
+        let tuned = Config { amplitude, phase_target, ..self.config };
         let before = self.drive;
         *self = tuned.build()?;
         // A ramp keeps its rate: a rate in proportion to the new amplitude could make a ramp down endless.

@@ -111,11 +111,7 @@ mod tests {
 
     /// A detector of bandwidth 0.1 for a frequency near 1.
     fn detector(detector: Detector, sample_time: f64) -> PhaseDetector {
-        PhaseDetector::new(&Config {
-            detector,
-            sample_time,
-            ..Config::for_resonance(1.0, 0.0)
-        })
+        PhaseDetector::new(&Config { detector, sample_time, ..Config::for_resonance(1.0, 0.0) })
     }
 
     /// Largest error of amplitude and phase in the last period, after the transient.

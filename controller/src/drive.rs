@@ -98,10 +98,7 @@ mod tests {
 
     #[test]
     fn a_release_without_a_ramp_takes_one_sample() {
-        let mut state = DriveState {
-            amplitude: 1.0,
-            trim: 0.2,
-        };
+        let mut state = DriveState { amplitude: 1.0, trim: 0.2 };
         DRIVE.release(&mut state);
         assert_eq!(state, DriveState::default());
     }

@@ -49,12 +49,7 @@ impl Quantity {
 
     /// The error for this value.
     pub fn refuse(&self, allowed: &'static str) -> ConfigError {
-        ConfigError {
-            name: self.name,
-            value: self.value,
-            unit: self.unit,
-            allowed,
-        }
+        ConfigError { name: self.name, value: self.value, unit: self.unit, allowed }
     }
 
     pub fn positive(&self) -> Result<(), ConfigError> {

@@ -91,10 +91,7 @@ mod tests {
     use super::*;
 
     const FILTER: LoopFilter = LoopFilter {
-        gains: Gains {
-            proportional: 1.0,
-            integral: 5.0,
-        },
+        gains: Gains { proportional: 1.0, integral: 5.0 },
         omega_min: 9.0,
         omega_max: 11.0,
         max_change: f64::INFINITY,
@@ -115,10 +112,7 @@ mod tests {
 
     #[test]
     fn a_limited_rate_causes_no_windup() {
-        let filter = LoopFilter {
-            max_change: 1e-3,
-            ..FILTER
-        };
+        let filter = LoopFilter { max_change: 1e-3, ..FILTER };
         let mut frequency = Frequency::at(10.0);
         for _ in 0..100 {
             let before = frequency.omega;

@@ -211,36 +211,22 @@ mod tests {
 
     #[test]
     fn a_signal_that_drifts_too_fast_does_not_settle() {
-        let amplitude = |rate: f64| {
-            move |t: f64| Reading {
-                amplitude: 1.0 + rate * t,
-                ..CONSTANT
-            }
-        };
+        let amplitude = |rate: f64| move |t: f64| Reading { amplitude: 1.0 + rate * t, ..CONSTANT };
         assert_eq!(periods_to_settle(amplitude(1.1e-4)), None);
         assert_eq!(periods_to_settle(amplitude(0.9e-4)), Some(20));
-        let frequency = |t: f64| Reading {
-            integral: 1.0 + 1.1e-6 * t,
-            ..CONSTANT
-        };
+        let frequency = |t: f64| Reading { integral: 1.0 + 1.1e-6 * t, ..CONSTANT };
         assert_eq!(periods_to_settle(frequency), None);
     }
 
     #[test]
     fn a_slow_modulation_is_not_stationary_at_its_crest() {
-        let reading = |t: f64| Reading {
-            amplitude: 1.0 + 0.1 * libm::sin(0.06 * t),
-            ..CONSTANT
-        };
+        let reading = |t: f64| Reading { amplitude: 1.0 + 0.1 * libm::sin(0.06 * t), ..CONSTANT };
         assert_eq!(periods_to_settle(reading), None);
     }
 
     #[test]
     fn one_invalid_sample_restarts_the_dwell() {
-        let reading = |t: f64| Reading {
-            valid: t != 10.5,
-            ..CONSTANT
-        };
+        let reading = |t: f64| Reading { valid: t != 10.5, ..CONSTANT };
         assert_eq!(periods_to_settle(reading), Some(30));
     }
 

@@ -122,24 +122,13 @@ mod tests {
     #[test]
     fn no_state_drives_after_active_becomes_false() {
         for state in ALL {
-            assert!(
-                !state
-                    .next(&Conditions {
-                        active: false,
-                        ..ACTIVE
-                    })
-                    .0
-                    .is_driving()
-            );
+            assert!(!state.next(&Conditions { active: false, ..ACTIVE }).0.is_driving());
         }
     }
 
     #[test]
     fn no_state_drives_on_a_fault() {
-        let conditions = Conditions {
-            fault: Some(Fault::Sensor),
-            ..ACTIVE
-        };
+        let conditions = Conditions { fault: Some(Fault::Sensor), ..ACTIVE };
         for state in ALL {
             assert!(!state.next(&conditions).0.is_driving());
         }
@@ -149,25 +138,13 @@ mod tests {
     fn a_latched_state_ends_only_when_active_becomes_false() {
         for state in [LoopState::LockLost, LoopState::Tripped] {
             assert_eq!(state.next(&ACTIVE).0, state);
-            assert_eq!(
-                state
-                    .next(&Conditions {
-                        active: false,
-                        ..ACTIVE
-                    })
-                    .0,
-                LoopState::Idle
-            );
+            assert_eq!(state.next(&Conditions { active: false, ..ACTIVE }).0, LoopState::Idle);
         }
     }
 
     #[test]
     fn a_lock_is_lost_only_from_locked() {
-        let conditions = Conditions {
-            lost: true,
-            settled: false,
-            ..ACTIVE
-        };
+        let conditions = Conditions { lost: true, settled: false, ..ACTIVE };
         assert_eq!(LoopState::Locked.next(&conditions).0, LoopState::LockLost);
         assert_eq!(LoopState::Acquiring.next(&conditions).0, LoopState::Acquiring);
     }

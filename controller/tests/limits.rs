@@ -14,9 +14,7 @@ fn ramps_stay_within_their_rates() {
         omega_start: 0.97 * OMEGA_0,
         ..config()
     });
-    let Config {
-        sample_time, amplitude, ..
-    } = *bench.controller.config();
+    let Config { sample_time, amplitude, .. } = *bench.controller.config();
     let mut before = bench.sample();
     for _ in 0..60_000 {
         let output = bench.sample();
@@ -32,63 +30,17 @@ fn ramps_stay_within_their_rates() {
 fn an_invalid_configuration_is_refused_by_name() {
     let refusal = |config: Config| config.build().expect_err("must be refused").to_string();
     assert_eq!(
-        refusal(Config {
-            sample_time: f64::NAN,
-            ..config()
-        }),
+        refusal(Config { sample_time: f64::NAN, ..config() }),
         "sample_time = NaN s is refused; allowed is a finite number above 0"
     );
     for (name, bad) in [
-        (
-            "omega_max",
-            Config {
-                omega_max: 1.0,
-                ..config()
-            },
-        ),
-        (
-            "omega_start",
-            Config {
-                omega_start: 1e3,
-                ..config()
-            },
-        ),
-        (
-            "amplitude",
-            Config {
-                amplitude: -1.0,
-                ..config()
-            },
-        ),
-        (
-            "bandwidth",
-            Config {
-                bandwidth: 1e4,
-                ..config()
-            },
-        ),
-        (
-            "phase_target",
-            Config {
-                phase_target: 4.0,
-                ..config()
-            },
-        ),
-        (
-            "sample_time",
-            Config {
-                sample_time: 0.05,
-                bandwidth: 0.1,
-                ..config()
-            },
-        ),
-        (
-            "delay",
-            Config {
-                delay: f64::INFINITY,
-                ..config()
-            },
-        ),
+        ("omega_max", Config { omega_max: 1.0, ..config() }),
+        ("omega_start", Config { omega_start: 1e3, ..config() }),
+        ("amplitude", Config { amplitude: -1.0, ..config() }),
+        ("bandwidth", Config { bandwidth: 1e4, ..config() }),
+        ("phase_target", Config { phase_target: 4.0, ..config() }),
+        ("sample_time", Config { sample_time: 0.05, bandwidth: 0.1, ..config() }),
+        ("delay", Config { delay: f64::INFINITY, ..config() }),
     ] {
         assert!(refusal(bad).starts_with(name), "{}", refusal(bad));
     }

@@ -11,10 +11,7 @@ fn relative(a: f64, b: f64) -> f64 {
 #[test]
 fn locks_at_the_natural_frequency_from_ten_percent_off() {
     for start in [0.9, 1.1] {
-        let mut bench = Bench::new(Config {
-            omega_start: start * OMEGA_0,
-            ..config()
-        });
+        let mut bench = Bench::new(Config { omega_start: start * OMEGA_0, ..config() });
         let (periods, output) = bench.run_to_lock(2000).expect("a lock");
         println!("from {start}: {periods} periods");
         assert!(relative(output.frequency, OMEGA_0) < 4e-5, "{output:?}");
@@ -33,12 +30,7 @@ fn locks_with_either_detector() {
         (Detector::Adaptive, 1, true),
         (Detector::Adaptive, 4, false),
     ] {
-        let mut bench = Bench::new(Config {
-            detector,
-            harmonics,
-            odd_only,
-            ..config()
-        });
+        let mut bench = Bench::new(Config { detector, harmonics, odd_only, ..config() });
         let (_, output) = bench.run_to_lock(2000).expect("a lock");
         assert!(relative(output.frequency, OMEGA_0) < 1e-4, "{detector:?} {output:?}");
     }
@@ -59,10 +51,7 @@ fn the_internal_oscillator_agrees_with_a_measured_reference() {
 
 /// Both sensors with a delay of one sample, as in FMI co-simulation.
 fn locked_frequency_with_a_late_sensor(delay_samples: f64, measured_reference: bool) -> f64 {
-    let mut bench = Bench::new(Config {
-        delay: delay_samples * config().sample_time,
-        ..config()
-    });
+    let mut bench = Bench::new(Config { delay: delay_samples * config().sample_time, ..config() });
     let mut late = (0.0, 0.0);
     let mut frequency = 0.0;
     for _ in 0..80_000 {
@@ -113,10 +102,7 @@ fn retuning_keeps_the_lock_and_settles_again() {
 
 #[test]
 fn the_base_amplitude_is_controlled_if_base_bandwidth_is_positive() {
-    let mut bench = Bench::new(Config {
-        base_bandwidth: 0.02 * OMEGA_0,
-        ..config()
-    });
+    let mut bench = Bench::new(Config { base_bandwidth: 0.02 * OMEGA_0, ..config() });
     let mut output = bench.sample();
     for _ in 0..60_000 {
         // A shaker with a gain of 0.8.
@@ -213,10 +199,7 @@ fn a_new_phase_target_is_acquired_with_the_drive_on() {
 
 #[test]
 fn a_ramp_down_to_zero_has_the_rate_of_the_ramp_up() {
-    let mut bench = Bench::new(Config {
-        ramp_time: 1.0,
-        ..config()
-    });
+    let mut bench = Bench::new(Config { ramp_time: 1.0, ..config() });
     bench.run_to_lock(3000).expect("a lock");
     bench
         .controller
@@ -264,10 +247,7 @@ fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
 
 #[test]
 fn the_response_cannot_be_controlled_without_a_limit_of_the_drive_or_in_an_open_loop() {
-    let to = Move {
-        response: 0.01,
-        ..Move::default()
-    };
+    let to = Move { response: 0.01, ..Move::default() };
     let mut bench = Bench::new(config());
     bench.run(10);
     let refusal = |bench: &mut Bench, to| {
@@ -275,10 +255,7 @@ fn the_response_cannot_be_controlled_without_a_limit_of_the_drive_or_in_an_open_
         refused.expect_err("must be refused").to_string()
     };
     assert!(refusal(&mut bench, to).starts_with("amplitude_max = 0 m is refused"));
-    let mut bench = Bench::new(Config {
-        amplitude_max: 1.0,
-        ..config()
-    });
+    let mut bench = Bench::new(Config { amplitude_max: 1.0, ..config() });
     assert!(refusal(&mut bench, to).starts_with("state = 0 is refused"));
     bench.run(10);
     assert!(refusal(&mut bench, Move::default()).starts_with("response = 0 m"));

@@ -39,10 +39,7 @@ fn never_locks_on_noise() {
 
 #[test]
 fn never_locks_without_a_drive() {
-    let mut bench = Bench::new(Config {
-        amplitude: 0.0,
-        ..config()
-    });
+    let mut bench = Bench::new(Config { amplitude: 0.0, ..config() });
     bench.resonator.q = 0.01;
     for _ in 0..50_000 {
         assert!(!bench.sample().locked);
@@ -65,10 +62,7 @@ fn a_reference_that_fails_ends_the_lock() {
 fn an_invalid_reading_ramps_the_drive_down_and_latches() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
         for (response, reference) in [(bad, 0.0), (0.0, bad)] {
-            let mut bench = Bench::new(Config {
-                ramp_time: 1.0,
-                ..config()
-            });
+            let mut bench = Bench::new(Config { ramp_time: 1.0, ..config() });
             bench.run_to_lock(2000).expect("a lock");
             let before = bench.sample().amplitude;
             let output = bench.sample_reading(response, Some(reference));
@@ -87,10 +81,7 @@ fn an_invalid_reading_ramps_the_drive_down_and_latches() {
 
 #[test]
 fn too_large_a_response_trips() {
-    let mut bench = Bench::new(Config {
-        response_max: 50.0 * AMPLITUDE,
-        ..config()
-    });
+    let mut bench = Bench::new(Config { response_max: 50.0 * AMPLITUDE, ..config() });
     let output = bench.run(400);
     assert_eq!(output.state, LoopState::Tripped);
     assert_eq!(output.fault, Some(Fault::ResponseTooLarge));
@@ -98,10 +89,7 @@ fn too_large_a_response_trips() {
 
 #[test]
 fn acquiring_times_out() {
-    let mut bench = Bench::new(Config {
-        acquire_timeout: 0.5,
-        ..config()
-    });
+    let mut bench = Bench::new(Config { acquire_timeout: 0.5, ..config() });
     let states: Vec<_> = (0..600).map(|_| bench.sample_reading(0.0, None).state).collect();
     assert_eq!(states[400], LoopState::Acquiring);
     assert_eq!(states[599], LoopState::Tripped);
@@ -134,21 +122,14 @@ fn a_disturbance_between_the_two_tolerances_does_not_unlock() {
         largest = largest.max(output.phase_error.abs());
         assert!(output.locked);
     }
-    let LockCriterion {
-        phase_tolerance,
-        unlock_tolerance,
-        ..
-    } = bench.controller.config().lock;
+    let LockCriterion { phase_tolerance, unlock_tolerance, .. } = bench.controller.config().lock;
     assert!(largest > phase_tolerance && largest < unlock_tolerance, "{largest}");
 }
 
 #[test]
 fn the_drive_is_switched_off_at_once_or_with_a_ramp_as_configured() {
     for (release_time, expected) in [(0.0, 0.0), (10.0, 0.999)] {
-        let mut bench = Bench::new(Config {
-            release_time,
-            ..config()
-        });
+        let mut bench = Bench::new(Config { release_time, ..config() });
         let before = bench.run(10);
         bench.active = false;
         let output = bench.sample();
@@ -162,10 +143,7 @@ fn the_drive_is_switched_off_at_once_or_with_a_ramp_as_configured() {
 
 /// A bench with the response amplitude controlled at half of its value at the lock, and a limited drive.
 fn holding(config: Config) -> Bench {
-    let mut bench = Bench::new(Config {
-        amplitude_max: 2.0 * AMPLITUDE,
-        ..config
-    });
+    let mut bench = Bench::new(Config { amplitude_max: 2.0 * AMPLITUDE, ..config });
     bench.run_to_lock(2000).expect("a lock");
     let to = Move {
         response: 0.5 * bench.sample().response_amplitude,
@@ -183,10 +161,7 @@ fn holding(config: Config) -> Bench {
 
 #[test]
 fn a_sensor_that_fails_while_the_response_is_controlled_ramps_the_drive_down() {
-    let mut bench = holding(Config {
-        ramp_time: 1.0,
-        ..config()
-    });
+    let mut bench = holding(Config { ramp_time: 1.0, ..config() });
     let before = bench.sample();
     assert!(before.locked && before.response_target > 0.0);
     let output = bench.sample_reading(f64::NAN, None);
@@ -200,10 +175,7 @@ fn a_sensor_that_fails_while_the_response_is_controlled_ramps_the_drive_down() {
 
 #[test]
 fn a_response_that_fades_out_does_not_make_the_drive_exceed_its_limit_or_its_rate() {
-    let mut bench = holding(Config {
-        ramp_time: 1.0,
-        ..config()
-    });
+    let mut bench = holding(Config { ramp_time: 1.0, ..config() });
     let step = bench.controller.config().sample_time * AMPLITUDE;
     let mut before = bench.sample().amplitude;
     for n in 0..20_000 {

@@ -138,9 +138,7 @@ impl<C: Component> Instance<C> {
 
     #[inline]
     fn check_step(&self, time: f64, step: f64) -> Result<(), Refusal> {
-        let &Session {
-            time: own, stop_time, ..
-        } = &self.session;
+        let &Session { time: own, stop_time, .. } = &self.session;
         let size = if own.abs() > step { own.abs() } else { step };
         let tolerance = CLOCK_TOLERANCE * size;
         let end = time + step;

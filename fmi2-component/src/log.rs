@@ -72,11 +72,7 @@ impl Log {
         categories: &'static [&'static str],
     ) -> Self {
         Self {
-            sink: logger.map(|logger| Sink {
-                logger,
-                environment,
-                instance_name: instance_name.into(),
-            }),
+            sink: logger.map(|logger| Sink { logger, environment, instance_name: instance_name.into() }),
             enabled: 0,
             categories,
             warned: RefCell::new(Vec::new()),

@@ -40,11 +40,7 @@ pub struct Libraries {
 
 impl From<&Path> for Libraries {
     fn from(folder: &Path) -> Self {
-        Self {
-            folder: folder.into(),
-            own: true,
-            others: Vec::new(),
-        }
+        Self { folder: folder.into(), own: true, others: Vec::new() }
     }
 }
 
@@ -77,10 +73,7 @@ pub fn pack_bench(scene: &Scene, libraries: &Libraries, out: &Path) -> Result<Ve
 
 /// Writes all of the files under temporary names before any of them gets its own.
 fn keep(out: &Path, files: &[File]) -> Result<Vec<PathBuf>, PackError> {
-    let failed = |path: &Path, source| PackError::Write {
-        path: path.into(),
-        source,
-    };
+    let failed = |path: &Path, source| PackError::Write { path: path.into(), source };
     std::fs::create_dir_all(out).map_err(|source| failed(out, source))?;
     let mut finished = Vec::new();
     for file in files {

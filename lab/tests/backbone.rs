@@ -128,11 +128,7 @@ struct Steady;
 impl Controller for Steady {
     fn sample(&mut self, _: Sensors, _: bool) -> Result<Command, ControllerError> {
         Ok(Command {
-            drive: Drive {
-                omega: 1.0,
-                amplitude: 0.01,
-                displacement: 0.0,
-            },
+            drive: Drive { omega: 1.0, amplitude: 0.01, displacement: 0.0 },
             ..Command::default()
         })
     }

@@ -159,11 +159,7 @@ impl Controller for Failing {
         let left = self.0.checked_sub(1);
         self.0 = left.ok_or_else(|| LinkError::System(std::io::ErrorKind::NotConnected.into()))?;
         Ok(Command {
-            drive: Drive {
-                omega: 1.0,
-                amplitude: 0.01,
-                displacement: 0.0,
-            },
+            drive: Drive { omega: 1.0, amplitude: 0.01, displacement: 0.0 },
             ..Command::default()
         })
     }
@@ -212,11 +208,7 @@ fn an_experiment_takes_any_controller_and_records_every_stage() {
         "record.window_periods=1.5",
     ]);
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
-    let drive = Drive {
-        omega: 1.0,
-        amplitude: 0.01,
-        displacement: 0.0,
-    };
+    let drive = Drive { omega: 1.0, amplitude: 0.01, displacement: 0.0 };
     let record = experiment::run(&mut rig, &mut OpenLoop(drive), &plan(&scene), |_, _, _| {}).unwrap();
     // The sample at which the lock had settled opens the hold.
     assert_eq!((record.hold().len(), record.decay().len()), (301, 200));

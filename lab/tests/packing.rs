@@ -135,11 +135,7 @@ fn a_library_of_another_version_is_refused() {
 fn with_other(folder: &Path, argument: &str) -> Libraries {
     let path = library(folder).display().to_string();
     let other: Binary = format!("{argument}={path}").parse().unwrap();
-    Libraries {
-        folder: folder.into(),
-        own: true,
-        others: vec![other],
-    }
+    Libraries { folder: folder.into(), own: true, others: vec![other] }
 }
 
 #[test]
@@ -164,11 +160,7 @@ fn only_the_libraries_given_are_packed_where_this_platform_is_left_out() {
 #[test]
 fn a_component_that_no_platform_has_is_refused() {
     let folder = tempfile::tempdir().unwrap();
-    let libraries = Libraries {
-        folder: folder.path().into(),
-        own: false,
-        others: Vec::new(),
-    };
+    let libraries = Libraries { folder: folder.path().into(), own: false, others: Vec::new() };
     let message = complaint_of(folder.path(), &libraries);
     for part in ["no library of Tiny", "--binary PLATFORM=FILE"] {
         assert!(message.contains(part), "{message}");

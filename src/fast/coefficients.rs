@@ -35,12 +35,7 @@ impl Coefficients {
 
     #[inline(never)]
     fn new(oscillator: &Oscillator, omega: f64) -> Self {
-        let Oscillator {
-            delta,
-            omega0_squared,
-            fastest,
-            ..
-        } = *oscillator;
+        let Oscillator { delta, omega0_squared, fastest, .. } = *oscillator;
         // `f'' = -omega² f`: every derivative is a combination of the same four numbers.
         let (mut last, mut now) = ([0.0, 1.0, 0.0, 0.0], [-omega0_squared, -2.0 * delta, 1.0, 0.0]);
         let mut forcing = [1.0, 0.0];

@@ -40,11 +40,7 @@ impl FastPath {
     #[inline(never)]
     pub(super) fn march(&mut self, start: &Start, left: f64, predicted: Option<&Predicted>) -> Found {
         self.cache.prepare_march(&start.rig.alone, &self.coefficients);
-        let mut from = Mark {
-            t: 0.0,
-            point: start.point,
-            sample: start.sample,
-        };
+        let mut from = Mark { t: 0.0, point: start.point, sample: start.sample };
         let mut fine = 0;
         for _ in 0..MOST_STRETCHES {
             if let Some(predicted) = predicted

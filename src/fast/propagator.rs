@@ -78,12 +78,7 @@ impl Propagator {
             let (xx, vv) = (xx - 1.0, vv - 1.0);
             (Transition { xx, xv, vx, vv }, Transition::default())
         };
-        Self {
-            t,
-            free,
-            exact,
-            ..Self::default()
-        }
+        Self { t, free, exact, ..Self::default() }
     }
 
     /// Makes the response that of these coefficients' frequency.
@@ -124,11 +119,7 @@ impl Propagator {
         let (head, tail) = &self.free;
         let (y, dy) = head.of(start.y, start.dy);
         let (more_y, more_dy) = tail.of(start.y, start.dy);
-        let Response {
-            base,
-            position,
-            velocity,
-        } = &self.response;
+        let Response { base, position, velocity } = &self.response;
         Increment {
             y: y + (more_y + forced(amplitude, start.phasor, *position)),
             dy: dy + (more_dy + forced(amplitude, start.phasor, *velocity)),

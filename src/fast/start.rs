@@ -29,11 +29,7 @@ impl<'a> Start<'a> {
             base,
             masses,
             point,
-            sample: Sample {
-                w: masses.w.value(),
-                dw: masses.dw,
-                ddw: 0.0,
-            },
+            sample: Sample { w: masses.w.value(), dw: masses.dw, ddw: 0.0 },
             drift: base.drive.signal[1] - masses.particle,
         }
     }

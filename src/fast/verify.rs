@@ -68,12 +68,7 @@ impl Envelope {
     /// Bounds over the next `t` seconds for a motion that is at `start`.
     #[inline(always)]
     pub fn new(oscillator: &Oscillator, drive: &Drive, start: &Point, t: f64) -> Self {
-        let Oscillator {
-            delta,
-            omega0_squared,
-            omega0,
-            ..
-        } = *oscillator;
+        let Oscillator { delta, omega0_squared, omega0, .. } = *oscillator;
         let damping = 2.0 * delta;
         let omega = drive.omega.abs();
         let forcing = forcing(oscillator, drive, t);

@@ -105,11 +105,7 @@ impl LoViNes {
             )));
         }
         let n = order as usize;
-        let Movement {
-            base,
-            primary,
-            particle,
-        } = Movement::of(plant);
+        let Movement { base, primary, particle } = Movement::of(plant);
         let p = &self.parameters;
         Ok(match variable {
             Real::q1 => primary[n],
@@ -130,10 +126,7 @@ impl LoViNes {
 
 /// The instant with a derivative along `known`.
 fn perturbed(now: &Instant<f64>, known: Real, reduced_are_states: bool) -> Result<Instant<Dual>, Refusal> {
-    let along = |variable: Real, value: f64| Dual {
-        value,
-        slope: f64::from(u8::from(variable == known)),
-    };
+    let along = |variable: Real, value: f64| Dual { value, slope: f64::from(u8::from(variable == known)) };
     let instant = Instant {
         primary_mass: along(Real::M, now.primary_mass),
         stiffness: along(Real::k, now.stiffness),

@@ -69,10 +69,7 @@ impl ModelExchange for LoViNes {
     fn new_discrete_states(&mut self, time: f64, log: &Log) -> Result<Discrete, Refusal> {
         self.progress = Progress::UnderWay;
         let jumped = (self.hybrid_mut()).resolve(time, |event| log::tell(log, time, event));
-        Ok(Discrete {
-            states_changed: jumped,
-            ..Discrete::default()
-        })
+        Ok(Discrete { states_changed: jumped, ..Discrete::default() })
     }
 
     fn completed_step(&mut self) -> bool {

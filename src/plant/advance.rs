@@ -74,11 +74,7 @@ impl Plant {
         if self.contact == Contact::Free && self.fast.step(&mut moving, duration) {
             self.time += duration;
             self.evaluations += 1;
-            return Ok(Outcome {
-                elapsed: duration,
-                evaluations: 1,
-                ..Outcome::default()
-            });
+            return Ok(Outcome { elapsed: duration, evaluations: 1, ..Outcome::default() });
         }
         self.check_duration(duration)?;
         let outcome = self.follow(duration, on_event);

@@ -72,9 +72,7 @@ impl Plant {
     /// An upper bound of the acceleration's magnitude, m/s²: the sum of its terms.
     #[inline(always)]
     fn acceleration_bound(&self, velocity: f64) -> f64 {
-        let Oscillator {
-            delta, omega0_squared, ..
-        } = self.rig.alone;
+        let Oscillator { delta, omega0_squared, .. } = self.rig.alone;
         let drive = &self.base.drive;
         let position = self.masses.x.value().abs() + drive.signal[0].abs() + drive.amplitude.abs();
         let velocity = velocity.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();

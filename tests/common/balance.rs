@@ -33,11 +33,7 @@ pub struct Walk {
 /// Base displacement and velocity, the signal as seen from now.
 fn base(plant: &Plant) -> (f64, f64) {
     let base = plant.base();
-    let Drive {
-        signal: [u0, u1, ..],
-        amplitude,
-        omega,
-    } = base.drive;
+    let Drive { signal: [u0, u1, ..], amplitude, omega } = base.drive;
     let (sin, cos) = base.phase.radians().sin_cos();
     if amplitude == 0.0 {
         return (u0, u1);

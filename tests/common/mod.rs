@@ -40,12 +40,7 @@ pub fn scene(driven: bool) -> impl Strategy<Value = Scene> {
         parameters.damping = 2.0 * zeta;
         Scene {
             parameters,
-            start: State {
-                q1,
-                dq1,
-                q2: q1 - w,
-                dq2: dq1 - dw,
-            },
+            start: State { q1, dq1, q2: q1 - w, dq2: dq1 - dw },
             drive: Drive {
                 signal: [amplitude * held, 0.0, 0.0, 0.0],
                 ..Drive::harmonic(amplitude * e, omega)

@@ -39,13 +39,7 @@ fn near_zero() -> impl Iterator<Item = f64> {
 
 /// The oscillator of unit mass and stiffness.
 pub fn unit(zeta: f64, drive: Drive, start: (f64, f64)) -> Case {
-    Case {
-        mass: 1.0,
-        stiffness: 1.0,
-        damping: 2.0 * zeta,
-        start,
-        drive,
-    }
+    Case { mass: 1.0, stiffness: 1.0, damping: 2.0 * zeta, start, drive }
 }
 
 /// The rig of the default scene with another damping ratio, and as much of the natural frequency as driving frequency.
@@ -62,10 +56,7 @@ fn rig(zeta: f64, amplitude: f64, ratio: f64, mass: f64, start: (f64, f64)) -> C
 }
 
 fn family(name: &'static str, cases: impl Iterator<Item = Case>) -> Family {
-    Family {
-        name,
-        cases: cases.collect(),
-    }
+    Family { name, cases: cases.collect() }
 }
 
 pub fn all() -> Vec<Family> {
@@ -129,10 +120,7 @@ pub fn all() -> Vec<Family> {
         alone.signal[order] = [0.4, -0.3, 0.2, 0.1][order];
         let mut full = Drive::harmonic(0.3, 0.7);
         full.signal[..=order].copy_from_slice(&[0.4, -0.3, 0.2, 0.1][..=order]);
-        let resonant = Drive {
-            omega: 1.0 + 1e-12,
-            ..full
-        };
+        let resonant = Drive { omega: 1.0 + 1e-12, ..full };
         families.push(family(
             name,
             every(1).flat_map(move |z| {

@@ -129,11 +129,7 @@ fn ways(case: &Case, oscillator: &Oscillator, t: f64) -> Vec<(&'static str, (f64
         half_width: 1e13,
         restitution: 0.65,
     };
-    let start = State {
-        q1: case.start.0,
-        dq1: case.start.1,
-        ..State::default()
-    };
+    let start = State { q1: case.start.0, dq1: case.start.1, ..State::default() };
     let advanced = |fast: bool| {
         let mut plant = Plant::new(parameters, start).expect("a case that makes sense");
         plant.set_fast_path(fast);
@@ -142,10 +138,7 @@ fn ways(case: &Case, oscillator: &Oscillator, t: f64) -> Vec<(&'static str, (f64
         assert_eq!(plant.totals().impacts, 0);
         (plant.state().q1, plant.state().dq1)
     };
-    let base = BaseMotion {
-        drive: case.drive,
-        ..BaseMotion::default()
-    };
+    let base = BaseMotion { drive: case.drive, ..BaseMotion::default() };
     let motion = Segment::new(oscillator, base, case.start);
     let [x, v, ..] = motion.at(&motion.series(), t).derivatives;
     let mut ways = vec![("closed form", (x, v))];
@@ -166,11 +159,7 @@ impl fmt::Display for Worst {
         let Some((case, way, t)) = &self.hardest else {
             return write!(f, " | none");
         };
-        let Drive {
-            signal,
-            amplitude,
-            omega,
-        } = case.drive;
+        let Drive { signal, amplitude, omega } = case.drive;
         write!(
             f,
             " | {way}, damping ratio {:e}, omega {omega:e}, E {amplitude}, signal {signal:?}, start {:?}, t {t:e}",

@@ -53,10 +53,7 @@ impl System {
             rates[n][n + 1] = TwoFloat::from(1.0);
         }
         let fastest = [(stiffness / mass).sqrt(), damping / mass, omega.abs()];
-        Self {
-            rates,
-            fastest: fastest.into_iter().fold(0.0, f64::max),
-        }
+        Self { rates, fastest: fastest.into_iter().fold(0.0, f64::max) }
     }
 
     /// What `t` seconds do to the state.

@@ -11,16 +11,8 @@ const MASS_RATIOS: [f64; 7] = [1e-6, 1e-5, 1e-4, 0.0084, 0.1, 0.3, 1.0];
 
 /// Elastic impacts, no damping, nothing drives: the energy is to stay.
 fn conservative(epsilon: f64, impacts: u64) -> f64 {
-    let parameters = Parameters {
-        damping: 0.0,
-        ..Parameters::dimensionless(epsilon, 0.0, 1.0)
-    };
-    let start = State {
-        q1: 0.4,
-        dq1: 0.1,
-        q2: 0.2,
-        dq2: -1.1,
-    };
+    let parameters = Parameters { damping: 0.0, ..Parameters::dimensionless(epsilon, 0.0, 1.0) };
+    let start = State { q1: 0.4, dq1: 0.1, q2: 0.2, dq2: -1.1 };
     let mut plant = Plant::new(parameters, start).unwrap();
     let at_start = plant.energy(0.0);
     let mut worst = 0.0f64;

@@ -50,11 +50,7 @@ pub struct Worst {
 impl Worst {
     /// A scene that panicked.
     pub fn panicked() -> Self {
-        Self {
-            scenes: 1,
-            panics: 1,
-            ..Self::default()
-        }
+        Self { scenes: 1, panics: 1, ..Self::default() }
     }
 
     pub fn and(self, other: Self) -> Self {
@@ -144,10 +140,7 @@ fn look(plant: &mut Plant, drive: Drive, step: f64) -> f64 {
 
 fn once(s: &Scene, number: usize) -> (Worst, [u64; 4]) {
     let mut plant = Plant::new(s.parameters, s.start).expect("a scene that makes sense");
-    let mut worst = Worst {
-        scenes: 1,
-        ..Worst::default()
-    };
+    let mut worst = Worst { scenes: 1, ..Worst::default() };
     let free = s.drive.amplitude == 0.0 && s.drive.signal == [0.0; 4];
     let at_start = plant.energy(0.0);
     let mut before = at_start;

@@ -19,10 +19,7 @@ const LOOKS: u32 = 3000;
 fn farthest(s: &Scene) -> Option<f64> {
     let p = s.parameters;
     let oscillator = Oscillator::new(p.primary_mass, p.stiffness, p.damping);
-    let base = BaseMotion {
-        drive: s.drive,
-        ..BaseMotion::default()
-    };
+    let base = BaseMotion { drive: s.drive, ..BaseMotion::default() };
     let motion = Segment::new(&oscillator, base, (0.0, s.start.dq1));
     let step = DURATION / f64::from(LOOKS);
     let at = |t: f64| motion.position_and_velocity(t).0.abs();
@@ -46,14 +43,8 @@ fn farthest(s: &Scene) -> Option<f64> {
 
 /// Impacts within the duration: in one step, in many, and by the general search alone.
 fn impacts(s: &Scene, half_width: f64) -> [u64; 3] {
-    let parameters = Parameters {
-        half_width,
-        ..s.parameters
-    };
-    let start = State {
-        dq1: s.start.dq1,
-        ..State::default()
-    };
+    let parameters = Parameters { half_width, ..s.parameters };
+    let start = State { dq1: s.start.dq1, ..State::default() };
     [(true, 1), (true, 150), (false, 1)].map(|(fast, steps)| {
         let mut plant = Plant::new(parameters, start).expect("a scene that makes sense");
         plant.set_fast_path(fast);
@@ -79,10 +70,7 @@ fn graze(s: &Scene) -> Grazes {
     let Some(farthest) = farthest(s) else {
         return Grazes::default();
     };
-    let mut grazes = Grazes {
-        scenes: 1,
-        ..Grazes::default()
-    };
+    let mut grazes = Grazes { scenes: 1, ..Grazes::default() };
     for exponent in 2..=13 {
         let delta = 10f64.powi(-exponent);
         let none = |impacts: [u64; 3]| impacts.iter().filter(|n| **n == 0).count() as u64;

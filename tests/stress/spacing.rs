@@ -69,10 +69,7 @@ impl Spacing {
 
 #[test]
 fn an_impact_reported_twice_or_too_soon_is_noticed() {
-    let start = lovines::State {
-        dq2: 0.5,
-        ..lovines::State::default()
-    };
+    let start = lovines::State { dq2: 0.5, ..lovines::State::default() };
     let p = lovines::Parameters::dimensionless(0.01, 1.0, 0.65);
     let plant = Plant::new(p, start).expect("valid values");
     let too_close = |second: f64, wall: Wall| {

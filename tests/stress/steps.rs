@@ -9,12 +9,7 @@ const OMEGA: f64 = 0.990_417;
 
 /// The default rig near its steady 1:1 motion.
 fn steady() -> (Plant, Drive) {
-    let start = State {
-        q1: -0.42,
-        dq1: 0.01,
-        q2: -0.99,
-        dq2: -0.86,
-    };
+    let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
     let plant = Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), start).unwrap();
     (plant, Drive::harmonic(0.0084 * 1.1, OMEGA))
 }
@@ -33,12 +28,7 @@ pub fn long(table: &mut Table) {
 
 /// The same with a chatter in every period: it ends before its time, and says so.
 pub fn chatter(table: &mut Table) {
-    let start = State {
-        q1: 0.1,
-        q2: 0.1,
-        dq2: 0.3,
-        ..State::default()
-    };
+    let start = State { q1: 0.1, q2: 0.1, dq2: 0.3, ..State::default() };
     let mut plant = Plant::new(Parameters::dimensionless(0.05, 1.0, 0.4), start).unwrap();
     let outcome = plant.advance(Drive::harmonic(1.5, 0.6), 1e6 * TAU / 0.6).unwrap();
     table.row(

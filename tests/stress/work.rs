@@ -68,12 +68,7 @@ fn rig(zeta: f64) -> Parameters {
 }
 
 fn hardest(zeta: f64, amplitude: f64, ratio: f64) -> Hardest {
-    let start = State {
-        q1: 0.1,
-        q2: -0.2,
-        dq2: 0.9,
-        ..State::default()
-    };
+    let start = State { q1: 0.1, q2: -0.2, dq2: 0.9, ..State::default() };
     let mut plant = Plant::new(rig(zeta), start).expect("valid values");
     let drive = Drive::harmonic(amplitude, ratio);
     plant.begin(drive).expect("valid values");
@@ -189,10 +184,7 @@ enum Particle {
 
 /// The base pushes the wall against the particle for ever: its acceleration never changes sign in these steps.
 fn pressing(_: u32) -> Drive {
-    Drive {
-        signal: [0.0, 0.0, 5.0, 0.0],
-        ..Drive::default()
-    }
+    Drive { signal: [0.0, 0.0, 5.0, 0.0], ..Drive::default() }
 }
 
 fn pressing_anew(n: u32) -> Drive {
@@ -219,13 +211,7 @@ fn slow_anew(n: u32) -> Drive {
 }
 
 const fn simple(what: &'static str, zeta: f64, particle: Particle, step: f64, drive: fn(u32) -> Drive) -> Simple {
-    Simple {
-        what,
-        zeta,
-        particle,
-        step,
-        drive,
-    }
+    Simple { what, zeta, particle, step, drive }
 }
 
 #[rustfmt::skip]
@@ -259,11 +245,7 @@ impl Simple {
             Particle::Slow => (0.0, 1e-6),
             Particle::Crossing => (0.0, 0.9),
         };
-        let start = State {
-            q2,
-            dq2,
-            ..State::default()
-        };
+        let start = State { q2, dq2, ..State::default() };
         let mut plant = Plant::new(rig(self.zeta), start).expect("valid values");
         plant.begin((self.drive)(0)).expect("valid values");
         // The first step decides about the contact.

@@ -6,10 +6,7 @@ use super::*;
 fn the_phase_stays_within_one_turn_whatever_the_step() {
     for omega in [-7.0, -1e-20, 0.0, 1e-20, 0.3, 55.0, 1e9] {
         for t in [1e-12, 0.1, 1.0, 1e3, 1e6] {
-            let base = BaseMotion {
-                drive: Drive::harmonic(1.0, omega),
-                phase: Phase::default(),
-            };
+            let base = BaseMotion { drive: Drive::harmonic(1.0, omega), phase: Phase::default() };
             let phase = base.after(t).phase.radians();
             assert!((0.0..TAU.0).contains(&phase), "{omega} {t}: {phase}");
         }
@@ -20,15 +17,8 @@ fn the_phase_stays_within_one_turn_whatever_the_step() {
 fn a_million_turns_in_one_step_and_in_a_million_agree() {
     // 2^-4 is exact, so that both runs mean the same instants.
     let drive = Drive::harmonic(1.0, 1.000_1);
-    let one = BaseMotion {
-        drive,
-        phase: Phase(0.5, 0.0),
-    }
-    .after(62_500.0);
-    let mut many = BaseMotion {
-        drive,
-        phase: Phase(0.5, 0.0),
-    };
+    let one = BaseMotion { drive, phase: Phase(0.5, 0.0) }.after(62_500.0);
+    let mut many = BaseMotion { drive, phase: Phase(0.5, 0.0) };
     for _ in 0..1_000_000 {
         many = many.after(0.062_5);
     }
@@ -39,10 +29,7 @@ fn a_million_turns_in_one_step_and_in_a_million_agree() {
 #[test]
 fn the_signal_seen_later_is_the_same_signal() {
     let base = BaseMotion {
-        drive: Drive {
-            signal: [1.0, -2.0, 0.5, 0.25],
-            ..Drive::default()
-        },
+        drive: Drive { signal: [1.0, -2.0, 0.5, 0.25], ..Drive::default() },
         phase: Phase::default(),
     };
     let direct = base.after(1.5).displacement();

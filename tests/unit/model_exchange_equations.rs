@@ -19,12 +19,7 @@ fn velocities_come_back_from_reduced_ones() {
             ..Instant::default()
         };
         let reduced = instant.reduced_velocities();
-        let back = Instant {
-            dq1: 0.0,
-            dq2: 0.0,
-            ..instant
-        }
-        .with_reduced(reduced);
+        let back = Instant { dq1: 0.0, dq2: 0.0, ..instant }.with_reduced(reduced);
         assert!((back.dq1 + 0.4).abs() < 1e-16 && (back.dq2 + 0.4).abs() < 1e-16);
     }
 }

@@ -6,16 +6,8 @@ use crate::{Drive, State};
 #[test]
 fn each_derivative_is_the_difference_quotient_of_the_one_before() {
     let p = Parameters::dimensionless(0.1, 1.0, 0.65);
-    let start = State {
-        q1: 0.2,
-        dq1: -0.5,
-        q2: 0.1,
-        dq2: 0.3,
-    };
-    let drive = Drive {
-        signal: [0.1, -0.2, 0.3, 0.05],
-        ..Drive::harmonic(0.2, 1.3)
-    };
+    let start = State { q1: 0.2, dq1: -0.5, q2: 0.1, dq2: 0.3 };
+    let drive = Drive { signal: [0.1, -0.2, 0.3, 0.05], ..Drive::harmonic(0.2, 1.3) };
     let mut plant = Plant::new(p, start).unwrap();
     plant.begin(drive).unwrap();
     let ahead = |t: f64| {

@@ -5,12 +5,7 @@ use crate::{Drive, Parameters, Plant, State};
 
 #[test]
 fn a_plant_saved_and_restored_at_any_step_goes_on_with_the_same_bits() {
-    let start = State {
-        q1: -0.42,
-        dq1: 0.01,
-        q2: -0.99,
-        dq2: -0.86,
-    };
+    let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
     for (step, wobble, slope, g) in [
         (0.063, 0.0, 0.0, 1.1),
         (0.063, 1e-4, 0.0, 1.1),

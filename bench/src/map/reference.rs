@@ -43,10 +43,7 @@ pub fn drive(sigma: f64, g: f64) -> Result<Drive, String> {
 /// # Errors
 /// A value that the plant does not accept.
 pub fn settle(drive: Drive) -> Result<Plant, String> {
-    let start = State {
-        dq2: START,
-        ..State::default()
-    };
+    let start = State { dq2: START, ..State::default() };
     let mut plant = Plant::new(RIG, start).map_err(|e| e.to_string())?;
     plant.begin(drive).map_err(|e| e.to_string())?;
     more(&mut plant, drive, SETTLING)?;

@@ -31,10 +31,7 @@ const ALLOWED_SYMMETRIC: (f64, f64) = (1.5, 1.5);
 /// An argument that is not known or has no valid value.
 pub fn run(arguments: &[String]) -> Result<String, String> {
     let (mut sigmas, mut gs) = (Axis::SIGMA, Axis::G);
-    let mut effort = Effort {
-        methods: Methods::Plant,
-        ..Effort::default()
-    };
+    let mut effort = Effort { methods: Methods::Plant, ..Effort::default() };
     let mut cells_too = false;
     let mut rest = arguments.iter();
     while let Some(option) = rest.next() {

@@ -39,11 +39,7 @@ impl Method for Shell {
             rig.well(rig.set_real(AMPLITUDE, first.amplitude));
         }
         rig.start();
-        Ok(Self {
-            rig,
-            time: 0.0,
-            state: scene.start,
-        })
+        Ok(Self { rig, time: 0.0, state: scene.start })
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {

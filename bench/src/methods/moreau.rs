@@ -22,13 +22,7 @@ pub struct Moreau {
 impl Method for Moreau {
     fn start(scene: &Scene, setting: f64) -> Result<Self, Failure> {
         let (p, y) = (scene.parameters, scene.start);
-        Ok(Self {
-            p,
-            steps_per_period: setting,
-            y,
-            angle: 0.0,
-            impacts: 0,
-        })
+        Ok(Self { p, steps_per_period: setting, y, angle: 0.0, impacts: 0 })
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {

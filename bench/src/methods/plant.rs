@@ -79,9 +79,6 @@ methods! {
 /// Equal drives in a single step. Its length is rounded once, and not at every addition.
 fn in_one(steps: &[Step]) -> Vec<Step> {
     let equal = |a: &Step, b: &Step| a == b;
-    let joined = |run: &[Step]| Step {
-        duration: run[0].duration * run.len() as f64,
-        ..run[0]
-    };
+    let joined = |run: &[Step]| Step { duration: run[0].duration * run.len() as f64, ..run[0] };
     steps.chunk_by(equal).map(joined).collect()
 }

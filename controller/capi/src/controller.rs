@@ -71,10 +71,9 @@ pub unsafe extern "C" fn phase_lock_init(
     if controller.is_null() {
         return NULL_POINTER;
     }
-    let built = Config::from(config).build().map(|lock| Stored {
-        state: lock.start(),
-        lock,
-    });
+    let built = Config::from(config)
+        .build()
+        .map(|lock| Stored { state: lock.start(), lock });
     // SAFETY: the storage is large and aligned enough, and may be written.
     let outcome = built.map(|stored| unsafe { controller.cast::<Stored>().write(stored) });
     // SAFETY: the caller's contract.

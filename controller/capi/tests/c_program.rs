@@ -60,11 +60,7 @@ fn by_the_core() -> String {
             };
             controller.hold_response(&mut state, to).unwrap();
         }
-        let input = Input {
-            response: q,
-            reference: Some(drive),
-            active: true,
-        };
+        let input = Input { response: q, reference: Some(drive), active: true };
         let output: Output = controller.process(&mut state, input);
         (drive, response) = (output.drive, output.response_amplitude);
         let h = config.sample_time;

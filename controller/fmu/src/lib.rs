@@ -182,11 +182,7 @@ impl Component for Controller {
         let Some(running) = &mut self.running else {
             return Err(Refusal::error("a step before initialization"));
         };
-        let Config {
-            amplitude,
-            phase_target,
-            ..
-        } = self.config;
+        let Config { amplitude, phase_target, .. } = self.config;
         let tuned = running.lock.config();
         if (tuned.amplitude, tuned.phase_target) != (amplitude, phase_target) {
             running.lock.retune(amplitude, phase_target)?;

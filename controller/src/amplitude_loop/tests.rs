@@ -76,10 +76,7 @@ fn an_expected_change_of_the_drive_reduces_the_control_error() {
 
 #[test]
 fn a_step_of_the_setpoint_settles_faster_than_the_structure_would() {
-    let to = Move {
-        response: 1.2,
-        ..Move::default()
-    };
+    let to = Move { response: 1.2, ..Move::default() };
     // 1/DELTA is 33 s.
     assert!(worst(to, 6_000) < 1e-2);
 }
@@ -89,13 +86,7 @@ fn the_drive_stays_within_its_limits_without_windup() {
     let control = amplitude_loop(0.1);
     let (mut structure, mut state) = settled();
     let mut go = |to: f64, samples: u32| {
-        state.start(
-            Move {
-                response: to,
-                ..Move::default()
-            },
-            DT,
-        );
+        state.start(Move { response: to, ..Move::default() }, DT);
         for _ in 0..samples {
             let (drive, _) = control.follow(&mut state, 0.0, Some(structure.reading));
             assert!((0.0..=0.1).contains(&drive));
@@ -112,15 +103,7 @@ fn the_drive_stays_within_its_limits_without_windup() {
 fn the_shifts_of_the_frequency_add_up_to_the_expected_change() {
     let control = amplitude_loop(1.0);
     let (_, mut state) = settled();
-    state.start(
-        Move {
-            response: 1.1,
-            duration: 3.0,
-            amplitude: 0.0,
-            omega: -0.7,
-        },
-        DT,
-    );
+    state.start(Move { response: 1.1, duration: 3.0, amplitude: 0.0, omega: -0.7 }, DT);
     let shifted: f64 = (0..400).map(|_| control.follow(&mut state, 0.0, Some(1.0)).1).sum();
     assert!((shifted + 0.7).abs() < 1e-12);
 }

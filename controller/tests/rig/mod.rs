@@ -23,11 +23,7 @@ pub struct Resonator {
 
 impl Resonator {
     pub fn new() -> Self {
-        Self {
-            omega_0: OMEGA_0,
-            zeta: ZETA,
-            ..Self::default()
-        }
+        Self { omega_0: OMEGA_0, zeta: ZETA, ..Self::default() }
     }
 
     /// Advances under a base oscillator of amplitude `e`, m, and frequency `omega`, rad/s.
@@ -90,11 +86,7 @@ impl Bench {
 
     /// One sample with other sensor readings.
     pub fn sample_reading(&mut self, response: f64, reference: Option<f64>) -> Output {
-        let input = Input {
-            response,
-            reference,
-            active: self.active,
-        };
+        let input = Input { response, reference, active: self.active };
         let output = self.controller.process(&mut self.state, input);
         let h = self.controller.config().sample_time;
         self.resonator.advance(output.amplitude, output.omega, h);

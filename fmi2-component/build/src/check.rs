@@ -65,9 +65,7 @@ fn unique(table: &Table, faults: &mut Vec<String>) {
         let mut references = HashMap::new();
         let mut identifiers = HashMap::new();
         for variable in table.of(kind) {
-            let Variable {
-                name, value_reference, ..
-            } = variable;
+            let Variable { name, value_reference, .. } = variable;
             if let Some(other) = references.insert(value_reference, name) {
                 faults.push(format!(
                     "{other} and {name} have the same valueReference {value_reference}"

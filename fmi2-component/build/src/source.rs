@@ -21,14 +21,7 @@ pub(crate) fn source(table: &Table) -> String {
 
 fn identity(out: &mut String, table: &Table) -> std::fmt::Result {
     let guid = guid(table);
-    let Table {
-        name,
-        identifier,
-        version,
-        event_indicators,
-        categories,
-        ..
-    } = table;
+    let Table { name, identifier, version, event_indicators, categories, .. } = table;
     let keys = |pick: fn(&(usize, usize)) -> usize| {
         let names = table.states.iter().map(pick).map(|place| {
             let name = table.variables.get(place).map_or("", |v| v.name.as_str());

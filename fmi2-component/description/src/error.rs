@@ -37,11 +37,7 @@ impl fmt::Display for Error {
             Self::Missing { element, attribute } => {
                 write!(f, "{element} has no attribute {attribute}")
             }
-            Self::Number {
-                element,
-                attribute,
-                value,
-            } => write!(
+            Self::Number { element, attribute, value } => write!(
                 f,
                 "{element}: {attribute} = {value:?} is not a whole number, 0 or above"
             ),

@@ -52,10 +52,7 @@ const STRUCTURE: Known = Known {
     elements: &["Outputs", "Derivatives", "InitialUnknowns"],
 };
 
-const UNKNOWNS: Known = Known {
-    attributes: &[],
-    elements: &["Unknown"],
-};
+const UNKNOWNS: Known = Known { attributes: &[], elements: &["Unknown"] };
 
 const UNKNOWN: Known = Known {
     attributes: &["index", "dependencies", "dependenciesKind"],

@@ -129,10 +129,7 @@ pub(crate) fn label(tag: &str, name: Option<&str>) -> String {
 }
 
 fn missing(element: &str, attribute: &'static str) -> Error {
-    Error::Missing {
-        element: element.to_owned(),
-        attribute,
-    }
+    Error::Missing { element: element.to_owned(), attribute }
 }
 
 fn required(value: Option<String>, element: &str, attribute: &'static str) -> Result<String, Error> {

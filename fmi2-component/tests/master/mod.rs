@@ -103,11 +103,7 @@ unsafe extern "C" fn hear(
     // SAFETY: none is NULL, and the environment is the list that `callbacks` was given.
     unsafe {
         let text = |pointer| CStr::from_ptr(pointer).to_str().unwrap().to_owned();
-        (*environment.cast::<Vec<Line>>()).push(Line {
-            status,
-            category: text(category),
-            text: text(message),
-        });
+        (*environment.cast::<Vec<Line>>()).push(Line { status, category: text(category), text: text(message) });
     }
 }
 

@@ -131,12 +131,7 @@ impl Bench {
         let sensors = self.rig.sense()?;
         let command = self.controller.sample(sensors, true)?;
         self.rig.advance(command.drive, self.sample_time)?;
-        Ok(Sample {
-            time: 0.0,
-            sensors,
-            command,
-            ground_truth: None,
-        })
+        Ok(Sample { time: 0.0, sensors, command, ground_truth: None })
     }
 
     /// Runs for a number of samples and returns the time it takes.

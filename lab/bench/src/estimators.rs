@@ -158,9 +158,7 @@ impl Truth {
             let omega = std::f64::consts::TAU / (three[2] - three[0]);
             (0.5 * d.omega0 * (three[0] + three[2]), d.sigma(omega))
         });
-        Ok(Self {
-            points: points.collect(),
-        })
+        Ok(Self { points: points.collect() })
     }
 
     /// The detuning at `tau`, interpolated linearly between the middles of two periods; `None` outside.

@@ -61,21 +61,11 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
     let lock = lock::measure(record, scene);
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
     if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
-        return Err(IdentificationError::Regime {
-            regime: lock.regime,
-            sigma: lock.sigma,
-            c: lock.c,
-        });
+        return Err(IdentificationError::Regime { regime: lock.regime, sigma: lock.sigma, c: lock.c });
     }
     let decay = decay_points(record, scene);
     if decay.is_empty() {
-        return Err(IdentificationError::NoDecay {
-            periods: scene.record.window_periods,
-        });
+        return Err(IdentificationError::NoDecay { periods: scene.record.window_periods });
     }
-    Ok(Identification {
-        parameters: scene.dimensionless(),
-        lock,
-        decay,
-    })
+    Ok(Identification { parameters: scene.dimensionless(), lock, decay })
 }

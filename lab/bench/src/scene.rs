@@ -58,10 +58,7 @@ impl Scene {
         let Some(path) = path else {
             return Self::parse("paper.toml (the default scene)", PAPER, overrides);
         };
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read {
-            path: path.into(),
-            source,
-        })?;
+        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.into(), source })?;
         Self::parse(&path.display().to_string(), &text, overrides)
     }
 

@@ -48,11 +48,7 @@ fn a_chain_that_is_off_gives_the_same_bits() {
     let scene = scene(&[]);
     let bare = || Simulated::new(scene.plant, scene.start).unwrap();
     let (mut rig, mut behind) = (bare(), chained(bare(), &scene));
-    let drive = Drive {
-        omega: 1.0,
-        amplitude: 0.01,
-        displacement: 0.0,
-    };
+    let drive = Drive { omega: 1.0, amplitude: 0.01, displacement: 0.0 };
     for _ in 0..2000 {
         assert_eq!(rig.sense().unwrap(), behind.sense().unwrap());
         rig.advance(drive, 0.06).unwrap();
@@ -66,10 +62,7 @@ struct Counter(f64);
 impl Rig for Counter {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         self.0 += 1.0;
-        Ok(Sensors {
-            response: self.0,
-            reference: Some(-self.0),
-        })
+        Ok(Sensors { response: self.0, reference: Some(-self.0) })
     }
 
     fn advance(&mut self, _: Drive, _: f64) -> Result<(), RigError> {

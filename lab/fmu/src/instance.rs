@@ -115,16 +115,8 @@ pub(super) struct Fmu {
 impl Fmu {
     /// Loads the FMU at `path`; `name` is its name in log messages.
     pub fn load(path: &Path, name: &str) -> Result<Self, FmuError> {
-        let (import, instance) = open(path, name).map_err(|source| FmuError::Load {
-            path: path.into(),
-            source,
-        })?;
-        Ok(Self {
-            instance,
-            import,
-            path: path.into(),
-            time: 0.0,
-        })
+        let (import, instance) = open(path, name).map_err(|source| FmuError::Load { path: path.into(), source })?;
+        Ok(Self { instance, import, path: path.into(), time: 0.0 })
     }
 
     /// The variable of that name and kind, if there is one.
@@ -136,11 +128,8 @@ impl Fmu {
 
     /// The variable of that name and kind.
     pub fn need(&self, kind: Kind, name: &'static str) -> Result<Reference, FmuError> {
-        self.find(kind, name).ok_or_else(|| FmuError::Variable {
-            path: self.path.clone(),
-            kind,
-            name,
-        })
+        self.find(kind, name)
+            .ok_or_else(|| FmuError::Variable { path: self.path.clone(), kind, name })
     }
 
     /// Sets the values that the FMU has variables for, and initialises it at time 0. A warning in the log names the

@@ -25,14 +25,7 @@ impl Dimensionless {
     /// The bare dimensionless model, with `omega0 = 1` and `b = 1`.
     #[must_use]
     pub fn new(epsilon: f64, lambda: f64, r: f64, g: f64) -> Self {
-        Self {
-            epsilon,
-            lambda,
-            r,
-            g,
-            omega0: 1.0,
-            b: 1.0,
-        }
+        Self { epsilon, lambda, r, g, omega0: 1.0, b: 1.0 }
     }
 
     /// The numbers of a plant in SI units whose base moves with the amplitude `amplitude`, m.

@@ -82,9 +82,7 @@ impl Orbit {
     /// The unknowns that shooting starts from: (phase, q1, q1', q2') after the impact on w = +1, sigma, G.
     #[must_use]
     pub fn unknowns(&self) -> Unknowns {
-        let AfterImpact {
-            phase, q1, dq1, dq2, ..
-        } = self.start;
+        let AfterImpact { phase, q1, dq1, dq2, .. } = self.start;
         Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
     }
 }

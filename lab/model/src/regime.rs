@@ -154,11 +154,7 @@ pub fn pattern(impacts: &[Impact]) -> Option<Pattern> {
             one_to_one if count == 2 => one_to_one,
             _ => Regime::Several,
         };
-        repeats.then(|| Pattern {
-            impacts: count,
-            periods: periods as u32,
-            regime: regime(),
-        })
+        repeats.then(|| Pattern { impacts: count, periods: periods as u32, regime: regime() })
     })
 }
 
@@ -226,10 +222,7 @@ mod tests {
         assert_eq!(synchrony(&even), 1.0);
         // Of twelve impacts in step and eight on the same wall, the first count.
         let mut mixed = impacts(&[(0.3, 1.0), (0.3 + PI, -1.0)], 1, 6);
-        mixed.extend((0..8).map(|n| Impact {
-            time: 40.0 + 0.7 * f64::from(n),
-            velocity: 0.2,
-        }));
+        mixed.extend((0..8).map(|n| Impact { time: 40.0 + 0.7 * f64::from(n), velocity: 0.2 }));
         assert!((synchrony(&mixed) - 0.6).abs() < 1e-12);
         assert_eq!(synchrony(&[]), 0.0);
     }

@@ -100,12 +100,6 @@ fn maps_that_make_no_sense_are_refused() {
     }
     let message = |plan: Plan| plan.run(|| {}).unwrap_err().to_string();
     assert!(message(plan("G=0:1:3", "G=0:1:3")).contains("both axes"));
-    assert!(
-        message(Plan {
-            record: 3,
-            ..plan("sigma=0:1:3", "G=0:1:3")
-        })
-        .contains("at least 20")
-    );
+    assert!(message(Plan { record: 3, ..plan("sigma=0:1:3", "G=0:1:3") }).contains("at least 20"));
     assert!(message(plan("sigma=-200:1:3", "G=0:1:3")).contains("above 0"));
 }

@@ -134,10 +134,7 @@ fn symmetry_breaks_near_the_theorys_speed_and_asymmetric_motions_leave_it() {
         breaking.motion.b
     );
     assert!((breaking.motion.b - B_SYMMETRY_BREAKING).abs() < 0.03);
-    let limits = Limits {
-        points: 60,
-        ..Limits::default()
-    };
+    let limits = Limits { points: 60, ..Limits::default() };
     let aside = asymmetric_branch(&scene, breaking, Condition::Excitation(1.6), &limits).unwrap();
     let far = aside.points.last().unwrap();
     let [first, second] = [far.bounces[0], far.bounces[1]];
@@ -185,11 +182,7 @@ fn without_damping_drive_and_loss_the_backbone_is_the_conservative_mode() {
         .unwrap();
     let conditions = [Condition::Sigma(mode.sigma), Condition::PhaseResonance];
     let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &mode.unknowns(), conditions).unwrap();
-    let limits = Limits {
-        sigma: [-3.0, 0.5],
-        points: 200,
-        ..Limits::default()
-    };
+    let limits = Limits { sigma: [-3.0, 0.5], points: 200, ..Limits::default() };
     let branch = continue_both_ways(&scene, &start, Condition::PhaseResonance, &limits);
     assert!(branch.points.len() > 20);
     let (mut most_g, mut energies) = (0f64, 0f64);
@@ -235,10 +228,7 @@ fn a_motion_with_more_impacts_is_followed_like_any_other() {
         .unwrap()
         .expect("a pattern");
     assert!(motion.pattern.impacts() > 2);
-    let limits = Limits {
-        points: 40,
-        ..Limits::default()
-    };
+    let limits = Limits { points: 40, ..Limits::default() };
     let branch = continue_both_ways(&scene, &motion, Condition::Excitation(2.2), &limits);
     let kinds: Vec<_> = branch.special.iter().map(|one| (one.kind, one.motion.sigma)).collect();
     println!(
@@ -268,10 +258,7 @@ fn a_branch_says_why_it_ended() {
     let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
     let conditions = [Condition::Excitation(1.1), Condition::PhaseResonance];
     let start = Periodic::find(&scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions).unwrap();
-    let limits = Limits {
-        points: 5,
-        ..Limits::default()
-    };
+    let limits = Limits { points: 5, ..Limits::default() };
     let branch = continue_both_ways(&scene, &start, Condition::Excitation(1.1), &limits);
     assert_eq!(branch.ended, Ended::Points);
 }

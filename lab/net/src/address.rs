@@ -18,10 +18,7 @@ pub enum BindScope {
 /// # Errors
 /// Text that is not an address, an unknown name, or an address outside `scope`.
 pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
-    let failed = |message: String| LinkError::Address {
-        address: text.into(),
-        message,
-    };
+    let failed = |message: String| LinkError::Address { address: text.into(), message };
     let place = text.strip_prefix("udp://").unwrap_or(text);
     let mut found: Vec<_> = place
         .to_socket_addrs()

@@ -174,11 +174,7 @@ impl Client {
         if same_time(step, sample_time) {
             return Ok(());
         }
-        Err(LinkError::Step {
-            peer: self.peer,
-            step,
-            sample_time,
-        })
+        Err(LinkError::Step { peer: self.peer, step, sample_time })
     }
 
     fn filter(&mut self, datagram: Result<Frame, FrameError>, from: SocketAddr) -> Result<Option<Frame>, LinkError> {
@@ -199,10 +195,7 @@ impl Client {
                 self.counters.foreign += 1;
                 Ok(None)
             }
-            Ok(frame) if frame.has(flag::SHUT_DOWN) => Err(LinkError::ShutDown {
-                peer: self.peer,
-                time: frame.time,
-            }),
+            Ok(frame) if frame.has(flag::SHUT_DOWN) => Err(LinkError::ShutDown { peer: self.peer, time: frame.time }),
             Ok(frame) => {
                 self.counters.received += 1;
                 Ok(Some(frame))

@@ -57,10 +57,7 @@ impl NetController {
         if self.failed {
             return Err(self.client.silent());
         }
-        let reading = Reading {
-            sensors,
-            ground_truth: None,
-        };
+        let reading = Reading { sensors, ground_truth: None };
         let mut frame = write_reading(self.client.frame(Kind::Sensors, self.at), &reading);
         frame.flags |= if active { flag::ACTIVE } else { 0 };
         self.client.send(frame)?;
@@ -83,16 +80,9 @@ impl NetController {
         let drive = if active {
             self.good.drive
         } else {
-            Drive {
-                omega: self.good.drive.omega,
-                ..Drive::default()
-            }
+            Drive { omega: self.good.drive.omega, ..Drive::default() }
         };
-        Command {
-            drive,
-            phase_error: self.good.phase_error,
-            settled: false,
-        }
+        Command { drive, phase_error: self.good.phase_error, settled: false }
     }
 
     /// The answer to the present sample, if the frame is this answer.

@@ -54,10 +54,7 @@ impl ControllerServer {
             sample_time: service.sample_time,
             silence: service.silence,
         };
-        Ok(Self {
-            session: ServerSession::listen(address, offer)?,
-            service,
-        })
+        Ok(Self { session: ServerSession::listen(address, offer)?, service })
     }
 
     /// Address of the server.

@@ -31,16 +31,7 @@ impl Counters {
     /// Whether any frame was not delivered once and in time.
     #[must_use]
     pub fn is_troubled(&self) -> bool {
-        let Self {
-            resent,
-            lost,
-            late,
-            repeated,
-            foreign,
-            malformed,
-            held,
-            ..
-        } = self;
+        let Self { resent, lost, late, repeated, foreign, malformed, held, .. } = self;
         [resent, lost, late, repeated, foreign, malformed, held]
             .iter()
             .any(|count| **count > 0)

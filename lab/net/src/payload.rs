@@ -62,11 +62,7 @@ pub(super) fn write_command(mut frame: Frame, command: &Command) -> Frame {
     if command.settled {
         frame.flags |= flag::SETTLED;
     }
-    let Drive {
-        omega,
-        amplitude,
-        displacement,
-    } = command.drive;
+    let Drive { omega, amplitude, displacement } = command.drive;
     frame.values = [omega, amplitude, displacement, command.phase_error, 0.0, 0.0];
     frame
 }
@@ -76,11 +72,7 @@ pub(super) fn read_command(frame: &Frame) -> Option<Command> {
     let [omega, amplitude, displacement, phase_error, ..] = frame.values;
     frame.values.iter().all(|x| x.is_finite()).then_some(())?;
     (omega >= 0.0 && amplitude >= 0.0).then_some(Command {
-        drive: Drive {
-            omega,
-            amplitude,
-            displacement,
-        },
+        drive: Drive { omega, amplitude, displacement },
         phase_error,
         settled: frame.has(flag::SETTLED),
     })
@@ -123,10 +115,7 @@ mod tests {
             [1.0, f64::INFINITY, 0.0, 0.0, 0.0, 0.0],
             [1.0, -1.0, 0.0, 0.0, 0.0, 0.0],
         ] {
-            let frame = Frame {
-                values,
-                ..Frame::new(Kind::Drive, 1)
-            };
+            let frame = Frame { values, ..Frame::new(Kind::Drive, 1) };
             assert_eq!(read_command(&frame), None);
         }
     }

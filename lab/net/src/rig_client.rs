@@ -105,10 +105,7 @@ impl NetRig {
     fn drive(&mut self, drive: Drive, step: f64) -> Result<(), LinkError> {
         self.client.check_step(step)?;
         let frame = self.client.frame(Kind::Drive, self.at);
-        let command = Command {
-            drive,
-            ..Command::default()
-        };
+        let command = Command { drive, ..Command::default() };
         self.client.send(write_command(frame, &command))?;
         self.at += 1;
         self.now = None;

@@ -203,11 +203,7 @@ impl ServerSession {
     }
 
     fn hello(&mut self, frame: &Frame, from: SocketAddr) -> Result<Option<Event>, LinkError> {
-        let Offer {
-            controller,
-            sample_time,
-            ..
-        } = self.offer;
+        let Offer { controller, sample_time, .. } = self.offer;
         if let Some(session) = &mut self.session {
             if (session.peer, session.id) == (from, frame.session) {
                 session.heard = Instant::now();
@@ -239,12 +235,7 @@ impl ServerSession {
     }
 
     fn welcome(&mut self, session: u64, to: SocketAddr) -> Result<(), LinkError> {
-        let Offer {
-            controller,
-            paced,
-            sample_time,
-            silence,
-        } = self.offer;
+        let Offer { controller, paced, sample_time, silence } = self.offer;
         let mut welcome = Frame::new(Kind::Welcome, session);
         welcome.flags |= if controller { flag::CONTROLLER } else { 0 };
         welcome.flags |= if paced { flag::PACED } else { 0 };

@@ -19,12 +19,7 @@ pub(super) struct Watchdog {
 
 impl Watchdog {
     pub fn new(limit: f64) -> Self {
-        Self {
-            limit,
-            quiet: 0.0,
-            drive: Drive::default(),
-            latched: None,
-        }
+        Self { limit, quiet: 0.0, drive: Drive::default(), latched: None }
     }
 
     /// A frame has arrived: the silence starts again.
@@ -81,11 +76,7 @@ impl Watchdog {
 mod tests {
     use super::*;
 
-    const DRIVE: Drive = Drive {
-        omega: 2.0,
-        amplitude: 1.0,
-        displacement: 0.5,
-    };
+    const DRIVE: Drive = Drive { omega: 2.0, amplitude: 1.0, displacement: 0.5 };
 
     #[test]
     fn the_last_drive_is_held_until_the_limit() {

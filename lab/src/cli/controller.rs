@@ -37,10 +37,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     let first = BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
-    let service = ControllerService {
-        sample_time: scene.sample_time(),
-        silence: arguments.silence,
-    };
+    let service = ControllerService { sample_time: scene.sample_time(), silence: arguments.silence };
     let mut server = ControllerServer::listen(arguments.serving.address()?, service)?;
     let (stop, tell) = arguments.serving.begin("controller", server.address()?)?;
     server

@@ -17,18 +17,12 @@ pub(super) struct Failure {
 impl Failure {
     /// Bad usage or input: exit code 2.
     pub(super) fn input(message: impl Display) -> Self {
-        Self {
-            code: 2,
-            message: message.to_string(),
-        }
+        Self { code: 2, message: message.to_string() }
     }
 
     /// A failure at run time: exit code 1.
     pub(super) fn run(message: impl Display) -> Self {
-        Self {
-            code: 1,
-            message: message.to_string(),
-        }
+        Self { code: 1, message: message.to_string() }
     }
 
     pub(super) fn code(&self) -> u8 {

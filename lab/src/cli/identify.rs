@@ -108,10 +108,7 @@ impl Packed {
         let refused = |error| Failure::input(format!("cannot write to {}: {error}", out.display()));
         std::fs::create_dir_all(out).map_err(refused)?;
         let folder = tempfile::Builder::new().prefix(".vines-").tempdir_in(out);
-        Ok(Self {
-            folder: folder.map_err(refused)?,
-            out: out.into(),
-        })
+        Ok(Self { folder: folder.map_err(refused)?, out: out.into() })
     }
 
     /// The plant.

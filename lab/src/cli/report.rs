@@ -61,10 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             arguments.x.axis
         )));
     }
-    let subject = Subject {
-        scene,
-        map: [arguments.x, arguments.y],
-    };
+    let subject = Subject { scene, map: [arguments.x, arguments.y] };
     let style = ProgressStyle::with_template("{msg:10} [{wide_bar}] {percent} %")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(1000).with_style(style);

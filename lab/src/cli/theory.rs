@@ -113,12 +113,7 @@ fn readable(report: &Report, listed: bool) -> String {
     } else {
         String::new()
     };
-    let Constants {
-        dissipation,
-        b_min,
-        c_min,
-        b_symmetry_breaking,
-    } = report.manifold;
+    let Constants { dissipation, b_min, c_min, b_symmetry_breaking } = report.manifold;
     format!(
         "First-order theory\n  {}\n\n\
          Slow invariant manifold: R = {dissipation:.6}, fold at B = {b_min:.6}, C = {c_min:.6}\n\
@@ -131,11 +126,7 @@ fn readable(report: &Report, listed: bool) -> String {
 }
 
 fn thresholds(report: &Report) -> String {
-    let Activation {
-        from_rest,
-        existence,
-        stable,
-    } = report.activation;
+    let Activation { from_rest, existence, stable } = report.activation;
     let stable = stable.map_or("none at any G".into(), |g| format!("G = {g:.6}"));
     format!(
         "Activation at sigma = {:.6}\n  impacts begin from rest    G = {from_rest:.6}\n  \

@@ -26,10 +26,7 @@ impl FromStr for Binary {
             let known = Platform::folders();
             format!("`{folder}` is no platform; there are {known}")
         })?;
-        Ok(Self {
-            platform,
-            path: path.into(),
-        })
+        Ok(Self { platform, path: path.into() })
     }
 }
 
@@ -58,10 +55,8 @@ pub(super) fn add(fitted: &mut Vec<Fitted>, others: &[Binary], components: &[Com
 
 /// A library tells by its guid what it belongs to.
 fn fit(binary: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
-    let content = std::fs::read(&binary.path).map_err(|source| PackError::Read {
-        path: binary.path.clone(),
-        source,
-    })?;
+    let content =
+        std::fs::read(&binary.path).map_err(|source| PackError::Read { path: binary.path.clone(), source })?;
     let platform = binary.platform;
     if let Err(found) = platform.check(&content) {
         return Err(binary.refused(format!("is {found}, but {} needs {}", platform.folder, platform.name)));
@@ -80,11 +75,7 @@ fn fit(binary: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
             names.join(", ")
         )));
     };
-    Ok(Fitted {
-        component,
-        platform,
-        content,
-    })
+    Ok(Fitted { component, platform, content })
 }
 
 impl Binary {
@@ -94,9 +85,6 @@ impl Binary {
     }
 
     fn refused(&self, problem: impl Into<String>) -> PackError {
-        PackError::Binary {
-            path: self.path.clone(),
-            problem: problem.into(),
-        }
+        PackError::Binary { path: self.path.clone(), problem: problem.into() }
     }
 }

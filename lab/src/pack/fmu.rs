@@ -19,9 +19,7 @@ pub(super) fn all(components: &[Component], libraries: &Libraries) -> Result<Vec
     for (index, component) in components.iter().enumerate() {
         let served: Vec<_> = fitted.iter().filter(|f| f.component == index).collect();
         if served.is_empty() {
-            return Err(PackError::Unserved {
-                identifier: component.identifier,
-            });
+            return Err(PackError::Unserved { identifier: component.identifier });
         }
         files.push(one(component, &served, date.as_deref())?);
     }
@@ -37,16 +35,8 @@ fn own(fitted: &mut Vec<Fitted>, components: &[Component], libraries: &Libraries
         .filter(|also| !libraries.others.iter().any(|other| other.is_for(also)));
     for (component, one) in components.iter().enumerate() {
         let content = library::read(one, &libraries.folder, &platform)?;
-        fitted.extend(second.map(|platform| Fitted {
-            component,
-            platform,
-            content: content.clone(),
-        }));
-        fitted.push(Fitted {
-            component,
-            platform,
-            content,
-        });
+        fitted.extend(second.map(|platform| Fitted { component, platform, content: content.clone() }));
+        fitted.push(Fitted { component, platform, content });
     }
     Ok(())
 }
@@ -69,9 +59,6 @@ fn one(component: &Component, libraries: &[&Fitted], date: Option<&str>) -> Resu
     let name = format!("{identifier}.fmu");
     match archive::zip(&entries) {
         Ok(content) => Ok(File { name, content }),
-        Err(source) => Err(PackError::Write {
-            path: name.into(),
-            source,
-        }),
+        Err(source) => Err(PackError::Write { path: name.into(), source }),
     }
 }

@@ -22,29 +22,17 @@ pub(super) fn read(component: &Component, folder: &Path, platform: &Platform) ->
             path: path.clone(),
             build_options: build_options.clone(),
         },
-        _ => PackError::Read {
-            path: path.clone(),
-            source,
-        },
+        _ => PackError::Read { path: path.clone(), source },
     })?;
     if let Err(found) = platform.check(&bytes) {
-        return Err(PackError::Platform {
-            path,
-            found,
-            needed: platform.name,
-            build_options,
-        });
+        return Err(PackError::Platform { path, found, needed: platform.name, build_options });
     }
     if !exports(&bytes, "fmi2Instantiate") {
         return Err(PackError::NotAComponent { path, build_options });
     }
     if component.guid().is_some_and(|guid| !mentions(&bytes, guid)) {
         let identifier = component.identifier;
-        return Err(PackError::Stale {
-            path,
-            identifier,
-            build_options,
-        });
+        return Err(PackError::Stale { path, identifier, build_options });
     }
     Ok(bytes)
 }

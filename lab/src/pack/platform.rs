@@ -40,33 +40,15 @@ const KNOWN: [Platform; 9] = [
 const DARWIN: &str = "darwin64";
 
 const fn linux(folder: &'static str, name: &'static str, architecture: Architecture) -> Platform {
-    Platform {
-        folder,
-        name,
-        suffix: ".so",
-        format: Elf,
-        architecture,
-    }
+    Platform { folder, name, suffix: ".so", format: Elf, architecture }
 }
 
 const fn windows(folder: &'static str, name: &'static str, architecture: Architecture) -> Platform {
-    Platform {
-        folder,
-        name,
-        suffix: ".dll",
-        format: Pe,
-        architecture,
-    }
+    Platform { folder, name, suffix: ".dll", format: Pe, architecture }
 }
 
 const fn macos(folder: &'static str, name: &'static str, architecture: Architecture) -> Platform {
-    Platform {
-        folder,
-        name,
-        suffix: ".dylib",
-        format: MachO,
-        architecture,
-    }
+    Platform { folder, name, suffix: ".dylib", format: MachO, architecture }
 }
 
 impl Platform {

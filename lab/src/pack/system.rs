@@ -44,9 +44,6 @@ pub(super) fn file(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
     let name = String::from("bench.ssp");
     match archive::zip(&entries) {
         Ok(content) => Ok(File { name, content }),
-        Err(source) => Err(PackError::Write {
-            path: name.into(),
-            source,
-        }),
+        Err(source) => Err(PackError::Write { path: name.into(), source }),
     }
 }

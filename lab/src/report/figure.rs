@@ -94,11 +94,7 @@ impl Figure {
 
     /// A figure of that size, px.
     pub fn new(size: (u32, u32), panels: Vec<Panel>) -> Self {
-        Self {
-            size,
-            panels,
-            key: Vec::new(),
-        }
+        Self { size, panels, key: Vec::new() }
     }
 
     /// With a key at the right of the panel.
@@ -109,10 +105,7 @@ impl Figure {
 
 impl Axis {
     pub fn new(range: (f64, f64), label: &str) -> Self {
-        Self {
-            range,
-            label: label.into(),
-        }
+        Self { range, label: label.into() }
     }
 }
 

@@ -159,13 +159,7 @@ pub(super) fn map_csv(map: &Map) -> Result<String, WriteError> {
         theory_stable: bool,
     }
     let row = |cell: &Cell| {
-        let Cell {
-            sigma,
-            g,
-            r,
-            point,
-            theory_stable,
-        } = *cell;
+        let Cell { sigma, g, r, point, theory_stable } = *cell;
         let Point {
             regime,
             impacts_per_period,

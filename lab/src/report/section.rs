@@ -64,10 +64,7 @@ pub struct Section {
 
 impl Section {
     pub(super) fn new(title: &str) -> Self {
-        Self {
-            title: title.into(),
-            ..Self::default()
-        }
+        Self { title: title.into(), ..Self::default() }
     }
 
     /// States the finding, in the summary and as a paragraph.
@@ -81,32 +78,19 @@ impl Section {
     }
 
     pub(super) fn figure(&mut self, name: &str, caption: impl Into<String>, svg: String) {
-        self.blocks.push(Block::Figure {
-            name: name.into(),
-            caption: caption.into(),
-            svg,
-        });
+        self.blocks
+            .push(Block::Figure { name: name.into(), caption: caption.into(), svg });
     }
 
     pub(super) fn table(&mut self, caption: &str, table: Table) {
-        self.blocks.push(Block::Table {
-            caption: caption.into(),
-            table,
-        });
+        self.blocks.push(Block::Table { caption: caption.into(), table });
     }
 
     pub(super) fn budget(&mut self, what: &str, size: String, why: &str) {
-        self.budget.push(Budget {
-            what: what.into(),
-            size,
-            why: why.into(),
-        });
+        self.budget.push(Budget { what: what.into(), size, why: why.into() });
     }
 
     pub(super) fn attach(&mut self, name: &str, text: String) {
-        self.attachments.push(Attachment {
-            name: name.into(),
-            text,
-        });
+        self.attachments.push(Attachment { name: name.into(), text });
     }
 }

@@ -81,18 +81,12 @@ impl Div for Dual {
 impl Scalar for Dual {
     fn sine(self) -> Self {
         let (value, cosine) = libm::sincos(self.value);
-        Self {
-            value,
-            slope: cosine * self.slope,
-        }
+        Self { value, slope: cosine * self.slope }
     }
 
     fn cosine(self) -> Self {
         let (sine, value) = libm::sincos(self.value);
-        Self {
-            value,
-            slope: -sine * self.slope,
-        }
+        Self { value, slope: -sine * self.slope }
     }
 }
 

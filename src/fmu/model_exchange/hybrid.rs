@@ -69,11 +69,7 @@ impl Hybrid {
             totals: Totals::default(),
             base_before: None,
             drive,
-            states: States {
-                q1,
-                q2,
-                ..States::default()
-            },
+            states: States { q1, q2, ..States::default() },
         };
         hybrid.set_velocities(dq1, dq2);
         Ok(hybrid)
@@ -185,11 +181,7 @@ impl Hybrid {
     }
 
     fn set_velocities(&mut self, dq1: f64, dq2: f64) {
-        let now = Instant {
-            dq1,
-            dq2,
-            ..self.instant()
-        };
+        let now = Instant { dq1, dq2, ..self.instant() };
         (self.states.u1, self.states.u2) = now.reduced_velocities();
     }
 
@@ -238,10 +230,7 @@ impl Hybrid {
     /// Whether a particle that leaves `wall` at `speed` is in truth at rest on it.
     fn rests(&self, law: &ImpactLaw, wall: Wall, primary: f64, speed: f64) -> bool {
         let (b, fast) = self.scales();
-        let now = Instant {
-            dq1: primary,
-            ..self.instant()
-        };
+        let now = Instant { dq1: primary, ..self.instant() };
         let pressing = wall.sign() * now.acceleration();
         let resolution = Resolution {
             lowest_hop: LOWEST_HOP * b,

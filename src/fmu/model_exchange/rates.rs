@@ -36,11 +36,7 @@ impl Movement {
         if stuck {
             particle[2..].copy_from_slice(&primary[2..]);
         }
-        Self {
-            base,
-            primary,
-            particle,
-        }
+        Self { base, primary, particle }
     }
 
     /// The `order`-th time derivative (0 to 3) of the mechanical energy.

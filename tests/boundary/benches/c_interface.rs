@@ -37,24 +37,14 @@ struct Scene {
 
 /// Near its lock: two impacts a period.
 const STEADY: Scene = Scene {
-    start: State {
-        q1: -0.42,
-        dq1: 0.01,
-        q2: -0.99,
-        dq2: -0.86,
-    },
+    start: State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 },
     amplitude: EPSILON * 1.1,
     omega: 0.990_417,
 };
 
 /// The particle is at rest in the middle, and no wall ever comes near it.
 const QUIET: Scene = Scene {
-    start: State {
-        q1: 0.0,
-        dq1: 0.0,
-        q2: 0.0,
-        dq2: 0.0,
-    },
+    start: State { q1: 0.0, dq1: 0.0, q2: 0.0, dq2: 0.0 },
     amplitude: 1e-3,
     omega: 0.990_417,
 };

@@ -64,10 +64,7 @@ pub fn sequence(fmu: &Fmu, seed: u64) -> Tally {
     };
     let master = Master::new(fmu, interface);
     let mut caller = Caller::new(&master, fmu.description, interface);
-    let mut tally = Tally {
-        sequences: 1,
-        ..Tally::default()
-    };
+    let mut tally = Tally { sequences: 1, ..Tally::default() };
     if dice.one_in(2) {
         master.start();
     }

@@ -40,11 +40,7 @@ unsafe extern "C" fn hear(
     // SAFETY: none is NULL, and the environment is the list that `callbacks` was given.
     unsafe {
         let text = |pointer| CStr::from_ptr(pointer).to_str().unwrap().to_owned();
-        (*environment.cast::<Vec<Line>>()).push(Line {
-            status,
-            category: text(category),
-            text: text(message),
-        });
+        (*environment.cast::<Vec<Line>>()).push(Line { status, category: text(category), text: text(message) });
     }
 }
 
@@ -97,12 +93,7 @@ impl Master {
         let f = fmu.functions;
         // SAFETY: as the standard asks.
         let c = unsafe { (f.fmi2Instantiate)(c"rig".as_ptr(), kind, guid.as_ptr(), location, &*functions, 0, 0) };
-        Self {
-            c,
-            f,
-            lines,
-            _callbacks: functions,
-        }
+        Self { c, f, lines, _callbacks: functions }
     }
 
     /// A co-simulation instance that is ready to step.

@@ -60,12 +60,7 @@ impl Pair {
         let armed = unsafe { (controller.f.fmi2SetBoolean)(controller.c, &controller::ACTIVE, 1, &1) };
         controller.well(armed);
         controller.start();
-        Self {
-            plant,
-            controller,
-            time: 0.0,
-            digest: Sha256::new(),
-        }
+        Self { plant, controller, time: 0.0, digest: Sha256::new() }
     }
 
     /// Hands values on, and takes a step of `step` s; answers the frequency of the drive, rad/s.
@@ -82,12 +77,7 @@ impl Pair {
 
     /// Takes every output bit of both into the digest.
     pub fn digest(&mut self) {
-        let Self {
-            plant,
-            controller,
-            digest,
-            ..
-        } = self;
+        let Self { plant, controller, digest, .. } = self;
         for value in reals(plant, plant::REALS) {
             digest.update(value.to_bits().to_le_bytes());
         }

@@ -47,11 +47,7 @@ mod tests {
     use super::*;
 
     fn known(c: f64) -> Known {
-        Known {
-            c,
-            g: 1.0 + c * c,
-            sigma: -3.0 + 2.0 * c,
-        }
+        Known { c, g: 1.0 + c * c, sigma: -3.0 + 2.0 * c }
     }
 
     fn slow_flow() -> SlowFlow {

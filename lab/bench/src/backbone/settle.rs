@@ -145,10 +145,7 @@ impl Balance {
         };
         let values: Vec<f64> = cycles.iter().map(&mut value).collect();
         let line = Line::fit(&values);
-        Self {
-            random: noise(&values) >= RANDOM_SHARE * line.residual,
-            line,
-        }
+        Self { random: noise(&values) >= RANDOM_SHARE * line.residual, line }
     }
 }
 
@@ -157,11 +154,7 @@ mod tests {
     use super::*;
     use nalgebra::Complex;
 
-    const CRITERION: Criterion = Criterion {
-        tolerance: 5e-4,
-        precision: 2e-3,
-        fewest: 8,
-    };
+    const CRITERION: Criterion = Criterion { tolerance: 5e-4, precision: 2e-3, fewest: 8 };
     /// Drive and frequency of phase resonance.
     const TRUTH: (f64, f64) = (0.02, 3.0);
 

@@ -160,11 +160,7 @@ pub fn track(
         progress(n, levels.len());
         let known: Vec<Known> = points
             .iter()
-            .map(|point| Known {
-                c: point.level,
-                g: point.g,
-                sigma: point.sigma,
-            })
+            .map(|point| Known { c: point.level, g: point.g, sigma: point.sigma })
             .collect();
         let (g, sigma) = predictor::change(settings.predictor, &known, level, &slow_flow);
         bench.controller.hold_response(Move {
@@ -175,11 +171,7 @@ pub fn track(
         })?;
         points.push(hold(&mut bench, scene, level)?);
     }
-    Ok(Tracked {
-        points,
-        periods_to_lock,
-        periods: bench.periods,
-    })
+    Ok(Tracked { points, periods_to_lock, periods: bench.periods })
 }
 
 /// Runs the loop until it is near phase resonance, with the initial drive amplitude.

@@ -44,11 +44,7 @@ pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic
         }
         // The phase of a turns by Im(drift/a) per half window.
         omega += (drift * a.conj()).im / square / (middle * sample_time);
-        fitted = Some(Harmonic {
-            amplitude: a.norm(),
-            phase: a.arg(),
-            omega,
-        });
+        fitted = Some(Harmonic { amplitude: a.norm(), phase: a.arg(), omega });
     }
     fitted
 }

@@ -13,10 +13,7 @@ pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
     truths
         .windows(2)
         .filter(|pair| pair[1].impacts > pair[0].impacts)
-        .map(|pair| Impact {
-            time: pair[1].impact_time,
-            velocity: pair[1].impact_velocity,
-        })
+        .map(|pair| Impact { time: pair[1].impact_time, velocity: pair[1].impact_velocity })
         .collect()
 }
 

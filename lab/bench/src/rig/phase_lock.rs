@@ -18,10 +18,7 @@ impl BuiltIn {
     /// Settings that the controller cannot work with.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         let lock = config.build()?;
-        Ok(Self {
-            state: lock.start(),
-            lock,
-        })
+        Ok(Self { state: lock.start(), lock })
     }
 }
 

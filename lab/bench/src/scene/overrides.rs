@@ -45,21 +45,13 @@ impl FromStr for Override {
             _ => (String::new(), None),
         };
         let (key, value) = keys.ok_or(SyntaxError::NotOneKey)?;
-        Ok(Self {
-            argument: argument.into(),
-            section,
-            key,
-            value,
-        })
+        Ok(Self { argument: argument.into(), section, key, value })
     }
 }
 
 impl Override {
     fn error(&self, message: impl Into<String>) -> SceneError {
-        SceneError::Override {
-            argument: self.argument.clone(),
-            message: message.into(),
-        }
+        SceneError::Override { argument: self.argument.clone(), message: message.into() }
     }
 
     fn is(&self, section: &str, key: &str) -> bool {

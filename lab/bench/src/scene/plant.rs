@@ -27,10 +27,7 @@ pub(super) struct PlantSection {
 
 impl PlantSection {
     pub(super) fn resolve(&self, origin: &str) -> Result<Parameters, SceneError> {
-        let keys = |message: &str| SceneError::Keys {
-            origin: origin.into(),
-            message: message.into(),
-        };
+        let keys = |message: &str| SceneError::Keys { origin: origin.into(), message: message.into() };
         let si = [self.mass, self.k, self.c, self.m, self.b];
         let dimensionless = [self.epsilon, self.lambda];
         let is_si = si.iter().any(Option::is_some);

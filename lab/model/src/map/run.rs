@@ -103,10 +103,9 @@ fn recorded(plant: &mut Plant, drive: Drive, periods: usize) -> Result<(Vec<Impa
     let mut rests = usize::from(plant.contact().is_some());
     for n in 0..periods {
         plant.advance_with(drive, TAU / drive.omega, |event| match event {
-            Event::Impact { t, velocity, .. } => impacts.push(Impact {
-                time: TAU * n as f64 + drive.omega * t,
-                velocity,
-            }),
+            Event::Impact { t, velocity, .. } => {
+                impacts.push(Impact { time: TAU * n as f64 + drive.omega * t, velocity })
+            }
             Event::Stuck { .. } => rests += 1,
             Event::Released { .. } => {}
         })?;

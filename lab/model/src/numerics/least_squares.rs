@@ -39,11 +39,7 @@ impl HarmonicBasis {
             let wave = if cosine { angle.cos() } else { angle.sin() };
             time(row).powi(degree as i32) * wave
         });
-        Self {
-            factors: matrix.clone().qr(),
-            matrix,
-            columns,
-        }
+        Self { factors: matrix.clone().qr(), matrix, columns }
     }
 
     /// Number of unknowns.
@@ -63,10 +59,7 @@ impl HarmonicBasis {
         self.factors.q_tr_mul(&mut right);
         let right = right.rows(0, self.terms()).into_owned();
         let coefficients = self.factors.r().solve_upper_triangular(&right)?;
-        Some(HarmonicFit {
-            coefficients,
-            columns: self.columns.clone(),
-        })
+        Some(HarmonicFit { coefficients, columns: self.columns.clone() })
     }
 
     /// The residual of a fit.

@@ -28,13 +28,7 @@ impl Bounce {
 
     pub(super) fn from_vector(x: &Vector4<f64>, wall: f64) -> Self {
         let [phase, q1, dq1, dq2] = (*x).into();
-        Self {
-            phase,
-            q1,
-            dq1,
-            dq2,
-            wall,
-        }
+        Self { phase, q1, dq1, dq2, wall }
     }
 
     /// Displacement of the particle over b.

@@ -108,11 +108,7 @@ pub fn continue_from(
     towards: &Unknowns,
     limits: &Limits,
 ) -> Branch {
-    let curve = Curve {
-        scene,
-        start,
-        condition,
-    };
+    let curve = Curve { scene, start, condition };
     let mut branch = Branch {
         points: vec![start.clone()],
         special: Vec::new(),
@@ -173,11 +169,7 @@ pub fn continue_both_ways(scene: &Dimensionless, start: &Periodic, condition: Co
     points.append(&mut up.points);
     let mut special: Vec<Special> = down.special.into_iter().rev().collect();
     special.append(&mut up.special);
-    Branch {
-        points,
-        special,
-        ended: up.ended,
-    }
+    Branch { points, special, ended: up.ended }
 }
 
 /// Distance from the symmetric motion at which an asymmetric one is searched for.
@@ -199,15 +191,8 @@ pub fn asymmetric_branch(
     let aside = svd.v_t?.row(svd.singular_values.imin()).transpose();
     let mut towards = Unknowns::zeros();
     towards.fixed_rows_mut::<4>(0).copy_from(&aside);
-    let doubled = Periodic {
-        pattern: symmetric.pattern.doubled(),
-        ..symmetric.clone()
-    };
-    let curve = Curve {
-        scene,
-        start: &doubled,
-        condition,
-    };
+    let doubled = Periodic { pattern: symmetric.pattern.doubled(), ..symmetric.clone() };
+    let curve = Curve { scene, start: &doubled, condition };
     let x = curve.correct(&symmetric.unknowns(), &towards, ASIDE)?;
     let start = curve.motion(&x)?;
     Some(continue_from(scene, &start, condition, &towards, limits))

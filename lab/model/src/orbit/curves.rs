@@ -66,11 +66,7 @@ pub fn response(scene: &Dimensionless, limits: &Limits) -> Option<Response> {
             asymmetric.extend(asymmetric_branch(scene, special, condition, limits));
         }
     }
-    Some(Response {
-        g: scene.g,
-        symmetric,
-        asymmetric,
-    })
+    Some(Response { g: scene.g, symmetric, asymmetric })
 }
 
 /// Whether a branch passes a motion within the distance of its own points.

@@ -24,11 +24,7 @@ impl ImpactPattern {
     /// Two impacts per period, half a period apart: symmetric 1:1.
     #[must_use]
     pub fn symmetric() -> Self {
-        Self {
-            walls: vec![1.0],
-            half_periods: 1,
-            mirrored: true,
-        }
+        Self { walls: vec![1.0], half_periods: 1, mirrored: true }
     }
 
     /// The same pattern over a whole period, as after symmetry breaking.
@@ -40,11 +36,7 @@ impl ImpactPattern {
         } else {
             walls.extend(&self.walls);
         }
-        Self {
-            walls,
-            half_periods: 2 * self.half_periods,
-            mirrored: false,
-        }
+        Self { walls, half_periods: 2 * self.half_periods, mirrored: false }
     }
 
     /// Impacts over the whole period of the motion.
@@ -139,15 +131,7 @@ pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknown
 
     let harmonic = Harmonic::new(scene, &map, pattern);
     let (v, v_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
-    Some(Returned {
-        residual,
-        by,
-        v,
-        v_by,
-        bounces,
-        durations,
-        monodromy,
-    })
+    Some(Returned { residual, by, v, v_by, bounces, durations, monodromy })
 }
 
 /// The chain rule: derivatives of a step by the unknowns. The step itself also depends on Omega and G.

@@ -90,9 +90,7 @@ impl Periodic {
     /// The unknowns of this motion: (phase, q1, q1', q2') after its first impact, sigma, G.
     #[must_use]
     pub fn unknowns(&self) -> Unknowns {
-        let Bounce {
-            phase, q1, dq1, dq2, ..
-        } = self.bounces[0];
+        let Bounce { phase, q1, dq1, dq2, .. } = self.bounces[0];
         Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
     }
 

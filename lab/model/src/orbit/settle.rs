@@ -45,9 +45,7 @@ fn settled(scene: &Dimensionless, sigma: f64, state: [f64; 4]) -> Option<Periodi
         .take(2 * LONGEST)
         .collect();
     let pattern = pattern(&bounces)?;
-    let Bounce {
-        phase, q1, dq1, dq2, ..
-    } = first;
+    let Bounce { phase, q1, dq1, dq2, .. } = first;
     let guess = Unknowns::from([phase, q1, dq1, dq2, sigma, scene.g]);
     let conditions = [Condition::Sigma(sigma), Condition::Excitation(scene.g)];
     Periodic::find(scene, &pattern, &guess, conditions)

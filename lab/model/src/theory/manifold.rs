@@ -25,9 +25,7 @@ impl Manifold {
     /// The manifold for the restitution coefficient `r`, in (0, 1].
     #[must_use]
     pub fn new(r: f64) -> Self {
-        Self {
-            dissipation: (1.0 - r) / (1.0 + r),
-        }
+        Self { dissipation: (1.0 - r) / (1.0 + r) }
     }
 
     /// `R^2 + pi^2/4`: the coefficient of B^2.

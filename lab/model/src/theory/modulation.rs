@@ -166,12 +166,6 @@ impl Iterator for ImpactSequence {
         (self.phase, self.z, self.b, self.psi) = (phase, z, b, psi);
         self.impacts += 1;
         self.lost = false;
-        Some(Modulation {
-            tau: phase / self.omega,
-            c: z.norm(),
-            gamma: z.arg(),
-            b,
-            psi,
-        })
+        Some(Modulation { tau: phase / self.omega, c: z.norm(), gamma: z.arg(), b, psi })
     }
 }

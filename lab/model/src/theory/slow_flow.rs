@@ -32,10 +32,7 @@ impl SlowFlow {
     /// The slow flow for the damping `lambda` and the restitution coefficient `r`.
     #[must_use]
     pub fn new(lambda: f64, r: f64) -> Self {
-        Self {
-            lambda,
-            manifold: Manifold::new(r),
-        }
+        Self { lambda, manifold: Manifold::new(r) }
     }
 
     /// `lambda C^2 + (4/pi) R B^2`: dissipation of C^2 by damping and impacts per unit of tau1 (eq. 11).

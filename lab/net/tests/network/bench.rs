@@ -76,12 +76,7 @@ fn serve(
             Box::new(move |session| list.lock().unwrap().push(session.clone())),
         );
     });
-    Served {
-        address,
-        stop,
-        sessions,
-        thread: Some(thread),
-    }
+    Served { address, stop, sessions, thread: Some(thread) }
 }
 
 /// Settings of a server for the plant of `scene`.
@@ -130,10 +125,7 @@ pub fn serve_controller(
     silence: f64,
     mut make: impl FnMut() -> Box<dyn Controller> + Send + 'static,
 ) -> Served {
-    let service = ControllerService {
-        sample_time: scene.sample_time(),
-        silence,
-    };
+    let service = ControllerService { sample_time: scene.sample_time(), silence };
     let mut server = ControllerServer::listen(ANYWHERE.parse().unwrap(), service).unwrap();
     serve(server.address().unwrap(), move |stop, tell| {
         server.serve(|| Ok(make()), stop, tell).unwrap();

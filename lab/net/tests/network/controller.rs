@@ -14,10 +14,7 @@ use crate::proxy::{Fate, Proxy};
 const PATIENT: f64 = 2.0;
 
 fn reading(n: usize) -> Sensors {
-    Sensors {
-        response: n as f64,
-        reference: None,
-    }
+    Sensors { response: n as f64, reference: None }
 }
 
 /// A controller that logs its readings, and answers with their number.

@@ -14,10 +14,7 @@ type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64
 type Drawn<T = ()> = Result<T, Box<dyn Error>>;
 
 const FONT: &str = "Helvetica, Arial, sans-serif";
-const CENTRE: Pos = Pos {
-    h_pos: HPos::Center,
-    v_pos: VPos::Center,
-};
+const CENTRE: Pos = Pos { h_pos: HPos::Center, v_pos: VPos::Center };
 
 /// Units of the drawing for `px` pixels of the figure.
 const fn px(px: u32) -> u32 {

@@ -76,13 +76,7 @@ pub fn figure(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
 
 impl Data<'_> {
     fn driven_panel(&self, row: usize, y: Axis) -> Panel {
-        let Comparison {
-            parameters,
-            lock,
-            exact,
-            theory,
-            ..
-        } = self.found;
+        let Comparison { parameters, lock, exact, theory, .. } = self.found;
         let end = 1.02 * self.driven.last().map_or(1.0, |one| one[0]);
         let mut panel = Panel::new(Axis::new((0.0, end), "time, in periods of the oscillator alone"), y);
         if row == 1 {

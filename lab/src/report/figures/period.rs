@@ -85,11 +85,7 @@ fn coordinates(
     panel.curve(w, line(EXACT, 30), "w = q₁ − q₂, exact");
     panel.curve(v, line(DECAY, 30), "v = q₁ + ε q₂, exact");
     if let Some(point) = theory {
-        let scene = Dimensionless {
-            omega0: 1.0,
-            b: 1.0,
-            ..*p
-        };
+        let scene = Dimensionless { omega0: 1.0, b: 1.0, ..*p };
         let wave = Waveform::new(&scene, point.sigma, point.b, -FRAC_PI_2);
         let time = |n: usize| part(n) * TAU / wave.omega;
         let of = |what: fn(&Waveform, f64) -> f64| -> Vec<Place> {

@@ -50,10 +50,7 @@ fn figure(map: &Map) -> Figure {
             swatch: Some((theme::regime(one), letter(one), theme::on_regime(one))),
         })
         .collect();
-    key.push(KeyEntry {
-        name: "stable 1:1, theory",
-        swatch: None,
-    });
+    key.push(KeyEntry { name: "stable 1:1, theory", swatch: None });
     Figure::new(SIZE, vec![panel]).with_key(key)
 }
 

@@ -14,18 +14,10 @@ impl Converter {
     /// two's complement.
     pub fn new(bits: u32, range: f64) -> Self {
         if bits == 0 {
-            return Self {
-                step: 0.0,
-                low: f64::NEG_INFINITY,
-                high: f64::INFINITY,
-            };
+            return Self { step: 0.0, low: f64::NEG_INFINITY, high: f64::INFINITY };
         }
         let step = 2.0 * range / 2_f64.powi(bits as i32);
-        Self {
-            step,
-            low: -range,
-            high: range - step,
-        }
+        Self { step, low: -range, high: range - step }
     }
 
     pub fn convert(&self, value: f64) -> f64 {

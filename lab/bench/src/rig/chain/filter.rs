@@ -16,12 +16,7 @@ pub struct LowPass {
 impl LowPass {
     /// A filter at rest with the cut-off frequency `cut_off`, rad/s.
     pub fn new(cut_off: f64) -> Self {
-        Self {
-            cut_off,
-            input: 0.0,
-            output: 0.0,
-            slope: 0.0,
-        }
+        Self { cut_off, input: 0.0, output: 0.0, slope: 0.0 }
     }
 
     /// The output `elapsed` seconds after the last sample, when the signal is `input`.

@@ -37,11 +37,7 @@ impl Sensor {
             RatioOf::Signal => (0.0, 1.0 / memory),
             RatioOf::Range => (0.5 * range * range, 0.0),
         };
-        Self {
-            ratio: 10_f64.powf(-snr / 20.0),
-            power,
-            follow,
-        }
+        Self { ratio: 10_f64.powf(-snr / 20.0), power, follow }
     }
 
     pub fn read(&mut self, value: f64, normal: &mut NormalDistribution) -> f64 {
