@@ -36,7 +36,7 @@ pub const NAMES: &[&str] = &[
 /// Measures the method of that name.
 ///
 /// # Errors
-/// A name that is none of [`NAMES`].
+/// An unknown name; [`NAMES`] has the known ones.
 pub fn measure_named(
     name: &str,
     scene: &Scene,

@@ -24,14 +24,15 @@
 //! value is written once:
 //!
 //! ```ignore
-#![doc = include_str!("../example/build.rs")]
+//! //! Turns the model description into the variable table.
+//!
+//! fn main() {
+//!     fmi2_component_build::generate("modelDescription.xml");
+//! }
 //! ```
 //!
-//! `src/lib.rs`; this is the whole example of a water tank, whose description lies beside it in `example/`:
-//!
-//! ```ignore
-#![doc = include_str!("../example/src/lib.rs")]
-//! ```
+//! `src/lib.rs` implements [`Component`] for a struct and ends with `fmi2_component::export!(MyComponent)`. The repository has a whole
+//! example, a water tank, in `fmi2-component/example/`, with its description.
 //!
 //! A component whose equations a master may integrate by itself says besides what they are ([`ModelExchange`]), and is
 //! exported by `fmi2_component::export!(MyComponent, model_exchange)`. Its description lists states and derivatives

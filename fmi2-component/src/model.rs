@@ -25,7 +25,7 @@ pub trait Model: 'static {
     type Real: Key<Value = f64>;
     /// The variables that hold an integer or an enumeration.
     type Integer: Key<Value = i32>;
-    /// The variables that hold a truth value.
+    /// The Boolean variables.
     type Boolean: Key<Value = bool>;
     /// The variables that hold text.
     type String: Key<Value = &'static str>;

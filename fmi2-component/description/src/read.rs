@@ -56,15 +56,22 @@ fn each<T, U>(list: Vec<T>, read: fn(T) -> Result<U, Error>) -> Result<Vec<U>, E
     list.into_iter().map(read).collect()
 }
 
+/// The lists of an element that has them; serde-xml-rs cannot flatten them into a struct of their own.
+macro_rules! lists {
+    ($element:ident) => {
+        [
+            (Kind::Real, $element.real),
+            (Kind::Integer, $element.integer),
+            (Kind::Boolean, $element.boolean),
+            (Kind::String, $element.string),
+            (Kind::Enumeration, $element.enumeration),
+        ]
+    };
+}
+
 fn simple_type(element: xml::SimpleType) -> Result<SimpleType, Error> {
     let label = label("SimpleType", element.name.as_deref());
-    let lists = [
-        (Kind::Real, element.real),
-        (Kind::Integer, element.integer),
-        (Kind::Boolean, element.boolean),
-        (Kind::String, element.string),
-        (Kind::Enumeration, element.enumeration),
-    ];
+    let lists = lists!(element);
     Ok(SimpleType {
         name: required(element.name, &label, "name")?,
         content: contents(lists, &label)?,
@@ -73,13 +80,7 @@ fn simple_type(element: xml::SimpleType) -> Result<SimpleType, Error> {
 
 fn variable(element: xml::ScalarVariable) -> Result<ScalarVariable, Error> {
     let label = label("ScalarVariable", element.name.as_deref());
-    let lists = [
-        (Kind::Real, element.real),
-        (Kind::Integer, element.integer),
-        (Kind::Boolean, element.boolean),
-        (Kind::String, element.string),
-        (Kind::Enumeration, element.enumeration),
-    ];
+    let lists = lists!(element);
     let reference = number(element.value_reference, &label, "valueReference")?;
     Ok(ScalarVariable {
         name: required(element.name, &label, "name")?,

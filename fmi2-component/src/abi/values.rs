@@ -1,4 +1,4 @@
-//! `fmi2GetReal`, `fmi2SetReal`, and the same for integers and truth values (FMI 2.0, clause 2.1.7).
+//! `fmi2GetReal`, `fmi2SetReal`, and the same for integers and Booleans (FMI 2.0, clause 2.1.7).
 
 use std::ffi::c_int;
 

@@ -1,4 +1,4 @@
-//! Sequences of calls, drawn by lot, with good and bad arguments: no crash, no hang, and a reason for every error.
+//! Random sequences of calls, with valid and invalid arguments: no crash, no hang, and a reason for every error.
 
 mod calls;
 mod dice;

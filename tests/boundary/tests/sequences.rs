@@ -1,4 +1,4 @@
-//! Sequences of calls drawn by lot; `scripts/stress` makes many more of them.
+//! Random sequences of calls; `scripts/stress` makes many more of them.
 
 use fmi2_boundary::{Fmu, fuzz};
 

@@ -1,4 +1,4 @@
-//! One call of any function, with arguments drawn by lot: most of them good, so that sequences get somewhere.
+//! One call of any function, with random arguments: most of them valid, so that sequences get somewhere.
 
 mod arguments;
 mod life;

@@ -1,4 +1,4 @@
-//! Arguments drawn by lot.
+//! Random arguments.
 
 use std::ptr::null;
 
