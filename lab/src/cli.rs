@@ -7,6 +7,7 @@ mod decay;
 mod endpoint;
 mod failure;
 mod identify;
+mod interrupt;
 mod map;
 mod orbit;
 mod pack;
@@ -18,12 +19,13 @@ mod theory;
 
 use std::{
     io::{self, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
 };
 
 use clap::{Parser, Subcommand};
 use serde::Serialize;
+use vines::net::Timing;
 
 use failure::Failure;
 
@@ -65,7 +67,11 @@ enum Command {
     Controller(controller::Arguments),
 }
 
-/// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input.
+/// Share of late samples of a rig in real time above which its results are doubtful.
+const TOLERATED: f64 = 0.01;
+
+/// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input, 3 for results of a rig that did not keep its time,
+/// 130 after Ctrl-C.
 pub fn run() -> ExitCode {
     let output = match Cli::parse().command {
         Command::Identify(arguments) => identify::run(&arguments),
@@ -108,6 +114,29 @@ fn yes_no(value: bool) -> String {
 fn written(paths: &[PathBuf]) -> String {
     let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     format!("Written: {}\n", files.join(", "))
+}
+
+/// Creates a folder for results, and checks that files can be written to it before anything is driven.
+fn writable(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .and_then(|()| tempfile::tempfile_in(folder))
+        .map_err(|error| Failure::input(format!("cannot write to {}: {error}", folder.display())))?;
+    Ok(())
+}
+
+/// Prints a result, and says on stderr how a rig in real time kept its time. Exit code 3 if it did not.
+fn with_timing(text: String, timing: Option<Timing>) -> Result<String, Failure> {
+    let Some(timing) = timing.filter(|timing| timing.share() > 0.0) else {
+        return Ok(text);
+    };
+    if timing.share() <= TOLERATED {
+        eprintln!("warning: the rig was not always in time: {timing}");
+        return Ok(text);
+    }
+    print(&text)?;
+    Err(Failure::late(format!(
+        "the rig did not keep its time, so these results are doubtful: {timing}"
+    )))
 }
 
 fn json(found: &impl Serialize) -> Result<String, Failure> {

@@ -7,11 +7,11 @@ use indicatif::ProgressBar;
 use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
 use super::{
-    endpoint::{Endpoint, OpenRig, ReachArguments},
+    endpoint::{Endpoint, ReachArguments},
     failure::Failure,
     json,
     scene_arguments::SceneArguments,
-    written,
+    with_timing, writable, written,
 };
 
 const HELP: &str = "\
@@ -27,7 +27,7 @@ Examples:
   vines backbone --set backbone.C_to=0.2 --set backbone.points=11
   vines backbone --set chain.snr=40 --set chain.seed=7    with sensor noise
   vines backbone --set backbone.predictor='\"theory\"'           with theory as the predictor
-  vines backbone --rig LoViNes.fmu --out out/fmu          another rig: an FMU, or udp://HOST:PORT
+  vines backbone --rig LoViNes.fmu --out out/fmu          another rig: an FMU, or a network address
 
 Writes tracked.json, tracked.csv and tracked.svg.";
 
@@ -42,7 +42,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
 
-    /// The rig: `built-in`, an FMU, or udp://HOST:PORT
+    /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), or udp://HOST:PORT (in real time)
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     rig: Endpoint,
 
@@ -61,19 +61,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .format_timestamp(None)
         .init();
     let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(Failure::input)?;
-    let OpenRig { mut rig, .. } = arguments.rig.rig(&scene, arguments.reach.reach())?;
+    writable(&arguments.out)?;
+    let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
-    let tracked = track(rig.as_mut(), &mut controller, &scene, |done, _| {
+    let tracked = track(&mut open.rig, &mut controller, &scene, |done, _| {
         bar.set_position(done as u64);
     });
     bar.finish_and_clear();
-    // Dropping the rig ends a network session.
-    drop(rig);
+    let timing = open.close();
     let found = TrackedComparison::of(&tracked?, &scene);
     let files = report::write_tracked(&found, &arguments.out).map_err(Failure::run)?;
-    if arguments.json {
-        return json(&found);
-    }
-    let summary = report::summary::tracked(&found);
-    Ok(format!("{summary}\n{}", written(&files)))
+    let text = if arguments.json {
+        json(&found)?
+    } else {
+        format!("{}\n{}", report::summary::tracked(&found), written(&files))
+    };
+    with_timing(text, timing)
 }

@@ -13,12 +13,12 @@ use vines::{
 };
 
 use super::{
-    endpoint::{Endpoint, OpenRig, ReachArguments},
+    endpoint::{Endpoint, ReachArguments},
     failure::Failure,
     json,
     pack::beside_this_program,
     scene_arguments::SceneArguments,
-    written,
+    with_timing, written,
 };
 
 const HELP: &str = "\
@@ -27,7 +27,7 @@ Examples:
   vines identify --set plant.r=0.7 --out r07       another coefficient of restitution
   vines identify --scene scenes/dimensionless.toml --set excitation.G=1.3
   vines identify --controller mine.fmu             another controller on the same plant
-  vines identify --rig udp://127.0.0.1:5510        a rig across the network; see `vines rig`
+  vines identify --rig udp://127.0.0.1:5510        a rig in real time across the network; see `vines rig`
 
 Without --rig, writes LoViNes.fmu and PhaseLock.fmu and runs the first; then writes identification.json, backbone.csv, backbone.svg and sim.svg.";
 
@@ -42,12 +42,12 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
 
-    /// The rig: `built-in`, an FMU, or udp://HOST:PORT [default: this program's plant FMU, packed into the
+    /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), or udp://HOST:PORT (in real time) [default: this program's plant FMU, packed into the
     /// folder of the results]
     #[arg(long, value_name = "ENDPOINT")]
     rig: Option<Endpoint>,
 
-    /// The controller: `built-in`, an FMU, or udp://HOST:PORT
+    /// The controller: `built-in`, an FMU, or tcp://HOST:PORT
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     controller: Endpoint,
 
@@ -68,32 +68,33 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let reach = arguments.reach.reach();
     // Invalid settings are refused before anything is written or connected.
     BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
-    let (OpenRig { mut rig, pace }, fmus) = match &arguments.rig {
+    let (mut open, fmus) = match &arguments.rig {
         Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&arguments.out)?),
         None => {
             let fmus = Packed::at(&arguments.out)?;
             (Endpoint::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
         }
     };
-    let mut controller = arguments.controller.controller(&scene, reach, pace)?;
+    let mut controller = arguments.controller.controller(&scene, reach, open.pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(&plan);
-    let record = experiment::run(rig.as_mut(), controller.as_mut(), &plan, |stage, done, of| {
+    let record = experiment::run(&mut open.rig, controller.as_mut(), &plan, |stage, done, of| {
         show(&bar, stage, done, of);
     });
     bar.finish_and_clear();
-    // Dropping rig and controller ends their network sessions.
-    drop((rig, controller));
+    drop(controller);
+    let timing = open.close();
     let record = record?;
     let found = identification::identify(&record, &scene).map_err(Failure::run)?;
     let found = Comparison::of(&found, &scene);
     let mut files = report::write(&found, &arguments.out).map_err(Failure::run)?;
     files.extend(fmus.keep()?);
-    if arguments.json {
-        return json(&found);
-    }
-    let summary = report::summary::identification(&found);
-    Ok(format!("{summary}\n{}", written(&files)))
+    let text = if arguments.json {
+        json(&found)?
+    } else {
+        format!("{}\n{}", report::summary::identification(&found), written(&files))
+    };
+    with_timing(text, timing)
 }
 
 /// This program's FMUs: packed into a temporary folder inside the folder of the results, and kept if the run succeeds.
