@@ -194,3 +194,14 @@ fn absurd_curves_and_maps_are_refused() {
     fails(&["map", "--x", "G=1:2:3", "--y", "G=1:2:3"], 2, "both axes are G");
     fails(&["report", "--x", "r=0.5:1:3", "--y", "r=0.5:1:3"], 2, "both r");
 }
+
+#[test]
+fn a_folder_that_is_a_file_is_refused_as_wrong_usage_before_anything_runs() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let path = file.path().to_str().unwrap();
+    for command in ["identify", "backbone", "map", "report", "pack"] {
+        let start = Instant::now();
+        fails(&[command, "--out", path], 2, path);
+        assert!(start.elapsed() < Duration::from_secs(5), "{command}");
+    }
+}

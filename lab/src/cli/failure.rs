@@ -88,7 +88,7 @@ impl From<LinkError> for Failure {
 impl From<PackError> for Failure {
     fn from(error: PackError) -> Self {
         match error {
-            PackError::Read { .. } | PackError::Write { .. } => Self::run(error),
+            PackError::Read { .. } => Self::run(error),
             _ => Self::input(error),
         }
     }

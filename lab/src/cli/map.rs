@@ -12,7 +12,7 @@ use vines::{
     scene::Scene,
 };
 
-use super::{failure::Failure, scene_arguments::SceneArguments, written};
+use super::{failure::Failure, scene_arguments::SceneArguments, writable, written};
 
 const HELP: &str = "\
 Every cell is one plant, driven at a fixed frequency from the scene's start; after its transient, its impacts are classified:
@@ -67,6 +67,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     let plan = plan(arguments, &scene)?;
+    writable(&arguments.out)?;
     let style = ProgressStyle::with_template("mapping regimes [{wide_bar}] {pos}/{len} cells")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(plan.cells() as u64).with_style(style);
