@@ -124,19 +124,40 @@ fn writable(folder: &Path) -> Result<(), Failure> {
     Ok(())
 }
 
-/// Prints a result, and says on stderr how a rig in real time kept its time. Exit code 3 if it did not.
-fn with_timing(text: String, timing: Option<Timing>) -> Result<String, Failure> {
-    let Some(timing) = timing.filter(|timing| timing.share() > 0.0) else {
-        return Ok(text);
+/// Warnings go to stderr: those of connections, and what an FMU logs.
+fn log_warnings() {
+    env_logger::Builder::new()
+        .filter_level(log::LevelFilter::Warn)
+        .format_timestamp(None)
+        .init();
+}
+
+/// The result of an experiment, as JSON or as a summary with the paths that were written. If a rig in real time was late, stderr
+/// says so; a rig that did not keep its time is a failure.
+fn result(
+    as_json: bool,
+    found: &impl Serialize,
+    summary: &str,
+    paths: &[PathBuf],
+    timing: Option<Timing>,
+) -> Result<String, Failure> {
+    let text = if as_json {
+        json(found)?
+    } else {
+        format!("{summary}\n{}", written(paths))
     };
-    if timing.share() <= TOLERATED {
-        eprintln!("warning: the rig was not always in time: {timing}");
-        return Ok(text);
+    match timing {
+        Some(timing) if timing.share() > TOLERATED => {
+            print(&text)?;
+            let message = format!("the rig did not keep its time, so these results are doubtful: {timing}");
+            Err(Failure::late(message))
+        }
+        Some(timing) if timing.share() > 0.0 => {
+            eprintln!("warning: the rig was not always in time: {timing}");
+            Ok(text)
+        }
+        _ => Ok(text),
     }
-    print(&text)?;
-    Err(Failure::late(format!(
-        "the rig did not keep its time, so these results are doubtful: {timing}"
-    )))
 }
 
 fn json(found: &impl Serialize) -> Result<String, Failure> {

@@ -189,7 +189,7 @@ fn an_address_without_a_server_is_named() {
         2,
         "tcp://HOST:PORT",
     );
-    fails(&["identify", "--controller", "udp://127.0.0.1:1"], 2, "tcp://HOST:PORT");
+    fails(&controller("udp://127.0.0.1:1"), 2, "tcp://HOST:PORT");
     fails(&["identify", "--rig", "udp://127.0.0.1"], 2, "HOST:PORT");
     let nobody = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     let address = format!("udp://{}", nobody.local_addr().unwrap());
@@ -281,7 +281,7 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_leaves_nothing_behind() {
         ];
         let never = ["--set", "controller.dwell_periods=9e4"];
         let client = Command::new(PROGRAM)
-            .args([&with_settings(&arguments)[..], &never].concat())
+            .args([&with_settings(&arguments)[..], &long].concat())
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();

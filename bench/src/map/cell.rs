@@ -81,7 +81,7 @@ pub struct Settled {
 impl Settled {
     /// # Errors
     /// A frequency that is not positive, or a value that the plant does not accept.
-    pub fn new(sigma: f64, g: f64) -> Result<Self, String> {
+    pub fn new(sigma: f64, g: f64) -> anyhow::Result<Self> {
         let drive = drive(sigma, g)?;
         let mut plant = settle(drive)?;
         let found = classify(&mut plant, drive)?;
@@ -108,7 +108,7 @@ impl Settled {
     ///
     /// # Errors
     /// None, as long as the drive of the cell is valid.
-    pub fn run(&mut self, lock: &Lock, effort: &Effort) -> Result<(), String> {
+    pub fn run(&mut self, lock: &Lock, effort: &Effort) -> anyhow::Result<()> {
         self.lock_ns.push(lock.run(effort.periods)?);
         let (ns, outcome) = timed(&self.plant, self.drive, effort.periods)?;
         let units = units(outcome.impacts, effort.periods);
@@ -178,7 +178,7 @@ struct Found {
 }
 
 /// The regime that the plant is in, told as `vines map` tells it.
-fn classify(plant: &mut Plant, drive: Drive) -> Result<Found, String> {
+fn classify(plant: &mut Plant, drive: Drive) -> anyhow::Result<Found> {
     let mut round = 0;
     loop {
         let (hits, rests) = watch(plant, drive)?;
@@ -205,7 +205,7 @@ fn classify(plant: &mut Plant, drive: Drive) -> Result<Found, String> {
 }
 
 /// The impacts of the recorded periods, and how often the particle came to rest on a wall or was at rest when they began.
-fn watch(plant: &mut Plant, drive: Drive) -> Result<(Vec<Impact>, u32), String> {
+fn watch(plant: &mut Plant, drive: Drive) -> anyhow::Result<(Vec<Impact>, u32)> {
     let mut hits = Vec::new();
     let mut rests = u32::from(plant.contact().is_some());
     for n in 0..RECORDED {
@@ -217,14 +217,14 @@ fn watch(plant: &mut Plant, drive: Drive) -> Result<(Vec<Impact>, u32), String> 
             Event::Stuck { .. } => rests += 1,
             Event::Released { .. } => {}
         });
-        outcome.map_err(|e| e.to_string())?;
+        outcome?;
     }
     Ok((hits, rests))
 }
 
 /// Mean growth of a small disturbance per period, as a natural logarithm. The disturbed plant is brought near again after every
 /// period (Benettin et al., Meccanica 15, 1980); both begin anew at phase 0.
-fn growth(plant: &Plant, drive: Drive) -> Result<f64, String> {
+fn growth(plant: &Plant, drive: Drive) -> anyhow::Result<f64> {
     let mut here = numbers(&plant.state());
     let mut apart = [DISTURBANCE / 2.0; 4];
     let (mut sum, mut counted) = (0.0, 0);
@@ -267,10 +267,10 @@ fn difference(state: [f64; 4], drive: Drive) -> Option<f64> {
     (0..4).map(|n| ((there[n] - here[n]) / scale(n)).abs()).reduce(f64::max)
 }
 
-fn begin([q1, dq1, q2, dq2]: [f64; 4], drive: Drive) -> Result<Plant, String> {
+fn begin([q1, dq1, q2, dq2]: [f64; 4], drive: Drive) -> anyhow::Result<Plant> {
     let state = State { q1, dq1, q2, dq2 };
-    let mut plant = Plant::new(RIG, state).map_err(|e| e.to_string())?;
-    plant.begin(drive).map_err(|e| e.to_string())?;
+    let mut plant = Plant::new(RIG, state)?;
+    plant.begin(drive)?;
     Ok(plant)
 }
 

@@ -128,6 +128,8 @@ impl Server {
                 if frame.kind == Kind::Hello {
                     self.refuse(Refusal::Busy, &frame, from)?;
                 }
+                // Over TCP, nobody else may keep the server from its client.
+                self.listener.close(from);
             }
             // The session of this client has ended.
             (Ok(frame), None) if frame.kind == Kind::Drive => {

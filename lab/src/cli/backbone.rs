@@ -9,9 +9,9 @@ use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn
 use super::{
     endpoint::{Endpoint, ReachArguments},
     failure::Failure,
-    json,
+    log_warnings, result,
     scene_arguments::SceneArguments,
-    with_timing, writable, written,
+    writable,
 };
 
 const HELP: &str = "\
@@ -56,10 +56,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    env_logger::Builder::new()
-        .filter_level(log::LevelFilter::Warn)
-        .format_timestamp(None)
-        .init();
+    log_warnings();
     let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(Failure::input)?;
     writable(&arguments.out)?;
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
@@ -71,10 +68,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let timing = open.close();
     let found = TrackedComparison::of(&tracked?, &scene);
     let files = report::write_tracked(&found, &arguments.out).map_err(Failure::run)?;
-    let text = if arguments.json {
-        json(&found)?
-    } else {
-        format!("{}\n{}", report::summary::tracked(&found), written(&files))
-    };
-    with_timing(text, timing)
+    let summary = report::summary::tracked(&found);
+    result(arguments.json, &found, &summary, &files, timing)
 }

@@ -15,10 +15,10 @@ use vines::{
 use super::{
     endpoint::{Endpoint, ReachArguments},
     failure::Failure,
-    json,
+    log_warnings,
     pack::beside_this_program,
+    result,
     scene_arguments::SceneArguments,
-    with_timing, written,
 };
 
 const HELP: &str = "\
@@ -61,10 +61,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    env_logger::Builder::new()
-        .filter_level(log::LevelFilter::Warn)
-        .format_timestamp(None)
-        .init();
+    log_warnings();
     let reach = arguments.reach.reach();
     // Invalid settings are refused before anything is written or connected.
     BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
@@ -89,12 +86,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let found = Comparison::of(&found, &scene);
     let mut files = report::write(&found, &arguments.out).map_err(Failure::run)?;
     files.extend(fmus.keep()?);
-    let text = if arguments.json {
-        json(&found)?
-    } else {
-        format!("{}\n{}", report::summary::identification(&found), written(&files))
-    };
-    with_timing(text, timing)
+    let summary = report::summary::identification(&found);
+    result(arguments.json, &found, &summary, &files, timing)
 }
 
 /// This program's FMUs: packed into a temporary folder inside the folder of the results, and kept if the run succeeds.
