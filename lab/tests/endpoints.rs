@@ -184,11 +184,8 @@ fn fails(arguments: &[&str], code: i32, part: &str) {
 #[test]
 fn an_address_without_a_server_is_named() {
     fails(&["identify", "--rig", "no-such.fmu"], 2, "udp://HOST:PORT");
-    fails(
-        &["identify", "--controller", "http://127.0.0.1:1"],
-        2,
-        "tcp://HOST:PORT",
-    );
+    let controller = |address| ["identify", "--rig", "built-in", "--controller", address];
+    fails(&controller("http://127.0.0.1:1"), 2, "tcp://HOST:PORT");
     fails(&controller("udp://127.0.0.1:1"), 2, "tcp://HOST:PORT");
     fails(&["identify", "--rig", "udp://127.0.0.1"], 2, "HOST:PORT");
     let nobody = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
@@ -269,17 +266,9 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_leaves_nothing_behind() {
         let rig = Server::start(mode);
         let folder = tempfile::tempdir().unwrap();
         let out = folder.path().to_str().unwrap();
-        // Never settles.
-        let arguments = [
-            "identify",
-            "--out",
-            out,
-            "--rig",
-            &rig.1,
-            "--set",
-            "record.lock_periods=1e5",
-        ];
-        let never = ["--set", "controller.dwell_periods=9e4"];
+        let arguments = ["identify", "--out", out, "--rig", &rig.1];
+        // A signal that comes later finds the rig still driven.
+        let long = ["--set", "record.hold_periods=20000"];
         let client = Command::new(PROGRAM)
             .args([&with_settings(&arguments)[..], &long].concat())
             .stderr(Stdio::piped())
