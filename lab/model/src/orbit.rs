@@ -8,9 +8,11 @@
 mod bounce;
 mod branch;
 mod candidate;
+mod components;
 mod continuation;
 mod convergence;
 mod curves;
+mod driven;
 mod flight;
 mod forced_oscillator;
 mod impact_map;
@@ -21,21 +23,25 @@ mod pattern;
 mod periodic;
 mod search;
 mod settle;
+mod tangent;
 
 use serde::Serialize;
 
 pub use bounce::Bounce;
 pub use branch::{Bifurcation, Branch, Ended, Limits, Special};
-pub use continuation::{asymmetric_branch, continue_both_ways, continue_from};
+pub use components::{Component, Response, Starts, random_state, response};
+pub use continuation::{branch_off, continue_both_ways, continue_from};
 pub use convergence::{Convergence, Difference, convergence};
-pub use curves::{Response, backbone, response};
+pub use curves::backbone;
+pub use driven::Driven;
 pub use impact_map::ImpactMap;
 pub use pattern::{ImpactPattern, Unknowns};
 pub use periodic::{Condition, Periodic};
-pub use search::{exact_backbone, phase_resonant};
+pub use search::{exact_backbone, phase_resonant, symmetric_orbits};
 pub use settle::settle;
+pub use tangent::Tangent;
 
-/// An exact symmetric 1:1 orbit at phase resonance: the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
+/// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Orbit {
     /// Base amplitude over `b epsilon`.

@@ -4,8 +4,9 @@ use std::fmt::Write;
 
 use clap::Args;
 use vines::{
+    numerics::range,
     orbit::{
-        Bifurcation, Branch, Condition, Limits, Orbit, Periodic, backbone, continue_both_ways, convergence,
+        Branch, Condition, Ended, Limits, Orbit, Periodic, Starts, backbone, continue_both_ways, convergence,
         phase_resonant, response, settle,
     },
     report::{Table, number, summary::parameters},
@@ -21,7 +22,8 @@ Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon
   multipliers  moduli of the multipliers of the half-period map; stable if all are below 1
 
 With --backbone or --response, orbits are followed by pseudo-arclength through folds and symmetry breaking, stable and unstable
-ones alike; --json prints all of them.
+ones alike; --json prints all of them. --response lists every component: those of symmetric 1:1 orbits over the whole range, those
+that branch off at symmetry breakings and period doublings (mirror images count once), and those on which random starts settle.
 
 Examples:
   vines orbit
@@ -47,9 +49,17 @@ pub(super) struct Arguments {
     #[arg(long, group = "what")]
     backbone: bool,
 
-    /// Follow the exact frequency response at the scene's G, with the asymmetric orbits that branch off
+    /// Follow all components of the exact frequency response at the scene's G
     #[arg(long, group = "what")]
     response: bool,
+
+    /// Detunings of --response and --backbone
+    #[arg(long, value_name = "FIRST:LAST", default_value = "-6:6", allow_hyphen_values = true, value_parser = detunings)]
+    range: [f64; 2],
+
+    /// Random starts of --response, from which other patterns are searched for
+    #[arg(long, value_name = "N", default_value_t = Starts::default().count)]
+    starts: usize,
 
     /// Theory minus exact orbit at epsilon and its halvings, with the fitted exponent
     #[arg(long, group = "what")]
@@ -72,18 +82,30 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             scene.g
         ))
     };
+    let limits = Limits { sigma: arguments.range, ..Limits::default() };
     if arguments.backbone {
-        let branch = backbone(&scene, &Limits::default()).ok_or_else(none)?;
+        let branch = backbone(&scene, &limits).ok_or_else(none)?;
         return shown(&scene, "Exact backbone", &branch, arguments.json, || {
             curve("Symmetric 1:1", &branch)
         });
     }
     if arguments.response {
-        let found = response(&scene, &Limits::default()).ok_or_else(none)?;
+        if 1.0 + scene.epsilon * arguments.range[0] <= 0.0 {
+            return Err(Failure::input(format!(
+                "--range from sigma = {} (dimensionless): 1 + epsilon sigma must be above 0",
+                arguments.range[0]
+            )));
+        }
+        let starts = Starts { count: arguments.starts, ..Starts::default() };
+        let found = response(&scene, &limits, starts);
         return shown(&scene, "Exact frequency response", &found, arguments.json, || {
-            let asymmetric = found.asymmetric.iter();
-            curve("Symmetric 1:1", &found.symmetric)
-                + &asymmetric.map(|branch| curve("Asymmetric", branch)).collect::<String>()
+            let count = found.components.len();
+            let all = found.components.iter().map(|one| curve(&one.name, &one.branch));
+            format!(
+                "{count} component{}\n\n{}",
+                if count == 1 { "" } else { "s" },
+                all.collect::<String>()
+            )
         });
     }
     if arguments.convergence {
@@ -123,6 +145,20 @@ fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
     })
 }
 
+/// Parses FIRST:LAST.
+fn detunings(text: &str) -> Result<[f64; 2], String> {
+    let form = || {
+        format!(
+            "`{text}`: expected FIRST:LAST, two detunings (dimensionless), the first below the last, for instance -6:6"
+        )
+    };
+    let (from, to) = text.split_once(':').ok_or_else(form)?;
+    match (from.trim().parse::<f64>(), to.trim().parse::<f64>()) {
+        (Ok(from), Ok(to)) if from < to && from.is_finite() && to.is_finite() => Ok([from, to]),
+        _ => Err(form()),
+    }
+}
+
 /// Periods before the motion is evaluated.
 const SETTLE: usize = 1000;
 
@@ -140,16 +176,15 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
              see `vines map`"
         ))
     })?;
-    let pattern = format!(
-        "{} impacts in {} period{}{}",
-        motion.pattern.impacts(),
-        motion.pattern.periods(),
-        if motion.pattern.periods() == 1 { "" } else { "s" },
-        if motion.pattern.mirrored { ", mirrored" } else { "" }
-    );
+    let pattern = motion.pattern.name();
     if arguments.response {
         let condition = Condition::Excitation(scene.g);
-        let branch = continue_both_ways(scene, &motion, condition, &Limits::default());
+        let branch = continue_both_ways(
+            scene,
+            &motion,
+            condition,
+            &Limits { sigma: arguments.range, ..Limits::default() },
+        );
         return shown(scene, "Exact frequency response", &branch, arguments.json, || {
             curve(&pattern, &branch)
         });
@@ -197,12 +232,16 @@ fn shown(
 }
 
 fn curve(name: &str, branch: &Branch) -> String {
-    let ended = serde_json::to_value(branch.ended).unwrap_or_default();
+    let stable = branch.points.iter().filter(|one| one.stable).count();
+    let sigmas = || branch.points.iter().map(|one| one.sigma);
+    let (low, high) = range((f64::MAX, f64::MIN), sigmas());
+    let ends = match branch.ended {
+        [Ended::Closed, _] => "closed".into(),
+        [one, other] => format!("ends: {}; {}", one.name(), other.name()),
+    };
     let mut text = format!(
-        "{name}: {} orbits, {} of them stable; ended: {}\n",
-        branch.points.len(),
-        branch.points.iter().filter(|one| one.stable).count(),
-        ended.as_str().unwrap_or_default()
+        "{name}: sigma from {low:.4} to {high:.4}, {} orbits, {stable} of them stable; {ends}\n",
+        branch.points.len()
     );
     let row = |motion: &Periodic| -> Vec<String> {
         let largest = motion.moduli()[3];
@@ -215,12 +254,7 @@ fn curve(name: &str, branch: &Branch) -> String {
     let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(ROWS));
     text += &table.rows(thinned.map(row)).text();
     for special in &branch.special {
-        let what = match special.kind {
-            Bifurcation::Fold => "fold",
-            Bifurcation::SymmetryBreaking => "symmetry breaking",
-            Bifurcation::PeriodDoubling => "period doubling",
-            Bifurcation::Torus => "torus (modulation begins)",
-        };
+        let what = special.name();
         let Periodic { sigma, g, c, b, .. } = special.motion;
         let _ = writeln!(
             text,

@@ -41,6 +41,9 @@ pub enum Ended {
     /// The largest number of points was reached.
     #[serde(rename = "number of points")]
     Points,
+    /// It joins the branch whose symmetry it breaks or whose period it doubles; beyond that it is its own mirror image.
+    #[serde(rename = "joins a shorter pattern")]
+    Joins,
     /// The pattern of impacts ends here: a graze, or impacts that accumulate.
     #[serde(rename = "graze")]
     Graze,
@@ -68,6 +71,8 @@ pub enum Bifurcation {
 pub struct Special {
     /// What happens.
     pub kind: Bifurcation,
+    /// The motion is stable on one side.
+    pub of_stable: bool,
     /// The motion there.
     pub motion: Periodic,
 }
@@ -79,8 +84,36 @@ pub struct Branch {
     pub points: Vec<Periodic>,
     /// Where stability changes, in order.
     pub special: Vec<Special>,
-    /// Why it ended.
-    pub ended: Ended,
+    /// Why it ended, before its first and after its last motion.
+    pub ended: [Ended; 2],
+}
+
+impl Ended {
+    /// As in a table.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Ended::Range => "left the range",
+            Ended::Closed => "closed",
+            Ended::Points => "number of points",
+            Ended::Joins => "joins a shorter pattern",
+            Ended::Graze => "graze",
+        }
+    }
+}
+
+impl Special {
+    /// As in a table. A modulation begins at a torus bifurcation only if the motion was stable before.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match (self.kind, self.of_stable) {
+            (Bifurcation::Fold, _) => "fold",
+            (Bifurcation::SymmetryBreaking, _) => "symmetry breaking",
+            (Bifurcation::PeriodDoubling, _) => "period doubling",
+            (Bifurcation::Torus, true) => "torus (modulation begins)",
+            (Bifurcation::Torus, false) => "Neimark-Sacker of an unstable motion",
+        }
+    }
 }
 
 impl Limits {

@@ -27,6 +27,28 @@ impl ImpactPattern {
         Self { walls: vec![1.0], half_periods: 1, mirrored: true }
     }
 
+    /// Two impacts per period, half a period apart.
+    #[must_use]
+    pub fn is_symmetric(&self) -> bool {
+        self.mirrored && self.periods() == 1 && self.impacts() == 2
+    }
+
+    /// As in a table.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let (impacts, periods) = (self.impacts(), self.periods());
+        match (impacts, periods) {
+            (2, 1) if self.mirrored => "symmetric 1:1".into(),
+            (2, 1) => "asymmetric 1:1".into(),
+            _ => {
+                let plural = |count: usize| if count == 1 { "" } else { "s" };
+                let mirrored = if self.mirrored { ", mirrored" } else { "" };
+                let (s, t) = (plural(impacts), plural(periods as usize));
+                format!("{impacts} impact{s} in {periods} period{t}{mirrored}")
+            }
+        }
+    }
+
     /// The same pattern over a whole period, as after symmetry breaking.
     #[must_use]
     pub fn doubled(&self) -> Self {
@@ -37,6 +59,20 @@ impl ImpactPattern {
             walls.extend(&self.walls);
         }
         Self { walls, half_periods: 2 * self.half_periods, mirrored: false }
+    }
+
+    /// The pattern of half the length that this one doubles; None if it does not repeat itself or its mirror image.
+    #[must_use]
+    pub fn halved(&self) -> Option<Self> {
+        let count = self.walls.len() / 2;
+        let (walls, rest) = self.walls.split_at(count);
+        let half = Self {
+            walls: walls.into(),
+            half_periods: self.half_periods / 2,
+            mirrored: self.half_periods % 4 != 0,
+        };
+        let same = walls.iter().zip(rest).all(|(one, other)| half.sign() * one == *other);
+        (!self.mirrored && self.walls.len() % 2 == 0 && count > 0 && same).then_some(half)
     }
 
     /// Impacts over the whole period of the motion.
@@ -55,11 +91,11 @@ impl ImpactPattern {
         }
     }
 
-    fn sign(&self) -> f64 {
+    pub(super) fn sign(&self) -> f64 {
         if self.mirrored { -1.0 } else { 1.0 }
     }
 
-    fn turn(&self) -> f64 {
+    pub(super) fn turn(&self) -> f64 {
         f64::from(self.half_periods) * PI
     }
 }

@@ -1,6 +1,6 @@
 //! A periodic motion of any pattern, its stability, and the Newton iteration that finds it.
 
-use nalgebra::{Complex, Matrix6, RowSVector, SVector};
+use nalgebra::{Complex, Matrix6, RowSVector, SVector, Vector4};
 use serde::Serialize;
 
 use super::{
@@ -118,6 +118,16 @@ impl Periodic {
             stable: multipliers[3].norm() < 1.0,
             multipliers: multipliers.map(|one| [one.re, one.im]),
         })
+    }
+
+    /// How far the second half of the motion is from repeating the first one or its mirror image; None for a pattern that is not
+    /// the double of another. It changes sign where a branch passes the motion that it doubles.
+    pub(super) fn halves_apart(&self) -> Option<Vector4<f64>> {
+        let half = self.pattern.halved()?;
+        let (first, middle) = (&self.bounces[0], &self.bounces[half.walls.len()]);
+        let mut apart = middle.vector() * half.sign() - first.vector();
+        apart[0] = middle.phase - first.phase - half.turn();
+        Some(apart)
     }
 
     /// Moduli of the multipliers, ascending.

@@ -2,7 +2,7 @@
 
 use super::{
     Orbit,
-    candidate::{Candidate, candidates},
+    candidate::{Candidate, Family},
     flight::Flight,
     multipliers,
 };
@@ -23,6 +23,7 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
     let grid = grid(scene.epsilon);
     let mut orbits: Vec<Orbit> = (0..2)
         .flat_map(|branch| Branch { scene, branch }.frequencies(&grid))
+        .filter(resonates)
         .filter_map(|candidate| accept(scene, &candidate))
         .collect();
     orbits.sort_by(|one, other| one.c.total_cmp(&other.c));
@@ -35,7 +36,20 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
 /// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.
 #[must_use]
 pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
-    candidates(scene, omega)
+    Family::new(scene, omega)
+        .and_then(|family| family.phase_resonant())
+        .into_iter()
+        .flatten()
+        .filter(|candidate| resonates(candidate))
+        .filter_map(|candidate| accept(scene, &candidate))
+        .collect()
+}
+
+/// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.
+#[must_use]
+pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
+    Family::new(scene, 1.0 + scene.epsilon * sigma)
+        .and_then(|family| family.driven(scene.g))
         .into_iter()
         .flatten()
         .filter_map(|candidate| accept(scene, &candidate))
@@ -51,16 +65,18 @@ fn grid(epsilon: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Keeps what is physical: the particle moves and stays inside its cavity, and the response lags the base.
+/// The response lags the base; without dissipation no base motion is needed, and no phase lag is defined.
+fn resonates(candidate: &Candidate) -> bool {
+    candidate.lags || candidate.g < 1e-12
+}
+
+/// Keeps what is physical: the particle moves and stays inside its cavity.
 fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
     let Candidate { omega, b, c, g, .. } = *candidate;
     let sizes = [b, c, g];
-    // Without dissipation no base motion is needed, and no phase lag is defined.
-    let conservative = g < 1e-12;
     let physical = sizes.iter().all(|size| size.is_finite())
         && b > 0.0
         && c > 1e-12
-        && (candidate.lags || conservative)
         && Flight::new(scene, candidate).stays_inside();
     if !physical {
         return None;
@@ -87,7 +103,9 @@ struct Branch<'a> {
 
 impl Branch<'_> {
     fn at(&self, omega: f64) -> Option<Candidate> {
-        candidates(self.scene, omega).map(|both| both[self.branch])
+        Family::new(self.scene, omega)?
+            .phase_resonant()
+            .map(|both| both[self.branch])
     }
 
     /// G of the branch minus that of the scene.
