@@ -126,11 +126,13 @@ fn readable(report: &Report, listed: bool) -> String {
 }
 
 fn thresholds(report: &Report) -> String {
-    let Activation { from_rest, existence, stable } = report.activation;
+    let Activation { steady_linear, from_rest, existence, stable } = report.activation;
     let stable = stable.map_or("none at any G".into(), |g| format!("G = {g:.6}"));
     format!(
-        "Activation at sigma = {:.6}\n  impacts begin from rest    G = {from_rest:.6}\n  \
-         some 1:1 motion exists     G = {existence:.6}\n  a stable one exists        {stable}\n",
+        "Activation at sigma = {:.6}\n  steady linear response reaches the wall   G = {steady_linear:.6}\n  \
+         impacts begin from rest (first beat)      G = {from_rest:.6}\n  \
+         some 1:1 motion exists                    G = {existence:.6}\n  \
+         a stable one exists                       {stable}\n",
         report.sigma
     )
 }

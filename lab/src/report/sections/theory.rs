@@ -70,8 +70,8 @@ fn describe_activation(section: &mut Section, flow: &SlowFlow, sigma: f64) {
         format!("needs less, G = {g:.4}, but only a particle that is already moving reaches it")
     });
     section.words(format!(
-        "How much base motion is needed? At σ = {sigma:.4}, impacts start from rest at G = {:.4}, where the linear response reaches \
-         the wall. A stable 1:1 motion {stable}.",
-        activation.from_rest
+        "How much base motion is needed? At σ = {sigma:.4}, the steady linear response reaches the wall at G = {:.4}. When the drive is \
+         switched on at rest, the first beat is larger than that: impacts start at G = {:.4}. A stable 1:1 motion {stable}.",
+        activation.steady_linear, activation.from_rest
     ));
 }
