@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use vines::{
-    map::{Axis, Map, Plan, Range},
+    map::{Axis, LIMIT, Map, Plan, Range},
     orbit::phase_resonant,
     regime::Regime,
     report::{self, Table, summary::parameters},
@@ -15,13 +15,16 @@ use vines::{
 use super::{failure::Failure, scene_arguments::SceneArguments, written};
 
 const HELP: &str = "\
-Every cell is one plant, driven at a fixed frequency from the scene's start; after its transient, its impacts are classified:
-  no impacts      the linear response
+Every cell is one plant, driven at a fixed frequency from the scene's start:
+  no impacts      the particle rests, and the primary mass cannot reach it
   symmetric 1:1   two impacts per period, half a period apart; asymmetric 1:1: at uneven intervals
-  n impacts       any other pattern that repeats
-  modulated       nothing repeats: captured into 1:1 resonance and lost again, or at least disturbances do not grow
-  chaotic         nothing repeats, disturbances grow, and there are hardly any captures
-  sticking        impacts accumulate, and the particle rests on a wall for a while
+  n impacts       any other motion that repeats itself
+  quasi-periodic  nothing repeats; the largest Lyapunov exponent is zero within its uncertainty
+  modulated       the exponent is positive, and a fifth of the impacts or more are captured into 1:1 resonance for a while
+  chaotic         the exponent is positive, with fewer captures
+  undecided       none of these was shown within --periods
+A cell is followed until it repeats itself, or for --periods; the table has the periods followed, the duration of the transient,
+the recurrence, the exponent with its standard error, the share of captured impacts, and how often the particle sticks to a wall.
 
 Where several regimes are stable the start decides; a particle at rest may stay so where a moving one does not.
 
@@ -51,13 +54,9 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SIGMA", allow_negative_numbers = true)]
     sigma: Option<f64>,
 
-    /// Periods before the record
-    #[arg(long, value_name = "PERIODS", default_value_t = 400)]
-    settle: usize,
-
-    /// Periods recorded; at least 20
-    #[arg(long, value_name = "PERIODS", default_value_t = 100)]
-    record: usize,
+    /// Largest number of periods that a cell is followed; at least 100
+    #[arg(long, value_name = "PERIODS", default_value_t = LIMIT)]
+    periods: usize,
 
     /// Folder for the results; made if it is not there
     #[arg(long, value_name = "DIR", default_value = "out")]
@@ -100,8 +99,7 @@ fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
         start: scene.dimensionless_start(),
         x: arguments.x,
         y: arguments.y,
-        settle: arguments.settle,
-        record: arguments.record,
+        limit: arguments.periods,
     })
 }
 

@@ -11,7 +11,7 @@ use super::figures::{backbone, manifold, regimes, tracked};
 use super::theme::dark;
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
 use crate::files::temporary;
-use crate::map::{Cell, Map, Point};
+use crate::map::{Cell, Map};
 
 /// Why the files of a run could not be written.
 #[derive(Debug, Error)]
@@ -150,37 +150,14 @@ pub(super) fn map_csv(map: &Map) -> Result<String, WriteError> {
         #[serde(rename = "G")]
         g: f64,
         r: f64,
-        regime: &'static str,
-        impacts_per_period: f64,
-        impacts: usize,
-        periods: u32,
-        synchrony: f64,
-        growth: Option<f64>,
+    }
+    #[derive(Serialize)]
+    struct Theory {
         theory_stable: bool,
     }
     let row = |cell: &Cell| {
         let Cell { sigma, g, r, point, theory_stable } = *cell;
-        let Point {
-            regime,
-            impacts_per_period,
-            impacts,
-            periods,
-            synchrony,
-            growth,
-        } = point;
-        let regime = regime.name();
-        Row {
-            sigma,
-            g,
-            r,
-            regime,
-            impacts_per_period,
-            impacts,
-            periods,
-            synchrony,
-            growth,
-            theory_stable,
-        }
+        (Row { sigma, g, r }, point, Theory { theory_stable })
     };
     csv(map.cells.iter().map(row))
 }

@@ -21,9 +21,10 @@ pub fn regime(regime: Regime) -> RGBColor {
         Regime::Symmetric => RGBColor(178, 217, 241),
         Regime::Asymmetric => RGBColor(240, 180, 70),
         Regime::Several => RGBColor(90, 174, 110),
-        Regime::Modulated => RGBColor(190, 88, 60),
+        Regime::QuasiPeriodic => RGBColor(60, 130, 160),
+        Regime::Modulated => RGBColor(190, 70, 45),
         Regime::Chaotic => RGBColor(106, 52, 128),
-        Regime::Sticking => RGBColor(30, 32, 40),
+        Regime::Undecided => RGBColor(30, 32, 40),
         // The map shows none of these.
         Regime::Other | Regime::Unresolved | Regime::Unknown => UNSTABLE,
     }
@@ -33,8 +34,8 @@ pub fn regime(regime: Regime) -> RGBColor {
 pub fn on_regime(regime: Regime) -> RGBColor {
     match regime {
         Regime::NoImpacts => RGBColor(0, 0, 0),
-        Regime::Sticking => RGBColor(255, 255, 255),
-        Regime::Modulated | Regime::Chaotic => RGBColor(254, 254, 254),
+        Regime::Undecided => RGBColor(255, 255, 255),
+        Regime::QuasiPeriodic | Regime::Modulated | Regime::Chaotic => RGBColor(254, 254, 254),
         _ => RGBColor(10, 10, 10),
     }
 }
@@ -48,7 +49,7 @@ const DARK: [(&str, &str); 9] = [
     ("#0072B2", "#56B4E9"),
     ("#78AAD2", "#3F7099"),
     ("#D55E00", "#F28C40"),
-    // No impacts is like the paper in both, sticking like the ink.
+    // No impacts is like the paper in both, undecided like the ink.
     ("#F6F6F4", "#23272B"),
     ("#1E2028", "#F2F2EE"),
 ];

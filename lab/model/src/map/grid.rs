@@ -14,6 +14,9 @@ use crate::Dimensionless;
 use crate::regime::Regime;
 use crate::theory::SlowFlow;
 
+/// Usual largest number of periods that a cell is followed.
+pub const LIMIT: usize = 10_000;
+
 /// Settings of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Plan {
@@ -27,10 +30,8 @@ pub struct Plan {
     pub x: Range,
     /// Vertical axis.
     pub y: Range,
-    /// Periods before the record.
-    pub settle: usize,
-    /// Periods recorded.
-    pub record: usize,
+    /// Largest number of periods that a cell is followed.
+    pub limit: usize,
 }
 
 /// One cell of the map.
@@ -65,8 +66,8 @@ pub enum MapError {
     /// Both axes have the same quantity.
     #[error("both axes are {0}: take two of sigma, G and r")]
     SameAxis(Axis),
-    /// No period is recorded, or so few that nothing can repeat.
-    #[error("{0} recorded periods are too few to find a pattern: at least 20 are needed")]
+    /// So few periods that nothing can be decided.
+    #[error("{0} periods are too few to decide a regime: at least 100 are needed")]
     TooShort(usize),
     /// Not a positive frequency.
     #[error("sigma = {sigma} (dimensionless) gives the frequency {omega} omega0, which must be above 0")]
@@ -113,8 +114,8 @@ impl Plan {
         if self.x.axis == self.y.axis {
             return Err(MapError::SameAxis(self.x.axis));
         }
-        if self.record < 20 {
-            return Err(MapError::TooShort(self.record));
+        if self.limit < 100 {
+            return Err(MapError::TooShort(self.limit));
         }
         let lowest = self.at(self.x.from, self.y.from).0;
         let omega = 1.0 + self.scene.epsilon * lowest;
@@ -135,7 +136,7 @@ impl Plan {
             .map(|n| {
                 let (x, y) = (self.x.at(n % self.x.points), self.y.at(n / self.x.points));
                 let (sigma, scene) = self.at(x, y);
-                let point = observe(&scene, sigma, self.start, (self.settle, self.record))?;
+                let point = observe(&scene, sigma, self.start, self.limit)?;
                 done();
                 Ok(Cell {
                     sigma,

@@ -65,11 +65,11 @@ fn caption(map: &Map) -> String {
             MapAxis::R => format!(", r = {}", plan.scene.r),
         });
     format!(
-        "ε = {:.5}, λ = {:.3}{}; each cell from the same start, {} periods after it",
+        "ε = {:.5}, λ = {:.3}{}; each cell from the same start, followed until it repeats, at most {} periods",
         plan.scene.epsilon,
         plan.scene.lambda,
         held.collect::<String>(),
-        plan.settle
+        plan.limit
     )
 }
 
@@ -87,9 +87,10 @@ fn letter(regime: Regime) -> &'static str {
         Regime::Symmetric => "S",
         Regime::Asymmetric => "A",
         Regime::Several => "n",
+        Regime::QuasiPeriodic => "Q",
         Regime::Modulated => "M",
         Regime::Chaotic => "C",
-        Regime::Sticking => "K",
+        Regime::Undecided => "U",
         Regime::Other | Regime::Unresolved | Regime::Unknown => "?",
     }
 }
