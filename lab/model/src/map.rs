@@ -5,6 +5,7 @@
 //! another start may lead to another regime.
 
 mod axis;
+mod decide;
 mod grid;
 mod island;
 mod run;

@@ -38,7 +38,7 @@ pub use impact_map::ImpactMap;
 pub use pattern::{ImpactPattern, Unknowns};
 pub use periodic::{Condition, Periodic};
 pub use search::{exact_backbone, phase_resonant, symmetric_orbits};
-pub use settle::settle;
+pub use settle::{settle, stable_near};
 pub use tangent::Tangent;
 
 /// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.

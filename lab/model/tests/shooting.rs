@@ -136,9 +136,8 @@ fn symmetry_breaks_near_the_theorys_speed_and_asymmetric_motions_leave_it() {
     assert!((breaking.motion.b - B_SYMMETRY_BREAKING).abs() < 0.03);
     let limits = Limits { points: 60, ..Limits::default() };
     let aside = branch_off(&scene, breaking, Condition::Excitation(1.6), &limits).unwrap();
-    let far = aside.points.last().unwrap();
-    let [first, second] = [far.bounces[0], far.bounces[1]];
-    let interval = (second.phase - first.phase - std::f64::consts::PI).abs();
+    let uneven = |one: &Periodic| (one.bounces[1].phase - one.bounces[0].phase - std::f64::consts::PI).abs();
+    let interval = aside.points.iter().map(uneven).fold(0.0, f64::max);
     println!(
         "{} asymmetric motions, intervals off half a period by up to {interval:.3} rad",
         aside.points.len()

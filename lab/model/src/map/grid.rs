@@ -15,7 +15,7 @@ use crate::regime::Regime;
 use crate::theory::SlowFlow;
 
 /// Usual largest number of periods that a cell is followed.
-pub const LIMIT: usize = 10_000;
+pub const LIMIT: usize = 20_000;
 
 /// Settings of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
