@@ -5,10 +5,12 @@
 //! alternating impulses of known size on the oscillator, and their periodic response has a closed form. At a given frequency
 //! one quadratic equation for B remains. There is no first-order approximation.
 
+mod bifurcations;
 mod bounce;
 mod branch;
 mod candidate;
 mod components;
+mod condition;
 mod continuation;
 mod convergence;
 mod curves;
@@ -27,16 +29,18 @@ mod tangent;
 
 use serde::Serialize;
 
+pub use bifurcations::{BifurcationCurve, bifurcation_curves};
 pub use bounce::Bounce;
 pub use branch::{Bifurcation, Branch, Ended, Limits, Special};
-pub use components::{Component, Response, Starts, random_state, response};
+pub use components::{Component, Exploration, Response, random_state, response};
+pub use condition::Condition;
 pub use continuation::{branch_off, continue_both_ways, continue_from};
 pub use convergence::{Convergence, Difference, convergence};
 pub use curves::backbone;
 pub use driven::Driven;
 pub use impact_map::ImpactMap;
 pub use pattern::{ImpactPattern, Unknowns};
-pub use periodic::{Condition, Periodic};
+pub use periodic::Periodic;
 pub use search::{exact_backbone, phase_resonant, symmetric_orbits};
 pub use settle::{settle, stable_near};
 pub use tangent::Tangent;

@@ -6,7 +6,7 @@ use rand_chacha::{
 };
 use vines_model::{
     Dimensionless,
-    orbit::{Ended, Limits, Periodic, Response, Starts, random_state, response, settle, symmetric_orbits},
+    orbit::{Ended, Exploration, Limits, Periodic, Response, random_state, response, settle, symmetric_orbits},
 };
 
 fn scene(g: f64) -> Dimensionless {
@@ -14,7 +14,7 @@ fn scene(g: f64) -> Dimensionless {
 }
 
 fn followed(g: f64) -> Response {
-    response(&scene(g), &Limits::default(), Starts::default())
+    response(&scene(g), &Limits::default(), Exploration::default())
 }
 
 fn list(response: &Response) {

@@ -6,7 +6,7 @@ use clap::Args;
 use vines::{
     numerics::range,
     orbit::{
-        Branch, Condition, Ended, Limits, Orbit, Periodic, Starts, backbone, continue_both_ways, convergence,
+        Branch, Condition, Ended, Exploration, Limits, Orbit, Periodic, backbone, continue_both_ways, convergence,
         phase_resonant, response, settle,
     },
     report::{Table, number, summary::parameters},
@@ -58,7 +58,7 @@ pub(super) struct Arguments {
     range: [f64; 2],
 
     /// Random starts of --response, from which other patterns are searched for
-    #[arg(long, value_name = "N", default_value_t = Starts::default().count)]
+    #[arg(long, value_name = "N", default_value_t = Exploration::default().starts)]
     starts: usize,
 
     /// Theory minus exact orbit at epsilon and its halvings, with the fitted exponent
@@ -96,8 +96,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
                 arguments.range[0]
             )));
         }
-        let starts = Starts { count: arguments.starts, ..Starts::default() };
-        let found = response(&scene, &limits, starts);
+        let exploration = Exploration { starts: arguments.starts, ..Exploration::default() };
+        let found = response(&scene, &limits, exploration);
         return shown(&scene, "Exact frequency response", &found, arguments.json, || {
             let count = found.components.len();
             let all = found.components.iter().map(|one| curve(&one.name, &one.branch));

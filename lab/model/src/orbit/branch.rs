@@ -44,6 +44,9 @@ pub enum Ended {
     /// It joins the branch whose symmetry it breaks or whose period it doubles; beyond that it is its own mirror image.
     #[serde(rename = "joins a shorter pattern")]
     Joins,
+    /// The complex pair of multipliers on the unit circle becomes real.
+    #[serde(rename = "strong resonance")]
+    Resonance,
     /// The pattern of impacts ends here: a graze, or impacts that accumulate.
     #[serde(rename = "graze")]
     Graze,
@@ -88,6 +91,19 @@ pub struct Branch {
     pub ended: [Ended; 2],
 }
 
+impl Bifurcation {
+    /// As in a table.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Bifurcation::Fold => "fold",
+            Bifurcation::SymmetryBreaking => "symmetry breaking",
+            Bifurcation::PeriodDoubling => "period doubling",
+            Bifurcation::Torus => "Neimark-Sacker",
+        }
+    }
+}
+
 impl Ended {
     /// As in a table.
     #[must_use]
@@ -97,6 +113,7 @@ impl Ended {
             Ended::Closed => "closed",
             Ended::Points => "number of points",
             Ended::Joins => "joins a shorter pattern",
+            Ended::Resonance => "strong resonance",
             Ended::Graze => "graze",
         }
     }
@@ -107,11 +124,9 @@ impl Special {
     #[must_use]
     pub fn name(&self) -> &'static str {
         match (self.kind, self.of_stable) {
-            (Bifurcation::Fold, _) => "fold",
-            (Bifurcation::SymmetryBreaking, _) => "symmetry breaking",
-            (Bifurcation::PeriodDoubling, _) => "period doubling",
             (Bifurcation::Torus, true) => "torus (modulation begins)",
             (Bifurcation::Torus, false) => "Neimark-Sacker of an unstable motion",
+            (kind, _) => kind.name(),
         }
     }
 }

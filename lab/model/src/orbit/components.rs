@@ -39,18 +39,20 @@ pub struct Component {
     pub branch: Branch,
 }
 
-/// Random starts from which motions are searched for.
+/// How components of other patterns are searched for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Starts {
-    /// How many.
-    pub count: usize,
-    /// Seed of the random numbers.
+pub struct Exploration {
+    /// Number of random starts.
+    pub starts: usize,
+    /// Seed of their random numbers.
     pub seed: u64,
+    /// Number of symmetry breakings and period doublings in a row that are followed.
+    pub doublings: usize,
 }
 
-impl Default for Starts {
+impl Default for Exploration {
     fn default() -> Self {
-        Self { count: 300, seed: 1 }
+        Self { starts: 300, seed: 1, doublings: 3 }
     }
 }
 
@@ -58,8 +60,6 @@ impl Default for Starts {
 const GRID: usize = 1200;
 /// Periods after which a random start has settled.
 const SETTLED: usize = 600;
-/// Number of symmetry breakings and period doublings in a row that are followed.
-const DOUBLINGS: usize = 3;
 /// Largest difference of two motions that are the same.
 const SAME: f64 = 1e-6;
 
@@ -78,9 +78,15 @@ pub fn random_state(random: &mut impl Rng) -> [f64; 4] {
 
 /// The exact frequency response at the scene's G over the range of sigma in `limits`.
 #[must_use]
-pub fn response(scene: &Dimensionless, limits: &Limits, starts: Starts) -> Response {
+pub fn response(scene: &Dimensionless, limits: &Limits, exploration: Exploration) -> Response {
     let condition = Condition::Excitation(scene.g);
-    let mut search = Search { scene, limits, condition, found: Vec::new() };
+    let mut search = Search {
+        scene,
+        limits,
+        condition,
+        doublings: exploration.doublings,
+        found: Vec::new(),
+    };
     let [low, high] = limits.sigma;
     for sigma in equally_spaced(low, high, GRID) {
         for orbit in symmetric_orbits(scene, sigma) {
@@ -91,8 +97,8 @@ pub fn response(scene: &Dimensionless, limits: &Limits, starts: Starts) -> Respo
             }
         }
     }
-    let mut random = ChaCha8Rng::seed_from_u64(starts.seed);
-    for _ in 0..starts.count {
+    let mut random = ChaCha8Rng::seed_from_u64(exploration.seed);
+    for _ in 0..exploration.starts {
         let part = random.next_u64() as f64 / u64::MAX as f64;
         let (sigma, state) = (low + part * (high - low), random_state(&mut random));
         if let Ok(Some(motion)) = settle(scene, sigma, state, SETTLED) {
@@ -106,6 +112,7 @@ struct Search<'a> {
     scene: &'a Dimensionless,
     limits: &'a Limits,
     condition: Condition,
+    doublings: usize,
     found: Vec<Branch>,
 }
 
@@ -131,7 +138,7 @@ impl Search<'_> {
             .cloned()
             .collect();
         self.found.push(branch);
-        if depth == DOUBLINGS {
+        if depth == self.doublings {
             return;
         }
         for special in specials {
@@ -185,7 +192,7 @@ fn invariants(motion: &Periodic) -> [f64; 4] {
     [motion.sigma, motion.c * cosine, motion.c * sine, motion.b]
 }
 
-fn apart(one: &Periodic, other: &Periodic) -> f64 {
+pub(super) fn apart(one: &Periodic, other: &Periodic) -> f64 {
     let (one, other) = (invariants(one), invariants(other));
     one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }

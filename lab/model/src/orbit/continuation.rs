@@ -8,8 +8,9 @@ use nalgebra::{Matrix4, Matrix6, SVector};
 
 use super::{
     branch::{Bifurcation, Branch, Ended, Limits, Special},
+    condition::Condition,
     pattern::{Returned, Unknowns, follow},
-    periodic::{Condition, Periodic, newton},
+    periodic::{Periodic, newton},
 };
 use crate::Dimensionless;
 use crate::numerics::try_bisection;
@@ -35,7 +36,10 @@ impl Curve<'_> {
         let returned = follow(self.scene, &self.start.pattern, x)?;
         let mut matrix = Matrix6::zeros();
         matrix.fixed_rows_mut::<4>(0).copy_from(&returned.by);
-        matrix.set_row(4, &self.condition.value(x, &returned).1);
+        matrix.set_row(
+            4,
+            &self.condition.value(self.scene, &self.start.pattern, x, &returned).1,
+        );
         matrix.set_row(5, &towards.transpose());
         let mut right = SVector::<f64, 6>::zeros();
         right[5] = 1.0;
@@ -49,7 +53,10 @@ impl Curve<'_> {
         let ahead = x + tangent * step;
         let found = newton(self.scene, &self.start.pattern, ahead, |x, returned: &Returned| {
             let plane = (tangent.dot(&(x - ahead)), tangent.transpose());
-            [self.condition.value(x, returned), plane]
+            [
+                self.condition.value(self.scene, &self.start.pattern, x, returned),
+                plane,
+            ]
         })?;
         ((found - ahead).norm() <= step.abs()).then_some(found)
     }
@@ -150,7 +157,12 @@ pub fn continue_from(
             branch.ended[1] = Ended::Joins;
             return branch;
         }
-        if outside(last) != outside(&motion) {
+        if let Condition::Bifurcation(kind) = condition {
+            if kind == Bifurcation::Torus && !motion.on_circle_in_pairs() {
+                branch.ended[1] = Ended::Resonance;
+                return branch;
+            }
+        } else if outside(last) != outside(&motion) {
             branch.special.extend(curve.locate(last, &tangent, step));
         }
         branch.points.push(motion);

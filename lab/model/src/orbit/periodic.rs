@@ -1,10 +1,11 @@
 //! A periodic motion of any pattern, its stability, and the Newton iteration that finds it.
 
-use nalgebra::{Complex, Matrix6, RowSVector, SVector, Vector4};
+use nalgebra::{Complex, Matrix6, SVector, Vector4};
 use serde::Serialize;
 
 use super::{
     bounce::Bounce,
+    condition::{Condition, Row},
     impact_map::ImpactMap,
     pattern::{ImpactPattern, Returned, Unknowns, follow, wrapped},
 };
@@ -39,34 +40,6 @@ pub struct Periodic {
     pub(super) durations: Vec<f64>,
 }
 
-/// An equation that selects a motion, in addition to the four that close it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Condition {
-    /// sigma has this value.
-    Sigma(f64),
-    /// G has this value.
-    Excitation(f64),
-    /// The first harmonic of v lags (or leads) the base by a quarter of a period.
-    PhaseResonance,
-}
-
-impl Condition {
-    pub(super) fn value(&self, x: &Unknowns, returned: &Returned) -> (f64, RowSVector<f64, 6>) {
-        let mut row = RowSVector::<f64, 6>::zeros();
-        match *self {
-            Condition::Sigma(sigma) => {
-                row[4] = 1.0;
-                (x[4] - sigma, row)
-            }
-            Condition::Excitation(g) => {
-                row[5] = 1.0;
-                (x[5] - g, row)
-            }
-            Condition::PhaseResonance => (returned.v.re, returned.v_by[0]),
-        }
-    }
-}
-
 /// Size of the last Newton correction.
 const CONVERGED: f64 = 1e-12;
 const ROUNDS: usize = 30;
@@ -82,7 +55,7 @@ impl Periodic {
         conditions: [Condition; 2],
     ) -> Option<Self> {
         let x = newton(scene, pattern, *guess, |x, returned| {
-            conditions.map(|one| one.value(x, returned))
+            conditions.map(|one| one.value(scene, pattern, x, returned))
         })?;
         Self::at(scene, pattern, &x)
     }
@@ -128,6 +101,18 @@ impl Periodic {
         let mut apart = middle.vector() * half.sign() - first.vector();
         apart[0] = middle.phase - first.phase - half.turn();
         Some(apart)
+    }
+
+    /// A complex pair of multipliers is on the unit circle.
+    pub(super) fn on_circle_in_pairs(&self) -> bool {
+        let mut pairs = self.multipliers.iter().filter(|[_, im]| im.abs() > 1e-3);
+        pairs.any(|[re, im]| (re.hypot(*im) - 1.0).abs() < 1e-6)
+    }
+
+    /// No multiplier is outside the unit circle, except for those that a bifurcation places on it.
+    #[must_use]
+    pub fn bounds_stability(&self) -> bool {
+        self.moduli()[3] < 1.0 + 1e-5
     }
 
     /// Moduli of the multipliers, ascending.
@@ -189,7 +174,7 @@ pub(super) fn newton(
     scene: &Dimensionless,
     pattern: &ImpactPattern,
     mut x: Unknowns,
-    conditions: impl Fn(&Unknowns, &Returned) -> [(f64, RowSVector<f64, 6>); 2],
+    conditions: impl Fn(&Unknowns, &Returned) -> [Row; 2],
 ) -> Option<Unknowns> {
     for _ in 0..ROUNDS {
         let returned = follow(scene, pattern, &x)?;

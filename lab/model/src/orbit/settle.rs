@@ -7,9 +7,10 @@ use lovines::{InvalidValue, State};
 
 use super::{
     bounce::Bounce,
+    condition::Condition,
     impact_map::ImpactMap,
     pattern::{ImpactPattern, Unknowns},
-    periodic::{Condition, Periodic},
+    periodic::Periodic,
 };
 use crate::Dimensionless;
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{SectionError, Subject};
-use crate::orbit::{Branch, Limits, Periodic, Response, Starts, backbone, response};
+use crate::orbit::{Branch, Exploration, Limits, Periodic, Response, backbone, response};
 use crate::report::figures::{period, responses};
 use crate::report::files::csv;
 use crate::report::section::Section;
@@ -34,7 +34,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     let excitations = excitations(&p);
     let mut found: Vec<Response> = Vec::new();
     for (n, g) in excitations.iter().enumerate() {
-        found.push(response(&Dimensionless { g: *g, ..p }, &limits, Starts::default()));
+        found.push(response(&Dimensionless { g: *g, ..p }, &limits, Exploration::default()));
         done((n + 1) as f64 / (excitations.len() + 1) as f64);
     }
     let Some(curve) = backbone(&p, &limits) else {
