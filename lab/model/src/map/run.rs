@@ -130,7 +130,7 @@ impl Run {
             let mut sticks = self.counts[n][1];
             let (driven, tangent, impacts, omega) =
                 (&self.driven, &mut self.tangent, &mut self.impacts, self.drive.omega);
-            let mut flight = driven.from(PI * n as f64, [q1, dq1]);
+            let mut flight = driven.from(PI * n as f64, [q1, dq1], self.plant.contact().is_some());
             self.plant.advance_with(self.drive, step, |event| match event {
                 Event::Impact { t, velocity, .. } => {
                     let acceleration = flight.impact(t, velocity);

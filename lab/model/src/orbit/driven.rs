@@ -36,16 +36,10 @@ impl Driven {
         }
     }
 
-    /// A step from (q1, q1') where the base has the phase `phase`, rad.
+    /// A step from (q1, q1') where the base has the phase `phase`, rad; the particle may be stuck to a wall.
     #[must_use]
-    pub fn from(&self, phase: f64, state: [f64; 2]) -> DrivenStep<'_> {
-        DrivenStep {
-            driven: self,
-            phase,
-            at: 0.0,
-            state: state.into(),
-            stuck: false,
-        }
+    pub fn from(&self, phase: f64, state: [f64; 2], stuck: bool) -> DrivenStep<'_> {
+        DrivenStep { driven: self, phase, at: 0.0, state: state.into(), stuck }
     }
 
     /// Bound of `|q1|` from (q1, q1') at the phase `phase` on, without impacts.

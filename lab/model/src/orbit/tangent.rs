@@ -51,10 +51,12 @@ impl Tangent {
         self.particle += Vector2::new(-particle * dw * later, particle * change);
     }
 
-    /// The particle comes to rest on a wall: from now on it moves with the primary mass.
+    /// The particle comes to rest on a wall: from now on it moves with the primary mass. A disturbed motion does so a little earlier or
+    /// later, with other velocities until then; only their common centre of mass has no jump.
     pub fn stick(&mut self, t: f64) {
         self.flow(t);
         self.stuck = true;
+        self.primary = (self.primary + self.particle * self.epsilon) / (1.0 + self.epsilon);
         self.particle = self.primary;
     }
 
