@@ -23,6 +23,7 @@ fn plan(x: &str, y: &str) -> Plan {
         x: x.parse().unwrap(),
         y: y.parse().unwrap(),
         limit: 2000,
+        starts: 1,
     }
 }
 
@@ -60,6 +61,33 @@ fn a_particle_that_is_pressed_to_its_wall_sticks() {
         point.sticks_per_period > 0.5 && point.regime != Regime::Undecided,
         "{point:?}"
     );
+}
+
+#[test]
+fn a_motion_that_sticks_and_repeats_itself_has_a_negative_exponent() {
+    let scene = Dimensionless::new(0.02, 0.8, 0.4, 0.8463);
+    let point = observe(&scene, -2.8639, [0.0, 0.7, 0.4, 0.3], 4000).unwrap();
+    println!("{point:?}");
+    assert!(point.sticks_per_period > 0.1 && point.regime == Regime::Several);
+    assert!(point.exponent.unwrap() < 0.0 && point.recurrence.unwrap() < 1e-6);
+}
+
+#[test]
+fn several_starts_show_where_regimes_coexist() {
+    // At the phase-resonant orbit, a particle at rest stays at rest.
+    let plan = Plan { starts: 6, ..plan("sigma=-1.2:-1.1:2", "G=1.05:1.1:2") };
+    let map = plan.run(|| {}).unwrap();
+    let other: Vec<_> = map
+        .cells
+        .iter()
+        .map(|one| (one.point.regime, one.coexisting.clone()))
+        .collect();
+    println!("{other:?}");
+    let rest = Plan { start: REST, ..plan }.run(|| {}).unwrap();
+    for cell in &rest.cells {
+        assert_eq!(cell.point.regime, Regime::NoImpacts);
+        assert!(cell.coexisting.contains(&Regime::Symmetric), "{cell:?}");
+    }
 }
 
 #[test]

@@ -1,12 +1,13 @@
 //! `vines map`: the regime map.
 
+use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use vines::{
     map::{Axis, LIMIT, Map, Plan, Range},
-    orbit::phase_resonant,
+    orbit::{Branch, phase_resonant},
     regime::Regime,
     report::{self, Table, summary::parameters},
     scene::Scene,
@@ -30,10 +31,13 @@ Where several regimes are stable the start decides; a particle at rest may stay 
 
 Examples:
   vines map                                               sigma and G, in out/
+  vines map --starts 5                                    with four random starts in every cell
   vines map --x r=0.3:1:71 --y G=0.2:3:57 --sigma=-1.1
   vines map --x sigma=-2:1:61 --y G=0.5:2:61 --set start.dq2=0 --set start.q2=0.005
 
-Writes map.csv, map.svg and map-dark.svg.";
+Over sigma and G, the curves on which 1:1 motions bifurcate are followed and drawn, solid where they bound the stability of a motion.
+
+Writes map.csv, map.svg and map-dark.svg, and over sigma and G also bifurcations.csv.";
 
 /// Map the regimes of the response over two of sigma, G and r
 #[derive(Debug, Args)]
@@ -57,6 +61,10 @@ pub(super) struct Arguments {
     /// Largest number of periods that a cell is followed; at least 100
     #[arg(long, value_name = "PERIODS", default_value_t = LIMIT)]
     periods: usize,
+
+    /// Starts per cell: that of the scene, and random ones that show where regimes coexist
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    starts: usize,
 
     /// Folder for the results; made if it is not there
     #[arg(long, value_name = "DIR", default_value = "out")]
@@ -100,6 +108,7 @@ fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
         x: arguments.x,
         y: arguments.y,
         limit: arguments.periods,
+        starts: arguments.starts,
     })
 }
 
@@ -119,11 +128,26 @@ fn summary(map: &Map) -> String {
         ]
     });
     let table = Table::new(["regime", "cells", "share", "inside the theory's stable island"]);
-    format!(
+    let mut text = format!(
         "Regimes over {} and {}\n  {}\n\n{}",
         map.plan.x,
         map.plan.y,
         parameters(&map.plan.scene),
         table.rows(rows).text()
-    )
+    );
+    if map.plan.starts > 1 {
+        let count = map.cells.iter().filter(|cell| !cell.coexisting.is_empty()).count();
+        let part = share(count, map.cells.len());
+        let _ = writeln!(
+            text,
+            "\n{} starts per cell lead to several regimes in {count} cells ({part})",
+            map.plan.starts
+        );
+    }
+    for curve in &map.curves {
+        let Branch { points, ended: [one, other], .. } = &curve.branch;
+        let (name, count) = (curve.name(), points.len());
+        let _ = writeln!(text, "  {name}: {count} points; ends: {}; {}", one.name(), other.name());
+    }
+    text
 }

@@ -4,6 +4,7 @@
 
 use plotters::style::RGBColor;
 
+use crate::orbit::Bifurcation;
 use crate::regime::Regime;
 
 pub const THEORY: RGBColor = RGBColor(40, 40, 40);
@@ -27,6 +28,16 @@ pub fn regime(regime: Regime) -> RGBColor {
         Regime::Undecided => RGBColor(30, 32, 40),
         // The map shows none of these.
         Regime::Other | Regime::Unresolved | Regime::Unknown => UNSTABLE,
+    }
+}
+
+/// The colour of a bifurcation curve on the map.
+pub fn bifurcation(kind: Bifurcation) -> RGBColor {
+    match kind {
+        Bifurcation::Fold => RGBColor(20, 60, 160),
+        Bifurcation::SymmetryBreaking => RGBColor(170, 90, 0),
+        Bifurcation::PeriodDoubling => RGBColor(0, 95, 50),
+        Bifurcation::Torus => RGBColor(200, 0, 60),
     }
 }
 

@@ -7,7 +7,7 @@ use crate::map::{Axis, LIMIT, Map, Plan};
 use crate::orbit::phase_resonant;
 use crate::regime::Regime;
 use crate::report::figures::regimes;
-use crate::report::files::map_csv;
+use crate::report::files::{bifurcations_csv, map_csv};
 use crate::report::section::Section;
 use crate::report::table::Table;
 
@@ -24,6 +24,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         x,
         y,
         limit: LIMIT,
+        starts: 1,
     };
     let (count, all) = (AtomicUsize::new(0), plan.cells());
     let map = plan.run(|| {
@@ -33,7 +34,8 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     describe(&mut section, &map);
     section.figure(
         "regimes",
-        "The regime map. The line is the border of the island in which first-order theory has a stable symmetric 1:1 motion.",
+        "The regime map. The black line is the border of the island in which first-order theory has a stable symmetric 1:1 motion. The \
+         coloured curves are exact bifurcations of the 1:1 motions, solid where they bound the stability of one.",
         regimes::svg(&map)?,
     );
     section.budget(
@@ -43,6 +45,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
          as lasting; docs/regimes.md says how often that happens.",
     );
     section.attach("regimes.csv", map_csv(&map)?);
+    section.attach("bifurcations.csv", bifurcations_csv(&map)?);
     Ok(section)
 }
 
