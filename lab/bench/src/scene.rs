@@ -22,7 +22,7 @@ pub use controller::Controller;
 pub use error::SceneError;
 pub use overrides::{Override, SyntaxError};
 pub use record::{Estimator, Record};
-pub use vines_model::Dimensionless;
+pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
 
 use sections::Sections;
 

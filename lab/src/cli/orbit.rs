@@ -6,11 +6,11 @@ use clap::Args;
 use vines::{
     numerics::range,
     orbit::{
-        Branch, Condition, Ended, Exploration, Limits, Orbit, Periodic, backbone, continue_both_ways, convergence,
-        phase_resonant, response, settle,
+        Branch, Condition, Convergence, Ended, Exploration, Limits, Orbit, Periodic, backbone, continue_both_ways,
+        convergence, phase_resonant, response, settle,
     },
     report::{Table, number, summary::parameters},
-    scene::Dimensionless,
+    scene::{Definition, Dimensionless},
 };
 
 use super::{failure::Failure, scene_arguments::SceneArguments, yes_no};
@@ -30,6 +30,7 @@ Examples:
   vines orbit --response --set excitation.G=1.6
   vines orbit --backbone --set plant.c=0 --set plant.r=1 --set excitation.G=0
   vines orbit --sigma=-0.6 --set excitation.G=2.2   the orbit that settles there, here six impacts in two periods
+  vines orbit --definitions                   resonance by phase or peak, by e or force, of v, q1 or acceleration
   vines orbit --convergence                   how theory approaches the exact orbit
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
   vines orbit --scene scenes/dimensionless.toml --json";
@@ -64,6 +65,10 @@ pub(super) struct Arguments {
     /// Theory minus exact orbit at epsilon and its halvings, with the fitted exponent
     #[arg(long, group = "what")]
     convergence: bool,
+
+    /// Theory minus exact orbit at epsilon and four halvings, for all definitions of resonance, references and sensors
+    #[arg(long, group = "what")]
+    definitions: bool,
 
     /// Print JSON instead of a table
     #[arg(long)]
@@ -110,6 +115,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     }
     if arguments.convergence {
         return converged(&scene, arguments.json);
+    }
+    if arguments.definitions {
+        return defined(&scene, arguments.json);
     }
     let orbits = phase_resonant(&scene);
     if arguments.json {
@@ -158,6 +166,70 @@ fn detunings(text: &str) -> Result<[f64; 2], String> {
         _ => Err(form()),
     }
 }
+
+/// One definition with its differences.
+#[derive(serde::Serialize)]
+struct Defined {
+    definition: Definition,
+    #[serde(flatten)]
+    study: Convergence,
+}
+
+/// Theory minus exact orbit for all definitions.
+fn defined(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
+    let study = |definition| {
+        let study = convergence(&Dimensionless { definition, ..*scene }, DEFINITION_HALVINGS)?;
+        Some(Defined { definition, study })
+    };
+    let all: Vec<Defined> = Definition::all().into_iter().filter_map(study).collect();
+    shown(
+        scene,
+        "Theory minus exact orbit, by definition of resonance",
+        &all,
+        json,
+        || {
+            let row = |one: &Defined| -> Vec<String> {
+                let rows = &one.study.rows;
+                let mut cells = vec![one.definition.name()];
+                cells.extend(rows[0].exact.map(number));
+                cells.extend(rows.iter().map(|row| format!("{:.2e}", row.sigma)));
+                cells.push(format!("{:.2}", one.study.slopes[0]));
+                cells.extend(rows.iter().map(|row| format!("{:.2e}", row.c)));
+                cells.push(format!("{:.2}", one.study.slopes[1]));
+                cells
+            };
+            let table = Table::new([
+                "resonance",
+                "sigma",
+                "C",
+                "sigma: eps",
+                "eps/2",
+                "eps/4",
+                "eps/8",
+                "eps/16",
+                "exponent",
+                "C: eps",
+                "eps/2",
+                "eps/4",
+                "eps/8",
+                "eps/16",
+                "exponent",
+            ]);
+            let missing = Definition::all().len() - all.len();
+            let note = match missing {
+                0 => String::new(),
+                _ => format!("\n{missing} definitions have no stable solution at every epsilon\n"),
+            };
+            format!(
+                "sigma and C of the exact orbit, then theory minus exact\n{}{note}",
+                table.rows(all.iter().map(row)).text()
+            )
+        },
+    )
+}
+
+/// Halvings of epsilon for each definition.
+const DEFINITION_HALVINGS: u32 = 4;
 
 /// Periods before the motion is evaluated.
 const SETTLE: usize = 1000;

@@ -24,6 +24,8 @@ const LEFT_OUT: f64 = 0.25;
 const BLOCKS: usize = 32;
 /// Standard errors by which a Lyapunov exponent differs from zero.
 const SIGNIFICANT: f64 = 4.0;
+/// Largest uncertainty of an exponent that is zero, per period.
+const ZERO: f64 = 2e-3;
 /// From this share of captured impacts on a chaotic motion is called modulated.
 const CAPTURES: f64 = 0.2;
 
@@ -161,18 +163,19 @@ impl Run {
         let n = self.halves();
         let from = (LEFT_OUT * n as f64) as usize;
         let (exponent, error) = self.exponent(from);
-        // A growth that is only linear in time, as on a torus, gives this.
+        // The uncertainty; a growth that is only linear in time, as on a torus, gives the first number.
         let linear = 2.0 * (0.5 * n as f64).ln() / (0.5 * n as f64);
+        let zero = linear.max(SIGNIFICANT * error);
         let mut point = self.point(Regime::Undecided, from);
         point.regime = if point.impacts_per_period == 0.0 {
             Regime::Undecided
-        } else if exponent > linear.max(SIGNIFICANT * error) {
+        } else if exponent > zero {
             if point.synchrony < CAPTURES {
                 Regime::Chaotic
             } else {
                 Regime::Modulated
             }
-        } else if exponent.abs() <= linear && SIGNIFICANT * error <= linear {
+        } else if exponent > -zero && zero < ZERO {
             Regime::QuasiPeriodic
         } else {
             Regime::Undecided

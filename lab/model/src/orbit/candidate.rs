@@ -15,8 +15,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::{AfterImpact, oscillator::Oscillator};
-use crate::Dimensionless;
 use crate::numerics::quadratic;
+use crate::{Definition, Dimensionless, Sensor};
 
 /// A symmetric motion that satisfies the impact law and the phase resonance, not yet checked for `|w| <= 1` in flight.
 #[derive(Debug, Clone, Copy)]
@@ -25,7 +25,7 @@ pub(super) struct Candidate {
     pub omega: f64,
     /// Speed of the particle; not physical unless positive.
     pub b: f64,
-    /// Amplitude of the first harmonic of v.
+    /// Amplitude of the first harmonic of the response.
     pub c: f64,
     /// Base amplitude over `b epsilon`.
     pub g: f64,
@@ -37,7 +37,7 @@ pub(super) struct Candidate {
     pub(super) before: Vector2<f64>,
     /// State (p, p') of the unit impulse response just after its impulse.
     pub(super) p: Vector2<f64>,
-    /// The first harmonic of v lags the base by pi/2, rather than leading it.
+    /// The first harmonic of the response lags the reference by pi/2, rather than leading it.
     pub(super) lags: bool,
 }
 
@@ -59,8 +59,11 @@ pub(super) struct Family {
     epsilon: f64,
     alpha: f64,
     beta: f64,
-    /// First harmonic of v less that of y, over B.
+    /// First harmonic of v or q1, as the sensor says, less that of y, over B.
     kappa: Complex<f64>,
+    /// Factor of the sensor, and direction of the reference in the complex plane.
+    scale: f64,
+    reference: Complex<f64>,
     /// Harmonic of the base over y.
     base_over_y: Complex<f64>,
     p: Vector2<f64>,
@@ -78,13 +81,23 @@ impl Family {
 
         // v = y + B kappa in the first harmonic: impulses through the oscillator, and the particle's triangle wave.
         let impulse = Complex::new(0.0, 2.0 * omega / PI);
-        let triangle = Complex::new(0.0, -4.0 / (PI * omega));
+        let Definition { sensor, reference, .. } = scene.definition;
+        let triangle = match sensor {
+            Sensor::V => Complex::new(0.0, -4.0 / (PI * omega)),
+            Sensor::Q1 | Sensor::Acceleration => Complex::new(0.0, 0.0),
+        };
         Some(Self {
             omega,
             epsilon,
             alpha: 2.0 * epsilon * p_before[0] - FRAC_PI_2 / omega,
             beta: (2.0 * (1.0 + epsilon) / (1.0 + r) - 1.0 + 2.0 * epsilon * p_before[1]) / omega,
             kappa: (oscillator.compliance(omega) * impulse * -2.0 + triangle) * epsilon,
+            scale: if sensor == Sensor::Acceleration {
+                omega * omega
+            } else {
+                1.0
+            },
+            reference: Complex::from_polar(1.0, reference.phase(epsilon * scene.lambda, omega)),
             base_over_y: oscillator.stiffness(omega) / oscillator.base_force(omega),
             p,
         })
@@ -94,7 +107,7 @@ impl Family {
     pub(super) fn phase_resonant(&self) -> Option<[Candidate; 2]> {
         let Self { alpha, beta, .. } = *self;
         // Only the direction of the base's harmonic matters for the phase.
-        let d = self.base_over_y.conj();
+        let d = (self.base_over_y * self.reference).conj();
         let u = d * self.kappa;
         let speeds = quadratic(
             d.re * (alpha * alpha + beta * beta) + u.re * beta + u.im * alpha,
@@ -120,13 +133,13 @@ impl Family {
         Candidate {
             omega: self.omega,
             b,
-            c: v.norm(),
+            c: v.norm() * self.scale,
             g: base.norm() / self.epsilon,
             base,
             y,
             before: Vector2::new(y.im, self.omega * y.re) - p_before * (2.0 * self.epsilon * b),
             p: self.p,
-            lags: (v * base.conj()).im < -1e-12 * v.norm() * base.norm(),
+            lags: (v * (base * self.reference).conj()).im < -1e-12 * v.norm() * base.norm(),
         }
     }
 }

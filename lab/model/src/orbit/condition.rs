@@ -6,7 +6,7 @@ use super::{
     branch::Bifurcation,
     pattern::{ImpactPattern, Returned, Unknowns, follow},
 };
-use crate::Dimensionless;
+use crate::{Dimensionless, Resonance};
 
 /// An equation that selects a motion, in addition to the four that close it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -15,8 +15,10 @@ pub enum Condition {
     Sigma(f64),
     /// G has this value.
     Excitation(f64),
-    /// The first harmonic of v lags (or leads) the base by a quarter of a period.
+    /// The first harmonic of the response lags (or leads) the reference by a quarter of a period.
     PhaseResonance,
+    /// The amplitude of the first harmonic of the response is extreme along the frequency response.
+    Peak,
     /// A multiplier, or a pair of them, is on the unit circle.
     Bifurcation(Bifurcation),
 }
@@ -28,6 +30,15 @@ pub(super) type Row = (f64, RowSVector<f64, 6>);
 const STEP: f64 = 1e-6;
 
 impl Condition {
+    /// What selects the backbone by the scene's definition.
+    #[must_use]
+    pub fn backbone(scene: &Dimensionless) -> Self {
+        match scene.definition.resonance {
+            Resonance::Phase => Condition::PhaseResonance,
+            Resonance::Peak => Condition::Peak,
+        }
+    }
+
     pub(super) fn value(
         &self,
         scene: &Dimensionless,
@@ -45,7 +56,8 @@ impl Condition {
                 row[5] = 1.0;
                 (x[5] - g, row)
             }
-            Condition::PhaseResonance => (returned.v.re, returned.v_by[0]),
+            Condition::PhaseResonance => (returned.s.re, returned.s_by[0]),
+            Condition::Peak => by_differences(scene, pattern, x, returned, slope_of_amplitude),
             Condition::Bifurcation(kind) => by_differences(scene, pattern, x, returned, |at| on_circle(kind, at)),
         }
     }
@@ -66,6 +78,20 @@ fn by_differences(
     };
     let slope = |n: usize| (at(n, STEP) - at(n, -STEP)) / (2.0 * STEP);
     (f(returned), RowSVector::from_fn(|_, n| slope(n)))
+}
+
+/// The change of half the square of the amplitude along a direction that closes the motion at constant G, by phase, q1, q1', q2' and
+/// sigma. The direction's components are the minors of the closing equations, so that it has no sign to choose.
+fn slope_of_amplitude(returned: &Returned) -> f64 {
+    let by_sigma = returned.by.fixed_columns::<5>(0);
+    (0..5)
+        .map(|n| {
+            let minor: Matrix4<f64> = by_sigma.remove_fixed_columns::<1>(n).into();
+            let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+            let change = returned.s.re * returned.s_by[0][n] + returned.s.im * returned.s_by[1][n];
+            sign * minor.determinant() * change
+        })
+        .sum()
 }
 
 /// Zero where the multipliers of the map are on the unit circle as the bifurcation says.

@@ -10,7 +10,7 @@ use crate::theory::Manifold;
 fn right_branch(scene: &Dimensionless) -> Option<Periodic> {
     let fastest = |one: &Orbit, other: &Orbit| one.b.total_cmp(&other.b);
     let orbit = phase_resonant(scene).into_iter().max_by(fastest)?;
-    let conditions = [Condition::Excitation(scene.g), Condition::PhaseResonance];
+    let conditions = [Condition::Excitation(scene.g), Condition::backbone(scene)];
     Periodic::find(scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions)
 }
 
@@ -24,7 +24,7 @@ fn at_any_excitation(scene: &Dimensionless) -> Option<Periodic> {
         let fastest = |one: &Orbit, other: &Orbit| one.b.total_cmp(&other.b);
         let met = exact_backbone(scene, 1.0 + scene.epsilon * sigma);
         let orbit = met.into_iter().max_by(fastest).filter(|one| one.b > right)?;
-        let conditions = [Condition::Sigma(sigma), Condition::PhaseResonance];
+        let conditions = [Condition::Sigma(sigma), Condition::backbone(scene)];
         Periodic::find(scene, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions)
     })
 }
@@ -34,5 +34,5 @@ fn at_any_excitation(scene: &Dimensionless) -> Option<Periodic> {
 #[must_use]
 pub fn backbone(scene: &Dimensionless, limits: &Limits) -> Option<Branch> {
     let start = right_branch(scene).or_else(|| at_any_excitation(scene))?;
-    Some(continue_both_ways(scene, &start, Condition::PhaseResonance, limits))
+    Some(continue_both_ways(scene, &start, Condition::backbone(scene), limits))
 }

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::bounce::Bounce;
 use super::impact_map::{ByAll, ImpactMap, RowByAll, Step};
-use crate::Dimensionless;
+use crate::{Definition, Dimensionless, Sensor};
 
 /// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -110,10 +110,10 @@ pub(super) struct Returned {
     pub residual: Vector4<f64>,
     /// Derivative of the residual by the unknowns.
     pub by: ByAll,
-    /// First harmonic of v: `Im(V exp(i phase))`.
-    pub v: Complex<f64>,
-    /// Derivative of V by the unknowns, real and imaginary part.
-    pub v_by: [RowByAll; 2],
+    /// First harmonic of the response relative to the reference: `Im(S exp(i phase))`.
+    pub s: Complex<f64>,
+    /// Derivative of S by the unknowns, real and imaginary part.
+    pub s_by: [RowByAll; 2],
     /// The bounces over the map, with the start and without the return.
     pub bounces: Vec<Bounce>,
     /// Time of flight after each.
@@ -166,8 +166,8 @@ pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknown
     by.column_mut(4).scale_mut(scene.epsilon);
 
     let harmonic = Harmonic::new(scene, &map, pattern);
-    let (v, v_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
-    Some(Returned { residual, by, v, v_by, bounces, durations, monodromy })
+    let (s, s_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
+    Some(Returned { residual, by, s, s_by, bounces, durations, monodromy })
 }
 
 /// The chain rule: derivatives of a step by the unknowns. The step itself also depends on Omega and G.
@@ -182,7 +182,7 @@ fn chained(step: &Step, by: &ByAll) -> (ByAll, RowByAll) {
     (all, impulse_by)
 }
 
-/// `V = direct G + impulses sum`: the base through the oscillator, and the impulses through oscillator and particle.
+/// `S = direct G + impulses sum`: the base through the oscillator, and the impulses through the oscillator and, for v, the particle.
 struct Harmonic {
     direct: [Complex<f64>; 2],
     impulses: [Complex<f64>; 2],
@@ -201,11 +201,23 @@ impl Harmonic {
         // (2i/duration) times the response to a force through the oscillator, less that of a free mass: the impulse on the
         // particle is the opposite one.
         let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
-        let inner = compliance + 1.0 / (omega * omega);
-        let inner_by = compliance_by - 2.0 / omega.powi(3);
+        let Definition { sensor, reference, .. } = scene.definition;
+        let particle = f64::from(u8::from(sensor == Sensor::V));
+        let inner = compliance + particle / (omega * omega);
+        let inner_by = compliance_by - 2.0 * particle / omega.powi(3);
+        // The factor of the sensor, seen from the reference, and its logarithmic derivative.
+        let damping = scene.epsilon * scene.lambda;
+        let (factor, slope) = if sensor == Sensor::Acceleration {
+            (omega * omega, 2.0 / omega)
+        } else {
+            (1.0, 0.0)
+        };
+        let seen = Complex::from_polar(factor, -reference.phase(damping, omega));
+        let seen_by = Complex::new(slope, -reference.phase_slope(damping, omega));
+        let read = |[z, by]: [Complex<f64>; 2]| [z * seen, (by + z * seen_by) * seen];
         Self {
-            direct: [direct, direct_by],
-            impulses: [weight * inner, weight * inner_by + weight / omega * inner],
+            direct: read([direct, direct_by]),
+            impulses: read([weight * inner, weight * inner_by + weight / omega * inner]),
         }
     }
 
@@ -217,7 +229,7 @@ impl Harmonic {
                 z
             }
         };
-        let v = zero_if_undriven(self.direct[0] * g) + self.impulses[0] * sum;
+        let s = zero_if_undriven(self.direct[0] * g) + self.impulses[0] * sum;
         let a = self.impulses[0];
         let mut by = [sum_by[0] * a.re - sum_by[1] * a.im, sum_by[0] * a.im + sum_by[1] * a.re];
         let own = [
@@ -231,7 +243,7 @@ impl Harmonic {
         for row in &mut by {
             row[4] *= epsilon;
         }
-        (v, by)
+        (s, by)
     }
 }
 

@@ -19,10 +19,10 @@ pub struct Periodic {
     pub g: f64,
     /// Detuning `(Omega - 1)/epsilon`.
     pub sigma: f64,
-    /// Amplitude of the harmonic of v at the base's frequency.
+    /// Amplitude of the response's harmonic at the base's frequency.
     #[serde(rename = "C")]
     pub c: f64,
-    /// Phase of that harmonic relative to the base, rad, in (-pi, pi].
+    /// Phase of that harmonic relative to the reference, rad, in (-pi, pi].
     pub gamma: f64,
     /// Speed of the particle over `b omega0`, averaged over time.
     #[serde(rename = "B")]
@@ -82,8 +82,8 @@ impl Periodic {
         Some(Self {
             g: x[5],
             sigma: x[4],
-            c: returned.v.norm(),
-            gamma: wrapped(returned.v.arg()),
+            c: returned.s.norm(),
+            gamma: wrapped(returned.s.arg()),
             b: travelled / total,
             pattern: pattern.clone(),
             bounces: returned.bounces,

@@ -1,20 +1,20 @@
 //! Search for all phase-resonant orbits of a scene, over frequency.
 
 use super::{
-    Orbit,
+    Condition, ImpactPattern, Orbit, Periodic,
     candidate::{Candidate, Family},
     flight::Flight,
     multipliers,
 };
-use crate::Dimensionless;
 use crate::numerics::{bisection, golden_section};
+use crate::{Dimensionless, Resonance};
 
 /// Frequencies searched, over omega0.
 const SEARCHED: [f64; 2] = [0.2, 3.0];
 /// Points of the search; they are dense around omega0, where the detuning is of order one.
 const POINTS: usize = 30_000;
 
-/// All exact symmetric 1:1 orbits at phase resonance at the scene's G, by rising C; empty where there are none.
+/// All exact symmetric 1:1 orbits at resonance at the scene's G, by rising C; empty where there are none.
 ///
 /// Frequencies between 0.2 and 3 omega0 are searched on a grid of about 0.001 in the detuning where that is of
 /// order one, and every root is refined to the last bit.
@@ -26,6 +26,10 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
         .filter(resonates)
         .filter_map(|candidate| accept(scene, &candidate))
         .collect();
+    if scene.definition.resonance == Resonance::Peak {
+        let peak = |orbit: &Orbit| peak(scene, orbit, Condition::Excitation(scene.g));
+        orbits = orbits.iter().filter_map(peak).collect();
+    }
     orbits.sort_by(|one, other| one.c.total_cmp(&other.c));
     orbits.dedup_by(|one, other| (one.sigma - other.sigma).abs() < 1e-9 && (one.b - other.b).abs() < 1e-9);
     orbits
@@ -36,13 +40,28 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
 /// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.
 #[must_use]
 pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
-    Family::new(scene, omega)
+    let orbits = Family::new(scene, omega)
         .and_then(|family| family.phase_resonant())
         .into_iter()
         .flatten()
-        .filter(|candidate| resonates(candidate))
-        .filter_map(|candidate| accept(scene, &candidate))
-        .collect()
+        .filter(resonates)
+        .filter_map(|candidate| accept(scene, &candidate));
+    match scene.definition.resonance {
+        Resonance::Phase => orbits.collect(),
+        Resonance::Peak => orbits
+            .filter_map(|orbit| peak(scene, &orbit, Condition::Sigma(orbit.sigma)))
+            .collect(),
+    }
+}
+
+/// The orbit near a phase-resonant one whose amplitude is largest along its frequency response.
+fn peak(scene: &Dimensionless, near: &Orbit, condition: Condition) -> Option<Orbit> {
+    let conditions = [condition, Condition::Peak];
+    let found = Periodic::find(scene, &ImpactPattern::symmetric(), &near.unknowns(), conditions)?;
+    let scene = Dimensionless { g: found.g, ..*scene };
+    symmetric_orbits(&scene, found.sigma)
+        .into_iter()
+        .min_by(|one, other| (one.b - found.b).abs().total_cmp(&(other.b - found.b).abs()))
 }
 
 /// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.
