@@ -7,6 +7,7 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct Definition {
     /// What singles out the motions of the backbone.
+    #[serde(rename = "definition")]
     pub resonance: Resonance,
     /// What the phase refers to.
     pub reference: Reference,

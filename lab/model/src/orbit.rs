@@ -56,9 +56,11 @@ pub struct Orbit {
     /// Angular frequency over omega0.
     #[serde(rename = "Omega")]
     pub omega: f64,
-    /// Amplitude of the first harmonic of v.
+    /// Amplitude of the first harmonic of the response: of v, unless the scene's definition of resonance says otherwise.
     #[serde(rename = "C")]
     pub c: f64,
+    /// Phase of the first harmonic of the response relative to the reference, rad.
+    pub gamma: f64,
     /// Speed of the particle in flight.
     #[serde(rename = "B")]
     pub b: f64,

@@ -7,7 +7,7 @@ use vines::{
     fmu::{FmuController, FmuRig},
     net::{BindScope, NetController, NetRig, resolve},
     rig::{BuiltIn, Chain, Controller, Rig, Simulated},
-    scene::Scene,
+    scene::{Resonance, Scene},
 };
 
 use super::failure::Failure;
@@ -55,7 +55,10 @@ impl Endpoint {
     pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
         let mut pace = None;
         let rig: Box<dyn Rig> = match self {
-            Self::BuiltIn => Box::new(Simulated::new(scene.plant, scene.start).map_err(Failure::input)?),
+            Self::BuiltIn => {
+                let plant = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
+                Box::new(plant.with_sensors(scene.resonance))
+            }
             Self::Fmu(file) => Box::new(FmuRig::load(file, &scene.start_values()).map_err(Failure::run)?),
             Self::Udp(address) => {
                 let rig = NetRig::connect(resolve(address, scope)?, scene.sample_time())?;
@@ -75,6 +78,12 @@ impl Endpoint {
         scope: BindScope,
         pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
+        if scene.resonance.resonance == Resonance::Peak && scene.controller.phase_target == -90.0 {
+            return Err(Failure::input(
+                "resonance.definition = \"peak\" with controller.phase_target = -90 degrees: the loop holds a phase, so set phase_target to the \
+                 phase at the peak, which `vines orbit` prints",
+            ));
+        }
         Ok(match self {
             Self::BuiltIn => Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?),
             Self::Fmu(file) => Box::new(FmuController::load(file, &scene.controller_config()).map_err(Failure::run)?),

@@ -17,7 +17,7 @@ use super::{failure::Failure, scene_arguments::SceneArguments, yes_no};
 
 const HELP: &str = "\
 Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon sigma:
-  C            amplitude of the first harmonic of the centre of mass, v = q1 + epsilon q2
+  C            amplitude of the first harmonic of the response: of v = q1 + epsilon q2, or as resonance.sensor says
   B            speed of the particle in flight
   multipliers  moduli of the multipliers of the half-period map; stable if all are below 1
 
@@ -123,7 +123,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if arguments.json {
         return super::json(&orbits);
     }
-    let title = "Exact symmetric 1:1 orbits at phase resonance";
+    let title = format!("Exact symmetric 1:1 orbits at resonance: {}", scene.definition.name());
     Ok(format!(
         "{title}\n  {}\n\n{}",
         parameters(&scene),
@@ -345,13 +345,24 @@ fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
         };
     }
     let rows = orbits.iter().map(|orbit| {
-        let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.b];
+        let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.gamma.to_degrees(), orbit.b];
         let mut row: Vec<String> = numbers.map(number).into();
         row.extend(orbit.multipliers.map(|one| format!("{one:.4}")));
         row.push(yes_no(orbit.stable));
         row
     });
-    Table::new(["sigma", "Omega", "C", "B", "mult1", "mult2", "mult3", "mult4", "stable"])
-        .rows(rows)
-        .text()
+    Table::new([
+        "sigma",
+        "Omega",
+        "C",
+        "phase, degrees",
+        "B",
+        "mult1",
+        "mult2",
+        "mult3",
+        "mult4",
+        "stable",
+    ])
+    .rows(rows)
+    .text()
 }

@@ -37,6 +37,8 @@ pub(super) struct Candidate {
     pub(super) before: Vector2<f64>,
     /// State (p, p') of the unit impulse response just after its impulse.
     pub(super) p: Vector2<f64>,
+    /// Phase of the first harmonic of the response relative to the reference, rad.
+    pub gamma: f64,
     /// The first harmonic of the response lags the reference by pi/2, rather than leading it.
     pub(super) lags: bool,
 }
@@ -134,6 +136,7 @@ impl Family {
             omega: self.omega,
             b,
             c: v.norm() * self.scale,
+            gamma: (v * (base * self.reference).conj()).arg(),
             g: base.norm() / self.epsilon,
             base,
             y,

@@ -106,6 +106,7 @@ fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
         sigma: (omega - 1.0) / scene.epsilon,
         omega,
         c,
+        gamma: candidate.gamma,
         b,
         impact_velocity: 2.0 * b * (1.0 + scene.epsilon) / (1.0 + scene.r),
         start: candidate.after_impact(scene.epsilon),

@@ -7,7 +7,7 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 
 use nalgebra::Complex;
 
-use super::{backbone::BackbonePoint, slow_flow::SlowFlow};
+use super::{backbone::BackbonePoint, manifold::BranchSide, slow_flow::SlowFlow};
 use crate::numerics::golden_section;
 use crate::{Dimensionless, Resonance, Sensor};
 
@@ -25,6 +25,21 @@ pub fn resonant(scene: &Dimensionless) -> Vec<BackbonePoint> {
         .collect()
 }
 
+/// The detuning of the free decay at the amplitude `c` that the scene's sensor reads, on the right branch; None below the fold.
+#[must_use]
+pub fn free_sigma(scene: &Dimensionless, c: f64) -> Option<f64> {
+    let theory = Reading { scene, flow: SlowFlow::new(scene.lambda, scene.r) };
+    let mut amplitude = c;
+    // Sensors differ from v by a factor of 1 + O(epsilon): each round gains as much.
+    for _ in 0..ROUNDS {
+        let b = theory.flow.manifold.b(amplitude, BranchSide::Right)?;
+        amplitude = c / theory.seen(b, theory.flow.free_detuning(b)).norm();
+    }
+    theory.flow.backbone_sigma(amplitude, BranchSide::Right)
+}
+
+/// Rounds of a fixed-point iteration.
+const ROUNDS: usize = 12;
 /// Phases beside phase resonance at which a peak is searched for, rad.
 const ASIDE: f64 = 0.3;
 
