@@ -6,7 +6,9 @@ use rand_chacha::{
 };
 use vines_model::{
     Dimensionless,
-    orbit::{Ended, Exploration, Limits, Periodic, Response, random_state, response, settle, symmetric_orbits},
+    orbit::{
+        Bifurcation, Ended, Exploration, Limits, Periodic, Response, random_state, response, settle, symmetric_orbits,
+    },
 };
 
 fn scene(g: f64) -> Dimensionless {
@@ -47,6 +49,13 @@ fn beside_the_closed_isola_the_response_has_the_component_of_slow_particles() {
         let symmetric: Vec<_> = found.symmetric().collect();
         assert!(symmetric.len() >= 2, "G = {g}");
         assert!(symmetric.iter().any(|one| one.ended == [Ended::Closed; 2]));
+        for one in &symmetric {
+            let folds = one.special.iter().filter(|one| one.kind == Bifurcation::Fold).count();
+            assert!(
+                one.ended != [Ended::Closed; 2] || folds == 2,
+                "a closed curve turns twice, G = {g}: {folds}"
+            );
+        }
         // Random starts settle on these.
         for sigma in [-0.4, -0.2, 0.0, 0.2] {
             let Some(stable) = symmetric_orbits(&scene(g), sigma).into_iter().find(|one| one.stable) else {

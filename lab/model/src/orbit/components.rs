@@ -137,6 +137,9 @@ impl Search<'_> {
             .filter(|one| breaking.contains(&one.kind))
             .cloned()
             .collect();
+        // One that ended early, where continuation failed, may be a part of this one.
+        self.found
+            .retain(|old| !branch.passes(self.scene, &old.points[old.points.len() / 2]));
         self.found.push(branch);
         if depth == self.doublings {
             return;

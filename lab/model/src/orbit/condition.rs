@@ -86,7 +86,7 @@ fn slope_of_amplitude(returned: &Returned) -> f64 {
     let by_sigma = returned.by.fixed_columns::<5>(0);
     (0..5)
         .map(|n| {
-            let minor: Matrix4<f64> = by_sigma.remove_fixed_columns::<1>(n).into();
+            let minor: Matrix4<f64> = by_sigma.remove_fixed_columns::<1>(n);
             let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
             let change = returned.s.re * returned.s_by[0][n] + returned.s.im * returned.s_by[1][n];
             sign * minor.determinant() * change

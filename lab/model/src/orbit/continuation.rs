@@ -170,6 +170,11 @@ pub fn continue_from(
         let mut apart = next - origin;
         apart[0] = super::pattern::wrapped(apart[0]);
         if branch.points.len() > 10 && apart.norm() < step && turned.dot(&first_tangent) > 0.9 {
+            let last = &branch.points[branch.points.len() - 1];
+            if outside(last) != outside(start) {
+                // A little beyond the start, which the plane at the end of the step may miss.
+                branch.special.extend(curve.locate(last, &turned, 1.1 * apart.norm()));
+            }
             branch.ended[1] = Ended::Closed;
             return branch;
         }

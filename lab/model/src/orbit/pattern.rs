@@ -69,10 +69,10 @@ impl ImpactPattern {
         let half = Self {
             walls: walls.into(),
             half_periods: self.half_periods / 2,
-            mirrored: self.half_periods % 4 != 0,
+            mirrored: !self.half_periods.is_multiple_of(4),
         };
         let same = walls.iter().zip(rest).all(|(one, other)| half.sign() * one == *other);
-        (!self.mirrored && self.walls.len() % 2 == 0 && count > 0 && same).then_some(half)
+        (!self.mirrored && self.walls.len().is_multiple_of(2) && count > 0 && same).then_some(half)
     }
 
     /// Impacts over the whole period of the motion.

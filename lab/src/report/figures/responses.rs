@@ -1,4 +1,4 @@
-//! Frequency responses at several excitations, exact and first-order, with the backbone through their maxima.
+//! Frequency responses at several excitations, exact and first-order, with the backbone near their maxima.
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::style::BLACK;

@@ -45,7 +45,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     if found.iter().any(|one| !one.components.is_empty()) {
         section.figure(
             "responses",
-            "Frequency responses at several excitations: exact, first-order, and the backbone of the theory through their maxima. \
+            "Frequency responses at several excitations: exact, first-order, and the backbone of the theory near their maxima. \
              Where a response loses its symmetry, the asymmetric motions (blue, beside the dashed curve) take over.",
             responses::figure(&p, &found).svg()?,
         );
