@@ -20,7 +20,9 @@ fn plan(scene: &Scene) -> Plan {
 }
 
 fn measure(scene: &Scene) -> Record {
-    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut rig = Simulated::new(scene.plant, scene.start)
+        .unwrap()
+        .with_sensors(scene.resonance);
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     experiment::run(&mut rig, &mut controller, &plan(scene), |_, _, _| {}).unwrap()
 }
@@ -52,6 +54,35 @@ fn a_longer_wait_brings_the_lock_closer_to_the_exact_orbit() {
         found.lock.periods_to_lock
     );
     assert!(sigma.abs() < 1e-5 && c.abs() < 1e-5);
+}
+
+#[test]
+fn the_lock_is_the_exact_orbit_for_every_sensor_and_reference() {
+    let lock = |settings: &[&str]| {
+        let found = identified(settings);
+        let (exact, lock) = (found.exact.unwrap(), found.lock);
+        let (sigma, c) = (lock.sigma - exact.sigma, lock.c / exact.c - 1.0);
+        println!(
+            "{settings:?}: sigma {:.5}, off by {sigma:.1e}; C {:.5}, off by {c:.1e}",
+            lock.sigma, lock.c
+        );
+        (sigma.abs(), c.abs())
+    };
+    for reference in ["resonance.reference='base'", "resonance.reference='force'"] {
+        for sensor in ["v", "q1", "acceleration"] {
+            let (sigma, c) = lock(&[reference, &format!("resonance.sensor='{sensor}'")]);
+            assert!(sigma < 2e-3 && c < 2e-3, "{reference} {sensor}");
+        }
+    }
+    // At the phase of the exact peak, the lock is the peak.
+    let peak = scene(&["resonance.definition='peak'"]).dimensionless();
+    let orbits = vines::orbit::phase_resonant(&peak);
+    let phase = orbits.iter().find(|one| one.stable).unwrap().gamma.to_degrees();
+    let (sigma, c) = lock(&[
+        "resonance.definition='peak'",
+        &format!("controller.phase_target={phase}"),
+    ]);
+    assert!(sigma < 2e-3 && c < 2e-3);
 }
 
 #[test]

@@ -7,10 +7,10 @@ use serde::Serialize;
 use vines_model::Dimensionless;
 use vines_model::numerics::mean_square;
 use vines_model::orbit::{self, Orbit};
-use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow};
+use vines_model::theory::{BackbonePoint, SlowFlow, free_sigma, resonant};
 
 use crate::identification::{DecayPoint, Identification, Lock};
-use crate::scene::Scene;
+use crate::scene::{Resonance, Scene};
 
 pub use exact_curve::{Distance, ExactCurve};
 pub use tracked::{TrackedComparison, TrackedPoint};
@@ -57,10 +57,11 @@ impl Comparison {
     pub fn of(found: &Identification, scene: &Scene) -> Self {
         let (parameters, lock) = (found.parameters, found.lock);
         let flow = SlowFlow::new(parameters.lambda, parameters.r);
-        let at_resonance = scene.controller.phase_target == PHASE_RESONANCE;
+        // At the peak the user gives the phase.
+        let peak = scene.resonance.resonance == Resonance::Peak;
+        let at_resonance = peak || scene.controller.phase_target == PHASE_RESONANCE;
         let distance = |sigma: f64, c: f64| (sigma - lock.sigma).hypot(c - lock.c);
-        let theory = flow
-            .phase_resonant(parameters.g)
+        let theory = resonant(&parameters)
             .into_iter()
             .filter(|point| at_resonance && point.stable())
             .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
@@ -80,7 +81,7 @@ impl Comparison {
             .take_while(|point| point.c >= lowest)
             .map(|point| ComparedPoint {
                 point: *point,
-                sigma_theory: flow.backbone_sigma(point.c, BranchSide::Right),
+                sigma_theory: free_sigma(&parameters, point.c),
             })
             .collect();
         Self {

@@ -100,6 +100,27 @@ fn a_value_of_the_wrong_type_is_named_with_its_line() {
 }
 
 #[test]
+fn what_is_measured_reaches_theory_and_exact_orbits() {
+    use vines_testbench::scene::{Definition, Reference, Resonance, Sensor};
+    assert_eq!(paper(&[]).unwrap().dimensionless().definition, Definition::default());
+    let set = [
+        "resonance.definition='peak'",
+        "resonance.reference='force'",
+        "resonance.sensor='acceleration'",
+    ];
+    let definition = Definition {
+        resonance: Resonance::Peak,
+        reference: Reference::Force,
+        sensor: Sensor::Acceleration,
+    };
+    assert_eq!(paper(&set).unwrap().dimensionless().definition, definition);
+    says(
+        &complaint(paper(&["resonance.sensor='w'"])),
+        &["`w`", "`v`", "`q1`", "`acceleration`"],
+    );
+}
+
+#[test]
 fn values_that_make_no_sense_are_named_with_unit_and_range() {
     for (argument, parts) in [
         ("plant.M=0", ["M (primary mass) = 0 kg", "from 1e-100 to 1e100"]),

@@ -11,7 +11,7 @@ use vines::{
     fmu::{FmuController, FmuRig},
     net::{Address, BindScope, NetController, NetRig, Timing},
     rig::{BuiltIn, Chain, Controller, Rig, Simulated},
-    scene::Scene,
+    scene::{Resonance, Scene},
 };
 
 use super::{failure::Failure, interrupt::Interruptible};
@@ -71,7 +71,10 @@ impl Endpoint {
     pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
         let (mut pace, mut timing) = (None, Arc::default());
         let rig: Box<dyn Rig> = match self {
-            Self::BuiltIn => Box::new(Simulated::new(scene.plant, scene.start).map_err(Failure::input)?),
+            Self::BuiltIn => {
+                let plant = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
+                Box::new(plant.with_sensors(scene.resonance))
+            }
             Self::Fmu(file) => Box::new(FmuRig::load(file, &scene.start_values()).map_err(Failure::run)?),
             Self::Network(address) => {
                 let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time())?;
@@ -92,6 +95,12 @@ impl Endpoint {
         scope: BindScope,
         pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
+        if scene.resonance.resonance == Resonance::Peak && scene.controller.phase_target == -90.0 {
+            return Err(Failure::input(
+                "resonance.definition = \"peak\" with controller.phase_target = -90 degrees: the loop holds a phase, so set phase_target to the \
+                 phase at the peak, which `vines orbit` prints",
+            ));
+        }
         Ok(match self {
             Self::BuiltIn => Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?),
             Self::Fmu(file) => Box::new(FmuController::load(file, &scene.controller_config()).map_err(Failure::run)?),

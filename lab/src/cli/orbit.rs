@@ -4,30 +4,33 @@ use std::fmt::Write;
 
 use clap::Args;
 use vines::{
+    numerics::range,
     orbit::{
-        Bifurcation, Branch, Condition, Limits, Orbit, Periodic, backbone, continue_both_ways, convergence,
-        phase_resonant, response, settle,
+        Branch, Condition, Convergence, Ended, Exploration, Limits, Orbit, Periodic, backbone, continue_both_ways,
+        convergence, phase_resonant, response, settle,
     },
     report::{Table, number, summary::parameters},
-    scene::Dimensionless,
+    scene::{Definition, Dimensionless},
 };
 
 use super::{failure::Failure, scene_arguments::SceneArguments, yes_no};
 
 const HELP: &str = "\
 Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon sigma:
-  C            amplitude of the first harmonic of the centre of mass, v = q1 + epsilon q2
+  C            amplitude of the first harmonic of the response: of v = q1 + epsilon q2, or as resonance.sensor says
   B            speed of the particle in flight
   multipliers  moduli of the multipliers of the half-period map; stable if all are below 1
 
 With --backbone or --response, orbits are followed by pseudo-arclength through folds and symmetry breaking, stable and unstable
-ones alike; --json prints all of them.
+ones alike; --json prints all of them. --response lists every component: those of symmetric 1:1 orbits over the whole range, those
+that branch off at symmetry breakings and period doublings (mirror images count once), and those on which random starts settle.
 
 Examples:
   vines orbit
   vines orbit --response --set excitation.G=1.6
   vines orbit --backbone --set plant.c=0 --set plant.r=1 --set excitation.G=0
   vines orbit --sigma=-0.6 --set excitation.G=2.2   the orbit that settles there, here six impacts in two periods
+  vines orbit --definitions                   resonance by phase or peak, by e or force, of v, q1 or acceleration
   vines orbit --convergence                   how theory approaches the exact orbit
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
   vines orbit --scene scenes/dimensionless.toml --json";
@@ -47,13 +50,25 @@ pub(super) struct Arguments {
     #[arg(long, group = "what")]
     backbone: bool,
 
-    /// Follow the exact frequency response at the scene's G, with the asymmetric orbits that branch off
+    /// Follow all components of the exact frequency response at the scene's G
     #[arg(long, group = "what")]
     response: bool,
+
+    /// Detunings of --response and --backbone
+    #[arg(long, value_name = "FIRST:LAST", default_value = "-6:6", allow_hyphen_values = true, value_parser = detunings)]
+    range: [f64; 2],
+
+    /// Random starts of --response, from which other patterns are searched for
+    #[arg(long, value_name = "N", default_value_t = Exploration::default().starts)]
+    starts: usize,
 
     /// Theory minus exact orbit at epsilon and its halvings, with the fitted exponent
     #[arg(long, group = "what")]
     convergence: bool,
+
+    /// Theory minus exact orbit at epsilon and four halvings, for all definitions of resonance, references and sensors
+    #[arg(long, group = "what")]
+    definitions: bool,
 
     /// Print JSON instead of a table
     #[arg(long)]
@@ -72,28 +87,43 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             scene.g
         ))
     };
+    let limits = Limits { sigma: arguments.range, ..Limits::default() };
     if arguments.backbone {
-        let branch = backbone(&scene, &Limits::default()).ok_or_else(none)?;
+        let branch = backbone(&scene, &limits).ok_or_else(none)?;
         return shown(&scene, "Exact backbone", &branch, arguments.json, || {
             curve("Symmetric 1:1", &branch)
         });
     }
     if arguments.response {
-        let found = response(&scene, &Limits::default()).ok_or_else(none)?;
+        if 1.0 + scene.epsilon * arguments.range[0] <= 0.0 {
+            return Err(Failure::input(format!(
+                "--range from sigma = {} (dimensionless): 1 + epsilon sigma must be above 0",
+                arguments.range[0]
+            )));
+        }
+        let exploration = Exploration { starts: arguments.starts, ..Exploration::default() };
+        let found = response(&scene, &limits, exploration);
         return shown(&scene, "Exact frequency response", &found, arguments.json, || {
-            let asymmetric = found.asymmetric.iter();
-            curve("Symmetric 1:1", &found.symmetric)
-                + &asymmetric.map(|branch| curve("Asymmetric", branch)).collect::<String>()
+            let count = found.components.len();
+            let all = found.components.iter().map(|one| curve(&one.name, &one.branch));
+            format!(
+                "{count} component{}\n\n{}",
+                if count == 1 { "" } else { "s" },
+                all.collect::<String>()
+            )
         });
     }
     if arguments.convergence {
         return converged(&scene, arguments.json);
     }
+    if arguments.definitions {
+        return defined(&scene, arguments.json);
+    }
     let orbits = phase_resonant(&scene);
     if arguments.json {
         return super::json(&orbits);
     }
-    let title = "Exact symmetric 1:1 orbits at phase resonance";
+    let title = format!("Exact symmetric 1:1 orbits at resonance: {}", scene.definition.name());
     Ok(format!(
         "{title}\n  {}\n\n{}",
         parameters(&scene),
@@ -123,6 +153,84 @@ fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
     })
 }
 
+/// Parses FIRST:LAST.
+fn detunings(text: &str) -> Result<[f64; 2], String> {
+    let form = || {
+        format!(
+            "`{text}`: expected FIRST:LAST, two detunings (dimensionless), the first below the last, for instance -6:6"
+        )
+    };
+    let (from, to) = text.split_once(':').ok_or_else(form)?;
+    match (from.trim().parse::<f64>(), to.trim().parse::<f64>()) {
+        (Ok(from), Ok(to)) if from < to && from.is_finite() && to.is_finite() => Ok([from, to]),
+        _ => Err(form()),
+    }
+}
+
+/// One definition with its differences.
+#[derive(serde::Serialize)]
+struct Defined {
+    definition: Definition,
+    #[serde(flatten)]
+    study: Convergence,
+}
+
+/// Theory minus exact orbit for all definitions.
+fn defined(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
+    let study = |definition| {
+        let study = convergence(&Dimensionless { definition, ..*scene }, DEFINITION_HALVINGS)?;
+        Some(Defined { definition, study })
+    };
+    let all: Vec<Defined> = Definition::all().into_iter().filter_map(study).collect();
+    shown(
+        scene,
+        "Theory minus exact orbit, by definition of resonance",
+        &all,
+        json,
+        || {
+            let row = |one: &Defined| -> Vec<String> {
+                let rows = &one.study.rows;
+                let mut cells = vec![one.definition.name()];
+                cells.extend(rows[0].exact.map(number));
+                cells.extend(rows.iter().map(|row| format!("{:.2e}", row.sigma)));
+                cells.push(format!("{:.2}", one.study.slopes[0]));
+                cells.extend(rows.iter().map(|row| format!("{:.2e}", row.c)));
+                cells.push(format!("{:.2}", one.study.slopes[1]));
+                cells
+            };
+            let table = Table::new([
+                "resonance",
+                "sigma",
+                "C",
+                "sigma: eps",
+                "eps/2",
+                "eps/4",
+                "eps/8",
+                "eps/16",
+                "exponent",
+                "C: eps",
+                "eps/2",
+                "eps/4",
+                "eps/8",
+                "eps/16",
+                "exponent",
+            ]);
+            let missing = Definition::all().len() - all.len();
+            let note = match missing {
+                0 => String::new(),
+                _ => format!("\n{missing} definitions have no stable solution at every epsilon\n"),
+            };
+            format!(
+                "sigma and C of the exact orbit, then theory minus exact\n{}{note}",
+                table.rows(all.iter().map(row)).text()
+            )
+        },
+    )
+}
+
+/// Halvings of epsilon for each definition.
+const DEFINITION_HALVINGS: u32 = 4;
+
 /// Periods before the motion is evaluated.
 const SETTLE: usize = 1000;
 
@@ -140,16 +248,15 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
              see `vines map`"
         ))
     })?;
-    let pattern = format!(
-        "{} impacts in {} period{}{}",
-        motion.pattern.impacts(),
-        motion.pattern.periods(),
-        if motion.pattern.periods() == 1 { "" } else { "s" },
-        if motion.pattern.mirrored { ", mirrored" } else { "" }
-    );
+    let pattern = motion.pattern.name();
     if arguments.response {
         let condition = Condition::Excitation(scene.g);
-        let branch = continue_both_ways(scene, &motion, condition, &Limits::default());
+        let branch = continue_both_ways(
+            scene,
+            &motion,
+            condition,
+            &Limits { sigma: arguments.range, ..Limits::default() },
+        );
         return shown(scene, "Exact frequency response", &branch, arguments.json, || {
             curve(&pattern, &branch)
         });
@@ -197,12 +304,16 @@ fn shown(
 }
 
 fn curve(name: &str, branch: &Branch) -> String {
-    let ended = serde_json::to_value(branch.ended).unwrap_or_default();
+    let stable = branch.points.iter().filter(|one| one.stable).count();
+    let sigmas = || branch.points.iter().map(|one| one.sigma);
+    let (low, high) = range((f64::MAX, f64::MIN), sigmas());
+    let ends = match branch.ended {
+        [Ended::Closed, _] => "closed".into(),
+        [one, other] => format!("ends: {}; {}", one.name(), other.name()),
+    };
     let mut text = format!(
-        "{name}: {} orbits, {} of them stable; ended: {}\n",
-        branch.points.len(),
-        branch.points.iter().filter(|one| one.stable).count(),
-        ended.as_str().unwrap_or_default()
+        "{name}: sigma from {low:.4} to {high:.4}, {} orbits, {stable} of them stable; {ends}\n",
+        branch.points.len()
     );
     let row = |motion: &Periodic| -> Vec<String> {
         let largest = motion.moduli()[3];
@@ -215,12 +326,7 @@ fn curve(name: &str, branch: &Branch) -> String {
     let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(ROWS));
     text += &table.rows(thinned.map(row)).text();
     for special in &branch.special {
-        let what = match special.kind {
-            Bifurcation::Fold => "fold",
-            Bifurcation::SymmetryBreaking => "symmetry breaking",
-            Bifurcation::PeriodDoubling => "period doubling",
-            Bifurcation::Torus => "torus (modulation begins)",
-        };
+        let what = special.name();
         let Periodic { sigma, g, c, b, .. } = special.motion;
         let _ = writeln!(
             text,
@@ -239,13 +345,24 @@ fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
         };
     }
     let rows = orbits.iter().map(|orbit| {
-        let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.b];
+        let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.gamma.to_degrees(), orbit.b];
         let mut row: Vec<String> = numbers.map(number).into();
         row.extend(orbit.multipliers.map(|one| format!("{one:.4}")));
         row.push(yes_no(orbit.stable));
         row
     });
-    Table::new(["sigma", "Omega", "C", "B", "mult1", "mult2", "mult3", "mult4", "stable"])
-        .rows(rows)
-        .text()
+    Table::new([
+        "sigma",
+        "Omega",
+        "C",
+        "phase, degrees",
+        "B",
+        "mult1",
+        "mult2",
+        "mult3",
+        "mult4",
+        "stable",
+    ])
+    .rows(rows)
+    .text()
 }

@@ -54,7 +54,9 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let first = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
+    let first = Simulated::new(scene.plant, scene.start)
+        .map_err(Failure::input)?
+        .with_sensors(scene.resonance);
     let default = if arguments.lock_step {
         SILENCE_LOCK_STEP
     } else {

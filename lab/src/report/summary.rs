@@ -2,12 +2,16 @@
 
 use super::table::{Table, number};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
-use crate::scene::Dimensionless;
+use crate::scene::{Definition, Dimensionless};
 
 /// The numbers that a result belongs to, in one line.
 #[must_use]
 pub fn parameters(p: &Dimensionless) -> String {
-    format!("{}, G = {:.4}", rig(p), p.g)
+    let definition = match p.definition == Definition::default() {
+        true => String::new(),
+        false => format!("; resonance: {}", p.definition.name()),
+    };
+    format!("{}, G = {:.4}{definition}", rig(p), p.g)
 }
 
 fn rig(p: &Dimensionless) -> String {

@@ -4,7 +4,7 @@ use lovines::Parameters;
 use serde::Deserialize;
 
 use super::{
-    Backbone, Chain, Controller, Dimensionless, Record, Scene, SceneError,
+    Backbone, Chain, Controller, Definition, Dimensionless, Record, Scene, SceneError,
     plant::{PlantSection, StartSection},
     validate::Quantity,
 };
@@ -20,6 +20,7 @@ pub(super) struct Sections {
     record: Record,
     backbone: Backbone,
     chain: Chain,
+    resonance: Definition,
 }
 
 /// The base amplitude; exactly one of the two keys is given.
@@ -66,6 +67,7 @@ impl Sections {
             record: self.record,
             backbone: self.backbone,
             chain: self.chain,
+            resonance: self.resonance,
         };
         scene.controller.check()?;
         scene.record.check(&scene.controller)?;
