@@ -10,7 +10,7 @@ use vines::{
 
 fn subject(settings: &[&str]) -> Subject {
     // An early lock is good enough here.
-    let early = ["controller.amplitude_drift=1e-3", "controller.dwell_periods=5"];
+    let early = ["controller.amplitude_tolerance=8e-3", "controller.dwell_periods=5"];
     let settings = early.iter().chain(settings);
     let overrides: Vec<Override> = settings.map(|s| s.parse().unwrap()).collect();
     let text = include_str!("../../scenes/dimensionless.toml");

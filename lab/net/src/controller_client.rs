@@ -82,7 +82,7 @@ impl NetController {
         } else {
             Drive { omega: self.good.drive.omega, ..Drive::default() }
         };
-        Command { drive, phase_error: self.good.phase_error, settled: false }
+        Command { drive, settled: false, ..self.good }
     }
 
     /// The answer to the present sample, if the frame is this answer.

@@ -69,8 +69,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     bar.finish_and_clear();
     // Dropping the rig ends a network session.
     drop(rig);
-    let found = TrackedComparison::of(&tracked?, &scene);
+    let tracked = tracked?;
+    let found = TrackedComparison::of(&tracked, &scene);
     let files = report::write_tracked(&found, &arguments.out).map_err(Failure::run)?;
+    if let Some(ended) = tracked.ended {
+        let points = found.points.len();
+        return Err(Failure::run(format!("{ended}\n{points} points were measured before. {}", written(&files).trim_end())));
+    }
     if arguments.json {
         return json(&found);
     }
