@@ -292,7 +292,10 @@ mod tests {
 
     #[test]
     fn noise_that_hides_the_tolerances_settles_after_two_dwells() {
-        let noisy = |t: f64| Reading { amplitude: 1.0 + 0.01 * noise(libm::floor(t - 0.05)), ..CONSTANT };
+        let noisy = |t: f64| Reading {
+            amplitude: 1.0 + 0.01 * noise(libm::floor(t - 0.05)),
+            ..CONSTANT
+        };
         assert_eq!(periods_to_settle(noisy), Some(40));
     }
 

@@ -264,15 +264,14 @@ fn the_response_cannot_be_controlled_without_a_limit_of_the_drive_or_in_an_open_
 #[test]
 fn a_shaped_drive_reaches_the_same_lock_several_times_as_fast_and_is_constant_from_then_on() {
     let periods = |approach_gain: f64| {
-        let config = Config {
-            approach_gain,
-            damping_rate: ZETA * OMEGA_0,
-            ..config()
-        };
+        let config = Config { approach_gain, damping_rate: ZETA * OMEGA_0, ..config() };
         let mut bench = Bench::new(config);
         let (periods, _) = bench.run_to_lock(2000).expect("a lock");
         let output = bench.run(20);
-        assert!(relative(output.response_amplitude, AMPLITUDE / (2.0 * ZETA)) < 1e-3, "{output:?}");
+        assert!(
+            relative(output.response_amplitude, AMPLITUDE / (2.0 * ZETA)) < 1e-3,
+            "{output:?}"
+        );
         assert_eq!(output.amplitude, AMPLITUDE);
         periods
     };
@@ -303,7 +302,12 @@ fn a_capture_raises_the_response_before_the_drive_goes_to_its_setpoint() {
     }
     assert_eq!(
         states,
-        [LoopState::Ramping, LoopState::Capturing, LoopState::Acquiring, LoopState::Locked]
+        [
+            LoopState::Ramping,
+            LoopState::Capturing,
+            LoopState::Acquiring,
+            LoopState::Locked
+        ]
     );
     assert!((0.97..1.05).contains(&(largest / level)), "{}", largest / level);
     assert!(relative(bench.sample().response_amplitude, 0.25 * level) < 1e-3);
@@ -311,7 +315,11 @@ fn a_capture_raises_the_response_before_the_drive_goes_to_its_setpoint() {
 
 #[test]
 fn retuning_leaves_no_trace_of_the_values_before() {
-    let config = Config { ramp_rate: Some(AMPLITUDE), release_rate: Some(0.1 * AMPLITUDE), ..config() };
+    let config = Config {
+        ramp_rate: Some(AMPLITUDE),
+        release_rate: Some(0.1 * AMPLITUDE),
+        ..config()
+    };
     let config = Config { amplitude_max: Some(1.0), ..config };
     let mut retuned = config.build().unwrap();
     for amplitude in [100.0 * AMPLITUDE, 0.0, AMPLITUDE] {

@@ -43,7 +43,10 @@ fn the_lock_is_the_exact_orbit_within_5e_3_in_sigma_and_half_a_percent_in_amplit
 
 #[test]
 fn a_longer_wait_brings_the_lock_closer_to_the_exact_orbit() {
-    let strict = ["controller.amplitude_tolerance=1e-7", "controller.frequency_tolerance=1e-6"];
+    let strict = [
+        "controller.amplitude_tolerance=1e-7",
+        "controller.frequency_tolerance=1e-6",
+    ];
     let found = identified(&strict);
     let exact = found.exact.unwrap();
     let (sigma, c) = (found.lock.sigma - exact.sigma, found.lock.c / exact.c - 1.0);
@@ -66,7 +69,7 @@ fn the_decay_follows_theory_and_the_distance_halves_with_epsilon() {
 #[test]
 fn a_lock_of_the_linear_mode_is_not_taken_for_the_impacting_one() {
     // At rest with the particle at the centre nothing ever hits, and the loop locks all the same, at sigma = 0.
-    let scene = scene(&["start.dq2=0"]);
+    let scene = scene(&["start.dq2=0", "controller.capture=false"]);
     let refusal = identify(&measure(&scene), &scene).unwrap_err();
     let IdentificationError::Regime { regime, sigma, .. } = refusal else {
         panic!("{refusal}");
@@ -99,8 +102,17 @@ fn noise_is_never_locked_and_ends_the_experiment_with_its_reason() {
     let scene = scene(&[]);
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let mut samples = Vec::new();
-    let outcome = experiment::run_into(&mut samples, &mut Noise(1), &mut controller, &plan(&scene), |_, _, _| {});
-    assert!(matches!(outcome, Err(ExperimentError::Tripped { fault: Fault::NoSignal, .. })));
+    let outcome = experiment::run_into(
+        &mut samples,
+        &mut Noise(1),
+        &mut controller,
+        &plan(&scene),
+        |_, _, _| {},
+    );
+    assert!(matches!(
+        outcome,
+        Err(ExperimentError::Tripped { fault: Fault::NoSignal, .. })
+    ));
     assert!(samples.len() < 2500, "{}", samples.len());
 }
 
@@ -136,7 +148,10 @@ fn from_rest_the_controller_alone_reaches_the_symmetric_orbit() {
     let found = identified(&["start.dq2=0.0"]);
     let exact = found.exact.unwrap();
     let (sigma, c) = (found.lock.sigma - exact.sigma, found.lock.c - exact.c);
-    println!("after {:.0} periods: sigma off by {sigma:.1e}, C by {c:.1e}", found.lock.periods_to_lock);
+    println!(
+        "after {:.0} periods: sigma off by {sigma:.1e}, C by {c:.1e}",
+        found.lock.periods_to_lock
+    );
     assert!(sigma.abs() < 1e-3 && c.abs() < 1e-3 && found.lock.regime == Regime::Symmetric);
     assert!(found.lock.periods_to_lock < 200.0);
 }
@@ -191,7 +206,7 @@ fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
 
 #[test]
 fn the_linear_mode_of_a_rig_that_does_not_report_its_impacts_is_refused() {
-    let refusal = identified_without_ground_truth(&["start.dq2=0"]).unwrap_err();
+    let refusal = identified_without_ground_truth(&["start.dq2=0", "controller.capture=false"]).unwrap_err();
     let IdentificationError::Regime { regime, .. } = refusal else {
         panic!("{refusal}");
     };

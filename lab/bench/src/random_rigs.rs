@@ -44,9 +44,12 @@ pub enum Outcome {
     /// Locked in the right regime, but farther from the orbit.
     #[serde(rename = "inaccurate")]
     Inaccurate,
-    /// Another regime, or no lock, with a reason.
-    #[serde(rename = "explained")]
-    Explained,
+    /// Locked in another regime; the message says in which.
+    #[serde(rename = "other regime")]
+    OtherRegime,
+    /// No lock, with a reason.
+    #[serde(rename = "no lock")]
+    NoLock,
     /// No lock, and no reason.
     #[serde(rename = "failed")]
     Failed,
@@ -101,24 +104,50 @@ fn lock(d: &Dimensionless, stable: &[Orbit], settings: &[Override]) -> Result<Ro
         format!("excitation.G={:?}", d.g),
         "record.decay_periods=3".into(),
     ];
-    let drawn = drawn.iter().map(|setting| setting.parse()).collect::<Result<Vec<Override>, _>>();
+    let drawn = drawn
+        .iter()
+        .map(|setting| setting.parse())
+        .collect::<Result<Vec<Override>, _>>();
     let settings = [drawn.map_err(SceneError::from)?, settings.to_vec()].concat();
     let scene = Scene::parse("random rig", SCENE, &settings)?;
     let rig = Simulated::new(scene.plant, scene.start)?;
     let mut rig = Chain::around(Box::new(rig), &scene.chain, d, scene.controller.samples_per_period);
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let outcome = experiment::run(rig.as_mut(), &mut controller, &Plan::of(&scene), |_, _, _| {});
+    let mut samples = Vec::new();
+    let outcome = experiment::run_into(
+        &mut samples,
+        rig.as_mut(),
+        &mut controller,
+        &Plan::of(&scene),
+        |_, _, _| {},
+    );
+    let outcome = outcome.map_err(|error| {
+        let reason = advice::reason(&scene, advice::last_regime(&samples, &scene));
+        (error, reason)
+    });
     Ok(judge(&scene, stable, outcome))
 }
 
-fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, ExperimentError>) -> Row {
+/// Judges a record, or the error of a run and its reason.
+fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentError, Option<String>)>) -> Row {
     let parameters = scene.dimensionless();
-    let row = Row { parameters, outcome: Outcome::Failed, periods: None, distance: None, message: None };
+    let row = Row {
+        parameters,
+        outcome: Outcome::Failed,
+        periods: None,
+        distance: None,
+        message: None,
+    };
     let record = match outcome {
         Ok(record) => record,
-        Err(error) => {
-            let message = advice::reason(scene, None).map_or_else(|| error.to_string(), |why| format!("{error}: {why}"));
-            return Row { message: Some(message), ..row };
+        Err((error, reason)) => {
+            let outcome = if reason.is_some() {
+                Outcome::NoLock
+            } else {
+                Outcome::Failed
+            };
+            let message = reason.map_or_else(|| error.to_string(), |why| format!("no lock: {why}"));
+            return Row { outcome, message: Some(message), ..row };
         }
     };
     let (sigma, c, regime) = held(&record, scene);
@@ -129,14 +158,18 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, ExperimentErro
         distance: Some(distance),
         ..row
     };
-    let locked_at = format!("locked at sigma = {sigma:.4}, C = {c:.4}, {}", regime.name());
+    let locked_at = format!("locked at sigma = {sigma:.4}, C = {c:.4}");
     match regime {
         Regime::Symmetric if distance <= CORRECT => Row { outcome: Outcome::Locked, ..row },
-        Regime::Symmetric => Row { outcome: Outcome::Inaccurate, message: Some(locked_at), ..row },
+        Regime::Symmetric => Row {
+            outcome: Outcome::Inaccurate,
+            message: Some(locked_at),
+            ..row
+        },
         regime => {
             let why = advice::reason(scene, Some(regime)).unwrap_or_default();
             let message = Some(format!("{locked_at}: {why}"));
-            Row { outcome: Outcome::Explained, message, ..row }
+            Row { outcome: Outcome::OtherRegime, message, ..row }
         }
     }
 }

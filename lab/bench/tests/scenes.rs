@@ -170,9 +170,15 @@ fn an_argument_that_is_no_assignment_is_refused() {
 #[test]
 fn a_drive_limit_below_the_first_impacts_is_refused_with_the_drive_that_is_needed() {
     let settings = ["start.dq2=0.0", "controller.G_max=1.2"];
-    says(&complaint(paper(&settings)), &["controller.G_max", "1.2", "at least 1.57", "capture = false"]);
+    says(
+        &complaint(paper(&settings)),
+        &["controller.G_max", "1.2", "at least 1.57", "capture = false"],
+    );
     assert!(paper(&[settings[0], settings[1], "controller.capture=false"]).is_ok());
-    assert!(paper(&["controller.G_max=1.2"]).is_ok(), "the particle of the default scene moves");
+    assert!(
+        paper(&["controller.G_max=1.2"]).is_ok(),
+        "the particle of the default scene moves"
+    );
 }
 
 #[test]
@@ -183,5 +189,11 @@ fn limits_follow_from_the_numbers_of_the_rig() {
     assert_eq!(config.response_max, Some(4.0 * d.b));
     assert!(config.acquire_timeout.is_some() && config.signal_timeout.is_some());
     assert_eq!(config.capture_response, None);
-    assert!(paper(&["start.dq2=0.0"]).unwrap().controller_config().capture_response.is_some());
+    assert!(
+        paper(&["start.dq2=0.0"])
+            .unwrap()
+            .controller_config()
+            .capture_response
+            .is_some()
+    );
 }

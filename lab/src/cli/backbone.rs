@@ -74,7 +74,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let files = report::write_tracked(&found, &arguments.out).map_err(Failure::run)?;
     if let Some(ended) = tracked.ended {
         let points = found.points.len();
-        return Err(Failure::run(format!("{ended}\n{points} points were measured before. {}", written(&files).trim_end())));
+        return Err(Failure::run(format!(
+            "{ended}\n{points} points were measured before. {}",
+            written(&files).trim_end()
+        )));
     }
     if arguments.json {
         return json(&found);

@@ -12,8 +12,9 @@ Draws rigs at random, each with a drive at which a stable symmetric 1:1 orbit ex
 0.1 to 3, r from 0.2 to 0.97. Locks each from rest and compares the lock with the exact orbit:
   locked      on a stable symmetric orbit, within 2e-3 in sigma and C
   inaccurate  symmetric, but farther from the orbit
-  explained   another regime, which coexists with the orbit; the message says so
-  failed      no lock
+  other       another regime, which coexists with the orbit; the message says so
+  no lock     nothing stationary in the time allowed; the message says why
+  failed      neither a lock nor a reason
 
 Examples:
   vines rigs
@@ -46,20 +47,37 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if arguments.json {
         return json(&rows);
     }
-    Ok(format!("{}\n{}", summary(&rows).markdown(), exceptions(&rows).markdown()))
+    Ok(format!(
+        "{}\n{}",
+        summary(&rows).markdown(),
+        exceptions(&rows).markdown()
+    ))
 }
 
 fn summary(rows: &[Row]) -> Table {
     let outcomes = [
         ("locked", Outcome::Locked),
         ("inaccurate", Outcome::Inaccurate),
-        ("explained", Outcome::Explained),
+        ("other regime", Outcome::OtherRegime),
+        ("no lock", Outcome::NoLock),
         ("failed", Outcome::Failed),
     ];
-    let headings = ["outcome", "rigs", "periods: median", "90 %", "most", "distance: median", "largest"];
+    let headings = [
+        "outcome",
+        "rigs",
+        "periods: median",
+        "90 %",
+        "most",
+        "distance: median",
+        "largest",
+    ];
     Table::new(headings).rows(outcomes.iter().map(|(name, outcome)| {
         let of = |value: fn(&Row) -> Option<f64>| {
-            let mut values: Vec<f64> = rows.iter().filter(|row| row.outcome == *outcome).filter_map(value).collect();
+            let mut values: Vec<f64> = rows
+                .iter()
+                .filter(|row| row.outcome == *outcome)
+                .filter_map(value)
+                .collect();
             values.sort_by(f64::total_cmp);
             values
         };

@@ -110,6 +110,8 @@ impl Scene {
         Config {
             amplitude_max: Some(d.amplitude(self.backbone.g_max.min(self.controller.g_max.unwrap_or(f64::INFINITY)))),
             bandwidth: self.backbone.bandwidth * d.omega0,
+            // The amplitude loop takes over as soon as the phase is near resonance.
+            approach_gain: 0.0,
             ..self.controller_config()
         }
     }

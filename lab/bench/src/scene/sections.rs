@@ -71,7 +71,9 @@ impl Sections {
         let needed = scene.impact_drive();
         Quantity::new("controller.G_max", scene.g_max(), "(over b epsilon)").check(
             !scene.captures() || scene.g_max() >= needed,
-            format!("must be at least {needed:.3}: from rest, impacts begin only there; or set controller.capture = false"),
+            format!(
+                "must be at least {needed:.3}: from rest, impacts begin only there; or set controller.capture = false"
+            ),
         )?;
         scene.record.check(&scene.controller)?;
         scene.backbone.check(&scene.controller)?;
