@@ -13,6 +13,7 @@ mod orbit;
 mod pack;
 mod report;
 mod rig;
+mod rigs;
 mod scene_arguments;
 mod serving;
 mod theory;
@@ -64,6 +65,7 @@ enum Command {
     Report(report::Arguments),
     Pack(pack::Arguments),
     Rig(rig::Arguments),
+    Rigs(rigs::Arguments),
     Controller(controller::Arguments),
 }
 
@@ -84,6 +86,7 @@ pub fn run() -> ExitCode {
         Command::Report(arguments) => report::run(&arguments),
         Command::Pack(arguments) => pack::run(&arguments),
         Command::Rig(arguments) => rig::run(&arguments),
+        Command::Rigs(arguments) => rigs::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),
     };
     match output.and_then(|text| print(&text)) {

@@ -58,7 +58,7 @@ const QUICK: [&str; 8] = [
     "start.dq2=1.0",
     "controller.samples_per_period=50",
     "controller.bandwidth=0.3",
-    "controller.amplitude_drift=5e-4",
+    "controller.amplitude_tolerance=4e-3",
     "record.hold_periods=10",
     "record.decay_periods=25",
 ];

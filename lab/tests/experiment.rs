@@ -5,7 +5,7 @@ use vines::experiment::{self, ExperimentError, Plan, Record};
 use vines::identification::{IdentificationError, Regime, identify};
 use vines::net::LinkError;
 use vines::rig::{
-    BuiltIn, Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors, Simulated,
+    BuiltIn, Command, Controller, ControllerError, Drive, Fault, GroundTruth, Rig, RigError, Sensors, Simulated,
 };
 use vines::scene::{Override, Scene};
 
@@ -45,7 +45,10 @@ fn the_lock_is_the_exact_orbit_within_5e_3_in_sigma_and_half_a_percent_in_amplit
 
 #[test]
 fn a_longer_wait_brings_the_lock_closer_to_the_exact_orbit() {
-    let strict = ["controller.amplitude_drift=1e-8", "controller.frequency_drift=1e-9"];
+    let strict = [
+        "controller.amplitude_tolerance=1e-7",
+        "controller.frequency_tolerance=1e-6",
+    ];
     let found = identified(&strict);
     let exact = found.exact.unwrap();
     let (sigma, c) = (found.lock.sigma - exact.sigma, found.lock.c / exact.c - 1.0);
@@ -97,7 +100,7 @@ fn the_decay_follows_theory_and_the_distance_halves_with_epsilon() {
 #[test]
 fn a_lock_of_the_linear_mode_is_not_taken_for_the_impacting_one() {
     // At rest with the particle at the centre nothing ever hits, and the loop locks all the same, at sigma = 0.
-    let scene = scene(&["start.dq2=0"]);
+    let scene = scene(&["start.dq2=0", "controller.capture=false"]);
     let refusal = identify(&measure(&scene), &scene).unwrap_err();
     let IdentificationError::Regime { regime, sigma, .. } = refusal else {
         panic!("{refusal}");
@@ -126,11 +129,70 @@ impl Rig for Noise {
 }
 
 #[test]
-fn noise_is_never_locked() {
-    let scene = scene(&["record.lock_periods=300"]);
+fn noise_is_never_locked_and_ends_the_experiment_with_its_reason() {
+    let scene = scene(&[]);
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    let outcome = experiment::run(&mut Noise(1), &mut controller, &plan(&scene), |_, _, _| {});
-    assert!(matches!(outcome, Err(ExperimentError::NoLock { .. })));
+    let mut samples = Vec::new();
+    let outcome = experiment::run_into(
+        &mut samples,
+        &mut Noise(1),
+        &mut controller,
+        &plan(&scene),
+        |_, _, _| {},
+    );
+    assert!(matches!(
+        outcome,
+        Err(ExperimentError::Tripped { fault: Fault::NoSignal, .. })
+    ));
+    assert!(samples.len() < 2500, "{}", samples.len());
+}
+
+#[test]
+fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_measured() {
+    let scene = scene(&["controller.C_max=0.3"]);
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let mut samples = Vec::new();
+    let outcome = experiment::run_into(&mut samples, &mut rig, &mut controller, &plan(&scene), |_, _, _| {});
+    let Err(ExperimentError::Tripped { periods, fault, .. }) = outcome else {
+        panic!("{outcome:?}");
+    };
+    assert!(fault == Fault::ResponseTooLarge && periods < 50.0, "{periods} {fault}");
+    let last = samples.last().unwrap();
+    assert!(last.sensors.response.abs() > 0.3 && samples.len() > 100);
+    assert_eq!(experiment::table(&samples).lines().count(), samples.len() + 1);
+}
+
+#[test]
+fn a_drive_that_is_not_a_number_never_reaches_the_rig() {
+    let (scene, mut rig) = (scene(&[]), Shaken(Drive::default()));
+    for drive in [(f64::NAN, 0.1), (1.0, f64::INFINITY)] {
+        let drive = Drive { omega: drive.0, amplitude: drive.1, displacement: 0.0 };
+        let outcome = experiment::run(&mut rig, &mut OpenLoop(drive), &plan(&scene), |_, _, _| {});
+        assert!(matches!(outcome, Err(ExperimentError::NotANumber(_))));
+        assert_eq!(rig.0, Drive::default());
+    }
+}
+
+#[test]
+fn from_rest_the_controller_alone_reaches_the_symmetric_orbit() {
+    let found = identified(&["start.dq2=0.0"]);
+    let exact = found.exact.unwrap();
+    let (sigma, c) = (found.lock.sigma - exact.sigma, found.lock.c - exact.c);
+    println!(
+        "after {:.0} periods: sigma off by {sigma:.1e}, C by {c:.1e}",
+        found.lock.periods_to_lock
+    );
+    assert!(sigma.abs() < 1e-3 && c.abs() < 1e-3 && found.lock.regime == Regime::Symmetric);
+    assert!(found.lock.periods_to_lock < 200.0);
+}
+
+#[test]
+fn the_default_lock_takes_at_most_120_periods() {
+    let found = identified(&[]);
+    let exact = found.exact.unwrap();
+    assert!(found.lock.periods_to_lock <= 120.0, "{}", found.lock.periods_to_lock);
+    assert!((found.lock.sigma - exact.sigma).abs() < 1.2e-4);
 }
 
 /// A rig that does not report its impacts, as hardware would not.
@@ -175,7 +237,7 @@ fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
 
 #[test]
 fn the_linear_mode_of_a_rig_that_does_not_report_its_impacts_is_refused() {
-    let refusal = identified_without_ground_truth(&["start.dq2=0"]).unwrap_err();
+    let refusal = identified_without_ground_truth(&["start.dq2=0", "controller.capture=false"]).unwrap_err();
     let IdentificationError::Regime { regime, .. } = refusal else {
         panic!("{refusal}");
     };
@@ -270,7 +332,7 @@ fn limits_of_a_scene_reach_the_controller() {
     // A response too large takes the drive away for good.
     let (_, drives) = run(&["controller.C_max=0.2"]).unwrap();
     assert!(drives[0] > 0.0 && drives[3999] == 0.0);
-    let (_, drives) = run(&["controller.acquire_periods=20"]).unwrap();
+    let (_, drives) = run(&["record.lock_periods=20"]).unwrap();
     assert!(drives[1900] > 0.0 && drives[3999] == 0.0);
     let refused = run(&["controller.G_max=1.0"]).unwrap_err().to_string();
     assert!(refused.starts_with("amplitude"), "{refused}");

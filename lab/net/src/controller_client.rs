@@ -86,7 +86,7 @@ impl NetController {
         } else {
             Drive { omega: self.good.drive.omega, ..Drive::default() }
         };
-        Command { drive, phase_error: self.good.phase_error, settled: false }
+        Command { drive, settled: false, ..self.good }
     }
 
     /// The answer to this sample or an earlier one.

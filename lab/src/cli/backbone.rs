@@ -11,7 +11,7 @@ use super::{
     failure::Failure,
     log_warnings, result,
     scene_arguments::SceneArguments,
-    writable,
+    writable, written,
 };
 
 const HELP: &str = "\
@@ -66,8 +66,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     });
     bar.finish_and_clear();
     let timing = open.close();
-    let found = TrackedComparison::of(&tracked?, &scene);
+    let tracked = tracked?;
+    let found = TrackedComparison::of(&tracked, &scene);
     let files = report::write_tracked(&found, &arguments.out).map_err(Failure::run)?;
+    if let Some(ended) = tracked.ended {
+        let points = found.points.len();
+        return Err(Failure::run(format!(
+            "{ended}\n{points} points were measured before. {}",
+            written(&files).trim_end()
+        )));
+    }
     let summary = report::summary::tracked(&found);
     result(arguments.json, &found, &summary, &files, timing)
 }

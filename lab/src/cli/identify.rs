@@ -6,10 +6,13 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tempfile::TempDir;
 use vines::{
+    advice,
     comparison::Comparison,
-    experiment::{self, Plan, Stage},
-    identification, pack, report,
+    experiment::{self, ExperimentError, Plan, Sample, Stage},
+    identification::{self, IdentificationError},
+    pack, report,
     rig::BuiltIn,
+    scene::Scene,
 };
 
 use super::{
@@ -19,6 +22,7 @@ use super::{
     pack::beside_this_program,
     result,
     scene_arguments::SceneArguments,
+    written,
 };
 
 const HELP: &str = "\
@@ -75,19 +79,47 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut controller = arguments.controller.controller(&scene, reach, open.pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(&plan);
-    let record = experiment::run(&mut open.rig, controller.as_mut(), &plan, |stage, done, of| {
-        show(&bar, stage, done, of);
-    });
+    let mut samples = Vec::new();
+    let record = experiment::run_into(
+        &mut samples,
+        &mut open.rig,
+        controller.as_mut(),
+        &plan,
+        |stage, done, of| show(&bar, stage, done, of),
+    );
     bar.finish_and_clear();
     drop(controller);
     let timing = open.close();
-    let record = record?;
-    let found = identification::identify(&record, &scene).map_err(Failure::run)?;
+    let record = match record {
+        Ok(record) => record,
+        Err(error) => return Err(interrupted(error, &samples, &scene, &arguments.out)),
+    };
+    let found = identification::identify(&record, &scene).map_err(|error| match error {
+        IdentificationError::Regime { regime, .. } => {
+            let reason = advice::reason(&scene, Some(regime)).unwrap_or_default();
+            Failure::run(format!("{error}\n{reason}"))
+        }
+        other => Failure::run(other),
+    })?;
     let found = Comparison::of(&found, &scene);
     let mut files = report::write(&found, &arguments.out).map_err(Failure::run)?;
     files.extend(fmus.keep()?);
     let summary = report::summary::identification(&found);
     result(arguments.json, &found, &summary, &files, timing)
+}
+
+/// The failure of an experiment that ended early, with the reason that the exact orbits know, and what was measured in a file.
+fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &Path) -> Failure {
+    let reason = matches!(error, ExperimentError::NoLock { .. })
+        .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
+        .flatten();
+    let failure = Failure::from(error);
+    let kept = match report::write_interrupted(samples, out) {
+        Ok(files) => written(&files).trim_end().to_string(),
+        Err(error) => error.to_string(),
+    };
+    let lines = [Some(failure.to_string()), reason, (!samples.is_empty()).then_some(kept)];
+    failure.with_message(lines.into_iter().flatten().collect::<Vec<_>>().join("\n"))
 }
 
 /// This program's FMUs: packed into a temporary folder inside the folder of the results, and kept if the run succeeds.

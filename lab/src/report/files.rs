@@ -10,6 +10,7 @@ use super::figure::FigureError;
 use super::figures::{backbone, manifold, regimes, tracked};
 use super::theme::dark;
 use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
+use crate::experiment::{Sample, table};
 use crate::files::temporary;
 use crate::map::{Cell, Map};
 use crate::regime::Regime;
@@ -80,6 +81,14 @@ pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBu
         ("tracked.svg", tracked::figure_with_drive(found).svg()?),
     ];
     write_files(out, &files)
+}
+
+/// Writes `interrupted.csv`: the samples of an experiment that ended early.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+    write_files(out, &[("interrupted.csv", table(samples))])
 }
 
 /// Writes each file under a temporary name, and gives it its own once it is complete.

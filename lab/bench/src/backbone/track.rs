@@ -8,7 +8,7 @@ use super::predictor::{self, Known};
 use super::settle::{Criterion, Estimate};
 use crate::experiment::Sample;
 use crate::identification::{Regime, classify, regime_by_response};
-use crate::rig::{Command, Controller, ControllerError, Drive, Move, Rig, RigError};
+use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError};
 use crate::scene::Scene;
 use vines_model::theory::SlowFlow;
 
@@ -48,6 +48,8 @@ pub struct Tracked {
     pub periods_to_lock: f64,
     /// All periods, from the start to the last point.
     pub periods: f64,
+    /// Why tracking ended before the last level; absent if it did not.
+    pub ended: Option<String>,
 }
 
 /// Why tracking ended early.
@@ -64,6 +66,14 @@ pub enum TrackError {
     NoLock {
         /// Time limit, periods.
         periods: f64,
+    },
+    /// The controller switched the drive off.
+    #[error("the controller switched the drive off after {periods:.1} periods: {fault}")]
+    Tripped {
+        /// Time since the start, periods of the drive.
+        periods: f64,
+        /// The reason.
+        fault: Fault,
     },
 }
 
@@ -104,6 +114,13 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
         });
         self.taken += 1;
         self.rig.advance(command.drive, self.sample_time)?;
+        if command.state.is_some_and(LoopState::is_latched) {
+            self.rig.advance(Drive::default(), self.sample_time)?;
+            return Err(TrackError::Tripped {
+                periods: self.periods,
+                fault: command.fault.unwrap_or(Fault::LockLost),
+            });
+        }
         Ok(command)
     }
 
@@ -151,11 +168,12 @@ pub fn track(
         samples: Vec::new(),
         periods: 0.0,
     };
-    approach(&mut bench, scene.record.lock_periods)?;
+    approach(&mut bench, scene.lock_periods())?;
     let periods_to_lock = bench.periods;
     let d = scene.dimensionless();
     let slow_flow = SlowFlow::new(d.lambda, d.r);
     let mut points: Vec<Point> = Vec::new();
+    let mut ended = None;
     for (n, &level) in levels.iter().enumerate() {
         progress(n, levels.len());
         let known: Vec<Known> = points
@@ -169,9 +187,17 @@ pub fn track(
             amplitude: d.amplitude(g),
             omega: d.omega_change(sigma),
         })?;
-        points.push(hold(&mut bench, scene, level)?);
+        match hold(&mut bench, scene, level) {
+            Ok(point) => points.push(point),
+            // What was measured is kept.
+            Err(error) if !points.is_empty() => {
+                ended = Some(error.to_string());
+                break;
+            }
+            Err(error) => return Err(error),
+        }
     }
-    Ok(Tracked { points, periods_to_lock, periods: bench.periods })
+    Ok(Tracked { points, periods_to_lock, periods: bench.periods, ended })
 }
 
 /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
@@ -183,7 +209,9 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(bench: &mut Bench<R, C>, mo
         }
         bench.samples.clear();
         let cycle = bench.cycle()?;
-        let driven = cycle.base.norm() > 0.0;
+        // A motion that is being captured is not to be held yet.
+        let captured = bench.samples.last().and_then(|sample| sample.command.state) != Some(LoopState::Capturing);
+        let driven = cycle.base.norm() > 0.0 && captured;
         near = if driven && cycle.phase_error.abs() < NEAR {
             near + 1
         } else {

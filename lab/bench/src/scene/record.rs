@@ -18,8 +18,8 @@ pub enum Estimator {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Record {
-    /// Time limit for the lock, natural periods.
-    pub lock_periods: f64,
+    /// Time limit for the lock, natural periods; by default at least 2000, and 20 relaxation times.
+    pub lock_periods: Option<f64>,
     /// How long the settled lock is held and measured, natural periods.
     pub hold_periods: f64,
     /// Length of the recorded decay, natural periods.
@@ -33,7 +33,7 @@ pub struct Record {
 impl Default for Record {
     fn default() -> Self {
         Self {
-            lock_periods: 2000.0,
+            lock_periods: None,
             hold_periods: 20.0,
             decay_periods: 50.0,
             window_periods: 2.5,
@@ -48,7 +48,8 @@ const MOST_SAMPLES: f64 = 2e7;
 impl Record {
     pub(super) fn check(&self, controller: &Controller) -> Result<(), SceneError> {
         let unit = "(natural periods)";
-        Quantity::new("record.lock_periods", self.lock_periods, unit).positive()?;
+        let lock_periods = self.lock_periods.unwrap_or(2000.0);
+        Quantity::new("record.lock_periods", lock_periods, unit).positive()?;
         Quantity::new("record.hold_periods", self.hold_periods, unit).check(
             (3.0..=1e6).contains(&self.hold_periods),
             "must be from 3 (to count impacts and measure) to 1000000",
@@ -58,7 +59,7 @@ impl Record {
             (0.5..=self.decay_periods).contains(&self.window_periods),
             format!("must be from 0.5 to decay_periods = {}", self.decay_periods),
         )?;
-        let samples = controller.samples_per_period * (self.lock_periods + self.hold_periods + self.decay_periods);
+        let samples = controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods);
         Quantity::new("samples_per_period times all periods of [record]", samples, "samples")
             .check(samples <= MOST_SAMPLES, "must be at most 20 million")
     }
