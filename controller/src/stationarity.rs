@@ -11,10 +11,10 @@ const DWELL: usize = 4;
 /// Number of blocks that the criterion for noise needs: two dwells.
 const BLOCKS: usize = 2 * DWELL;
 /// Largest range of four means over two blocks that counts as noise, in units of the scatter.
-const NOISE_RANGE: f64 = 4.0;
+const NOISE_RANGE: f64 = 5.0;
 /// Smallest sum of the squared differences from period to period over that of the squared deviations from the mean that counts as
 /// noise. A drift over five periods has 0.4, noise about 1.
-const RANDOM: f64 = 0.6;
+const RANDOM: f64 = 0.5;
 /// Largest scatter of the periods, relative, that counts as noise.
 const NOISE_MAX: f64 = 0.03;
 
