@@ -23,11 +23,11 @@ pub enum Detector {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LockCriterion {
-    /// Largest phase error that counts as locked, mean over a period, rad.
+    /// Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
     pub phase_tolerance: f64,
     /// Phase error, mean over a period, above which the lock is lost, rad; at least `phase_tolerance`.
     pub unlock_tolerance: f64,
-    /// Largest relative drift of the frequency per period.
+    /// Largest relative drift of the frequency per period; where noise is larger than such a drift, the noise is accepted.
     pub frequency_drift: f64,
     /// Largest relative drift of the response amplitude per period.
     pub amplitude_drift: f64,

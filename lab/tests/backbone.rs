@@ -160,3 +160,44 @@ fn a_controller_that_cannot_hold_the_response_is_refused() {
         Err(TrackError::Controller(ControllerError::NoResponseLoop))
     ));
 }
+
+/// A rig whose response sensor stops after some samples.
+struct Dying {
+    rig: Simulated,
+    left: usize,
+    stuck: f64,
+}
+
+impl Rig for Dying {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        let mut sensors = self.rig.sense()?;
+        self.left = self.left.saturating_sub(1);
+        if self.left > 0 {
+            self.stuck = sensors.response;
+        }
+        sensors.response = self.stuck;
+        Ok(sensors)
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.rig.advance(drive, step)
+    }
+}
+
+#[test]
+fn a_sensor_that_stops_ends_tracking_and_keeps_the_points_before() {
+    let scene = scene(&[]);
+    let rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut rig = Dying { rig, left: 20_000, stuck: 0.0 };
+    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
+    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
+    let reason = tracked.ended.unwrap();
+    assert!(reason.contains("did not change for half a period"), "{reason}");
+    assert!((5..15).contains(&tracked.points.len()), "{}", tracked.points.len());
+    for point in &tracked.points {
+        assert!(
+            point.g > 0.5 && point.settled && (point.c / point.level - 1.0).abs() < 0.01,
+            "{point:?}"
+        );
+    }
+}

@@ -87,7 +87,7 @@ typedef struct PhaseLockConfig {
   double delay;
   // Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
   double response_gain;
-  // Largest phase error that counts as locked, mean over a period, rad.
+  // Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
   double phase_tolerance;
   // Phase error above which the lock is lost, mean over a period, rad.
   double unlock_tolerance;

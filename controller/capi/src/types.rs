@@ -64,7 +64,7 @@ pub struct PhaseLockConfig {
     pub delay: f64,
     /// Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
     pub response_gain: f64,
-    /// Largest phase error that counts as locked, mean over a period, rad.
+    /// Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
     pub phase_tolerance: f64,
     /// Phase error above which the lock is lost, mean over a period, rad.
     pub unlock_tolerance: f64,

@@ -59,7 +59,8 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
             d.lambda
         )),
         Regime::Symmetric => Some(format!(
-            "the motion is symmetric but not stationary; {place}. Near the end of its stable range the loop may need a smaller \
+            "the motion is symmetric but not on the stable orbit: {place}. A symmetric orbit of larger amplitude may be unstable and lose \
+             its symmetry slowly. Near the end of its stable range the loop may need a smaller \
              controller.approach_gain or more record.lock_periods"
         )),
         regime => Some(format!(

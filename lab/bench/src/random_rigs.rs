@@ -161,15 +161,15 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
     let locked_at = format!("locked at sigma = {sigma:.4}, C = {c:.4}");
     match regime {
         Regime::Symmetric if distance <= CORRECT => Row { outcome: Outcome::Locked, ..row },
-        Regime::Symmetric => Row {
-            outcome: Outcome::Inaccurate,
-            message: Some(locked_at),
-            ..row
-        },
         regime => {
             let why = advice::reason(scene, Some(regime)).unwrap_or_default();
             let message = Some(format!("{locked_at}: {why}"));
-            Row { outcome: Outcome::OtherRegime, message, ..row }
+            let outcome = if regime == Regime::Symmetric {
+                Outcome::Inaccurate
+            } else {
+                Outcome::OtherRegime
+            };
+            Row { outcome, message, ..row }
         }
     }
 }
