@@ -1,6 +1,8 @@
 //! What a record says: the locked point, its regime, and the backbone along the free decay.
 
+mod balance;
 mod crossings;
+mod cycle;
 mod decay;
 mod fit;
 mod lock;
@@ -12,6 +14,8 @@ use thiserror::Error;
 use crate::experiment::Record;
 use crate::scene::{Dimensionless, Scene};
 
+pub use balance::{Balance, Slopes};
+pub use cycle::Cycle;
 pub use decay::{DecayPoint, decay_points};
 pub use lock::Lock;
 pub use regime::{classify, impacts};

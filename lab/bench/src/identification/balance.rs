@@ -1,0 +1,209 @@
+//! Phase resonance from the balances of amplitude and phase: the estimator of locked and of tracked points.
+//!
+//! Near phase resonance, amplitude A and phase Theta of the response to a base of the amplitude E obey
+//!
+//! ```text
+//! A' = g (E cos phi - E_R(A)),      Theta' = omega_R(A) - (g E/A) sin phi,      g = omega0^2/(2 omega)
+//! ```
+//!
+//! with the phase error phi. The drive `E_R` and the frequency `omega_R` of phase resonance follow for any history of drive and
+//! frequency, from straight lines in time:
+//!
+//! ```text
+//! A - integral of g E cos phi = const - g E_R t,      Theta + integral of (g E/A) sin phi = const + omega_R t
+//! ```
+//!
+//! Where A varies within the periods used, `E_R` and `omega_R` are linear in it, which adds the integral of `A - mean A` to the
+//! lines. docs/estimators.md derives the uncertainties.
+
+use nalgebra::Complex;
+use vines_model::numerics::{Estimate, Line, Prior, Regression, mean};
+
+use super::Cycle;
+
+/// What is known of the backbone about a point in advance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slopes {
+    /// Slope of the drive `E_R` over the amplitude, dimensionless: value and standard uncertainty.
+    pub base: [f64; 2],
+    /// The same of the frequency `omega_R`, rad/(s m).
+    pub omega: [f64; 2],
+    /// Changes of `E_R` and `omega_R` per rate of change of the amplitude, because the impacts follow it late: s and rad/m.
+    pub drift: [f64; 2],
+}
+
+/// The two lines, fitted to some periods.
+#[derive(Debug, Clone)]
+pub struct Balance {
+    /// Number of periods.
+    pub periods: usize,
+    /// Mean amplitude of the response, m.
+    pub response: Estimate,
+    /// Mean phase error, rad.
+    pub phase_error: Estimate,
+    /// Mean amplitude of the base, m.
+    pub base: Estimate,
+    /// Largest scatter of the residuals over the noise of the sensors.
+    pub excess: f64,
+    /// g.
+    gain: f64,
+    /// Coefficients: constant, time, and integral of the amplitude's deviation.
+    drive: Regression,
+    turning: Regression,
+    /// Sizes of the neglected terms of `E_R`, m, and `omega_R`, rad/s.
+    pub remainders: [f64; 2],
+    /// Standard uncertainties of `E_R` and `omega_R` by the phase errors and the base within the integrals.
+    within: [f64; 2],
+}
+
+/// Size of the neglected terms relative to those of the second order.
+const REMAINDER: f64 = 0.7;
+
+impl Balance {
+    /// From at least four periods of an oscillator of the natural frequency `omega0`, rad/s.
+    #[must_use]
+    pub fn of(cycles: &[Cycle], omega0: f64, slopes: &Slopes) -> Option<Self> {
+        let n = cycles.len() as f64;
+        if cycles.len() < 4 {
+            return None;
+        }
+        let omega = mean(cycles.iter().map(|cycle| cycle.omega));
+        let gain = 0.5 * omega0 * omega0 / omega;
+        let response = mean(cycles.iter().map(Cycle::amplitude));
+        let base = mean(cycles.iter().map(|cycle| cycle.base.norm()));
+        let phase_error = mean(cycles.iter().map(|cycle| cycle.phase_error));
+        let [noise, base_noise] = [0, 1].map(|i| mean(cycles.iter().map(|cycle| cycle.noise[i])).sqrt());
+        // Rounding is the least noise.
+        let noise = noise.max(1e-14 * response);
+        let middle = mean(cycles.iter().map(|cycle| cycle.time));
+        let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
+        let integral = |rate: &dyn Fn(&Cycle) -> f64| integral(cycles, rate);
+        let deviation = integral(&|cycle| cycle.amplitude() - response);
+        let columns = [vec![1.0; cycles.len()], time, deviation];
+        let drives = drives(cycles);
+        // The integral of A' is A.
+        // Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
+        let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
+        let [late, turned] = [1.0 + gain * slopes.drift[0], slopes.drift[1]];
+        let amplitudes: Vec<f64> = cycles
+            .iter()
+            .zip(&drives)
+            .map(|(cycle, drive)| cycle.amplitude() * late - inertia * drive.force.im - gain * drive.work.re)
+           .collect();
+        let phases: Vec<f64> = phases(cycles)
+            .zip(cycles.iter().zip(&drives))
+            .map(|(phase, (cycle, drive))| {
+                phase + (gain * drive.work.im - inertia * drive.force.re) / response - turned * cycle.amplitude()
+            })
+            .collect();
+        let prior = |[value, uncertainty]: [f64; 2]| [Prior { coefficient: 2, value, uncertainty }];
+        let [slope, width] = slopes.base;
+        let drive = Regression::fit(&columns, &amplitudes, &prior([-gain * slope, gain * width]), noise)?;
+        let turning = Regression::fit(&columns, &phases, &prior(slopes.omega), noise / response)?;
+        // The terms beyond these are as large as a share of them.
+        let remainder = |value: &dyn Fn(&Drive) -> f64| {
+            let values: Vec<f64> = drives.iter().map(|drive| REMAINDER * inertia * value(drive)).collect();
+            Line::fit(&values).slope / (cycles[1].time - cycles[0].time)
+        };
+        let remainders = [
+            remainder(&|drive| drive.force.re) / gain,
+            remainder(&|drive| drive.force.re) / response,
+        ];
+        let phase_noise = (noise / response).hypot(base_noise / base);
+        let excess = drive.excess.max(turning.excess);
+        let of = |value: f64, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
+        Some(Self {
+            periods: cycles.len(),
+            response: of(response, noise),
+            phase_error: of(phase_error, phase_noise),
+            base: of(base, base_noise),
+            excess,
+            gain,
+            drive,
+            turning,
+            remainders: remainders.map(f64::abs),
+            within: [base_noise / n.sqrt(), gain * base / response * phase_noise / n.sqrt()],
+        })
+    }
+
+    /// `E_R`, m, and `omega_R`, rad/s, at the mean amplitude plus `ahead`, m.
+    #[must_use]
+    pub fn at(&self, ahead: f64) -> [Estimate; 2] {
+        let weights = [0.0, 1.0, ahead];
+        let drive = self.drive.estimate(&weights).scaled(-1.0 / self.gain);
+        let turning = self.turning.estimate(&weights);
+        [(drive, self.within[0]), (turning, self.within[1])]
+            .map(|(one, within)| Estimate::new(one.value, &[one.uncertainty, within]))
+    }
+
+    /// Slopes of `E_R` and `omega_R` over the amplitude.
+    #[must_use]
+    pub fn slopes(&self) -> [Estimate; 2] {
+        let weights = [0.0, 0.0, 1.0];
+        [self.drive.estimate(&weights).scaled(-1.0 / self.gain), self.turning.estimate(&weights)]
+    }
+
+    /// Distance, m, from the mean amplitude to the one that the mean base holds at phase resonance.
+    #[must_use]
+    pub fn ahead(&self) -> f64 {
+        (self.base.value - self.at(0.0)[0].value) / self.slopes()[0].value
+    }
+}
+
+/// Integral over time from the first period's middle on, by the trapezoidal rule.
+fn integral(cycles: &[Cycle], rate: &dyn Fn(&Cycle) -> f64) -> Vec<f64> {
+    let mut sum = 0.0;
+    let steps = cycles.windows(2).map(|pair| {
+        sum += 0.5 * (rate(&pair[0]) + rate(&pair[1])) * (pair[1].time - pair[0].time);
+        sum
+    });
+    std::iter::once(0.0).chain(steps).collect()
+}
+
+/// The drive of a period, from the command, which has no noise; the sensor calibrates it.
+struct Drive {
+    /// Base amplitude by `exp(i phase error)`, m.
+    force: Complex<f64>,
+    /// Its integral from the first period on, m s; the mean over this period.
+    work: Complex<f64>,
+}
+
+fn drives(cycles: &[Cycle]) -> Vec<Drive> {
+    let total = |value: fn(&Cycle) -> f64| cycles.iter().map(value).sum::<f64>();
+    let gain = total(|cycle| cycle.base.norm()) / total(|cycle| cycle.commanded[0].norm());
+    let relative = |cycle: &Cycle| {
+        let turned = cycle.response[0] * cycle.commanded[0].conj();
+        turned / turned.norm()
+    };
+    // Target phase, and phase of the base relative to the command.
+    let turn: Complex<f64> = cycles
+        .iter()
+        .map(|cycle| relative(cycle).conj() * Complex::from_polar(1.0, cycle.phase_error))
+        .sum();
+    let mut sum = Complex::<f64>::default();
+    cycles
+        .iter()
+        .map(|cycle| {
+            let [middle, change] = cycle.commanded;
+            let growth = (change * middle.conj()).re / middle.norm();
+            let share = relative(cycle) * turn / turn.norm() * gain;
+            let before = sum;
+            sum += share * cycle.duration * middle.norm();
+            Drive {
+                force: share * middle.norm(),
+                work: before + share * cycle.duration * (0.5 * middle.norm() - growth / 6.0),
+            }
+        })
+        .collect()
+}
+
+/// Phases of the response, rad, continuous from period to period.
+fn phases(cycles: &[Cycle]) -> impl Iterator<Item = f64> {
+    let mut before = cycles[0].response[0];
+    let mut phase = before.arg();
+    cycles.iter().map(move |cycle| {
+        phase += (cycle.response[0] * before.conj()).arg();
+        before = cycle.response[0];
+        cycle.drive_phase + phase
+    })
+}
