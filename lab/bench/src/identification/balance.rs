@@ -85,17 +85,11 @@ impl Balance {
         // Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
         let [late, turned] = [1.0 + gain * slopes.drift[0], slopes.drift[1]];
-        let amplitudes: Vec<f64> = cycles
-            .iter()
-            .zip(&drives)
-            .map(|(cycle, drive)| cycle.amplitude() * late - inertia * drive.force.im - gain * drive.work.re)
-           .collect();
-        let phases: Vec<f64> = phases(cycles)
-            .zip(cycles.iter().zip(&drives))
-            .map(|(phase, (cycle, drive))| {
-                phase + (gain * drive.work.im - inertia * drive.force.re) / response - turned * cycle.amplitude()
-            })
-            .collect();
+        let balanced = motion(cycles).into_iter().zip(&drives).map(|((amplitude, phase), drive)| {
+            let phase = phase + (gain * drive.work.im - inertia * drive.force.re) / response - turned * amplitude;
+            (amplitude * late - inertia * drive.force.im - gain * drive.work.re, phase)
+        });
+        let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
         let prior = |[value, uncertainty]: [f64; 2]| [Prior { coefficient: 2, value, uncertainty }];
         let [slope, width] = slopes.base;
         let drive = Regression::fit(&columns, &amplitudes, &prior([-gain * slope, gain * width]), noise)?;
@@ -197,13 +191,34 @@ fn drives(cycles: &[Cycle]) -> Vec<Drive> {
         .collect()
 }
 
-/// Phases of the response, rad, continuous from period to period.
-fn phases(cycles: &[Cycle]) -> impl Iterator<Item = f64> {
+/// Amplitudes and phases of the response, continuous from period to period, without the influence of their own drift.
+///
+/// Over one period from the phase 0 on, a drift z' of the complex amplitude per radian changes the fitted amplitude by
+/// -i conj(z')/2.
+fn motion(cycles: &[Cycle]) -> Vec<(f64, f64)> {
     let mut before = cycles[0].response[0];
-    let mut phase = before.arg();
-    cycles.iter().map(move |cycle| {
-        phase += (cycle.response[0] * before.conj()).arg();
-        before = cycle.response[0];
-        cycle.drive_phase + phase
-    })
+    let mut turned = before.arg();
+    let phases: Vec<f64> = cycles
+        .iter()
+        .map(|cycle| {
+            turned += (cycle.response[0] * before.conj()).arg();
+            before = cycle.response[0];
+            cycle.drive_phase + turned
+        })
+        .collect();
+    let last = cycles.len() - 1;
+    (0..=last)
+        .map(|n| {
+            let (from, to) = (n.saturating_sub(1), (n + 1).min(last));
+            let time = (cycles[to].time - cycles[from].time) * cycles[n].omega;
+            let growth = (cycles[to].amplitude() - cycles[from].amplitude()) / time;
+            let amplitude = cycles[n].amplitude();
+            // The frequency of the drive may jump from period to period; that of the response does not.
+            let turning = amplitude * ((phases[to] - phases[from]) / time - 1.0);
+            let z = cycles[n].response[0];
+            let drift = Complex::new(growth, turning) * z / amplitude;
+            let correction = Complex::new(0.0, 0.5) * drift.conj() / z;
+            (amplitude * (1.0 + correction.re), phases[n] + correction.im)
+        })
+        .collect()
 }

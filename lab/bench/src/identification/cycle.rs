@@ -32,10 +32,8 @@ pub struct Cycle {
     pub duration: f64,
 }
 
-/// Offset, sine and cosine of three harmonics, and the drift of the first: without that, a drift changes the amplitude.
-const TERMS: usize = 9;
-/// Variance of an amplitude over that of a fit without drift, over one period.
-const DRIFT: f64 = 1.08;
+/// Offset, and sine and cosine of three harmonics.
+const TERMS: usize = 7;
 
 impl Cycle {
     /// The samples of one period; `phase` (rad) is that of the drive at the first, `target` (rad) that of the response to the
@@ -53,26 +51,28 @@ impl Cycle {
         let uniform: Vec<f64> = (0..samples.len())
             .map(|n| drive_phase + (n as f64 - middle) * sample_time * mean_omega)
             .collect();
-        let basis = |phases: &[f64]| HarmonicBasis::new(phases, 0, &[Some(1), Some(0), Some(0)]);
-        let along = basis(&uniform);
+        let basis = HarmonicBasis::new(&uniform, 0, &[Some(0); 3]);
         let degrees = (samples.len() - TERMS) as f64;
-        let fitted = |basis: &HarmonicBasis, value: fn(&Sample) -> f64| {
+        let fitted = |value: fn(&Sample) -> f64| {
             let values = DVector::from_iterator(samples.len(), samples.iter().map(value));
             let fit = basis.fit(&values)?;
             let variance = basis.residual(&values, &fit).norm_squared() / degrees;
-            Some((fit, DRIFT * variance * 2.0 / samples.len() as f64))
+            Some((fit, variance * 2.0 / samples.len() as f64))
         };
-        let (response, noise) = fitted(&basis(&uniform), |s| s.sensors.response)?;
+        let (response, noise) = fitted(|s| s.sensors.response)?;
         let mean = |value: fn(&Sample) -> f64| mean(samples.iter().map(value));
-        // The amplitude commanded at a sample begins there.
-        let amplitude = |n: usize| 0.5 * (samples[n.saturating_sub(1)].command.drive.amplitude + samples[n].command.drive.amplitude);
-        let motion = DVector::from_fn(samples.len(), |n, _| amplitude(n) * phases[n].sin());
-        // The amplitude may vary within the period; the fundamental is what drives the response.
-        let commanded = along.fit(&motion)?;
+        // The amplitude commanded at a sample begins there; a sensor reads what the one before left.
+        let before = |n: usize| samples[n.saturating_sub(1)].command.drive.amplitude;
+        let motion = |amplitude: &dyn Fn(usize) -> f64| {
+            DVector::from_fn(samples.len(), |n, _| amplitude(n) * phases[n].sin())
+        };
+        let drifting = HarmonicBasis::new(&uniform, 0, &[Some(1), Some(0), Some(0)]);
+        let commanded = drifting.fit(&motion(&|n| 0.5 * (before(n) + samples[n].command.drive.amplitude)))?;
+        let as_read = basis.fit(&motion(&before))?.harmonic(1);
         let measured = samples.iter().all(|s| s.sensors.reference.is_some());
         let (base, base_noise) = if measured {
-            let (base, noise) = fitted(&along, |s| s.sensors.reference.unwrap_or(0.0))?;
-            (base.harmonic(1), noise)
+            let (base, noise) = fitted(|s| s.sensors.reference.unwrap_or(0.0))?;
+            (base.harmonic(1) * commanded.harmonic(1) / as_read, noise)
         } else {
             (Complex::new(mean(|s| s.command.drive.amplitude), 0.0), 0.0)
         };
