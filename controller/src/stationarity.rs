@@ -5,7 +5,16 @@ use crate::config::LockCriterion;
 /// Number of blocks of a dwell.
 const BLOCKS: usize = 4;
 
+/// Deviation, in standard deviations of the noise, that counts as noise.
+const NOISE: f64 = 4.0;
+/// Weight of a new period in the running mean square of the noise.
+const FOLLOW: f64 = 0.125;
+
 /// The criterion. Impacts cause ripple within a period, so it compares means over whole periods only.
+///
+/// Noise widens all limits: without that, a noisy sensor would never allow a lock. Its size is taken from second differences of the
+/// phase error from period to period, to which smooth changes contribute little. The detector gives amplitude and phase
+/// the same relative noise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stationarity {
@@ -67,6 +76,33 @@ struct Block {
     amplitude: f64,
 }
 
+/// White noise of a quantity from period to period.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Noise {
+    before: [f64; 2],
+    periods: u32,
+    mean_square: f64,
+}
+
+impl Noise {
+    fn take(&mut self, value: f64) {
+        if self.periods >= 2 {
+            // White noise of variance 1 gives second differences the variance 1 + 4 + 1.
+            let difference = value - 2.0 * self.before[0] + self.before[1];
+            let weight = FOLLOW.max(1.0 / f64::from(self.periods - 1));
+            self.mean_square += weight * (difference * difference / 6.0 - self.mean_square);
+        }
+        self.before = [value, self.before[0]];
+        self.periods = self.periods.saturating_add(1);
+    }
+
+    /// The largest deviation of a mean over some periods that counts as noise.
+    fn limit(&self, periods: u32) -> f64 {
+        NOISE * libm::sqrt(self.mean_square / f64::from(periods))
+    }
+}
+
 /// The running dwell: the last complete blocks, and the present one.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -77,6 +113,8 @@ pub struct Dwell {
     block: Sums,
     periods: u32,
     settled: bool,
+    /// Of the phase error, rad, and of the proportional part of the frequency, relative.
+    noise: [Noise; 2],
 }
 
 impl Dwell {
@@ -121,10 +159,12 @@ impl Stationarity {
         let period = core::mem::take(&mut dwell.period);
         let error = (period.error / period.samples as f64).abs();
         let valid = period.invalid == 0;
-        if valid && error <= self.phase_tolerance {
+        dwell.noise[0].take(period.error / period.samples as f64);
+        dwell.noise[1].take((period.omega - period.integral) / period.integral);
+        if valid && error <= self.phase_tolerance + dwell.noise[0].limit(1) {
             self.end_period(dwell, &period);
         } else {
-            *dwell = Dwell::default();
+            *dwell = Dwell { noise: dwell.noise, ..Dwell::default() };
         }
         !valid || error > self.unlock_tolerance
     }
@@ -148,9 +188,10 @@ impl Stationarity {
         // Periods between the centres of the first and the last block. A slope would miss the crest of a slow
         // modulation; the range does not.
         let distance = f64::from(self.block) * (BLOCKS - 1) as f64;
+        let by_noise = dwell.noise.map(|noise| noise.limit(self.block));
         dwell.settled = dwell.complete == BLOCKS
-            && range(&dwell.blocks, |block| block.integral) <= self.frequency_drift * distance
-            && range(&dwell.blocks, |block| block.amplitude) <= self.amplitude_drift * distance;
+            && range(&dwell.blocks, |block| block.integral) <= self.frequency_drift * distance + by_noise[1]
+            && range(&dwell.blocks, |block| block.amplitude) <= self.amplitude_drift * distance + by_noise[0];
     }
 }
 

@@ -38,12 +38,9 @@ pub enum IdentificationError {
         /// Amplitude at the lock.
         c: f64,
     },
-    /// No window of the decay could be evaluated.
-    #[error("the decay holds no window of {periods} periods with synchronous impacts")]
-    NoDecay {
-        /// Window length asked for.
-        periods: f64,
-    },
+    /// The hold contains no periodic motion.
+    #[error("the hold contains no periodic motion: the response or the base reads zero; check the sensors and record.hold_periods")]
+    NoMotion,
 }
 
 /// What a record says; dimensionless throughout.
@@ -60,16 +57,13 @@ pub struct Identification {
 /// Identifies a record of `scene`.
 ///
 /// # Errors
-/// A lock in another regime than the symmetric 1:1 one, or a decay too short to fit.
+/// A lock in another regime than the symmetric 1:1 one, or no motion.
 pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, IdentificationError> {
-    let lock = lock::measure(record, scene);
+    let lock = lock::measure(record, scene).ok_or(IdentificationError::NoMotion)?;
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
     if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
         return Err(IdentificationError::Regime { regime: lock.regime, sigma: lock.sigma, c: lock.c });
     }
     let decay = decay_points(record, scene);
-    if decay.is_empty() {
-        return Err(IdentificationError::NoDecay { periods: scene.record.window_periods });
-    }
     Ok(Identification { parameters: scene.dimensionless(), lock, decay })
 }

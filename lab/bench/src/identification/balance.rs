@@ -137,10 +137,25 @@ impl Balance {
         [self.drive.estimate(&weights).scaled(-1.0 / self.gain), self.turning.estimate(&weights)]
     }
 
-    /// Distance, m, from the mean amplitude to the one that the mean base holds at phase resonance.
+    /// Distance, m, from the mean amplitude to the one that the base amplitude `base`, m, holds at phase resonance.
     #[must_use]
-    pub fn ahead(&self) -> f64 {
-        (self.base.value - self.at(0.0)[0].value) / self.slopes()[0].value
+    pub fn ahead(&self, base: f64) -> f64 {
+        (base - self.at(0.0)[0].value) / self.slopes()[0].value
+    }
+
+    /// Frequency, rad/s, and amplitude, m, that a constant base amplitude leads to.
+    #[must_use]
+    pub fn limit(&self, base: Estimate) -> [Estimate; 2] {
+        let ahead = self.ahead(base.value);
+        let [drive, turning] = self.at(ahead);
+        let [by_base, by_omega] = self.slopes().map(|slope| slope.value);
+        // The uncertainty of the slope is in that of the drive at the limit.
+        let limit = Estimate::new(
+            self.response.value + ahead,
+            &[self.response.uncertainty, drive.uncertainty / by_base, base.uncertainty / by_base],
+        );
+        let change = by_omega * limit.uncertainty;
+        [Estimate::new(turning.value, &[turning.uncertainty, change]), limit]
     }
 }
 
