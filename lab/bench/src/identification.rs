@@ -16,7 +16,7 @@ use crate::scene::{Dimensionless, Scene};
 
 pub use balance::{Balance, Slopes};
 pub use cycle::Cycle;
-pub use decay::{DecayPoint, decay_points};
+pub use decay::{DecayEnd, DecayPoint, DecayPoints, decay_points};
 pub use lock::Lock;
 pub use regime::{classify, impacts};
 pub use response::regime_by_response;
@@ -50,8 +50,8 @@ pub struct Identification {
     pub parameters: Dimensionless,
     /// The locked point as measured.
     pub lock: Lock,
-    /// The decay, from the release to the loss of synchrony where the rig reports impacts.
-    pub decay: Vec<DecayPoint>,
+    /// The decay, from the release on; without points if it is shorter than the window of the fit.
+    pub decay: DecayPoints,
 }
 
 /// Identifies a record of `scene`.
