@@ -13,7 +13,7 @@ use crate::identification::{DecayEnd, DecayPoint, Identification, Lock};
 use crate::scene::Scene;
 
 pub use exact_curve::{Distance, ExactCurve};
-pub use tracked::{TrackedComparison, TrackedPoint};
+pub use tracked::{TrackedComparison, TrackedPoint, Worst};
 
 /// Amplitudes above which the decay is compared with theory, C.
 ///

@@ -26,3 +26,11 @@ fn decay_points(panel: &mut Panel, points: impl Iterator<Item = Place>, label: &
 fn locked_point(panel: &mut Panel, place: Place) {
     panel.square(place, LOCK, "locked, measured");
 }
+
+/// Error bars of 95 %: places with the half width of the interval, upright or level.
+fn error_bars(panel: &mut Panel, bars: impl Iterator<Item = (Place, f64)>, upright: bool) {
+    let ends = |((x, y), half): (Place, f64)| {
+        if upright { [(x, y - half), (x, y + half)] } else { [(x - half, y), (x + half, y)] }
+    };
+    panel.segments(bars.map(ends).collect(), line(DECAY, 12));
+}

@@ -9,7 +9,7 @@ use thiserror::Error;
 use super::figure::FigureError;
 use super::figures::{backbone, manifold, regimes, tracked};
 use super::theme::dark;
-use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
+use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
 use crate::files::temporary;
 use crate::map::{Cell, Map, Point};
 
@@ -116,10 +116,11 @@ pub(super) fn decay_csv(found: &Comparison) -> Result<String, WriteError> {
     #[derive(Serialize)]
     struct Theory {
         sigma_theory: Option<f64>,
+        sigma_exact: Option<f64>,
     }
     csv(found.decay.iter().map(|one| {
-        let sigma_theory = one.sigma_theory;
-        (one.point, Theory { sigma_theory })
+        let ComparedPoint { point, sigma_theory, sigma_exact } = *one;
+        (point, Theory { sigma_theory, sigma_exact })
     }))
 }
 

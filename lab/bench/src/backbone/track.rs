@@ -42,6 +42,8 @@ pub struct Point {
     pub averaged: usize,
     /// The motion was steady within these uncertainties; otherwise the point was taken at the time limit.
     pub settled: bool,
+    /// The response reached the level; otherwise the drive was at a limit, or the time too short.
+    pub reached: bool,
     /// The regime determined from the response alone, as on a real rig.
     pub regime: Regime,
     /// The regime determined from the impacts, if the rig is a simulation.
@@ -177,6 +179,8 @@ pub fn track(
     Ok(Tracked { points, periods_to_lock, periods: bench.periods })
 }
 
+/// Largest relative difference of the response from its level that counts as reached.
+const REACHED: f64 = 0.03;
 /// Share of the drive that a move may need in addition to the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
 
@@ -277,5 +281,6 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
             .map(|_| classify(averaged, bench.sample_time, omega.value).1),
         averaged: said.periods,
         settled: said.steady || criterion.is_met(&said),
+        reached: (said.response.value / d.b - level).abs() <= (REACHED * level).max(4.0 * said.response.uncertainty / d.b),
     })
 }

@@ -11,6 +11,8 @@ use vines_model::theory::SlowFlow;
 const FREQUENCIES: usize = 3000;
 /// ... and about its lowest frequency, where it turns back: number of frequencies, and range of the detuning.
 const TURN: (usize, f64) = (1200, 0.02);
+/// Largest difference in C between neighbours.
+const JUMP: f64 = 0.03;
 /// Largest particle speed of the curve: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
@@ -51,6 +53,18 @@ impl ExactCurve {
         let (steps, width) = TURN;
         orbits.extend(between(lowest - 0.1 * width, lowest + width, steps));
         orbits.sort_by(|a, b| a.b.total_cmp(&b.b));
+        // Another family of orbits can have the same particle speeds: the curve is followed from its largest speed.
+        let mut last = orbits.last().map_or(0.0, |orbit| orbit.c);
+        let mut orbits: Vec<Orbit> = orbits
+            .into_iter()
+            .rev()
+            .filter(|orbit| {
+                let next = (orbit.c - last).abs() < JUMP;
+                last = if next { orbit.c } else { last };
+                next
+            })
+            .collect();
+        orbits.reverse();
         // From the fold on: C rises with B there.
         let fold = (0..orbits.len())
             .min_by(|&a, &b| orbits[a].c.total_cmp(&orbits[b].c))
