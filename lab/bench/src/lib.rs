@@ -5,6 +5,7 @@
 #![forbid(unsafe_code)]
 
 pub mod backbone;
+pub mod calibration;
 pub mod chain_effects;
 pub mod comparison;
 pub mod estimators;

@@ -7,8 +7,9 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::figure::FigureError;
-use super::figures::{backbone, manifold, regimes, tracked};
+use super::figures::{backbone, coverage, manifold, regimes, tracked};
 use super::theme::dark;
+use crate::calibration::Calibration;
 use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
 use crate::files::temporary;
 use crate::map::{Cell, Map, Point};
@@ -76,6 +77,14 @@ pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBu
         ("tracked.svg", tracked::figure_with_drive(found).svg()?),
     ];
     write_files(out, &files)
+}
+
+/// Writes `coverage.svg` into `out` and returns its path, as [`write()`] does.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_calibration(found: &Calibration, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+    write_files(out, &[("coverage.svg", coverage::figure(found).svg()?)])
 }
 
 /// Writes each file under a temporary name, and gives it its own once it is complete.

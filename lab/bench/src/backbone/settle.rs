@@ -77,6 +77,7 @@ impl Criterion {
         let considered = counts.into_iter().filter(|count| *count >= self.fewest);
         considered
             .filter_map(|count| self.from(&cycles[n - count..]))
+            .filter(|found| found.at.iter().all(|one| (one.value + one.uncertainty).is_finite()))
             .min_by(|one, other| self.size(one).total_cmp(&self.size(other)))
     }
 

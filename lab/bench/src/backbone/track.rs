@@ -164,6 +164,7 @@ pub fn track(
         progress(n, levels.len());
         let known: Vec<Known> = points
             .iter()
+            .filter(|point| point.g.is_finite() && point.sigma.is_finite())
             .map(|point| Known { c: point.c, g: point.g, sigma: point.sigma })
             .collect();
         let (g, sigma) = predictor::change(settings.predictor, &known, level, &slow_flow);
