@@ -23,15 +23,45 @@ pub type RigSettings = [&'static str; 4];
 
 /// The rigs: the default one, one with lighter particle and harder walls, one with a heavy particle.
 pub const RIGS: [RigSettings; 3] = [
-    ["plant.epsilon=0.0084", "plant.lambda=1.43", "plant.r=0.65", "excitation.G=1.1"],
-    ["plant.epsilon=0.0042", "plant.lambda=1.0", "plant.r=0.8", "excitation.G=0.75"],
-    ["plant.epsilon=0.02", "plant.lambda=1.43", "plant.r=0.6", "excitation.G=1.2"],
+    [
+        "plant.epsilon=0.0084",
+        "plant.lambda=1.43",
+        "plant.r=0.65",
+        "excitation.G=1.1",
+    ],
+    [
+        "plant.epsilon=0.0042",
+        "plant.lambda=1.0",
+        "plant.r=0.8",
+        "excitation.G=0.75",
+    ],
+    [
+        "plant.epsilon=0.02",
+        "plant.lambda=1.43",
+        "plant.r=0.6",
+        "excitation.G=1.2",
+    ],
 ];
 /// Rigs that were not used while the estimators were written.
 pub const OTHER_RIGS: [RigSettings; 3] = [
-    ["plant.epsilon=0.006", "plant.lambda=2.0", "plant.r=0.7", "excitation.G=1.4"],
-    ["plant.epsilon=0.012", "plant.lambda=0.8", "plant.r=0.5", "excitation.G=1.1"],
-    ["plant.epsilon=0.03", "plant.lambda=1.2", "plant.r=0.75", "excitation.G=0.9"],
+    [
+        "plant.epsilon=0.006",
+        "plant.lambda=2.0",
+        "plant.r=0.7",
+        "excitation.G=1.4",
+    ],
+    [
+        "plant.epsilon=0.012",
+        "plant.lambda=0.8",
+        "plant.r=0.5",
+        "excitation.G=1.1",
+    ],
+    [
+        "plant.epsilon=0.03",
+        "plant.lambda=1.2",
+        "plant.r=0.75",
+        "excitation.G=0.9",
+    ],
 ];
 /// Signal-to-noise ratios, dB.
 pub const RATIOS: [f64; 3] = [40.0, 30.0, 20.0];
@@ -117,12 +147,19 @@ pub fn calibrate(
     for rig in rigs {
         for ratio in RATIOS {
             let noise = format!("chain.snr={ratio:?}");
-            let settings = rig.iter().chain(&LEVELS).copied().chain([noise.as_str(), "chain.snr_of=\"signal\""]);
+            let settings = rig
+                .iter()
+                .chain(&LEVELS)
+                .copied()
+                .chain([noise.as_str(), "chain.snr_of=\"signal\""]);
             let overrides = settings.map(str::parse).collect::<Result<Vec<Override>, _>>()?;
             scenes.push((ratio, load(&overrides)?));
         }
     }
-    let curves: Vec<ExactCurve> = scenes.iter().map(|(_, scene)| ExactCurve::of(&scene.dimensionless())).collect();
+    let curves: Vec<ExactCurve> = scenes
+        .iter()
+        .map(|(_, scene)| ExactCurve::of(&scene.dimensionless()))
+        .collect();
     let (next, found) = (AtomicU64::new(0), Mutex::new(Calibration::default()));
     let count = (seeds.end - seeds.start) * scenes.len() as u64;
     let work = || {
@@ -162,7 +199,9 @@ fn run(scene: &Scene, snr: f64, curve: &ExactCurve) -> Calibration {
             run.outcomes.extend(outcomes);
             run.failures.extend(unsettled);
         }
-        Err(error) => run.failures.push(format!("{snr} dB, seed {}: {error}", scene.chain.seed)),
+        Err(error) => run
+            .failures
+            .push(format!("{snr} dB, seed {}: {error}", scene.chain.seed)),
     }
     run
 }
@@ -180,13 +219,21 @@ fn chained(scene: &Scene, log: &Log) -> Result<Chain, RunError> {
 fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, RunError> {
     let log = Log::default();
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = experiment::run(&mut chained(scene, &log)?, &mut controller, &Plan::of(scene), |_, _, _| {})?;
+    let record = experiment::run(
+        &mut chained(scene, &log)?,
+        &mut controller,
+        &Plan::of(scene),
+        |_, _, _| {},
+    )?;
     let found = identify(&record, scene)?;
     let phase = identify(&with_ideal_sensors(record, &log), scene)?.lock.phase_error_deg;
     let lock = found.lock;
     let distance = |one: &orbit::Orbit| (one.sigma - lock.sigma).hypot(one.c - lock.c);
     let orbits = orbit::phase_resonant(&scene.dimensionless());
-    let exact = orbits.iter().min_by(|a, b| distance(a).total_cmp(&distance(b))).ok_or("no exact orbit at this G")?;
+    let exact = orbits
+        .iter()
+        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
+        .ok_or("no exact orbit at this G")?;
     let outcome = |kind, quantity, error, uncertainty| Outcome { snr, kind, quantity, error, uncertainty, bound: None };
     let mut outcomes = vec![
         outcome(Kind::Lock, "sigma", lock.sigma - exact.sigma, lock.u_sigma),
@@ -198,7 +245,8 @@ fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, R
         outcomes.push(outcome(Kind::Lock, "B", b - exact.b, u));
     }
     for point in found.decay.points.iter().filter(|point| point.c > COMPARED_ABOVE) {
-        if let (Some(sigma), Some(u), Some([exact, _])) = (point.sigma_steady, point.u_sigma_steady, curve.at(point.c)) {
+        if let (Some(sigma), Some(u), Some([exact, _])) = (point.sigma_steady, point.u_sigma_steady, curve.at(point.c))
+        {
             outcomes.push(outcome(Kind::Decay, "sigma", sigma - exact, u));
         }
     }
@@ -219,13 +267,17 @@ fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<(Vec<Outcome>,
     let (mut outcomes, mut unsettled) = (Vec::new(), Vec::new());
     for point in &found.points {
         let Some([sigma, g]) = curve.at(point.c).filter(|_| point.settled) else {
-            unsettled.push(format!("{snr} dB, seed {}: not settled at C = {:.3}", scene.chain.seed, point.level));
+            unsettled.push(format!(
+                "{snr} dB, seed {}: not settled at C = {:.3}",
+                scene.chain.seed, point.level
+            ));
             continue;
         };
         // Frequency and growth of a sinusoid of unknown amplitude and phase in white noise (Rife and Boorstyn, 1974).
         let periods = point.averaged as f64;
         let ratio = 10_f64.powf(-snr / 20.0) / 2_f64.sqrt();
-        let slope = ratio * (24.0 / (scene.controller.samples_per_period * periods)).sqrt() / (std::f64::consts::TAU * periods);
+        let slope =
+            ratio * (24.0 / (scene.controller.samples_per_period * periods)).sqrt() / (std::f64::consts::TAU * periods);
         let slope = slope / scene.dimensionless().epsilon;
         let outcome = |quantity, error, uncertainty, bound| Outcome {
             snr,
@@ -265,7 +317,9 @@ impl Coverage {
     pub fn of<'a>(outcomes: impl Iterator<Item = &'a Outcome> + Clone) -> Self {
         let count = outcomes.clone().count();
         let pulls = outcomes.clone().map(|one| one.error.abs() / one.uncertainty);
-        let square = |values: &mut dyn Iterator<Item = f64>| (values.map(|value| value * value).sum::<f64>() / count as f64).sqrt();
+        let square = |values: &mut dyn Iterator<Item = f64>| {
+            (values.map(|value| value * value).sum::<f64>() / count as f64).sqrt()
+        };
         let bounds: Option<Vec<f64>> = outcomes.clone().map(|one| one.bound).collect();
         Self {
             count,

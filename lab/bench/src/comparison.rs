@@ -111,7 +111,10 @@ impl Comparison {
 
 /// RMS of an error over the points above [`COMPARED_ABOVE`]; `None` where there is none.
 fn rms(points: &[ComparedPoint], error: impl Fn(&ComparedPoint) -> Option<f64>) -> Option<f64> {
-    let errors = points.iter().filter(|one| one.point.c > COMPARED_ABOVE).filter_map(error);
+    let errors = points
+        .iter()
+        .filter(|one| one.point.c > COMPARED_ABOVE)
+        .filter_map(error);
     let mean_square = mean_square(errors);
     (!mean_square.is_nan()).then(|| mean_square.sqrt())
 }

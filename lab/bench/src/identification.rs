@@ -39,7 +39,9 @@ pub enum IdentificationError {
         c: f64,
     },
     /// The hold contains no periodic motion.
-    #[error("the hold contains no periodic motion: the response or the base reads zero; check the sensors and record.hold_periods")]
+    #[error(
+        "the hold contains no periodic motion: the response or the base reads zero; check the sensors and record.hold_periods"
+    )]
     NoMotion,
 }
 

@@ -22,8 +22,8 @@ mod waveform;
 
 pub use activation::Activation;
 pub use backbone::BackbonePoint;
-pub use drift::Drift;
 pub use decay::{Decay, DecayPoint};
+pub use drift::Drift;
 pub use epmc::Epmc;
 pub use equilibrium::Equilibrium;
 pub use manifold::{BranchSide, Manifold};

@@ -58,7 +58,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if arguments.json {
         return json(&found.outcomes);
     }
-    Ok(format!("{}\n{}\n{}", table(&found).markdown(), totals(&found), written(&files)))
+    Ok(format!(
+        "{}\n{}\n{}",
+        table(&found).markdown(),
+        totals(&found),
+        written(&files)
+    ))
 }
 
 /// One row for each ratio and quantity.
@@ -79,7 +84,16 @@ fn table(found: &Calibration) -> Table {
             ]
         })
     });
-    Table::new(["noise", "result", "number", "covered", "worst", "RMS error", "Cramér–Rao"]).rows(rows)
+    Table::new([
+        "noise",
+        "result",
+        "number",
+        "covered",
+        "worst",
+        "RMS error",
+        "Cramér–Rao",
+    ])
+    .rows(rows)
 }
 
 /// The results under study.
@@ -97,7 +111,10 @@ const QUANTITIES: [(Kind, &str, &str); 8] = [
 fn totals(found: &Calibration) -> String {
     let all = Coverage::of(found.outcomes.iter());
     let unsettled = found.failures.len();
-    let first = found.failures.first().map_or(String::new(), |first| format!(", the first: {first}"));
+    let first = found
+        .failures
+        .first()
+        .map_or(String::new(), |first| format!(", the first: {first}"));
     format!(
         "{} runs, {} results: {:.1} % covered, worst error {:.1} standard uncertainties; {unsettled} points or runs without a result{first}\n",
         found.runs,

@@ -31,7 +31,11 @@ fn locked_point(panel: &mut Panel, place: Place) {
 /// Error bars of 95 %: places with the half width of the interval, upright or level.
 fn error_bars(panel: &mut Panel, bars: impl Iterator<Item = (Place, f64)>, upright: bool) {
     let ends = |((x, y), half): (Place, f64)| {
-        if upright { [(x, y - half), (x, y + half)] } else { [(x - half, y), (x + half, y)] }
+        if upright {
+            [(x, y - half), (x, y + half)]
+        } else {
+            [(x - half, y), (x + half, y)]
+        }
     };
     panel.segments(bars.map(ends).collect(), line(DECAY, 12));
 }

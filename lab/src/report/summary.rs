@@ -64,7 +64,10 @@ fn others(found: &Comparison) -> String {
     let other = found.orbits.iter().filter(|orbit| orbit.stable && !followed(orbit));
     let mut text: String = other
         .map(|orbit| {
-            format!("  (another stable orbit at this G, not followed: sigma = {:.4}, C = {:.4}, B = {:.4})\n", orbit.sigma, orbit.c, orbit.b)
+            format!(
+                "  (another stable orbit at this G, not followed: sigma = {:.4}, C = {:.4}, B = {:.4})\n",
+                orbit.sigma, orbit.c, orbit.b
+            )
         })
         .collect();
     if found.exact.as_ref().is_some_and(|exact| !exact.stable) {
@@ -102,7 +105,9 @@ fn agreement(found: &Comparison) -> String {
     let exact = found.rms_sigma_exact.zip(found.rms_steady_exact).map_or(String::new(), |(raw, steady)| {
         format!("\nRMS of sigma against the exact backbone: {raw:.4}; corrected for the drift (sigma_steady): {steady:.4}")
     });
-    format!("RMS of sigma against theory over C > {COMPARED_ABOVE}: {rms:.4} (theory is of first order in epsilon){exact}")
+    format!(
+        "RMS of sigma against theory over C > {COMPARED_ABOVE}: {rms:.4} (theory is of first order in epsilon){exact}"
+    )
 }
 
 /// The points of a tracked backbone, and what they cost.
@@ -114,7 +119,11 @@ pub fn tracked(found: &TrackedComparison) -> String {
             None => point.regime.to_string(),
         };
         let settled = if point.settled { "" } else { "; not settled" };
-        let reached = if point.reached { String::new() } else { format!("; level {:.3} not reached", point.level) };
+        let reached = if point.reached {
+            String::new()
+        } else {
+            format!("; level {:.3} not reached", point.level)
+        };
         let pairs = [(point.c, point.u_c), (point.sigma, point.u_sigma), (point.g, point.u_g)];
         let mut cells = pairs.map(|(value, u)| with_uncertainty(value, u)).to_vec();
         let equal = exact.and_then(|exact| Some(exact.sigma?.abs().max(exact.g?.abs())));

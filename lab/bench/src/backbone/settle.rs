@@ -89,9 +89,8 @@ impl Criterion {
 
     /// Largest uncertainty over the largest allowed.
     fn size(&self, found: &Found) -> f64 {
-        let size = |i: usize| {
-            (found.at[i].uncertainty / self.precision[i]).max(found.systematic[i] / self.tolerance[i])
-        };
+        let size =
+            |i: usize| (found.at[i].uncertainty / self.precision[i]).max(found.systematic[i] / self.tolerance[i]);
         size(0).max(size(1))
     }
 
@@ -120,7 +119,12 @@ impl Criterion {
             periods: cycles.len(),
             response: whole.response,
             phase_error: whole.phase_error,
-            at: [0, 1].map(|i| Estimate::new(estimates[i].value, &[estimates[i].uncertainty, slopes[i], systematic[i]])),
+            at: [0, 1].map(|i| {
+                Estimate::new(
+                    estimates[i].value,
+                    &[estimates[i].uncertainty, slopes[i], systematic[i]],
+                )
+            }),
             systematic,
             steady: drifts == [0.0; 2] && whole.excess <= STEADY,
         })

@@ -196,7 +196,9 @@ fn move_periods(scene: &Scene, from: Option<&Known>, level: f64) -> f64 {
 /// Slopes of the backbone by the last two points, or what is known without them: their order of magnitude.
 fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
     let d = scene.dimensionless();
-    let drift = SlowFlow::new(d.lambda, d.r).drift(level).map_or([0.0; 2], |drift| [drift.g, drift.sigma]);
+    let drift = SlowFlow::new(d.lambda, d.r)
+        .drift(level)
+        .map_or([0.0; 2], |drift| [drift.g, drift.sigma]);
     let (g, sigma) = match known {
         [.., one, other] if one.c != other.c => {
             let slope = |from: f64, to: f64| (to - from) / (other.c - one.c);
@@ -262,7 +264,10 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         }
     };
     let said = found.unwrap_or_else(|| Found::unsettled(&cycles[cycles.len() / 2..]));
-    let samples: usize = cycles[cycles.len() - said.periods..].iter().map(|cycle| cycle.samples).sum();
+    let samples: usize = cycles[cycles.len() - said.periods..]
+        .iter()
+        .map(|cycle| cycle.samples)
+        .sum();
     let averaged = &bench.samples[bench.samples.len() - samples..];
     let [base, omega] = said.at;
     Ok(Point {
@@ -282,6 +287,7 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
             .map(|_| classify(averaged, bench.sample_time, omega.value).1),
         averaged: said.periods,
         settled: said.steady || criterion.is_met(&said),
-        reached: (said.response.value / d.b - level).abs() <= (REACHED * level).max(4.0 * said.response.uncertainty / d.b),
+        reached: (said.response.value / d.b - level).abs()
+            <= (REACHED * level).max(4.0 * said.response.uncertainty / d.b),
     })
 }

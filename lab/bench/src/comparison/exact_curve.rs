@@ -82,7 +82,10 @@ impl ExactCurve {
     /// `[sigma, G]` at the amplitude `c`; `None` outside the curve.
     #[must_use]
     pub fn at(&self, c: f64) -> Option<[f64; 2]> {
-        let pair = self.orbits.windows(2).rfind(|pair| (pair[0].c - c) * (pair[1].c - c) <= 0.0 && pair[0].c != pair[1].c)?;
+        let pair = self
+            .orbits
+            .windows(2)
+            .rfind(|pair| (pair[0].c - c) * (pair[1].c - c) <= 0.0 && pair[0].c != pair[1].c)?;
         let x = (c - pair[0].c) / (pair[1].c - pair[0].c);
         let between = |from: f64, to: f64| from + x * (to - from);
         Some([between(pair[0].sigma, pair[1].sigma), between(pair[0].g, pair[1].g)])
@@ -92,7 +95,10 @@ impl ExactCurve {
     #[must_use]
     pub fn distance(&self, c: f64, sigma: f64, g: f64) -> Option<Distance> {
         let at = |orbit: &Orbit| [orbit.c, orbit.sigma, orbit.g];
-        let segments = self.orbits.windows(2).map(|pair| to_segment([c, sigma, g], at(&pair[0]), at(&pair[1])));
+        let segments = self
+            .orbits
+            .windows(2)
+            .map(|pair| to_segment([c, sigma, g], at(&pair[0]), at(&pair[1])));
         let nearest = segments.reduce(f64::min)?;
         let same = self.at(c);
         Some(Distance {

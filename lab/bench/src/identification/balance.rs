@@ -85,10 +85,16 @@ impl Balance {
         // Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
         let [late, turned] = [1.0 + gain * slopes.drift[0], slopes.drift[1]];
-        let balanced = motion(cycles).into_iter().zip(&drives).map(|((amplitude, phase), drive)| {
-            let phase = phase + (gain * drive.work.im - inertia * drive.force.re) / response - turned * amplitude;
-            (amplitude * late - inertia * drive.force.im - gain * drive.work.re, phase)
-        });
+        let balanced = motion(cycles)
+            .into_iter()
+            .zip(&drives)
+            .map(|((amplitude, phase), drive)| {
+                let phase = phase + (gain * drive.work.im - inertia * drive.force.re) / response - turned * amplitude;
+                (
+                    amplitude * late - inertia * drive.force.im - gain * drive.work.re,
+                    phase,
+                )
+            });
         let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
         let prior = |[value, uncertainty]: [f64; 2]| [Prior { coefficient: 2, value, uncertainty }];
         let [slope, width] = slopes.base;
@@ -134,7 +140,10 @@ impl Balance {
     #[must_use]
     pub fn slopes(&self) -> [Estimate; 2] {
         let weights = [0.0, 0.0, 1.0];
-        [self.drive.estimate(&weights).scaled(-1.0 / self.gain), self.turning.estimate(&weights)]
+        [
+            self.drive.estimate(&weights).scaled(-1.0 / self.gain),
+            self.turning.estimate(&weights),
+        ]
     }
 
     /// Distance, m, from the mean amplitude to the one that the base amplitude `base`, m, holds at phase resonance.
@@ -152,7 +161,11 @@ impl Balance {
         // The uncertainty of the slope is in that of the drive at the limit.
         let limit = Estimate::new(
             self.response.value + ahead,
-            &[self.response.uncertainty, drive.uncertainty / by_base, base.uncertainty / by_base],
+            &[
+                self.response.uncertainty,
+                drive.uncertainty / by_base,
+                base.uncertainty / by_base,
+            ],
         );
         let change = by_omega * limit.uncertainty;
         [Estimate::new(turning.value, &[turning.uncertainty, change]), limit]

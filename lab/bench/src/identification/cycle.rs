@@ -63,9 +63,8 @@ impl Cycle {
         let mean = |value: fn(&Sample) -> f64| mean(samples.iter().map(value));
         // The amplitude commanded at a sample begins there; a sensor reads what the one before left.
         let before = |n: usize| samples[n.saturating_sub(1)].command.drive.amplitude;
-        let motion = |amplitude: &dyn Fn(usize) -> f64| {
-            DVector::from_fn(samples.len(), |n, _| amplitude(n) * phases[n].sin())
-        };
+        let motion =
+            |amplitude: &dyn Fn(usize) -> f64| DVector::from_fn(samples.len(), |n, _| amplitude(n) * phases[n].sin());
         let drifting = HarmonicBasis::new(&uniform, 0, &[Some(1), Some(0), Some(0)]);
         let commanded = drifting.fit(&motion(&|n| 0.5 * (before(n) + samples[n].command.drive.amplitude)))?;
         let as_read = basis.fit(&motion(&before))?.harmonic(1);

@@ -130,7 +130,8 @@ impl Piece {
             .map(|s| s.ground_truth.map(|w| w.particle_velocity.abs()))
             .collect();
         let (c, rate, sigma) = (self.amplitude / d.b, self.rate / (d.b * d.omega0), d.sigma(self.omega));
-        let span = (self.samples.end - self.samples.start) as f64 / decay.len() as f64 * (decay[decay.len() - 1].time - decay[0].time);
+        let span = (self.samples.end - self.samples.start) as f64 / decay.len() as f64
+            * (decay[decay.len() - 1].time - decay[0].time);
         let window = rate * d.omega0 * span;
         let backbone = |c: f64| flow.backbone_sigma(c, BranchSide::Right);
         // The fit weighs the frequencies of its window by a parabola: curvature changes their mean by a fortieth.
@@ -139,8 +140,13 @@ impl Piece {
             _ => 0.0,
         };
         let noise = self.uncertainties[1] / d.omega_change(1.0);
-        let [u_c, u_sigma] = [self.uncertainties[0] / d.b, Estimate::new(sigma, &[noise, bent]).uncertainty];
-        let correction = flow.drift(c).map(|drift| drift.sigma * rate + second_order(flow, d, c, rate));
+        let [u_c, u_sigma] = [
+            self.uncertainties[0] / d.b,
+            Estimate::new(sigma, &[noise, bent]).uncertainty,
+        ];
+        let correction = flow
+            .drift(c)
+            .map(|drift| drift.sigma * rate + second_order(flow, d, c, rate));
         let slope = backbone(c + u_c).zip(backbone(c)).map_or(0.0, |(after, at)| after - at);
         DecayPoint {
             tau: d.omega0 * self.time,

@@ -52,13 +52,26 @@ pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic
         let change = drift * a.conj() / half;
         omega += change.im / square;
         let amplitude = square.sqrt();
-        fitted = Some((basis, fit, Harmonic { amplitude, phase: a.arg(), omega, rate: change.re / amplitude, uncertainties: [0.0; 2] }));
+        fitted = Some((
+            basis,
+            fit,
+            Harmonic {
+                amplitude,
+                phase: a.arg(),
+                omega,
+                rate: change.re / amplitude,
+                uncertainties: [0.0; 2],
+            },
+        ));
     }
     let (basis, fit, found) = fitted?;
     let degrees = (values.len() - basis.terms()) as f64;
     let noise = (basis.residual(&right, &fit).norm_squared() / degrees).sqrt();
     let largest = |degree: usize| basis.variances(1, degree).into_iter().fold(0.0, f64::max).sqrt();
-    let uncertainties = [noise * largest(0), noise * largest(1) / (found.amplitude * middle * sample_time)];
+    let uncertainties = [
+        noise * largest(0),
+        noise * largest(1) / (found.amplitude * middle * sample_time),
+    ];
     Some(Harmonic { uncertainties, ..found })
 }
 

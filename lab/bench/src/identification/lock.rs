@@ -6,9 +6,9 @@ use vines_model::numerics::{Estimate, mean};
 use vines_model::regime::Regime;
 use vines_model::theory::{BranchSide, Manifold, SlowFlow};
 
-use super::{Balance, Cycle, Slopes};
 use super::regime::classify;
 use super::response::regime_by_response;
+use super::{Balance, Cycle, Slopes};
 use crate::experiment::Record;
 use crate::scene::Scene;
 
@@ -69,6 +69,10 @@ const MOST: f64 = 240.0;
 const SPREAD: f64 = 0.03;
 /// Largest phase error of a period, rad, for the same.
 const PHASE_RANGE: f64 = 0.3;
+/// Fewest periods of an estimate.
+const FEWEST: usize = 8;
+/// Difference, in standard uncertainties, that still counts as noise.
+const RANDOM: f64 = 2.0;
 /// Relative standard uncertainty of the slopes by first-order theory.
 const SLOPE: f64 = 0.3;
 
@@ -79,21 +83,25 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let held = Cycle::all(hold, dt, target);
     let approach = approached(record, scene, &held);
     let slopes = slopes(scene, mean(held.iter().map(Cycle::amplitude)) / d.b);
-    let balance = Balance::of(&approach, d.omega0, &slopes)?;
     // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
-    let ahead = balance.ahead(base.value);
-    let [omega, limit] = limits(&balance, &approach, scene, base, &slopes);
+    let [omega, limit] = limits(&approach, d.omega0, base, &slopes)?;
     let speeds: Option<Vec<f64>> = hold
         .iter()
         .map(|s| s.ground_truth.map(|w| d.speed(w.particle_velocity.abs())))
         .collect();
     let b_slope = b_slope(scene, limit.value / d.b);
-    let remaining = (balance.response.value + ahead - response.value) / d.b;
+    let remaining = (limit.value - response.value) / d.b;
     let b = speeds.map(|speeds| {
-        let per_period: Vec<f64> = speeds.chunks(hold.len().div_ceil(held.len())).map(|c| mean(c.iter().copied())).collect();
+        let per_period: Vec<f64> = speeds
+            .chunks(hold.len().div_ceil(held.len()))
+            .map(|c| mean(c.iter().copied()))
+            .collect();
         let value = Estimate::mean(&per_period);
-        Estimate::new(value.value + b_slope * remaining, &[value.uncertainty, b_slope * limit.uncertainty / d.b])
+        Estimate::new(
+            value.value + b_slope * remaining,
+            &[value.uncertainty, b_slope * limit.uncertainty / d.b],
+        )
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
         (count, Regime::Unknown) => (count, regime_by_response(hold, scene)),
@@ -117,18 +125,28 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     })
 }
 
-/// Frequency, rad/s, and amplitude, m, at the end of the approach. The second half of the periods is nearer to it; where it disagrees
-/// beyond the noise, the balances are not linear enough, and the difference is a part of the uncertainty.
-fn limits(balance: &Balance, approach: &[Cycle], scene: &Scene, base: Estimate, slopes: &Slopes) -> [Estimate; 2] {
-    let whole = balance.limit(base);
-    let Some(late) = Balance::of(&approach[approach.len() / 2..], scene.dimensionless().omega0, slopes) else {
-        return whole;
-    };
-    let late = late.limit(base);
-    [0, 1].map(|i| {
-        let difference = (whole[i].value - late[i].value).abs() - 2.0 * late[i].uncertainty;
-        Estimate::new(whole[i].value, &[whole[i].uncertainty, difference.max(0.0)])
-    })
+/// Frequency, rad/s, and amplitude, m, at the end of the approach.
+///
+/// The later periods are nearer to it, the longer record has less noise. Where the second half of the periods disagrees with all
+/// of them beyond the noise, the difference is a part of the uncertainty; the periods with the smallest uncertainty count.
+fn limits(approach: &[Cycle], omega0: f64, base: Estimate, slopes: &Slopes) -> Option<[Estimate; 2]> {
+    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, omega0, slopes)?.limit(base));
+    let mut best = limit(approach)?;
+    let mut cycles = approach;
+    let mut first = true;
+    while cycles.len() >= 2 * FEWEST {
+        let half = &cycles[cycles.len() / 2..];
+        let (whole, late) = (limit(cycles)?, limit(half)?);
+        for i in 0..2 {
+            let difference = (whole[i].value - late[i].value).abs() - RANDOM * late[i].uncertainty;
+            let one = Estimate::new(whole[i].value, &[whole[i].uncertainty, difference.max(0.0)]);
+            if first || one.uncertainty < best[i].uncertainty {
+                best[i] = one;
+            }
+        }
+        (cycles, first) = (half, false);
+    }
+    Some(best)
 }
 
 /// The periods before the release in which the motion was as near as in the hold.
@@ -151,11 +169,16 @@ fn approached(record: &Record, scene: &Scene, held: &[Cycle]) -> Vec<Cycle> {
 fn means(held: &[Cycle]) -> [Estimate; 3] {
     let values = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&held.iter().map(value).collect::<Vec<f64>>()).value;
     let [response, base] = [values(&Cycle::amplitude), values(&|cycle| cycle.base.norm())];
-    let [noise, base_noise] = [0, 1].map(|i| mean(held.iter().map(|cycle| cycle.noise[i])).sqrt() / (held.len() as f64).sqrt());
+    let [noise, base_noise] =
+        [0, 1].map(|i| mean(held.iter().map(|cycle| cycle.noise[i])).sqrt() / (held.len() as f64).sqrt());
     let phase_noise = (noise / response).hypot(base_noise / base);
     [
-        Estimate { value: base, uncertainty: base_noise },
-        Estimate { value: values(&|cycle| cycle.phase_error), uncertainty: phase_noise },
+        // Rounding and the steps of the command.
+        Estimate { value: base, uncertainty: base_noise.max(1e-8 * base) },
+        Estimate {
+            value: values(&|cycle| cycle.phase_error),
+            uncertainty: phase_noise,
+        },
         Estimate { value: response, uncertainty: noise },
     ]
 }
@@ -169,7 +192,10 @@ fn slopes(scene: &Scene, c: f64) -> Slopes {
     let ([g, sigma], drift) = match (at(c - step), at(c + step), flow.drift(c)) {
         (Some(low), Some(high), Some(drift)) => {
             let slope = |low: f64, high: f64| (high - low) / (2.0 * step);
-            ([slope(low.g, high.g), slope(low.sigma, high.sigma)], [drift.g, drift.sigma])
+            (
+                [slope(low.g, high.g), slope(low.sigma, high.sigma)],
+                [drift.g, drift.sigma],
+            )
         }
         _ => ([d.lambda, 0.0], [0.0; 2]),
     };
@@ -184,5 +210,7 @@ fn slopes(scene: &Scene, c: f64) -> Slopes {
 /// Slope of the particle speed over the amplitude `c` by first-order theory.
 fn b_slope(scene: &Scene, c: f64) -> f64 {
     let manifold = Manifold::new(scene.plant.restitution);
-    manifold.b(c, BranchSide::Right).map_or(0.0, |b| 2.0 * c * manifold.slope(b))
+    manifold
+        .b(c, BranchSide::Right)
+        .map_or(0.0, |b| 2.0 * c * manifold.slope(b))
 }

@@ -54,7 +54,11 @@ impl Record {
             "must be from 3 (to count impacts and measure) to 1000000",
         )?;
         Quantity::new("record.decay_periods", self.decay_periods, unit).not_negative()?;
-        let longest = if self.decay_periods > 0.0 { self.decay_periods } else { 1000.0 };
+        let longest = if self.decay_periods > 0.0 {
+            self.decay_periods
+        } else {
+            1000.0
+        };
         Quantity::new("record.window_periods", self.window_periods, "(periods)").check(
             (0.5..=longest).contains(&self.window_periods),
             format!("must be from 0.5 to {longest} (decay_periods, or 1000)"),

@@ -26,13 +26,18 @@ impl Estimate {
     #[must_use]
     pub fn mean(values: &[f64]) -> Self {
         let fit = Regression::fit(&[vec![1.0; values.len()]], values, &[], 0.0);
-        fit.map_or(Self { value: f64::NAN, uncertainty: f64::NAN }, |fit| fit.estimate(&[1.0]))
+        fit.map_or(Self { value: f64::NAN, uncertainty: f64::NAN }, |fit| {
+            fit.estimate(&[1.0])
+        })
     }
 
     /// In another unit.
     #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
-        Self { value: self.value * factor, uncertainty: self.uncertainty * factor.abs() }
+        Self {
+            value: self.value * factor,
+            uncertainty: self.uncertainty * factor.abs(),
+        }
     }
 }
 
@@ -74,7 +79,9 @@ impl Regression {
     #[must_use]
     pub fn fit(columns: &[Vec<f64>], values: &[f64], priors: &[Prior], noise: f64) -> Option<Self> {
         let (rows, terms) = (values.len(), columns.len());
-        let degrees = (rows + priors.len()).checked_sub(terms).filter(|n| *n > 0 || noise > 0.0)? as f64;
+        let degrees = (rows + priors.len())
+            .checked_sub(terms)
+            .filter(|n| *n > 0 || noise > 0.0)? as f64;
         let data = DMatrix::from_fn(rows, terms, |row, column| columns[column][row]);
         let values = DVector::from_column_slice(values);
         // A prior counts as one more value, weighted by its uncertainty relative to the noise.
@@ -100,13 +107,20 @@ impl Regression {
         let scatter = (residual.norm_squared() / degrees.max(1.0)).sqrt();
         // White noise alone exceeds this in one case of twenty.
         let is_noise = scatter <= noise * (1.0 + 1.64 / (2.0 * degrees).sqrt());
-        let deviation = if is_noise { noise } else { scatter * student_factor(degrees) };
+        let deviation = if is_noise {
+            noise
+        } else {
+            scatter * student_factor(degrees)
+        };
         let variance = deviation * deviation;
         let excess = if noise > 0.0 { scatter / noise } else { 1.0 };
         let covariance = &inverse * inverse.transpose() * variance;
         let covariance = DMatrix::from_fn(terms, terms, |i, j| covariance[(i, j)] / (lengths[i] * lengths[j]));
         let coefficients = DVector::from_fn(terms, |i, _| scaled[i] / lengths[i]);
-        coefficients.iter().all(|one| one.is_finite()).then_some(Self { coefficients, covariance, excess })
+        coefficients
+            .iter()
+            .all(|one| one.is_finite())
+            .then_some(Self { coefficients, covariance, excess })
     }
 
     /// A coefficient.
@@ -155,7 +169,9 @@ mod tests {
         let free = fit.estimate(&[0.0, 1.0]).uncertainty;
         assert!((free - 0.1 / 42f64.sqrt()).abs() < 1e-12);
         let prior = Prior { coefficient: 1, value: 0.5, uncertainty: free };
-        let held = Regression::fit(&columns, &values, &[prior], 0.1).unwrap().estimate(&[0.0, 1.0]);
+        let held = Regression::fit(&columns, &values, &[prior], 0.1)
+            .unwrap()
+            .estimate(&[0.0, 1.0]);
         assert!((held.uncertainty - free / 2f64.sqrt()).abs() < 1e-9);
         assert_eq!(Regression::fit(&[vec![0.0; 3]], &[1.0; 3], &[], 0.1), None);
     }

@@ -41,14 +41,33 @@ pub fn figure(found: &Comparison) -> Figure {
     let decay = decay.map(|point| (point.sigma, point.c));
     let inside = decay.filter(|(sigma, _)| (low..=high).contains(sigma));
     decay_points(&mut panel, inside, DECAY_LABEL);
-    let steady = found.decay.iter().map(|one| one.point).step_by(THINNED).filter(|point| point.c > fold);
+    let steady = found
+        .decay
+        .iter()
+        .map(|one| one.point)
+        .step_by(THINNED)
+        .filter(|point| point.c > fold);
     let steady = steady.filter_map(|point| Some(((point.sigma_steady?, point.c), 1.96 * point.u_sigma_steady?)));
-    let steady: Vec<_> = steady.filter(|((sigma, _), half)| sigma - half >= low && sigma + half <= high).collect();
-    panel.crosses(steady.iter().map(|(place, _)| *place).collect(), line(LOCK, 12), "free decay, corrected for the drift");
+    let steady: Vec<_> = steady
+        .filter(|((sigma, _), half)| sigma - half >= low && sigma + half <= high)
+        .collect();
+    panel.crosses(
+        steady.iter().map(|(place, _)| *place).collect(),
+        line(LOCK, 12),
+        "free decay, corrected for the drift",
+    );
     error_bars(&mut panel, steady.into_iter(), false);
     let lock = &found.lock;
-    error_bars(&mut panel, std::iter::once(((lock.sigma, lock.c), 1.96 * lock.u_sigma)), false);
-    error_bars(&mut panel, std::iter::once(((lock.sigma, lock.c), 1.96 * lock.u_c)), true);
+    error_bars(
+        &mut panel,
+        std::iter::once(((lock.sigma, lock.c), 1.96 * lock.u_sigma)),
+        false,
+    );
+    error_bars(
+        &mut panel,
+        std::iter::once(((lock.sigma, lock.c), 1.96 * lock.u_c)),
+        true,
+    );
     locked_point(&mut panel, (found.lock.sigma, found.lock.c));
     Figure::single(panel)
 }

@@ -23,12 +23,15 @@ const LEVELS: [(f64, f64); 11] = [
 
 pub fn figure(found: &Calibration) -> Figure {
     let axis = |label| Axis::new((0.0, 1.0), label);
-    let mut panel = Panel::new(axis("nominal level of the interval"), axis("share that contains the exact value"))
-        .heading(
-            "Coverage of the uncertainties",
-            &format!("{} runs at 40, 30 and 20 dB, three rigs", found.runs),
-        )
-        .legend(SeriesLabelPosition::LowerRight);
+    let mut panel = Panel::new(
+        axis("nominal level of the interval"),
+        axis("share that contains the exact value"),
+    )
+    .heading(
+        "Coverage of the uncertainties",
+        &format!("{} runs at 40, 30 and 20 dB, three rigs", found.runs),
+    )
+    .legend(SeriesLabelPosition::LowerRight);
     panel.dashed(vec![(0.0, 0.0), (1.0, 1.0)], line(EXACT, 12), "exact coverage");
     for (kind, colour, label) in [
         (Kind::Lock, LOCK, "lock"),
@@ -37,10 +40,17 @@ pub fn figure(found: &Calibration) -> Figure {
     ] {
         let of_kind: Vec<&Outcome> = found.outcomes.iter().filter(|one| one.kind == kind).collect();
         let share = |half: f64| {
-            let inside = of_kind.iter().filter(|one| one.error.abs() <= half * one.uncertainty).count();
+            let inside = of_kind
+                .iter()
+                .filter(|one| one.error.abs() <= half * one.uncertainty)
+                .count();
             inside as f64 / of_kind.len().max(1) as f64
         };
-        panel.curve(LEVELS.map(|(level, half)| (level, share(half))).to_vec(), line(colour, 20), label);
+        panel.curve(
+            LEVELS.map(|(level, half)| (level, share(half))).to_vec(),
+            line(colour, 20),
+            label,
+        );
     }
     Figure::single(panel)
 }

@@ -40,7 +40,11 @@ fn amplitude_panel(tracked: &TrackedComparison) -> Panel {
     add_backbones(&mut panel, p, x, (0.0, top));
     let place = |one: Point| (one.sigma, one.c);
     decay_points(&mut panel, all.clone().map(place), "tracked");
-    error_bars(&mut panel, all.clone().map(|one| (place(one), 1.96 * one.u_sigma)), false);
+    error_bars(
+        &mut panel,
+        all.clone().map(|one| (place(one), 1.96 * one.u_sigma)),
+        false,
+    );
     let unsettled: Vec<_> = all.filter(|one| !one.settled).map(place).collect();
     if !unsettled.is_empty() {
         panel.crosses(unsettled, line(DECAY, 20), "not settled in time");

@@ -146,7 +146,10 @@ fn describe_lock(section: &mut Section, found: &Comparison) {
         section.budget(
             "lock, measured against the exact orbit",
             format!("{sigma:.1e} in σ, {:.3} % in C", percent(lock.c, exact.c)),
-            &format!("Standard uncertainties: {:.1e} in σ, {:.1e} in C. The rest of the approach is extrapolated.", lock.u_sigma, lock.u_c),
+            &format!(
+                "Standard uncertainties: {:.1e} in σ, {:.1e} in C. The rest of the approach is extrapolated.",
+                lock.u_sigma, lock.u_c
+            ),
         );
     }
     if let Some(theory) = &found.theory {
