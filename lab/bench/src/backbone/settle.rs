@@ -60,7 +60,7 @@ impl Found {
 /// Phase error, rad, up to which the balances hold.
 const PHASE_RANGE: f64 = 0.3;
 /// Largest relative deviation of the amplitude within the periods, unless it is noise.
-const SPREAD: f64 = 0.015;
+const SPREAD: f64 = 0.01;
 /// Difference of the halves, in its standard uncertainties, that still counts as noise.
 const RANDOM: f64 = 2.0;
 /// Largest scatter of the residuals over the noise of the sensors for a steady motion whose uncertainty is not yet small.

@@ -58,6 +58,8 @@ pub struct Balance {
 
 /// Size of the neglected terms relative to those of the second order.
 const REMAINDER: f64 = 0.7;
+/// Relative uncertainty of the effect of a drift of the amplitude.
+const LATE: f64 = 0.15;
 
 impl Balance {
     /// From at least four periods of an oscillator of the natural frequency `omega0`, rad/s.
@@ -69,7 +71,8 @@ impl Balance {
         }
         let omega = mean(cycles.iter().map(|cycle| cycle.omega));
         let gain = 0.5 * omega0 * omega0 / omega;
-        let response = mean(cycles.iter().map(Cycle::amplitude));
+        let motion = motion(cycles);
+        let response = mean(motion.iter().map(|one| one.0));
         let base = mean(cycles.iter().map(|cycle| cycle.base.norm()));
         let phase_error = mean(cycles.iter().map(|cycle| cycle.phase_error));
         let [noise, base_noise] = [0, 1].map(|i| mean(cycles.iter().map(|cycle| cycle.noise[i])).sqrt());
@@ -77,15 +80,14 @@ impl Balance {
         let noise = noise.max(1e-14 * response);
         let middle = mean(cycles.iter().map(|cycle| cycle.time));
         let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
-        let integral = |rate: &dyn Fn(&Cycle) -> f64| integral(cycles, rate);
-        let deviation = integral(&|cycle| cycle.amplitude() - response);
+        let deviation = integral(&time, motion.iter().map(|one| one.0 - response));
         let columns = [vec![1.0; cycles.len()], time, deviation];
         let drives = drives(cycles);
         // The integral of A' is A.
         // Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
         let [late, turned] = [1.0 + gain * slopes.drift[0], slopes.drift[1]];
-        let balanced = motion(cycles)
+        let balanced = motion
             .into_iter()
             .zip(&drives)
             .map(|((amplitude, phase), drive)| {
@@ -101,13 +103,12 @@ impl Balance {
         let drive = Regression::fit(&columns, &amplitudes, &prior([-gain * slope, gain * width]), noise)?;
         let turning = Regression::fit(&columns, &phases, &prior(slopes.omega), noise / response)?;
         // The terms beyond these are as large as a share of them.
-        let remainder = |value: &dyn Fn(&Drive) -> f64| {
-            let values: Vec<f64> = drives.iter().map(|drive| REMAINDER * inertia * value(drive)).collect();
-            Line::fit(&values).slope / (cycles[1].time - cycles[0].time)
-        };
+        let slope = |values: Vec<f64>| Line::fit(&values).slope * n / (cycles[cycles.len() - 1].time - cycles[0].time);
+        let inertial = REMAINDER * inertia * slope(drives.iter().map(|drive| drive.force.re).collect());
+        let drift = LATE * slope(cycles.iter().map(Cycle::amplitude).collect());
         let remainders = [
-            remainder(&|drive| drive.force.re) / gain,
-            remainder(&|drive| drive.force.re) / response,
+            (inertial / gain).hypot(drift * slopes.drift[0]),
+            (inertial / response).hypot(drift * slopes.drift[1]),
         ];
         let phase_noise = (noise / response).hypot(base_noise / base);
         let excess = drive.excess.max(turning.excess);
@@ -121,7 +122,7 @@ impl Balance {
             gain,
             drive,
             turning,
-            remainders: remainders.map(f64::abs),
+            remainders,
             within: [base_noise / n.sqrt(), gain * base / response * phase_noise / n.sqrt()],
         })
     }
@@ -172,14 +173,17 @@ impl Balance {
     }
 }
 
-/// Integral over time from the first period's middle on, by the trapezoidal rule.
-fn integral(cycles: &[Cycle], rate: &dyn Fn(&Cycle) -> f64) -> Vec<f64> {
-    let mut sum = 0.0;
-    let steps = cycles.windows(2).map(|pair| {
-        sum += 0.5 * (rate(&pair[0]) + rate(&pair[1])) * (pair[1].time - pair[0].time);
-        sum
-    });
-    std::iter::once(0.0).chain(steps).collect()
+/// Integral over time from the first value on, by the trapezoidal rule.
+fn integral(time: &[f64], rates: impl Iterator<Item = f64>) -> Vec<f64> {
+    let (mut sum, mut before) = (0.0, None);
+    time.iter()
+        .zip(rates)
+        .map(|(time, rate)| {
+            sum += before.map_or(0.0, |(earlier, slower): (f64, f64)| 0.5 * (rate + slower) * (time - earlier));
+            before = Some((*time, rate));
+            sum
+        })
+        .collect()
 }
 
 /// The drive of a period, from the command, which has no noise; the sensor calibrates it.
