@@ -32,16 +32,16 @@ fn tracked(settings: &[&str]) -> TrackedComparison {
 }
 
 #[test]
-fn clean_points_lie_within_1e_3_of_the_exact_orbits_at_25_periods_each() {
+fn clean_points_lie_within_1e_3_of_the_exact_orbits_at_equal_c_at_15_periods_each() {
     let report = tracked(&[]);
     assert!(report.worst().unwrap().at_equal_c <= 1e-3);
-    assert!(report.periods_per_point() <= 25.0);
+    assert!(report.periods_per_point() <= 15.0);
     for one in &report.points {
         assert!(one.point.settled);
         assert_eq!(one.point.regime, Regime::Symmetric);
         assert_eq!(one.point.regime_by_impacts, Some(Regime::Symmetric));
         // The level asked for is the level held.
-        assert!((one.point.c - one.point.level).abs() < 1e-3, "{one:?}");
+        assert!(one.point.reached && (one.point.c - one.point.level).abs() < 8e-3, "{one:?}");
     }
 }
 
@@ -72,15 +72,30 @@ fn through_40_db_of_sensor_noise_points_lie_within_5e_3() {
 }
 
 #[test]
-fn theory_can_make_the_forecast_and_a_loop_without_any_needs_longer() {
-    let feed = |feed: &str| {
+fn every_predictor_leads_to_the_same_backbone() {
+    for feed in ["theory", "none"] {
         let feed = format!("backbone.feed=\"{feed}\"");
         let report = tracked(&["backbone.C_to=0.4", "backbone.points=7", &feed]);
         assert!(report.worst().unwrap().at_equal_c <= 1e-3);
-        report.periods_per_point()
-    };
-    let (theory, none) = (feed("theory"), feed("none"));
-    assert!(theory < none, "{theory} {none}");
+    }
+}
+
+#[test]
+fn a_level_that_the_drive_cannot_hold_is_reported_as_not_reached() {
+    let report = tracked(&["backbone.G_max=1.12", "backbone.C_from=0.7", "backbone.C_to=0.4", "backbone.points=2"]);
+    assert!(!report.points[0].point.reached && report.points[1].point.reached);
+    assert!(vines::report::summary::tracked(&report).contains("level 0.700 not reached"));
+}
+
+#[test]
+fn tracked_points_through_noise_state_how_far_off_they_are() {
+    let report = tracked(&["chain.snr=30", "backbone.C_from=0.6", "backbone.C_to=0.3", "backbone.points=7"]);
+    for one in report.points.iter().filter(|one| one.point.settled) {
+        let (exact, point) = (one.exact.unwrap(), one.point);
+        assert!(exact.sigma.unwrap().abs() <= 4.0 * point.u_sigma, "{one:?}");
+        assert!(exact.g.unwrap().abs() <= 4.0 * point.u_g, "{one:?}");
+        assert!(point.u_sigma < 0.01 && point.u_g < 0.01, "{one:?}");
+    }
 }
 
 #[test]

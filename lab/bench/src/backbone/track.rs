@@ -9,6 +9,7 @@ use crate::experiment::Sample;
 use crate::identification::{Cycle, Regime, Slopes, classify, regime_by_response};
 use crate::rig::{Command, Controller, ControllerError, Drive, Move, Rig, RigError};
 use crate::scene::Scene;
+use vines_model::numerics::Estimate;
 use vines_model::theory::SlowFlow;
 
 /// One point of the backbone; dimensionless.
@@ -181,7 +182,7 @@ pub fn track(
 }
 
 /// Largest relative difference of the response from its level that counts as reached.
-const REACHED: f64 = 0.03;
+const REACHED: f64 = 0.01;
 /// Share of the drive that a move may need in addition to the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
 
@@ -254,12 +255,16 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         fewest: settings.dwell_min as usize,
         slopes: *slopes,
     };
+    let is_reached = |found: &Found| {
+        let Estimate { value, uncertainty } = found.response.scaled(1.0 / d.b);
+        (value - level).abs() <= (REACHED * level).max(4.0 * uncertainty)
+    };
     let mut cycles: Vec<Cycle> = Vec::new();
     let most = settings.dwell_max as usize;
     let found = loop {
         cycles.push(bench.cycle()?);
         let found = criterion.best(&cycles);
-        if cycles.len() >= most || found.is_some_and(|found| criterion.is_met(&found)) {
+        if cycles.len() >= most || found.is_some_and(|found| criterion.is_met(&found) && is_reached(&found)) {
             break found;
         }
     };
@@ -281,13 +286,12 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         u_g: d.excitation(base.uncertainty),
         u_phase_deg: said.phase_error.uncertainty.to_degrees(),
         periods: bench.periods - start,
-        regime: regime_by_response(averaged, scene),
+        regime: regime_by_response(averaged, scene, base.value, omega.value),
         regime_by_impacts: bench.samples[0]
             .ground_truth
             .map(|_| classify(averaged, bench.sample_time, omega.value).1),
         averaged: said.periods,
         settled: said.steady || criterion.is_met(&said),
-        reached: (said.response.value / d.b - level).abs()
-            <= (REACHED * level).max(4.0 * said.response.uncertainty / d.b),
+        reached: is_reached(&said),
     })
 }

@@ -104,7 +104,7 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
         )
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
-        (count, Regime::Unknown) => (count, regime_by_response(hold, scene)),
+        (count, Regime::Unknown) => (count, regime_by_response(hold, scene, base.value, omega.value)),
         told => told,
     };
     Some(Lock {
