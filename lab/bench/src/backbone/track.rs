@@ -176,13 +176,16 @@ pub fn track(
             amplitude: d.amplitude(g),
             omega: d.omega_change(sigma),
         })?;
-        points.push(hold(&mut bench, scene, level, periods, &slopes(scene, &known, level))?);
+        let wait = periods + if points.is_empty() { FIRST } else { 0.0 };
+        points.push(hold(&mut bench, scene, level, wait, &slopes(scene, &known, level))?);
     }
     Ok(Tracked { points, periods_to_lock, periods: bench.periods })
 }
 
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
+/// Periods of the first level more than those of the move: the start of the loop disturbs the particle, too.
+const FIRST: f64 = 32.0;
 /// Share of the drive that a move may need in addition to the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
 

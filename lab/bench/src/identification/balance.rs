@@ -87,16 +87,13 @@ impl Balance {
         // Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
         let [late, turned] = [1.0 + gain * slopes.drift[0], slopes.drift[1]];
-        let balanced = motion
-            .into_iter()
-            .zip(&drives)
-            .map(|((amplitude, phase), drive)| {
-                let phase = phase + (gain * drive.work.im - inertia * drive.force.re) / response - turned * amplitude;
-                (
-                    amplitude * late - inertia * drive.force.im - gain * drive.work.re,
-                    phase,
-                )
-            });
+        let balanced = motion.into_iter().zip(&drives).map(|((amplitude, phase), drive)| {
+            let phase = phase + (gain * drive.work.im - inertia * drive.force.re) / response - turned * amplitude;
+            (
+                amplitude * late - inertia * drive.force.im - gain * drive.work.re,
+                phase,
+            )
+        });
         let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
         let prior = |[value, uncertainty]: [f64; 2]| [Prior { coefficient: 2, value, uncertainty }];
         let [slope, width] = slopes.base;
@@ -179,7 +176,9 @@ fn integral(time: &[f64], rates: impl Iterator<Item = f64>) -> Vec<f64> {
     time.iter()
         .zip(rates)
         .map(|(time, rate)| {
-            sum += before.map_or(0.0, |(earlier, slower): (f64, f64)| 0.5 * (rate + slower) * (time - earlier));
+            sum += before.map_or(0.0, |(earlier, slower): (f64, f64)| {
+                0.5 * (rate + slower) * (time - earlier)
+            });
             before = Some((*time, rate));
             sum
         })
