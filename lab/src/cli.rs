@@ -1,6 +1,7 @@
 //! The command line: one file per command.
 
 mod backbone;
+mod calibrate;
 mod chain;
 mod controller;
 mod decay;
@@ -34,6 +35,7 @@ const EXAMPLES: &str = "\
 Examples:
   vines identify                               the whole experiment on the default scene, results in out/
   vines backbone                               the backbone level by level, with the loop closed
+  vines calibrate                              the coverage of the uncertainties over 504 noisy runs
   vines orbit                                  exact orbits of the default scene
   vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
   vines orbit --response                       the exact frequency response, stable and unstable
@@ -57,6 +59,7 @@ struct Cli {
 enum Command {
     Identify(identify::Arguments),
     Backbone(backbone::Arguments),
+    Calibrate(calibrate::Arguments),
     Chain(chain::Arguments),
     Decay(decay::Arguments),
     Orbit(orbit::Arguments),
@@ -78,6 +81,7 @@ pub fn run() -> ExitCode {
     let output = match Cli::parse().command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Backbone(arguments) => backbone::run(&arguments),
+        Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Chain(arguments) => chain::run(&arguments),
         Command::Decay(arguments) => decay::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),

@@ -2,10 +2,10 @@
 
 use vines::comparison::Comparison;
 use vines::experiment::{self, ExperimentError, Plan, Record};
-use vines::identification::{IdentificationError, Regime, identify};
+use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
 use vines::net::LinkError;
 use vines::rig::{
-    BuiltIn, Command, Controller, ControllerError, Drive, Fault, GroundTruth, Rig, RigError, Sensors, Simulated,
+    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Fault, GroundTruth, Rig, RigError, Sensors, Simulated,
 };
 use vines::scene::{Override, Scene};
 
@@ -336,4 +336,38 @@ fn limits_of_a_scene_reach_the_controller() {
     assert!(drives[1900] > 0.0 && drives[3999] == 0.0);
     let refused = run(&["controller.G_max=1.0"]).unwrap_err().to_string();
     assert!(refused.starts_with("amplitude"), "{refused}");
+}
+
+#[test]
+fn the_decay_corrected_for_its_drift_lies_within_a_third_of_the_raw_distance() {
+    for settings in [&[][..], &["plant.epsilon=0.02"], &["plant.r=0.8"]] {
+        let found = identified(settings);
+        let (raw, steady) = (found.rms_sigma_exact.unwrap(), found.rms_steady_exact.unwrap());
+        println!("{settings:?}: raw {raw:.4}, corrected {steady:.4}");
+        assert!(steady <= raw / 3.0);
+        assert_eq!(found.decay_end, DecayEnd::Synchrony);
+    }
+}
+
+#[test]
+fn a_decay_too_short_for_points_keeps_the_lock_and_says_that_the_record_ended() {
+    let found = identified(&["record.decay_periods=1", "record.window_periods=1"]);
+    assert!(found.decay.is_empty() && found.exact.is_some());
+    assert_eq!(found.decay_end, DecayEnd::Record);
+    assert!(vines::report::summary::identification(&found).contains("no points"));
+}
+
+#[test]
+fn a_lock_through_30_db_takes_less_than_twice_the_periods_and_states_how_far_off_it_is() {
+    let scene = scene(&["chain.snr=30"]);
+    let plant = Box::new(Simulated::new(scene.plant, scene.start).unwrap());
+    let mut rig = Chain::new(plant, &scene.chain, &scene.dimensionless(), 100.0);
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let record = experiment::run(&mut rig, &mut controller, &plan(&scene), |_, _, _| {}).unwrap();
+    let found = Comparison::of(&identify(&record, &scene).unwrap(), &scene);
+    let (lock, exact) = (found.lock, found.exact.unwrap());
+    println!("{lock:?}");
+    assert!(lock.periods_to_lock <= 2.0 * identified(&[]).lock.periods_to_lock);
+    assert!((lock.sigma - exact.sigma).abs() <= 4.0 * lock.u_sigma && lock.u_sigma < 0.01);
+    assert!((lock.c - exact.c).abs() <= 4.0 * lock.u_c && lock.u_c < 0.01);
 }

@@ -8,6 +8,7 @@ use thiserror::Error;
 
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, GroundTruth, LoopState, Rig, RigError, Sensors};
 use crate::scene::Scene;
+use vines_model::theory::{B_SYMMETRY_BREAKING, BackbonePoint, SlowFlow};
 
 /// Durations of the stages, in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -33,9 +34,31 @@ impl Plan {
             sample_time,
             lock: samples(scene.lock_periods()),
             hold: samples(scene.record.hold_periods),
-            decay: samples(scene.record.decay_periods),
+            decay: samples(decay_periods(scene)),
         }
     }
+}
+
+/// Length of the recorded decay over the one that theory expects.
+const DECAY_MARGIN: f64 = 1.25;
+/// Longest recorded decay, natural periods, that is not asked for.
+const LONGEST_DECAY: f64 = 5000.0;
+/// Periods more than that, for the loss of synchrony to show.
+const DECAY_EXTRA: f64 = 10.0;
+
+/// Length of the recorded decay, natural periods: that of the scene, or as long as first-order theory expects synchrony to last
+/// from symmetry breaking on, with a margin.
+fn decay_periods(scene: &Scene) -> f64 {
+    if scene.record.decay_periods > 0.0 {
+        return scene.record.decay_periods;
+    }
+    let d = scene.dimensionless();
+    let flow = SlowFlow::new(d.lambda, d.r);
+    let stable = flow.phase_resonant(d.g).into_iter().filter(BackbonePoint::stable);
+    let from = stable.map(|point| point.b).fold(f64::NAN, f64::max);
+    let from = if from.is_nan() { B_SYMMETRY_BREAKING } else { from };
+    let duration = flow.decay(from).map_or(0.0, |decay| decay.duration()) / (d.epsilon * std::f64::consts::TAU);
+    (DECAY_MARGIN * duration + DECAY_EXTRA).min(LONGEST_DECAY)
 }
 
 /// The stage an experiment is in.

@@ -6,6 +6,7 @@
 
 pub mod advice;
 pub mod backbone;
+pub mod calibration;
 pub mod chain_effects;
 pub mod comparison;
 pub mod estimators;

@@ -151,8 +151,8 @@ fn values_that_make_no_sense_are_named_with_unit_and_range() {
             ["controller.omega_max = 0.5 (omega0)", "omega_min = 0.9"],
         ),
         (
-            "record.decay_periods=0",
-            ["record.decay_periods = 0 (natural periods)", "positive"],
+            "record.decay_periods=-1",
+            ["record.decay_periods = -1 (natural periods)", "zero or positive"],
         ),
     ] {
         says(&complaint(paper(&[argument])), &parts);

@@ -9,6 +9,7 @@
 mod activation;
 mod backbone;
 mod decay;
+mod drift;
 mod epmc;
 mod equilibrium;
 mod manifold;
@@ -23,6 +24,7 @@ mod waveform;
 pub use activation::Activation;
 pub use backbone::BackbonePoint;
 pub use decay::{Decay, DecayPoint};
+pub use drift::Drift;
 pub use epmc::Epmc;
 pub use equilibrium::Equilibrium;
 pub use manifold::{BranchSide, Manifold};

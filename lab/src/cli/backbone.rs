@@ -20,7 +20,9 @@ Holds the response at one level after another, and measures the drive and the fr
   sigma     detuning (Omega - 1)/epsilon at which the response lags the base by 90 degrees
   G         base amplitude over b epsilon
   averaged  periods at the end of the dwell that the point is averaged over
-  distance  from the exact backbone: the largest of the differences in C, sigma and G
+  error     difference in sigma or G, whichever is larger, from the exact backbone at the same C
+Numbers after ± are standard uncertainties; those of sigma and G hold at the C of the same line. A level that the response does not
+reach, because the drive is at a limit, is named as such.
 
 Examples:
   vines backbone                                          29 levels from C = 0.7 down to 0.14

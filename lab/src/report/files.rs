@@ -7,9 +7,10 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::figure::FigureError;
-use super::figures::{backbone, manifold, regimes, tracked};
+use super::figures::{backbone, coverage, manifold, regimes, tracked};
 use super::theme::dark;
-use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
+use crate::calibration::Calibration;
+use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
 use crate::experiment::{Sample, table};
 use crate::files::temporary;
 use crate::map::{Cell, Map};
@@ -91,6 +92,14 @@ pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>,
     write_files(out, &[("interrupted.csv", table(samples))])
 }
 
+/// Writes `coverage.svg` into `out` and returns its path, as [`write()`] does.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_calibration(found: &Calibration, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+    write_files(out, &[("coverage.svg", coverage::figure(found).svg()?)])
+}
+
 /// Writes each file under a temporary name, and gives it its own once it is complete.
 pub(super) fn write_files<N: AsRef<str>>(out: &Path, files: &[(N, String)]) -> Result<Vec<PathBuf>, WriteError> {
     let refused = |path: &Path| {
@@ -129,10 +138,11 @@ pub(super) fn decay_csv(found: &Comparison) -> Result<String, WriteError> {
     #[derive(Serialize)]
     struct Theory {
         sigma_theory: Option<f64>,
+        sigma_exact: Option<f64>,
     }
     csv(found.decay.iter().map(|one| {
-        let sigma_theory = one.sigma_theory;
-        (one.point, Theory { sigma_theory })
+        let ComparedPoint { point, sigma_theory, sigma_exact } = *one;
+        (point, Theory { sigma_theory, sigma_exact })
     }))
 }
 
