@@ -103,6 +103,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         }
         let exploration = Exploration { starts: arguments.starts, ..Exploration::default() };
         let found = response(&scene, &limits, exploration);
+        if found.components.is_empty() {
+            return Err(Failure::run(format!(
+                "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {} to {}; raise excitation.G or --starts",
+                scene.g, limits.sigma[0], limits.sigma[1]
+            )));
+        }
         return shown(&scene, "Exact frequency response", &found, arguments.json, || {
             let count = found.components.len();
             let all = found.components.iter().map(|one| curve(&one.name, &one.branch));
