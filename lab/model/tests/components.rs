@@ -144,20 +144,20 @@ fn a_torus_is_reported_as_modulation_only_where_the_motion_was_stable() {
 }
 
 /// Settles from random starts at random detunings; counts the 1:1 motions, the others, and those of each that no component contains.
-fn missing(g: f64, count: usize, seed: u64) -> [usize; 4] {
-    let found = followed(g);
+fn missing(scene: &Dimensionless, count: usize, seed: u64) -> [usize; 4] {
+    let found = response(scene, &Limits::default(), Exploration::default());
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut counts = [0; 4];
     for _ in 0..count {
         let sigma = 12.0 * (random.next_u64() as f64 / u64::MAX as f64) - 6.0;
-        let Ok(Some(motion)) = settle(&scene(g), sigma, random_state(&mut random), 800) else {
+        let Ok(Some(motion)) = settle(scene, sigma, random_state(&mut random), 800) else {
             continue;
         };
         let other = usize::from(!(motion.pattern.impacts() == 2 && motion.pattern.periods() == 1));
         counts[other] += 1;
-        if motion.stable && !found.contains(&scene(g), &motion) {
+        if motion.stable && !found.contains(scene, &motion) {
             println!(
-                "G = {g}: {} at sigma = {sigma}, C = {} is missing",
+                "{scene:?}: {} at sigma = {sigma}, C = {} is missing",
                 motion.pattern.name(),
                 motion.c
             );
@@ -171,11 +171,15 @@ fn missing(g: f64, count: usize, seed: u64) -> [usize; 4] {
 fn no_stable_orbit_from_random_starts_is_missing_from_the_components() {
     let mut random = ChaCha8Rng::seed_from_u64(20_261_121);
     let mut sums = [0; 4];
-    for n in 0..6 {
-        let g = 0.6 + 2.4 * (random.next_u64() as f64 / u64::MAX as f64);
-        let counts = missing(g, 60, 100 + n);
+    // SCENES sets their number: docs/theory.md has a longer run.
+    let scenes: u64 = std::env::var("SCENES").map_or(4, |text| text.parse().expect("SCENES: a number"));
+    for n in 0..scenes {
+        let mut within = |low: f64, high: f64| low + (high - low) * (random.next_u64() as f64 / u64::MAX as f64);
+        let epsilon = within(0.003_f64.ln(), 0.05_f64.ln()).exp();
+        let scene = Dimensionless::new(epsilon, within(0.2, 2.0), within(0.3, 0.95), within(0.4, 3.0));
+        let counts = missing(&scene, 60, 100 + n);
         println!(
-            "G = {g:.4}: 1:1 {}, others {}, missing {} and {}",
+            "scene {n}: 1:1 {}, others {}, missing {} and {}",
             counts[0], counts[1], counts[2], counts[3]
         );
         (0..4).for_each(|n| sums[n] += counts[n]);
@@ -184,5 +188,5 @@ fn no_stable_orbit_from_random_starts_is_missing_from_the_components() {
         "all: 1:1 {}, others {}, missing {} and {}",
         sums[0], sums[1], sums[2], sums[3]
     );
-    assert!(sums[0] > 100 && sums[2] == 0, "{sums:?}");
+    assert!(sums[0] > 40 && sums[2] == 0, "{sums:?}");
 }

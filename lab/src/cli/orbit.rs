@@ -1,4 +1,6 @@
-//! `vines orbit`: exact orbits at phase resonance.
+//! `vines orbit`: exact orbits at resonance, and their curves.
+
+mod studies;
 
 use std::fmt::Write;
 
@@ -6,12 +8,14 @@ use clap::Args;
 use vines::{
     numerics::range,
     orbit::{
-        Branch, Condition, Convergence, Ended, Exploration, Limits, Orbit, Periodic, backbone, continue_both_ways,
-        convergence, phase_resonant, response, settle,
+        Branch, Condition, Ended, Exploration, Limits, Orbit, Periodic, backbone, continue_both_ways, phase_resonant,
+        response, settle,
     },
     report::{Table, number, summary::parameters},
-    scene::{Definition, Dimensionless},
+    scene::Dimensionless,
 };
+
+use studies::{converged, defined};
 
 use super::{failure::Failure, scene_arguments::SceneArguments, yes_no};
 
@@ -103,6 +107,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         }
         let exploration = Exploration { starts: arguments.starts, ..Exploration::default() };
         let found = response(&scene, &limits, exploration);
+        if found.components.is_empty() {
+            return Err(Failure::run(format!(
+                "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {} to {}; raise excitation.G or --starts",
+                scene.g, limits.sigma[0], limits.sigma[1]
+            )));
+        }
         return shown(&scene, "Exact frequency response", &found, arguments.json, || {
             let count = found.components.len();
             let all = found.components.iter().map(|one| curve(&one.name, &one.branch));
@@ -131,28 +141,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     ))
 }
 
-/// The convergence of the theory towards the exact orbits.
-fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
-    let study = convergence(scene, HALVINGS).ok_or_else(|| {
-        Failure::run(format!(
-            "theory or exact orbits have no stable phase-resonant solution at G = {} (dimensionless)",
-            scene.g
-        ))
-    })?;
-    shown(scene, "Theory minus exact orbit", &study, json, || {
-        let rows = study
-            .rows
-            .iter()
-            .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}")));
-        let [sigma, c, b] = study.slopes;
-        let table = Table::new(["epsilon", "sigma", "C", "B"]).rows(rows);
-        format!(
-            "{}\nExponent of epsilon: sigma {sigma:.3}, C {c:.3}, B {b:.3}\n",
-            table.text()
-        )
-    })
-}
-
 /// Parses FIRST:LAST.
 fn detunings(text: &str) -> Result<[f64; 2], String> {
     let form = || {
@@ -166,70 +154,6 @@ fn detunings(text: &str) -> Result<[f64; 2], String> {
         _ => Err(form()),
     }
 }
-
-/// One definition with its differences.
-#[derive(serde::Serialize)]
-struct Defined {
-    definition: Definition,
-    #[serde(flatten)]
-    study: Convergence,
-}
-
-/// Theory minus exact orbit for all definitions.
-fn defined(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
-    let study = |definition| {
-        let study = convergence(&Dimensionless { definition, ..*scene }, DEFINITION_HALVINGS)?;
-        Some(Defined { definition, study })
-    };
-    let all: Vec<Defined> = Definition::all().into_iter().filter_map(study).collect();
-    shown(
-        scene,
-        "Theory minus exact orbit, by definition of resonance",
-        &all,
-        json,
-        || {
-            let row = |one: &Defined| -> Vec<String> {
-                let rows = &one.study.rows;
-                let mut cells = vec![one.definition.name()];
-                cells.extend(rows[0].exact.map(number));
-                cells.extend(rows.iter().map(|row| format!("{:.2e}", row.sigma)));
-                cells.push(format!("{:.2}", one.study.slopes[0]));
-                cells.extend(rows.iter().map(|row| format!("{:.2e}", row.c)));
-                cells.push(format!("{:.2}", one.study.slopes[1]));
-                cells
-            };
-            let table = Table::new([
-                "resonance",
-                "sigma",
-                "C",
-                "sigma: eps",
-                "eps/2",
-                "eps/4",
-                "eps/8",
-                "eps/16",
-                "exponent",
-                "C: eps",
-                "eps/2",
-                "eps/4",
-                "eps/8",
-                "eps/16",
-                "exponent",
-            ]);
-            let missing = Definition::all().len() - all.len();
-            let note = match missing {
-                0 => String::new(),
-                _ => format!("\n{missing} definitions have no stable solution at every epsilon\n"),
-            };
-            format!(
-                "sigma and C of the exact orbit, then theory minus exact\n{}{note}",
-                table.rows(all.iter().map(row)).text()
-            )
-        },
-    )
-}
-
-/// Halvings of epsilon for each definition.
-const DEFINITION_HALVINGS: u32 = 4;
 
 /// Periods before the motion is evaluated.
 const SETTLE: usize = 1000;
@@ -285,8 +209,6 @@ fn described(pattern: &str, motion: &Periodic) -> String {
     )
 }
 
-/// Halvings of epsilon in the convergence study.
-const HALVINGS: u32 = 7;
 /// Rows of a curve in a text table.
 const ROWS: usize = 24;
 

@@ -73,6 +73,23 @@ impl Curve<'_> {
         Periodic::at(self.scene, &self.start.pattern, x)
     }
 
+    /// A bifurcation between the last motion of a closed branch and its start, at that distance.
+    fn special_at_start(&self, branch: &Branch, tangent: &Unknowns, distance: f64) -> Option<Special> {
+        let last = branch.points.last()?;
+        // A little beyond the start, which the plane at the end of the step may miss.
+        let within = || self.locate(last, tangent, 1.1 * distance);
+        (outside(last) != outside(self.start)).then(within)?
+    }
+
+    /// The last motion within a step before the one that the branch doubles.
+    fn joint(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Periodic> {
+        let x = from.unknowns();
+        let at = |part: f64| self.motion(&self.correct(&x, tangent, part * step)?);
+        let before = |part: f64| at(part).map(|one| !joins(from, &one)).ok_or(());
+        let (end, _) = try_bisection(0.0, 1.0, FINEST, before).ok()?;
+        at(end)
+    }
+
     /// Where the number of multipliers outside the unit circle changes within a step.
     fn locate(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Special> {
         let x = from.unknowns();
@@ -148,12 +165,7 @@ pub fn continue_from(
         };
         let last = branch.points.last().unwrap_or(start);
         if joins(last, &motion) {
-            let at = |part: f64| curve.motion(&curve.correct(&x, &tangent, part * step)?);
-            let before = |part: f64| at(part).map(|one| !joins(last, &one)).ok_or(());
-            let end = try_bisection(0.0, 1.0, FINEST, before)
-                .ok()
-                .and_then(|(end, _)| at(end));
-            branch.points.extend(end);
+            branch.points.extend(curve.joint(last, &tangent, step));
             branch.ended[1] = Ended::Joins;
             return branch;
         }
@@ -170,11 +182,9 @@ pub fn continue_from(
         let mut apart = next - origin;
         apart[0] = super::pattern::wrapped(apart[0]);
         if branch.points.len() > 10 && apart.norm() < step && turned.dot(&first_tangent) > 0.9 {
-            let last = &branch.points[branch.points.len() - 1];
-            if outside(last) != outside(start) {
-                // A little beyond the start, which the plane at the end of the step may miss.
-                branch.special.extend(curve.locate(last, &turned, 1.1 * apart.norm()));
-            }
+            branch
+                .special
+                .extend(curve.special_at_start(&branch, &turned, apart.norm()));
             branch.ended[1] = Ended::Closed;
             return branch;
         }
