@@ -7,7 +7,7 @@ use serde::Serialize;
 use vines_model::Dimensionless;
 use vines_model::numerics::mean_square;
 use vines_model::orbit::{self, Orbit};
-use vines_model::theory::{BackbonePoint, SlowFlow, free_sigma, resonant};
+use vines_model::theory::{BackbonePoint, free_sigma, resonant};
 
 use crate::identification::{DecayEnd, DecayPoint, Identification, Lock};
 use crate::scene::{Resonance, Scene};
