@@ -115,7 +115,7 @@ impl FastPath {
             self.cache.confirm();
             return Some(Found::FreeAsBefore(increment, phase));
         }
-        let predicted = arrive(&self.coefficients, propagator, start, start.wall_ahead()).ok()?;
+        let predicted = arrive(&self.coefficients, propagator, start, start.wall_ahead())?;
         if !monotone(predicted.arrival.t.value()) {
             start.sample.ddw = start.acceleration(&self.coefficients, &point);
             return Some(self.march(start, left, Some(&predicted)));
