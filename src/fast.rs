@@ -151,7 +151,7 @@ impl FastPath {
     #[inline(always)]
     fn take_step(&mut self, moving: &mut Moving, start: &Point) {
         let step = &mut self.cache.step;
-        let increment = step.increment(&moving.rig.alone, &moving.base.drive, start);
+        let increment = step.increment(&moving.base.drive, start);
         let (t, angle) = (step.t, step.angle);
         let phase = moving.base.phase.rotated(angle, 0.0);
         self.apply(moving, &increment, phase, t);

@@ -58,13 +58,7 @@ impl Cache {
         Some(propagator)
     }
 
-    /// The expected propagator was the right one.
-    #[inline(always)]
-    pub fn confirm(&mut self) {
-        self.last = self.followers[usize::from(self.last)];
-    }
-
-    /// There was a flight, or a part of one, of `t` seconds.
+    /// A flight to a contact, or what was left of a step, took `t` seconds.
     #[inline(always)]
     pub fn learn(&mut self, coefficients: &Coefficients, t: f64) {
         let is_near = |n: u8| (self.flights[usize::from(n) % FLIGHTS].t - t).abs() < coefficients.near;

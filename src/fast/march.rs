@@ -40,7 +40,6 @@ impl FastPath {
                 && predicted.arrival.t.value() - from.t <= LONGEST_STRETCH * self.coefficients.stretch
                 && verified(start, &from, predicted)
             {
-                self.cache.confirm();
                 return Found::Contact(predicted.arrival);
             }
             let to = self.mark(start, &from, n);
@@ -69,9 +68,7 @@ impl FastPath {
     #[inline(always)]
     fn approach(&mut self, start: &Start, from: &Mark, t: f64, wall: Wall) -> Option<Arrival> {
         let predicted = self.arrive_after(start, from, t, wall)?;
-        let arrival = verified(start, from, &predicted).then_some(predicted.arrival)?;
-        self.cache.learn(&self.coefficients, arrival.t.value());
-        Some(arrival)
+        verified(start, from, &predicted).then_some(predicted.arrival)
     }
 }
 

@@ -170,13 +170,11 @@ impl<const N: usize> Nearby<N> {
         let (f, df) = (amplitude * f, amplitude * df);
         let (y, dy) = (start.y + there.y, start.dy + there.dy);
         let [per_y, per_dy, per_f, per_df] = &coefficients.taylor;
-        let term = |n: usize| (per_y[n] * y + per_dy[n] * dy) + (per_f[n] * f + per_df[n] * df);
-        Self {
-            there: *there,
-            dy,
-            c: core::array::from_fn(term),
-            omega: coefficients.omega,
+        let mut c = [0.0; N];
+        for (n, c) in c.iter_mut().enumerate() {
+            *c = (per_y[n] * y + per_dy[n] * dy) + (per_f[n] * f + per_df[n] * df);
         }
+        Self { there: *there, dy, c, omega: coefficients.omega }
     }
 
     /// What `h` seconds add to the displacement beyond uniform motion, m, and to the velocity, m/s.

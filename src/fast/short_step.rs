@@ -23,6 +23,8 @@ pub(super) struct ShortStep {
     pub t: f64,
     /// What the free motion adds: the sum of both.
     free: (Transition, Transition),
+    /// Velocity per base displacement and, over the frequency, per base velocity: `omega0² xv` and `2 delta xv`.
+    pushed: (f64, f64),
     /// `G_n`, in the unit of `t^n`.
     moments: [f64; MOMENTS],
     /// The key of the response, rad/s.
@@ -39,6 +41,7 @@ impl Default for ShortStep {
         Self {
             t: f64::NAN,
             free: Default::default(),
+            pushed: (0.0, 0.0),
             moments: [0.0; MOMENTS],
             omega: f64::NAN,
             angle: (0.0, 0.0),
@@ -52,9 +55,15 @@ impl Default for ShortStep {
 impl ShortStep {
     /// The propagator of a step of `t` seconds.
     pub fn new(oscillator: &Oscillator, t: f64) -> Self {
+        let free = oscillator.exact_increment(t);
+        let per_velocity = free.0.xv + free.1.xv;
         Self {
             t,
-            free: oscillator.exact_increment(t),
+            free,
+            pushed: (
+                oscillator.omega0_squared * per_velocity,
+                2.0 * oscillator.delta * per_velocity,
+            ),
             moments: core::array::from_fn(|n| moment(oscillator, n, t)),
             ..Self::default()
         }
@@ -67,35 +76,37 @@ impl ShortStep {
 
     /// The response at another frequency.
     #[inline(always)]
-    fn respond(&mut self, oscillator: &Oscillator, omega: f64) {
+    fn respond(&mut self, omega: f64) {
         let g = &self.moments;
         let square = -omega * omega;
         let even = g[0] + square * (g[2] + square * (g[4] + square * (g[6] + square * g[8])));
         let odd = omega * (g[1] + square * (g[3] + square * (g[5] + square * g[7])));
         self.position = Complex64::new(even, odd);
         // `K' = i omega K + F xv`.
-        let per_velocity = self.free.0.xv + self.free.1.xv;
-        self.velocity = Complex64::new(
-            oscillator.omega0_squared * per_velocity - omega * odd,
-            2.0 * oscillator.delta * omega * per_velocity + omega * even,
-        );
+        let (steady, moving) = self.pushed;
+        self.velocity = Complex64::new(steady - omega * odd, omega * (moving + even));
         self.angle = product(omega, self.t);
-        let (angle, error) = self.angle;
-        let square = angle * angle;
-        // The Taylor series of sine and cosine, from the last term to the first.
-        let sum =
-            |divisors: [f64; 6]| (divisors.iter().rev()).fold(1.0, |sum, divisor| 1.0 - square * (1.0 / divisor) * sum);
-        let cos = sum([2.0, 12.0, 30.0, 56.0, 90.0, 132.0]);
-        let sin = angle * sum([6.0, 20.0, 42.0, 72.0, 110.0, 156.0]);
-        self.rotation = (cos - error * sin, sin + error * cos);
+        let angle = self.angle.0;
+        let square = -angle * angle;
+        // The Taylor series of sine and cosine: the first terms left out are below 1e-17.
+        let cos = 1.0
+            + square
+                * (0.5
+                    + square
+                        * (1.0 / 24.0
+                            + square * (1.0 / 720.0 + square * (1.0 / 40_320.0 + square * (1.0 / 3_628_800.0)))));
+        let sin = angle
+            * (1.0
+                + square * (1.0 / 6.0 + square * (1.0 / 120.0 + square * (1.0 / 5040.0 + square * (1.0 / 362_880.0)))));
+        self.rotation = (cos, sin);
         self.omega = omega;
     }
 
     /// What one step adds to `start` under `drive`.
     #[inline(always)]
-    pub fn increment(&mut self, oscillator: &Oscillator, drive: &Drive, start: &Point) -> Increment {
+    pub fn increment(&mut self, drive: &Drive, start: &Point) -> Increment {
         if self.omega != drive.omega {
-            self.respond(oscillator, drive.omega);
+            self.respond(drive.omega);
         }
         let (head, tail) = &self.free;
         let (y, dy) = head.of(start.y, start.dy);
