@@ -22,7 +22,7 @@ mod start;
 mod verify;
 
 use crate::arithmetic::Sum;
-use crate::base_motion::{BaseMotion, Phase, shift};
+use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
 use crate::plant::{Masses, Rig};
 use crate::segment::Segment;
@@ -101,8 +101,9 @@ impl FastPath {
 
     /// The drive was changed.
     #[inline(always)]
-    pub fn drive_changed(&mut self) {
+    pub fn drive_changed(&mut self, drive: &Drive) {
         self.contact_free = 0.0;
+        self.cache.step.drive_changed(drive);
     }
 
     /// The phasor and the phase of the base have moved on.
@@ -137,23 +138,29 @@ impl FastPath {
     /// Takes a step whose propagator is cached, if it meets no contact. Returns whether it was taken.
     #[inline]
     pub fn step(&mut self, moving: &mut Moving, duration: f64) -> bool {
-        if duration != self.cache.step.t || self.disabled {
+        let late = duration - self.cache.step.t;
+        if !self.cache.step.serves(&moving.base.drive, late) || self.disabled {
             return false;
         }
         let start = self.point(moving);
         if duration >= self.contact_free && !self.is_contact_free(moving, &start, duration) {
             return false;
         }
-        self.take_step(moving, &start);
+        self.take_step(moving, &start, late);
         true
     }
 
+    /// Takes a step that is longer than the cached one by `late` seconds.
     #[inline(always)]
-    fn take_step(&mut self, moving: &mut Moving, start: &Point) {
+    fn take_step(&mut self, moving: &mut Moving, start: &Point, late: f64) {
         let step = &mut self.cache.step;
-        let increment = step.increment(&moving.base.drive, start);
-        let (t, angle) = (step.t, step.angle);
-        let phase = moving.base.phase.rotated(angle, 0.0);
+        let drive = &moving.base.drive;
+        let mut increment = step.increment(drive, start);
+        if late != 0.0 {
+            increment = increment.later(&moving.rig.alone, drive, start, late);
+        }
+        let (t, angle) = (step.t + late, step.angle);
+        let phase = moving.base.phase.rotated(angle, drive.omega * late);
         self.apply(moving, &increment, phase, t);
         self.contact_free -= t;
     }
@@ -200,7 +207,7 @@ impl FastPath {
         let fastest = oscillator.fastest.max(drive.omega.abs());
         if t == duration && self.cache.repeats(oscillator, &drive, duration) {
             self.evaluations += 1;
-            self.take_step(moving, start);
+            self.take_step(moving, start, duration - self.cache.step.t);
         } else if u2 != 0.0 || u3 != 0.0 || drive.omega < 0.0 || t * fastest > LONGEST_COAST {
             self.evaluations += 1;
             let (x, v) = (moving.masses.x.value(), moving.masses.v.value());

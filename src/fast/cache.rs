@@ -3,7 +3,7 @@
 use super::coefficients::Coefficients;
 use super::grid::Grid;
 use super::propagator::Propagator;
-use super::short_step::ShortStep;
+use super::short_step::{SAME, ShortStep};
 use crate::base_motion::Drive;
 use crate::oscillator::Oscillator;
 
@@ -36,12 +36,12 @@ impl Cache {
     /// Whether a whole step without contact can be taken with [`Self::step`]: it is short, and has been taken before.
     #[inline(always)]
     pub fn repeats(&mut self, oscillator: &Oscillator, drive: &Drive, duration: f64) -> bool {
-        if duration == self.step.t {
+        if self.step.serves(drive, duration - self.step.t) {
             return true;
         }
-        let again = duration == self.last_duration;
+        let again = (duration - self.last_duration).abs() <= SAME * duration;
         self.last_duration = duration;
-        if again && ShortStep::serves(oscillator, drive.omega, duration) {
+        if again && ShortStep::is_short(oscillator, drive.omega, duration) {
             self.step = ShortStep::new(oscillator, duration);
         }
         duration == self.step.t

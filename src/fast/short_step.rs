@@ -13,6 +13,8 @@ use num_complex::Complex64;
 
 /// Longest step, in units of the fastest rate's time: the first term left out is below 1e-17.
 pub(super) const LONGEST: f64 = 1.0 / 8.0;
+/// Steps whose lengths differ by less, relative, are the same but for a correction of first order; the second order is below 1e-20.
+pub(super) const SAME: f64 = 1e-9;
 /// Number of the `G_n`.
 const MOMENTS: usize = 9;
 
@@ -69,9 +71,23 @@ impl ShortStep {
         }
     }
 
-    /// Whether a step of this length can have such a propagator.
-    pub fn serves(oscillator: &Oscillator, omega: f64, t: f64) -> bool {
+    /// Whether a step of `t` seconds can have such a propagator.
+    pub fn is_short(oscillator: &Oscillator, omega: f64, t: f64) -> bool {
         t * oscillator.fastest.max(omega.abs()) <= LONGEST && t > 0.0
+    }
+
+    /// Whether it serves for a step that is longer by `late` seconds: masters compute equal steps with rounding errors.
+    #[inline(always)]
+    pub fn serves(&self, drive: &Drive, late: f64) -> bool {
+        late == 0.0 || (late.abs() <= SAME * self.t && drive.signal[2] == 0.0 && drive.signal[3] == 0.0)
+    }
+
+    /// Forgets the step if it is not short against the drive.
+    #[inline(always)]
+    pub fn drive_changed(&mut self, drive: &Drive) {
+        if drive.omega.abs() * self.t > LONGEST {
+            *self = Self::default();
+        }
     }
 
     /// The response at another frequency.
@@ -120,6 +136,22 @@ impl ShortStep {
             y: y + (more_y + forced(drive.amplitude, start.phasor, self.position)),
             dy: dy + (more_dy + forced(drive.amplitude, start.phasor, self.velocity)),
             phasor: rotate(start.phasor, self.rotation),
+        }
+    }
+}
+
+impl Increment {
+    /// The same for a step that is longer by `late` seconds, to first order; the signal is a straight line.
+    #[inline(never)]
+    pub fn later(&self, oscillator: &Oscillator, drive: &Drive, start: &Point, late: f64) -> Self {
+        let Oscillator { delta, omega0_squared, .. } = *oscillator;
+        let (y, dy) = (start.y + self.y, start.dy + self.dy);
+        let strength = Complex64::new(omega0_squared, 2.0 * delta * drive.omega);
+        let forcing = forced(drive.amplitude, self.phasor, strength);
+        Self {
+            y: self.y + late * dy,
+            dy: self.dy + late * (forcing - omega0_squared * y - 2.0 * delta * dy),
+            phasor: rotate(self.phasor, (1.0, drive.omega * late)),
         }
     }
 }

@@ -109,7 +109,7 @@ impl Plant {
         }
         self.base.drive = drive;
         if self.begun {
-            self.fast.drive_changed();
+            self.fast.drive_changed(&drive);
         } else {
             self.begun = true;
             self.fast.state_changed(&self.base);
