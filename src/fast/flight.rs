@@ -11,8 +11,8 @@ use crate::plant::Rig;
 
 /// Largest displacements, in half-widths: the digits of `w` are those of `q1`.
 const WIDEST: f64 = 64.0;
-/// Largest damping ratio: above it the stretches of a march are too short for it to pay.
-const HEAVIEST: f64 = 0.5;
+/// Largest damping ratio: above it the stretches of a march are too short, and the plain solver needs fewer evaluations.
+const HEAVIEST: f64 = 6.0;
 
 /// What a flight leads to.
 pub(super) enum Found {

@@ -12,6 +12,8 @@ use crate::contact::Wall;
 const MOST_STRETCHES: u32 = 64;
 /// Shortest stretch, in distances between points of the grid.
 const SHORTEST: usize = 3;
+/// So many divisions in a march, and the plain solver is cheaper.
+const MOST_DIVIDED: u32 = 16;
 /// Longest stretch before a predicted contact that one bound can verify, in stretches.
 const LONGEST_STRETCH: f64 = 2.0;
 
@@ -28,13 +30,14 @@ enum Stretch {
 
 impl FastPath {
     /// Marches over the flight until a contact is found or `left` seconds are over. Where a stretch cannot be verified, it is
-    /// divided once.
+    /// halved, down to [`SHORTEST`].
     #[inline(never)]
     pub(super) fn march(&mut self, start: &Start, left: f64, predicted: Option<&Predicted>) -> Found {
         self.cache.grid.prepare(&start.rig.alone, &self.coefficients);
         let mut from = Mark { t: 0.0, point: start.point, sample: start.sample };
         // Points of the grid in the next stretch.
         let mut n = POINTS;
+        let mut divided = 0;
         for _ in 0..MOST_STRETCHES {
             if let Some(predicted) = predicted
                 && predicted.arrival.t.value() - from.t <= LONGEST_STRETCH * self.coefficients.stretch
@@ -57,7 +60,10 @@ impl FastPath {
             };
             match found {
                 Some(arrival) => return Found::Contact(arrival),
-                None if n > SHORTEST => n /= 2,
+                None if n > SHORTEST && divided < MOST_DIVIDED => {
+                    n /= 2;
+                    divided += 1;
+                }
                 None => return Found::Nothing,
             }
         }
