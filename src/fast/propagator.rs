@@ -62,6 +62,19 @@ pub(super) fn rotate(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
 
+/// Cosine and sine of a small angle from their Taylor series, up to degree `N + 2`.
+#[inline(always)]
+pub(super) fn rotation<const N: usize>(angle: f64) -> (f64, f64) {
+    let square = angle * angle;
+    let (mut cos, mut sin) = (1.0, 1.0);
+    for n in (1..=N / 2 + 1).rev() {
+        let n = 2.0 * n as f64;
+        cos = 1.0 - square * (1.0 / (n * (n - 1.0))) * cos;
+        sin = 1.0 - square * (1.0 / (n * (n + 1.0))) * sin;
+    }
+    (cos, angle * sin)
+}
+
 /// `E Im(z K)` for the phasor `z`.
 #[inline(always)]
 pub(super) fn forced(amplitude: f64, (cos, sin): (f64, f64), k: Complex64) -> f64 {
@@ -193,17 +206,10 @@ impl<const N: usize> Nearby<N> {
     #[inline(always)]
     pub fn at(&self, h: f64) -> Increment {
         let (bent, quickened) = self.change(h);
-        let angle = self.omega * h;
-        let square = angle * angle;
-        // The Taylor series of sine and cosine, from the last term to the first.
-        let sum =
-            |divisors: &[f64]| (divisors.iter().rev()).fold(1.0, |sum, divisor| 1.0 - square * (1.0 / divisor) * sum);
-        let cos = sum(&[2.0, 12.0, 30.0, 56.0][..N / 2]);
-        let sin = angle * sum(&[6.0, 20.0, 42.0, 72.0][..N / 2]);
         Increment {
             y: self.there.y + (h * self.dy + bent),
             dy: self.there.dy + quickened,
-            phasor: rotate(self.there.phasor, (cos, sin)),
+            phasor: rotate(self.there.phasor, rotation::<N>(self.omega * h)),
         }
     }
 }

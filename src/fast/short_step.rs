@@ -5,7 +5,7 @@
 //! belong to the step, not to the drive: a drive that changes at every sample costs two polynomials in `omega²`, and needs
 //! neither a sine nor a division. That holds for every damping ratio, at resonance and away from it.
 
-use super::propagator::{Increment, Point, forced, rotate};
+use super::propagator::{Increment, Point, forced, rotate, rotation};
 use crate::arithmetic::product;
 use crate::base_motion::Drive;
 use crate::oscillator::{Oscillator, Transition};
@@ -102,19 +102,7 @@ impl ShortStep {
         let (steady, moving) = self.pushed;
         self.velocity = Complex64::new(steady - omega * odd, omega * (moving + even));
         self.angle = product(omega, self.t);
-        let angle = self.angle.0;
-        let square = -angle * angle;
-        // The Taylor series of sine and cosine: the first terms left out are below 1e-17.
-        let cos = 1.0
-            + square
-                * (0.5
-                    + square
-                        * (1.0 / 24.0
-                            + square * (1.0 / 720.0 + square * (1.0 / 40_320.0 + square * (1.0 / 3_628_800.0)))));
-        let sin = angle
-            * (1.0
-                + square * (1.0 / 6.0 + square * (1.0 / 120.0 + square * (1.0 / 5040.0 + square * (1.0 / 362_880.0)))));
-        self.rotation = (cos, sin);
+        self.rotation = rotation::<8>(self.angle.0);
         self.omega = omega;
     }
 
