@@ -81,7 +81,7 @@ impl Predicted {
     /// The contact at `wall` after a time and an angle of the base; `added` is what the motion has added to the start until then, and
     /// `ddw` the relative acceleration there.
     #[inline(always)]
-    fn new(start: &Start, wall: Wall, (t, angle): (Sum, ((f64, f64), f64)), added: Increment, ddw: f64) -> Self {
+    pub fn new(start: &Start, wall: Wall, (t, angle): (Sum, ((f64, f64), f64)), added: Increment, ddw: f64) -> Self {
         let masses = start.masses;
         let dw = start.sample.dw + added.dy;
         Self {
