@@ -81,6 +81,14 @@ impl Forcing {
         Self { omega, strength, form }
     }
 
+    /// `H`, where the first form is used.
+    pub(crate) fn steady(&self) -> Option<Complex64> {
+        match self.form {
+            Form::Steady(steady) => Some(steady),
+            Form::DividedDifferences { .. } => None,
+        }
+    }
+
     /// The response after `t` seconds; `free` and `decayed` are the free motion's ([`Oscillator::flow`]) after that time.
     pub(crate) fn response(&self, t: f64, free: &Transition, decayed: Complex64) -> Response {
         let (sin, cos) = sincos_of_product((self.omega, 0.0), t);

@@ -1,6 +1,7 @@
 //! The next contact of a free flight: predicted, then verified.
 
 use super::arrival::{Arrival, arrive};
+use super::coefficients::Coefficients;
 use super::propagator::{Increment, Point};
 use super::start::Start;
 use super::verify::is_monotone;
@@ -45,7 +46,10 @@ impl FastPath {
         let mut start = Start::new(moving, point);
         let found = match self.as_before(&mut start, left) {
             Some(found) => found,
-            None => self.look(&mut start, left),
+            None => match out_of_reach(&self.coefficients, &start) {
+                Some(t) if t > self.coefficients.stretch => Found::Free(t),
+                _ => self.look(&mut start, left),
+            },
         };
         match found {
             Found::Contact(arrival) if arrival.t.value() <= left => {
@@ -136,4 +140,24 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
         && oscillator.delta <= HEAVIEST * oscillator.omega0
         && offset.abs().max(base.drive.amplitude.abs()).max(point.y.abs()) <= widest
         && slope.abs().max(point.dy.abs()) <= fastest
+}
+
+/// How long the particle stays where the primary mass, at its largest displacement, cannot reach it with a wall, s.
+///
+/// That displacement is at most the amplitude of the steady response and that of the free motion, which never grows.
+#[inline(always)]
+fn out_of_reach(coefficients: &Coefficients, start: &Start) -> Option<f64> {
+    let amplitude = start.base.drive.amplitude;
+    let steady = coefficients.forcing.steady()? * amplitude;
+    let (b, particle) = (start.half_width(), start.point.y - start.sample.w);
+    let room = b * (1.0 - 1e-9) - particle.abs() - steady.l1_norm();
+    if room <= 0.0 || start.base.drive.signal[1] != 0.0 {
+        return None;
+    }
+    let (cos, sin) = start.point.phasor;
+    let y = start.point.y - (steady.re * sin + steady.im * cos);
+    let dy = start.point.dy - coefficients.omega * (steady.re * cos - steady.im * sin);
+    let omega0 = start.rig.alone.omega0;
+    let room = room - (y * y + (dy / omega0) * (dy / omega0)).sqrt();
+    (room > 0.0).then(|| room / start.masses.particle.abs())
 }
