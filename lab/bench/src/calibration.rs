@@ -83,8 +83,13 @@ pub enum Kind {
 /// The error of one result.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Outcome {
+    /// Mass ratio of the rig.
+    pub epsilon: f64,
     /// Signal-to-noise ratio, dB.
     pub snr: f64,
+    /// Amplitude of the response over b.
+    #[serde(rename = "C")]
+    pub c: f64,
     /// What it belongs to.
     pub kind: Kind,
     /// Name of the quantity.
@@ -234,7 +239,17 @@ fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, R
         .iter()
         .min_by(|a, b| distance(a).total_cmp(&distance(b)))
         .ok_or("no exact orbit at this G")?;
-    let outcome = |kind, quantity, error, uncertainty| Outcome { snr, kind, quantity, error, uncertainty, bound: None };
+    let epsilon = scene.dimensionless().epsilon;
+    let outcome = |kind, quantity, error, uncertainty| Outcome {
+        epsilon,
+        snr,
+        c: lock.c,
+        kind,
+        quantity,
+        error,
+        uncertainty,
+        bound: None,
+    };
     let mut outcomes = vec![
         outcome(Kind::Lock, "sigma", lock.sigma - exact.sigma, lock.u_sigma),
         outcome(Kind::Lock, "C", lock.c - exact.c, lock.u_c),
@@ -247,7 +262,8 @@ fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, R
     for point in found.decay.points.iter().filter(|point| point.c > COMPARED_ABOVE) {
         if let (Some(sigma), Some(u), Some([exact, _])) = (point.sigma_steady, point.u_sigma_steady, curve.at(point.c))
         {
-            outcomes.push(outcome(Kind::Decay, "sigma", sigma - exact, u));
+            let outcome = outcome(Kind::Decay, "sigma", sigma - exact, u);
+            outcomes.push(Outcome { c: point.c, ..outcome });
         }
     }
     Ok(outcomes)
@@ -280,7 +296,9 @@ fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<(Vec<Outcome>,
             ratio * (24.0 / (scene.controller.samples_per_period * periods)).sqrt() / (std::f64::consts::TAU * periods);
         let slope = slope / scene.dimensionless().epsilon;
         let outcome = |quantity, error, uncertainty, bound| Outcome {
+            epsilon: scene.dimensionless().epsilon,
             snr,
+            c: point.c,
             kind: Kind::Tracked,
             quantity,
             error,
