@@ -47,6 +47,8 @@ pub struct Balance {
     pub excess: f64,
     /// g.
     gain: f64,
+    /// Measured over commanded amplitude of the base.
+    calibration: f64,
     /// Coefficients: constant, time, and integral of the amplitude's deviation.
     drive: Regression,
     turning: Regression,
@@ -82,7 +84,8 @@ impl Balance {
         let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
         let deviation = integral(&time, motion.iter().map(|one| one.0 - response));
         let columns = [vec![1.0; cycles.len()], time, deviation];
-        let drives = drives(cycles);
+        let calibration = total(cycles, |cycle| cycle.base.norm()) / total(cycles, |cycle| cycle.commanded[0].norm());
+        let drives = drives(cycles, calibration);
         // The integral of A' is A.
         // Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
@@ -117,6 +120,7 @@ impl Balance {
             base: of(base, base_noise),
             excess,
             gain,
+            calibration,
             drive,
             turning,
             remainders,
@@ -144,27 +148,20 @@ impl Balance {
         ]
     }
 
-    /// Distance, m, from the mean amplitude to the one that the base amplitude `base`, m, holds at phase resonance.
+    /// Frequency, rad/s, and amplitude, m, that a constant base of the commanded amplitude `command`, m, leads to.
+    ///
+    /// The base sensor calibrates both this base and the drive that it is compared with; its noise cancels.
     #[must_use]
-    pub fn ahead(&self, base: f64) -> f64 {
-        (base - self.at(0.0)[0].value) / self.slopes()[0].value
-    }
-
-    /// Frequency, rad/s, and amplitude, m, that a constant base amplitude leads to.
-    #[must_use]
-    pub fn limit(&self, base: Estimate) -> [Estimate; 2] {
-        let ahead = self.ahead(base.value);
-        let [drive, turning] = self.at(ahead);
+    pub fn limit(&self, command: f64) -> [Estimate; 2] {
         let [by_base, by_omega] = self.slopes().map(|slope| slope.value);
+        let ahead = (command * self.calibration - self.at(0.0)[0].value) / by_base;
+        let drive = self.drive.estimate(&[0.0, 1.0, ahead]).scaled(1.0 / self.gain);
         // The uncertainty of the slope is in that of the drive at the limit.
         let limit = Estimate::new(
             self.response.value + ahead,
-            &[
-                self.response.uncertainty,
-                drive.uncertainty / by_base,
-                base.uncertainty / by_base,
-            ],
+            &[self.response.uncertainty, drive.uncertainty / by_base],
         );
+        let turning = self.at(ahead)[1];
         let change = by_omega * limit.uncertainty;
         [Estimate::new(turning.value, &[turning.uncertainty, change]), limit]
     }
@@ -193,9 +190,11 @@ struct Drive {
     work: Complex<f64>,
 }
 
-fn drives(cycles: &[Cycle]) -> Vec<Drive> {
-    let total = |value: fn(&Cycle) -> f64| cycles.iter().map(value).sum::<f64>();
-    let gain = total(|cycle| cycle.base.norm()) / total(|cycle| cycle.commanded[0].norm());
+fn total(cycles: &[Cycle], value: fn(&Cycle) -> f64) -> f64 {
+    cycles.iter().map(value).sum()
+}
+
+fn drives(cycles: &[Cycle], calibration: f64) -> Vec<Drive> {
     let relative = |cycle: &Cycle| {
         let turned = cycle.response[0] * cycle.commanded[0].conj();
         turned / turned.norm()
@@ -211,7 +210,7 @@ fn drives(cycles: &[Cycle]) -> Vec<Drive> {
         .map(|cycle| {
             let [middle, change] = cycle.commanded;
             let growth = (change * middle.conj()).re / middle.norm();
-            let share = relative(cycle) * turn / turn.norm() * gain;
+            let share = relative(cycle) * turn / turn.norm() * calibration;
             let before = sum;
             sum += share * cycle.duration * middle.norm();
             Drive {

@@ -85,7 +85,8 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let slopes = slopes(scene, mean(held.iter().map(Cycle::amplitude)) / d.b);
     // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
-    let [omega, limit] = limits(&approach, d.omega0, base, &slopes)?;
+    let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
+    let [omega, limit] = limits(&approach, d.omega0, command, &slopes)?;
     let speeds: Option<Vec<f64>> = hold
         .iter()
         .map(|s| s.ground_truth.map(|w| d.speed(w.particle_velocity.abs())))
@@ -129,8 +130,8 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
 ///
 /// The later periods are nearer to it, the longer record has less noise. Where the second half of the periods disagrees with all
 /// of them beyond the noise, the difference is a part of the uncertainty; the periods with the smallest uncertainty count.
-fn limits(approach: &[Cycle], omega0: f64, base: Estimate, slopes: &Slopes) -> Option<[Estimate; 2]> {
-    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, omega0, slopes)?.limit(base));
+fn limits(approach: &[Cycle], omega0: f64, command: f64, slopes: &Slopes) -> Option<[Estimate; 2]> {
+    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, omega0, slopes)?.limit(command));
     let mut best = limit(approach)?;
     let mut cycles = approach;
     let mut first = true;
