@@ -39,6 +39,8 @@ pub struct Balance {
     pub periods: usize,
     /// Mean amplitude of the response, m.
     pub response: Estimate,
+    /// Standard uncertainty of the amplitude, m, that drive and frequency belong to: its noise within the integrals.
+    pub u_level: f64,
     /// Mean phase error, rad.
     pub phase_error: Estimate,
     /// Mean amplitude of the base, m.
@@ -60,6 +62,8 @@ pub struct Balance {
 
 /// Size of the neglected terms relative to those of the second order.
 const REMAINDER: f64 = 0.7;
+/// A slope weighs integrated noise by a parabola, whose variance is this multiple of that of a mean.
+const PARABOLA: f64 = 1.2;
 /// Relative uncertainty of the effect of a drift of the amplitude.
 const LATE: f64 = 0.15;
 
@@ -116,6 +120,7 @@ impl Balance {
         Some(Self {
             periods: cycles.len(),
             response: of(response, noise),
+            u_level: noise * (PARABOLA / n).sqrt(),
             phase_error: of(phase_error, phase_noise),
             base: of(base, base_noise),
             excess,
@@ -124,7 +129,10 @@ impl Balance {
             drive,
             turning,
             remainders,
-            within: [base_noise / n.sqrt(), gain * base / response * phase_noise / n.sqrt()],
+            within: [
+                base_noise / n.sqrt(),
+                gain * base / response * phase_noise * (PARABOLA / n).sqrt(),
+            ],
         })
     }
 
@@ -159,7 +167,7 @@ impl Balance {
         // The uncertainty of the slope is in that of the drive at the limit.
         let limit = Estimate::new(
             self.response.value + ahead,
-            &[self.response.uncertainty, drive.uncertainty / by_base],
+            &[self.u_level, drive.uncertainty / by_base],
         );
         let turning = self.at(ahead)[1];
         let change = by_omega * limit.uncertainty;

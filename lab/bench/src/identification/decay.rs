@@ -65,8 +65,6 @@ pub struct DecayPoints {
 
 /// Points per period along the decay.
 const PER_PERIOD: f64 = 8.0;
-/// Relative uncertainty of the correction for the drift away from the fold.
-const CORRECTION: f64 = 0.1;
 
 /// The points along the decay of a record, up to the loss of synchrony where the rig reports impacts, otherwise to the fold.
 #[must_use]
@@ -185,7 +183,7 @@ fn correction(flow: &SlowFlow, d: &Dimensionless, [c, rate]: [f64; 2], tau: f64)
     let late = rate * delay * (effect(c + step)? - effect(c - step)?) / (2.0 * step);
     let value = by_drift(c, rate)?;
     let incomplete = value * slowest.min(1.0).powf(tau / PI);
-    (late.abs() < value.abs()).then(|| Estimate::new(value, &[CORRECTION * value, late, incomplete]))
+    (late.abs() < value.abs()).then(|| Estimate::new(value, &[late, incomplete]))
 }
 
 /// The change of sigma by `C''`: `C''/(2 epsilon C)` with `C'' = C' dC'/dC`, where `C' = -epsilon G/2` along the decay.

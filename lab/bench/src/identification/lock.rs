@@ -101,7 +101,11 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
         let value = Estimate::mean(&per_period);
         Estimate::new(
             value.value + b_slope * remaining,
-            &[value.uncertainty, b_slope * limit.uncertainty / d.b],
+            &[
+                value.uncertainty,
+                b_slope * limit.uncertainty / d.b,
+                b_slope * response.uncertainty / d.b,
+            ],
         )
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
