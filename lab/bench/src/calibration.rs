@@ -109,8 +109,30 @@ pub struct Calibration {
     pub runs: u64,
     /// The errors.
     pub outcomes: Vec<Outcome>,
-    /// Messages of the runs, or parts of runs, that failed, and tracked points that had not settled.
-    pub failures: Vec<String>,
+    /// Results that are missing.
+    pub missing: Vec<Missing>,
+}
+
+/// What was not measured, or had not settled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Missing {
+    /// Signal-to-noise ratio, dB.
+    pub snr: f64,
+    /// What is missing.
+    pub what: Part,
+    /// Seed of the noise, and the reason.
+    pub message: String,
+}
+
+/// A part of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The lock and the decay.
+    Lock,
+    /// The levels from the one at which tracking ended early.
+    Levels,
+    /// A tracked point that has not settled.
+    Settled,
 }
 
 /// The plant with a log of what ideal sensors read.
@@ -180,7 +202,7 @@ pub fn calibrate(
             let mut all = found.lock().unwrap_or_else(PoisonError::into_inner);
             all.runs += 1;
             all.outcomes.extend(run.outcomes);
-            all.failures.extend(run.failures);
+            all.missing.extend(run.missing);
             progress(all.runs);
         }
     };
@@ -195,18 +217,21 @@ pub fn calibrate(
 /// One run: a lock with its decay, and a tracked backbone.
 fn run(scene: &Scene, snr: f64, curve: &ExactCurve) -> Calibration {
     let mut run = Calibration::default();
-    let results = locked(scene, snr, curve).and_then(|outcomes| {
-        run.outcomes.extend(outcomes);
-        tracked(scene, snr, curve)
-    });
-    match results {
-        Ok((outcomes, unsettled)) => {
+    let missing = |what, message: &dyn std::fmt::Display| Missing {
+        snr,
+        what,
+        message: format!("{snr} dB, seed {}: {message}", scene.chain.seed),
+    };
+    match locked(scene, snr, curve) {
+        Ok(outcomes) => run.outcomes.extend(outcomes),
+        Err(error) => run.missing.push(missing(Part::Lock, &error)),
+    }
+    match tracked(scene, snr, curve) {
+        Ok((outcomes, lost)) => {
             run.outcomes.extend(outcomes);
-            run.failures.extend(unsettled);
+            run.missing.extend(lost.iter().map(|(what, why)| missing(*what, why)));
         }
-        Err(error) => run
-            .failures
-            .push(format!("{snr} dB, seed {}: {error}", scene.chain.seed)),
+        Err(error) => run.missing.push(missing(Part::Levels, &error)),
     }
     run
 }
@@ -276,17 +301,15 @@ fn with_ideal_sensors(mut record: Record, log: &Log) -> Record {
     record
 }
 
-fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<(Vec<Outcome>, Vec<String>), RunError> {
+fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<(Vec<Outcome>, Vec<(Part, String)>), RunError> {
     let log = Log::default();
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let found = track(&mut chained(scene, &log)?, &mut controller, scene, |_, _| {})?;
-    let (mut outcomes, mut unsettled) = (Vec::new(), Vec::new());
+    let ended = found.ended.map(|why| (Part::Levels, why));
+    let (mut outcomes, mut missing) = (Vec::new(), Vec::from_iter(ended));
     for point in &found.points {
         let Some([sigma, g]) = curve.at(point.c).filter(|_| point.settled) else {
-            unsettled.push(format!(
-                "{snr} dB, seed {}: not settled at C = {:.3}",
-                scene.chain.seed, point.level
-            ));
+            missing.push((Part::Settled, format!("not settled at C = {:.3}", point.level)));
             continue;
         };
         // Frequency and growth of a sinusoid of unknown amplitude and phase in white noise (Rife and Boorstyn, 1974).
@@ -308,7 +331,7 @@ fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<(Vec<Outcome>,
         outcomes.push(outcome("sigma", point.sigma - sigma, point.u_sigma, slope));
         outcomes.push(outcome("G", point.g - g, point.u_g, 2.0 * point.c * slope));
     }
-    Ok((outcomes, unsettled))
+    Ok((outcomes, missing))
 }
 
 /// Statistics of the outcomes of one quantity.

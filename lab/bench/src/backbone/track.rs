@@ -241,6 +241,8 @@ fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
         base: g.map(|g| d.amplitude(g) / d.b),
         omega: sigma.map(|sigma| d.omega_change(sigma) / d.b),
         drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
+        // The spread of a held amplitude is small.
+        curvature: [0.0; 2],
     }
 }
 

@@ -30,6 +30,8 @@ pub struct Slopes {
     pub omega: [f64; 2],
     /// Changes of `E_R` and `omega_R` per rate of change of the amplitude, because the impacts follow it late: s and rad/m.
     pub drift: [f64; 2],
+    /// Second derivatives of `E_R`, 1/m, and `omega_R`, rad/(s m²), over the amplitude; 0 where they are not known.
+    pub curvature: [f64; 2],
 }
 
 /// The two lines, fitted to some periods.
@@ -49,6 +51,8 @@ pub struct Balance {
     pub excess: f64,
     /// g.
     gain: f64,
+    /// Variance of the amplitude within the periods, m², and the curvatures of the backbone.
+    bend: (f64, [f64; 2]),
     /// Measured over commanded amplitude of the base.
     calibration: f64,
     /// Coefficients: constant, time, and integral of the amplitude's deviation.
@@ -86,6 +90,8 @@ impl Balance {
         let noise = noise.max(1e-14 * response);
         let middle = mean(cycles.iter().map(|cycle| cycle.time));
         let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
+        let spread = mean(motion.iter().map(|one| (one.0 - response).powi(2)));
+        let bend = ((spread - noise * noise).max(0.0), slopes.curvature);
         let deviation = integral(&time, motion.iter().map(|one| one.0 - response));
         let columns = [vec![1.0; cycles.len()], time, deviation];
         let calibration = total(cycles, |cycle| cycle.base.norm()) / total(cycles, |cycle| cycle.commanded[0].norm());
@@ -125,6 +131,7 @@ impl Balance {
             base: of(base, base_noise),
             excess,
             gain,
+            bend,
             calibration,
             drive,
             turning,
@@ -164,14 +171,20 @@ impl Balance {
         let [by_base, by_omega] = self.slopes().map(|slope| slope.value);
         let ahead = (command * self.calibration - self.at(0.0)[0].value) / by_base;
         let drive = self.drive.estimate(&[0.0, 1.0, ahead]).scaled(1.0 / self.gain);
+        // The backbone is not straight from the amplitudes measured to the limit.
+        let (spread, curvature) = self.bend;
+        let bent = curvature.map(|curvature| 0.5 * curvature * (ahead * ahead + spread));
         // The uncertainty of the slope is in that of the drive at the limit.
         let limit = Estimate::new(
             self.response.value + ahead,
-            &[self.u_level, drive.uncertainty / by_base],
+            &[self.u_level, drive.uncertainty / by_base, bent[0] / by_base],
         );
         let turning = self.at(ahead)[1];
         let change = by_omega * limit.uncertainty;
-        [Estimate::new(turning.value, &[turning.uncertainty, change]), limit]
+        [
+            Estimate::new(turning.value, &[turning.uncertainty, change, bent[1]]),
+            limit,
+        ]
     }
 }
 

@@ -194,21 +194,24 @@ fn slopes(scene: &Scene, c: f64) -> Slopes {
     let flow = SlowFlow::new(d.lambda, d.r);
     let at = |c: f64| flow.manifold.b(c, BranchSide::Right).map(|b| flow.backbone_at(b));
     let step = 1e-3 * c;
-    let ([g, sigma], drift) = match (at(c - step), at(c + step), flow.drift(c)) {
-        (Some(low), Some(high), Some(drift)) => {
+    let ([g, sigma], bend, drift) = match (at(c - step), at(c), at(c + step), flow.drift(c)) {
+        (Some(low), Some(middle), Some(high), Some(drift)) => {
             let slope = |low: f64, high: f64| (high - low) / (2.0 * step);
+            let bend = |low: f64, middle: f64, high: f64| (low - 2.0 * middle + high) / (step * step);
             (
                 [slope(low.g, high.g), slope(low.sigma, high.sigma)],
+                [bend(low.g, middle.g, high.g), bend(low.sigma, middle.sigma, high.sigma)],
                 [drift.g, drift.sigma],
             )
         }
-        _ => ([d.lambda, 0.0], [0.0; 2]),
+        _ => ([d.lambda, 0.0], [0.0; 2], [0.0; 2]),
     };
     let pair = |slope: f64| [slope, SLOPE * slope.abs() + 0.1];
     Slopes {
         base: pair(g).map(|g| d.amplitude(g) / d.b),
         omega: pair(sigma).map(|sigma| d.omega_change(sigma) / d.b),
         drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
+        curvature: [d.amplitude(bend[0]), d.omega_change(bend[1])].map(|bend| bend / (d.b * d.b)),
     }
 }
 
