@@ -3,12 +3,14 @@
 //! Each run locks, lets the motion decay and tracks some levels of the backbone. The error of every result over its standard
 //! uncertainty should be normally distributed: 95 % of them within ±1.96.
 
+mod outcome;
+mod rigs;
+
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use serde::Serialize;
 use vines_model::orbit;
 
 use crate::backbone::track;
@@ -18,89 +20,13 @@ use crate::identification::identify;
 use crate::rig::{BuiltIn, Chain, Drive, GroundTruth, Rig, RigError, Sensors, Simulated};
 use crate::scene::{Override, Scene, SceneError};
 
-/// Settings of a rig.
-pub type RigSettings = [&'static str; 4];
+pub use outcome::{Coverage, HALF_WIDTH, Kind, Outcome};
+pub use rigs::{OTHER_RIGS, RIGS, RigSettings};
 
-/// The rigs: the default one, one with lighter particle and harder walls, one with a heavy particle.
-pub const RIGS: [RigSettings; 3] = [
-    [
-        "plant.epsilon=0.0084",
-        "plant.lambda=1.43",
-        "plant.r=0.65",
-        "excitation.G=1.1",
-    ],
-    [
-        "plant.epsilon=0.0042",
-        "plant.lambda=1.0",
-        "plant.r=0.8",
-        "excitation.G=0.75",
-    ],
-    [
-        "plant.epsilon=0.02",
-        "plant.lambda=1.43",
-        "plant.r=0.6",
-        "excitation.G=1.2",
-    ],
-];
-/// Rigs that were not used while the estimators were written.
-pub const OTHER_RIGS: [RigSettings; 3] = [
-    [
-        "plant.epsilon=0.006",
-        "plant.lambda=2.0",
-        "plant.r=0.7",
-        "excitation.G=1.4",
-    ],
-    [
-        "plant.epsilon=0.012",
-        "plant.lambda=0.8",
-        "plant.r=0.5",
-        "excitation.G=1.1",
-    ],
-    [
-        "plant.epsilon=0.03",
-        "plant.lambda=1.2",
-        "plant.r=0.75",
-        "excitation.G=0.9",
-    ],
-];
 /// Signal-to-noise ratios, dB.
 pub const RATIOS: [f64; 3] = [40.0, 30.0, 20.0];
 /// The levels that are tracked.
 const LEVELS: [&str; 3] = ["backbone.C_from=0.6", "backbone.C_to=0.3", "backbone.points=5"];
-
-/// What a result belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// The locked point, against the exact orbit at the same G.
-    Lock,
-    /// A settled tracked point, against the exact backbone at the same C.
-    Tracked,
-    /// A point of the decay with C > 0.2, corrected for the drift, against the same.
-    Decay,
-}
-
-/// The error of one result.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Outcome {
-    /// Mass ratio of the rig.
-    pub epsilon: f64,
-    /// Signal-to-noise ratio, dB.
-    pub snr: f64,
-    /// Amplitude of the response over b.
-    #[serde(rename = "C")]
-    pub c: f64,
-    /// What it belongs to.
-    pub kind: Kind,
-    /// Name of the quantity.
-    pub quantity: &'static str,
-    /// Value less exact value.
-    pub error: f64,
-    /// Standard uncertainty.
-    pub uncertainty: f64,
-    /// Cramér–Rao bound of the standard deviation; absent where it is not known in closed form.
-    pub bound: Option<f64>,
-}
 
 /// All outcomes, and what failed.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -332,42 +258,4 @@ fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<(Vec<Outcome>,
         outcomes.push(outcome("G", point.g - g, point.u_g, 2.0 * point.c * slope));
     }
     Ok((outcomes, missing))
-}
-
-/// Statistics of the outcomes of one quantity.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Coverage {
-    /// Number of results.
-    pub count: usize,
-    /// Share of the results whose 95 % interval contains the exact value.
-    pub covered: f64,
-    /// Largest error over its standard uncertainty.
-    pub worst: f64,
-    /// RMS error.
-    pub rms: f64,
-    /// RMS of the Cramér–Rao bounds; absent where they are not known.
-    pub bound: Option<f64>,
-}
-
-/// Half width of a 95 % interval, standard uncertainties.
-pub const HALF_WIDTH: f64 = 1.96;
-
-impl Coverage {
-    /// Of some outcomes; shares of none are NaN.
-    #[must_use]
-    pub fn of<'a>(outcomes: impl Iterator<Item = &'a Outcome> + Clone) -> Self {
-        let count = outcomes.clone().count();
-        let pulls = outcomes.clone().map(|one| one.error.abs() / one.uncertainty);
-        let square = |values: &mut dyn Iterator<Item = f64>| {
-            (values.map(|value| value * value).sum::<f64>() / count as f64).sqrt()
-        };
-        let bounds: Option<Vec<f64>> = outcomes.clone().map(|one| one.bound).collect();
-        Self {
-            count,
-            covered: pulls.clone().filter(|pull| *pull <= HALF_WIDTH).count() as f64 / count as f64,
-            worst: pulls.fold(0.0, f64::max),
-            rms: square(&mut outcomes.map(|one| one.error)),
-            bound: bounds.map(|bounds| square(&mut bounds.into_iter())),
-        }
-    }
 }
