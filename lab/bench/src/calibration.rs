@@ -227,7 +227,10 @@ fn with_ideal_sensors(mut record: Record, log: &Log) -> Record {
     record
 }
 
-fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<(Vec<Outcome>, Vec<(Part, String)>), RunError> {
+/// Outcomes of the settled points, and what is missing.
+type TrackedOutcomes = (Vec<Outcome>, Vec<(Part, String)>);
+
+fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<TrackedOutcomes, RunError> {
     let log = Log::default();
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let found = track(&mut chained(scene, &log)?, &mut controller, scene, |_, _| {})?;

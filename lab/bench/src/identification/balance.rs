@@ -96,8 +96,7 @@ impl Balance {
         let columns = [vec![1.0; cycles.len()], time, deviation];
         let calibration = total(cycles, |cycle| cycle.base.norm()) / total(cycles, |cycle| cycle.commanded[0].norm());
         let drives = drives(cycles, calibration);
-        // The integral of A' is A.
-        // Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
+        // The integral of A' is A. Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
         let [late, turned] = [1.0 + gain * slopes.drift[0], slopes.drift[1]];
         let balanced = motion.into_iter().zip(&drives).map(|((amplitude, phase), drive)| {
@@ -112,14 +111,7 @@ impl Balance {
         let [slope, width] = slopes.base;
         let drive = Regression::fit(&columns, &amplitudes, &prior([-gain * slope, gain * width]), noise)?;
         let turning = Regression::fit(&columns, &phases, &prior(slopes.omega), noise / response)?;
-        // The terms beyond these are as large as a share of them.
-        let slope = |values: Vec<f64>| Line::fit(&values).slope * n / (cycles[cycles.len() - 1].time - cycles[0].time);
-        let inertial = REMAINDER * inertia * slope(drives.iter().map(|drive| drive.force.re).collect());
-        let drift = LATE * slope(cycles.iter().map(Cycle::amplitude).collect());
-        let remainders = [
-            (inertial / gain).hypot(drift * slopes.drift[0]),
-            (inertial / response).hypot(drift * slopes.drift[1]),
-        ];
+        let remainders = remainders(cycles, &drives, [inertia, gain, response], slopes.drift);
         let phase_noise = (noise / response).hypot(base_noise / base);
         let excess = drive.excess.max(turning.excess);
         let of = |value: f64, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
@@ -186,6 +178,18 @@ impl Balance {
             limit,
         ]
     }
+}
+
+/// Sizes of the terms beyond those of the second order and beyond the drift: a share of them.
+fn remainders(cycles: &[Cycle], drives: &[Drive], [inertia, gain, response]: [f64; 3], late: [f64; 2]) -> [f64; 2] {
+    let duration = cycles[cycles.len() - 1].time - cycles[0].time;
+    let slope = |values: Vec<f64>| Line::fit(&values).slope * cycles.len() as f64 / duration;
+    let inertial = REMAINDER * inertia * slope(drives.iter().map(|drive| drive.force.re).collect());
+    let drift = LATE * slope(cycles.iter().map(Cycle::amplitude).collect());
+    [
+        (inertial / gain).hypot(drift * late[0]),
+        (inertial / response).hypot(drift * late[1]),
+    ]
 }
 
 /// Integral over time from the first value on, by the trapezoidal rule.
