@@ -1,5 +1,7 @@
 //! The controller: one function per sample.
 
+mod output;
+
 use crate::amplitude_loop::{AmplitudeLoop, AmplitudeState, Move};
 use crate::approach::{Approach, ApproachState};
 use crate::capture::{Capture, CaptureState, Observation};
@@ -281,30 +283,6 @@ impl PhaseLock {
                 valid: measured.valid,
             };
             state.lost = self.stationarity.update(&mut state.dwell, &reading, period_ends);
-        }
-    }
-
-    fn output(&self, state: &State, measured: &Measurement, drive: f64) -> Output {
-        let omega = state.frequency.omega;
-        let response_amplitude = state.channels.response.amplitude();
-        let means = state.dwell.means();
-        let (frequency, response_mean) = means.unwrap_or((omega, response_amplitude));
-        Output {
-            omega,
-            amplitude: state.drive.amplitude,
-            drive,
-            phase_error: measured.error,
-            response_amplitude,
-            response_target: state.amplitude_loop.map_or(0.0, |l| l.setpoint()),
-            reference_amplitude: measured.reference_amplitude,
-            coherence: state.channels.response.coherence(),
-            // Rounding can move the mean of values at a limit beyond the limit.
-            frequency: frequency.clamp(self.config.omega_min, self.config.omega_max),
-            response_mean,
-            locked: state.loop_state == LoopState::Locked,
-            settled: state.dwell.settled() && state.tuning == self.tuning(),
-            state: state.loop_state,
-            fault: state.fault,
         }
     }
 }

@@ -5,9 +5,11 @@
 //! the *response*, and the drive follows. A predictor computes drive and frequency of the next point from the points before, so that
 //! the loops have little to correct.
 
+mod point;
 mod predictor;
 mod settle;
 mod track;
 
+pub use point::{Point, Tracked};
 pub use settle::{Criterion, Found};
-pub use track::{Point, TrackError, Tracked, track};
+pub use track::{TrackError, track};

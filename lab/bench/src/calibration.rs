@@ -3,12 +3,14 @@
 //! Each run locks, lets the motion decay and tracks some levels of the backbone. The error of every result over its standard
 //! uncertainty should be normally distributed: 95 % of them within ±1.96.
 
+mod outcome;
+mod rigs;
+
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Mutex, PoisonError};
 
-use serde::Serialize;
 use vines_model::orbit;
 
 use crate::backbone::track;
@@ -18,84 +20,13 @@ use crate::identification::identify;
 use crate::rig::{BuiltIn, Chain, Drive, GroundTruth, Rig, RigError, Sensors, Simulated};
 use crate::scene::{Override, Scene, SceneError};
 
-/// Settings of a rig.
-pub type RigSettings = [&'static str; 4];
+pub use outcome::{Coverage, HALF_WIDTH, Kind, Outcome};
+pub use rigs::{OTHER_RIGS, RIGS, RigSettings};
 
-/// The rigs: the default one, one with lighter particle and harder walls, one with a heavy particle.
-pub const RIGS: [RigSettings; 3] = [
-    [
-        "plant.epsilon=0.0084",
-        "plant.lambda=1.43",
-        "plant.r=0.65",
-        "excitation.G=1.1",
-    ],
-    [
-        "plant.epsilon=0.0042",
-        "plant.lambda=1.0",
-        "plant.r=0.8",
-        "excitation.G=0.75",
-    ],
-    [
-        "plant.epsilon=0.02",
-        "plant.lambda=1.43",
-        "plant.r=0.6",
-        "excitation.G=1.2",
-    ],
-];
-/// Rigs that were not used while the estimators were written.
-pub const OTHER_RIGS: [RigSettings; 3] = [
-    [
-        "plant.epsilon=0.006",
-        "plant.lambda=2.0",
-        "plant.r=0.7",
-        "excitation.G=1.4",
-    ],
-    [
-        "plant.epsilon=0.012",
-        "plant.lambda=0.8",
-        "plant.r=0.5",
-        "excitation.G=1.1",
-    ],
-    [
-        "plant.epsilon=0.03",
-        "plant.lambda=1.2",
-        "plant.r=0.75",
-        "excitation.G=0.9",
-    ],
-];
 /// Signal-to-noise ratios, dB.
 pub const RATIOS: [f64; 3] = [40.0, 30.0, 20.0];
 /// The levels that are tracked.
 const LEVELS: [&str; 3] = ["backbone.C_from=0.6", "backbone.C_to=0.3", "backbone.points=5"];
-
-/// What a result belongs to.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Kind {
-    /// The locked point, against the exact orbit at the same G.
-    Lock,
-    /// A settled tracked point, against the exact backbone at the same C.
-    Tracked,
-    /// A point of the decay with C > 0.2, corrected for the drift, against the same.
-    Decay,
-}
-
-/// The error of one result.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Outcome {
-    /// Signal-to-noise ratio, dB.
-    pub snr: f64,
-    /// What it belongs to.
-    pub kind: Kind,
-    /// Name of the quantity.
-    pub quantity: &'static str,
-    /// Value less exact value.
-    pub error: f64,
-    /// Standard uncertainty.
-    pub uncertainty: f64,
-    /// Cramér–Rao bound of the standard deviation; absent where it is not known in closed form.
-    pub bound: Option<f64>,
-}
 
 /// All outcomes, and what failed.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -104,8 +35,30 @@ pub struct Calibration {
     pub runs: u64,
     /// The errors.
     pub outcomes: Vec<Outcome>,
-    /// Messages of the runs, or parts of runs, that failed, and tracked points that had not settled.
-    pub failures: Vec<String>,
+    /// Results that are missing.
+    pub missing: Vec<Missing>,
+}
+
+/// What was not measured, or had not settled.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Missing {
+    /// Signal-to-noise ratio, dB.
+    pub snr: f64,
+    /// What is missing.
+    pub what: Part,
+    /// Seed of the noise, and the reason.
+    pub message: String,
+}
+
+/// A part of a run.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Part {
+    /// The lock and the decay.
+    Lock,
+    /// The levels from the one at which tracking ended early.
+    Levels,
+    /// A tracked point that has not settled.
+    Settled,
 }
 
 /// The plant with a log of what ideal sensors read.
@@ -175,7 +128,7 @@ pub fn calibrate(
             let mut all = found.lock().unwrap_or_else(PoisonError::into_inner);
             all.runs += 1;
             all.outcomes.extend(run.outcomes);
-            all.failures.extend(run.failures);
+            all.missing.extend(run.missing);
             progress(all.runs);
         }
     };
@@ -190,18 +143,21 @@ pub fn calibrate(
 /// One run: a lock with its decay, and a tracked backbone.
 fn run(scene: &Scene, snr: f64, curve: &ExactCurve) -> Calibration {
     let mut run = Calibration::default();
-    let results = locked(scene, snr, curve).and_then(|outcomes| {
-        run.outcomes.extend(outcomes);
-        tracked(scene, snr, curve)
-    });
-    match results {
-        Ok((outcomes, unsettled)) => {
+    let missing = |what, message: &dyn std::fmt::Display| Missing {
+        snr,
+        what,
+        message: format!("{snr} dB, seed {}: {message}", scene.chain.seed),
+    };
+    match locked(scene, snr, curve) {
+        Ok(outcomes) => run.outcomes.extend(outcomes),
+        Err(error) => run.missing.push(missing(Part::Lock, &error)),
+    }
+    match tracked(scene, snr, curve) {
+        Ok((outcomes, lost)) => {
             run.outcomes.extend(outcomes);
-            run.failures.extend(unsettled);
+            run.missing.extend(lost.iter().map(|(what, why)| missing(*what, why)));
         }
-        Err(error) => run
-            .failures
-            .push(format!("{snr} dB, seed {}: {error}", scene.chain.seed)),
+        Err(error) => run.missing.push(missing(Part::Levels, &error)),
     }
     run
 }
@@ -234,7 +190,17 @@ fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, R
         .iter()
         .min_by(|a, b| distance(a).total_cmp(&distance(b)))
         .ok_or("no exact orbit at this G")?;
-    let outcome = |kind, quantity, error, uncertainty| Outcome { snr, kind, quantity, error, uncertainty, bound: None };
+    let epsilon = scene.dimensionless().epsilon;
+    let outcome = |kind, quantity, error, uncertainty| Outcome {
+        epsilon,
+        snr,
+        c: lock.c,
+        kind,
+        quantity,
+        error,
+        uncertainty,
+        bound: None,
+    };
     let mut outcomes = vec![
         outcome(Kind::Lock, "sigma", lock.sigma - exact.sigma, lock.u_sigma),
         outcome(Kind::Lock, "C", lock.c - exact.c, lock.u_c),
@@ -247,7 +213,8 @@ fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, R
     for point in found.decay.points.iter().filter(|point| point.c > COMPARED_ABOVE) {
         if let (Some(sigma), Some(u), Some([exact, _])) = (point.sigma_steady, point.u_sigma_steady, curve.at(point.c))
         {
-            outcomes.push(outcome(Kind::Decay, "sigma", sigma - exact, u));
+            let outcome = outcome(Kind::Decay, "sigma", sigma - exact, u);
+            outcomes.push(Outcome { c: point.c, ..outcome });
         }
     }
     Ok(outcomes)
@@ -260,17 +227,18 @@ fn with_ideal_sensors(mut record: Record, log: &Log) -> Record {
     record
 }
 
-fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<(Vec<Outcome>, Vec<String>), RunError> {
+/// Outcomes of the settled points, and what is missing.
+type TrackedOutcomes = (Vec<Outcome>, Vec<(Part, String)>);
+
+fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<TrackedOutcomes, RunError> {
     let log = Log::default();
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let found = track(&mut chained(scene, &log)?, &mut controller, scene, |_, _| {})?;
-    let (mut outcomes, mut unsettled) = (Vec::new(), Vec::new());
+    let ended = found.ended.map(|why| (Part::Levels, why));
+    let (mut outcomes, mut missing) = (Vec::new(), Vec::from_iter(ended));
     for point in &found.points {
         let Some([sigma, g]) = curve.at(point.c).filter(|_| point.settled) else {
-            unsettled.push(format!(
-                "{snr} dB, seed {}: not settled at C = {:.3}",
-                scene.chain.seed, point.level
-            ));
+            missing.push((Part::Settled, format!("not settled at C = {:.3}", point.level)));
             continue;
         };
         // Frequency and growth of a sinusoid of unknown amplitude and phase in white noise (Rife and Boorstyn, 1974).
@@ -280,7 +248,9 @@ fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<(Vec<Outcome>,
             ratio * (24.0 / (scene.controller.samples_per_period * periods)).sqrt() / (std::f64::consts::TAU * periods);
         let slope = slope / scene.dimensionless().epsilon;
         let outcome = |quantity, error, uncertainty, bound| Outcome {
+            epsilon: scene.dimensionless().epsilon,
             snr,
+            c: point.c,
             kind: Kind::Tracked,
             quantity,
             error,
@@ -290,43 +260,5 @@ fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<(Vec<Outcome>,
         outcomes.push(outcome("sigma", point.sigma - sigma, point.u_sigma, slope));
         outcomes.push(outcome("G", point.g - g, point.u_g, 2.0 * point.c * slope));
     }
-    Ok((outcomes, unsettled))
-}
-
-/// Statistics of the outcomes of one quantity.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Coverage {
-    /// Number of results.
-    pub count: usize,
-    /// Share of the results whose 95 % interval contains the exact value.
-    pub covered: f64,
-    /// Largest error over its standard uncertainty.
-    pub worst: f64,
-    /// RMS error.
-    pub rms: f64,
-    /// RMS of the Cramér–Rao bounds; absent where they are not known.
-    pub bound: Option<f64>,
-}
-
-/// Half width of a 95 % interval, standard uncertainties.
-pub const HALF_WIDTH: f64 = 1.96;
-
-impl Coverage {
-    /// Of some outcomes; shares of none are NaN.
-    #[must_use]
-    pub fn of<'a>(outcomes: impl Iterator<Item = &'a Outcome> + Clone) -> Self {
-        let count = outcomes.clone().count();
-        let pulls = outcomes.clone().map(|one| one.error.abs() / one.uncertainty);
-        let square = |values: &mut dyn Iterator<Item = f64>| {
-            (values.map(|value| value * value).sum::<f64>() / count as f64).sqrt()
-        };
-        let bounds: Option<Vec<f64>> = outcomes.clone().map(|one| one.bound).collect();
-        Self {
-            count,
-            covered: pulls.clone().filter(|pull| *pull <= HALF_WIDTH).count() as f64 / count as f64,
-            worst: pulls.fold(0.0, f64::max),
-            rms: square(&mut outcomes.map(|one| one.error)),
-            bound: bounds.map(|bounds| square(&mut bounds.into_iter())),
-        }
-    }
+    Ok((outcomes, missing))
 }

@@ -2,13 +2,15 @@
 //!
 //! It follows the state of the controller: a controller that switches the drive off ends the experiment at once.
 
-use std::fmt::Write;
+mod record;
 
 use thiserror::Error;
 
-use crate::rig::{Command, Controller, ControllerError, Drive, Fault, GroundTruth, LoopState, Rig, RigError, Sensors};
+use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Rig, RigError};
 use crate::scene::Scene;
 use vines_model::theory::{B_SYMMETRY_BREAKING, BackbonePoint, SlowFlow};
+
+pub use record::{Record, Sample, drive_phases, table};
 
 /// Durations of the stages, in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,79 +72,6 @@ pub enum Stage {
     Holding,
     /// The drive is off.
     Decaying,
-}
-
-/// One sample of the record.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Sample {
-    /// Time, s.
-    pub time: f64,
-    /// What the sensors read.
-    pub sensors: Sensors,
-    /// Output of the controller: the drive from this sample to the next.
-    pub command: Command,
-    /// The ground truth of a simulated rig.
-    pub ground_truth: Option<GroundTruth>,
-}
-
-/// The samples as a table (CSV): what a run that ended early has measured.
-#[must_use]
-pub fn table(samples: &[Sample]) -> String {
-    let mut text = String::from("time,response,reference,omega,E,phase_error,state,fault\n");
-    for Sample { time, sensors, command, .. } in samples {
-        let Drive { omega, amplitude, .. } = command.drive;
-        let reference = sensors.reference.map_or_else(String::new, |value| value.to_string());
-        let state = command
-            .state
-            .map_or_else(String::new, |state| (state as u8).to_string());
-        let fault = command.fault.map_or(0, |fault| fault as u8);
-        let response = sensors.response;
-        // Writing to a string cannot fail.
-        let _ = writeln!(
-            text,
-            "{time},{response},{reference},{omega},{amplitude},{},{state},{fault}",
-            command.phase_error
-        );
-    }
-    text
-}
-
-/// Phases of the drive at the samples, rad, from `start` at the first.
-#[must_use]
-pub fn drive_phases(samples: &[Sample], sample_time: f64, start: f64) -> Vec<f64> {
-    let advance = |phase: &mut f64, sample: &Sample| {
-        let now = *phase;
-        *phase += sample.command.drive.omega * sample_time;
-        Some(now)
-    };
-    samples.iter().scan(start, advance).collect()
-}
-
-/// Everything that was measured.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Record {
-    /// Time from sample to sample, s.
-    pub sample_time: f64,
-    /// The samples, from the start on.
-    pub samples: Vec<Sample>,
-    /// Index of the sample at which the lock had settled.
-    pub settled: usize,
-    /// Index of the first sample with the drive off.
-    pub released: usize,
-}
-
-impl Record {
-    /// The samples between the settled lock and the release.
-    #[must_use]
-    pub fn hold(&self) -> &[Sample] {
-        &self.samples[self.settled..self.released]
-    }
-
-    /// The samples from the release on.
-    #[must_use]
-    pub fn decay(&self) -> &[Sample] {
-        &self.samples[self.released..]
-    }
 }
 
 /// Why an experiment ended early.

@@ -32,5 +32,5 @@ pub use modulation::{ImpactSequence, Modulation};
 pub use resonance::{free_sigma, resonant};
 pub use response::ResponsePoint;
 pub use slow_flow::{Coefficients, SlowFlow};
-pub use stability::{B_SYMMETRY_BREAKING, half_period_map, impacts_stable};
+pub use stability::{B_SYMMETRY_BREAKING, half_period_map, half_period_multipliers, impacts_stable};
 pub use waveform::{Waveform, triangle_wave};

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::calibration::{self, Calibration, Coverage, Kind, OTHER_RIGS, RATIOS, RIGS};
+use vines::calibration::{self, Calibration, Coverage, Kind, OTHER_RIGS, Part, RATIOS, RIGS};
 use vines::report::{self, Table};
 use vines::scene::Scene;
 
@@ -59,8 +59,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         return json(&found.outcomes);
     }
     Ok(format!(
-        "{}\n{}\n{}",
+        "{}\n{}\n{}\n{}",
         table(&found).markdown(),
+        missing(&found).markdown(),
         totals(&found),
         written(&files)
     ))
@@ -108,15 +109,33 @@ const QUANTITIES: [(Kind, &str, &str); 8] = [
     (Kind::Decay, "sigma", "decay: sigma, corrected"),
 ];
 
+/// Number of results without a value, for each ratio.
+fn missing(found: &Calibration) -> Table {
+    let rows = RATIOS.map(|snr| {
+        let count = |what| {
+            let missing = found.missing.iter();
+            missing
+                .filter(|one| one.snr == snr && one.what == what)
+                .count()
+                .to_string()
+        };
+        [
+            format!("{snr} dB"),
+            count(Part::Lock),
+            count(Part::Levels),
+            count(Part::Settled),
+        ]
+    });
+    Table::new(["noise", "no lock", "tracking ended early", "points not settled"]).rows(rows)
+}
+
 fn totals(found: &Calibration) -> String {
     let all = Coverage::of(found.outcomes.iter());
-    let unsettled = found.failures.len();
-    let first = found
-        .failures
-        .first()
-        .map_or(String::new(), |first| format!(", the first: {first}"));
+    let first = found.missing.first().map_or(String::new(), |first| {
+        format!(". Missing, for example: {}", first.message)
+    });
     format!(
-        "{} runs, {} results: {:.1} % covered, worst error {:.1} standard uncertainties; {unsettled} points or runs without a result{first}\n",
+        "{} runs, {} results: {:.1} % covered, worst error {:.1} standard uncertainties{first}\n",
         found.runs,
         all.count,
         100.0 * all.covered,

@@ -30,6 +30,8 @@ pub struct Slopes {
     pub omega: [f64; 2],
     /// Changes of `E_R` and `omega_R` per rate of change of the amplitude, because the impacts follow it late: s and rad/m.
     pub drift: [f64; 2],
+    /// Second derivatives of `E_R`, 1/m, and `omega_R`, rad/(s m²), over the amplitude; 0 where they are not known.
+    pub curvature: [f64; 2],
 }
 
 /// The two lines, fitted to some periods.
@@ -39,6 +41,8 @@ pub struct Balance {
     pub periods: usize,
     /// Mean amplitude of the response, m.
     pub response: Estimate,
+    /// Standard uncertainty of the amplitude, m, that drive and frequency belong to: its noise within the integrals.
+    pub u_level: f64,
     /// Mean phase error, rad.
     pub phase_error: Estimate,
     /// Mean amplitude of the base, m.
@@ -47,6 +51,10 @@ pub struct Balance {
     pub excess: f64,
     /// g.
     gain: f64,
+    /// Variance of the amplitude within the periods, m², and the curvatures of the backbone.
+    bend: (f64, [f64; 2]),
+    /// Measured over commanded amplitude of the base.
+    calibration: f64,
     /// Coefficients: constant, time, and integral of the amplitude's deviation.
     drive: Regression,
     turning: Regression,
@@ -58,6 +66,8 @@ pub struct Balance {
 
 /// Size of the neglected terms relative to those of the second order.
 const REMAINDER: f64 = 0.7;
+/// A slope weighs integrated noise by a parabola, whose variance is this multiple of that of a mean.
+const PARABOLA: f64 = 1.2;
 /// Relative uncertainty of the effect of a drift of the amplitude.
 const LATE: f64 = 0.15;
 
@@ -80,11 +90,13 @@ impl Balance {
         let noise = noise.max(1e-14 * response);
         let middle = mean(cycles.iter().map(|cycle| cycle.time));
         let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
+        let spread = mean(motion.iter().map(|one| (one.0 - response).powi(2)));
+        let bend = ((spread - noise * noise).max(0.0), slopes.curvature);
         let deviation = integral(&time, motion.iter().map(|one| one.0 - response));
         let columns = [vec![1.0; cycles.len()], time, deviation];
-        let drives = drives(cycles);
-        // The integral of A' is A.
-        // Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
+        let calibration = total(cycles, |cycle| cycle.base.norm()) / total(cycles, |cycle| cycle.commanded[0].norm());
+        let drives = drives(cycles, calibration);
+        // The integral of A' is A. Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
         let [late, turned] = [1.0 + gain * slopes.drift[0], slopes.drift[1]];
         let balanced = motion.into_iter().zip(&drives).map(|((amplitude, phase), drive)| {
@@ -99,28 +111,27 @@ impl Balance {
         let [slope, width] = slopes.base;
         let drive = Regression::fit(&columns, &amplitudes, &prior([-gain * slope, gain * width]), noise)?;
         let turning = Regression::fit(&columns, &phases, &prior(slopes.omega), noise / response)?;
-        // The terms beyond these are as large as a share of them.
-        let slope = |values: Vec<f64>| Line::fit(&values).slope * n / (cycles[cycles.len() - 1].time - cycles[0].time);
-        let inertial = REMAINDER * inertia * slope(drives.iter().map(|drive| drive.force.re).collect());
-        let drift = LATE * slope(cycles.iter().map(Cycle::amplitude).collect());
-        let remainders = [
-            (inertial / gain).hypot(drift * slopes.drift[0]),
-            (inertial / response).hypot(drift * slopes.drift[1]),
-        ];
+        let remainders = remainders(cycles, &drives, [inertia, gain, response], slopes.drift);
         let phase_noise = (noise / response).hypot(base_noise / base);
         let excess = drive.excess.max(turning.excess);
         let of = |value: f64, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
         Some(Self {
             periods: cycles.len(),
             response: of(response, noise),
+            u_level: noise * (PARABOLA / n).sqrt(),
             phase_error: of(phase_error, phase_noise),
             base: of(base, base_noise),
             excess,
             gain,
+            bend,
+            calibration,
             drive,
             turning,
             remainders,
-            within: [base_noise / n.sqrt(), gain * base / response * phase_noise / n.sqrt()],
+            within: [
+                base_noise / n.sqrt(),
+                gain * base / response * phase_noise * (PARABOLA / n).sqrt(),
+            ],
         })
     }
 
@@ -144,30 +155,41 @@ impl Balance {
         ]
     }
 
-    /// Distance, m, from the mean amplitude to the one that the base amplitude `base`, m, holds at phase resonance.
+    /// Frequency, rad/s, and amplitude, m, that a constant base of the commanded amplitude `command`, m, leads to.
+    ///
+    /// The base sensor calibrates both this base and the drive that it is compared with; its noise cancels.
     #[must_use]
-    pub fn ahead(&self, base: f64) -> f64 {
-        (base - self.at(0.0)[0].value) / self.slopes()[0].value
-    }
-
-    /// Frequency, rad/s, and amplitude, m, that a constant base amplitude leads to.
-    #[must_use]
-    pub fn limit(&self, base: Estimate) -> [Estimate; 2] {
-        let ahead = self.ahead(base.value);
-        let [drive, turning] = self.at(ahead);
+    pub fn limit(&self, command: f64) -> [Estimate; 2] {
         let [by_base, by_omega] = self.slopes().map(|slope| slope.value);
+        let ahead = (command * self.calibration - self.at(0.0)[0].value) / by_base;
+        let drive = self.drive.estimate(&[0.0, 1.0, ahead]).scaled(1.0 / self.gain);
+        // The backbone is not straight from the amplitudes measured to the limit.
+        let (spread, curvature) = self.bend;
+        let bent = curvature.map(|curvature| 0.5 * curvature * (ahead * ahead + spread));
         // The uncertainty of the slope is in that of the drive at the limit.
         let limit = Estimate::new(
             self.response.value + ahead,
-            &[
-                self.response.uncertainty,
-                drive.uncertainty / by_base,
-                base.uncertainty / by_base,
-            ],
+            &[self.u_level, drive.uncertainty / by_base, bent[0] / by_base],
         );
+        let turning = self.at(ahead)[1];
         let change = by_omega * limit.uncertainty;
-        [Estimate::new(turning.value, &[turning.uncertainty, change]), limit]
+        [
+            Estimate::new(turning.value, &[turning.uncertainty, change, bent[1]]),
+            limit,
+        ]
     }
+}
+
+/// Sizes of the terms beyond those of the second order and beyond the drift: a share of them.
+fn remainders(cycles: &[Cycle], drives: &[Drive], [inertia, gain, response]: [f64; 3], late: [f64; 2]) -> [f64; 2] {
+    let duration = cycles[cycles.len() - 1].time - cycles[0].time;
+    let slope = |values: Vec<f64>| Line::fit(&values).slope * cycles.len() as f64 / duration;
+    let inertial = REMAINDER * inertia * slope(drives.iter().map(|drive| drive.force.re).collect());
+    let drift = LATE * slope(cycles.iter().map(Cycle::amplitude).collect());
+    [
+        (inertial / gain).hypot(drift * late[0]),
+        (inertial / response).hypot(drift * late[1]),
+    ]
 }
 
 /// Integral over time from the first value on, by the trapezoidal rule.
@@ -193,9 +215,11 @@ struct Drive {
     work: Complex<f64>,
 }
 
-fn drives(cycles: &[Cycle]) -> Vec<Drive> {
-    let total = |value: fn(&Cycle) -> f64| cycles.iter().map(value).sum::<f64>();
-    let gain = total(|cycle| cycle.base.norm()) / total(|cycle| cycle.commanded[0].norm());
+fn total(cycles: &[Cycle], value: fn(&Cycle) -> f64) -> f64 {
+    cycles.iter().map(value).sum()
+}
+
+fn drives(cycles: &[Cycle], calibration: f64) -> Vec<Drive> {
     let relative = |cycle: &Cycle| {
         let turned = cycle.response[0] * cycle.commanded[0].conj();
         turned / turned.norm()
@@ -211,7 +235,7 @@ fn drives(cycles: &[Cycle]) -> Vec<Drive> {
         .map(|cycle| {
             let [middle, change] = cycle.commanded;
             let growth = (change * middle.conj()).re / middle.norm();
-            let share = relative(cycle) * turn / turn.norm() * gain;
+            let share = relative(cycle) * turn / turn.norm() * calibration;
             let before = sum;
             sum += share * cycle.duration * middle.norm();
             Drive {

@@ -1,6 +1,6 @@
 //! The backbone along the free decay: a window slides from the release to the loss of synchrony.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
 use serde::Serialize;
@@ -12,7 +12,7 @@ use crate::experiment::{Record, Sample};
 use crate::scene::{Dimensionless, Estimator, Scene};
 use vines_model::numerics::{Estimate, mean};
 use vines_model::regime::end_of_synchrony;
-use vines_model::theory::{BranchSide, SlowFlow};
+use vines_model::theory::{BranchSide, SlowFlow, half_period_multipliers};
 
 /// One point along the decay; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -29,7 +29,7 @@ pub struct DecayPoint {
     pub sigma: f64,
     /// Rate of change of the amplitude, `dC/dtau`.
     pub rate: f64,
-    /// Detuning of the steady motion of the same amplitude: sigma less the effect of the drift; absent at the fold and below.
+    /// Detuning of the steady motion of the same amplitude: sigma less the effect of the drift; absent near the fold and below.
     pub sigma_steady: Option<f64>,
     /// Standard uncertainty of C.
     #[serde(rename = "u_C")]
@@ -65,8 +65,6 @@ pub struct DecayPoints {
 
 /// Points per period along the decay.
 const PER_PERIOD: f64 = 8.0;
-/// Relative uncertainty of the correction for the drift: the next order.
-const CORRECTION: f64 = 0.1;
 
 /// The points along the decay of a record, up to the loss of synchrony where the rig reports impacts, otherwise to the fold.
 #[must_use]
@@ -79,7 +77,7 @@ pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
     };
     // Initial frequency: the command of the last held sample.
     let omega = record.hold().last().map_or(d.omega0, |s| s.command.drive.omega);
-    let half_period = std::f64::consts::PI / omega;
+    let half_period = PI / omega;
     let flow = SlowFlow::new(d.lambda, d.r);
     let has_impacts = first.ground_truth.is_some();
     let until = if has_impacts {
@@ -144,9 +142,7 @@ impl Piece {
             self.uncertainties[0] / d.b,
             Estimate::new(sigma, &[noise, bent]).uncertainty,
         ];
-        let correction = flow
-            .drift(c)
-            .map(|drift| drift.sigma * rate + second_order(flow, d, c, rate));
+        let correction = correction(flow, d, [c, rate], d.omega0 * self.time);
         let slope = backbone(c + u_c).zip(backbone(c)).map_or(0.0, |(after, at)| after - at);
         DecayPoint {
             tau: d.omega0 * self.time,
@@ -155,13 +151,39 @@ impl Piece {
             b: speeds.map(|speeds| d.speed(mean(speeds))),
             sigma,
             rate,
-            sigma_steady: correction.map(|by_drift| sigma - by_drift),
+            sigma_steady: correction.map(|by_drift| sigma - by_drift.value),
             u_c,
             u_sigma,
             u_sigma_steady: correction
-                .map(|by_drift| Estimate::new(sigma, &[u_sigma, slope, CORRECTION * by_drift]).uncertainty),
+                .map(|by_drift| Estimate::new(sigma, &[u_sigma, slope, by_drift.uncertainty]).uncertainty),
         }
     }
+}
+
+/// Effect of the drift `[C, dC/dtau]` on sigma, at `tau` since the release.
+///
+/// The particle follows a change with the multipliers of its map. The effect is therefore late by their delay, and is not complete soon
+/// after the release, where the drift begins. Both are parts of the uncertainty. `None` where the first is as large as the effect
+/// (towards the fold), because the series in the rate of the drift fails there.
+fn correction(flow: &SlowFlow, d: &Dimensionless, [c, rate]: [f64; 2], tau: f64) -> Option<Estimate> {
+    let by_drift = |c: f64, rate: f64| Some(flow.drift(c)?.sigma * rate + second_order(flow, d, c, rate));
+    let b = flow.manifold.b(c, BranchSide::Right)?;
+    let multipliers = half_period_multipliers(d.r, b);
+    let delay = multipliers
+        .map(|one| PI / (1.0 - one).norm())
+        .into_iter()
+        .fold(0.0, f64::max);
+    let slowest = multipliers.map(nalgebra::Complex::norm).into_iter().fold(0.0, f64::max);
+    // Along the decay, by first-order theory.
+    let effect = |c: f64| {
+        let b = flow.manifold.b(c, BranchSide::Right)?;
+        by_drift(c, -0.5 * d.epsilon * flow.backbone_at(b).g)
+    };
+    let step = 1e-3 * c;
+    let late = rate * delay * (effect(c + step)? - effect(c - step)?) / (2.0 * step);
+    let value = by_drift(c, rate)?;
+    let incomplete = value * slowest.min(1.0).powf(tau / PI);
+    (late.abs() < value.abs()).then(|| Estimate::new(value, &[late, incomplete]))
 }
 
 /// The change of sigma by `C''`: `C''/(2 epsilon C)` with `C'' = C' dC'/dC`, where `C' = -epsilon G/2` along the decay.

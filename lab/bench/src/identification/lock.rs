@@ -85,7 +85,8 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let slopes = slopes(scene, mean(held.iter().map(Cycle::amplitude)) / d.b);
     // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
-    let [omega, limit] = limits(&approach, d.omega0, base, &slopes)?;
+    let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
+    let [omega, limit] = limits(&approach, d.omega0, command, &slopes)?;
     let speeds: Option<Vec<f64>> = hold
         .iter()
         .map(|s| s.ground_truth.map(|w| d.speed(w.particle_velocity.abs())))
@@ -100,7 +101,11 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
         let value = Estimate::mean(&per_period);
         Estimate::new(
             value.value + b_slope * remaining,
-            &[value.uncertainty, b_slope * limit.uncertainty / d.b],
+            &[
+                value.uncertainty,
+                b_slope * limit.uncertainty / d.b,
+                b_slope * response.uncertainty / d.b,
+            ],
         )
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
@@ -129,8 +134,8 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
 ///
 /// The later periods are nearer to it, the longer record has less noise. Where the second half of the periods disagrees with all
 /// of them beyond the noise, the difference is a part of the uncertainty; the periods with the smallest uncertainty count.
-fn limits(approach: &[Cycle], omega0: f64, base: Estimate, slopes: &Slopes) -> Option<[Estimate; 2]> {
-    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, omega0, slopes)?.limit(base));
+fn limits(approach: &[Cycle], omega0: f64, command: f64, slopes: &Slopes) -> Option<[Estimate; 2]> {
+    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, omega0, slopes)?.limit(command));
     let mut best = limit(approach)?;
     let mut cycles = approach;
     let mut first = true;
@@ -189,21 +194,24 @@ fn slopes(scene: &Scene, c: f64) -> Slopes {
     let flow = SlowFlow::new(d.lambda, d.r);
     let at = |c: f64| flow.manifold.b(c, BranchSide::Right).map(|b| flow.backbone_at(b));
     let step = 1e-3 * c;
-    let ([g, sigma], drift) = match (at(c - step), at(c + step), flow.drift(c)) {
-        (Some(low), Some(high), Some(drift)) => {
+    let ([g, sigma], bend, drift) = match (at(c - step), at(c), at(c + step), flow.drift(c)) {
+        (Some(low), Some(middle), Some(high), Some(drift)) => {
             let slope = |low: f64, high: f64| (high - low) / (2.0 * step);
+            let bend = |low: f64, middle: f64, high: f64| (low - 2.0 * middle + high) / (step * step);
             (
                 [slope(low.g, high.g), slope(low.sigma, high.sigma)],
+                [bend(low.g, middle.g, high.g), bend(low.sigma, middle.sigma, high.sigma)],
                 [drift.g, drift.sigma],
             )
         }
-        _ => ([d.lambda, 0.0], [0.0; 2]),
+        _ => ([d.lambda, 0.0], [0.0; 2], [0.0; 2]),
     };
     let pair = |slope: f64| [slope, SLOPE * slope.abs() + 0.1];
     Slopes {
         base: pair(g).map(|g| d.amplitude(g) / d.b),
         omega: pair(sigma).map(|sigma| d.omega_change(sigma) / d.b),
         drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
+        curvature: [d.amplitude(bend[0]), d.omega_change(bend[1])].map(|bend| bend / (d.b * d.b)),
     }
 }
 

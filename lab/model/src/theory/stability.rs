@@ -2,6 +2,8 @@
 
 use std::f64::consts::PI;
 
+use nalgebra::Complex;
+
 use super::manifold::Manifold;
 
 /// Above this particle speed, `2 pi/(pi^2 - 4)`, the orbit loses its symmetry, whatever r (docs/theory.md, eq. 10).
@@ -13,6 +15,14 @@ pub const B_SYMMETRY_BREAKING: f64 = 2.0 * PI / (PI * PI - 4.0);
 pub fn half_period_map(r: f64, b: f64) -> [f64; 2] {
     let trace = 2.0 * r + (1.0 + r).powi(2) * (PI / (2.0 * b) - PI * PI / 4.0);
     [trace, r * r]
+}
+
+/// Multipliers of that map.
+#[must_use]
+pub fn half_period_multipliers(r: f64, b: f64) -> [Complex<f64>; 2] {
+    let [trace, determinant] = half_period_map(r, b);
+    let root = Complex::new(0.25 * trace * trace - determinant, 0.0).sqrt();
+    [0.5 * trace + root, 0.5 * trace - root]
 }
 
 /// The impacts keep their symmetric 1:1 pattern: `Bmin < B < 2 pi/(pi^2 - 4)` (eq. 10).

@@ -4,7 +4,7 @@ use plotters::chart::SeriesLabelPosition;
 
 use crate::calibration::{Calibration, Kind, Outcome};
 use crate::report::figure::{Axis, Figure, Panel, line};
-use crate::report::theme::{DECAY, EXACT, LOCK, THEORY};
+use crate::report::theme::{DECAY, EXACT, LOCK, UNSTABLE};
 
 /// Nominal levels, and the half widths of their intervals in standard uncertainties.
 const LEVELS: [(f64, f64); 11] = [
@@ -32,10 +32,10 @@ pub fn figure(found: &Calibration) -> Figure {
         &format!("{} runs at 40, 30 and 20 dB, three rigs", found.runs),
     )
     .legend(SeriesLabelPosition::LowerRight);
-    panel.dashed(vec![(0.0, 0.0), (1.0, 1.0)], line(EXACT, 12), "exact coverage");
+    panel.dashed(vec![(0.0, 0.0), (1.0, 1.0)], line(UNSTABLE, 12), "exact coverage");
     for (kind, colour, label) in [
         (Kind::Lock, LOCK, "lock"),
-        (Kind::Tracked, THEORY, "tracked, settled"),
+        (Kind::Tracked, EXACT, "tracked, settled"),
         (Kind::Decay, DECAY, "decay, corrected"),
     ] {
         let of_kind: Vec<&Outcome> = found.outcomes.iter().filter(|one| one.kind == kind).collect();

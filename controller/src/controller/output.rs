@@ -1,0 +1,33 @@
+//! The output of one sample.
+
+use super::PhaseLock;
+use crate::sensing::Measurement;
+use crate::signals::Output;
+use crate::state::State;
+use crate::supervisor::LoopState;
+
+impl PhaseLock {
+    pub(super) fn output(&self, state: &State, measured: &Measurement, drive: f64) -> Output {
+        let omega = state.frequency.omega;
+        let response_amplitude = state.channels.response.amplitude();
+        let means = state.dwell.means();
+        let (frequency, response_mean) = means.unwrap_or((omega, response_amplitude));
+        Output {
+            omega,
+            amplitude: state.drive.amplitude,
+            drive,
+            phase_error: measured.error,
+            response_amplitude,
+            response_target: state.amplitude_loop.map_or(0.0, |l| l.setpoint()),
+            reference_amplitude: measured.reference_amplitude,
+            coherence: state.channels.response.coherence(),
+            // Rounding can move the mean of values at a limit beyond the limit.
+            frequency: frequency.clamp(self.config.omega_min, self.config.omega_max),
+            response_mean,
+            locked: state.loop_state == LoopState::Locked,
+            settled: state.dwell.settled() && state.tuning == self.tuning(),
+            state: state.loop_state,
+            fault: state.fault,
+        }
+    }
+}

@@ -1,0 +1,57 @@
+//! The tracked backbone and its points.
+
+use serde::Serialize;
+
+use crate::identification::Regime;
+
+/// One point of the backbone; dimensionless.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Point {
+    /// Target level.
+    pub level: f64,
+    /// Amplitude of the fundamental of v.
+    #[serde(rename = "C")]
+    pub c: f64,
+    /// Detuning.
+    pub sigma: f64,
+    /// Base amplitude over `b epsilon`.
+    #[serde(rename = "G")]
+    pub g: f64,
+    /// Mean phase error, degrees.
+    pub phase_error_deg: f64,
+    /// Standard uncertainties of C, and of sigma and G at this C.
+    #[serde(rename = "u_C")]
+    pub u_c: f64,
+    /// See above.
+    pub u_sigma: f64,
+    /// See above.
+    #[serde(rename = "u_G")]
+    pub u_g: f64,
+    /// Standard uncertainty of the phase error, degrees.
+    pub u_phase_deg: f64,
+    /// Periods of the move to this level and at this level.
+    pub periods: f64,
+    /// Periods averaged.
+    pub averaged: usize,
+    /// The motion was steady within these uncertainties; otherwise the point was taken at the time limit.
+    pub settled: bool,
+    /// The response reached the level; otherwise the drive was at a limit, or the time too short.
+    pub reached: bool,
+    /// The regime determined from the response alone, as on a real rig.
+    pub regime: Regime,
+    /// The regime determined from the impacts, if the rig is a simulation.
+    pub regime_by_impacts: Option<Regime>,
+}
+
+/// The tracked backbone.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Tracked {
+    /// The points, in the order in which they were taken.
+    pub points: Vec<Point>,
+    /// Periods from the start to the closed loop.
+    pub periods_to_lock: f64,
+    /// All periods, from the start to the last point.
+    pub periods: f64,
+    /// Why tracking ended before the last level; absent if it did not.
+    pub ended: Option<String>,
+}
