@@ -161,13 +161,15 @@ impl Bench {
 
     fn step(&mut self, drive: Drive) -> Result<(), String> {
         let (impacts, phase) = (&mut self.impacts, self.phase);
-        let count = |event: Event| {
+        let mut count = |event: Event| {
             if let Event::Impact { t, velocity, .. } = event {
                 impacts.push(Impact { time: phase + drive.omega * t, velocity });
             }
         };
         let step = self.lock.config().sample_time;
-        self.rig.step(drive, step, count).map_err(|error| error.to_string())?;
+        self.rig
+            .step(drive, step, &mut count)
+            .map_err(|error| error.to_string())?;
         let surplus = self.impacts.len().saturating_sub(KEPT);
         self.impacts.drain(..surplus);
         self.phase += drive.omega * step;
@@ -191,7 +193,8 @@ impl Bench {
     pub fn between(&self, ahead: f64) -> Plant {
         let (mut plant, drive) = self.before;
         // The drive was accepted for the whole sample period; a shorter step cannot be refused.
-        let _ = plant.advance(lovines::Drive::harmonic(drive.amplitude, drive.omega), ahead.max(0.0));
+        let drive = lovines::Drive::harmonic(drive.amplitude, drive.omega);
+        let _ = plant.advance_with(drive, ahead.max(0.0), &mut (|_| {}) as &mut dyn FnMut(Event));
         plant
     }
 
@@ -200,7 +203,7 @@ impl Bench {
     pub fn first_impact(&self, later_than: f64) -> Option<(f64, Wall)> {
         let (mut plant, drive) = self.before;
         let mut first = None;
-        let note = |event: Event| {
+        let mut note = |event: Event| {
             if let Event::Impact { t, wall, .. } = event
                 && first.is_none()
                 && t > later_than
@@ -209,7 +212,13 @@ impl Bench {
             }
         };
         let drive = lovines::Drive::harmonic(drive.amplitude, drive.omega);
-        plant.advance_with(drive, self.lock.config().sample_time, note).ok()?;
+        plant
+            .advance_with(
+                drive,
+                self.lock.config().sample_time,
+                &mut note as &mut dyn FnMut(Event),
+            )
+            .ok()?;
         first
     }
 

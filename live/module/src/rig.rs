@@ -35,8 +35,8 @@ impl NoisyRig {
         }
     }
 
-    /// One sample period under a harmonic drive.
-    pub fn step(&mut self, drive: rig::Drive, step: f64, on_event: impl FnMut(Event)) -> Result<(), InvalidValue> {
+    /// One sample period under a harmonic drive. (One instance of the plant's code for all callers: it is most of the module.)
+    pub fn step(&mut self, drive: rig::Drive, step: f64, on_event: &mut dyn FnMut(Event)) -> Result<(), InvalidValue> {
         let drive = Drive::harmonic(drive.amplitude, drive.omega);
         self.plant.advance_with(drive, step, on_event)?;
         Ok(())
@@ -49,6 +49,6 @@ impl Rig for NoisyRig {
     }
 
     fn advance(&mut self, drive: rig::Drive, step: f64) -> Result<(), RigError> {
-        Ok(self.step(drive, step, |_| {})?)
+        Ok(self.step(drive, step, &mut |_| {})?)
     }
 }
