@@ -32,11 +32,11 @@ struct Steady {
 }
 
 impl Steady {
-    fn load(folder: &Path) -> Result<Self, String> {
+    fn load(folder: &Path) -> anyhow::Result<Self> {
         let scene = Scene::load(folder, "steady")?;
         let first = scene.steps[0];
         Ok(Self {
-            plant: Plant::new(scene.parameters, scene.state()).map_err(|e| e.to_string())?,
+            plant: Plant::new(scene.parameters, scene.state())?,
             drive: first.drive(),
             period: first.duration,
         })
@@ -64,7 +64,7 @@ impl Steady {
 ///
 /// # Errors
 /// An unknown name of what grows, or a scene that cannot be read.
-pub fn measure(folder: &Path, what: &str, budget: f64, most: f64) -> Result<Value, String> {
+pub fn measure(folder: &Path, what: &str, budget: f64, most: f64) -> anyhow::Result<Value> {
     let scene = Steady::load(folder)?;
     let mut points = Vec::new();
     let mut size = 10.0;
@@ -76,9 +76,7 @@ pub fn measure(folder: &Path, what: &str, budget: f64, most: f64) -> Result<Valu
             "samples per period" => timed(budget, || {
                 scene.step_by_step(PERIODS * count, scene.period / count as f64)
             }),
-            _ => {
-                return Err(format!("{what}: there are periods, impacts and samples per period"));
-            }
+            _ => anyhow::bail!("{what}: there are periods, impacts and samples per period"),
         };
         let grown = if what == "impacts" { work as f64 } else { count as f64 };
         points.push([grown, ns, work as f64]);

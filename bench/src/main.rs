@@ -64,22 +64,19 @@ enum Request {
     },
 }
 
-fn answer(folder: &Path, request: &str) -> Result<serde_json::Value, String> {
-    let wrong = |e: serde_json::Error| e.to_string();
-    match serde_json::from_str(request).map_err(wrong)? {
+fn answer(folder: &Path, request: &str) -> anyhow::Result<serde_json::Value> {
+    match serde_json::from_str(request)? {
         Request::Run { scene, method, setting, checks, budget, limit } => {
             let scene = Scene::load(folder, &scene)?;
             let (budget, limit) = (Duration::from_secs_f64(budget), Duration::from_secs_f64(limit));
             let answer = methods::measure_named(&method, &scene, setting, &checks, budget, limit)?;
-            serde_json::to_value(answer).map_err(wrong)
+            Ok(serde_json::to_value(answer)?)
         }
         Request::Growth { growth, budget, most } => growth::measure(folder, &growth, budget, most),
         Request::Profile { profile } => profile::of(&Scene::load(folder, &profile)?),
         Request::Record { record } => Ok(json!({"drives": closed_loop::record(record)})),
         Request::Loop { closed_loop, budget } => Ok(closed_loop::measure(closed_loop, budget)),
-        Request::Map { map_g, sigmas, effort } => {
-            serde_json::to_value(map::row(map_g, &sigmas, &effort)?).map_err(wrong)
-        }
+        Request::Map { map_g, sigmas, effort } => Ok(serde_json::to_value(map::row(map_g, &sigmas, &effort)?)?),
         Request::Methods { methods } => Ok(json!(methods.then_some(methods::NAMES))),
     }
 }
@@ -90,7 +87,7 @@ fn main() -> std::io::Result<()> {
         match map::terminal::run(&arguments[2..]) {
             Ok(text) => println!("{text}"),
             Err(error) => {
-                eprintln!("error: {error}");
+                eprintln!("error: {error:#}");
                 std::process::exit(2);
             }
         }
@@ -101,7 +98,7 @@ fn main() -> std::io::Result<()> {
         .unwrap_or_else(|| env!("CARGO_MANIFEST_DIR").into());
     for line in std::io::stdin().lock().lines() {
         let line = line?;
-        let answer = answer(Path::new(&folder), &line).unwrap_or_else(|error| json!({"error": error}));
+        let answer = answer(Path::new(&folder), &line).unwrap_or_else(|error| json!({"error": format!("{error:#}")}));
         let mut out = std::io::stdout().lock();
         writeln!(out, "{answer}")?;
         out.flush()?;

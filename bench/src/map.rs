@@ -8,6 +8,7 @@ mod cell;
 mod reference;
 pub mod terminal;
 
+use anyhow::anyhow;
 use serde::{Deserialize, Serialize};
 
 pub use cell::Cell;
@@ -60,7 +61,7 @@ pub struct Row {
 ///
 /// # Errors
 /// A frequency that is not positive, or a value that the plant does not accept.
-pub fn row(g: f64, sigmas: &[f64], effort: &Effort) -> Result<Row, String> {
+pub fn row(g: f64, sigmas: &[f64], effort: &Effort) -> anyhow::Result<Row> {
     let lock = Lock::settle()?;
     let mut begun = sigmas
         .iter()
@@ -114,11 +115,11 @@ impl Axis {
 }
 
 impl std::str::FromStr for Axis {
-    type Err = String;
+    type Err = anyhow::Error;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> anyhow::Result<Self> {
         let wrong = || {
-            format!(
+            anyhow!(
                 "`{text}` is not an axis; expected FIRST:LAST:POINTS (dimensionless) with 1 to 500 points, for instance -5:5:33"
             )
         };
@@ -168,7 +169,7 @@ mod tests {
     #[test]
     fn a_frequency_below_zero_is_refused() {
         let refused = row(1.0, &[-200.0], &short()).unwrap_err();
-        assert!(refused.contains("sigma = -200"), "{refused}");
+        assert!(refused.to_string().contains("sigma = -200"), "{refused}");
     }
 
     #[test]

@@ -44,7 +44,7 @@ pub fn measure_named(
     checks: &[usize],
     budget: Duration,
     limit: Duration,
-) -> Result<Answer, String> {
+) -> anyhow::Result<Answer> {
     let measure = match name {
         "plant" => measure::<plant::AsAsked>,
         "plant-one-step" => measure::<plant::OneStep>,
@@ -58,9 +58,7 @@ pub fn measure_named(
         "diffsol-tsit45" => measure::<diffsol::Tsit45>,
         #[cfg(feature = "diffsol")]
         "diffsol-bdf" => measure::<diffsol::Bdf>,
-        _ => {
-            return Err(format!("there is no method {name}; there are {}", NAMES.join(", ")));
-        }
+        _ => anyhow::bail!("there is no method {name}; there are {}", NAMES.join(", ")),
     };
     Ok(measure(scene, setting, checks, budget, limit))
 }

@@ -10,8 +10,8 @@ use crate::scene::Scene;
 ///
 /// # Errors
 /// A scene that the plant refuses.
-pub fn of(scene: &Scene) -> Result<Value, String> {
-    let mut plant = begin(scene).map_err(|failure| failure.0)?;
+pub fn of(scene: &Scene) -> anyhow::Result<Value> {
+    let mut plant = begin(scene).map_err(|failure| anyhow::anyhow!(failure.0))?;
     let (mut empty, mut at_rest, mut whole) = (0u64, 0.0, 0.0);
     for step in &scene.steps {
         // Since when, in this step, the particle has been on a wall.
@@ -21,7 +21,7 @@ pub fn of(scene: &Scene) -> Result<Value, String> {
             Event::Released { t, .. } => at_rest += t - since.take().unwrap_or(t),
             Event::Impact { .. } => {}
         });
-        let outcome = outcome.map_err(|error| error.to_string())?;
+        let outcome = outcome?;
         at_rest += since.map_or(0.0, |since| step.duration - since);
         whole += step.duration;
         empty += u64::from(outcome.impacts == 0);

@@ -1,5 +1,6 @@
 //! The scenes, as scenes.json and loop.json have them.
 
+use anyhow::Context;
 use std::path::Path;
 
 use lovines::{Drive, Parameters, State};
@@ -58,15 +59,15 @@ impl Scene {
     ///
     /// # Errors
     /// A file that cannot be read, or a scene that is not in it.
-    pub fn load(folder: &Path, name: &str) -> Result<Self, String> {
+    pub fn load(folder: &Path, name: &str) -> anyhow::Result<Self> {
         let read = |file: &str| {
             let path = folder.join(file);
-            std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))
+            std::fs::read_to_string(&path).with_context(|| path.display().to_string())
         };
-        let wrong = |e: serde_json::Error| format!("{name}: {e}");
-        let all: serde_json::Value = serde_json::from_str(&read("scenes.json")?).map_err(wrong)?;
-        let written = all.get(name).ok_or_else(|| format!("there is no scene {name}"))?;
-        let scene: Written = serde_json::from_value(written.clone()).map_err(wrong)?;
+        let wrong = || format!("scene {name}");
+        let all: serde_json::Value = serde_json::from_str(&read("scenes.json")?).with_context(wrong)?;
+        let written = all.get(name).with_context(|| format!("there is no scene {name}"))?;
+        let scene: Written = serde_json::from_value(written.clone()).with_context(wrong)?;
         let steps = match &scene.drives {
             None => {
                 let step = Step {
@@ -77,7 +78,7 @@ impl Scene {
                 vec![step; scene.steps]
             }
             Some(file) => {
-                let drives: Vec<[f64; 2]> = serde_json::from_str(&read(file)?).map_err(wrong)?;
+                let drives: Vec<[f64; 2]> = serde_json::from_str(&read(file)?).with_context(wrong)?;
                 let step = |[amplitude, omega]: [f64; 2]| Step { amplitude, omega, duration: scene.step };
                 drives.into_iter().map(step).collect()
             }

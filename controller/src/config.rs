@@ -23,11 +23,11 @@ pub enum Detector {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LockCriterion {
-    /// Largest phase error that counts as locked, mean over a period, rad.
+    /// Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
     pub phase_tolerance: f64,
     /// Phase error, mean over a period, above which the lock is lost, rad; at least `phase_tolerance`.
     pub unlock_tolerance: f64,
-    /// Largest relative drift of the frequency per period.
+    /// Largest relative drift of the frequency per period; where noise is larger than such a drift, the noise is accepted.
     pub frequency_drift: f64,
     /// Largest relative drift of the response amplitude per period.
     pub amplitude_drift: f64,
@@ -66,18 +66,17 @@ pub struct Config {
     pub omega_min: f64,
     /// Highest frequency, rad/s.
     pub omega_max: f64,
-    /// Largest rate of change of the frequency, rad/s²; 0: no limit.
-    pub omega_rate: f64,
+    /// Largest rate of change of the frequency, rad/s².
+    pub omega_rate: Option<f64>,
     /// Setpoint of the drive amplitude, m; tunable.
     pub amplitude: f64,
-    /// Largest drive amplitude, m; 0: no limit.
-    pub amplitude_max: f64,
-    /// Duration of a drive ramp from 0 to `amplitude`, s, and of the ramp down after a fault; 0: step change. While the
-    /// response amplitude is controlled, the drive changes no faster either.
-    pub ramp_time: f64,
-    /// Duration of the drive ramp from `amplitude` to 0 after `active` becomes false, s; 0: switch off at once, as a
-    /// free decay requires.
-    pub release_time: f64,
+    /// Largest drive amplitude, m.
+    pub amplitude_max: Option<f64>,
+    /// Largest rate of change of the drive amplitude, m/s, in every ramp but the release: at the start, after a fault, to a new
+    /// setpoint, and while the response amplitude is controlled. `None`: step changes.
+    pub ramp_rate: Option<f64>,
+    /// Rate of the drive ramp to 0 after `active` becomes false, m/s. `None`: switched off at once, as a free decay requires.
+    pub release_rate: Option<f64>,
     /// Bandwidth of the control of the *measured* base amplitude, rad/s; 0: no control, for a shaker whose gain is known.
     pub base_bandwidth: f64,
     /// Setpoint of the phase of the response relative to the reference, rad; tunable.
@@ -101,17 +100,29 @@ pub struct Config {
     /// through its base: half the natural frequency in rad/s. Used only by
     /// [`PhaseLock::hold_response`](crate::PhaseLock::hold_response).
     pub response_gain: f64,
+    /// How much faster the response approaches its steady state than under a constant drive: `1 + approach_gain` times. The
+    /// drive is shaped until the lock criterion is met, and constant from then on; 0: always constant.
+    pub approach_gain: f64,
+    /// Response amplitude, m, at which impacts certainly occur. The response rises to it before the drive goes to its setpoint, so
+    /// that a particle at rest joins the motion. `None`: the drive goes to its setpoint at once.
+    pub capture_response: Option<f64>,
     /// Lock criterion.
     pub lock: LockCriterion,
-    /// Reading of the response sensor above which the drive is switched off, m; 0: no limit.
-    pub response_max: f64,
-    /// Longest time from the end of the ramp to the lock, s; 0: no limit.
-    pub acquire_timeout: f64,
+    /// Reading of the response sensor above which the drive is switched off, m.
+    pub response_max: Option<f64>,
+    /// Longest time from the end of the ramp to the lock, s. The time in which [`PhaseLock::hold_response`](crate::PhaseLock::hold_response)
+    /// controls the response does not count.
+    pub acquire_timeout: Option<f64>,
+    /// Longest time in the closed loop without a valid measurement, s: with too small an amplitude or too much noise.
+    pub signal_timeout: Option<f64>,
+    /// Whether a sensor measures the base. Without it the internal oscillator with the configured `delay` is the reference.
+    pub reference_connected: bool,
 }
 
 impl Config {
     /// Suitable initial values for a structure with a resonance near `omega` (rad/s) and a base amplitude in m:
-    /// 100 samples per period, ±20 % of frequency, a bandwidth of a tenth of `omega`, no ramps, no limits and no time-out.
+    /// 100 samples per period, ±20 % of frequency, a bandwidth of a tenth of `omega`, no ramps, at most four times the base
+    /// amplitude, and 2000 periods for the lock. Only the limit of the response must be set.
     #[must_use]
     pub fn for_resonance(omega: f64, amplitude: f64) -> Self {
         Self {
@@ -119,11 +130,11 @@ impl Config {
             omega_start: omega,
             omega_min: 0.8 * omega,
             omega_max: 1.2 * omega,
-            omega_rate: 0.0,
+            omega_rate: None,
             amplitude,
-            amplitude_max: 0.0,
-            ramp_time: 0.0,
-            release_time: 0.0,
+            amplitude_max: Some(4.0 * amplitude),
+            ramp_rate: None,
+            release_rate: None,
             base_bandwidth: 0.0,
             phase_target: -FRAC_PI_2,
             detector: Detector::Adaptive,
@@ -133,18 +144,18 @@ impl Config {
             damping_rate: 0.0,
             delay: 0.0,
             response_gain: 0.5 * omega,
+            approach_gain: 0.0,
+            capture_response: None,
             lock: LockCriterion::default(),
-            response_max: 0.0,
-            acquire_timeout: 0.0,
+            response_max: None,
+            acquire_timeout: Some(2000.0 * TAU / omega),
+            signal_timeout: Some(20.0 * TAU / omega),
+            reference_connected: true,
         }
     }
 
     /// Largest drive amplitude, m; infinite without a limit.
     pub(crate) fn amplitude_limit(&self) -> f64 {
-        if self.amplitude_max > 0.0 {
-            self.amplitude_max
-        } else {
-            f64::INFINITY
-        }
+        self.amplitude_max.unwrap_or(f64::INFINITY)
     }
 }

@@ -1,16 +1,19 @@
 //! The controller: one function per sample.
 
 use crate::amplitude_loop::{AmplitudeLoop, AmplitudeState, Move};
+use crate::approach::{Approach, ApproachState};
+use crate::capture::{Capture, CaptureState, Observation};
 use crate::config::Config;
 use crate::drive::Drive;
 use crate::error::{ConfigError, Quantity};
 use crate::gains::Gains;
 use crate::loop_filter::LoopFilter;
+use crate::range::NONE;
 use crate::sensing::{Measurement, PresentDrive, Sensing};
 use crate::signals::{Input, Output};
 use crate::state::State;
 use crate::stationarity::{Dwell, Reading, Stationarity};
-use crate::supervisor::{Conditions, LoopState};
+use crate::supervisor::{Conditions, Fault, LoopState};
 
 /// Phase error, rad, up to which a larger drive certainly gives a larger response.
 const PHASE_RANGE: f64 = core::f64::consts::FRAC_PI_3;
@@ -24,6 +27,8 @@ pub struct PhaseLock {
     filter: LoopFilter,
     drive: Drive,
     amplitude_loop: AmplitudeLoop,
+    approach: Approach,
+    capture: Capture,
     stationarity: Stationarity,
 }
 
@@ -40,6 +45,8 @@ impl Config {
             filter: LoopFilter::new(&self),
             drive,
             amplitude_loop: AmplitudeLoop::new(&self, &drive),
+            approach: Approach::new(&self),
+            capture: Capture::new(&self),
             stationarity: Stationarity::new(&self.lock),
             config: self,
         })
@@ -71,18 +78,13 @@ impl PhaseLock {
         Output::idle(self.config.omega_start)
     }
 
-    /// Changes drive amplitude (m) and phase target (rad) between samples. The state continues; `settled` becomes false.
+    /// Changes drive amplitude (m) and phase target (rad) between samples. The state continues; `settled` becomes false. Rates and
+    /// limits stay those of the configuration.
     ///
     /// # Errors
     /// A value out of range; then nothing changes.
     pub fn retune(&mut self, amplitude: f64, phase_target: f64) -> Result<(), ConfigError> {
-        let tuned = Config { amplitude, phase_target, ..self.config };
-        let before = self.drive;
-        *self = tuned.build()?;
-        // A ramp keeps its rate: a rate in proportion to the new amplitude could make a ramp down endless.
-        self.drive.ramp_step = self.drive.ramp_step.max(before.ramp_step);
-        self.drive.release_step = self.drive.release_step.max(before.release_step);
-        self.amplitude_loop = AmplitudeLoop::new(&self.config, &self.drive);
+        *self = Config { amplitude, phase_target, ..self.config }.build()?;
         Ok(())
     }
 
@@ -96,12 +98,12 @@ impl PhaseLock {
         Quantity::new("duration", to.duration, "s").not_negative()?;
         Quantity::new("amplitude", to.amplitude, "m").check(true, "a finite number")?;
         Quantity::new("omega", to.omega, "rad/s").check(true, "a finite number")?;
-        Quantity::new("amplitude_max", self.config.amplitude_max, "m").check(
-            self.config.amplitude_max > 0.0,
+        Quantity::new("amplitude_max", self.config.amplitude_max.unwrap_or(NONE), "m").check(
+            self.config.amplitude_max.is_some(),
             "above 0 to control the response amplitude: the drive needs a limit",
         )?;
         Quantity::new("state", f64::from(state.loop_state as u8), "").check(
-            state.loop_state.is_closed(),
+            matches!(state.loop_state, LoopState::Acquiring | LoopState::Locked),
             "2 (acquiring) or 3 (locked): the response amplitude can be controlled only in a closed loop",
         )?;
         let (reading, drive) = (state.channels.response.amplitude(), state.drive.amplitude);
@@ -121,7 +123,13 @@ impl PhaseLock {
             amplitude: state.drive.amplitude,
         };
         let measured = self.sensing.measure(&mut state.channels, &input, drive);
-        self.change_state(state, input.active, &measured);
+        let watched = if state.loop_state.is_closed() {
+            self.sensing.watch(&mut state.channels, &input, &measured, drive.omega)
+        } else {
+            self.sensing.stop_watching(&mut state.channels);
+            None
+        };
+        self.change_state(state, input.active, measured.fault.or(watched));
         self.steer(state, &measured);
         let output = self.output(state, &measured, drive.rotor.im * state.drive.amplitude);
         let omega = state.frequency.omega;
@@ -135,17 +143,18 @@ impl PhaseLock {
     }
 
     /// Advances the state machine.
-    fn change_state(&self, state: &mut State, active: bool, measured: &Measurement) {
+    fn change_state(&self, state: &mut State, active: bool, fault: Option<Fault>) {
         let timeout = self.config.acquire_timeout;
         let elapsed = state.acquiring as f64 * self.config.sample_time;
         let before = state.loop_state;
         let (next, fault) = before.next(&Conditions {
             active,
-            fault: measured.fault,
+            fault,
             ready: state.ready,
+            capture: self.capture.is_on(),
             settled: state.dwell.settled(),
             lost: state.lost,
-            timed_out: timeout > 0.0 && elapsed >= timeout,
+            timed_out: timeout.is_some_and(|timeout| elapsed >= timeout),
         });
         state.loop_state = next;
         if next == LoopState::Locked && state.tuning.1 != self.config.phase_target {
@@ -156,11 +165,13 @@ impl PhaseLock {
         if fault.is_some() || (next == LoopState::Ramping && before != LoopState::Ramping) {
             state.fault = fault;
         }
-        state.acquiring = if next == LoopState::Acquiring {
-            state.acquiring + 1
-        } else {
-            0
+        let is_searching = match next {
+            LoopState::Capturing => true,
+            // A held response is a measurement, which takes as long as it needs.
+            LoopState::Acquiring => state.amplitude_loop.is_none(),
+            _ => false,
         };
+        state.acquiring = if is_searching { state.acquiring + 1 } else { 0 };
     }
 
     /// Sets frequency and drive amplitude according to the loop state.
@@ -170,6 +181,8 @@ impl PhaseLock {
         state.ready = false;
         if !state.loop_state.is_closed() {
             state.amplitude_loop = None;
+            state.approach = ApproachState::default();
+            state.capture = CaptureState::default();
         }
         let frequency = &mut state.frequency;
         match state.loop_state {
@@ -181,6 +194,7 @@ impl PhaseLock {
                 filter.go_to(frequency, omega_start);
                 state.ready = drive.ramp(&mut state.drive, self.config.amplitude) && frequency.omega == omega_start;
             }
+            LoopState::Capturing => self.capture(state, measured),
             LoopState::Acquiring | LoopState::Locked => self.close_loop(state, measured),
             LoopState::LockLost | LoopState::Tripped => {
                 filter.hold(frequency);
@@ -193,6 +207,25 @@ impl PhaseLock {
         }
     }
 
+    /// One sample of the capture.
+    fn capture(&self, state: &mut State, measured: &Measurement) {
+        let complete = self.capture.advance(
+            &mut state.capture,
+            &mut state.amplitude_loop,
+            &Observation {
+                omega: state.frequency.omega,
+                drive: state.drive.amplitude,
+                response: state.channels.response.amplitude(),
+                error: measured.valid.then_some(measured.error),
+            },
+        );
+        self.close_loop(state, measured);
+        state.ready = complete;
+        if complete {
+            state.amplitude_loop = None;
+        }
+    }
+
     /// One sample of the closed loop.
     fn close_loop(&self, state: &mut State, measured: &Measurement) {
         let Self { filter, drive, .. } = self;
@@ -201,10 +234,14 @@ impl PhaseLock {
         } else {
             filter.hold(&mut state.frequency);
         }
+        let reading = state.channels.response.amplitude();
+        let near = measured.valid && measured.error.abs() < PHASE_RANGE;
+        let before = state.drive.amplitude;
+        let holding = self
+            .approach
+            .observe(&mut state.approach, before, reading, measured.error);
+        let holding = near.then_some(holding);
         if let Some(amplitude_loop) = &mut state.amplitude_loop {
-            let reading = state.channels.response.amplitude();
-            let near = measured.valid && measured.error.abs() < PHASE_RANGE;
-            let before = state.drive.amplitude;
             let (amplitude, shift) = self
                 .amplitude_loop
                 .follow(amplitude_loop, before, near.then_some(reading));
@@ -212,11 +249,18 @@ impl PhaseLock {
             filter.shift(&mut state.frequency, shift);
             state.ready = amplitude_loop.has_arrived();
         } else {
-            let setpoint = self.config.amplitude;
+            let amplitude = self.config.amplitude;
+            let setpoint = match holding {
+                Some(holding) if state.loop_state == LoopState::Acquiring => {
+                    self.approach.shape(&mut state.approach, amplitude, holding)
+                }
+                _ => amplitude,
+            };
             if measured.valid && measured.has_sensor {
                 drive.control(&mut state.drive, setpoint, measured.reference_amplitude);
             }
-            state.ready = drive.ramp(&mut state.drive, setpoint);
+            let arrived = drive.ramp(&mut state.drive, setpoint);
+            state.ready = arrived || setpoint != amplitude;
         }
     }
 

@@ -29,17 +29,11 @@ pub struct DriveState {
 impl Drive {
     /// The drive of a configuration.
     pub fn new(config: &Config) -> Self {
-        let per_sample = |range: f64, time: f64| {
-            if time > 0.0 {
-                range * (config.sample_time / time)
-            } else {
-                f64::INFINITY
-            }
-        };
+        let per_sample = |rate: Option<f64>| rate.map_or(f64::INFINITY, |rate| rate * config.sample_time);
         Self {
             amplitude_max: config.amplitude_limit(),
-            ramp_step: per_sample(config.amplitude, config.ramp_time),
-            release_step: per_sample(config.amplitude, config.release_time),
+            ramp_step: per_sample(config.ramp_rate),
+            release_step: per_sample(config.release_rate),
             control_step: -libm::expm1(-config.base_bandwidth * config.sample_time),
         }
     }

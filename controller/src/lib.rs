@@ -18,9 +18,9 @@
 //! stops. A rig with an oscillator of its own that receives `omega` therefore stays in phase with it. `drive` is
 //! `E sin(phase)` at `t`.
 //!
-//! **Reference.** A reference channel that is absent, or has read exactly zero so far, counts as not connected. Then the
-//! internal oscillator with the configured `delay` is the reference. From the first other reading on, the channel is
-//! the reference. Both channels have identical detectors, so that their phase shifts cancel.
+//! **Reference.** Where no sensor measures the base ([`Input::reference`] is `None`, or `reference_connected` is false), the
+//! internal oscillator with the configured `delay` is the reference. Both channels have identical detectors, so that their phase
+//! shifts cancel.
 //!
 //! **Safety.** For any sensor readings, including NaN, every output is finite and within the configured limits. An
 //! invalid reading ramps the drive down and latches; see [`LoopState`].
@@ -49,6 +49,8 @@
 
 mod amplitude_loop;
 mod angle;
+mod approach;
+mod capture;
 mod check;
 mod config;
 mod controller;
@@ -75,7 +77,7 @@ pub use error::ConfigError;
 pub use gains::Gains;
 pub use harmonics::MAX_HARMONICS;
 pub use parameters::{PARAMETERS, Parameter};
-pub use range::{Range, Value};
+pub use range::{NONE, Range, Value};
 pub use sample_clock::SampleClock;
 pub use signals::{Input, Output};
 pub use state::State;

@@ -42,11 +42,9 @@ impl LoopFilter {
             gains: Gains::from_bandwidth(config.bandwidth, config.damping_rate),
             omega_min: config.omega_min,
             omega_max: config.omega_max,
-            max_change: if config.omega_rate > 0.0 {
-                config.omega_rate * config.sample_time
-            } else {
-                f64::INFINITY
-            },
+            max_change: config
+                .omega_rate
+                .map_or(f64::INFINITY, |rate| rate * config.sample_time),
             sample_time: config.sample_time,
         }
     }

@@ -6,7 +6,7 @@
 
 use crate::config::{Config, Detector};
 use crate::error::{ConfigError, Quantity};
-use crate::range::{Range, Value};
+use crate::range::{NONE, Range, Value};
 
 /// Invokes the macro `$with` with one row per parameter:
 /// `group field: type, unit, range;`. The group is `config` for a field of [`Config`] and `lock` for one of
@@ -19,11 +19,11 @@ macro_rules! parameters {
             config omega_start: real, "rad/s", Positive;
             config omega_min: real, "rad/s", Positive;
             config omega_max: real, "rad/s", Positive;
-            config omega_rate: real, "rad/s2", NotNegative;
+            config omega_rate: optional, "rad/s2", Optional;
             config amplitude: real, "m", NotNegative;
-            config amplitude_max: real, "m", NotNegative;
-            config ramp_time: real, "s", NotNegative;
-            config release_time: real, "s", NotNegative;
+            config amplitude_max: optional, "m", Optional;
+            config ramp_rate: optional, "m/s", Optional;
+            config release_rate: optional, "m/s", Optional;
             config base_bandwidth: real, "rad/s", NotNegative;
             config phase_target: real, "rad", Angle;
             config detector: detector, "", Detector;
@@ -39,9 +39,13 @@ macro_rules! parameters {
             lock dwell: integer, "periods", Dwell;
             lock coherence_min: real, "", Share;
             lock response_min: real, "", NotNegative;
-            config response_max: real, "m", NotNegative;
-            config acquire_timeout: real, "s", NotNegative;
+            config response_max: optional, "m", Optional;
+            config acquire_timeout: optional, "s", Optional;
+            config signal_timeout: optional, "s", Optional;
+            config reference_connected: boolean, "", Boolean;
             config response_gain: real, "1/s", Positive;
+            config approach_gain: real, "", NotNegative;
+            config capture_response: optional, "m", Optional;
         }
     };
 }
@@ -64,12 +68,6 @@ impl Parameter {
     #[must_use]
     pub fn find(name: &str) -> Option<&'static Self> {
         PARAMETERS.iter().find(|parameter| parameter.name == name)
-    }
-
-    /// Whether `PhaseLock.fmu` has the parameter. `response_gain` serves a function that FMI cannot call.
-    #[must_use]
-    pub fn is_in_fmu(&self) -> bool {
-        self.name != "response_gain"
     }
 
     /// The value in a configuration.
@@ -136,6 +134,10 @@ macro_rules! getter {
     (real, $place:expr) => {
         Value::Real($place)
     };
+    (optional, $place:expr) => {
+        // The number that means "none" is no value of an option, so it must not pass for one.
+        Value::Real($place.map_or(NONE, |value| if value == NONE { 0.0 } else { value }))
+    };
     (integer, $place:expr) => {
         Value::Integer(i32::try_from($place).unwrap_or(i32::MAX))
     };
@@ -150,6 +152,9 @@ macro_rules! getter {
 macro_rules! setter {
     (real, $place:expr, $value:ident) => {
         $place = $value.number()
+    };
+    (optional, $place:expr, $value:ident) => {
+        $place = Some($value.number()).filter(|number| *number != NONE)
     };
     (integer, $place:expr, $value:ident) => {
         $place = $value.number() as _
@@ -205,6 +210,19 @@ mod tests {
                 .filter(|other| other.get(&config) != other.get(&before));
             assert_eq!(changed.count(), 1, "{}", parameter.name);
         }
+    }
+
+    #[test]
+    fn an_option_is_absent_only_at_the_number_for_none() {
+        let parameter = Parameter::find("response_max").expect("a parameter");
+        let mut config = Config::for_resonance(55.0, 1e-4);
+        for (value, expected) in [(NONE, None), (0.1, Some(0.1)), (0.0, Some(0.0)), (-2.0, Some(-2.0))] {
+            parameter.set(&mut config, Value::Real(value)).expect("a real number");
+            assert_eq!(config.response_max, expected);
+            assert_eq!(config.build().is_ok(), value == NONE || value > 0.0, "{value}");
+        }
+        config.response_max = Some(NONE);
+        assert!(config.build().is_err());
     }
 
     #[test]

@@ -26,6 +26,9 @@ impl Value {
     }
 }
 
+/// The number that means "none" for an optional parameter, where the interface knows only numbers.
+pub const NONE: f64 = -1.0;
+
 /// The values that a parameter may have, whatever the values of the others are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Range {
@@ -33,6 +36,8 @@ pub enum Range {
     Positive,
     /// Finite, 0 or above.
     NotNegative,
+    /// Finite and above 0, or [`NONE`].
+    Optional,
     /// From -pi to pi.
     Angle,
     /// Above 0 and below 1.
@@ -55,6 +60,7 @@ impl Range {
             && match self {
                 Self::Positive => number > 0.0,
                 Self::NotNegative => number >= 0.0,
+                Self::Optional => number > 0.0 || number == NONE,
                 Self::Angle => number.abs() <= PI,
                 Self::Share => number > 0.0 && number < 1.0,
                 Self::Detector => number == 1.0 || number == 2.0,
@@ -70,6 +76,7 @@ impl Range {
         match self {
             Self::Positive => "a finite number above 0",
             Self::NotNegative => "a finite number, 0 or above",
+            Self::Optional => "a finite number above 0, or -1 for none",
             Self::Angle => "between -pi and pi",
             Self::Share => "above 0 and below 1",
             Self::Detector => "1 (adaptive) or 2 (demodulator)",

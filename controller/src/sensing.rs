@@ -1,5 +1,7 @@
 //! The measurements of a sample: phase error, amplitudes, and whether they are valid.
 
+use core::f64::consts::PI;
+
 use crate::angle::{Complex, wrap};
 use crate::config::Config;
 use crate::detector::{Estimate, PhaseDetector};
@@ -20,11 +22,17 @@ pub struct Sensing {
     phase_target: f64,
     /// s
     delay: f64,
-    /// m; 0 without a limit.
-    response_max: f64,
+    /// m
+    response_max: Option<f64>,
     /// Smallest valid response amplitude, m.
     response_min: f64,
     coherence_min: f64,
+    /// Whether a sensor measures the base.
+    has_reference: bool,
+    /// s
+    sample_time: f64,
+    /// Longest time without a valid response, s.
+    signal_timeout: Option<f64>,
 }
 
 /// State of both channels.
@@ -34,8 +42,13 @@ pub struct Channels {
     /// Estimate of the response.
     pub response: Estimate,
     reference: Estimate,
-    /// Whether the reference channel has ever read anything but exactly zero.
-    connected: bool,
+    /// The last reading of the response, m, and the time for which it has not changed, s.
+    last: f64,
+    unchanged: f64,
+    /// Time since the loop was closed or the measurement was last valid, s.
+    invalid: f64,
+    /// Whether the measurement has been valid since the loop was closed.
+    seen: bool,
 }
 
 /// The drive in the present sample.
@@ -83,13 +96,15 @@ impl Sensing {
             response_max: config.response_max,
             response_min: config.lock.response_min * config.amplitude,
             coherence_min: config.lock.coherence_min,
+            has_reference: config.reference_connected,
+            sample_time: config.sample_time,
+            signal_timeout: config.signal_timeout,
         }
     }
 
     /// Updates both channels with a sample.
     pub fn measure(&self, state: &mut Channels, input: &Input, drive: PresentDrive) -> Measurement {
-        state.connected |= input.reference.is_some_and(|reading| reading != 0.0);
-        let channel = input.reference.filter(|_| state.connected);
+        let channel = input.reference.filter(|_| self.has_reference);
         let fault = self.fault(input.response, channel);
         // The detectors ignore an invalid reading and keep their estimates.
         if fault != Some(Fault::Sensor) {
@@ -116,11 +131,32 @@ impl Sensing {
         }
     }
 
+    /// Watches the signals while the loop is closed: a sensor that has stopped, or a response that cannot be measured.
+    pub fn watch(&self, state: &mut Channels, input: &Input, measured: &Measurement, omega: f64) -> Option<Fault> {
+        let add = |time: f64, condition: bool| if condition { time + self.sample_time } else { 0.0 };
+        state.seen |= measured.valid;
+        state.invalid = add(state.invalid, !measured.valid);
+        state.unchanged = add(state.unchanged, state.seen && input.response == state.last);
+        state.last = input.response;
+        if state.unchanged * omega > PI {
+            Some(Fault::Sensor)
+        } else if self.signal_timeout.is_some_and(|limit| state.invalid > limit) {
+            Some(Fault::NoSignal)
+        } else {
+            None
+        }
+    }
+
+    /// Ends the watch when the loop opens.
+    pub fn stop_watching(&self, state: &mut Channels) {
+        (state.unchanged, state.invalid, state.seen) = (0.0, 0.0, false);
+    }
+
     fn fault(&self, response: f64, reference: Option<f64>) -> Option<Fault> {
         let is_valid = |reading: f64| reading.abs() <= READING_MAX;
         if !is_valid(response) || !reference.is_none_or(is_valid) {
             Some(Fault::Sensor)
-        } else if self.response_max > 0.0 && response.abs() > self.response_max {
+        } else if self.response_max.is_some_and(|limit| response.abs() > limit) {
             Some(Fault::ResponseTooLarge)
         } else {
             None

@@ -8,8 +8,7 @@ use crate::supervisor::{Fault, LoopState};
 pub struct Input {
     /// Response of the structure, m.
     pub response: f64,
-    /// Displacement of the base, m. If it is `None`, or if the channel has read exactly zero so far, the internal
-    /// oscillator is the reference.
+    /// Displacement of the base, m. If it is `None`, the internal oscillator is the reference.
     pub reference: Option<f64>,
     /// Whether the drive is requested. A change from false to true arms the controller, also after a fault.
     pub active: bool,

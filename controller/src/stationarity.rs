@@ -1,9 +1,22 @@
 //! Stationarity of phase, frequency and amplitude.
+//!
+//! A motion is stationary if the means over a quarter of the dwell differ by no more than the drift tolerances. Where noise hides so
+//! small a drift, the differences of means over half a dwell are compared with the scatter of the periods within the blocks instead:
+//! a drift makes the range of four consecutive means ten times as large as the scatter, noise about twice.
 
 use crate::config::LockCriterion;
 
 /// Number of blocks of a dwell.
-const BLOCKS: usize = 4;
+const DWELL: usize = 4;
+/// Number of blocks that the criterion for noise needs: two dwells.
+const BLOCKS: usize = 2 * DWELL;
+/// Largest range of four means over two blocks that counts as noise, in units of the scatter.
+const NOISE_RANGE: f64 = 5.0;
+/// Smallest sum of the squared differences from period to period over that of the squared deviations from the mean that counts as
+/// noise. A drift over five periods has 0.4, noise about 1.
+const RANDOM: f64 = 0.5;
+/// Largest scatter of the periods, relative, that counts as noise.
+const NOISE_MAX: f64 = 0.03;
 
 /// The criterion. Impacts cause ripple within a period, so it compares means over whole periods only.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +49,7 @@ pub struct Reading {
     pub valid: bool,
 }
 
+/// Sums over the samples of a period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Sums {
@@ -47,24 +61,50 @@ struct Sums {
     invalid: u64,
 }
 
-impl Sums {
-    fn add(&mut self, other: &Sums) {
-        self.error += other.error;
-        self.integral += other.integral;
-        self.omega += other.omega;
-        self.amplitude += other.amplitude;
-        self.samples += other.samples;
-        self.invalid += other.invalid;
+/// Mean of a quantity over the periods of a block, the sum of the squared deviations from it, and that of the squared differences
+/// from period to period.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+struct Scatter {
+    mean: f64,
+    squares: f64,
+    differences: f64,
+    last: f64,
+}
+
+impl Scatter {
+    /// Welford's update with the `n`-th value.
+    fn add(&mut self, value: f64, n: f64) {
+        let before = value - self.mean;
+        self.mean += before / n;
+        self.squares += before * (value - self.mean);
+        if n > 1.0 {
+            self.differences += (value - self.last) * (value - self.last);
+        }
+        self.last = value;
     }
 }
 
-/// Means over a block.
+/// Means over the periods of a block.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Block {
-    integral: f64,
+    periods: u32,
+    error: f64,
     omega: f64,
-    amplitude: f64,
+    integral: Scatter,
+    amplitude: Scatter,
+}
+
+impl Block {
+    fn add(&mut self, period: &Sums) {
+        self.periods += 1;
+        let (n, samples) = (f64::from(self.periods), period.samples as f64);
+        self.error += (period.error / samples - self.error) / n;
+        self.omega += (period.omega / samples - self.omega) / n;
+        self.integral.add(period.integral / samples, n);
+        self.amplitude.add(period.amplitude / samples, n);
+    }
 }
 
 /// The running dwell: the last complete blocks, and the present one.
@@ -74,8 +114,7 @@ pub struct Dwell {
     blocks: [Block; BLOCKS],
     complete: usize,
     period: Sums,
-    block: Sums,
-    periods: u32,
+    block: Block,
     settled: bool,
 }
 
@@ -85,11 +124,15 @@ impl Dwell {
         self.settled
     }
 
-    /// Means over the complete blocks: frequency, rad/s, and response amplitude, m.
+    /// Means over the complete blocks of the last dwell: frequency, rad/s, and response amplitude, m.
     pub fn means(&self) -> Option<(f64, f64)> {
-        let complete = &self.blocks[BLOCKS - self.complete..];
-        let mean = |value: fn(&Block) -> f64| complete.iter().map(value).sum::<f64>() / self.complete as f64;
-        (self.complete > 0).then(|| (mean(|block| block.omega), mean(|block| block.amplitude)))
+        let complete = self.last(self.complete.min(DWELL));
+        let mean = |value: fn(&Block) -> f64| mean(complete, value);
+        (self.complete > 0).then(|| (mean(|block| block.omega), mean(|block| block.amplitude.mean)))
+    }
+
+    fn last(&self, count: usize) -> &[Block] {
+        &self.blocks[BLOCKS - count..]
     }
 }
 
@@ -101,140 +144,85 @@ impl Stationarity {
             unlock_tolerance: lock.unlock_tolerance,
             frequency_drift: lock.frequency_drift,
             amplitude_drift: lock.amplitude_drift,
-            block: lock.dwell.div_ceil(BLOCKS as u32),
+            block: lock.dwell.div_ceil(DWELL as u32),
         }
     }
 
     /// Takes a sample; `period_ends` marks the last one of a period. Returns whether the lock is lost.
     pub fn update(&self, dwell: &mut Dwell, reading: &Reading, period_ends: bool) -> bool {
-        dwell.period.add(&Sums {
-            error: reading.error,
-            integral: reading.integral,
-            omega: reading.omega,
-            amplitude: reading.amplitude,
-            samples: 1,
-            invalid: u64::from(!reading.valid),
-        });
+        let period = &mut dwell.period;
+        period.error += reading.error;
+        period.integral += reading.integral;
+        period.omega += reading.omega;
+        period.amplitude += reading.amplitude;
+        period.samples += 1;
+        period.invalid += u64::from(!reading.valid);
         if !period_ends {
             return false;
         }
         let period = core::mem::take(&mut dwell.period);
         let error = (period.error / period.samples as f64).abs();
-        let valid = period.invalid == 0;
-        if valid && error <= self.phase_tolerance {
-            self.end_period(dwell, &period);
-        } else {
+        let lost = period.invalid > 0 || error > self.unlock_tolerance;
+        if lost {
             *dwell = Dwell::default();
+        } else {
+            self.end_period(dwell, &period);
         }
-        !valid || error > self.unlock_tolerance
+        lost
     }
 
     fn end_period(&self, dwell: &mut Dwell, period: &Sums) {
         dwell.block.add(period);
-        dwell.periods += 1;
-        if dwell.periods < self.block {
+        if dwell.block.periods < self.block {
             return;
         }
-        let sums = core::mem::take(&mut dwell.block);
-        let samples = sums.samples as f64;
-        dwell.periods = 0;
         dwell.blocks.rotate_left(1);
-        dwell.blocks[BLOCKS - 1] = Block {
-            integral: sums.integral / samples,
-            omega: sums.omega / samples,
-            amplitude: sums.amplitude / samples,
-        };
+        dwell.blocks[BLOCKS - 1] = core::mem::take(&mut dwell.block);
         dwell.complete = (dwell.complete + 1).min(BLOCKS);
-        // Periods between the centres of the first and the last block. A slope would miss the crest of a slow
-        // modulation; the range does not.
-        let distance = f64::from(self.block) * (BLOCKS - 1) as f64;
-        dwell.settled = dwell.complete == BLOCKS
-            && range(&dwell.blocks, |block| block.integral) <= self.frequency_drift * distance
-            && range(&dwell.blocks, |block| block.amplitude) <= self.amplitude_drift * distance;
+        dwell.settled = dwell.complete >= DWELL && self.is_smooth(dwell.last(DWELL))
+            || dwell.complete == BLOCKS && self.is_noise(&dwell.blocks);
+    }
+
+    fn is_smooth(&self, blocks: &[Block]) -> bool {
+        // Periods between the centres of the first and the last block. A slope would miss the crest of a slow modulation; the
+        // range does not.
+        let distance = f64::from(self.block) * (DWELL - 1) as f64;
+        blocks.iter().all(|block| block.error.abs() <= self.phase_tolerance)
+            && range(blocks, 1, |block| block.integral.mean) <= self.frequency_drift * distance
+            && range(blocks, 1, |block| block.amplitude.mean) <= self.amplitude_drift * distance
+    }
+
+    fn is_noise(&self, blocks: &[Block; BLOCKS]) -> bool {
+        let distance = f64::from(2 * self.block) * (DWELL - 1) as f64;
+        let is_constant = |value: fn(&Block) -> Scatter, drift: f64| {
+            let squares = mean(blocks, |block| value(block).squares);
+            let scatter = libm::sqrt(squares / f64::from(self.block)) / value(&blocks[BLOCKS - 1]).mean;
+            let largest = (NOISE_RANGE * scatter).max(drift * distance);
+            let differences = mean(blocks, |block| value(block).differences);
+            let random =
+                differences >= RANDOM * squares || range(blocks, 2, |block| value(block).mean) <= drift * distance;
+            random && scatter <= NOISE_MAX && range(blocks, 2, |block| value(block).mean) <= largest
+        };
+        mean(blocks, |block| block.error).abs() <= self.phase_tolerance
+            && is_constant(|block| block.integral, self.frequency_drift)
+            && is_constant(|block| block.amplitude, self.amplitude_drift)
     }
 }
 
-/// Difference of the largest and the smallest value, relative to the last one.
-fn range(blocks: &[Block; BLOCKS], value: impl Fn(&Block) -> f64) -> f64 {
-    let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
-    for block in blocks {
-        low = low.min(value(block));
-        high = high.max(value(block));
+fn mean(blocks: &[Block], value: impl Fn(&Block) -> f64) -> f64 {
+    blocks.iter().map(value).sum::<f64>() / blocks.len() as f64
+}
+
+/// Difference of the largest and the smallest mean over `group` blocks, relative to the last one.
+fn range(blocks: &[Block], group: usize, value: impl Fn(&Block) -> f64) -> f64 {
+    let (mut low, mut high, mut last) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+    for group in blocks.chunks(group) {
+        last = mean(group, &value);
+        low = low.min(last);
+        high = high.max(last);
     }
-    (high - low) / value(&blocks[BLOCKS - 1])
+    (high - low) / last
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    const CRITERION: Stationarity = Stationarity {
-        phase_tolerance: 0.01,
-        unlock_tolerance: 0.1,
-        frequency_drift: 1e-6,
-        amplitude_drift: 1e-4,
-        block: 5,
-    };
-    const CONSTANT: Reading = Reading {
-        error: 0.0,
-        integral: 1.0,
-        omega: 1.0,
-        amplitude: 1.0,
-        valid: true,
-    };
-
-    /// Number of periods of ten samples until settled; None after 200.
-    fn periods_to_settle(reading: impl Fn(f64) -> Reading) -> Option<u32> {
-        let mut dwell = Dwell::default();
-        (1..=200).find(|period| {
-            for sample in 0..10 {
-                let periods = f64::from(*period) + f64::from(sample) / 10.0;
-                CRITERION.update(&mut dwell, &reading(periods), sample == 9);
-            }
-            dwell.settled()
-        })
-    }
-
-    #[test]
-    fn a_constant_signal_settles_after_the_dwell() {
-        assert_eq!(periods_to_settle(|_| CONSTANT), Some(20));
-    }
-
-    #[test]
-    fn ripple_within_the_period_does_not_matter() {
-        let reading = |t: f64| Reading {
-            error: 0.05 * libm::sin(core::f64::consts::TAU * t),
-            ..CONSTANT
-        };
-        assert_eq!(periods_to_settle(reading), Some(20));
-    }
-
-    #[test]
-    fn a_signal_that_drifts_too_fast_does_not_settle() {
-        let amplitude = |rate: f64| move |t: f64| Reading { amplitude: 1.0 + rate * t, ..CONSTANT };
-        assert_eq!(periods_to_settle(amplitude(1.1e-4)), None);
-        assert_eq!(periods_to_settle(amplitude(0.9e-4)), Some(20));
-        let frequency = |t: f64| Reading { integral: 1.0 + 1.1e-6 * t, ..CONSTANT };
-        assert_eq!(periods_to_settle(frequency), None);
-    }
-
-    #[test]
-    fn a_slow_modulation_is_not_stationary_at_its_crest() {
-        let reading = |t: f64| Reading { amplitude: 1.0 + 0.1 * libm::sin(0.06 * t), ..CONSTANT };
-        assert_eq!(periods_to_settle(reading), None);
-    }
-
-    #[test]
-    fn one_invalid_sample_restarts_the_dwell() {
-        let reading = |t: f64| Reading { valid: t != 10.5, ..CONSTANT };
-        assert_eq!(periods_to_settle(reading), Some(30));
-    }
-
-    #[test]
-    fn the_lock_is_lost_only_beyond_the_wider_tolerance() {
-        let mut dwell = Dwell::default();
-        let mut is_lost = |error| CRITERION.update(&mut dwell, &Reading { error, ..CONSTANT }, true);
-        assert!(!is_lost(0.05) && !is_lost(-0.09));
-        assert!(is_lost(0.11));
-    }
-}
+mod tests;

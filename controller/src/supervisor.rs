@@ -1,5 +1,7 @@
 //! The state machine of the loop.
 
+use core::fmt;
+
 /// State of the loop. The numbers are those of the FMU's `state`.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -19,13 +21,15 @@ pub enum LoopState {
     Tripped = 5,
     /// `active` became false: the drive is released, the frequency stays constant.
     ShutDown = 6,
+    /// The loop is closed, and the response rises until impacts begin.
+    Capturing = 7,
 }
 
 /// Reason why the drive was switched off. The numbers are those of the FMU's `fault`, where 0 means no fault.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Fault {
-    /// A sensor read NaN, infinity, or more than 1e100 m.
+    /// A sensor read NaN, infinity, or more than 1e100 m, or the reading of the response did not change for half a period.
     Sensor = 1,
     /// The response exceeded `response_max`.
     ResponseTooLarge = 2,
@@ -33,6 +37,65 @@ pub enum Fault {
     TimedOut = 3,
     /// The phase error exceeded `unlock_tolerance`, or the response was no longer valid, while locked.
     LockLost = 4,
+    /// No valid measurement for `signal_timeout`: the amplitude of a channel is too small, or its noise too large.
+    NoSignal = 5,
+}
+
+impl LoopState {
+    /// All states, by number.
+    pub const ALL: [Self; 8] = [
+        Self::Idle,
+        Self::Ramping,
+        Self::Acquiring,
+        Self::Locked,
+        Self::LockLost,
+        Self::Tripped,
+        Self::ShutDown,
+        Self::Capturing,
+    ];
+
+    /// The state of that number.
+    #[must_use]
+    pub fn of_number(number: i32) -> Option<Self> {
+        Self::ALL.into_iter().find(|state| *state as i32 == number)
+    }
+
+    /// Whether a fault has switched the drive off; latched until `active` becomes false.
+    #[must_use]
+    pub fn is_latched(self) -> bool {
+        matches!(self, Self::LockLost | Self::Tripped)
+    }
+}
+
+impl Fault {
+    /// All faults.
+    pub const ALL: [Self; 5] = [
+        Self::Sensor,
+        Self::ResponseTooLarge,
+        Self::TimedOut,
+        Self::LockLost,
+        Self::NoSignal,
+    ];
+
+    /// The fault of that number; none for 0.
+    #[must_use]
+    pub fn of_number(number: i32) -> Option<Self> {
+        Self::ALL.into_iter().find(|fault| *fault as i32 == number)
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Sensor => "a sensor read no number, or the response did not change for half a period",
+            Self::ResponseTooLarge => "the response exceeded its limit",
+            Self::TimedOut => "the time limit for the lock is over",
+            Self::LockLost => "the lock was lost",
+            Self::NoSignal => {
+                "the response or the base could not be measured: too small an amplitude, or too much noise"
+            }
+        })
+    }
 }
 
 /// Conditions of the transitions.
@@ -44,6 +107,8 @@ pub struct Conditions {
     pub fault: Option<Fault>,
     /// The ramp has ended.
     pub ready: bool,
+    /// A motion with impacts is to be captured first.
+    pub capture: bool,
     /// The lock criterion is met.
     pub settled: bool,
     /// The phase error or the validity of the response ends the lock.
@@ -62,21 +127,24 @@ impl LoopState {
     /// Whether the loop is closed.
     #[must_use]
     pub fn is_closed(self) -> bool {
-        matches!(self, Self::Acquiring | Self::Locked)
+        matches!(self, Self::Capturing | Self::Acquiring | Self::Locked)
     }
 
     /// The next state, and the fault that caused it.
     pub(crate) fn next(self, conditions: &Conditions) -> (Self, Option<Fault>) {
         match self {
-            Self::Ramping | Self::Acquiring | Self::Locked if !conditions.active => (Self::ShutDown, None),
+            Self::Ramping | Self::Capturing | Self::Acquiring | Self::Locked if !conditions.active => {
+                (Self::ShutDown, None)
+            }
             Self::LockLost | Self::Tripped if !conditions.active => (Self::Idle, None),
             Self::LockLost | Self::Tripped => (self, None),
             Self::Idle | Self::ShutDown if !conditions.active => (self, None),
             _ if conditions.fault.is_some() => (Self::Tripped, conditions.fault),
             Self::Idle | Self::ShutDown => (Self::Ramping, None),
-            Self::Ramping if conditions.ready => (Self::Acquiring, None),
+            Self::Ramping if conditions.ready && conditions.capture => (Self::Capturing, None),
+            Self::Ramping | Self::Capturing if conditions.ready => (Self::Acquiring, None),
             Self::Acquiring if conditions.settled => (Self::Locked, None),
-            Self::Acquiring if conditions.timed_out => (Self::Tripped, Some(Fault::TimedOut)),
+            Self::Capturing | Self::Acquiring if conditions.timed_out => (Self::Tripped, Some(Fault::TimedOut)),
             Self::Locked if conditions.lost => (Self::LockLost, Some(Fault::LockLost)),
             running => (running, None),
         }
@@ -93,17 +161,35 @@ mod tests {
         ready: true,
         settled: true,
         lost: false,
+        capture: false,
         timed_out: false,
     };
-    const ALL: [LoopState; 7] = [
-        LoopState::Idle,
-        LoopState::Ramping,
-        LoopState::Acquiring,
-        LoopState::Locked,
-        LoopState::LockLost,
-        LoopState::Tripped,
-        LoopState::ShutDown,
-    ];
+
+    #[test]
+    fn states_and_faults_are_found_by_their_numbers() {
+        for (number, state) in LoopState::ALL.into_iter().enumerate() {
+            assert_eq!(
+                (state as usize, LoopState::of_number(number as i32)),
+                (number, Some(state))
+            );
+        }
+        for (number, fault) in Fault::ALL.into_iter().enumerate() {
+            assert_eq!(Fault::of_number(number as i32 + 1), Some(fault));
+        }
+        assert_eq!((LoopState::of_number(8), Fault::of_number(0)), (None, None));
+    }
+
+    #[test]
+    fn a_capture_comes_before_the_approach() {
+        let capture = Conditions { capture: true, ..ACTIVE };
+        assert_eq!(LoopState::Ramping.next(&capture).0, LoopState::Capturing);
+        assert_eq!(LoopState::Capturing.next(&capture).0, LoopState::Acquiring);
+        let late = Conditions { ready: false, timed_out: true, ..capture };
+        assert_eq!(
+            LoopState::Capturing.next(&late),
+            (LoopState::Tripped, Some(Fault::TimedOut))
+        );
+    }
 
     #[test]
     fn locking_passes_through_every_state_in_order() {
@@ -121,7 +207,7 @@ mod tests {
 
     #[test]
     fn no_state_drives_after_active_becomes_false() {
-        for state in ALL {
+        for state in LoopState::ALL {
             assert!(!state.next(&Conditions { active: false, ..ACTIVE }).0.is_driving());
         }
     }
@@ -129,7 +215,7 @@ mod tests {
     #[test]
     fn no_state_drives_on_a_fault() {
         let conditions = Conditions { fault: Some(Fault::Sensor), ..ACTIVE };
-        for state in ALL {
+        for state in LoopState::ALL {
             assert!(!state.next(&conditions).0.is_driving());
         }
     }

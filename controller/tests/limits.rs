@@ -4,13 +4,13 @@ mod rig;
 
 use phase_lock::{Config, Input, LoopState, Move};
 use proptest::prelude::*;
-use rig::{Bench, OMEGA_0, config};
+use rig::{AMPLITUDE, Bench, OMEGA_0, config};
 
 #[test]
 fn ramps_stay_within_their_rates() {
     let mut bench = Bench::new(Config {
-        ramp_time: 2.0,
-        omega_rate: 0.5,
+        ramp_rate: Some(0.5 * AMPLITUDE),
+        omega_rate: Some(0.5),
         omega_start: 0.97 * OMEGA_0,
         ..config()
     });
@@ -62,22 +62,26 @@ proptest! {
     fn outputs_are_finite_and_within_limits_for_any_input(
         readings in prop::collection::vec((reading(), prop::option::of(reading()), prop::bool::weighted(0.9)), 1..400),
         bandwidth in 0.02..1.0_f64,
-        ramp_time in prop_oneof![Just(0.0), 0.01..1.0_f64],
+        ramp_time in prop::option::of(0.01..1.0_f64),
         base_bandwidth in 0.0..0.02_f64,
         demodulate: bool,
         hold: bool,
+        capture: bool,
+        approach_gain in 0.0..30.0_f64,
     ) {
         let mut config = Config {
             bandwidth: bandwidth * OMEGA_0,
             base_bandwidth: base_bandwidth * OMEGA_0,
-            ramp_time,
+            ramp_rate: ramp_time.map(|time| AMPLITUDE / time),
+            capture_response: capture.then_some(0.01),
+            approach_gain,
             ..config()
         };
         if demodulate {
             config.detector = phase_lock::Detector::Demodulator;
         }
         if hold {
-            config.amplitude_max = 3.0 * config.amplitude;
+            config.amplitude_max = Some(3.0 * config.amplitude);
         }
         let controller = config.build().unwrap();
         let mut state = controller.start();
@@ -90,7 +94,7 @@ proptest! {
             let output = controller.process(&mut state, Input { response, reference, active });
             prop_assert!((config.omega_min..=config.omega_max).contains(&output.omega));
             prop_assert!((config.omega_min..=config.omega_max).contains(&output.frequency));
-            prop_assert!((0.0..=config.amplitude_max.max(config.amplitude)).contains(&output.amplitude));
+            prop_assert!((0.0..=config.amplitude_max.unwrap_or(f64::INFINITY)).contains(&output.amplitude));
             prop_assert!(output.drive.abs() <= output.amplitude);
             prop_assert!(output.phase_error.abs() <= std::f64::consts::PI);
             prop_assert!(output.response_amplitude.is_finite() && output.reference_amplitude.is_finite());

@@ -199,7 +199,7 @@ fn a_new_phase_target_is_acquired_with_the_drive_on() {
 
 #[test]
 fn a_ramp_down_to_zero_has_the_rate_of_the_ramp_up() {
-    let mut bench = Bench::new(Config { ramp_time: 1.0, ..config() });
+    let mut bench = Bench::new(Config { ramp_rate: Some(AMPLITUDE), ..config() });
     bench.run_to_lock(3000).expect("a lock");
     bench
         .controller
@@ -213,7 +213,7 @@ fn a_ramp_down_to_zero_has_the_rate_of_the_ramp_up() {
 #[test]
 fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
     let mut bench = Bench::new(Config {
-        amplitude_max: 4.0 * AMPLITUDE,
+        amplitude_max: Some(4.0 * AMPLITUDE),
         damping_rate: ZETA * OMEGA_0,
         ..config()
     });
@@ -248,15 +248,82 @@ fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
 #[test]
 fn the_response_cannot_be_controlled_without_a_limit_of_the_drive_or_in_an_open_loop() {
     let to = Move { response: 0.01, ..Move::default() };
-    let mut bench = Bench::new(config());
+    let mut bench = Bench::new(Config { amplitude_max: None, ..config() });
     bench.run(10);
     let refusal = |bench: &mut Bench, to| {
         let refused = bench.controller.hold_response(&mut bench.state, to);
         refused.expect_err("must be refused").to_string()
     };
-    assert!(refusal(&mut bench, to).starts_with("amplitude_max = 0 m is refused"));
-    let mut bench = Bench::new(Config { amplitude_max: 1.0, ..config() });
+    assert!(refusal(&mut bench, to).starts_with("amplitude_max = -1 m is refused"));
+    let mut bench = Bench::new(Config { amplitude_max: Some(1.0), ..config() });
     assert!(refusal(&mut bench, to).starts_with("state = 0 is refused"));
     bench.run(10);
     assert!(refusal(&mut bench, Move::default()).starts_with("response = 0 m"));
+}
+
+#[test]
+fn a_shaped_drive_reaches_the_same_lock_several_times_as_fast_and_is_constant_from_then_on() {
+    let periods = |approach_gain: f64| {
+        let config = Config { approach_gain, damping_rate: ZETA * OMEGA_0, ..config() };
+        let mut bench = Bench::new(config);
+        let (periods, _) = bench.run_to_lock(2000).expect("a lock");
+        let output = bench.run(20);
+        assert!(
+            relative(output.response_amplitude, AMPLITUDE / (2.0 * ZETA)) < 1e-3,
+            "{output:?}"
+        );
+        assert_eq!(output.amplitude, AMPLITUDE);
+        periods
+    };
+    let (constant, shaped) = (periods(0.0), periods(4.0));
+    println!("{constant} {shaped}");
+    assert!(shaped < 0.5 * constant);
+}
+
+#[test]
+fn a_capture_raises_the_response_before_the_drive_goes_to_its_setpoint() {
+    // Under the drive's setpoint the response stays at a quarter of the level.
+    let level = 4.0 * AMPLITUDE / (2.0 * ZETA);
+    let config = Config {
+        capture_response: Some(level),
+        amplitude_max: Some(6.0 * AMPLITUDE),
+        damping_rate: ZETA * OMEGA_0,
+        approach_gain: 2.0,
+        ..config()
+    };
+    let mut bench = Bench::new(config);
+    let (mut largest, mut states) = (0.0_f64, Vec::new());
+    for _ in 0..100 * 1000 {
+        let output = bench.sample();
+        largest = largest.max(output.response_amplitude);
+        if states.last() != Some(&output.state) {
+            states.push(output.state);
+        }
+    }
+    assert_eq!(
+        states,
+        [
+            LoopState::Ramping,
+            LoopState::Capturing,
+            LoopState::Acquiring,
+            LoopState::Locked
+        ]
+    );
+    assert!((0.97..1.05).contains(&(largest / level)), "{}", largest / level);
+    assert!(relative(bench.sample().response_amplitude, 0.25 * level) < 1e-3);
+}
+
+#[test]
+fn retuning_leaves_no_trace_of_the_values_before() {
+    let config = Config {
+        ramp_rate: Some(AMPLITUDE),
+        release_rate: Some(0.1 * AMPLITUDE),
+        ..config()
+    };
+    let config = Config { amplitude_max: Some(1.0), ..config };
+    let mut retuned = config.build().unwrap();
+    for amplitude in [100.0 * AMPLITUDE, 0.0, AMPLITUDE] {
+        retuned.retune(amplitude, config.phase_target).unwrap();
+        assert_eq!(retuned, Config { amplitude, ..config }.build().unwrap());
+    }
 }

@@ -62,7 +62,7 @@ fn a_reference_that_fails_ends_the_lock() {
 fn an_invalid_reading_ramps_the_drive_down_and_latches() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY, 1e300] {
         for (response, reference) in [(bad, 0.0), (0.0, bad)] {
-            let mut bench = Bench::new(Config { ramp_time: 1.0, ..config() });
+            let mut bench = Bench::new(Config { ramp_rate: Some(AMPLITUDE), ..config() });
             bench.run_to_lock(2000).expect("a lock");
             let before = bench.sample().amplitude;
             let output = bench.sample_reading(response, Some(reference));
@@ -81,7 +81,7 @@ fn an_invalid_reading_ramps_the_drive_down_and_latches() {
 
 #[test]
 fn too_large_a_response_trips() {
-    let mut bench = Bench::new(Config { response_max: 50.0 * AMPLITUDE, ..config() });
+    let mut bench = Bench::new(Config { response_max: Some(50.0 * AMPLITUDE), ..config() });
     let output = bench.run(400);
     assert_eq!(output.state, LoopState::Tripped);
     assert_eq!(output.fault, Some(Fault::ResponseTooLarge));
@@ -89,7 +89,7 @@ fn too_large_a_response_trips() {
 
 #[test]
 fn acquiring_times_out() {
-    let mut bench = Bench::new(Config { acquire_timeout: 0.5, ..config() });
+    let mut bench = Bench::new(Config { acquire_timeout: Some(0.5), ..config() });
     let states: Vec<_> = (0..600).map(|_| bench.sample_reading(0.0, None).state).collect();
     assert_eq!(states[400], LoopState::Acquiring);
     assert_eq!(states[599], LoopState::Tripped);
@@ -128,8 +128,8 @@ fn a_disturbance_between_the_two_tolerances_does_not_unlock() {
 
 #[test]
 fn the_drive_is_switched_off_at_once_or_with_a_ramp_as_configured() {
-    for (release_time, expected) in [(0.0, 0.0), (10.0, 0.999)] {
-        let mut bench = Bench::new(Config { release_time, ..config() });
+    for (release_rate, expected) in [(None, 0.0), (Some(0.1 * AMPLITUDE), 0.999)] {
+        let mut bench = Bench::new(Config { release_rate, ..config() });
         let before = bench.run(10);
         bench.active = false;
         let output = bench.sample();
@@ -143,7 +143,7 @@ fn the_drive_is_switched_off_at_once_or_with_a_ramp_as_configured() {
 
 /// A bench with the response amplitude controlled at half of its value at the lock, and a limited drive.
 fn holding(config: Config) -> Bench {
-    let mut bench = Bench::new(Config { amplitude_max: 2.0 * AMPLITUDE, ..config });
+    let mut bench = Bench::new(Config { amplitude_max: Some(2.0 * AMPLITUDE), ..config });
     bench.run_to_lock(2000).expect("a lock");
     let to = Move {
         response: 0.5 * bench.sample().response_amplitude,
@@ -161,7 +161,7 @@ fn holding(config: Config) -> Bench {
 
 #[test]
 fn a_sensor_that_fails_while_the_response_is_controlled_ramps_the_drive_down() {
-    let mut bench = holding(Config { ramp_time: 1.0, ..config() });
+    let mut bench = holding(Config { ramp_rate: Some(AMPLITUDE), ..config() });
     let before = bench.sample();
     assert!(before.locked && before.response_target > 0.0);
     let output = bench.sample_reading(f64::NAN, None);
@@ -175,7 +175,7 @@ fn a_sensor_that_fails_while_the_response_is_controlled_ramps_the_drive_down() {
 
 #[test]
 fn a_response_that_fades_out_does_not_make_the_drive_exceed_its_limit_or_its_rate() {
-    let mut bench = holding(Config { ramp_time: 1.0, ..config() });
+    let mut bench = holding(Config { ramp_rate: Some(AMPLITUDE), ..config() });
     let step = bench.controller.config().sample_time * AMPLITUDE;
     let mut before = bench.sample().amplitude;
     for n in 0..20_000 {
@@ -188,4 +188,42 @@ fn a_response_that_fades_out_does_not_make_the_drive_exceed_its_limit_or_its_rat
         before = output.amplitude;
     }
     assert_eq!(bench.sample().state, LoopState::LockLost);
+}
+
+#[test]
+fn a_sensor_that_stops_while_the_response_is_controlled_trips_within_half_a_period() {
+    for stuck_at_zero in [true, false] {
+        let mut bench = holding(config());
+        let value = if stuck_at_zero { 0.0 } else { bench.resonator.q };
+        let tripped = (0..200).find_map(|n| {
+            let base = bench.resonator.base;
+            let output = bench.sample_reading(value, Some(base));
+            (output.state == LoopState::Tripped).then_some((n, output))
+        });
+        let (samples, output) = tripped.expect("a trip");
+        assert!(samples <= 52 && output.fault == Some(Fault::Sensor), "{samples}");
+        assert_eq!(bench.sample().amplitude, 0.0);
+    }
+}
+
+#[test]
+fn a_sensor_that_reads_only_noise_trips_before_the_lock() {
+    let mut bench = Bench::new(Config { response_max: None, ..config() });
+    let mut noise = rig::Noise(7);
+    let tripped = (0..100 * 100).find(|_| {
+        let base = bench.resonator.base;
+        bench.sample_reading(0.01 * noise.next(), Some(base)).state == LoopState::Tripped
+    });
+    assert!(tripped.is_some_and(|samples| samples < 100 * 25), "{tripped:?}");
+    assert_eq!(bench.sample().fault, Some(Fault::NoSignal));
+}
+
+#[test]
+fn a_base_sensor_that_is_dead_from_the_start_trips() {
+    let mut bench = Bench::new(config());
+    let tripped = (0..100 * 100).find(|_| {
+        let q = bench.resonator.q;
+        bench.sample_reading(q, Some(0.0)).state == LoopState::Tripped
+    });
+    assert!(tripped.is_some(), "a base that reads 0 is not \"not connected\"");
 }

@@ -1,29 +1,33 @@
 //! The command line: one file per command.
 
 mod backbone;
+mod calibrate;
 mod chain;
 mod controller;
 mod decay;
 mod endpoint;
 mod failure;
 mod identify;
+mod interrupt;
 mod map;
 mod orbit;
 mod pack;
 mod report;
 mod rig;
+mod rigs;
 mod scene_arguments;
 mod serving;
 mod theory;
 
 use std::{
     io::{self, Write},
-    path::PathBuf,
+    path::{Path, PathBuf},
     process::ExitCode,
 };
 
 use clap::{Parser, Subcommand};
 use serde::Serialize;
+use vines::net::Timing;
 
 use failure::Failure;
 
@@ -31,6 +35,7 @@ const EXAMPLES: &str = "\
 Examples:
   vines identify                               the whole experiment on the default scene, results in out/
   vines backbone                               the backbone level by level, with the loop closed
+  vines calibrate                              the coverage of the uncertainties over 504 noisy runs
   vines orbit                                  exact orbits of the default scene
   vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
   vines orbit --response                       the exact frequency response, stable and unstable
@@ -54,6 +59,7 @@ struct Cli {
 enum Command {
     Identify(identify::Arguments),
     Backbone(backbone::Arguments),
+    Calibrate(calibrate::Arguments),
     Chain(chain::Arguments),
     Decay(decay::Arguments),
     Orbit(orbit::Arguments),
@@ -62,14 +68,20 @@ enum Command {
     Report(report::Arguments),
     Pack(pack::Arguments),
     Rig(rig::Arguments),
+    Rigs(rigs::Arguments),
     Controller(controller::Arguments),
 }
 
-/// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input.
+/// Share of late samples of a rig in real time above which its results are doubtful.
+const TOLERATED: f64 = 0.01;
+
+/// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input, 3 for results of a rig that did not keep its time,
+/// 130 after Ctrl-C.
 pub fn run() -> ExitCode {
     let output = match Cli::parse().command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Backbone(arguments) => backbone::run(&arguments),
+        Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Chain(arguments) => chain::run(&arguments),
         Command::Decay(arguments) => decay::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
@@ -78,6 +90,7 @@ pub fn run() -> ExitCode {
         Command::Report(arguments) => report::run(&arguments),
         Command::Pack(arguments) => pack::run(&arguments),
         Command::Rig(arguments) => rig::run(&arguments),
+        Command::Rigs(arguments) => rigs::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),
     };
     match output.and_then(|text| print(&text)) {
@@ -108,6 +121,50 @@ fn yes_no(value: bool) -> String {
 fn written(paths: &[PathBuf]) -> String {
     let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     format!("Written: {}\n", files.join(", "))
+}
+
+/// Creates a folder for results, and checks that files can be written to it before anything is driven.
+fn writable(folder: &Path) -> Result<(), Failure> {
+    std::fs::create_dir_all(folder)
+        .and_then(|()| tempfile::tempfile_in(folder))
+        .map_err(|error| Failure::input(format!("cannot write to {}: {error}", folder.display())))?;
+    Ok(())
+}
+
+/// Warnings go to stderr: those of connections, and what an FMU logs.
+fn log_warnings() {
+    env_logger::Builder::new()
+        .filter_level(log::LevelFilter::Warn)
+        .format_timestamp(None)
+        .init();
+}
+
+/// The result of an experiment, as JSON or as a summary with the paths that were written. If a rig in real time was late, stderr
+/// says so; a rig that did not keep its time is a failure.
+fn result(
+    as_json: bool,
+    found: &impl Serialize,
+    summary: &str,
+    paths: &[PathBuf],
+    timing: Option<Timing>,
+) -> Result<String, Failure> {
+    let text = if as_json {
+        json(found)?
+    } else {
+        format!("{summary}\n{}", written(paths))
+    };
+    match timing {
+        Some(timing) if timing.share() > TOLERATED => {
+            print(&text)?;
+            let message = format!("the rig did not keep its time, so these results are doubtful: {timing}");
+            Err(Failure::late(message))
+        }
+        Some(timing) if timing.share() > 0.0 => {
+            eprintln!("warning: the rig was not always in time: {timing}");
+            Ok(text)
+        }
+        _ => Ok(text),
+    }
 }
 
 fn json(found: &impl Serialize) -> Result<String, Failure> {

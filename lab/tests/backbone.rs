@@ -24,24 +24,27 @@ fn tracked(settings: &[&str]) -> TrackedComparison {
     let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
     let report = TrackedComparison::of(&tracked, &scene);
     println!(
-        "{settings:?}: {:.1} periods per point, at most {:.1e} from the exact backbone",
+        "{settings:?}: {:.1} periods per point, at most {:.1e} from the exact backbone at equal C",
         report.periods_per_point(),
-        report.worst().unwrap()
+        report.worst().unwrap().at_equal_c
     );
     report
 }
 
 #[test]
-fn clean_points_lie_within_1e_3_of_the_exact_orbits_at_25_periods_each() {
+fn clean_points_lie_within_1e_3_of_the_exact_orbits_at_equal_c_at_15_periods_each() {
     let report = tracked(&[]);
-    assert!(report.worst().unwrap() <= 1e-3);
-    assert!(report.periods_per_point() <= 25.0);
+    assert!(report.worst().unwrap().at_equal_c <= 1e-3);
+    assert!(report.periods_per_point() <= 15.0);
     for one in &report.points {
         assert!(one.point.settled);
         assert_eq!(one.point.regime, Regime::Symmetric);
         assert_eq!(one.point.regime_by_impacts, Some(Regime::Symmetric));
         // The level asked for is the level held.
-        assert!((one.point.c - one.point.level).abs() < 1e-3, "{one:?}");
+        assert!(
+            one.point.reached && (one.point.c - one.point.level).abs() < 8e-3,
+            "{one:?}"
+        );
     }
 }
 
@@ -54,14 +57,14 @@ fn another_plant_is_tracked_as_closely() {
         "backbone.C_to=0.45",
         "backbone.points=5",
     ]);
-    assert!(report.worst().unwrap() <= 1e-3);
+    assert!(report.worst().unwrap().at_equal_c <= 1e-3);
 }
 
 #[test]
 fn through_40_db_of_sensor_noise_points_lie_within_5e_3() {
     {
         let report = tracked(&["chain.snr=40"]);
-        assert!(report.worst().unwrap() <= 5e-3);
+        assert!(report.worst().unwrap().at_equal_c <= 5e-3);
         assert!(report.periods_per_point() <= 25.0);
         // At 40 dB, harmonics of 3e-4 are hidden, but no other regime is reported.
         for one in &report.points {
@@ -72,20 +75,51 @@ fn through_40_db_of_sensor_noise_points_lie_within_5e_3() {
 }
 
 #[test]
-fn theory_can_make_the_forecast_and_a_loop_without_any_needs_longer() {
-    let feed = |feed: &str| {
+fn every_predictor_leads_to_the_same_backbone() {
+    for feed in ["theory", "none"] {
         let feed = format!("backbone.feed=\"{feed}\"");
         let report = tracked(&["backbone.C_to=0.4", "backbone.points=7", &feed]);
-        assert!(report.worst().unwrap() <= 1e-3);
-        report.periods_per_point()
-    };
-    let (theory, none) = (feed("theory"), feed("none"));
-    assert!(theory < none, "{theory} {none}");
+        assert!(report.worst().unwrap().at_equal_c <= 1e-3);
+    }
+}
+
+#[test]
+fn a_level_that_the_drive_cannot_hold_is_reported_as_not_reached() {
+    let report = tracked(&[
+        "backbone.G_max=1.12",
+        "backbone.C_from=0.7",
+        "backbone.C_to=0.4",
+        "backbone.points=2",
+    ]);
+    assert!(!report.points[0].point.reached && report.points[1].point.reached);
+    assert!(vines::report::summary::tracked(&report).contains("level 0.700 not reached"));
+}
+
+#[test]
+fn tracked_points_through_noise_state_how_far_off_they_are() {
+    let report = tracked(&[
+        "chain.snr=30",
+        "backbone.C_from=0.6",
+        "backbone.C_to=0.3",
+        "backbone.points=7",
+    ]);
+    for one in report.points.iter().filter(|one| one.point.settled) {
+        let (exact, point) = (one.exact.unwrap(), one.point);
+        assert!(exact.sigma.unwrap().abs() <= 4.0 * point.u_sigma, "{one:?}");
+        assert!(exact.g.unwrap().abs() <= 4.0 * point.u_g, "{one:?}");
+        assert!(point.u_sigma < 0.01 && point.u_g < 0.01, "{one:?}");
+    }
 }
 
 #[test]
 fn beyond_symmetry_breaking_both_ways_of_telling_the_regime_say_so() {
-    let report = tracked(&["backbone.C_from=0.6", "backbone.C_to=0.8", "backbone.points=3"]);
+    // The asymmetry grows slowly: a short dwell measures the symmetric motion, although it is unstable.
+    let report = tracked(&[
+        "backbone.C_from=0.6",
+        "backbone.C_to=0.8",
+        "backbone.points=3",
+        "backbone.dwell_min=50",
+    ]);
     let regimes: Vec<_> = report
         .points
         .iter()
@@ -101,6 +135,7 @@ fn beyond_symmetry_breaking_both_ways_of_telling_the_regime_say_so() {
 fn the_response_alone_distinguishes_the_linear_mode_from_the_impacting_one() {
     let report = tracked(&[
         "start.dq2=0",
+        "controller.capture=false",
         "backbone.C_from=0.6",
         "backbone.C_to=0.5",
         "backbone.points=2",
@@ -158,4 +193,45 @@ fn a_controller_that_cannot_hold_the_response_is_refused() {
         outcome,
         Err(TrackError::Controller(ControllerError::NoResponseLoop))
     ));
+}
+
+/// A rig whose response sensor stops after some samples.
+struct Dying {
+    rig: Simulated,
+    left: usize,
+    stuck: f64,
+}
+
+impl Rig for Dying {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        let mut sensors = self.rig.sense()?;
+        self.left = self.left.saturating_sub(1);
+        if self.left > 0 {
+            self.stuck = sensors.response;
+        }
+        sensors.response = self.stuck;
+        Ok(sensors)
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.rig.advance(drive, step)
+    }
+}
+
+#[test]
+fn a_sensor_that_stops_ends_tracking_and_keeps_the_points_before() {
+    let scene = scene(&[]);
+    let rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut rig = Dying { rig, left: 20_000, stuck: 0.0 };
+    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
+    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
+    let reason = tracked.ended.unwrap();
+    assert!(reason.contains("did not change for half a period"), "{reason}");
+    assert!((5..15).contains(&tracked.points.len()), "{}", tracked.points.len());
+    for point in &tracked.points {
+        assert!(
+            point.g > 0.5 && point.settled && (point.c / point.level - 1.0).abs() < 0.01,
+            "{point:?}"
+        );
+    }
 }

@@ -149,8 +149,17 @@ fn curves_and_settled_orbits_come_as_json_too() {
     let points = mode["points"].as_array().unwrap();
     assert!(points.len() > 100 && points.iter().all(|one| one["G"].as_f64().unwrap().abs() < 1e-9));
     let response = json(&["orbit", "--response", "--json", "--set", "excitation.G=1.6"]);
-    assert!(response["symmetric"]["special"].as_array().map_or(0, Vec::len) >= 3);
-    assert_eq!(response["asymmetric"].as_array().map(Vec::len), Some(1));
+    let components = response["components"].as_array().unwrap();
+    let named = |name: &str| {
+        components
+            .iter()
+            .filter(|one| one["name"].as_str().unwrap().starts_with(name))
+            .count()
+    };
+    assert!(components[0]["special"].as_array().map_or(0, Vec::len) >= 3);
+    assert_eq!((named("symmetric 1:1"), named("asymmetric 1:1")), (1, 1));
+    let study = json(&["orbit", "--definitions", "--json"]);
+    assert_eq!(study.as_array().map(Vec::len), Some(9));
     let settled = json(&["orbit", "--sigma=-0.6", "--json", "--set", "excitation.G=2.2"]);
     assert_eq!(settled["bounces"].as_array().map(Vec::len), Some(6));
     let study = json(&["orbit", "--convergence", "--json"]);
@@ -169,8 +178,10 @@ fn a_map_is_written_as_table_and_figures() {
         "sigma=-2:1:4",
         "--y",
         "G=1:1.4:3",
-        "--settle",
-        "200",
+        "--periods",
+        "2000",
+        "--starts",
+        "2",
         "--out",
         out,
     ]);
@@ -182,15 +193,30 @@ fn a_map_is_written_as_table_and_figures() {
     );
     let rows = std::fs::read_to_string(folder.path().join("map.csv")).unwrap();
     assert_eq!(rows.lines().count(), 1 + 12);
-    assert!(rows.starts_with("sigma,G,r,regime,impacts_per_period,impacts,periods,synchrony,growth,theory_stable"));
+    assert!(rows.starts_with("sigma,G,r,regime,followed,transient,recurrence,exponent,exponent_error,synchrony,"));
+    let curves = std::fs::read_to_string(folder.path().join("bifurcations.csv")).unwrap();
+    assert!(curves.starts_with("curve,bifurcation,sigma,G,C,B,bounds_stability\n") && curves.lines().count() > 20);
 }
 
 #[test]
 fn absurd_curves_and_maps_are_refused() {
     fails(&["orbit", "--sigma=-1000"], 2, "above 0");
     fails(&["orbit", "--sigma=-1", "--set", "excitation.G=0.6"], 1, "vines map");
-    fails(&["orbit", "--response", "--set", "excitation.G=0.1"], 1, "G = 0.1");
+    fails(&["orbit", "--response", "--set", "excitation.G=0"], 1, "G = 0");
+    fails(&["orbit", "--response", "--range=2:-2"], 2, "first below the last");
+    fails(&["identify", "--set", "resonance.definition='peak'"], 2, "phase_target");
     fails(&["theory", "--sigma=nan"], 2, "finite");
     fails(&["map", "--x", "G=1:2:3", "--y", "G=1:2:3"], 2, "both axes are G");
     fails(&["report", "--x", "r=0.5:1:3", "--y", "r=0.5:1:3"], 2, "both r");
+}
+
+#[test]
+fn a_folder_that_is_a_file_is_refused_as_wrong_usage_before_anything_runs() {
+    let file = tempfile::NamedTempFile::new().unwrap();
+    let path = file.path().to_str().unwrap();
+    for command in ["identify", "backbone", "map", "report"] {
+        let start = Instant::now();
+        fails(&[command, "--out", path], 2, path);
+        assert!(start.elapsed() < Duration::from_secs(5), "{command}");
+    }
 }

@@ -2,10 +2,10 @@
 
 use vines::comparison::Comparison;
 use vines::experiment::{self, ExperimentError, Plan, Record};
-use vines::identification::{IdentificationError, Regime, identify};
+use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
 use vines::net::LinkError;
 use vines::rig::{
-    BuiltIn, Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors, Simulated,
+    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Fault, GroundTruth, Rig, RigError, Sensors, Simulated,
 };
 use vines::scene::{Override, Scene};
 
@@ -20,7 +20,9 @@ fn plan(scene: &Scene) -> Plan {
 }
 
 fn measure(scene: &Scene) -> Record {
-    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut rig = Simulated::new(scene.plant, scene.start)
+        .unwrap()
+        .with_sensors(scene.resonance);
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     experiment::run(&mut rig, &mut controller, &plan(scene), |_, _, _| {}).unwrap()
 }
@@ -43,7 +45,10 @@ fn the_lock_is_the_exact_orbit_within_5e_3_in_sigma_and_half_a_percent_in_amplit
 
 #[test]
 fn a_longer_wait_brings_the_lock_closer_to_the_exact_orbit() {
-    let strict = ["controller.amplitude_drift=1e-8", "controller.frequency_drift=1e-9"];
+    let strict = [
+        "controller.amplitude_tolerance=1e-7",
+        "controller.frequency_tolerance=1e-6",
+    ];
     let found = identified(&strict);
     let exact = found.exact.unwrap();
     let (sigma, c) = (found.lock.sigma - exact.sigma, found.lock.c / exact.c - 1.0);
@@ -52,6 +57,35 @@ fn a_longer_wait_brings_the_lock_closer_to_the_exact_orbit() {
         found.lock.periods_to_lock
     );
     assert!(sigma.abs() < 1e-5 && c.abs() < 1e-5);
+}
+
+#[test]
+fn the_lock_is_the_exact_orbit_for_every_sensor_and_reference() {
+    let lock = |settings: &[&str]| {
+        let found = identified(settings);
+        let (exact, lock) = (found.exact.unwrap(), found.lock);
+        let (sigma, c) = (lock.sigma - exact.sigma, lock.c / exact.c - 1.0);
+        println!(
+            "{settings:?}: sigma {:.5}, off by {sigma:.1e}; C {:.5}, off by {c:.1e}",
+            lock.sigma, lock.c
+        );
+        (sigma.abs(), c.abs())
+    };
+    for reference in ["resonance.reference='base'", "resonance.reference='force'"] {
+        for sensor in ["v", "q1", "acceleration"] {
+            let (sigma, c) = lock(&[reference, &format!("resonance.sensor='{sensor}'")]);
+            assert!(sigma < 2e-3 && c < 2e-3, "{reference} {sensor}");
+        }
+    }
+    // At the phase of the exact peak, the lock is the peak.
+    let peak = scene(&["resonance.definition='peak'"]).dimensionless();
+    let orbits = vines::orbit::phase_resonant(&peak);
+    let phase = orbits.iter().find(|one| one.stable).unwrap().gamma.to_degrees();
+    let (sigma, c) = lock(&[
+        "resonance.definition='peak'",
+        &format!("controller.phase_target={phase}"),
+    ]);
+    assert!(sigma < 2e-3 && c < 2e-3);
 }
 
 #[test]
@@ -66,7 +100,7 @@ fn the_decay_follows_theory_and_the_distance_halves_with_epsilon() {
 #[test]
 fn a_lock_of_the_linear_mode_is_not_taken_for_the_impacting_one() {
     // At rest with the particle at the centre nothing ever hits, and the loop locks all the same, at sigma = 0.
-    let scene = scene(&["start.dq2=0"]);
+    let scene = scene(&["start.dq2=0", "controller.capture=false"]);
     let refusal = identify(&measure(&scene), &scene).unwrap_err();
     let IdentificationError::Regime { regime, sigma, .. } = refusal else {
         panic!("{refusal}");
@@ -95,11 +129,70 @@ impl Rig for Noise {
 }
 
 #[test]
-fn noise_is_never_locked() {
-    let scene = scene(&["record.lock_periods=300"]);
+fn noise_is_never_locked_and_ends_the_experiment_with_its_reason() {
+    let scene = scene(&[]);
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    let outcome = experiment::run(&mut Noise(1), &mut controller, &plan(&scene), |_, _, _| {});
-    assert!(matches!(outcome, Err(ExperimentError::NoLock { .. })));
+    let mut samples = Vec::new();
+    let outcome = experiment::run_into(
+        &mut samples,
+        &mut Noise(1),
+        &mut controller,
+        &plan(&scene),
+        |_, _, _| {},
+    );
+    assert!(matches!(
+        outcome,
+        Err(ExperimentError::Tripped { fault: Fault::NoSignal, .. })
+    ));
+    assert!(samples.len() < 2500, "{}", samples.len());
+}
+
+#[test]
+fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_measured() {
+    let scene = scene(&["controller.C_max=0.3"]);
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let mut samples = Vec::new();
+    let outcome = experiment::run_into(&mut samples, &mut rig, &mut controller, &plan(&scene), |_, _, _| {});
+    let Err(ExperimentError::Tripped { periods, fault, .. }) = outcome else {
+        panic!("{outcome:?}");
+    };
+    assert!(fault == Fault::ResponseTooLarge && periods < 50.0, "{periods} {fault}");
+    let last = samples.last().unwrap();
+    assert!(last.sensors.response.abs() > 0.3 && samples.len() > 100);
+    assert_eq!(experiment::table(&samples).lines().count(), samples.len() + 1);
+}
+
+#[test]
+fn a_drive_that_is_not_a_number_never_reaches_the_rig() {
+    let (scene, mut rig) = (scene(&[]), Shaken(Drive::default()));
+    for drive in [(f64::NAN, 0.1), (1.0, f64::INFINITY)] {
+        let drive = Drive { omega: drive.0, amplitude: drive.1, displacement: 0.0 };
+        let outcome = experiment::run(&mut rig, &mut OpenLoop(drive), &plan(&scene), |_, _, _| {});
+        assert!(matches!(outcome, Err(ExperimentError::NotANumber(_))));
+        assert_eq!(rig.0, Drive::default());
+    }
+}
+
+#[test]
+fn from_rest_the_controller_alone_reaches_the_symmetric_orbit() {
+    let found = identified(&["start.dq2=0.0"]);
+    let exact = found.exact.unwrap();
+    let (sigma, c) = (found.lock.sigma - exact.sigma, found.lock.c - exact.c);
+    println!(
+        "after {:.0} periods: sigma off by {sigma:.1e}, C by {c:.1e}",
+        found.lock.periods_to_lock
+    );
+    assert!(sigma.abs() < 1e-3 && c.abs() < 1e-3 && found.lock.regime == Regime::Symmetric);
+    assert!(found.lock.periods_to_lock < 200.0);
+}
+
+#[test]
+fn the_default_lock_takes_at_most_120_periods() {
+    let found = identified(&[]);
+    let exact = found.exact.unwrap();
+    assert!(found.lock.periods_to_lock <= 120.0, "{}", found.lock.periods_to_lock);
+    assert!((found.lock.sigma - exact.sigma).abs() < 1.2e-4);
 }
 
 /// A rig that does not report its impacts, as hardware would not.
@@ -144,7 +237,7 @@ fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
 
 #[test]
 fn the_linear_mode_of_a_rig_that_does_not_report_its_impacts_is_refused() {
-    let refusal = identified_without_ground_truth(&["start.dq2=0"]).unwrap_err();
+    let refusal = identified_without_ground_truth(&["start.dq2=0", "controller.capture=false"]).unwrap_err();
     let IdentificationError::Regime { regime, .. } = refusal else {
         panic!("{refusal}");
     };
@@ -239,8 +332,42 @@ fn limits_of_a_scene_reach_the_controller() {
     // A response too large takes the drive away for good.
     let (_, drives) = run(&["controller.C_max=0.2"]).unwrap();
     assert!(drives[0] > 0.0 && drives[3999] == 0.0);
-    let (_, drives) = run(&["controller.acquire_periods=20"]).unwrap();
+    let (_, drives) = run(&["record.lock_periods=20"]).unwrap();
     assert!(drives[1900] > 0.0 && drives[3999] == 0.0);
     let refused = run(&["controller.G_max=1.0"]).unwrap_err().to_string();
     assert!(refused.starts_with("amplitude"), "{refused}");
+}
+
+#[test]
+fn the_decay_corrected_for_its_drift_lies_within_a_third_of_the_raw_distance() {
+    for settings in [&[][..], &["plant.epsilon=0.02"], &["plant.r=0.8"]] {
+        let found = identified(settings);
+        let (raw, steady) = (found.rms_sigma_exact.unwrap(), found.rms_steady_exact.unwrap());
+        println!("{settings:?}: raw {raw:.4}, corrected {steady:.4}");
+        assert!(steady <= raw / 3.0);
+        assert_eq!(found.decay_end, DecayEnd::Synchrony);
+    }
+}
+
+#[test]
+fn a_decay_too_short_for_points_keeps_the_lock_and_says_that_the_record_ended() {
+    let found = identified(&["record.decay_periods=1", "record.window_periods=1"]);
+    assert!(found.decay.is_empty() && found.exact.is_some());
+    assert_eq!(found.decay_end, DecayEnd::Record);
+    assert!(vines::report::summary::identification(&found).contains("no points"));
+}
+
+#[test]
+fn a_lock_through_30_db_takes_less_than_twice_the_periods_and_states_how_far_off_it_is() {
+    let scene = scene(&["chain.snr=30"]);
+    let plant = Box::new(Simulated::new(scene.plant, scene.start).unwrap());
+    let mut rig = Chain::new(plant, &scene.chain, &scene.dimensionless(), 100.0);
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let record = experiment::run(&mut rig, &mut controller, &plan(&scene), |_, _, _| {}).unwrap();
+    let found = Comparison::of(&identify(&record, &scene).unwrap(), &scene);
+    let (lock, exact) = (found.lock, found.exact.unwrap());
+    println!("{lock:?}");
+    assert!(lock.periods_to_lock <= 2.0 * identified(&[]).lock.periods_to_lock);
+    assert!((lock.sigma - exact.sigma).abs() <= 4.0 * lock.u_sigma && lock.u_sigma < 0.01);
+    assert!((lock.c - exact.c).abs() <= 4.0 * lock.u_c && lock.u_c < 0.01);
 }

@@ -16,8 +16,8 @@ use vines::pack::pack_bench;
 use vines::rig::{BuiltIn, Simulated};
 use vines::scene::Scene;
 
-/// The periods that are driven: the default scene locks after 304.
-const PERIODS: f64 = 330.0;
+/// The periods that are driven: the default scene locks after about 110.
+const PERIODS: f64 = 140.0;
 const HOLD_PERIODS: f64 = 20.0;
 
 /// The libraries of this build; cargo makes one of the two only where it is asked for. The folder is that of the tests in

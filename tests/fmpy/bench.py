@@ -45,6 +45,10 @@ class Scene:
             "omega_max": 1.1,
             "amplitude": self.amplitude,
             "bandwidth": 0.1,
+            "response_gain": 0.5,
+            "amplitude_max": 4 * self.amplitude,
+            "acquire_timeout": 2000 * PERIOD,
+            "signal_timeout": 20 * PERIOD,
         }
 
     def sigma(self, omega: float) -> float:

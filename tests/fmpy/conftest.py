@@ -58,7 +58,8 @@ def run(fmus: dict[str, Fmu]) -> Callable[..., Record]:
             stack.callback(plant.close)
             stack.callback(controller.close)
             plant.start(scene.plant())
-            controller.start(scene.controller() | dict(settings))
+            connected = {"reference_connected": coupling.get("reference", True)}
+            controller.start(scene.controller() | connected | dict(settings))
             return experiment(Pair(plant, controller, step, **coupling), scene)
 
     return run

@@ -3,26 +3,16 @@
 use std::f64::consts::TAU;
 use std::time::Instant;
 
-use lovines::{Drive, Event, Plant, State};
+use lovines::{Drive, Plant, State};
 use serde::Serialize;
-use vines_model::regime::{Impact, Pattern, Regime, pattern, synchrony};
+use vines_model::{Dimensionless, map::observe, regime::Regime};
 
-use super::reference::{Lock, RIG, drive, evaluations, more, settle, timed};
+use super::reference::{Lock, RIG, drive, evaluations, settle, timed};
 use super::{Effort, Methods, median};
 use crate::methods::{BrentBaseline, brent_baseline};
 
-/// Periods whose impacts are classified.
-const RECORDED: u32 = 100;
-/// Times that a motion which neither repeats nor is chaotic is given longer to settle.
-const ROUNDS: usize = 3;
-/// As in `vines map`: growth of a small disturbance per period (natural logarithm) above which a motion is chaotic, the share
-/// of captured impacts from which it is modulated, and the share of periods with a rest from which it sticks.
-const CHAOS: f64 = 0.05;
-const CAPTURES: f64 = 0.2;
-const STICKING: f64 = 0.1;
-/// Periods over which a disturbance of this size (half-widths) is followed.
-const FOLLOWED: u32 = 100;
-const DISTURBANCE: f64 = 1e-8;
+/// Periods over which a motion without repetition is followed before its regime is decided, as in `vines map`.
+const FOLLOWED: usize = 400;
 /// Periods over which the plant is compared with the closed form and Brent's method, and the latter's tolerance, s.
 const COMPARED: u32 = 20;
 const TOLERANCE: f64 = 1e-15;
@@ -81,11 +71,12 @@ pub struct Settled {
 impl Settled {
     /// # Errors
     /// A frequency that is not positive, or a value that the plant does not accept.
-    pub fn new(sigma: f64, g: f64) -> Result<Self, String> {
+    pub fn new(sigma: f64, g: f64) -> anyhow::Result<Self> {
         let drive = drive(sigma, g)?;
-        let mut plant = settle(drive)?;
-        let found = classify(&mut plant, drive)?;
-        let repeats = found.pattern.is_some() || found.regime == Regime::NoImpacts;
+        let plant = settle(drive)?;
+        let scene = Dimensionless::of(&RIG, drive.amplitude);
+        let found = observe(&scene, sigma, scene.state(&plant.state()), FOLLOWED)?;
+        let repeats = found.periods > 0 || found.regime == Regime::NoImpacts;
         let state = numbers(&plant.state());
         Ok(Self {
             sigma,
@@ -93,7 +84,7 @@ impl Settled {
             drive,
             brent: Some(brent_baseline(RIG, state, time(TIMED_TOLERANCE))),
             regime: found.regime.name(),
-            pattern: found.pattern.map_or((0, 0), |one| (one.impacts, one.periods)),
+            pattern: (found.impacts, found.periods),
             impacts_per_period: 0.0,
             difference: repeats.then(|| difference(state, drive)).flatten(),
             plant,
@@ -108,7 +99,7 @@ impl Settled {
     ///
     /// # Errors
     /// None, as long as the drive of the cell is valid.
-    pub fn run(&mut self, lock: &Lock, effort: &Effort) -> Result<(), String> {
+    pub fn run(&mut self, lock: &Lock, effort: &Effort) -> anyhow::Result<()> {
         self.lock_ns.push(lock.run(effort.periods)?);
         let (ns, outcome) = timed(&self.plant, self.drive, effort.periods)?;
         let units = units(outcome.impacts, effort.periods);
@@ -172,87 +163,6 @@ fn units(impacts: u64, periods: u32) -> f64 {
     (impacts as f64).max(f64::from(periods))
 }
 
-struct Found {
-    regime: Regime,
-    pattern: Option<Pattern>,
-}
-
-/// The regime that the plant is in, told as `vines map` tells it.
-fn classify(plant: &mut Plant, drive: Drive) -> Result<Found, String> {
-    let mut round = 0;
-    loop {
-        let (hits, rests) = watch(plant, drive)?;
-        let found = |regime, pattern| Ok(Found { regime, pattern });
-        if f64::from(rests) >= STICKING * f64::from(RECORDED) {
-            return found(Regime::Sticking, None);
-        }
-        if hits.is_empty() {
-            return found(Regime::NoImpacts, None);
-        }
-        if let Some(one) = pattern(&hits) {
-            return found(one.regime, Some(one));
-        }
-        let growth = growth(plant, drive)?;
-        round += 1;
-        if growth > CHAOS && synchrony(&hits) < CAPTURES {
-            return found(Regime::Chaotic, None);
-        }
-        if growth > CHAOS || round == ROUNDS {
-            return found(Regime::Modulated, None);
-        }
-        more(plant, drive, 400)?;
-    }
-}
-
-/// The impacts of the recorded periods, and how often the particle came to rest on a wall or was at rest when they began.
-fn watch(plant: &mut Plant, drive: Drive) -> Result<(Vec<Impact>, u32), String> {
-    let mut hits = Vec::new();
-    let mut rests = u32::from(plant.contact().is_some());
-    for n in 0..RECORDED {
-        let outcome = plant.advance_with(drive, TAU / drive.omega, |event| match event {
-            Event::Impact { t, velocity, .. } => hits.push(Impact {
-                time: TAU * f64::from(n) + drive.omega * t,
-                velocity: velocity / speed(),
-            }),
-            Event::Stuck { .. } => rests += 1,
-            Event::Released { .. } => {}
-        });
-        outcome.map_err(|e| e.to_string())?;
-    }
-    Ok((hits, rests))
-}
-
-/// Mean growth of a small disturbance per period, as a natural logarithm. The disturbed plant is brought near again after every
-/// period (Benettin et al., Meccanica 15, 1980); both begin anew at phase 0.
-fn growth(plant: &Plant, drive: Drive) -> Result<f64, String> {
-    let mut here = numbers(&plant.state());
-    let mut apart = [DISTURBANCE / 2.0; 4];
-    let (mut sum, mut counted) = (0.0, 0);
-    for _ in 0..FOLLOWED {
-        let shifted = |sign: f64| core::array::from_fn(|n| here[n] + sign * apart[n] * scale(n));
-        // A disturbed particle outside its cavity is put on the other side.
-        let (Ok(mut one), Ok(mut other)) = (
-            begin(here, drive),
-            begin(shifted(1.0), drive).or_else(|_| begin(shifted(-1.0), drive)),
-        ) else {
-            break;
-        };
-        let before = distance(&numbers(&other.state()), &here);
-        more(&mut one, drive, 1)?;
-        more(&mut other, drive, 1)?;
-        here = numbers(&one.state());
-        let there = numbers(&other.state());
-        let after = distance(&there, &here);
-        if before == 0.0 || after == 0.0 {
-            break;
-        }
-        sum += (after / before).ln();
-        counted += 1;
-        apart = core::array::from_fn(|n| (there[n] - here[n]) / scale(n) * (DISTURBANCE / after));
-    }
-    Ok(sum / f64::from(counted.max(1)))
-}
-
 /// Largest difference of the plant and the closed form with Brent's method from the same state on; none if the latter stalls.
 fn difference(state: [f64; 4], drive: Drive) -> Option<f64> {
     let mut plant = begin(state, drive).ok()?;
@@ -267,10 +177,10 @@ fn difference(state: [f64; 4], drive: Drive) -> Option<f64> {
     (0..4).map(|n| ((there[n] - here[n]) / scale(n)).abs()).reduce(f64::max)
 }
 
-fn begin([q1, dq1, q2, dq2]: [f64; 4], drive: Drive) -> Result<Plant, String> {
+fn begin([q1, dq1, q2, dq2]: [f64; 4], drive: Drive) -> anyhow::Result<Plant> {
     let state = State { q1, dq1, q2, dq2 };
-    let mut plant = Plant::new(RIG, state).map_err(|e| e.to_string())?;
-    plant.begin(drive).map_err(|e| e.to_string())?;
+    let mut plant = Plant::new(RIG, state)?;
+    plant.begin(drive)?;
     Ok(plant)
 }
 
@@ -291,11 +201,4 @@ fn time(radians: f64) -> f64 {
 /// Unit of the n-th state.
 fn scale(n: usize) -> f64 {
     if n.is_multiple_of(2) { RIG.half_width } else { speed() }
-}
-
-fn distance(one: &[f64; 4], other: &[f64; 4]) -> f64 {
-    (0..4)
-        .map(|n| ((one[n] - other[n]) / scale(n)).powi(2))
-        .sum::<f64>()
-        .sqrt()
 }

@@ -25,14 +25,14 @@ const SETTLING: u32 = 400;
 ///
 /// # Errors
 /// A detuning whose frequency is not positive.
-pub fn drive(sigma: f64, g: f64) -> Result<Drive, String> {
+pub fn drive(sigma: f64, g: f64) -> anyhow::Result<Drive> {
     let epsilon = RIG.mass_ratio();
     let ratio = 1.0 + epsilon * sigma;
     if ratio > 0.0 && ratio.is_finite() && g.is_finite() {
         let omega = RIG.natural_frequency() * ratio;
         Ok(Drive::harmonic(g * RIG.half_width * epsilon, omega))
     } else {
-        Err(format!(
+        Err(anyhow::anyhow!(
             "sigma = {sigma}, G = {g} (dimensionless): a frequency of {ratio} omega0; allowed are finite values with a frequency above 0"
         ))
     }
@@ -42,10 +42,10 @@ pub fn drive(sigma: f64, g: f64) -> Result<Drive, String> {
 ///
 /// # Errors
 /// A value that the plant does not accept.
-pub fn settle(drive: Drive) -> Result<Plant, String> {
+pub fn settle(drive: Drive) -> anyhow::Result<Plant> {
     let start = State { dq2: START, ..State::default() };
-    let mut plant = Plant::new(RIG, start).map_err(|e| e.to_string())?;
-    plant.begin(drive).map_err(|e| e.to_string())?;
+    let mut plant = Plant::new(RIG, start)?;
+    plant.begin(drive)?;
     more(&mut plant, drive, SETTLING)?;
     Ok(plant)
 }
@@ -54,9 +54,9 @@ pub fn settle(drive: Drive) -> Result<Plant, String> {
 ///
 /// # Errors
 /// A drive that the plant does not accept.
-pub fn more(plant: &mut Plant, drive: Drive, periods: u32) -> Result<(), String> {
+pub fn more(plant: &mut Plant, drive: Drive, periods: u32) -> anyhow::Result<()> {
     let duration = f64::from(periods) * TAU / drive.omega;
-    plant.advance(drive, duration).map_err(|e| e.to_string())?;
+    plant.advance(drive, duration)?;
     Ok(())
 }
 
@@ -69,14 +69,14 @@ pub fn evaluations(outcome: &Outcome) -> Option<u64> {
 ///
 /// # Errors
 /// A drive that the plant does not accept.
-pub fn timed(settled: &Plant, drive: Drive, periods: u32) -> Result<(f64, Outcome), String> {
+pub fn timed(settled: &Plant, drive: Drive, periods: u32) -> anyhow::Result<(f64, Outcome)> {
     let mut plant = *settled;
     let duration = f64::from(periods) * TAU / drive.omega;
     let began = Instant::now();
     let outcome = plant.advance(std::hint::black_box(drive), duration);
     std::hint::black_box(plant.state());
     let ns = began.elapsed().as_nanos() as f64;
-    Ok((ns, outcome.map_err(|e| e.to_string())?))
+    Ok((ns, outcome?))
 }
 
 /// The default lock, settled.
@@ -88,7 +88,7 @@ pub struct Lock {
 impl Lock {
     /// # Errors
     /// None, as long as the default scene is valid.
-    pub fn settle() -> Result<Self, String> {
+    pub fn settle() -> anyhow::Result<Self> {
         let drive = drive(LOCK.0, LOCK.1)?;
         let plant = settle(drive)?;
         Ok(Self { plant, drive })
@@ -98,7 +98,7 @@ impl Lock {
     ///
     /// # Errors
     /// None, as long as the default scene is valid.
-    pub fn run(&self, periods: u32) -> Result<f64, String> {
+    pub fn run(&self, periods: u32) -> anyhow::Result<f64> {
         let (ns, outcome) = timed(&self.plant, self.drive, periods)?;
         Ok(ns / outcome.impacts as f64)
     }

@@ -1,5 +1,6 @@
 //! The map on the terminal: `vines-bench map`.
 
+use anyhow::{Context, bail};
 use std::fmt::Write as _;
 use std::io::IsTerminal;
 
@@ -29,7 +30,7 @@ const ALLOWED_SYMMETRIC: (f64, f64) = (1.5, 1.5);
 ///
 /// # Errors
 /// An argument that is not known or has no valid value.
-pub fn run(arguments: &[String]) -> Result<String, String> {
+pub fn run(arguments: &[String]) -> anyhow::Result<String> {
     let (mut sigmas, mut gs) = (Axis::SIGMA, Axis::G);
     let mut effort = Effort { methods: Methods::Plant, ..Effort::default() };
     let mut cells_too = false;
@@ -38,7 +39,7 @@ pub fn run(arguments: &[String]) -> Result<String, String> {
         let mut value = || {
             rest.next()
                 .map(String::as_str)
-                .ok_or_else(|| format!("{option} needs a value"))
+                .with_context(|| format!("{option} needs a value"))
         };
         match option.as_str() {
             "--help" | "-h" => return Ok(HELP.into()),
@@ -51,7 +52,7 @@ pub fn run(arguments: &[String]) -> Result<String, String> {
             _ => match option.split_once('=') {
                 Some(("--sigma", value)) => sigmas = value.parse()?,
                 Some(("--G", value)) => gs = value.parse()?,
-                _ => return Err(format!("{option} is not an option of this command\n{HELP}")),
+                _ => bail!("{option} is not an option of this command\n{HELP}"),
             },
         }
     }
@@ -81,18 +82,18 @@ pub fn run(arguments: &[String]) -> Result<String, String> {
     Ok(text)
 }
 
-fn methods(text: &str) -> Result<Methods, String> {
+fn methods(text: &str) -> anyhow::Result<Methods> {
     match text {
         "plant" => Ok(Methods::Plant),
         "both" => Ok(Methods::Both),
-        _ => Err(format!("--method {text}: allowed are plant and both")),
+        _ => bail!("--method {text}: allowed are plant and both"),
     }
 }
 
-fn count(option: &str, text: &str) -> Result<u32, String> {
+fn count(option: &str, text: &str) -> anyhow::Result<u32> {
     let allowed = |n: &u32| (1..=100_000).contains(n);
     let wrong = || format!("{option} {text}: allowed is a whole number from 1 to 100000");
-    text.parse().ok().filter(allowed).ok_or_else(wrong)
+    text.parse().ok().filter(allowed).with_context(wrong)
 }
 
 /// One letter for a regime.

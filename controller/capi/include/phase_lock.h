@@ -27,13 +27,15 @@ typedef enum PhaseLockStage {
   PHASE_LOCK_STAGE_TRIPPED = 5,
   // active became false: the drive is released.
   PHASE_LOCK_STAGE_SHUT_DOWN = 6,
+  // The response rises until impacts begin.
+  PHASE_LOCK_STAGE_CAPTURING = 7,
 } PhaseLockStage;
 
 // Reason why the drive was switched off.
 typedef enum PhaseLockFault {
   // No fault.
   PHASE_LOCK_FAULT_NONE = 0,
-  // A sensor read NaN, infinity, or more than 1e100 m.
+  // A sensor read NaN, infinity, or more than 1e100 m, or the response did not change for half a period.
   PHASE_LOCK_FAULT_SENSOR = 1,
   // The response exceeded response_max.
   PHASE_LOCK_FAULT_RESPONSE_TOO_LARGE = 2,
@@ -41,7 +43,17 @@ typedef enum PhaseLockFault {
   PHASE_LOCK_FAULT_TIMED_OUT = 3,
   // The phase error exceeded unlock_tolerance, or the response was no longer valid.
   PHASE_LOCK_FAULT_LOCK_LOST = 4,
+  // No valid measurement for signal_timeout.
+  PHASE_LOCK_FAULT_NO_SIGNAL = 5,
 } PhaseLockFault;
+
+// An optional value; all zeros: not present.
+typedef struct PhaseLockOptional {
+  // Whether there is a value.
+  bool present;
+  // The value.
+  double value;
+} PhaseLockOptional;
 
 // All parameters; phase_lock_config_for_resonance gives initial values.
 typedef struct PhaseLockConfig {
@@ -53,16 +65,16 @@ typedef struct PhaseLockConfig {
   double omega_min;
   // Highest frequency, rad/s.
   double omega_max;
-  // Largest rate of change of the frequency, rad/s^2; 0: no limit.
-  double omega_rate;
+  // Largest rate of change of the frequency, rad/s^2.
+  struct PhaseLockOptional omega_rate;
   // Setpoint of the drive amplitude, m.
   double amplitude;
-  // Largest drive amplitude, m; 0: no limit.
-  double amplitude_max;
-  // Duration of a drive ramp from 0 to amplitude, s, and of the ramp down after a fault; 0: step change.
-  double ramp_time;
-  // Duration of the drive ramp to 0 after active becomes false, s; 0: switch off at once.
-  double release_time;
+  // Largest drive amplitude, m.
+  struct PhaseLockOptional amplitude_max;
+  // Largest rate of change of the drive amplitude in a ramp, m/s; not present: step changes.
+  struct PhaseLockOptional ramp_rate;
+  // Rate of the drive ramp to 0 after active becomes false, m/s; not present: switched off at once.
+  struct PhaseLockOptional release_rate;
   // Bandwidth of the control of the measured base amplitude, rad/s; 0: no control.
   double base_bandwidth;
   // Setpoint of the phase of the response relative to the reference, rad.
@@ -75,7 +87,7 @@ typedef struct PhaseLockConfig {
   double delay;
   // Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
   double response_gain;
-  // Largest phase error that counts as locked, mean over a period, rad.
+  // Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
   double phase_tolerance;
   // Phase error above which the lock is lost, mean over a period, rad.
   double unlock_tolerance;
@@ -87,10 +99,18 @@ typedef struct PhaseLockConfig {
   double coherence_min;
   // Smallest valid response amplitude, as a multiple of amplitude.
   double response_min;
-  // Reading of the response sensor above which the drive is switched off, m; 0: no limit.
-  double response_max;
-  // Longest time from the end of the ramp to the lock, s; 0: no limit.
-  double acquire_timeout;
+  // Reading of the response sensor above which the drive is switched off, m.
+  struct PhaseLockOptional response_max;
+  // Longest time from the end of the ramp to the lock, s.
+  struct PhaseLockOptional acquire_timeout;
+  // Longest time in the closed loop without a valid measurement, s.
+  struct PhaseLockOptional signal_timeout;
+  // Whether a sensor measures the base.
+  bool reference_connected;
+  // The response approaches its steady state 1 + approach_gain times as fast as under a constant drive; 0: constant drive.
+  double approach_gain;
+  // Response amplitude, m, at which impacts certainly occur; it is visited first, so that a particle at rest joins the motion.
+  struct PhaseLockOptional capture_response;
   // Time for which the lock criterion must hold, periods.
   uint32_t dwell;
   // Number of harmonics of the adaptive filter, 1 to 8; 0: synchronous demodulator.

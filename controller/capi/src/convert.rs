@@ -2,7 +2,9 @@
 
 use phase_lock::{Config, Detector, Fault, Input, LoopState, Move, Output};
 
-use crate::types::{PhaseLockConfig, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOutput, PhaseLockStage};
+use crate::types::{
+    PhaseLockConfig, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOptional, PhaseLockOutput, PhaseLockStage,
+};
 
 // In C, `harmonics = 0` selects the demodulator; every other parameter is a field of the same name.
 macro_rules! read {
@@ -11,6 +13,9 @@ macro_rules! read {
             0 => Detector::Demodulator,
             _ => Detector::Adaptive,
         }
+    };
+    (optional, $c:ident, $config:ident, config, $field:ident) => {
+        $config.$field = $c.$field.present.then_some($c.$field.value)
     };
     ($type:ident, $c:ident, $config:ident, config, harmonics) => {
         $config.harmonics = $c.harmonics.max(1)
@@ -25,6 +30,12 @@ macro_rules! read {
 
 macro_rules! write {
     (detector, $c:ident, $config:ident, $group:ident, $field:ident) => {};
+    (optional, $c:ident, $config:ident, config, $field:ident) => {
+        $c.$field = PhaseLockOptional {
+            present: $config.$field.is_some(),
+            value: $config.$field.unwrap_or_default(),
+        }
+    };
     ($type:ident, $c:ident, $config:ident, config, harmonics) => {
         $c.harmonics = match $config.detector {
             Detector::Demodulator => 0,
@@ -104,6 +115,7 @@ impl From<Output> for PhaseLockOutput {
                 LoopState::LockLost => PhaseLockStage::LockLost,
                 LoopState::Tripped => PhaseLockStage::Tripped,
                 LoopState::ShutDown => PhaseLockStage::ShutDown,
+                LoopState::Capturing => PhaseLockStage::Capturing,
             },
             fault: match o.fault {
                 None => PhaseLockFault::None,
@@ -111,6 +123,7 @@ impl From<Output> for PhaseLockOutput {
                 Some(Fault::ResponseTooLarge) => PhaseLockFault::ResponseTooLarge,
                 Some(Fault::TimedOut) => PhaseLockFault::TimedOut,
                 Some(Fault::LockLost) => PhaseLockFault::LockLost,
+                Some(Fault::NoSignal) => PhaseLockFault::NoSignal,
             },
             locked: o.locked,
             settled: o.settled,

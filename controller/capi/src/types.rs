@@ -20,6 +20,16 @@ pub(crate) struct Stored {
 const _: () = assert!(size_of::<Stored>() <= size_of::<PhaseLockController>());
 const _: () = assert!(align_of::<Stored>() <= align_of::<PhaseLockController>());
 
+/// An optional value; all zeros: not present.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PhaseLockOptional {
+    /// Whether there is a value.
+    pub present: bool,
+    /// The value.
+    pub value: f64,
+}
+
 /// All parameters; phase_lock_config_for_resonance gives initial values.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -32,16 +42,16 @@ pub struct PhaseLockConfig {
     pub omega_min: f64,
     /// Highest frequency, rad/s.
     pub omega_max: f64,
-    /// Largest rate of change of the frequency, rad/s^2; 0: no limit.
-    pub omega_rate: f64,
+    /// Largest rate of change of the frequency, rad/s^2.
+    pub omega_rate: PhaseLockOptional,
     /// Setpoint of the drive amplitude, m.
     pub amplitude: f64,
-    /// Largest drive amplitude, m; 0: no limit.
-    pub amplitude_max: f64,
-    /// Duration of a drive ramp from 0 to amplitude, s, and of the ramp down after a fault; 0: step change.
-    pub ramp_time: f64,
-    /// Duration of the drive ramp to 0 after active becomes false, s; 0: switch off at once.
-    pub release_time: f64,
+    /// Largest drive amplitude, m.
+    pub amplitude_max: PhaseLockOptional,
+    /// Largest rate of change of the drive amplitude in a ramp, m/s; not present: step changes.
+    pub ramp_rate: PhaseLockOptional,
+    /// Rate of the drive ramp to 0 after active becomes false, m/s; not present: switched off at once.
+    pub release_rate: PhaseLockOptional,
     /// Bandwidth of the control of the measured base amplitude, rad/s; 0: no control.
     pub base_bandwidth: f64,
     /// Setpoint of the phase of the response relative to the reference, rad.
@@ -54,7 +64,7 @@ pub struct PhaseLockConfig {
     pub delay: f64,
     /// Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
     pub response_gain: f64,
-    /// Largest phase error that counts as locked, mean over a period, rad.
+    /// Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
     pub phase_tolerance: f64,
     /// Phase error above which the lock is lost, mean over a period, rad.
     pub unlock_tolerance: f64,
@@ -66,10 +76,18 @@ pub struct PhaseLockConfig {
     pub coherence_min: f64,
     /// Smallest valid response amplitude, as a multiple of amplitude.
     pub response_min: f64,
-    /// Reading of the response sensor above which the drive is switched off, m; 0: no limit.
-    pub response_max: f64,
-    /// Longest time from the end of the ramp to the lock, s; 0: no limit.
-    pub acquire_timeout: f64,
+    /// Reading of the response sensor above which the drive is switched off, m.
+    pub response_max: PhaseLockOptional,
+    /// Longest time from the end of the ramp to the lock, s.
+    pub acquire_timeout: PhaseLockOptional,
+    /// Longest time in the closed loop without a valid measurement, s.
+    pub signal_timeout: PhaseLockOptional,
+    /// Whether a sensor measures the base.
+    pub reference_connected: bool,
+    /// The response approaches its steady state 1 + approach_gain times as fast as under a constant drive; 0: constant drive.
+    pub approach_gain: f64,
+    /// Response amplitude, m, at which impacts certainly occur; it is visited first, so that a particle at rest joins the motion.
+    pub capture_response: PhaseLockOptional,
     /// Time for which the lock criterion must hold, periods.
     pub dwell: u32,
     /// Number of harmonics of the adaptive filter, 1 to 8; 0: synchronous demodulator.
@@ -110,6 +128,8 @@ pub enum PhaseLockStage {
     Tripped = 5,
     /// active became false: the drive is released.
     ShutDown = 6,
+    /// The response rises until impacts begin.
+    Capturing = 7,
 }
 
 /// Reason why the drive was switched off.
@@ -118,7 +138,7 @@ pub enum PhaseLockStage {
 pub enum PhaseLockFault {
     /// No fault.
     None = 0,
-    /// A sensor read NaN, infinity, or more than 1e100 m.
+    /// A sensor read NaN, infinity, or more than 1e100 m, or the response did not change for half a period.
     Sensor = 1,
     /// The response exceeded response_max.
     ResponseTooLarge = 2,
@@ -126,6 +146,8 @@ pub enum PhaseLockFault {
     TimedOut = 3,
     /// The phase error exceeded unlock_tolerance, or the response was no longer valid.
     LockLost = 4,
+    /// No valid measurement for signal_timeout.
+    NoSignal = 5,
 }
 
 /// Drive until the next sample, and the controller's estimates.

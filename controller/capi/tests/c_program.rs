@@ -41,8 +41,8 @@ fn static_library(folder: &Path) -> PathBuf {
 fn by_the_core() -> String {
     let (omega_0, zeta, amplitude) = (55.39, 0.005, 1e-4);
     let config = Config {
-        amplitude_max: 4.0 * amplitude,
-        response_max: 0.1,
+        amplitude_max: Some(4.0 * amplitude),
+        response_max: Some(0.1),
         omega_start: 0.98 * omega_0,
         ..Config::for_resonance(omega_0, amplitude)
     };

@@ -16,8 +16,8 @@ int main(void) {
     const double omega_0 = 55.39, zeta = 0.005, amplitude = 1e-4;
     PhaseLockConfig config;
     phase_lock_config_for_resonance(&config, omega_0, amplitude);
-    config.amplitude_max = 4.0 * amplitude;
-    config.response_max = 0.1;
+    config.amplitude_max = (PhaseLockOptional){true, 4.0 * amplitude};
+    config.response_max = (PhaseLockOptional){true, 0.1};
     config.omega_start = 0.98 * omega_0;
 
     char message[200];

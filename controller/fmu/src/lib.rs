@@ -143,7 +143,10 @@ impl Component for Controller {
             Boolean::active => self.active,
             Boolean::locked => self.output().is_some_and(|o| o.locked),
             Boolean::settled => self.output().is_some_and(|o| o.settled),
-            Boolean::odd_only => self.config.odd_only,
+            parameter => match self.parameter(parameter) {
+                Some(Value::Boolean(value)) => value,
+                _ => unreachable!("{parameter:?} is a Boolean parameter of the core"),
+            },
         }
     }
 

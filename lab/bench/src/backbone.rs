@@ -5,11 +5,9 @@
 //! the *response*, and the drive follows. A predictor computes drive and frequency of the next point from the points before, so that
 //! the loops have little to correct.
 
-mod cycle;
 mod predictor;
 mod settle;
 mod track;
 
-pub use cycle::Cycle;
-pub use settle::{Criterion, Estimate};
+pub use settle::{Criterion, Found};
 pub use track::{Point, TrackError, Tracked, track};

@@ -8,8 +8,8 @@ use serde::Serialize;
 use thiserror::Error;
 use vines_model::numerics::{mean, standard_deviation};
 
-use crate::backbone::Cycle;
 use crate::experiment::Sample;
+use crate::identification::Cycle;
 use crate::rig::{BuiltIn, Chain, Controller, ControllerError, Rig, RigError, Simulated};
 use crate::scene::{Override, Scene, SceneError, SyntaxError};
 

@@ -7,13 +7,13 @@ use serde::Serialize;
 use vines_model::Dimensionless;
 use vines_model::numerics::mean_square;
 use vines_model::orbit::{self, Orbit};
-use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow};
+use vines_model::theory::{BackbonePoint, free_sigma, resonant};
 
-use crate::identification::{DecayPoint, Identification, Lock};
-use crate::scene::Scene;
+use crate::identification::{DecayEnd, DecayPoint, Identification, Lock};
+use crate::scene::{Resonance, Scene};
 
 pub use exact_curve::{Distance, ExactCurve};
-pub use tracked::{TrackedComparison, TrackedPoint};
+pub use tracked::{TrackedComparison, TrackedPoint, Worst};
 
 /// Amplitudes above which the decay is compared with theory, C.
 ///
@@ -35,10 +35,18 @@ pub struct Comparison {
     pub theory: Option<BackbonePoint>,
     /// The exact phase-resonant orbit at the same G nearest to the lock; absent as above.
     pub exact: Option<Orbit>,
-    /// The decay, from the release to the loss of synchrony, or to the fold where the rig does not report impacts.
+    /// All exact phase-resonant orbits at the same G, by rising C; the lock followed `exact`.
+    pub orbits: Vec<Orbit>,
+    /// The decay, from the release on.
     pub decay: Vec<ComparedPoint>,
+    /// What ended its points.
+    pub decay_end: DecayEnd,
     /// RMS of the decay's sigma minus theory, over the points with C > 0.2.
     pub rms_sigma_error: Option<f64>,
+    /// RMS of the decay's sigma minus that of the exact backbone at the same C, over the same points.
+    pub rms_sigma_exact: Option<f64>,
+    /// The same, corrected for the drift.
+    pub rms_steady_exact: Option<f64>,
 }
 
 /// A point along the decay beside theory.
@@ -49,6 +57,8 @@ pub struct ComparedPoint {
     pub point: DecayPoint,
     /// Detuning of the backbone at this C, to first order; absent below the fold.
     pub sigma_theory: Option<f64>,
+    /// Detuning of the exact backbone at this C; absent outside it.
+    pub sigma_exact: Option<f64>,
 }
 
 impl Comparison {
@@ -56,50 +66,55 @@ impl Comparison {
     #[must_use]
     pub fn of(found: &Identification, scene: &Scene) -> Self {
         let (parameters, lock) = (found.parameters, found.lock);
-        let flow = SlowFlow::new(parameters.lambda, parameters.r);
-        let at_resonance = scene.controller.phase_target == PHASE_RESONANCE;
+        // At the peak the user gives the phase.
+        let peak = scene.resonance.resonance == Resonance::Peak;
+        let at_resonance = peak || scene.controller.phase_target == PHASE_RESONANCE;
         let distance = |sigma: f64, c: f64| (sigma - lock.sigma).hypot(c - lock.c);
-        let theory = flow
-            .phase_resonant(parameters.g)
+        let theory = resonant(&parameters)
             .into_iter()
             .filter(|point| at_resonance && point.stable())
             .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
-        let exact = orbit::phase_resonant(&parameters)
+        let orbits: Vec<Orbit> = orbit::phase_resonant(&parameters)
             .into_iter()
             .filter(|_| at_resonance)
+            .collect();
+        let exact = orbits
+            .iter()
+            .copied()
             .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
-        // A rig that does not report impacts does not show the loss of synchrony; its decay is cut at the fold of the backbone.
-        let lowest = if lock.impacts_per_period.is_nan() {
-            flow.manifold.c_min()
-        } else {
-            0.0
-        };
+        let curve = ExactCurve::of(&parameters);
         let decay: Vec<ComparedPoint> = found
             .decay
+            .points
             .iter()
-            .take_while(|point| point.c >= lowest)
             .map(|point| ComparedPoint {
                 point: *point,
-                sigma_theory: flow.backbone_sigma(point.c, BranchSide::Right),
+                sigma_theory: free_sigma(&parameters, point.c),
+                sigma_exact: curve.at(point.c).map(|[sigma, _]| sigma),
             })
             .collect();
+        let steady = |one: &ComparedPoint| Some(one.point.sigma_steady? - one.sigma_exact?);
         Self {
-            rms_sigma_error: rms_sigma_error(&decay),
+            rms_sigma_error: rms(&decay, |one| Some(one.point.sigma - one.sigma_theory?)),
+            rms_sigma_exact: rms(&decay, |one| Some(one.point.sigma - one.sigma_exact?)),
+            rms_steady_exact: rms(&decay, steady),
             parameters,
             lock,
             theory,
             exact,
+            orbits,
             decay,
+            decay_end: found.decay.end,
         }
     }
 }
 
-/// RMS of sigma minus theory over the points above [`COMPARED_ABOVE`]; `None` where there is none.
-fn rms_sigma_error(points: &[ComparedPoint]) -> Option<f64> {
+/// RMS of an error over the points above [`COMPARED_ABOVE`]; `None` where there is none.
+fn rms(points: &[ComparedPoint], error: impl Fn(&ComparedPoint) -> Option<f64>) -> Option<f64> {
     let errors = points
         .iter()
         .filter(|one| one.point.c > COMPARED_ABOVE)
-        .filter_map(|one| one.sigma_theory.map(|theory| one.point.sigma - theory));
+        .filter_map(error);
     let mean_square = mean_square(errors);
     (!mean_square.is_nan()).then(|| mean_square.sqrt())
 }

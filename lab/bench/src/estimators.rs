@@ -100,7 +100,7 @@ impl Decay {
         let errors: Vec<f64> = (1..=seeds)
             .flat_map(|seed| {
                 let record = self.disturbed(snr, seed);
-                decay_points(&record, scene)
+                decay_points(&record, scene).points
             })
             .filter(|point| point.c > COMPARED_ABOVE)
             .filter_map(|point| Some(point.sigma - self.truth.sigma(point.tau)?))
@@ -136,7 +136,8 @@ impl Truth {
     fn of(mut rig: Simulated, scene: &Scene) -> Result<Self, RigError> {
         let d = scene.dimensionless();
         let step = d.natural_period() / FINE;
-        let steps = (scene.record.decay_periods * FINE) as usize;
+        let periods = Plan::of(scene).decay as f64 / scene.controller.samples_per_period;
+        let steps = (periods * FINE) as usize;
         let mut crossings = Vec::new();
         let mut before = rig.sense()?.response;
         for n in 0..steps {

@@ -1,9 +1,14 @@
 //! The experiment: lock at phase resonance, hold, release, record the decay.
+//!
+//! It follows the state of the controller: a controller that switches the drive off ends the experiment at once.
+
+use std::fmt::Write;
 
 use thiserror::Error;
 
-use crate::rig::{Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors};
+use crate::rig::{Command, Controller, ControllerError, Drive, Fault, GroundTruth, LoopState, Rig, RigError, Sensors};
 use crate::scene::Scene;
+use vines_model::theory::{B_SYMMETRY_BREAKING, BackbonePoint, SlowFlow};
 
 /// Durations of the stages, in samples.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -27,11 +32,33 @@ impl Plan {
         let samples = |periods: f64| (periods * period / sample_time).round() as usize;
         Self {
             sample_time,
-            lock: samples(scene.record.lock_periods),
+            lock: samples(scene.lock_periods()),
             hold: samples(scene.record.hold_periods),
-            decay: samples(scene.record.decay_periods),
+            decay: samples(decay_periods(scene)),
         }
     }
+}
+
+/// Length of the recorded decay over the one that theory expects.
+const DECAY_MARGIN: f64 = 1.25;
+/// Longest recorded decay, natural periods, that is not asked for.
+const LONGEST_DECAY: f64 = 5000.0;
+/// Periods more than that, for the loss of synchrony to show.
+const DECAY_EXTRA: f64 = 10.0;
+
+/// Length of the recorded decay, natural periods: that of the scene, or as long as first-order theory expects synchrony to last
+/// from symmetry breaking on, with a margin.
+fn decay_periods(scene: &Scene) -> f64 {
+    if scene.record.decay_periods > 0.0 {
+        return scene.record.decay_periods;
+    }
+    let d = scene.dimensionless();
+    let flow = SlowFlow::new(d.lambda, d.r);
+    let stable = flow.phase_resonant(d.g).into_iter().filter(BackbonePoint::stable);
+    let from = stable.map(|point| point.b).fold(f64::NAN, f64::max);
+    let from = if from.is_nan() { B_SYMMETRY_BREAKING } else { from };
+    let duration = flow.decay(from).map_or(0.0, |decay| decay.duration()) / (d.epsilon * std::f64::consts::TAU);
+    (DECAY_MARGIN * duration + DECAY_EXTRA).min(LONGEST_DECAY)
 }
 
 /// The stage an experiment is in.
@@ -56,6 +83,28 @@ pub struct Sample {
     pub command: Command,
     /// The ground truth of a simulated rig.
     pub ground_truth: Option<GroundTruth>,
+}
+
+/// The samples as a table (CSV): what a run that ended early has measured.
+#[must_use]
+pub fn table(samples: &[Sample]) -> String {
+    let mut text = String::from("time,response,reference,omega,E,phase_error,state,fault\n");
+    for Sample { time, sensors, command, .. } in samples {
+        let Drive { omega, amplitude, .. } = command.drive;
+        let reference = sensors.reference.map_or_else(String::new, |value| value.to_string());
+        let state = command
+            .state
+            .map_or_else(String::new, |state| (state as u8).to_string());
+        let fault = command.fault.map_or(0, |fault| fault as u8);
+        let response = sensors.response;
+        // Writing to a string cannot fail.
+        let _ = writeln!(
+            text,
+            "{time},{response},{reference},{omega},{amplitude},{},{state},{fault}",
+            command.phase_error
+        );
+    }
+    text
 }
 
 /// Phases of the drive at the samples, rad, from `start` at the first.
@@ -118,67 +167,160 @@ pub enum ExperimentError {
         /// Last frequency, rad/s.
         omega: f64,
     },
+    /// The controller switched the drive off.
+    #[error("the controller switched the drive off after {periods:.1} periods while {stage}: {fault}")]
+    Tripped {
+        /// Time since the start, periods of the drive.
+        periods: f64,
+        /// Stage of the experiment.
+        stage: &'static str,
+        /// The reason.
+        fault: Fault,
+    },
+    /// The controller asked for a drive that is not a number.
+    #[error("the controller asked for omega = {} rad/s and E = {} m, which is refused; the drive is off", .0.omega, .0.amplitude)]
+    NotANumber(Drive),
 }
 
 /// Runs the whole experiment. `progress` receives the stage, the samples taken in it, and their largest number.
 ///
 /// # Errors
-/// A failure of the rig or of the controller, or no lock in the time allowed.
+/// A failure of the rig or of the controller, a controller that switches the drive off, or no lock in the time allowed.
 pub fn run(
+    rig: &mut (impl Rig + ?Sized),
+    controller: &mut (impl Controller + ?Sized),
+    plan: &Plan,
+    progress: impl FnMut(Stage, usize, usize),
+) -> Result<Record, ExperimentError> {
+    run_into(&mut Vec::new(), rig, controller, plan, progress)
+}
+
+/// As [`run`]; if the experiment ends early, what was measured stays in `samples`.
+///
+/// # Errors
+/// As [`run`].
+pub fn run_into(
+    samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
     plan: &Plan,
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    let mut samples = Vec::new();
-    let mut step = |active| -> Result<Command, ExperimentError> {
-        let sensors = rig.sense()?;
-        let command = match controller.sample(sensors, active) {
-            Ok(command) => command,
-            Err(error) => {
-                // A failed controller must not leave the rig driven. An error of the rig would not change the result.
-                let _ = rig.advance(Drive::default(), plan.sample_time);
-                return Err(error.into());
-            }
-        };
-        samples.push(Sample {
-            time: samples.len() as f64 * plan.sample_time,
-            sensors,
-            command,
-            ground_truth: rig.ground_truth()?,
-        });
-        rig.advance(command.drive, plan.sample_time)?;
-        Ok(command)
-    };
-
+    let mut bench = Bench { rig, controller, sample_time: plan.sample_time, samples };
     let mut settled = 0;
     loop {
-        let command = step(true)?;
+        let command = bench.sample(Stage::Locking)?;
         progress(Stage::Locking, settled, plan.lock);
         if command.settled {
             break;
         }
         settled += 1;
         if settled >= plan.lock {
-            return Err(ExperimentError::NoLock {
-                periods: plan.lock as f64 * plan.sample_time * command.drive.omega / std::f64::consts::TAU,
-                phase_error: command.phase_error.to_degrees(),
-                omega: command.drive.omega,
-            });
+            return Err(bench.no_lock(&command));
         }
     }
     for n in 0..plan.hold {
-        step(true)?;
+        bench.sample(Stage::Holding)?;
         progress(Stage::Holding, n + 1, plan.hold);
     }
     for n in 0..plan.decay {
-        step(false)?;
+        bench.sample(Stage::Decaying)?;
         progress(Stage::Decaying, n + 1, plan.decay);
     }
+    let samples = std::mem::take(samples);
     Ok(Record {
         sample_time: plan.sample_time,
         released: samples.len() - plan.decay,
         samples,
         settled,
     })
+}
+
+/// Rig and controller, and the samples so far.
+struct Bench<'a, R: ?Sized, C: ?Sized> {
+    rig: &'a mut R,
+    controller: &'a mut C,
+    sample_time: f64,
+    samples: &'a mut Vec<Sample>,
+}
+
+impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
+    fn sample(&mut self, stage: Stage) -> Result<Command, ExperimentError> {
+        let sensors = self.rig.sense()?;
+        let active = stage != Stage::Decaying;
+        let asked = self.controller.sample(sensors, active).map_err(ExperimentError::from);
+        let command = match asked.and_then(checked) {
+            Ok(command) => command,
+            Err(error) => {
+                // A failed controller must not leave the rig driven. An error of the rig would not change the result.
+                let _ = self.rig.advance(Drive::default(), self.sample_time);
+                return Err(error);
+            }
+        };
+        self.samples.push(Sample {
+            time: self.samples.len() as f64 * self.sample_time,
+            sensors,
+            command,
+            ground_truth: self.rig.ground_truth()?,
+        });
+        self.rig.advance(command.drive, self.sample_time)?;
+        if active && command.state.is_some_and(LoopState::is_latched) {
+            self.ramp_down(command)?;
+            return Err(self.tripped(stage, &command));
+        }
+        Ok(command)
+    }
+
+    /// Follows the controller's ramp after a fault until the drive is off.
+    fn ramp_down(&mut self, mut command: Command) -> Result<(), ExperimentError> {
+        while command.drive.amplitude > 0.0 {
+            let asked = self.controller.sample(self.rig.sense()?, true)?;
+            // A ramp never rises, whatever the controller says.
+            let amplitude = if asked.drive.amplitude < command.drive.amplitude {
+                asked.drive.amplitude
+            } else {
+                0.0
+            };
+            command = Command { drive: Drive { amplitude, ..asked.drive }, ..asked };
+            self.rig.advance(checked(command)?.drive, self.sample_time)?;
+        }
+        Ok(())
+    }
+
+    fn tripped(&self, stage: Stage, command: &Command) -> ExperimentError {
+        match command.fault {
+            Some(Fault::TimedOut) => self.no_lock(command),
+            fault => ExperimentError::Tripped {
+                periods: self.periods(command),
+                stage: match stage {
+                    Stage::Locking => "searching for phase resonance",
+                    Stage::Holding => "holding the lock",
+                    Stage::Decaying => "recording the decay",
+                },
+                fault: fault.unwrap_or(Fault::LockLost),
+            },
+        }
+    }
+
+    fn no_lock(&self, command: &Command) -> ExperimentError {
+        ExperimentError::NoLock {
+            periods: self.periods(command),
+            phase_error: command.phase_error.to_degrees(),
+            omega: command.drive.omega,
+        }
+    }
+
+    fn periods(&self, command: &Command) -> f64 {
+        self.samples.len() as f64 * self.sample_time * command.drive.omega / std::f64::consts::TAU
+    }
+}
+
+/// A command with a drive that a rig can take.
+fn checked(command: Command) -> Result<Command, ExperimentError> {
+    let Drive { omega, amplitude, displacement } = command.drive;
+    if [omega, amplitude, displacement].iter().all(|value| value.is_finite()) {
+        Ok(command)
+    } else {
+        Err(ExperimentError::NotANumber(command.drive))
+    }
 }

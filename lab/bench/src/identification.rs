@@ -1,6 +1,8 @@
 //! What a record says: the locked point, its regime, and the backbone along the free decay.
 
+mod balance;
 mod crossings;
+mod cycle;
 mod decay;
 mod fit;
 mod lock;
@@ -12,7 +14,9 @@ use thiserror::Error;
 use crate::experiment::Record;
 use crate::scene::{Dimensionless, Scene};
 
-pub use decay::{DecayPoint, decay_points};
+pub use balance::{Balance, Slopes};
+pub use cycle::Cycle;
+pub use decay::{DecayEnd, DecayPoint, DecayPoints, decay_points};
 pub use lock::Lock;
 pub use regime::{classify, impacts};
 pub use response::regime_by_response;
@@ -34,12 +38,11 @@ pub enum IdentificationError {
         /// Amplitude at the lock.
         c: f64,
     },
-    /// No window of the decay could be evaluated.
-    #[error("the decay holds no window of {periods} periods with synchronous impacts")]
-    NoDecay {
-        /// Window length asked for.
-        periods: f64,
-    },
+    /// The hold contains no periodic motion.
+    #[error(
+        "the hold contains no periodic motion: the response or the base reads zero; check the sensors and record.hold_periods"
+    )]
+    NoMotion,
 }
 
 /// What a record says; dimensionless throughout.
@@ -49,23 +52,20 @@ pub struct Identification {
     pub parameters: Dimensionless,
     /// The locked point as measured.
     pub lock: Lock,
-    /// The decay, from the release to the loss of synchrony where the rig reports impacts.
-    pub decay: Vec<DecayPoint>,
+    /// The decay, from the release on; without points if it is shorter than the window of the fit.
+    pub decay: DecayPoints,
 }
 
 /// Identifies a record of `scene`.
 ///
 /// # Errors
-/// A lock in another regime than the symmetric 1:1 one, or a decay too short to fit.
+/// A lock in another regime than the symmetric 1:1 one, or no motion.
 pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, IdentificationError> {
-    let lock = lock::measure(record, scene);
+    let lock = lock::measure(record, scene).ok_or(IdentificationError::NoMotion)?;
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
     if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
         return Err(IdentificationError::Regime { regime: lock.regime, sigma: lock.sigma, c: lock.c });
     }
     let decay = decay_points(record, scene);
-    if decay.is_empty() {
-        return Err(IdentificationError::NoDecay { periods: scene.record.window_periods });
-    }
     Ok(Identification { parameters: scene.dimensionless(), lock, decay })
 }

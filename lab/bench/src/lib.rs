@@ -4,11 +4,14 @@
 
 #![forbid(unsafe_code)]
 
+pub mod advice;
 pub mod backbone;
+pub mod calibration;
 pub mod chain_effects;
 pub mod comparison;
 pub mod estimators;
 pub mod experiment;
 pub mod identification;
+pub mod random_rigs;
 pub mod rig;
 pub mod scene;

@@ -6,7 +6,7 @@ mod error;
 mod phase_lock;
 mod simulated;
 
-pub use ::phase_lock::Move;
+pub use ::phase_lock::{Fault, LoopState, Move};
 pub use chain::Chain;
 pub(crate) use chain::NormalDistribution;
 pub use error::{ControllerError, RigError};
@@ -86,6 +86,10 @@ pub struct Command {
     pub phase_error: f64,
     /// Phase, frequency and amplitude have been stationary for the controller's dwell time.
     pub settled: bool,
+    /// State of the loop; absent if the controller does not report it.
+    pub state: Option<LoopState>,
+    /// Why the controller switched the drive off.
+    pub fault: Option<Fault>,
 }
 
 /// A controller: anything that can hold a rig at phase resonance.

@@ -22,7 +22,7 @@ pub use controller::Controller;
 pub use error::SceneError;
 pub use overrides::{Override, SyntaxError};
 pub use record::{Estimator, Record};
-pub use vines_model::Dimensionless;
+pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
 
 use sections::Sections;
 
@@ -47,6 +47,8 @@ pub struct Scene {
     pub backbone: Backbone,
     /// The measurement chain between rig and controller.
     pub chain: Chain,
+    /// What counts as resonance, and what is measured.
+    pub resonance: Definition,
 }
 
 impl Scene {
@@ -80,7 +82,10 @@ impl Scene {
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.
     #[must_use]
     pub fn dimensionless(&self) -> Dimensionless {
-        Dimensionless::of(&self.plant, self.amplitude)
+        Dimensionless {
+            definition: self.resonance,
+            ..Dimensionless::of(&self.plant, self.amplitude)
+        }
     }
 
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.

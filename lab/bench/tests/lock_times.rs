@@ -12,8 +12,9 @@ fn periods(bandwidth: f64, tolerance: f64) -> f64 {
     let settings = [
         format!("controller.bandwidth={bandwidth:?}"),
         format!("controller.phase_tolerance={tolerance:?}"),
-        "controller.frequency_drift=1e-4".into(),
-        "controller.amplitude_drift=1.0".into(),
+        "controller.frequency_tolerance=0.32".into(),
+        "controller.amplitude_tolerance=27.0".into(),
+        "controller.approach_gain=0.0".into(),
         // The largest bandwidth needs more than a hundred samples a period.
         "controller.samples_per_period=200.0".into(),
     ];

@@ -56,7 +56,7 @@ fn every_key_of_the_paper_file_has_its_default() {
 fn one_value_can_be_set() {
     let scene = paper(&["plant.r=0.7", "record.lock_periods=10", "start.dq2 = -0.4"]).unwrap();
     assert_eq!(scene.plant.restitution, 0.7);
-    assert_eq!(scene.record.lock_periods, 10.0);
+    assert_eq!(scene.lock_periods(), 10.0);
     assert_eq!(scene.start.dq2, -0.4);
 }
 
@@ -100,6 +100,27 @@ fn a_value_of_the_wrong_type_is_named_with_its_line() {
 }
 
 #[test]
+fn what_is_measured_reaches_theory_and_exact_orbits() {
+    use vines_testbench::scene::{Definition, Reference, Resonance, Sensor};
+    assert_eq!(paper(&[]).unwrap().dimensionless().definition, Definition::default());
+    let set = [
+        "resonance.definition='peak'",
+        "resonance.reference='force'",
+        "resonance.sensor='acceleration'",
+    ];
+    let definition = Definition {
+        resonance: Resonance::Peak,
+        reference: Reference::Force,
+        sensor: Sensor::Acceleration,
+    };
+    assert_eq!(paper(&set).unwrap().dimensionless().definition, definition);
+    says(
+        &complaint(paper(&["resonance.sensor='w'"])),
+        &["`w`", "`v`", "`q1`", "`acceleration`"],
+    );
+}
+
+#[test]
 fn values_that_make_no_sense_are_named_with_unit_and_range() {
     for (argument, parts) in [
         ("plant.M=0", ["M (primary mass) = 0 kg", "from 1e-100 to 1e100"]),
@@ -130,8 +151,8 @@ fn values_that_make_no_sense_are_named_with_unit_and_range() {
             ["controller.omega_max = 0.5 (omega0)", "omega_min = 0.9"],
         ),
         (
-            "record.decay_periods=0",
-            ["record.decay_periods = 0 (natural periods)", "positive"],
+            "record.decay_periods=-1",
+            ["record.decay_periods = -1 (natural periods)", "zero or positive"],
         ),
     ] {
         says(&complaint(paper(&[argument])), &parts);
@@ -165,4 +186,35 @@ fn an_argument_that_is_no_assignment_is_refused() {
     for argument in ["plant.r", "r=0.7", "plant.r=", "plant.r=0.7 m", "plant.r=1\nx=2"] {
         assert!(argument.parse::<Override>().is_err(), "{argument}");
     }
+}
+
+#[test]
+fn a_drive_limit_below_the_first_impacts_is_refused_with_the_drive_that_is_needed() {
+    let settings = ["start.dq2=0.0", "controller.G_max=1.2"];
+    says(
+        &complaint(paper(&settings)),
+        &["controller.G_max", "1.2", "at least 1.57", "capture = false"],
+    );
+    assert!(paper(&[settings[0], settings[1], "controller.capture=false"]).is_ok());
+    assert!(
+        paper(&["controller.G_max=1.2"]).is_ok(),
+        "the particle of the default scene moves"
+    );
+}
+
+#[test]
+fn limits_follow_from_the_numbers_of_the_rig() {
+    let scene = paper(&[]).unwrap();
+    let (config, d) = (scene.controller_config(), scene.dimensionless());
+    assert!((d.excitation(config.amplitude_max.unwrap()) - 4.0 * 1.1 * d.lambda).abs() < 1e-9);
+    assert_eq!(config.response_max, Some(4.0 * d.b));
+    assert!(config.acquire_timeout.is_some() && config.signal_timeout.is_some());
+    assert_eq!(config.capture_response, None);
+    assert!(
+        paper(&["start.dq2=0.0"])
+            .unwrap()
+            .controller_config()
+            .capture_response
+            .is_some()
+    );
 }

@@ -4,14 +4,14 @@ use std::path::Path;
 
 use fmi::fmi2::instance::Common;
 use phase_lock::{Config, PARAMETERS, Value};
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Sensors};
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Sensors};
 
 use crate::instance::{Fmu, FmuError, Kind, Reference};
 
 /// A controller FMU, stepped sample by sample.
 ///
-/// It needs the inputs `response` and `active` and the outputs `omega`, `E` and `settled`; `reference`, `drive` and `phase_error`
-/// are used where it has them. Of the configuration it gets what it has a parameter for, by the names of
+/// It needs the inputs `response` and `active` and the outputs `omega`, `E` and `settled`; `reference`, `drive`, `phase_error`,
+/// `state` and `fault` are used where it has them. Of the configuration it gets what it has a parameter for, by the names of
 /// `PhaseLock.fmu`. At each sample its inputs are set, it is stepped by one sample time, and what it then puts out is
 /// the drive of that very sample period.
 pub struct FmuController {
@@ -25,6 +25,8 @@ pub struct FmuController {
     displacement: Option<Reference>,
     phase_error: Option<Reference>,
     settled: Reference,
+    /// `state` and `fault`.
+    states: [Option<Reference>; 2],
 }
 
 impl FmuController {
@@ -48,6 +50,7 @@ impl FmuController {
             displacement: fmu.find(Kind::Real, "drive"),
             phase_error: fmu.find(Kind::Real, "phase_error"),
             settled,
+            states: ["state", "fault"].map(|name| fmu.find(Kind::Integer, name)),
             fmu,
         })
     }
@@ -56,8 +59,17 @@ impl FmuController {
         reference.map_or(Ok(0.0), |one| self.fmu.reals("give its outputs", [one]).map(|[x]| x))
     }
 
+    fn integer(&mut self, reference: Option<Reference>) -> Result<Option<i32>, FmuError> {
+        let Some(reference) = reference else {
+            return Ok(None);
+        };
+        let mut value = [0];
+        self.fmu
+            .ask("give its outputs", |i| i.get_integer(&[reference], &mut value))?;
+        Ok(Some(value[0]))
+    }
+
     fn exchange(&mut self, sensors: Sensors, active: bool) -> Result<Command, FmuError> {
-        // A channel that reads 0 for ever counts as not connected.
         let readings = [sensors.response, sensors.reference.unwrap_or(0.0)];
         let (references, active_reference) = (&self.sensors, [self.active]);
         self.fmu.ask("take its inputs", |i| {
@@ -77,6 +89,8 @@ impl FmuController {
             },
             phase_error: self.optional(self.phase_error)?,
             settled: settled != [0],
+            state: self.integer(self.states[0])?.and_then(LoopState::of_number),
+            fault: self.integer(self.states[1])?.and_then(Fault::of_number),
         })
     }
 }
@@ -91,7 +105,6 @@ impl Controller for FmuController {
 fn parameters(config: &Config) -> Vec<(&'static str, Value)> {
     PARAMETERS
         .iter()
-        .filter(|parameter| parameter.is_in_fmu())
         .map(|parameter| (parameter.name, parameter.get(config)))
         .collect()
 }

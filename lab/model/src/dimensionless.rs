@@ -3,6 +3,8 @@
 use lovines::{Drive, InvalidValue, Parameters, Plant, State};
 use serde::Serialize;
 
+use crate::Definition;
+
 /// The parameters of the dimensionless model, and the units of length and frequency.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Dimensionless {
@@ -19,13 +21,23 @@ pub struct Dimensionless {
     pub omega0: f64,
     /// Half-width of the cavity, m: the unit of length.
     pub b: f64,
+    /// What counts as resonance, and what is measured.
+    pub definition: Definition,
 }
 
 impl Dimensionless {
     /// The bare dimensionless model, with `omega0 = 1` and `b = 1`.
     #[must_use]
     pub fn new(epsilon: f64, lambda: f64, r: f64, g: f64) -> Self {
-        Self { epsilon, lambda, r, g, omega0: 1.0, b: 1.0 }
+        Self {
+            epsilon,
+            lambda,
+            r,
+            g,
+            omega0: 1.0,
+            b: 1.0,
+            definition: Definition::default(),
+        }
     }
 
     /// The numbers of a plant in SI units whose base moves with the amplitude `amplitude`, m.
@@ -39,6 +51,7 @@ impl Dimensionless {
             g: 0.0,
             omega0,
             b: plant.half_width,
+            definition: Definition::default(),
         };
         numbers.g = numbers.excitation(amplitude);
         numbers

@@ -6,6 +6,7 @@
 
 #![forbid(unsafe_code)]
 
+mod definition;
 mod dimensionless;
 pub mod map;
 pub mod numerics;
@@ -13,4 +14,5 @@ pub mod orbit;
 pub mod regime;
 pub mod theory;
 
+pub use definition::{Definition, Reference, Resonance, Sensor};
 pub use dimensionless::Dimensionless;

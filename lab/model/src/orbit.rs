@@ -5,12 +5,16 @@
 //! alternating impulses of known size on the oscillator, and their periodic response has a closed form. At a given frequency
 //! one quadratic equation for B remains. There is no first-order approximation.
 
+mod bifurcations;
 mod bounce;
 mod branch;
 mod candidate;
+mod components;
+mod condition;
 mod continuation;
 mod convergence;
 mod curves;
+mod driven;
 mod flight;
 mod forced_oscillator;
 mod impact_map;
@@ -21,21 +25,27 @@ mod pattern;
 mod periodic;
 mod search;
 mod settle;
+mod tangent;
 
 use serde::Serialize;
 
+pub use bifurcations::{BifurcationCurve, bifurcation_curves};
 pub use bounce::Bounce;
 pub use branch::{Bifurcation, Branch, Ended, Limits, Special};
-pub use continuation::{asymmetric_branch, continue_both_ways, continue_from};
+pub use components::{Component, Exploration, Response, random_state, response};
+pub use condition::Condition;
+pub use continuation::{branch_off, continue_both_ways, continue_from};
 pub use convergence::{Convergence, Difference, convergence};
-pub use curves::{Response, backbone, response};
+pub use curves::backbone;
+pub use driven::Driven;
 pub use impact_map::ImpactMap;
 pub use pattern::{ImpactPattern, Unknowns};
-pub use periodic::{Condition, Periodic};
-pub use search::{exact_backbone, phase_resonant};
-pub use settle::settle;
+pub use periodic::Periodic;
+pub use search::{exact_backbone, phase_resonant, symmetric_orbits};
+pub use settle::{settle, stable_near};
+pub use tangent::Tangent;
 
-/// An exact symmetric 1:1 orbit at phase resonance: the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
+/// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Orbit {
     /// Base amplitude over `b epsilon`.
@@ -46,9 +56,11 @@ pub struct Orbit {
     /// Angular frequency over omega0.
     #[serde(rename = "Omega")]
     pub omega: f64,
-    /// Amplitude of the first harmonic of v.
+    /// Amplitude of the first harmonic of the response: of v, unless the scene's definition of resonance says otherwise.
     #[serde(rename = "C")]
     pub c: f64,
+    /// Phase of the first harmonic of the response relative to the reference, rad.
+    pub gamma: f64,
     /// Speed of the particle in flight.
     #[serde(rename = "B")]
     pub b: f64,

@@ -1,6 +1,6 @@
 //! Classification of regimes from a sequence of impacts.
 
-use std::f64::consts::{PI, TAU};
+use std::f64::consts::PI;
 use std::fmt::{self, Display, Formatter};
 
 use serde::Serialize;
@@ -22,16 +22,19 @@ pub enum Regime {
     /// Another pattern that repeats.
     #[serde(rename = "n impacts")]
     Several,
-    /// Nothing repeats: the motion is captured into 1:1 resonance and lost again (strongly modulated response), or at least
-    /// disturbances do not grow.
+    /// Nothing repeats, and disturbances neither grow nor shrink: the largest Lyapunov exponent is zero within its uncertainty.
+    #[serde(rename = "quasi-periodic")]
+    QuasiPeriodic,
+    /// The largest Lyapunov exponent is positive, and at least a fifth of the impacts belong to captures into 1:1 resonance, which
+    /// are lost again: a chaotic strongly modulated response.
     #[serde(rename = "modulated")]
     Modulated,
-    /// Nothing repeats, disturbances grow, and there are hardly any captures.
+    /// The largest Lyapunov exponent is positive, and fewer impacts belong to captures.
     #[serde(rename = "chaotic")]
     Chaotic,
-    /// Impacts accumulate, and the particle rests on a wall for a while.
-    #[serde(rename = "sticking")]
-    Sticking,
+    /// None of these was shown within the periods that were simulated.
+    #[serde(rename = "undecided")]
+    Undecided,
     /// Not 1:1; a record too short, or without impact data, cannot say more.
     #[serde(rename = "other")]
     Other,
@@ -44,15 +47,16 @@ pub enum Regime {
 }
 
 impl Regime {
-    /// Those that a simulated impact sequence can show, from the least to the most impacts.
-    pub const SIMULATED: [Regime; 7] = [
+    /// Those of the map; they exclude each other.
+    pub const SIMULATED: [Regime; 8] = [
         Regime::NoImpacts,
         Regime::Symmetric,
         Regime::Asymmetric,
         Regime::Several,
+        Regime::QuasiPeriodic,
         Regime::Modulated,
         Regime::Chaotic,
-        Regime::Sticking,
+        Regime::Undecided,
     ];
 
     /// Its short name, as in a table.
@@ -63,9 +67,10 @@ impl Regime {
             Regime::Symmetric => "symmetric 1:1",
             Regime::Asymmetric => "asymmetric 1:1",
             Regime::Several => "n impacts",
+            Regime::QuasiPeriodic => "quasi-periodic",
             Regime::Modulated => "modulated",
             Regime::Chaotic => "chaotic",
-            Regime::Sticking => "sticking",
+            Regime::Undecided => "undecided",
             Regime::Other => "irregular",
             Regime::Unresolved => "steady and nonlinear (noise hides its symmetry)",
             Regime::Unknown => "unknown (the rig does not report impacts)",
@@ -97,16 +102,14 @@ impl Impact {
     }
 }
 
-/// Largest standard deviation of the intervals, relative to their mean, in a symmetric regime: of a measured motion, which
-/// noise disturbs, ...
+/// Largest standard deviation of the intervals, relative to their mean, in a symmetric regime of a measured motion, which
+/// noise disturbs.
 pub const MEASURED: f64 = 0.01;
-/// ... and of a simulated one.
-pub const SIMULATED: f64 = 0.01 / PI;
 /// Deviation of the impacts per period from two that still counts as two.
 const COUNT: f64 = 0.05;
 
 /// The regime of impacts that come `per_period` times a period: symmetric 1:1 where the intervals differ by no more than
-/// `tolerance` ([`MEASURED`] or [`SIMULATED`]), asymmetric 1:1, or another one.
+/// `tolerance` ([`MEASURED`]), asymmetric 1:1, or another one.
 #[must_use]
 pub fn one_to_one(impacts: &[Impact], per_period: f64, tolerance: f64) -> Regime {
     let alternate = impacts.windows(2).all(|pair| pair[0].on_other_wall(&pair[1]));
@@ -120,42 +123,6 @@ pub fn one_to_one(impacts: &[Impact], per_period: f64, tolerance: f64) -> Regime
     } else {
         Regime::Asymmetric
     }
-}
-
-/// A repeating pattern: impacts, and periods of the base.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Pattern {
-    /// Impacts of one repetition.
-    pub impacts: usize,
-    /// Periods of the base that it takes.
-    pub periods: u32,
-    /// The regime of that pattern.
-    pub regime: Regime,
-}
-
-/// Longest pattern looked for, impacts.
-const LONGEST: usize = 96;
-/// Two impacts are the same within this, rad and relative velocity: far above the remainder of a transient.
-const SAME: f64 = 2e-3;
-
-/// The shortest pattern that all impacts repeat at least twice; times are phases of the base, rad.
-#[must_use]
-pub fn pattern(impacts: &[Impact]) -> Option<Pattern> {
-    (1..=LONGEST.min(impacts.len() / 3)).find_map(|count| {
-        let periods = ((impacts[count].time - impacts[0].time) / TAU).round();
-        let repeats = periods > 0.0
-            && impacts.iter().zip(&impacts[count..]).all(|(one, other)| {
-                !one.on_other_wall(other)
-                    && (other.time - one.time - periods * TAU).abs() < SAME
-                    && (other.velocity - one.velocity).abs() < SAME * (1.0 + one.velocity.abs())
-            });
-        let regime = || match one_to_one(&impacts[..=count], count as f64 / periods, SIMULATED) {
-            Regime::Other => Regime::Several,
-            one_to_one if count == 2 => one_to_one,
-            _ => Regime::Several,
-        };
-        repeats.then(|| Pattern { impacts: count, periods: periods as u32, regime: regime() })
-    })
 }
 
 /// Smallest number of consecutive impacts, on alternating walls, of a capture into 1:1 resonance.
@@ -199,6 +166,8 @@ pub fn end_of_synchrony(impacts: &[Impact], half_period: f64) -> Option<f64> {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
 
     fn impacts(pattern: &[(f64, f64)], periods: usize, repeats: usize) -> Vec<Impact> {
@@ -210,10 +179,6 @@ mod tests {
                 })
             })
             .collect()
-    }
-
-    fn named(impacts: &[Impact]) -> Option<(usize, u32, Regime)> {
-        pattern(impacts).map(|one| (one.impacts, one.periods, one.regime))
     }
 
     #[test]
@@ -230,10 +195,8 @@ mod tests {
     #[test]
     fn even_intervals_are_symmetric_and_uneven_ones_are_not() {
         let even = impacts(&[(0.3, 1.0), (0.3 + PI, -1.0)], 1, 20);
-        assert_eq!(named(&even), Some((2, 1, Regime::Symmetric)));
         assert_eq!(one_to_one(&even, 2.0, MEASURED), Regime::Symmetric);
         let uneven = impacts(&[(0.3, 1.0), (0.5 + PI, -1.0)], 1, 20);
-        assert_eq!(named(&uneven), Some((2, 1, Regime::Asymmetric)));
         assert_eq!(one_to_one(&uneven, 2.0, MEASURED), Regime::Asymmetric);
     }
 
@@ -243,24 +206,6 @@ mod tests {
         assert_eq!(one_to_one(&even, 3.0, MEASURED), Regime::Other);
         let same = impacts(&[(0.3, 1.0), (0.3 + PI, 1.0)], 1, 20);
         assert_eq!(one_to_one(&same, 2.0, MEASURED), Regime::Other);
-    }
-
-    #[test]
-    fn longer_patterns_are_counted() {
-        let three = impacts(&[(0.3, 1.0), (0.9, 1.0), (3.0, -1.0)], 1, 20);
-        assert_eq!(named(&three), Some((3, 1, Regime::Several)));
-        let doubled = impacts(&[(0.3, 1.0), (3.4, -1.0), (6.7, 1.0), (9.8, -1.0)], 2, 20);
-        assert_eq!(named(&doubled), Some((4, 2, Regime::Several)));
-    }
-
-    #[test]
-    fn a_drifting_sequence_has_no_pattern() {
-        let mut drifting = impacts(&[(0.3, 1.0), (0.3 + PI, -1.0)], 1, 40);
-        for (n, impact) in drifting.iter_mut().enumerate() {
-            impact.time += 0.2 * (0.37 * n as f64).sin();
-        }
-        assert_eq!(named(&drifting), None);
-        assert_eq!(named(&[]), None);
     }
 
     #[test]

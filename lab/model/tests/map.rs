@@ -3,7 +3,7 @@
 use vines_model::{
     Dimensionless,
     map::{Axis, Map, Plan, Point, Range, observe},
-    orbit::phase_resonant,
+    orbit::{phase_resonant, settle},
     regime::Regime,
 };
 
@@ -12,7 +12,7 @@ const REST: [f64; 4] = [0.0; 4];
 
 fn at(g: f64, sigma: f64, start: [f64; 4]) -> Point {
     let scene = Dimensionless::new(0.0084, 1.43, 0.65, g);
-    observe(&scene, sigma, start, (300, 60)).unwrap()
+    observe(&scene, sigma, start, 5000).unwrap()
 }
 
 fn plan(x: &str, y: &str) -> Plan {
@@ -22,8 +22,8 @@ fn plan(x: &str, y: &str) -> Plan {
         start: MOVING,
         x: x.parse().unwrap(),
         y: y.parse().unwrap(),
-        settle: 300,
-        record: 60,
+        limit: 2000,
+        starts: 1,
     }
 }
 
@@ -38,24 +38,83 @@ fn each_regime_is_found_where_it_is_known_to_be() {
     // Far above that, more impacts per period, and in the end no order.
     assert_eq!(at(2.2, -0.6, MOVING).regime, Regime::Several);
     let irregular = at(2.7, -0.8, MOVING);
+    println!("{irregular:?}");
     assert_eq!(irregular.regime, Regime::Chaotic);
-    assert!(irregular.growth.unwrap() > 0.05);
+    assert!(irregular.exponent.unwrap() > 10.0 * irregular.exponent_error.unwrap());
 }
 
 #[test]
 fn just_below_the_fold_resonance_is_captured_and_lost() {
     let point = at(0.9, -1.1, MOVING);
-    println!("{:.0} % of the impacts are captured", 100.0 * point.synchrony);
+    println!("{point:?}");
     assert_eq!(point.regime, Regime::Modulated);
-    assert!(point.synchrony > 0.2 && point.impacts == 0);
+    assert!(point.synchrony > 0.2 && point.impacts == 0 && point.exponent.unwrap() > 0.0);
 }
 
 #[test]
 fn a_particle_that_is_pressed_to_its_wall_sticks() {
     // Slowly shaken with hardly any rebound, the particle rides on the walls.
     let scene = Dimensionless::new(0.1, 1.0, 0.05, 60.0);
-    let point = observe(&scene, -6.0, MOVING, (60, 40)).unwrap();
-    assert_eq!(point.regime, Regime::Sticking);
+    let point = observe(&scene, -6.0, MOVING, 2000).unwrap();
+    println!("{point:?}");
+    assert!(
+        point.sticks_per_period > 0.5 && point.regime != Regime::Undecided,
+        "{point:?}"
+    );
+}
+
+#[test]
+fn a_motion_that_sticks_and_repeats_itself_has_a_negative_exponent() {
+    let scene = Dimensionless::new(0.02, 0.8, 0.4, 0.8463);
+    let point = observe(&scene, -2.8639, [0.0, 0.7, 0.4, 0.3], 4000).unwrap();
+    println!("{point:?}");
+    assert!(point.sticks_per_period > 0.1 && point.regime == Regime::Several);
+    assert!(point.exponent.unwrap() < 0.0 && point.recurrence.unwrap() < 1e-6);
+}
+
+#[test]
+fn several_starts_show_where_regimes_coexist() {
+    // At the phase-resonant orbit, a particle at rest stays at rest.
+    let plan = Plan { starts: 6, ..plan("sigma=-1.2:-1.1:2", "G=1.05:1.1:2") };
+    let map = plan.run(|| {}).unwrap();
+    let other: Vec<_> = map
+        .cells
+        .iter()
+        .map(|one| (one.point.regime, one.coexisting.clone()))
+        .collect();
+    println!("{other:?}");
+    let rest = Plan { start: REST, ..plan }.run(|| {}).unwrap();
+    for cell in &rest.cells {
+        assert_eq!(cell.point.regime, Regime::NoImpacts);
+        assert!(cell.coexisting.contains(&Regime::Symmetric), "{cell:?}");
+    }
+}
+
+#[test]
+fn a_moving_particle_is_never_without_impacts() {
+    // Even if it is too slow to reach a wall within the periods simulated.
+    let scene = Dimensionless::new(0.0084, 1.43, 0.65, 0.0);
+    let slow = observe(&scene, 0.0, [0.0, 0.0, 0.0, 1e-5], 1000).unwrap();
+    assert_eq!((slow.regime, slow.followed), (Regime::Undecided, 4000));
+    let rest = observe(&scene, 0.0, REST, 1000).unwrap();
+    assert_eq!(rest.regime, Regime::NoImpacts);
+}
+
+#[test]
+fn the_exponent_of_a_stable_orbit_is_that_of_its_multipliers() {
+    for (g, sigma) in [(1.1, -1.1408), (1.6, -0.9), (2.2, -0.6)] {
+        let scene = Dimensionless::new(0.0084, 1.43, 0.65, g);
+        let motion = settle(&scene, sigma, MOVING, 2000).unwrap().unwrap();
+        let half_periods = f64::from(motion.pattern.half_periods);
+        let expected = 2.0 * motion.moduli()[3].ln() / half_periods;
+        let point = at(g, sigma, MOVING);
+        let (found, error) = (point.exponent.unwrap(), point.exponent_error.unwrap());
+        println!("G = {g}: exponent {found:.6} +- {error:.6}, multipliers {expected:.6}");
+        assert!(
+            (found - expected).abs() < 0.02 * expected.abs() + 2.0 * error,
+            "{found} {expected}"
+        );
+    }
 }
 
 #[test]
@@ -100,6 +159,6 @@ fn maps_that_make_no_sense_are_refused() {
     }
     let message = |plan: Plan| plan.run(|| {}).unwrap_err().to_string();
     assert!(message(plan("G=0:1:3", "G=0:1:3")).contains("both axes"));
-    assert!(message(Plan { record: 3, ..plan("sigma=0:1:3", "G=0:1:3") }).contains("at least 20"));
+    assert!(message(Plan { limit: 3, ..plan("sigma=0:1:3", "G=0:1:3") }).contains("at least 100"));
     assert!(message(plan("sigma=-200:1:3", "G=0:1:3")).contains("above 0"));
 }

@@ -238,6 +238,7 @@ fn the_activation_thresholds_are_where_equilibria_begin() {
         assert!(activation.existence <= stable);
     }
     // From rest the linear resonance must reach the wall: C = G/lambda = 1.
+    close(flow.activation(0.0).steady_linear, LAMBDA, 1e-15);
     close(flow.activation(0.0).from_rest, LAMBDA, 1e-15);
 }
 
@@ -328,4 +329,38 @@ fn the_stable_island_lies_between_fold_and_symmetry_breaking() {
     let (b_min, sigma) = (Manifold::new(R).b_min(), -1.0);
     let within = flow.stable_at(sigma, 0.5 * (b_min + B_SYMMETRY_BREAKING));
     assert!(within && !flow.stable_at(sigma, b_min - 0.01) && !flow.stable_at(sigma, B_SYMMETRY_BREAKING + 0.01));
+}
+
+/// The smallest G at which the plant, at rest until the drive is switched on, has an impact.
+fn first_impact(epsilon: f64, lambda: f64, sigma: f64) -> f64 {
+    let hits = |g: f64| {
+        let scene = Dimensionless::new(epsilon, lambda, 0.65, g);
+        let mut plant = scene.plant([0.0; 4]).unwrap();
+        let drive = scene.drive(sigma);
+        let periods = 6.0 / (epsilon * lambda);
+        plant.advance(drive, periods).unwrap().impacts > 0
+    };
+    vines_model::numerics::try_bisection(0.0, 40.0, 1e-6, |g| Ok::<_, ()>(!hits(g)))
+        .unwrap()
+        .1
+}
+
+#[test]
+fn impacts_begin_from_rest_where_the_beat_reaches_the_wall() {
+    for (sigma, known) in [(-1.18, 2.322), (-2.0, 3.122), (-5.0, 6.10)] {
+        let flow = SlowFlow::new(1.43, 0.65);
+        let found = flow.activation(sigma);
+        let [plant, half] = [0.0084, 0.0042].map(|epsilon| first_impact(epsilon, 1.43, sigma));
+        println!(
+            "sigma = {sigma}: from rest {:.4}, plant {plant:.4} and {half:.4} at half epsilon, steady {:.4}",
+            found.from_rest, found.steady_linear
+        );
+        assert!((plant - known).abs() < 0.006 * known, "{plant}");
+        assert!((found.from_rest - plant).abs() < 0.03 * plant, "{found:?}");
+        assert!(
+            (found.from_rest - half).abs() < 0.7 * (found.from_rest - plant).abs() + 1e-3,
+            "{found:?}"
+        );
+        assert!(found.steady_linear > 1.1 * found.from_rest);
+    }
 }

@@ -1,5 +1,6 @@
 //! Addresses. Without permission, only those of this machine are allowed.
 
+use std::fmt::{self, Display, Formatter};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 
 use super::error::LinkError;
@@ -13,14 +14,48 @@ pub enum BindScope {
     Remote,
 }
 
-/// The address of `HOST:PORT` or `udp://HOST:PORT`. If the name has several, an IPv4 address.
+/// An address on the network. The transport decides who sets the pace.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Address {
+    /// `tcp://`: a controller, or a rig in lock-step.
+    Tcp(SocketAddr),
+    /// `udp://`: a rig in real time.
+    Udp(SocketAddr),
+}
+
+impl Address {
+    /// The address of `tcp://HOST:PORT` or `udp://HOST:PORT`.
+    ///
+    /// # Errors
+    /// As [`resolve`], and another scheme.
+    pub fn parse(text: &str, scope: BindScope) -> Result<Self, LinkError> {
+        match text.split_once("://") {
+            Some(("tcp", place)) => Ok(Self::Tcp(resolve(place, scope)?)),
+            Some(("udp", place)) => Ok(Self::Udp(resolve(place, scope)?)),
+            _ => Err(LinkError::Address {
+                address: text.into(),
+                message: "expected is tcp://HOST:PORT or udp://HOST:PORT".into(),
+            }),
+        }
+    }
+}
+
+impl Display for Address {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Tcp(address) => write!(f, "tcp://{address}"),
+            Self::Udp(address) => write!(f, "udp://{address}"),
+        }
+    }
+}
+
+/// The address of `HOST:PORT`. If the name has several, an IPv4 address.
 ///
 /// # Errors
 /// Text that is not an address, an unknown name, or an address outside `scope`.
 pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
     let failed = |message: String| LinkError::Address { address: text.into(), message };
-    let place = text.strip_prefix("udp://").unwrap_or(text);
-    let mut found: Vec<_> = place
+    let mut found: Vec<_> = text
         .to_socket_addrs()
         .map_err(|error| failed(format!("{error}; expected is HOST:PORT")))?
         .collect();
@@ -32,7 +67,7 @@ pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
     Ok(address)
 }
 
-fn is_loopback(ip: IpAddr) -> bool {
+pub(super) fn is_loopback(ip: IpAddr) -> bool {
     ip.to_canonical().is_loopback()
 }
 
@@ -42,7 +77,7 @@ mod tests {
 
     #[test]
     fn loopback_is_always_allowed_and_other_addresses_only_with_permission() {
-        for here in ["127.0.0.1:5000", "udp://127.8.8.8:1", "[::1]:9"] {
+        for here in ["127.0.0.1:5000", "127.8.8.8:1", "[::1]:9"] {
             assert!(resolve(here, BindScope::Loopback).is_ok(), "{here}");
         }
         for beyond in ["0.0.0.0:5000", "192.0.2.1:5000", "[::]:5000", "[2001:db8::1]:1"] {
@@ -54,9 +89,18 @@ mod tests {
 
     #[test]
     fn text_that_is_not_an_address_is_named() {
-        for text in ["", "udp://", "127.0.0.1", "127.0.0.1:99999", "127.0.0.1:rig"] {
-            let refused = resolve(text, BindScope::Remote).unwrap_err().to_string();
+        for text in [
+            "",
+            "udp://",
+            "tcp://127.0.0.1",
+            "udp://127.0.0.1:99999",
+            "http://127.0.0.1:1",
+            "127.0.0.1:1",
+        ] {
+            let refused = Address::parse(text, BindScope::Remote).unwrap_err().to_string();
             assert!(refused.contains("HOST:PORT"), "{refused}");
         }
+        let udp = Address::parse("udp://127.0.0.1:1", BindScope::Loopback).unwrap();
+        assert_eq!(udp.to_string(), "udp://127.0.0.1:1");
     }
 }

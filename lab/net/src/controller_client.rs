@@ -3,22 +3,23 @@
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
+use super::address::Address;
 use super::client::Client;
-use super::counters::Counters;
 use super::error::LinkError;
 use super::frame::{Frame, Kind, flag};
 use super::payload::{Reading, read_command, write_reading};
-use super::sequence_window::{Arrival, SequenceWindow};
+use super::report::Counters;
 use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Sensors};
 
 /// A controller at a network address.
 #[derive(Debug)]
 pub struct NetController {
     client: Client,
-    order: SequenceWindow,
-    at: u64,
     /// Waiting time for an answer before the last one is held; None beside a rig that waits, too.
     patience: Option<Duration>,
+    /// Since when an answer is due.
+    waiting: Option<Instant>,
+    /// The last answer.
     good: Command,
     failed: bool,
 }
@@ -33,15 +34,13 @@ impl NetController {
     /// # Errors
     /// A server that does not answer, refuses, or has another version.
     pub fn connect(peer: SocketAddr, sample_time: f64, pace: Option<f64>) -> Result<Self, LinkError> {
-        let mut client = Client::connect(peer, true, sample_time)?;
-        if let Some(seconds) = pace {
-            client.limit_silence(seconds);
-        }
+        let mut client = Client::connect(Address::Tcp(peer), true, sample_time)?;
+        let limit = pace.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+        client.silence = limit.map_or(client.silence, |limit| limit.min(client.silence));
         Ok(Self {
             client,
-            order: SequenceWindow::default(),
-            at: 0,
             patience: pace.map(|_| Duration::from_secs_f64(0.5 * sample_time)),
+            waiting: None,
             good: Command::default(),
             failed: false,
         })
@@ -49,29 +48,34 @@ impl NetController {
 
     /// The counters of the session.
     #[must_use]
-    pub fn counters(&mut self) -> Counters {
-        *self.client.counters()
+    pub fn counters(&self) -> Counters {
+        self.client.counters
     }
 
     fn ask(&mut self, sensors: Sensors, active: bool) -> Result<Command, LinkError> {
-        if self.failed {
-            return Err(self.client.silent());
-        }
         let reading = Reading { sensors, ground_truth: None };
-        let mut frame = write_reading(self.client.frame(Kind::Sensors, self.at), &reading);
+        let mut frame = write_reading(self.client.frame(Kind::Sensors), &reading);
         frame.flags |= if active { flag::ACTIVE } else { 0 };
         self.client.send(frame)?;
-        let deadline = self.patience.map(|patience| Instant::now() + patience);
+        let now = Instant::now();
+        let end = *self.waiting.get_or_insert(now) + self.client.silence;
+        let until = self.patience.map_or(end, |patience| (now + patience).min(end));
         let command = loop {
-            let Some(frame) = self.client.receive(deadline)? else {
-                self.client.counters().held += 1;
+            let Some(frame) = self.client.receive(until)? else {
+                if Instant::now() >= end {
+                    return Err(self.client.silent());
+                }
+                self.client.counters.held += 1;
                 break self.held(active);
             };
-            if let Some(command) = self.read(&frame) {
-                break command;
+            self.good = self.read(&frame)?;
+            self.waiting = None;
+            if frame.sequence == self.client.at {
+                break self.good;
             }
+            self.client.counters.late += 1;
         };
-        self.at += 1;
+        self.client.at += 1;
         Ok(command)
     }
 
@@ -82,36 +86,27 @@ impl NetController {
         } else {
             Drive { omega: self.good.drive.omega, ..Drive::default() }
         };
-        Command { drive, phase_error: self.good.phase_error, settled: false }
+        Command { drive, settled: false, ..self.good }
     }
 
-    /// The answer to the present sample, if the frame is this answer.
-    fn read(&mut self, frame: &Frame) -> Option<Command> {
-        let command = read_command(frame).filter(|_| frame.sequence <= self.at);
-        let due = frame.sequence == self.at;
-        let Some(command) = command.filter(|_| frame.kind == Kind::Drive) else {
-            self.client.counters().malformed += 1;
-            return None;
-        };
-        match self.order.arrive(frame.sequence) {
-            Arrival::New { .. } => {
-                self.good = command;
-                self.client.answered();
-                self.client.counters().late += u64::from(!due);
-                return due.then_some(command);
-            }
-            Arrival::Late => self.client.counters().late += 1,
-            Arrival::Repeated => self.client.counters().repeated += 1,
-        }
-        None
+    /// The answer to this sample or an earlier one.
+    fn read(&self, frame: &Frame) -> Result<Command, LinkError> {
+        let command = read_command(frame);
+        let Drive { omega, amplitude, .. } = command.drive;
+        let valid = frame.values.iter().all(|x| x.is_finite()) && omega >= 0.0 && amplitude >= 0.0;
+        let due = frame.kind == Kind::Drive && frame.sequence <= self.client.at;
+        (valid && due).then_some(command).ok_or_else(|| self.client.invalid())
     }
 }
 
 impl Controller for NetController {
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        if self.failed {
+            return Err(self.client.silent().into());
+        }
         let answer = self.ask(sensors, active);
         // Latched: after one failure the peer is not asked again.
-        self.failed |= answer.is_err();
+        self.failed = answer.is_err();
         Ok(answer?)
     }
 }

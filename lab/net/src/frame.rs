@@ -3,7 +3,7 @@
 use thiserror::Error;
 
 /// Version of the protocol.
-pub const VERSION: u16 = 1;
+pub const VERSION: u16 = 2;
 /// Size of every frame, bytes.
 pub const SIZE: usize = 84;
 /// First four bytes of every frame in every version.
@@ -26,14 +26,16 @@ pub enum Kind {
     Sensors = 4,
     /// A drive: to a rig server, or from a controller server.
     Drive = 5,
-    /// The client ends the session.
+    /// The client ends the session with a rig in real time.
     Farewell = 6,
+    /// The rig in real time confirms the farewell, and reports its timing.
+    Report = 7,
 }
 
 impl Kind {
     fn from_code(code: u8) -> Option<Self> {
-        use Kind::{Drive, Farewell, Hello, Refusal, Sensors, Welcome};
-        [Hello, Welcome, Refusal, Sensors, Drive, Farewell]
+        use Kind::{Drive, Farewell, Hello, Refusal, Report, Sensors, Welcome};
+        [Hello, Welcome, Refusal, Sensors, Drive, Farewell, Report]
             .into_iter()
             .find(|kind| *kind as u8 == code)
     }
@@ -49,10 +51,8 @@ pub mod flag {
     pub const REFERENCE: u8 = 4;
     /// Sensors: the rig is a simulation, and its last four values describe the impacts.
     pub const GROUND_TRUTH: u8 = 8;
-    /// Sensors or Drive, from a server: the drive has been shut down for this session.
+    /// Sensors, from a rig in real time: the drive has been shut down for this session.
     pub const SHUT_DOWN: u8 = 16;
-    /// Welcome, of a rig: it runs in real time.
-    pub const PACED: u8 = 32;
     /// Hello and Welcome: the server is, or should be, a controller; otherwise a rig.
     pub const CONTROLLER: u8 = 64;
 }
@@ -89,6 +89,9 @@ pub enum FrameError {
     /// The checksum does not match the content.
     #[error("wrong checksum")]
     Checksum,
+    /// There will be no more frames.
+    #[error("the connection is closed")]
+    Closed,
     /// Its kind is unknown.
     #[error("unknown kind {0}")]
     Kind(u8),
@@ -174,7 +177,7 @@ mod tests {
 
     fn frames() -> impl Strategy<Value = Frame> {
         let numbers = prop::array::uniform6(any::<u64>());
-        (1u8..=6, any::<u8>(), any::<u64>(), any::<u64>(), any::<u64>(), numbers).prop_map(
+        (1u8..=7, any::<u8>(), any::<u64>(), any::<u64>(), any::<u64>(), numbers).prop_map(
             |(kind, flags, session, sequence, time, values)| Frame {
                 kind: Kind::from_code(kind).unwrap(),
                 flags,
@@ -229,13 +232,13 @@ mod tests {
             values: [1.0, 2.0, 0.0, 0.0, 0.0, -1.0],
         };
         let bytes = frame.encode();
-        assert_eq!(&bytes[..8], b"VINE\x01\x00\x05\x02");
+        assert_eq!(&bytes[..8], b"VINE\x02\x00\x05\x02");
         assert_eq!(bytes[8..16], [8, 7, 6, 5, 4, 3, 2, 1]);
         assert_eq!(bytes[16..24], [9, 0, 0, 0, 0, 0, 0, 0]);
         assert_eq!(bytes[24..32], 0.5f64.to_le_bytes());
         assert_eq!(bytes[72..80], (-1.0f64).to_le_bytes());
         // The value of zlib.crc32 in Python.
-        assert_eq!(bytes[80..], 0xadb8_2c0eu32.to_le_bytes());
+        assert_eq!(bytes[80..], 0xe40e_f90du32.to_le_bytes());
     }
 
     #[test]
@@ -243,6 +246,6 @@ mod tests {
         let longer = [&b"VINE\x07\x00"[..], &[0; 100]].concat();
         assert_eq!(Frame::decode(&longer), Err(FrameError::Version(7)));
         assert_eq!(Frame::decode(b"VINE"), Err(FrameError::Magic));
-        assert_eq!(Frame::decode(b"VINE\x01\x00 short"), Err(FrameError::Size(12)));
+        assert_eq!(Frame::decode(b"VINE\x02\x00 short"), Err(FrameError::Size(12)));
     }
 }

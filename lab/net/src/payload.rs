@@ -1,7 +1,7 @@
 //! The six values of a frame: readings or a drive.
 
 use super::frame::{Frame, Kind, flag};
-use vines_testbench::rig::{Command, Drive, GroundTruth, Sensors};
+use vines_testbench::rig::{Command, Drive, Fault, GroundTruth, LoopState, Sensors};
 
 /// Readings of a sample.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -63,19 +63,23 @@ pub(super) fn write_command(mut frame: Frame, command: &Command) -> Frame {
         frame.flags |= flag::SETTLED;
     }
     let Drive { omega, amplitude, displacement } = command.drive;
-    frame.values = [omega, amplitude, displacement, command.phase_error, 0.0, 0.0];
+    // The state is counted from 1, so that 0 means that it is not reported.
+    let state = command.state.map_or(0.0, |state| f64::from(state as u8) + 1.0);
+    let fault = command.fault.map_or(0.0, |fault| f64::from(fault as u8));
+    frame.values = [omega, amplitude, displacement, command.phase_error, state, fault];
     frame
 }
 
-/// The command in a frame; None if a value is invalid. An invalid value must not reach a shaker.
-pub(super) fn read_command(frame: &Frame) -> Option<Command> {
-    let [omega, amplitude, displacement, phase_error, ..] = frame.values;
-    frame.values.iter().all(|x| x.is_finite()).then_some(())?;
-    (omega >= 0.0 && amplitude >= 0.0).then_some(Command {
+/// The command in a frame.
+pub(super) fn read_command(frame: &Frame) -> Command {
+    let [omega, amplitude, displacement, phase_error, state, fault] = frame.values;
+    Command {
         drive: Drive { omega, amplitude, displacement },
         phase_error,
         settled: frame.has(flag::SETTLED),
-    })
+        state: LoopState::of_number(state as i32 - 1),
+        fault: Fault::of_number(fault as i32),
+    }
 }
 
 #[cfg(test)]
@@ -97,26 +101,16 @@ mod tests {
         }
 
         #[test]
-        fn drives_survive_the_frame(omega in 0.0..1e6, amplitude in 0.0..1e6, displacement in -1e6..1e6, settled: bool) {
+        fn drives_survive_the_frame(omega in 0.0..1e6, amplitude in 0.0..1e6, displacement in -1e6..1e6, settled: bool, state in -1..8, fault in 0..6) {
             let command = Command {
                 drive: Drive { omega, amplitude, displacement },
                 phase_error: -0.5,
                 settled,
+                state: LoopState::of_number(state),
+                fault: Fault::of_number(fault),
             };
             let frame = write_command(Frame::new(Kind::Hello, 1), &command);
-            prop_assert_eq!(read_command(&Frame::decode(&frame.encode()).unwrap()), Some(command));
-        }
-    }
-
-    #[test]
-    fn a_drive_with_nan_infinity_or_a_negative_amplitude_is_invalid() {
-        for values in [
-            [f64::NAN, 0.0, 0.0, 0.0, 0.0, 0.0],
-            [1.0, f64::INFINITY, 0.0, 0.0, 0.0, 0.0],
-            [1.0, -1.0, 0.0, 0.0, 0.0, 0.0],
-        ] {
-            let frame = Frame { values, ..Frame::new(Kind::Drive, 1) };
-            assert_eq!(read_command(&frame), None);
+            prop_assert_eq!(read_command(&Frame::decode(&frame.encode()).unwrap()), command);
         }
     }
 }

@@ -1,11 +1,11 @@
-//! Report of a server on a session.
+//! Reports on a session: of the server to its user, and of a rig in real time to its client.
 
 use std::fmt::{self, Display, Formatter};
 use std::net::SocketAddr;
 
 use serde::Serialize;
 
-use super::counters::Counters;
+use super::frame::{Frame, Kind};
 use super::real_time_clock::Punctuality;
 
 /// End of a session.
@@ -14,10 +14,45 @@ use super::real_time_clock::Punctuality;
 pub enum Ended {
     /// The client ended the session.
     Farewell,
-    /// The client was silent for too long; the drive was shut down.
+    /// The client was silent, or behind, for too long; the drive was shut down.
     Silence,
+    /// The client sent a drive or a frame that is not allowed; the drive was shut down.
+    Refused,
     /// The server was stopped.
     Stopped,
+}
+
+/// Frames and samples of a session in real time, counted by client or server.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize)]
+pub struct Counters {
+    /// Valid frames of this session.
+    pub received: u64,
+    /// Frames that arrived after their sample, after a later frame, or twice.
+    pub late: u64,
+    /// Frames of another sender or another session.
+    pub foreign: u64,
+    /// Datagrams that are not frames, and frames with invalid values.
+    pub malformed: u64,
+    /// Samples for which the last valid value was held.
+    pub held: u64,
+}
+
+impl Counters {
+    /// Whether any frame was not delivered once and in time.
+    #[must_use]
+    pub fn is_troubled(&self) -> bool {
+        *self != Self { received: self.received, ..Self::default() }
+    }
+}
+
+impl Display for Counters {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { received, late, foreign, malformed, held } = self;
+        write!(
+            f,
+            "{received} frames received, {late} late, {foreign} foreign, {malformed} malformed; {held} samples held"
+        )
+    }
 }
 
 /// One session of a server.
@@ -35,26 +70,31 @@ pub struct Session {
     pub seconds: f64,
     /// Lateness of the samples, for a rig in real time.
     pub punctuality: Option<Punctuality>,
-    /// Counters.
-    pub counters: Counters,
+    /// Counters, for a rig in real time.
+    pub counters: Option<Counters>,
 }
 
 impl Session {
     /// Samples per second of the wall clock.
     #[must_use]
     pub fn rate(&self) -> f64 {
-        self.samples as f64 / self.seconds
+        if self.seconds > 0.0 {
+            self.samples as f64 / self.seconds
+        } else {
+            0.0
+        }
     }
 }
 
 impl Display for Session {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         let ended = match self.ended {
-            Ended::Farewell => "ended by the client's farewell",
-            Ended::Silence => "SHUT DOWN: the client was silent for too long",
+            Ended::Farewell => "ended by the client",
+            Ended::Silence => "SHUT DOWN: the client was silent, or behind, for too long",
+            Ended::Refused => "SHUT DOWN: the client sent a drive or a frame that is not allowed",
             Ended::Stopped => "stopped by the server",
         };
-        writeln!(f, "session of udp://{}: {ended}", self.peer)?;
+        writeln!(f, "session of {}: {ended}", self.peer)?;
         writeln!(
             f,
             "  {} samples in {:.3} s: {:.1} per second, nominal {:.1}",
@@ -66,6 +106,56 @@ impl Display for Session {
         if let Some(punctuality) = &self.punctuality {
             write!(f, "{punctuality}")?;
         }
-        writeln!(f, "  {}", self.counters)
+        self.counters.map_or(Ok(()), |counters| writeln!(f, "  {counters}"))
+    }
+}
+
+/// What a rig in real time reports to its client at the end.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub struct Timing {
+    /// Samples served.
+    pub samples: u64,
+    /// Samples that were late by a whole period or more.
+    pub missed: u64,
+    /// Largest lateness, s.
+    pub worst: f64,
+    /// Samples without a drive in time.
+    pub held: u64,
+}
+
+impl Timing {
+    /// Share of the samples that the rig served too late, or without a drive in time.
+    #[must_use]
+    pub fn share(&self) -> f64 {
+        self.missed.max(self.held) as f64 / self.samples.max(1) as f64
+    }
+
+    pub(super) fn write(&self, session: u64) -> Frame {
+        let Self { samples, missed, worst, held } = *self;
+        Frame {
+            values: [samples as f64, missed as f64, worst, held as f64, 0.0, 0.0],
+            ..Frame::new(Kind::Report, session)
+        }
+    }
+
+    pub(super) fn read(frame: &Frame) -> Self {
+        let [samples, missed, worst, held, ..] = frame.values;
+        Self {
+            samples: samples as u64,
+            missed: missed as u64,
+            worst,
+            held: held as u64,
+        }
+    }
+}
+
+impl Display for Timing {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        let Self { samples, missed, worst, held } = self;
+        write!(
+            f,
+            "of {samples} samples, {missed} missed their deadline (at worst {:.3} ms late), and {held} had no drive in time",
+            1e3 * worst
+        )
     }
 }

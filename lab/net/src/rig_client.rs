@@ -1,30 +1,32 @@
 //! A rig at a network address.
 
-use std::net::SocketAddr;
+use std::sync::{Arc, OnceLock};
+use std::time::{Duration, Instant};
 
+use super::address::Address;
 use super::client::Client;
-use super::counters::Counters;
 use super::error::LinkError;
 use super::frame::{Frame, Kind};
 use super::payload::{Reading, read_reading, write_command};
-use super::sequence_window::{Arrival, SequenceWindow};
+use super::report::{Counters, Timing};
 use vines_testbench::rig::{Command, Drive, GroundTruth, Rig, RigError, Sensors};
 
-/// A rig at a network address.
+/// Longest time for the report of a rig in real time.
+const REPORT: Duration = Duration::from_millis(200);
+
+/// A rig at a network address: in lock-step over TCP, in real time over UDP.
 ///
 /// The last valid reading replaces a lost one, so that the controller gets every sample of the rig's clock.
 #[derive(Debug)]
 pub struct NetRig {
     client: Client,
-    order: SequenceWindow,
-    /// Sequence number of the present sample.
-    at: u64,
     /// Reading of the present sample, if it has arrived.
     now: Option<Reading>,
     /// The last valid reading.
     good: Reading,
-    /// Reading of a later sample, which arrived first.
-    ahead: Option<Frame>,
+    /// The frame with the newest reading, which may be that of a later sample.
+    newest: Option<Frame>,
+    timing: Arc<OnceLock<Timing>>,
 }
 
 impl NetRig {
@@ -32,83 +34,92 @@ impl NetRig {
     ///
     /// # Errors
     /// A server that does not answer, refuses, or has another version.
-    pub fn connect(peer: SocketAddr, sample_time: f64) -> Result<Self, LinkError> {
+    pub fn connect(peer: Address, sample_time: f64) -> Result<Self, LinkError> {
         Ok(Self {
             client: Client::connect(peer, false, sample_time)?,
-            order: SequenceWindow::default(),
-            at: 0,
             now: None,
             good: Reading::default(),
-            ahead: None,
+            newest: None,
+            timing: Arc::default(),
         })
     }
 
     /// The longest silence, s, of a rig in real time; None for a rig in lock-step.
     #[must_use]
     pub fn pace(&self) -> Option<f64> {
-        self.client.pace()
+        self.client.is_real_time().then_some(self.client.silence.as_secs_f64())
     }
 
     /// The counters of the session.
     #[must_use]
-    pub fn counters(&mut self) -> Counters {
-        *self.client.counters()
+    pub fn counters(&self) -> Counters {
+        self.client.counters
+    }
+
+    /// What a rig in real time reports about its timing. Set at the end of the session, unless the report is lost.
+    #[must_use]
+    pub fn timing(&self) -> Arc<OnceLock<Timing>> {
+        Arc::clone(&self.timing)
     }
 
     /// The reading of the present sample.
     fn reading(&mut self) -> Result<Reading, LinkError> {
-        while self.now.is_none() {
-            match self.ahead {
-                Some(frame) if frame.sequence > self.at => {
-                    self.client.counters().held += 1;
-                    self.now = Some(self.good);
+        let end = Instant::now() + self.client.silence;
+        loop {
+            let reading = match (self.now, self.newest) {
+                (Some(reading), _) => return Ok(reading),
+                (None, Some(frame)) if frame.sequence == self.client.at => read_reading(&frame),
+                (None, Some(frame)) if frame.sequence > self.client.at => {
+                    self.client.counters.held += 1;
+                    self.good
                 }
-                Some(frame) => {
-                    self.ahead = None;
-                    self.take(&frame);
+                _ => {
+                    self.wait(end)?;
+                    continue;
                 }
-                None => self.wait()?,
-            }
+            };
+            self.good = reading;
+            self.now = Some(reading);
         }
-        Ok(self.now.unwrap_or(self.good))
     }
 
-    fn wait(&mut self) -> Result<(), LinkError> {
-        let Some(frame) = self.client.receive(None)? else {
-            return Ok(());
-        };
+    /// Waits for a later reading.
+    fn wait(&mut self, end: Instant) -> Result<(), LinkError> {
+        let frame = self.client.receive(end)?.ok_or_else(|| self.client.silent())?;
         if frame.kind != Kind::Sensors {
-            // A second Welcome.
-            self.client.counters().repeated += 1;
             return Ok(());
         }
-        match self.order.arrive(frame.sequence) {
-            Arrival::New { missing } if missing > self.client.patience() => {
-                return Err(self.client.silent());
-            }
-            Arrival::New { missing } => {
-                self.client.answered();
-                self.client.counters().lost += missing;
-                self.ahead = Some(frame);
-            }
-            Arrival::Late => self.client.counters().late += 1,
-            Arrival::Repeated => self.client.counters().repeated += 1,
+        if self.newest.is_some_and(|newest| newest.sequence >= frame.sequence) {
+            self.client.counters.late += 1;
+            return Ok(());
         }
+        if frame.sequence.saturating_sub(self.client.at) > self.client.patience() {
+            return Err(self.client.silent());
+        }
+        self.newest = Some(frame);
         Ok(())
-    }
-
-    fn take(&mut self, frame: &Frame) {
-        self.good = read_reading(frame);
-        self.now = Some(self.good);
     }
 
     fn drive(&mut self, drive: Drive, step: f64) -> Result<(), LinkError> {
         self.client.check_step(step)?;
-        let frame = self.client.frame(Kind::Drive, self.at);
         let command = Command { drive, ..Command::default() };
-        self.client.send(write_command(frame, &command))?;
-        self.at += 1;
+        self.client
+            .send(write_command(self.client.frame(Kind::Drive), &command))?;
+        self.client.at += 1;
         self.now = None;
+        Ok(())
+    }
+
+    /// Ends the session with a rig in real time. If this fails, the server's watchdog does.
+    fn farewell(&mut self) -> Result<(), LinkError> {
+        self.client.send(self.client.frame(Kind::Farewell))?;
+        let end = Instant::now() + REPORT;
+        while let Some(frame) = self.client.receive(end)? {
+            if frame.kind == Kind::Report {
+                let _ = self.timing.set(Timing::read(&frame));
+                break;
+            }
+        }
         Ok(())
     }
 }
@@ -124,5 +135,13 @@ impl Rig for NetRig {
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         Ok(self.reading()?.ground_truth)
+    }
+}
+
+impl Drop for NetRig {
+    fn drop(&mut self) {
+        if self.client.is_real_time() {
+            let _ = self.farewell();
+        }
     }
 }

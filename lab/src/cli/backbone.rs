@@ -7,11 +7,11 @@ use indicatif::ProgressBar;
 use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
 use super::{
-    endpoint::{Endpoint, OpenRig, ReachArguments},
+    endpoint::{Endpoint, ReachArguments},
     failure::Failure,
-    json,
+    log_warnings, result,
     scene_arguments::SceneArguments,
-    written,
+    writable, written,
 };
 
 const HELP: &str = "\
@@ -20,14 +20,16 @@ Holds the response at one level after another, and measures the drive and the fr
   sigma     detuning (Omega - 1)/epsilon at which the response lags the base by 90 degrees
   G         base amplitude over b epsilon
   averaged  periods at the end of the dwell that the point is averaged over
-  distance  from the exact backbone: the largest of the differences in C, sigma and G
+  error     difference in sigma or G, whichever is larger, from the exact backbone at the same C
+Numbers after ± are standard uncertainties; those of sigma and G hold at the C of the same line. A level that the response does not
+reach, because the drive is at a limit, is named as such.
 
 Examples:
   vines backbone                                          29 levels from C = 0.7 down to 0.14
   vines backbone --set backbone.C_to=0.2 --set backbone.points=11
   vines backbone --set chain.snr=40 --set chain.seed=7    with sensor noise
   vines backbone --set backbone.predictor='\"theory\"'           with theory as the predictor
-  vines backbone --rig LoViNes.fmu --out out/fmu          another rig: an FMU, or udp://HOST:PORT
+  vines backbone --rig LoViNes.fmu --out out/fmu          another rig: an FMU, or a network address
 
 Writes tracked.json, tracked.csv and tracked.svg.";
 
@@ -42,7 +44,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
 
-    /// The rig: `built-in`, an FMU, or udp://HOST:PORT
+    /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), or udp://HOST:PORT (in real time)
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     rig: Endpoint,
 
@@ -56,24 +58,26 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    env_logger::Builder::new()
-        .filter_level(log::LevelFilter::Warn)
-        .format_timestamp(None)
-        .init();
+    log_warnings();
     let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(Failure::input)?;
-    let OpenRig { mut rig, .. } = arguments.rig.rig(&scene, arguments.reach.reach())?;
+    writable(&arguments.out)?;
+    let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
-    let tracked = track(rig.as_mut(), &mut controller, &scene, |done, _| {
+    let tracked = track(&mut open.rig, &mut controller, &scene, |done, _| {
         bar.set_position(done as u64);
     });
     bar.finish_and_clear();
-    // Dropping the rig ends a network session.
-    drop(rig);
-    let found = TrackedComparison::of(&tracked?, &scene);
+    let timing = open.close();
+    let tracked = tracked?;
+    let found = TrackedComparison::of(&tracked, &scene);
     let files = report::write_tracked(&found, &arguments.out).map_err(Failure::run)?;
-    if arguments.json {
-        return json(&found);
+    if let Some(ended) = tracked.ended {
+        let points = found.points.len();
+        return Err(Failure::run(format!(
+            "{ended}\n{points} points were measured before. {}",
+            written(&files).trim_end()
+        )));
     }
     let summary = report::summary::tracked(&found);
-    Ok(format!("{summary}\n{}", written(&files)))
+    result(arguments.json, &found, &summary, &files, timing)
 }

@@ -1,8 +1,8 @@
 //! `vines controller`: the phase-locked loop at a network address.
 
 use clap::Args;
-use vines::net::{ControllerServer, ControllerService};
-use vines::rig::{BuiltIn, Controller};
+use vines::net::{Address, Role, Served, Service};
+use vines::rig::BuiltIn;
 
 use super::{
     failure::Failure,
@@ -12,10 +12,9 @@ use super::{
 
 const HELP: &str = "\
 Examples:
-  vines controller --listen 127.0.0.1:5511      then: vines identify --controller udp://127.0.0.1:5511
+  vines controller --listen 127.0.0.1:5511      then: vines identify --controller tcp://127.0.0.1:5511
 
-Answers every reading with a drive. The last valid reading replaces a lost one. After --silence the session ends, and
-further readings are answered without a drive. See docs/network-protocol.md.
+Answers every reading with a drive. After --silence the session ends. See docs/network-protocol.md.
 
 The server listens on this machine only, unless --allow-remote is given: there is no authentication and no encryption.";
 
@@ -37,11 +36,11 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     let first = BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
-    let service = ControllerService { sample_time: scene.sample_time(), silence: arguments.silence };
-    let mut server = ControllerServer::listen(arguments.serving.address()?, service)?;
-    let (stop, tell) = arguments.serving.begin("controller", server.address()?)?;
-    server
-        .serve(|| Ok(Box::new(first.clone()) as Box<dyn Controller>), stop, tell)
-        .map_err(Failure::run)?;
-    Ok(String::new())
+    let service = Service {
+        role: Role::Controller,
+        sample_time: scene.sample_time(),
+        silence: arguments.silence,
+    };
+    let make = || Served::Controller(Box::new(first.clone()));
+    arguments.serving.serve("controller", Address::Tcp, service, make)
 }

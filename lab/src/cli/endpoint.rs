@@ -1,16 +1,20 @@
 //! `--rig` and `--controller`: the implementations of the two sides of the bench.
 
-use std::{path::PathBuf, str::FromStr};
+use std::{
+    path::PathBuf,
+    str::FromStr,
+    sync::{Arc, OnceLock},
+};
 
 use clap::Args;
 use vines::{
     fmu::{FmuController, FmuRig},
-    net::{BindScope, NetController, NetRig, resolve},
+    net::{Address, BindScope, NetController, NetRig, Timing},
     rig::{BuiltIn, Chain, Controller, Rig, Simulated},
-    scene::Scene,
+    scene::{Resonance, Scene},
 };
 
-use super::failure::Failure;
+use super::{failure::Failure, interrupt::Interruptible};
 
 /// An implementation, as written on the command line.
 #[derive(Debug, Clone, PartialEq)]
@@ -19,8 +23,8 @@ pub(super) enum Endpoint {
     BuiltIn,
     /// The path of an FMU.
     Fmu(PathBuf),
-    /// `udp://HOST:PORT`.
-    Udp(String),
+    /// `tcp://HOST:PORT` or `udp://HOST:PORT`.
+    Network(String),
 }
 
 impl FromStr for Endpoint {
@@ -30,42 +34,58 @@ impl FromStr for Endpoint {
         if text == "built-in" {
             return Ok(Self::BuiltIn);
         }
-        if text.starts_with("udp://") {
-            return Ok(Self::Udp(text.into()));
+        if text.contains("://") {
+            return Ok(Self::Network(text.into()));
         }
         let file = PathBuf::from(text);
         if file.is_file() {
             Ok(Self::Fmu(file))
         } else {
             Err(format!(
-                "{text} does not exist; give `built-in`, the path of an FMU, or udp://HOST:PORT"
+                "{text} does not exist; give `built-in`, the path of an FMU, tcp://HOST:PORT, or for a rig in real time \
+                 udp://HOST:PORT"
             ))
         }
     }
 }
 
-/// A rig, and, in real time, the longest silence that it tolerates, s.
+/// A rig.
 pub(super) struct OpenRig {
-    pub rig: Box<dyn Rig>,
+    pub rig: Interruptible,
+    /// In real time, the longest silence that it tolerates, s.
     pub pace: Option<f64>,
+    /// In real time, what it reports when the session has ended.
+    timing: Arc<OnceLock<Timing>>,
+}
+
+impl OpenRig {
+    /// Ends the session of a rig in real time. Its report tells how it kept its time.
+    pub(super) fn close(self) -> Option<Timing> {
+        drop(self.rig);
+        self.timing.get().copied()
+    }
 }
 
 impl Endpoint {
     /// The rig of this endpoint.
     pub(super) fn rig(&self, scene: &Scene, scope: BindScope) -> Result<OpenRig, Failure> {
-        let mut pace = None;
+        let (mut pace, mut timing) = (None, Arc::default());
         let rig: Box<dyn Rig> = match self {
-            Self::BuiltIn => Box::new(Simulated::new(scene.plant, scene.start).map_err(Failure::input)?),
+            Self::BuiltIn => {
+                let plant = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
+                Box::new(plant.with_sensors(scene.resonance))
+            }
             Self::Fmu(file) => Box::new(FmuRig::load(file, &scene.start_values()).map_err(Failure::run)?),
-            Self::Udp(address) => {
-                let rig = NetRig::connect(resolve(address, scope)?, scene.sample_time())?;
+            Self::Network(address) => {
+                let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time())?;
                 pace = rig.pace();
+                timing = rig.timing();
                 Box::new(rig)
             }
         };
         let (d, samples) = (scene.dimensionless(), scene.controller.samples_per_period);
-        let rig = Chain::around(rig, &scene.chain, &d, samples);
-        Ok(OpenRig { rig, pace })
+        let rig = Interruptible::around(Chain::around(rig, &scene.chain, &d, samples), scene.sample_time())?;
+        Ok(OpenRig { rig, pace, timing })
     }
 
     /// The controller of this endpoint, for a rig of that `pace`.
@@ -75,13 +95,23 @@ impl Endpoint {
         scope: BindScope,
         pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
+        if scene.resonance.resonance == Resonance::Peak && scene.controller.phase_target == -90.0 {
+            return Err(Failure::input(
+                "resonance.definition = \"peak\" with controller.phase_target = -90 degrees: the loop holds a phase, so set phase_target to the \
+                 phase at the peak, which `vines orbit` prints",
+            ));
+        }
         Ok(match self {
             Self::BuiltIn => Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?),
             Self::Fmu(file) => Box::new(FmuController::load(file, &scene.controller_config()).map_err(Failure::run)?),
-            Self::Udp(address) => {
-                let peer = resolve(address, scope)?;
-                Box::new(NetController::connect(peer, scene.sample_time(), pace)?)
-            }
+            Self::Network(address) => match Address::parse(address, scope)? {
+                Address::Tcp(peer) => Box::new(NetController::connect(peer, scene.sample_time(), pace)?),
+                Address::Udp(_) => {
+                    return Err(Failure::input(format!(
+                        "{address}: a controller has an address tcp://HOST:PORT"
+                    )));
+                }
+            },
         })
     }
 }

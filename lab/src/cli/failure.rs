@@ -7,6 +7,8 @@ use vines::{
     scene::SceneError,
 };
 
+use super::interrupt::{INTERRUPTED, Interrupted};
+
 /// A message and an exit code.
 #[derive(Debug)]
 pub(super) struct Failure {
@@ -23,6 +25,25 @@ impl Failure {
     /// A failure at run time: exit code 1.
     pub(super) fn run(message: impl Display) -> Self {
         Self { code: 1, message: message.to_string() }
+    }
+
+    /// A failure of the rig. A drive that the plant refuses comes from the scene.
+    fn of_rig(cause: &RigError, message: &impl Display) -> Self {
+        match cause {
+            RigError::Refused(_) => Self::input(message),
+            _ if cause.cause::<Interrupted>().is_some() => Self { code: INTERRUPTED, message: message.to_string() },
+            _ => Self::run(message),
+        }
+    }
+
+    /// A rig in real time did not keep its time: exit code 3.
+    pub(super) fn late(message: impl Display) -> Self {
+        Self { code: 3, message: message.to_string() }
+    }
+
+    /// The same exit code with another message.
+    pub(super) fn with_message(self, message: String) -> Self {
+        Self { message, ..self }
     }
 
     pub(super) fn code(&self) -> u8 {
@@ -42,11 +63,10 @@ impl From<SceneError> for Failure {
     }
 }
 
-/// A drive that the plant refuses comes from the scene.
 impl From<ExperimentError> for Failure {
     fn from(error: ExperimentError) -> Self {
-        match error {
-            ExperimentError::Rig(RigError::Refused(_)) => Self::input(error),
+        match &error {
+            ExperimentError::Rig(cause) => Self::of_rig(cause, &error),
             _ => Self::run(error),
         }
     }
@@ -54,8 +74,8 @@ impl From<ExperimentError> for Failure {
 
 impl From<TrackError> for Failure {
     fn from(error: TrackError) -> Self {
-        match error {
-            TrackError::Rig(RigError::Refused(_)) => Self::input(error),
+        match &error {
+            TrackError::Rig(cause) => Self::of_rig(cause, &error),
             _ => Self::run(error),
         }
     }
@@ -73,7 +93,7 @@ impl From<LinkError> for Failure {
 impl From<PackError> for Failure {
     fn from(error: PackError) -> Self {
         match error {
-            PackError::Read { .. } | PackError::Write { .. } => Self::run(error),
+            PackError::Read { .. } => Self::run(error),
             _ => Self::input(error),
         }
     }

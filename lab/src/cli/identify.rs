@@ -6,17 +6,21 @@ use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use tempfile::TempDir;
 use vines::{
+    advice,
     comparison::Comparison,
-    experiment::{self, Plan, Stage},
-    identification, pack, report,
+    experiment::{self, ExperimentError, Plan, Sample, Stage},
+    identification::{self, IdentificationError},
+    pack, report,
     rig::BuiltIn,
+    scene::Scene,
 };
 
 use super::{
-    endpoint::{Endpoint, OpenRig, ReachArguments},
+    endpoint::{Endpoint, ReachArguments},
     failure::Failure,
-    json,
+    log_warnings,
     pack::beside_this_program,
+    result,
     scene_arguments::SceneArguments,
     written,
 };
@@ -27,7 +31,7 @@ Examples:
   vines identify --set plant.r=0.7 --out r07       another coefficient of restitution
   vines identify --scene scenes/dimensionless.toml --set excitation.G=1.3
   vines identify --controller mine.fmu             another controller on the same plant
-  vines identify --rig udp://127.0.0.1:5510        a rig across the network; see `vines rig`
+  vines identify --rig udp://127.0.0.1:5510        a rig in real time across the network; see `vines rig`
 
 Without --rig, writes LoViNes.fmu and PhaseLock.fmu and runs the first; then writes identification.json, backbone.csv, backbone.svg and sim.svg.";
 
@@ -42,12 +46,12 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
 
-    /// The rig: `built-in`, an FMU, or udp://HOST:PORT [default: this program's plant FMU, packed into the
+    /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), or udp://HOST:PORT (in real time) [default: this program's plant FMU, packed into the
     /// folder of the results]
     #[arg(long, value_name = "ENDPOINT")]
     rig: Option<Endpoint>,
 
-    /// The controller: `built-in`, an FMU, or udp://HOST:PORT
+    /// The controller: `built-in`, an FMU, or tcp://HOST:PORT
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     controller: Endpoint,
 
@@ -61,39 +65,61 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    env_logger::Builder::new()
-        .filter_level(log::LevelFilter::Warn)
-        .format_timestamp(None)
-        .init();
+    log_warnings();
     let reach = arguments.reach.reach();
     // Invalid settings are refused before anything is written or connected.
     BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
-    let (OpenRig { mut rig, pace }, fmus) = match &arguments.rig {
+    let (mut open, fmus) = match &arguments.rig {
         Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&arguments.out)?),
         None => {
             let fmus = Packed::at(&arguments.out)?;
             (Endpoint::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
         }
     };
-    let mut controller = arguments.controller.controller(&scene, reach, pace)?;
+    let mut controller = arguments.controller.controller(&scene, reach, open.pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(&plan);
-    let record = experiment::run(rig.as_mut(), controller.as_mut(), &plan, |stage, done, of| {
-        show(&bar, stage, done, of);
-    });
+    let mut samples = Vec::new();
+    let record = experiment::run_into(
+        &mut samples,
+        &mut open.rig,
+        controller.as_mut(),
+        &plan,
+        |stage, done, of| show(&bar, stage, done, of),
+    );
     bar.finish_and_clear();
-    // Dropping rig and controller ends their network sessions.
-    drop((rig, controller));
-    let record = record?;
-    let found = identification::identify(&record, &scene).map_err(Failure::run)?;
+    drop(controller);
+    let timing = open.close();
+    let record = match record {
+        Ok(record) => record,
+        Err(error) => return Err(interrupted(error, &samples, &scene, &arguments.out)),
+    };
+    let found = identification::identify(&record, &scene).map_err(|error| match error {
+        IdentificationError::Regime { regime, .. } => {
+            let reason = advice::reason(&scene, Some(regime)).unwrap_or_default();
+            Failure::run(format!("{error}\n{reason}"))
+        }
+        other => Failure::run(other),
+    })?;
     let found = Comparison::of(&found, &scene);
     let mut files = report::write(&found, &arguments.out).map_err(Failure::run)?;
     files.extend(fmus.keep()?);
-    if arguments.json {
-        return json(&found);
-    }
     let summary = report::summary::identification(&found);
-    Ok(format!("{summary}\n{}", written(&files)))
+    result(arguments.json, &found, &summary, &files, timing)
+}
+
+/// The failure of an experiment that ended early, with the reason that the exact orbits know, and what was measured in a file.
+fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &Path) -> Failure {
+    let reason = matches!(error, ExperimentError::NoLock { .. })
+        .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
+        .flatten();
+    let failure = Failure::from(error);
+    let kept = match report::write_interrupted(samples, out) {
+        Ok(files) => written(&files).trim_end().to_string(),
+        Err(error) => error.to_string(),
+    };
+    let lines = [Some(failure.to_string()), reason, (!samples.is_empty()).then_some(kept)];
+    failure.with_message(lines.into_iter().flatten().collect::<Vec<_>>().join("\n"))
 }
 
 /// This program's FMUs: packed into a temporary folder inside the folder of the results, and kept if the run succeeds.

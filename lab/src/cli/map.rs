@@ -1,36 +1,43 @@
 //! `vines map`: the regime map.
 
+use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use vines::{
-    map::{Axis, Map, Plan, Range},
-    orbit::phase_resonant,
+    map::{Axis, LIMIT, Map, Plan, Range},
+    orbit::{Branch, phase_resonant},
     regime::Regime,
     report::{self, Table, summary::parameters},
     scene::Scene,
 };
 
-use super::{failure::Failure, scene_arguments::SceneArguments, written};
+use super::{failure::Failure, scene_arguments::SceneArguments, writable, written};
 
 const HELP: &str = "\
-Every cell is one plant, driven at a fixed frequency from the scene's start; after its transient, its impacts are classified:
-  no impacts      the linear response
+Every cell is one plant, driven at a fixed frequency from the scene's start:
+  no impacts      the particle rests, and the primary mass cannot reach it
   symmetric 1:1   two impacts per period, half a period apart; asymmetric 1:1: at uneven intervals
-  n impacts       any other pattern that repeats
-  modulated       nothing repeats: captured into 1:1 resonance and lost again, or at least disturbances do not grow
-  chaotic         nothing repeats, disturbances grow, and there are hardly any captures
-  sticking        impacts accumulate, and the particle rests on a wall for a while
+  n impacts       any other motion that repeats itself
+  quasi-periodic  nothing repeats; the largest Lyapunov exponent is zero within its uncertainty
+  modulated       the exponent is positive, and a fifth of the impacts or more are captured into 1:1 resonance for a while
+  chaotic         the exponent is positive, with fewer captures
+  undecided       none of these was shown within --periods
+A cell is followed until it repeats itself, or for --periods; the table has the periods followed, the duration of the transient,
+the recurrence, the exponent with its standard error, the share of captured impacts, and how often the particle sticks to a wall.
 
 Where several regimes are stable the start decides; a particle at rest may stay so where a moving one does not.
 
 Examples:
   vines map                                               sigma and G, in out/
+  vines map --starts 5                                    with four random starts in every cell
   vines map --x r=0.3:1:71 --y G=0.2:3:57 --sigma=-1.1
   vines map --x sigma=-2:1:61 --y G=0.5:2:61 --set start.dq2=0 --set start.q2=0.005
 
-Writes map.csv, map.svg and map-dark.svg.";
+Over sigma and G, the curves on which 1:1 motions bifurcate are followed and drawn, solid where they bound the stability of a motion.
+
+Writes map.csv, map.svg and map-dark.svg, and over sigma and G also bifurcations.csv.";
 
 /// Map the regimes of the response over two of sigma, G and r
 #[derive(Debug, Args)]
@@ -51,13 +58,13 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SIGMA", allow_negative_numbers = true)]
     sigma: Option<f64>,
 
-    /// Periods before the record
-    #[arg(long, value_name = "PERIODS", default_value_t = 400)]
-    settle: usize,
+    /// Largest number of periods that a cell is followed; at least 100
+    #[arg(long, value_name = "PERIODS", default_value_t = LIMIT)]
+    periods: usize,
 
-    /// Periods recorded; at least 20
-    #[arg(long, value_name = "PERIODS", default_value_t = 100)]
-    record: usize,
+    /// Starts per cell: that of the scene, and random ones that show where regimes coexist
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    starts: usize,
 
     /// Folder for the results; made if it is not there
     #[arg(long, value_name = "DIR", default_value = "out")]
@@ -67,6 +74,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     let plan = plan(arguments, &scene)?;
+    writable(&arguments.out)?;
     let style = ProgressStyle::with_template("mapping regimes [{wide_bar}] {pos}/{len} cells")
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(plan.cells() as u64).with_style(style);
@@ -100,8 +108,8 @@ fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
         start: scene.dimensionless_start(),
         x: arguments.x,
         y: arguments.y,
-        settle: arguments.settle,
-        record: arguments.record,
+        limit: arguments.periods,
+        starts: arguments.starts,
     })
 }
 
@@ -121,11 +129,26 @@ fn summary(map: &Map) -> String {
         ]
     });
     let table = Table::new(["regime", "cells", "share", "inside the theory's stable island"]);
-    format!(
+    let mut text = format!(
         "Regimes over {} and {}\n  {}\n\n{}",
         map.plan.x,
         map.plan.y,
         parameters(&map.plan.scene),
         table.rows(rows).text()
-    )
+    );
+    if map.plan.starts > 1 {
+        let count = map.cells.iter().filter(|cell| !cell.coexisting.is_empty()).count();
+        let part = share(count, map.cells.len());
+        let _ = writeln!(
+            text,
+            "\n{} starts per cell lead to several regimes in {count} cells ({part})",
+            map.plan.starts
+        );
+    }
+    for curve in &map.curves {
+        let Branch { points, ended: [one, other], .. } = &curve.branch;
+        let (name, count) = (curve.name(), points.len());
+        let _ = writeln!(text, "  {name}: {count} points; ends: {}; {}", one.name(), other.name());
+    }
+    text
 }

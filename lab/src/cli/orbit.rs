@@ -1,33 +1,40 @@
-//! `vines orbit`: exact orbits at phase resonance.
+//! `vines orbit`: exact orbits at resonance, and their curves.
+
+mod studies;
 
 use std::fmt::Write;
 
 use clap::Args;
 use vines::{
+    numerics::range,
     orbit::{
-        Bifurcation, Branch, Condition, Limits, Orbit, Periodic, backbone, continue_both_ways, convergence,
-        phase_resonant, response, settle,
+        Branch, Condition, Ended, Exploration, Limits, Orbit, Periodic, backbone, continue_both_ways, phase_resonant,
+        response, settle,
     },
     report::{Table, number, summary::parameters},
     scene::Dimensionless,
 };
 
+use studies::{converged, defined};
+
 use super::{failure::Failure, scene_arguments::SceneArguments, yes_no};
 
 const HELP: &str = "\
 Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon sigma:
-  C            amplitude of the first harmonic of the centre of mass, v = q1 + epsilon q2
+  C            amplitude of the first harmonic of the response: of v = q1 + epsilon q2, or as resonance.sensor says
   B            speed of the particle in flight
   multipliers  moduli of the multipliers of the half-period map; stable if all are below 1
 
 With --backbone or --response, orbits are followed by pseudo-arclength through folds and symmetry breaking, stable and unstable
-ones alike; --json prints all of them.
+ones alike; --json prints all of them. --response lists every component: those of symmetric 1:1 orbits over the whole range, those
+that branch off at symmetry breakings and period doublings (mirror images count once), and those on which random starts settle.
 
 Examples:
   vines orbit
   vines orbit --response --set excitation.G=1.6
   vines orbit --backbone --set plant.c=0 --set plant.r=1 --set excitation.G=0
   vines orbit --sigma=-0.6 --set excitation.G=2.2   the orbit that settles there, here six impacts in two periods
+  vines orbit --definitions                   resonance by phase or peak, by e or force, of v, q1 or acceleration
   vines orbit --convergence                   how theory approaches the exact orbit
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
   vines orbit --scene scenes/dimensionless.toml --json";
@@ -47,13 +54,25 @@ pub(super) struct Arguments {
     #[arg(long, group = "what")]
     backbone: bool,
 
-    /// Follow the exact frequency response at the scene's G, with the asymmetric orbits that branch off
+    /// Follow all components of the exact frequency response at the scene's G
     #[arg(long, group = "what")]
     response: bool,
+
+    /// Detunings of --response and --backbone
+    #[arg(long, value_name = "FIRST:LAST", default_value = "-6:6", allow_hyphen_values = true, value_parser = detunings)]
+    range: [f64; 2],
+
+    /// Random starts of --response, from which other patterns are searched for
+    #[arg(long, value_name = "N", default_value_t = Exploration::default().starts)]
+    starts: usize,
 
     /// Theory minus exact orbit at epsilon and its halvings, with the fitted exponent
     #[arg(long, group = "what")]
     convergence: bool,
+
+    /// Theory minus exact orbit at epsilon and four halvings, for all definitions of resonance, references and sensors
+    #[arg(long, group = "what")]
+    definitions: bool,
 
     /// Print JSON instead of a table
     #[arg(long)]
@@ -72,28 +91,49 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             scene.g
         ))
     };
+    let limits = Limits { sigma: arguments.range, ..Limits::default() };
     if arguments.backbone {
-        let branch = backbone(&scene, &Limits::default()).ok_or_else(none)?;
+        let branch = backbone(&scene, &limits).ok_or_else(none)?;
         return shown(&scene, "Exact backbone", &branch, arguments.json, || {
             curve("Symmetric 1:1", &branch)
         });
     }
     if arguments.response {
-        let found = response(&scene, &Limits::default()).ok_or_else(none)?;
+        if 1.0 + scene.epsilon * arguments.range[0] <= 0.0 {
+            return Err(Failure::input(format!(
+                "--range from sigma = {} (dimensionless): 1 + epsilon sigma must be above 0",
+                arguments.range[0]
+            )));
+        }
+        let exploration = Exploration { starts: arguments.starts, ..Exploration::default() };
+        let found = response(&scene, &limits, exploration);
+        if found.components.is_empty() {
+            return Err(Failure::run(format!(
+                "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {} to {}; raise excitation.G or --starts",
+                scene.g, limits.sigma[0], limits.sigma[1]
+            )));
+        }
         return shown(&scene, "Exact frequency response", &found, arguments.json, || {
-            let asymmetric = found.asymmetric.iter();
-            curve("Symmetric 1:1", &found.symmetric)
-                + &asymmetric.map(|branch| curve("Asymmetric", branch)).collect::<String>()
+            let count = found.components.len();
+            let all = found.components.iter().map(|one| curve(&one.name, &one.branch));
+            format!(
+                "{count} component{}\n\n{}",
+                if count == 1 { "" } else { "s" },
+                all.collect::<String>()
+            )
         });
     }
     if arguments.convergence {
         return converged(&scene, arguments.json);
     }
+    if arguments.definitions {
+        return defined(&scene, arguments.json);
+    }
     let orbits = phase_resonant(&scene);
     if arguments.json {
         return super::json(&orbits);
     }
-    let title = "Exact symmetric 1:1 orbits at phase resonance";
+    let title = format!("Exact symmetric 1:1 orbits at resonance: {}", scene.definition.name());
     Ok(format!(
         "{title}\n  {}\n\n{}",
         parameters(&scene),
@@ -101,26 +141,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     ))
 }
 
-/// The convergence of the theory towards the exact orbits.
-fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
-    let study = convergence(scene, HALVINGS).ok_or_else(|| {
-        Failure::run(format!(
-            "theory or exact orbits have no stable phase-resonant solution at G = {} (dimensionless)",
-            scene.g
-        ))
-    })?;
-    shown(scene, "Theory minus exact orbit", &study, json, || {
-        let rows = study
-            .rows
-            .iter()
-            .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}")));
-        let [sigma, c, b] = study.slopes;
-        let table = Table::new(["epsilon", "sigma", "C", "B"]).rows(rows);
+/// Parses FIRST:LAST.
+fn detunings(text: &str) -> Result<[f64; 2], String> {
+    let form = || {
         format!(
-            "{}\nExponent of epsilon: sigma {sigma:.3}, C {c:.3}, B {b:.3}\n",
-            table.text()
+            "`{text}`: expected FIRST:LAST, two detunings (dimensionless), the first below the last, for instance -6:6"
         )
-    })
+    };
+    let (from, to) = text.split_once(':').ok_or_else(form)?;
+    match (from.trim().parse::<f64>(), to.trim().parse::<f64>()) {
+        (Ok(from), Ok(to)) if from < to && from.is_finite() && to.is_finite() => Ok([from, to]),
+        _ => Err(form()),
+    }
 }
 
 /// Periods before the motion is evaluated.
@@ -140,16 +172,15 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
              see `vines map`"
         ))
     })?;
-    let pattern = format!(
-        "{} impacts in {} period{}{}",
-        motion.pattern.impacts(),
-        motion.pattern.periods(),
-        if motion.pattern.periods() == 1 { "" } else { "s" },
-        if motion.pattern.mirrored { ", mirrored" } else { "" }
-    );
+    let pattern = motion.pattern.name();
     if arguments.response {
         let condition = Condition::Excitation(scene.g);
-        let branch = continue_both_ways(scene, &motion, condition, &Limits::default());
+        let branch = continue_both_ways(
+            scene,
+            &motion,
+            condition,
+            &Limits { sigma: arguments.range, ..Limits::default() },
+        );
         return shown(scene, "Exact frequency response", &branch, arguments.json, || {
             curve(&pattern, &branch)
         });
@@ -178,8 +209,6 @@ fn described(pattern: &str, motion: &Periodic) -> String {
     )
 }
 
-/// Halvings of epsilon in the convergence study.
-const HALVINGS: u32 = 7;
 /// Rows of a curve in a text table.
 const ROWS: usize = 24;
 
@@ -197,12 +226,16 @@ fn shown(
 }
 
 fn curve(name: &str, branch: &Branch) -> String {
-    let ended = serde_json::to_value(branch.ended).unwrap_or_default();
+    let stable = branch.points.iter().filter(|one| one.stable).count();
+    let sigmas = || branch.points.iter().map(|one| one.sigma);
+    let (low, high) = range((f64::MAX, f64::MIN), sigmas());
+    let ends = match branch.ended {
+        [Ended::Closed, _] => "closed".into(),
+        [one, other] => format!("ends: {}; {}", one.name(), other.name()),
+    };
     let mut text = format!(
-        "{name}: {} orbits, {} of them stable; ended: {}\n",
-        branch.points.len(),
-        branch.points.iter().filter(|one| one.stable).count(),
-        ended.as_str().unwrap_or_default()
+        "{name}: sigma from {low:.4} to {high:.4}, {} orbits, {stable} of them stable; {ends}\n",
+        branch.points.len()
     );
     let row = |motion: &Periodic| -> Vec<String> {
         let largest = motion.moduli()[3];
@@ -215,12 +248,7 @@ fn curve(name: &str, branch: &Branch) -> String {
     let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(ROWS));
     text += &table.rows(thinned.map(row)).text();
     for special in &branch.special {
-        let what = match special.kind {
-            Bifurcation::Fold => "fold",
-            Bifurcation::SymmetryBreaking => "symmetry breaking",
-            Bifurcation::PeriodDoubling => "period doubling",
-            Bifurcation::Torus => "torus (modulation begins)",
-        };
+        let what = special.name();
         let Periodic { sigma, g, c, b, .. } = special.motion;
         let _ = writeln!(
             text,
@@ -239,13 +267,24 @@ fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
         };
     }
     let rows = orbits.iter().map(|orbit| {
-        let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.b];
+        let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.gamma.to_degrees(), orbit.b];
         let mut row: Vec<String> = numbers.map(number).into();
         row.extend(orbit.multipliers.map(|one| format!("{one:.4}")));
         row.push(yes_no(orbit.stable));
         row
     });
-    Table::new(["sigma", "Omega", "C", "B", "mult1", "mult2", "mult3", "mult4", "stable"])
-        .rows(rows)
-        .text()
+    Table::new([
+        "sigma",
+        "Omega",
+        "C",
+        "phase, degrees",
+        "B",
+        "mult1",
+        "mult2",
+        "mult3",
+        "mult4",
+        "stable",
+    ])
+    .rows(rows)
+    .text()
 }

@@ -10,7 +10,7 @@ use vines::{
     rig::BuiltIn,
 };
 
-use super::{failure::Failure, scene_arguments::SceneArguments};
+use super::{failure::Failure, scene_arguments::SceneArguments, writable};
 
 const HELP: &str = "\
 Runs the experiment, tracks the backbone, follows the exact curves, studies the convergence, maps the regimes, and writes
@@ -61,6 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             arguments.x.axis
         )));
     }
+    writable(&arguments.out)?;
     let subject = Subject { scene, map: [arguments.x, arguments.y] };
     let style = ProgressStyle::with_template("{msg:10} [{wide_bar}] {percent} %")
         .unwrap_or_else(|_| ProgressStyle::default_bar());

@@ -1,8 +1,8 @@
 //! `vines rig`: the plant at a network address.
 
 use clap::Args;
-use vines::net::{RigServer, RigService};
-use vines::rig::{Rig, Simulated};
+use vines::net::{Address, Role, Served, Service};
+use vines::rig::Simulated;
 
 use super::{
     failure::Failure,
@@ -13,11 +13,13 @@ use super::{
 const HELP: &str = "\
 Examples:
   vines rig --listen 127.0.0.1:5510                 in real time; then: vines identify --rig udp://127.0.0.1:5510
-  vines rig --listen 127.0.0.1:5510 --lock-step     as fast as the drives arrive, with the bits of the built-in plant
+  vines rig --listen 127.0.0.1:5510 --lock-step     as fast as the drives arrive, with the bits of the built-in plant;
+                                                    then: vines identify --rig tcp://127.0.0.1:5510
 
 Every session starts with the plant in the start state of the scene; the rig's clock starts with the first drive frame. Client and
-server take the sample time from their scene: use the same scene for both. Lost and late drives are counted, and the last valid
-one is held. After --silence the drive ramps to zero and stays there until another session starts. See docs/network-protocol.md.
+server take the sample time from their scene: use the same scene for both. In real time, lost and late drives are counted, and the
+last valid one is held. When the newest drive is older than --silence, the drive ramps to zero and stays there until another session
+starts. In lock-step, a drive that is not allowed ends the session. See docs/network-protocol.md.
 
 The server listens on this machine only, unless --allow-remote is given: there is no authentication and no encryption, and everyone
 who can reach the address can drive the rig.";
@@ -52,24 +54,26 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let first = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
+    let first = Simulated::new(scene.plant, scene.start)
+        .map_err(Failure::input)?
+        .with_sensors(scene.resonance);
     let default = if arguments.lock_step {
         SILENCE_LOCK_STEP
     } else {
         SILENCE_PACED
     };
-    let service = RigService {
-        sample_time: scene.sample_time(),
-        paced: !arguments.lock_step,
-        silence: arguments.silence.unwrap_or(default),
-        max_amplitude: arguments.max_amplitude.unwrap_or(scene.plant.half_width),
+    let (mode, transport): (_, fn(_) -> _) = if arguments.lock_step {
+        ("in lock-step", Address::Tcp)
+    } else {
+        ("in real time", Address::Udp)
     };
-    let mut server = RigServer::listen(arguments.serving.address()?, service)?;
-    let mode = if service.paced { "in real time" } else { "in lock-step" };
+    let max_amplitude = arguments.max_amplitude.unwrap_or(scene.plant.half_width);
+    let service = Service {
+        role: Role::Rig { max_amplitude },
+        sample_time: scene.sample_time(),
+        silence: arguments.silence.unwrap_or(default),
+    };
     let what = format!("rig, {mode}, {:.1} samples per second,", 1.0 / service.sample_time);
-    let (stop, tell) = arguments.serving.begin(&what, server.address()?)?;
-    server
-        .serve(|| Ok(Box::new(first.clone()) as Box<dyn Rig>), stop, tell)
-        .map_err(Failure::run)?;
-    Ok(String::new())
+    let make = || Served::Rig(Box::new(first.clone()));
+    arguments.serving.serve(&what, transport, service, make)
 }

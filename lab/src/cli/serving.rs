@@ -1,18 +1,14 @@
 //! Common options of the two servers: address, end, output.
 
 use std::{
-    net::SocketAddr,
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering},
-    },
+    sync::{Arc, atomic::Ordering},
     time::{Duration, Instant},
 };
 
 use clap::Args;
-use vines::net::{Session, resolve};
+use vines::net::{Address, Served, Server, Service, Session, resolve};
 
-use super::{endpoint::ReachArguments, failure::Failure, print};
+use super::{endpoint::ReachArguments, failure::Failure, interrupt::stop_flag, print};
 
 #[derive(Debug, Args)]
 pub(super) struct ServingArguments {
@@ -37,21 +33,17 @@ pub(super) struct ServingArguments {
 }
 
 impl ServingArguments {
-    pub(super) fn address(&self) -> Result<SocketAddr, Failure> {
-        Ok(resolve(&self.listen, self.reach.reach())?)
-    }
-
-    /// Prints the address. Returns a function that is true when the server should stop, and one that prints reports.
-    pub(super) fn begin(
+    /// Serves `what` at a TCP or UDP address: prints the address, then a report per session.
+    pub(super) fn serve(
         &self,
         what: &str,
-        address: SocketAddr,
-    ) -> Result<(impl Fn() -> bool, impl FnMut(&Session)), Failure> {
-        let stop = Arc::new(AtomicBool::new(false));
-        let signal = Arc::clone(&stop);
-        ctrlc::set_handler(move || signal.store(true, Ordering::Relaxed))
-            .map_err(|error| Failure::run(format!("cannot wait for Ctrl-C: {error}")))?;
-        print(&format!("{what} on udp://{address}\n"))?;
+        transport: fn(std::net::SocketAddr) -> Address,
+        service: Service,
+        mut make: impl FnMut() -> Served,
+    ) -> Result<String, Failure> {
+        let mut server = Server::listen(transport(resolve(&self.listen, self.reach.reach())?), service)?;
+        let stop = stop_flag()?;
+        print(&format!("{what} on {}\n", server.address().map_err(Failure::run)?))?;
         let enough = Arc::clone(&stop);
         let end = self
             .duration
@@ -71,7 +63,8 @@ impl ServingArguments {
                 enough.store(true, Ordering::Relaxed);
             }
         };
-        Ok((stop, tell))
+        server.serve(|| Ok(make()), stop, tell).map_err(Failure::run)?;
+        Ok(String::new())
     }
 }
 

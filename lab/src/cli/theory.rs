@@ -5,7 +5,7 @@ use serde::Serialize;
 use vines::{
     report::{Table, number, summary::parameters},
     scene::Dimensionless,
-    theory::{Activation, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, SlowFlow},
+    theory::{Activation, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, SlowFlow, resonant},
 };
 
 use super::{failure::Failure, json, scene_arguments::SceneArguments, yes_no};
@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let points = arguments.points as usize;
     // From near the end of the left branch, where the particle is at rest, to a little beyond the stable range.
     let highest = 1.2 * B_SYMMETRY_BREAKING;
-    let solutions = flow.phase_resonant(scene.g);
+    let solutions = resonant(&scene);
     if let Some(sigma) = arguments.sigma.filter(|sigma| !sigma.is_finite()) {
         return Err(Failure::input(format!(
             "--sigma = {sigma} (dimensionless) is not a finite number"
@@ -118,19 +118,22 @@ fn readable(report: &Report, listed: bool) -> String {
         "First-order theory\n  {}\n\n\
          Slow invariant manifold: R = {dissipation:.6}, fold at B = {b_min:.6}, C = {c_min:.6}\n\
          Symmetric impacts are stable for {b_min:.6} < B < {b_symmetry_breaking:.6}\n\n\
-         Phase resonance\n{}\n{}{equilibria}",
+         Resonance: {}\n{}\n{}{equilibria}",
         parameters(&report.scene),
+        report.scene.definition.name(),
         solutions(&report.solutions),
         thresholds(report),
     )
 }
 
 fn thresholds(report: &Report) -> String {
-    let Activation { from_rest, existence, stable } = report.activation;
+    let Activation { steady_linear, from_rest, existence, stable } = report.activation;
     let stable = stable.map_or("none at any G".into(), |g| format!("G = {g:.6}"));
     format!(
-        "Activation at sigma = {:.6}\n  impacts begin from rest    G = {from_rest:.6}\n  \
-         some 1:1 motion exists     G = {existence:.6}\n  a stable one exists        {stable}\n",
+        "Activation at sigma = {:.6}\n  steady linear response reaches the wall   G = {steady_linear:.6}\n  \
+         impacts begin from rest (first beat)      G = {from_rest:.6}\n  \
+         some 1:1 motion exists                    G = {existence:.6}\n  \
+         a stable one exists                       {stable}\n",
         report.sigma
     )
 }

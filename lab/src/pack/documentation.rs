@@ -2,9 +2,8 @@
 //!
 //! The tables of the page come from `modelDescription.xml`; equations and explanations are in `pictures/`.
 
-use std::fmt::Write;
-
 use fmi2_description::{Description, Error, ScalarVariable};
+use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// The files: name inside the FMU, content. A component without a figure gets the page only.
 ///
@@ -51,28 +50,35 @@ const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;color:#1f2933;max-w
 
 fn page(xml: &str, material: Option<&Material>) -> Result<String, Error> {
     let description = Description::parse(xml)?;
-    let name = escape(&description.model_name);
-    let mut out = format!(
-        "<!DOCTYPE html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n<title>{name}</title>\n\
-         <style>{STYLE}</style>\n</head>\n<body>\n<h1>{name}</h1>\n<p>{}.</p>\n",
-        escape(&description.description)
-    );
-    if let Some(material) = material {
-        let _ = write!(out, "{}\n{}", material.svg, material.text);
-    }
-    let _ = writeln!(
-        out,
-        "<p>Version {}; FMI {}; {}. Default experiment: {}.</p>",
-        escape(&description.version),
-        escape(&description.fmi_version),
-        interfaces(&description).join(" and "),
-        experiment(&description),
-    );
-    for (causality, heading) in SECTIONS {
-        table(&mut out, &description, causality, heading);
-    }
-    out += "</body>\n</html>\n";
-    Ok(out)
+    let interfaces = [
+        description.co_simulation.as_ref().map(|_| "co-simulation"),
+        description.model_exchange.as_ref().map(|_| "model exchange"),
+    ];
+    let interfaces: Vec<_> = interfaces.into_iter().flatten().collect();
+    let experiment = &description.default_experiment;
+    let [start, stop, step] = [&experiment.start_time, &experiment.stop_time, &experiment.step_size]
+        .map(|time| time.as_deref().map_or("?".into(), rounded));
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                title { (description.model_name) }
+                style { (PreEscaped(STYLE)) }
+            }
+            body {
+                h1 { (description.model_name) }
+                p { (description.description) "." }
+                @if let Some(material) = material { (PreEscaped(material.svg)) (PreEscaped(material.text)) }
+                p {
+                    "Version " (description.version) "; FMI " (description.fmi_version) "; " (interfaces.join(" and "))
+                    ". Default experiment: " (start) " s to " (stop) " s in steps of " (step) " s."
+                }
+                @for (causality, heading) in SECTIONS { (table(&description, causality, heading)) }
+            }
+        }
+    };
+    Ok(page.into_string())
 }
 
 /// Causalities in the order in which a reader wants them.
@@ -83,29 +89,6 @@ const SECTIONS: [(&str, &str); 5] = [
     ("output", "Outputs"),
     ("local", "Local variables"),
 ];
-
-fn interfaces(description: &Description) -> Vec<&'static str> {
-    let co_simulation = description.co_simulation.as_ref();
-    let model_exchange = description.model_exchange.as_ref();
-    [
-        co_simulation.map(|_| "co-simulation"),
-        model_exchange.map(|_| "model exchange"),
-    ]
-    .into_iter()
-    .flatten()
-    .collect()
-}
-
-fn experiment(description: &Description) -> String {
-    let experiment = &description.default_experiment;
-    let text = |value: &Option<String>| value.clone().unwrap_or_else(|| "?".into());
-    format!(
-        "{} s to {} s in steps of {} s",
-        escape(&text(&experiment.start_time)),
-        escape(&text(&experiment.stop_time)),
-        escape(&rounded(&text(&experiment.step_size)))
-    )
-}
 
 /// A number with at most six digits. The description has all digits.
 fn rounded(text: &str) -> String {
@@ -122,42 +105,28 @@ fn rounded(text: &str) -> String {
     }
 }
 
-fn table(out: &mut String, description: &Description, causality: &str, heading: &str) {
-    let variables = description
-        .variables
-        .iter()
-        .filter(|variable| variable.causality.as_deref().unwrap_or("local") == causality);
-    let mut rows = variables.map(row).peekable();
-    if rows.peek().is_none() {
-        return;
+fn table(description: &Description, causality: &str, heading: &str) -> Markup {
+    let is_one = |one: &&ScalarVariable| one.causality.as_deref().unwrap_or("local") == causality;
+    let variables: Vec<_> = description.variables.iter().filter(is_one).collect();
+    html! {
+        @if !variables.is_empty() {
+            h2 { (heading) }
+            table {
+                tr { th { "name" } th { "start" } th { "unit" } th { "variability" } th { "meaning" } }
+                @for one in variables {
+                    @let content = one.content.first();
+                    "\n"
+                    tr {
+                        td { code { (one.name) } }
+                        td { (rounded(content.and_then(|c| c.start.as_deref()).unwrap_or_default())) }
+                        td { (content.and_then(|c| c.unit.as_deref()).unwrap_or_default()) }
+                        td { (one.variability.as_deref().unwrap_or_default()) }
+                        td { (one.description) }
+                    }
+                }
+            }
+        }
     }
-    let _ = writeln!(
-        out,
-        "<h2>{heading}</h2>\n<table>\n<tr><th>name</th><th>start</th><th>unit</th><th>variability</th><th>meaning</th></tr>"
-    );
-    rows.for_each(|row| out.push_str(&row));
-    *out += "</table>\n";
-}
-
-fn row(variable: &ScalarVariable) -> String {
-    let content = variable.content.first();
-    let start = content.and_then(|c| c.start.as_deref()).unwrap_or_default();
-    let unit = content.and_then(|c| c.unit.as_deref()).unwrap_or_default();
-    format!(
-        "<tr><td><code>{}</code></td><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-        escape(&variable.name),
-        escape(&rounded(start)),
-        escape(unit),
-        escape(variable.variability.as_deref().unwrap_or_default()),
-        escape(&variable.description),
-    )
-}
-
-fn escape(text: &str) -> String {
-    text.replace('&', "&amp;")
-        .replace('<', "&lt;")
-        .replace('>', "&gt;")
-        .replace('"', "&quot;")
 }
 
 #[cfg(test)]
@@ -176,7 +145,7 @@ mod tests {
             for variable in Description::parse(xml).unwrap().variables {
                 let name = &variable.name;
                 assert!(page.contains(&format!("<code>{name}</code>")), "{name}");
-                let description = escape(&variable.description);
+                let description = html! { (variable.description) }.into_string();
                 assert!(page.contains(&description), "{name}");
             }
             assert!(page.contains("<svg") && files[1].1.starts_with(b"\x89PNG"));

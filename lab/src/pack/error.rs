@@ -2,8 +2,9 @@
 
 use std::path::PathBuf;
 
-/// A failure that names the file and what to do.
+/// A failure that names the file and what to do; `build_options` are those of `cargo build --release`.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages explain the fields")]
 pub enum PackError {
     /// There is no such library.
     #[error(
@@ -11,34 +12,22 @@ pub enum PackError {
          `cargo build --release {build_options}`, or say where it is with --libraries", path.display()
     )]
     Missing {
-        /// The component.
         identifier: &'static str,
-        /// Where it was looked for.
         path: PathBuf,
-        /// Options of `cargo build --release` that build it.
         build_options: String,
     },
     /// The library exists but cannot be read.
     #[error("cannot read {}: {source}", path.display())]
-    Read {
-        /// The library.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    Read { path: PathBuf, source: std::io::Error },
     /// The library cannot run here.
     #[error(
         "{} is {found}, but this platform needs {needed}; build it here with `cargo build --release {build_options}`",
         path.display()
     )]
     Platform {
-        /// The library.
         path: PathBuf,
-        /// What its header says.
         found: String,
-        /// What would be right.
         needed: &'static str,
-        /// Options of `cargo build --release` that build it.
         build_options: String,
     },
     /// The library is one for this platform, but without FMI functions.
@@ -46,42 +35,26 @@ pub enum PackError {
         "{} has no function fmi2Instantiate, so it is no FMI 2.0 component; \
          build it with `cargo build --release {build_options}`", path.display()
     )]
-    NotAComponent {
-        /// The library.
-        path: PathBuf,
-        /// Options of `cargo build --release` that build it.
-        build_options: String,
-    },
+    NotAComponent { path: PathBuf, build_options: String },
     /// The library was built from other variables than the description has.
     #[error(
         "{} was built from other variables than {identifier} has now: build it anew with \
          `cargo build --release {build_options}`", path.display()
     )]
     Stale {
-        /// The library.
         path: PathBuf,
-        /// The component.
         identifier: &'static str,
-        /// Options of `cargo build --release` that build it.
         build_options: String,
     },
     /// A library for another platform that cannot be used.
     #[error("{} {problem}", path.display())]
-    Binary {
-        /// The library.
-        path: PathBuf,
-        /// What is wrong with it.
-        problem: String,
-    },
+    Binary { path: PathBuf, problem: String },
     /// No platform is served.
     #[error(
         "there is no library of {identifier} for any platform: give one by --binary PLATFORM=FILE, or leave out \
          --only-binaries"
     )]
-    Unserved {
-        /// The component.
-        identifier: &'static str,
-    },
+    Unserved { identifier: &'static str },
     /// The date of the files is no date.
     #[error(
         "SOURCE_DATE_EPOCH = {0:?} is refused; allowed are seconds since 1970, for instance {example}",
@@ -99,10 +72,5 @@ pub enum PackError {
     Description(fmi2_description::Error),
     /// A file could not be written.
     #[error("cannot write {}: {source}", path.display())]
-    Write {
-        /// The file or folder.
-        path: PathBuf,
-        /// What the system said.
-        source: std::io::Error,
-    },
+    Write { path: PathBuf, source: std::io::Error },
 }

@@ -82,8 +82,15 @@ enum Kind {
 /// An entry of the key beside a panel.
 pub struct KeyEntry {
     pub name: &'static str,
-    /// Colour of the swatch, letter and colour of the letter; a line without them.
-    pub swatch: Option<(RGBColor, &'static str, RGBColor)>,
+    pub mark: Mark,
+}
+
+/// What an entry explains.
+pub enum Mark {
+    /// Colour, letter, and colour of the letter.
+    Swatch(RGBColor, &'static str, RGBColor),
+    Line(RGBColor),
+    Dot,
 }
 
 impl Figure {

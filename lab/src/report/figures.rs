@@ -3,6 +3,7 @@
 pub mod approach;
 pub mod backbone;
 pub mod backbones;
+pub mod coverage;
 pub mod history;
 pub mod manifold;
 pub mod period;
@@ -25,4 +26,16 @@ fn decay_points(panel: &mut Panel, points: impl Iterator<Item = Place>, label: &
 /// The locked point.
 fn locked_point(panel: &mut Panel, place: Place) {
     panel.square(place, LOCK, "locked, measured");
+}
+
+/// Error bars of 95 %: places with the half width of the interval, upright or level.
+fn error_bars(panel: &mut Panel, bars: impl Iterator<Item = (Place, f64)>, upright: bool) {
+    let ends = |((x, y), half): (Place, f64)| {
+        if upright {
+            [(x, y - half), (x, y + half)]
+        } else {
+            [(x - half, y), (x + half, y)]
+        }
+    };
+    panel.segments(bars.map(ends).collect(), line(DECAY, 12));
 }

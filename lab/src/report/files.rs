@@ -7,11 +7,14 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::figure::FigureError;
-use super::figures::{backbone, manifold, regimes, tracked};
+use super::figures::{backbone, coverage, manifold, regimes, tracked};
 use super::theme::dark;
-use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
+use crate::calibration::Calibration;
+use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
+use crate::experiment::{Sample, table};
 use crate::files::temporary;
-use crate::map::{Cell, Map, Point};
+use crate::map::{Cell, Map};
+use crate::regime::Regime;
 
 /// Why the files of a run could not be written.
 #[derive(Debug, Error)]
@@ -51,17 +54,20 @@ pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, WriteError>
     write_files(out, &files)
 }
 
-/// Writes `map.csv`, `map.svg` and `map-dark.svg` into `out` and returns their paths, as [`write()`] does.
+/// Writes `map.csv`, `map.svg`, `map-dark.svg` and, over sigma and G, `bifurcations.csv` into `out` and returns their paths, as [`write()`] does.
 ///
 /// # Errors
 /// As [`write()`].
 pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
     let figure = regimes::svg(map)?;
-    let files = [
+    let mut files = vec![
         ("map.csv", map_csv(map)?),
         ("map-dark.svg", dark(&figure)),
         ("map.svg", figure),
     ];
+    if !map.curves.is_empty() {
+        files.push(("bifurcations.csv", bifurcations_csv(map)?));
+    }
     write_files(out, &files)
 }
 
@@ -76,6 +82,22 @@ pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBu
         ("tracked.svg", tracked::figure_with_drive(found).svg()?),
     ];
     write_files(out, &files)
+}
+
+/// Writes `interrupted.csv`: the samples of an experiment that ended early.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+    write_files(out, &[("interrupted.csv", table(samples))])
+}
+
+/// Writes `coverage.svg` into `out` and returns its path, as [`write()`] does.
+///
+/// # Errors
+/// As [`write()`].
+pub fn write_calibration(found: &Calibration, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+    write_files(out, &[("coverage.svg", coverage::figure(found).svg()?)])
 }
 
 /// Writes each file under a temporary name, and gives it its own once it is complete.
@@ -116,10 +138,11 @@ pub(super) fn decay_csv(found: &Comparison) -> Result<String, WriteError> {
     #[derive(Serialize)]
     struct Theory {
         sigma_theory: Option<f64>,
+        sigma_exact: Option<f64>,
     }
     csv(found.decay.iter().map(|one| {
-        let sigma_theory = one.sigma_theory;
-        (one.point, Theory { sigma_theory })
+        let ComparedPoint { point, sigma_theory, sigma_exact } = *one;
+        (point, Theory { sigma_theory, sigma_exact })
     }))
 }
 
@@ -150,37 +173,46 @@ pub(super) fn map_csv(map: &Map) -> Result<String, WriteError> {
         #[serde(rename = "G")]
         g: f64,
         r: f64,
-        regime: &'static str,
-        impacts_per_period: f64,
-        impacts: usize,
-        periods: u32,
-        synchrony: f64,
-        growth: Option<f64>,
+    }
+    #[derive(Serialize)]
+    struct More {
         theory_stable: bool,
+        coexisting: String,
     }
     let row = |cell: &Cell| {
-        let Cell { sigma, g, r, point, theory_stable } = *cell;
-        let Point {
-            regime,
-            impacts_per_period,
-            impacts,
-            periods,
-            synchrony,
-            growth,
-        } = point;
-        let regime = regime.name();
-        Row {
-            sigma,
-            g,
-            r,
-            regime,
-            impacts_per_period,
-            impacts,
-            periods,
-            synchrony,
-            growth,
-            theory_stable,
-        }
+        let Cell { sigma, g, r, point, theory_stable, .. } = *cell;
+        let names: Vec<&str> = cell.coexisting.iter().map(Regime::name).collect();
+        let coexisting = names.join("; ");
+        (Row { sigma, g, r }, point, More { theory_stable, coexisting })
     };
     csv(map.cells.iter().map(row))
+}
+
+/// The points of the bifurcation curves.
+pub(super) fn bifurcations_csv(map: &Map) -> Result<String, WriteError> {
+    #[derive(Serialize)]
+    struct Row {
+        curve: usize,
+        bifurcation: String,
+        sigma: f64,
+        #[serde(rename = "G")]
+        g: f64,
+        #[serde(rename = "C")]
+        c: f64,
+        #[serde(rename = "B")]
+        b: f64,
+        bounds_stability: bool,
+    }
+    let rows = map.curves.iter().enumerate().flat_map(|(n, curve)| {
+        curve.branch.points.iter().map(move |one| Row {
+            curve: n + 1,
+            bifurcation: curve.name(),
+            sigma: one.sigma,
+            g: one.g,
+            c: one.c,
+            b: one.b,
+            bounds_stability: one.bounds_stability(),
+        })
+    });
+    csv(rows)
 }

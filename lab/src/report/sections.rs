@@ -29,7 +29,7 @@ pub struct Subject {
 impl Subject {
     /// The simulated plant of the scene, with its measurement chain.
     fn rig(&self) -> Result<Box<dyn Rig>, InvalidValue> {
-        let plant = Simulated::new(self.scene.plant, self.scene.start)?;
+        let plant = Simulated::new(self.scene.plant, self.scene.start)?.with_sensors(self.scene.resonance);
         let scene = &self.scene;
         Ok(Chain::around(
             Box::new(plant),

@@ -1,13 +1,19 @@
 //! Summaries for a terminal.
 
-use super::table::{Table, number};
+use super::table::{Table, number, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
-use crate::scene::Dimensionless;
+use crate::identification::{DecayEnd, Regime};
+use crate::orbit::Orbit;
+use crate::scene::{Definition, Dimensionless};
 
 /// The numbers that a result belongs to, in one line.
 #[must_use]
 pub fn parameters(p: &Dimensionless) -> String {
-    format!("{}, G = {:.4}", rig(p), p.g)
+    let definition = match p.definition == Definition::default() {
+        true => String::new(),
+        false => format!("; resonance: {}", p.definition.name()),
+    };
+    format!("{}, G = {:.4}{definition}", rig(p), p.g)
 }
 
 fn rig(p: &Dimensionless) -> String {
@@ -22,7 +28,9 @@ pub fn identification(found: &Comparison) -> String {
     let row = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
         [name.to_string(), number(sigma), number(c), b.map_or("-".into(), number)]
     };
-    let measured = row("measured at the lock", lock.sigma, lock.c, lock.b);
+    let b = lock.b.zip(lock.u_b).map_or("-".into(), |(b, u)| with_uncertainty(b, u));
+    let [sigma, c] = [(lock.sigma, lock.u_sigma), (lock.c, lock.u_c)].map(|(value, u)| with_uncertainty(value, u));
+    let measured = ["measured at the lock".to_string(), sigma, c, b];
     let exact = found.exact.iter();
     let exact = exact.map(|one| row("exact orbit", one.sigma, one.c, Some(one.b)));
     let theory = found.theory.iter();
@@ -38,27 +46,53 @@ pub fn identification(found: &Comparison) -> String {
         ""
     };
     format!(
-        "{}, G = {:.4}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} degrees\n\n{}{note}\n{}\n{}\n",
+        "{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{}\n{}\n{}\n",
         rig(&found.parameters),
-        lock.g,
+        with_uncertainty(lock.g, lock.u_g),
         lock.periods_to_lock,
         lock.regime,
         lock.impacts(),
         lock.phase_error_deg,
+        lock.u_phase_deg,
         table.text(),
+        others(found),
         decay(found),
         agreement(found)
     )
 }
 
+/// The phase-resonant orbits at this G that the lock did not follow, where there is more than one that a loop could lock; and whether
+/// the motion has a mirror image.
+fn others(found: &Comparison) -> String {
+    let followed = |orbit: &&Orbit| found.exact.as_ref().is_some_and(|exact| exact == *orbit);
+    let other = found.orbits.iter().filter(|orbit| orbit.stable && !followed(orbit));
+    let mut text: String = other
+        .map(|orbit| {
+            format!(
+                "  (another stable orbit at this G, not followed: sigma = {:.4}, C = {:.4}, B = {:.4})\n",
+                orbit.sigma, orbit.c, orbit.b
+            )
+        })
+        .collect();
+    if found.exact.as_ref().is_some_and(|exact| !exact.stable) {
+        text += "  (the nearest exact orbit is unstable under a constant drive and frequency; the loop holds it)\n";
+    }
+    if found.lock.regime == Regime::Asymmetric {
+        text += "  (asymmetric motions come in pairs, mirror images with the same sigma and C; one of the two was followed)\n";
+    }
+    text
+}
+
 fn decay(found: &Comparison) -> String {
-    let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) else {
-        return "Free decay: no points".into();
+    let end = match found.decay_end {
+        DecayEnd::Synchrony => "where the impacts lose synchrony",
+        DecayEnd::Fold => "where the backbone folds",
+        DecayEnd::Record => "where the record ends; a larger record.decay_periods shows more",
     };
-    let end = if found.lock.impacts_per_period.is_nan() {
-        "where the backbone folds"
-    } else {
-        "where the impacts lose synchrony"
+    let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) else {
+        return format!(
+            "Free decay: no points, because it is shorter than the window of the fit; it ends {end}. A shorter record.window_periods may help"
+        );
     };
     format!(
         "Free decay: {} points from C = {:.4} down to {:.4}, {end}",
@@ -69,12 +103,15 @@ fn decay(found: &Comparison) -> String {
 }
 
 fn agreement(found: &Comparison) -> String {
-    match found.rms_sigma_error {
-        Some(rms) => format!(
-            "RMS of sigma against theory over C > {COMPARED_ABOVE}: {rms:.4} (theory is of first order in epsilon)"
-        ),
-        None => format!("No point of the decay lies above C = {COMPARED_ABOVE}"),
-    }
+    let Some(rms) = found.rms_sigma_error else {
+        return format!("No point of the decay lies above C = {COMPARED_ABOVE}");
+    };
+    let exact = found.rms_sigma_exact.zip(found.rms_steady_exact).map_or(String::new(), |(raw, steady)| {
+        format!("\nRMS of sigma against the exact backbone: {raw:.4}; corrected for the drift (sigma_steady): {steady:.4}")
+    });
+    format!(
+        "RMS of sigma against theory over C > {COMPARED_ABOVE}: {rms:.4} (theory is of first order in epsilon){exact}"
+    )
 }
 
 /// The points of a tracked backbone, and what they cost.
@@ -86,12 +123,19 @@ pub fn tracked(found: &TrackedComparison) -> String {
             None => point.regime.to_string(),
         };
         let settled = if point.settled { "" } else { "; not settled" };
-        let mut cells = [point.c, point.sigma, point.g].map(number).to_vec();
+        let reached = if point.reached {
+            String::new()
+        } else {
+            format!("; level {:.3} not reached", point.level)
+        };
+        let pairs = [(point.c, point.u_c), (point.sigma, point.u_sigma), (point.g, point.u_g)];
+        let mut cells = pairs.map(|(value, u)| with_uncertainty(value, u)).to_vec();
+        let equal = exact.and_then(|exact| Some(exact.sigma?.abs().max(exact.g?.abs())));
         cells.extend([
             format!("{:.1}", point.periods),
             point.averaged.to_string(),
-            exact.map_or("-".into(), |exact| format!("{:.1e}", exact.nearest)),
-            regime + settled,
+            equal.map_or("-".into(), |error| format!("{error:.1e}")),
+            regime + settled + &reached,
         ]);
         cells
     });
@@ -101,13 +145,15 @@ pub fn tracked(found: &TrackedComparison) -> String {
         "G",
         "periods",
         "averaged",
-        "distance",
+        "error",
         "regime by response / by impacts",
     ])
     .rows(rows);
     let worst = found.worst().map_or(String::new(), |worst| {
         format!(
-            "Largest distance from the exact backbone (largest of the differences in C, sigma and G): {worst:.1e}\n"
+            "Largest error of a settled point, in sigma or G against the exact backbone at the same C: {:.1e} (distance from the nearest \
+             place of the curve: {:.1e})\n",
+            worst.at_equal_c, worst.nearest
         )
     });
     format!(

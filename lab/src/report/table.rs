@@ -101,6 +101,12 @@ pub fn number(value: f64) -> String {
     format!("{value:.6}")
 }
 
+/// A number of a table with its standard uncertainty.
+#[must_use]
+pub fn with_uncertainty(value: f64, uncertainty: f64) -> String {
+    format!("{value:.6} ± {uncertainty:.1e}")
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -4,6 +4,7 @@
 
 use plotters::style::RGBColor;
 
+use crate::orbit::Bifurcation;
 use crate::regime::Regime;
 
 pub const THEORY: RGBColor = RGBColor(40, 40, 40);
@@ -21,11 +22,22 @@ pub fn regime(regime: Regime) -> RGBColor {
         Regime::Symmetric => RGBColor(178, 217, 241),
         Regime::Asymmetric => RGBColor(240, 180, 70),
         Regime::Several => RGBColor(90, 174, 110),
-        Regime::Modulated => RGBColor(190, 88, 60),
+        Regime::QuasiPeriodic => RGBColor(60, 130, 160),
+        Regime::Modulated => RGBColor(190, 70, 45),
         Regime::Chaotic => RGBColor(106, 52, 128),
-        Regime::Sticking => RGBColor(30, 32, 40),
+        Regime::Undecided => RGBColor(30, 32, 40),
         // The map shows none of these.
         Regime::Other | Regime::Unresolved | Regime::Unknown => UNSTABLE,
+    }
+}
+
+/// The colour of a bifurcation curve on the map.
+pub fn bifurcation(kind: Bifurcation) -> RGBColor {
+    match kind {
+        Bifurcation::Fold => RGBColor(20, 60, 160),
+        Bifurcation::SymmetryBreaking => RGBColor(170, 90, 0),
+        Bifurcation::PeriodDoubling => RGBColor(0, 95, 50),
+        Bifurcation::Torus => RGBColor(200, 0, 60),
     }
 }
 
@@ -33,8 +45,8 @@ pub fn regime(regime: Regime) -> RGBColor {
 pub fn on_regime(regime: Regime) -> RGBColor {
     match regime {
         Regime::NoImpacts => RGBColor(0, 0, 0),
-        Regime::Sticking => RGBColor(255, 255, 255),
-        Regime::Modulated | Regime::Chaotic => RGBColor(254, 254, 254),
+        Regime::Undecided => RGBColor(255, 255, 255),
+        Regime::QuasiPeriodic | Regime::Modulated | Regime::Chaotic => RGBColor(254, 254, 254),
         _ => RGBColor(10, 10, 10),
     }
 }
@@ -48,7 +60,7 @@ const DARK: [(&str, &str); 9] = [
     ("#0072B2", "#56B4E9"),
     ("#78AAD2", "#3F7099"),
     ("#D55E00", "#F28C40"),
-    // No impacts is like the paper in both, sticking like the ink.
+    // No impacts is like the paper in both, undecided like the ink.
     ("#F6F6F4", "#23272B"),
     ("#1E2028", "#F2F2EE"),
 ];

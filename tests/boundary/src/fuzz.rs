@@ -1,7 +1,7 @@
 //! Random sequences of calls, with valid and invalid arguments: no crash, no hang, and a reason for every error.
 
 mod calls;
-mod dice;
+mod random;
 
 use std::time::{Duration, Instant};
 
@@ -10,7 +10,7 @@ use fmi2_component::Status;
 use crate::library::Fmu;
 use crate::master::{Interface, Master};
 use calls::Caller;
-pub use dice::Dice;
+pub use random::RandomSource;
 
 /// What became of the calls of some sequences.
 #[derive(Clone, Debug, Default)]
@@ -56,8 +56,8 @@ const CALLS: usize = 80;
 /// If a call is fatal, or an error without a reason, or an illegal call has changed something.
 #[must_use]
 pub fn sequence(fmu: &Fmu, seed: u64) -> Tally {
-    let mut dice = Dice::new(seed);
-    let interface = if fmu.description.contains("<ModelExchange") && dice.one_in(2) {
+    let mut random = RandomSource::new(seed);
+    let interface = if fmu.description.contains("<ModelExchange") && random.one_in(2) {
         Interface::ModelExchange
     } else {
         Interface::CoSimulation
@@ -65,14 +65,14 @@ pub fn sequence(fmu: &Fmu, seed: u64) -> Tally {
     let master = Master::new(fmu, interface);
     let mut caller = Caller::new(&master, fmu.description, interface);
     let mut tally = Tally { sequences: 1, ..Tally::default() };
-    if dice.one_in(2) {
+    if random.one_in(2) {
         master.start();
     }
     for n in 0..CALLS {
-        let before = dice.one_in(8).then(|| snapshot(&master)).flatten();
+        let before = random.one_in(8).then(|| snapshot(&master)).flatten();
         let _ = master.heard();
         let began = Instant::now();
-        let (name, status) = caller.call(&mut dice);
+        let (name, status) = caller.call(&mut random);
         tally.longest = tally.longest.max(began.elapsed());
         if began.elapsed() > SLOW {
             eprintln!(

@@ -3,7 +3,7 @@
 use fmi2_component::Status;
 use sha2::{Digest, Sha256};
 
-use crate::fuzz::Dice;
+use crate::fuzz::RandomSource;
 use crate::library::Fmu;
 use crate::master::{Interface, Master};
 
@@ -139,8 +139,8 @@ pub fn lock(pair: &mut Pair, periods: f64, mut next: impl FnMut() -> f64) -> Loc
 
 /// Steps between two multiples of the sample time, at random.
 pub fn irregular(from: f64, to: f64, seed: u64) -> impl FnMut() -> f64 {
-    let mut dice = Dice::new(seed);
-    move || dice.between(from, to) * SAMPLE_TIME
+    let mut random = RandomSource::new(seed);
+    move || random.between(from, to) * SAMPLE_TIME
 }
 
 fn reals<const N: usize>(m: &Master, references: [u32; N]) -> [f64; N] {

@@ -3,13 +3,13 @@
 use serde::Serialize;
 use thiserror::Error;
 
-use super::cycle::Cycle;
 use super::predictor::{self, Known};
-use super::settle::{Criterion, Estimate};
+use super::settle::{Criterion, Found};
 use crate::experiment::Sample;
-use crate::identification::{Regime, classify, regime_by_response};
-use crate::rig::{Command, Controller, ControllerError, Drive, Move, Rig, RigError};
+use crate::identification::{Cycle, Regime, Slopes, classify, regime_by_response};
+use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError};
 use crate::scene::Scene;
+use vines_model::numerics::Estimate;
 use vines_model::theory::SlowFlow;
 
 /// One point of the backbone; dimensionless.
@@ -27,12 +27,24 @@ pub struct Point {
     pub g: f64,
     /// Mean phase error, degrees.
     pub phase_error_deg: f64,
+    /// Standard uncertainties of C, and of sigma and G at this C.
+    #[serde(rename = "u_C")]
+    pub u_c: f64,
+    /// See above.
+    pub u_sigma: f64,
+    /// See above.
+    #[serde(rename = "u_G")]
+    pub u_g: f64,
+    /// Standard uncertainty of the phase error, degrees.
+    pub u_phase_deg: f64,
     /// Periods of the move to this level and at this level.
     pub periods: f64,
     /// Periods averaged.
     pub averaged: usize,
-    /// The point had settled; otherwise it was taken at the time limit.
+    /// The motion was steady within these uncertainties; otherwise the point was taken at the time limit.
     pub settled: bool,
+    /// The response reached the level; otherwise the drive was at a limit, or the time too short.
+    pub reached: bool,
     /// The regime determined from the response alone, as on a real rig.
     pub regime: Regime,
     /// The regime determined from the impacts, if the rig is a simulation.
@@ -48,6 +60,8 @@ pub struct Tracked {
     pub periods_to_lock: f64,
     /// All periods, from the start to the last point.
     pub periods: f64,
+    /// Why tracking ended before the last level; absent if it did not.
+    pub ended: Option<String>,
 }
 
 /// Why tracking ended early.
@@ -65,6 +79,14 @@ pub enum TrackError {
         /// Time limit, periods.
         periods: f64,
     },
+    /// The controller switched the drive off.
+    #[error("the controller switched the drive off after {periods:.1} periods: {fault}")]
+    Tripped {
+        /// Time since the start, periods of the drive.
+        periods: f64,
+        /// The reason.
+        fault: Fault,
+    },
 }
 
 /// Phase error, rad, below which the control of the response begins.
@@ -79,10 +101,9 @@ struct Bench<'a, R: ?Sized, C: ?Sized> {
     sample_time: f64,
     target: f64,
     taken: usize,
-    /// Phase of the drive, turns.
-    turns: f64,
-    samples: Vec<Sample>,
+    /// Phase of the drive since the start, turns: the periods so far.
     periods: f64,
+    samples: Vec<Sample>,
 }
 
 impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
@@ -104,6 +125,13 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
         });
         self.taken += 1;
         self.rig.advance(command.drive, self.sample_time)?;
+        if command.state.is_some_and(LoopState::is_latched) {
+            self.rig.advance(Drive::default(), self.sample_time)?;
+            return Err(TrackError::Tripped {
+                periods: self.periods,
+                fault: command.fault.unwrap_or(Fault::LockLost),
+            });
+        }
         Ok(command)
     }
 
@@ -111,17 +139,12 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
     fn cycle(&mut self) -> Result<Cycle, TrackError> {
         loop {
             let begin = self.samples.len();
-            let phase = self.turns * std::f64::consts::TAU;
-            loop {
+            let first = self.periods;
+            while self.periods < first.floor() + 1.0 {
                 let command = self.sample()?;
-                let step = command.drive.omega * self.sample_time / std::f64::consts::TAU;
-                self.turns += step;
-                self.periods += step;
-                if self.turns >= 1.0 {
-                    self.turns -= 1.0;
-                    break;
-                }
+                self.periods += command.drive.omega * self.sample_time / std::f64::consts::TAU;
             }
+            let phase = first * std::f64::consts::TAU;
             if let Some(cycle) = Cycle::of(&self.samples[begin..], self.sample_time, phase, self.target) {
                 return Ok(cycle);
             }
@@ -147,31 +170,78 @@ pub fn track(
         sample_time: scene.sample_time(),
         target: scene.controller.phase_target_radians(),
         taken: 0,
-        turns: 0.0,
         samples: Vec::new(),
         periods: 0.0,
     };
-    approach(&mut bench, scene.record.lock_periods)?;
+    approach(&mut bench, scene.lock_periods())?;
     let periods_to_lock = bench.periods;
     let d = scene.dimensionless();
     let slow_flow = SlowFlow::new(d.lambda, d.r);
     let mut points: Vec<Point> = Vec::new();
+    let mut ended = None;
     for (n, &level) in levels.iter().enumerate() {
         progress(n, levels.len());
         let known: Vec<Known> = points
             .iter()
-            .map(|point| Known { c: point.level, g: point.g, sigma: point.sigma })
+            .filter(|point| point.g.is_finite() && point.sigma.is_finite())
+            .map(|point| Known { c: point.c, g: point.g, sigma: point.sigma })
             .collect();
         let (g, sigma) = predictor::change(settings.predictor, &known, level, &slow_flow);
+        let periods = move_periods(scene, known.last(), level);
         bench.controller.hold_response(Move {
             response: level * d.b,
-            duration: settings.move_periods * d.natural_period(),
+            duration: periods * d.natural_period(),
             amplitude: d.amplitude(g),
             omega: d.omega_change(sigma),
         })?;
-        points.push(hold(&mut bench, scene, level)?);
+        let wait = periods + if points.is_empty() { FIRST } else { 0.0 };
+        match hold(&mut bench, scene, level, wait, &slopes(scene, &known, level)) {
+            Ok(point) => points.push(point),
+            // What was measured is kept.
+            Err(error) if !points.is_empty() => {
+                ended = Some(error.to_string());
+                break;
+            }
+            Err(error) => return Err(error),
+        }
     }
-    Ok(Tracked { points, periods_to_lock, periods: bench.periods })
+    Ok(Tracked { points, periods_to_lock, periods: bench.periods, ended })
+}
+
+/// Largest relative difference of the response from its level that counts as reached.
+const REACHED: f64 = 0.01;
+/// Periods of the first level more than those of the move: the start of the loop disturbs the particle, too.
+const FIRST: f64 = 32.0;
+/// Share of the drive that a move may need in addition to the drive that holds the response.
+const MOVE_SHARE: f64 = 0.8;
+
+/// Periods of the move to a level: those of the scene, or as many as the drive needs to change the response that much.
+fn move_periods(scene: &Scene, from: Option<&Known>, level: f64) -> f64 {
+    let slowest = from.map_or(0.0, |from| {
+        2.0 * (level - from.c).abs() / (MOVE_SHARE * scene.dimensionless().epsilon * from.g * std::f64::consts::TAU)
+    });
+    scene.backbone.move_periods.max(slowest)
+}
+
+/// Slopes of the backbone by the last two points, or what is known without them: their order of magnitude.
+fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
+    let d = scene.dimensionless();
+    let drift = SlowFlow::new(d.lambda, d.r)
+        .drift(level)
+        .map_or([0.0; 2], |drift| [drift.g, drift.sigma]);
+    let (g, sigma) = match known {
+        [.., one, other] if one.c != other.c => {
+            let slope = |from: f64, to: f64| (to - from) / (other.c - one.c);
+            let pair = |slope: f64| [slope, 0.5 * slope.abs() + 0.5];
+            (pair(slope(one.g, other.g)), pair(slope(one.sigma, other.sigma)))
+        }
+        _ => ([1.0, 2.0], [0.0, 5.0]),
+    };
+    Slopes {
+        base: g.map(|g| d.amplitude(g) / d.b),
+        omega: sigma.map(|sigma| d.omega_change(sigma) / d.b),
+        drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
+    }
 }
 
 /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
@@ -183,7 +253,9 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(bench: &mut Bench<R, C>, mo
         }
         bench.samples.clear();
         let cycle = bench.cycle()?;
-        let driven = cycle.base.norm() > 0.0;
+        // A motion that is being captured is not to be held yet.
+        let captured = bench.samples.last().and_then(|sample| sample.command.state) != Some(LoopState::Capturing);
+        let driven = cycle.base.norm() > 0.0 && captured;
         near = if driven && cycle.phase_error.abs() < NEAR {
             near + 1
         } else {
@@ -198,42 +270,59 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     bench: &mut Bench<R, C>,
     scene: &Scene,
     level: f64,
+    move_periods: f64,
+    slopes: &Slopes,
 ) -> Result<Point, TrackError> {
     let (settings, d) = (&scene.backbone, scene.dimensionless());
     let start = bench.periods;
     bench.samples.clear();
-    while bench.periods - start < settings.move_periods {
+    while bench.periods - start < move_periods {
         bench.cycle()?;
     }
     let criterion = Criterion {
-        tolerance: settings.tolerance,
-        precision: settings.precision,
+        omega0: d.omega0,
+        precision: [d.amplitude(settings.precision), d.omega_change(settings.precision)],
+        tolerance: [d.amplitude(settings.tolerance), d.omega_change(settings.tolerance)],
         fewest: settings.dwell_min as usize,
+        slopes: *slopes,
+    };
+    let is_reached = |found: &Found| {
+        let Estimate { value, uncertainty } = found.response.scaled(1.0 / d.b);
+        (value - level).abs() <= (REACHED * level).max(4.0 * uncertainty)
     };
     let mut cycles: Vec<Cycle> = Vec::new();
     let most = settings.dwell_max as usize;
     let found = loop {
         cycles.push(bench.cycle()?);
-        let found = criterion.judge(&cycles);
-        if found.is_some() || cycles.len() >= most {
+        let found = criterion.best(&cycles);
+        if cycles.len() >= most || found.is_some_and(|found| criterion.is_met(&found) && is_reached(&found)) {
             break found;
         }
     };
-    let said = found.unwrap_or_else(|| Estimate::of(&cycles[cycles.len() / 2..]));
-    let samples = said.periods as f64 * std::f64::consts::TAU / (said.omega * bench.sample_time);
-    let averaged = &bench.samples[bench.samples.len().saturating_sub(samples as usize)..];
+    let said = found.unwrap_or_else(|| Found::unsettled(&cycles[cycles.len() / 2..]));
+    let samples: usize = cycles[cycles.len() - said.periods..]
+        .iter()
+        .map(|cycle| cycle.samples)
+        .sum();
+    let averaged = &bench.samples[bench.samples.len() - samples..];
+    let [base, omega] = said.at;
     Ok(Point {
         level,
-        c: said.response / d.b,
-        sigma: d.sigma(said.omega),
-        g: d.excitation(said.base),
-        phase_error_deg: said.phase_error.to_degrees(),
+        c: said.response.value / d.b,
+        sigma: d.sigma(omega.value),
+        g: d.excitation(base.value),
+        phase_error_deg: said.phase_error.value.to_degrees(),
+        u_c: said.response.uncertainty / d.b,
+        u_sigma: omega.uncertainty / d.omega_change(1.0),
+        u_g: d.excitation(base.uncertainty),
+        u_phase_deg: said.phase_error.uncertainty.to_degrees(),
         periods: bench.periods - start,
-        regime: regime_by_response(averaged, scene),
+        regime: regime_by_response(averaged, scene, base.value, omega.value),
         regime_by_impacts: bench.samples[0]
             .ground_truth
-            .map(|_| classify(averaged, bench.sample_time, said.omega).1),
+            .map(|_| classify(averaged, bench.sample_time, omega.value).1),
         averaged: said.periods,
-        settled: found.is_some(),
+        settled: said.steady || criterion.is_met(&said),
+        reached: is_reached(&said),
     })
 }

@@ -11,6 +11,8 @@ use vines_model::theory::SlowFlow;
 const FREQUENCIES: usize = 3000;
 /// ... and about its lowest frequency, where it turns back: number of frequencies, and range of the detuning.
 const TURN: (usize, f64) = (1200, 0.02);
+/// Largest difference in C between neighbours.
+const JUMP: f64 = 0.03;
 /// Largest particle speed of the curve: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
@@ -51,6 +53,18 @@ impl ExactCurve {
         let (steps, width) = TURN;
         orbits.extend(between(lowest - 0.1 * width, lowest + width, steps));
         orbits.sort_by(|a, b| a.b.total_cmp(&b.b));
+        // Another family of orbits can have the same particle speeds: the curve is followed from its largest speed.
+        let mut last = orbits.last().map_or(0.0, |orbit| orbit.c);
+        let mut orbits: Vec<Orbit> = orbits
+            .into_iter()
+            .rev()
+            .filter(|orbit| {
+                let next = (orbit.c - last).abs() < JUMP;
+                last = if next { orbit.c } else { last };
+                next
+            })
+            .collect();
+        orbits.reverse();
         // From the fold on: C rises with B there.
         let fold = (0..orbits.len())
             .min_by(|&a, &b| orbits[a].c.total_cmp(&orbits[b].c))
@@ -65,26 +79,32 @@ impl ExactCurve {
         &self.orbits
     }
 
+    /// `[sigma, G]` at the amplitude `c`; `None` outside the curve.
+    #[must_use]
+    pub fn at(&self, c: f64) -> Option<[f64; 2]> {
+        let pair = self
+            .orbits
+            .windows(2)
+            .rfind(|pair| (pair[0].c - c) * (pair[1].c - c) <= 0.0 && pair[0].c != pair[1].c)?;
+        let x = (c - pair[0].c) / (pair[1].c - pair[0].c);
+        let between = |from: f64, to: f64| from + x * (to - from);
+        Some([between(pair[0].sigma, pair[1].sigma), between(pair[0].g, pair[1].g)])
+    }
+
     /// How far `(C, sigma, G)` lies from the curve; `None` where there is no curve.
     #[must_use]
     pub fn distance(&self, c: f64, sigma: f64, g: f64) -> Option<Distance> {
         let at = |orbit: &Orbit| [orbit.c, orbit.sigma, orbit.g];
-        let point = [c, sigma, g];
-        let mut nearest = f64::INFINITY;
-        let mut same = None;
-        for pair in self.orbits.windows(2) {
-            let (from, to) = (at(&pair[0]), at(&pair[1]));
-            nearest = nearest.min(to_segment(point, from, to));
-            if (from[0] - c) * (to[0] - c) <= 0.0 && from[0] != to[0] {
-                let x = (c - from[0]) / (to[0] - from[0]);
-                let difference = |i: usize| point[i] - from[i] - x * (to[i] - from[i]);
-                same = Some((difference(1), difference(2)));
-            }
-        }
-        nearest.is_finite().then_some(Distance {
+        let segments = self
+            .orbits
+            .windows(2)
+            .map(|pair| to_segment([c, sigma, g], at(&pair[0]), at(&pair[1])));
+        let nearest = segments.reduce(f64::min)?;
+        let same = self.at(c);
+        Some(Distance {
             nearest,
-            sigma: same.map(|(sigma, _)| sigma),
-            g: same.map(|(_, g)| g),
+            sigma: same.map(|[exact, _]| sigma - exact),
+            g: same.map(|[_, exact]| g - exact),
         })
     }
 }

@@ -64,10 +64,26 @@ impl TrackedComparison {
         self.periods / self.points.len() as f64
     }
 
-    /// Largest distance of a point from the exact backbone.
+    /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.
     #[must_use]
-    pub fn worst(&self) -> Option<f64> {
-        let distances = self.points.iter().filter_map(|one| one.exact);
-        distances.map(|exact| exact.nearest).reduce(f64::max)
+    pub fn worst(&self) -> Option<Worst> {
+        let errors = self.points.iter().filter(|one| one.point.settled).filter_map(|one| {
+            let Distance { nearest, sigma, g } = one.exact?;
+            let at_equal_c = sigma?.abs().max(g?.abs());
+            Some(Worst { at_equal_c, nearest })
+        });
+        errors.reduce(|one, other| Worst {
+            at_equal_c: one.at_equal_c.max(other.at_equal_c),
+            nearest: one.nearest.max(other.nearest),
+        })
     }
+}
+
+/// Largest errors of the points of a tracked backbone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Worst {
+    /// Largest difference in sigma or G from the exact backbone at the same C.
+    pub at_equal_c: f64,
+    /// Largest distance from the nearest place of the exact backbone: the largest of the differences in C, sigma and G there.
+    pub nearest: f64,
 }

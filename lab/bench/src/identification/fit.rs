@@ -12,6 +12,10 @@ pub struct Harmonic {
     pub phase: f64,
     /// Angular frequency, rad/s.
     pub omega: f64,
+    /// Rate of change of the amplitude, 1/s times its unit.
+    pub rate: f64,
+    /// Standard uncertainties of amplitude and frequency by the noise of the samples.
+    pub uncertainties: [f64; 2],
 }
 
 /// Rounds of refitting about the frequency found; each reduces the error by orders of magnitude.
@@ -36,17 +40,39 @@ pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic
         let phases: Vec<f64> = (0..values.len())
             .map(|n| (n as f64 - middle) * sample_time * omega)
             .collect();
-        let fit = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(1)]).fit(&right)?;
+        let basis = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(1)]);
+        let fit = basis.fit(&right)?;
         let (a, drift) = (fit.harmonic(1), fit.drift(1));
         let square = a.norm_sqr();
         if square == 0.0 || !square.is_finite() {
             return None;
         }
         // The phase of a turns by Im(drift/a) per half window.
-        omega += (drift * a.conj()).im / square / (middle * sample_time);
-        fitted = Some(Harmonic { amplitude: a.norm(), phase: a.arg(), omega });
+        let half = middle * sample_time;
+        let change = drift * a.conj() / half;
+        omega += change.im / square;
+        let amplitude = square.sqrt();
+        fitted = Some((
+            basis,
+            fit,
+            Harmonic {
+                amplitude,
+                phase: a.arg(),
+                omega,
+                rate: change.re / amplitude,
+                uncertainties: [0.0; 2],
+            },
+        ));
     }
-    fitted
+    let (basis, fit, found) = fitted?;
+    let degrees = (values.len() - basis.terms()) as f64;
+    let noise = (basis.residual(&right, &fit).norm_squared() / degrees).sqrt();
+    let largest = |degree: usize| basis.variances(1, degree).into_iter().fold(0.0, f64::max).sqrt();
+    let uncertainties = [
+        noise * largest(0),
+        noise * largest(1) / (found.amplitude * middle * sample_time),
+    ];
+    Some(Harmonic { uncertainties, ..found })
 }
 
 #[cfg(test)]

@@ -2,12 +2,13 @@
 
 use serde::Serialize;
 
-use vines_model::numerics::mean;
+use vines_model::numerics::{Estimate, mean};
 use vines_model::regime::Regime;
+use vines_model::theory::{BranchSide, Manifold, SlowFlow};
 
-use super::fit::harmonic;
 use super::regime::classify;
 use super::response::regime_by_response;
+use super::{Balance, Cycle, Slopes};
 use crate::experiment::Record;
 use crate::scene::Scene;
 
@@ -27,6 +28,21 @@ pub struct Lock {
     pub b: Option<f64>,
     /// Phase of v relative to the base, minus the target, degrees.
     pub phase_error_deg: f64,
+    /// Standard uncertainty of G.
+    #[serde(rename = "u_G")]
+    pub u_g: f64,
+    /// Standard uncertainty of sigma.
+    pub u_sigma: f64,
+    /// Standard uncertainty of C.
+    #[serde(rename = "u_C")]
+    pub u_c: f64,
+    /// Standard uncertainty of B; absent as above.
+    #[serde(rename = "u_B")]
+    pub u_b: Option<f64>,
+    /// Standard uncertainty of the phase error, degrees.
+    pub u_phase_deg: f64,
+    /// Periods that sigma and C are estimated from: those of the hold, and those before it in which the motion was as near.
+    pub averaged: usize,
     /// From the start to the settled lock, in periods of the locked motion.
     pub periods_to_lock: f64,
     /// Impacts per period; NaN if the rig does not report them.
@@ -47,42 +63,154 @@ impl Lock {
     }
 }
 
-pub(super) fn measure(record: &Record, scene: &Scene) -> Lock {
+/// Most periods before the release that are evaluated.
+const MOST: f64 = 240.0;
+/// Largest relative deviation of the amplitude from that of the hold, unless it is noise.
+const SPREAD: f64 = 0.03;
+/// Largest phase error of a period, rad, for the same.
+const PHASE_RANGE: f64 = 0.3;
+/// Fewest periods of an estimate.
+const FEWEST: usize = 8;
+/// Difference, in standard uncertainties, that still counts as noise.
+const RANDOM: f64 = 2.0;
+/// Relative standard uncertainty of the slopes by first-order theory.
+const SLOPE: f64 = 0.3;
+
+pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let d = scene.dimensionless();
-    let hold = record.hold();
-    let dt = record.sample_time;
-    let commanded = mean(hold.iter().map(|s| s.command.drive.omega));
-    let response: Vec<f64> = hold.iter().map(|s| s.sensors.response).collect();
-    let v = harmonic(&response, dt, commanded);
-    let omega = v.map_or(commanded, |v| v.omega);
-    let reference: Option<Vec<f64>> = hold.iter().map(|s| s.sensors.reference).collect();
-    let base = reference.and_then(|reference| harmonic(&reference, dt, commanded));
-    let command = hold[hold.len() / 2].command;
-    let phase_error = match (v, base) {
-        (Some(v), Some(base)) => {
-            let turn = std::f64::consts::TAU;
-            let error = v.phase - base.phase - scene.controller.phase_target_radians();
-            error - turn * (error / turn).round()
-        }
-        _ => command.phase_error,
-    };
+    let (dt, hold) = (record.sample_time, record.hold());
+    let target = scene.controller.phase_target_radians();
+    let held = Cycle::all(hold, dt, target);
+    let approach = approached(record, scene, &held);
+    let slopes = slopes(scene, mean(held.iter().map(Cycle::amplitude)) / d.b);
+    // The drive of the hold decides where the approach ends.
+    let [base, phase_error, response] = means(&held);
+    let [omega, limit] = limits(&approach, d.omega0, base, &slopes)?;
     let speeds: Option<Vec<f64>> = hold
         .iter()
-        .map(|s| s.ground_truth.map(|w| w.particle_velocity.abs()))
+        .map(|s| s.ground_truth.map(|w| d.speed(w.particle_velocity.abs())))
         .collect();
-    let (impacts_per_period, regime) = match classify(hold, dt, omega) {
-        (count, Regime::Unknown) => (count, regime_by_response(hold, scene)),
+    let b_slope = b_slope(scene, limit.value / d.b);
+    let remaining = (limit.value - response.value) / d.b;
+    let b = speeds.map(|speeds| {
+        let per_period: Vec<f64> = speeds
+            .chunks(hold.len().div_ceil(held.len()))
+            .map(|c| mean(c.iter().copied()))
+            .collect();
+        let value = Estimate::mean(&per_period);
+        Estimate::new(
+            value.value + b_slope * remaining,
+            &[value.uncertainty, b_slope * limit.uncertainty / d.b],
+        )
+    });
+    let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
+        (count, Regime::Unknown) => (count, regime_by_response(hold, scene, base.value, omega.value)),
         told => told,
     };
-    let amplitude = base.map_or(command.drive.amplitude, |base| base.amplitude);
-    Lock {
-        g: d.excitation(amplitude),
-        sigma: d.sigma(omega),
-        c: v.map_or(0.0, |v| v.amplitude) / d.b,
-        b: speeds.map(|speeds| d.speed(mean(speeds))),
-        phase_error_deg: phase_error.to_degrees(),
-        periods_to_lock: record.settled as f64 * dt * omega / std::f64::consts::TAU,
+    Some(Lock {
+        g: d.excitation(base.value),
+        sigma: d.sigma(omega.value),
+        c: limit.value / d.b,
+        b: b.map(|b| b.value),
+        phase_error_deg: phase_error.value.to_degrees(),
+        u_g: d.excitation(base.uncertainty),
+        u_sigma: omega.uncertainty / d.omega_change(1.0),
+        u_c: limit.uncertainty / d.b,
+        u_b: b.map(|b| b.uncertainty),
+        u_phase_deg: phase_error.uncertainty.to_degrees(),
+        averaged: approach.len(),
+        periods_to_lock: record.settled as f64 * dt * omega.value / std::f64::consts::TAU,
         impacts_per_period,
         regime,
+    })
+}
+
+/// Frequency, rad/s, and amplitude, m, at the end of the approach.
+///
+/// The later periods are nearer to it, the longer record has less noise. Where the second half of the periods disagrees with all
+/// of them beyond the noise, the difference is a part of the uncertainty; the periods with the smallest uncertainty count.
+fn limits(approach: &[Cycle], omega0: f64, base: Estimate, slopes: &Slopes) -> Option<[Estimate; 2]> {
+    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, omega0, slopes)?.limit(base));
+    let mut best = limit(approach)?;
+    let mut cycles = approach;
+    let mut first = true;
+    while cycles.len() >= 2 * FEWEST {
+        let half = &cycles[cycles.len() / 2..];
+        let (whole, late) = (limit(cycles)?, limit(half)?);
+        for i in 0..2 {
+            let difference = (whole[i].value - late[i].value).abs() - RANDOM * late[i].uncertainty;
+            let one = Estimate::new(whole[i].value, &[whole[i].uncertainty, difference.max(0.0)]);
+            if first || one.uncertainty < best[i].uncertainty {
+                best[i] = one;
+            }
+        }
+        (cycles, first) = (half, false);
     }
+    Some(best)
+}
+
+/// The periods before the release in which the motion was as near as in the hold.
+fn approached(record: &Record, scene: &Scene, held: &[Cycle]) -> Vec<Cycle> {
+    let most = (MOST * scene.controller.samples_per_period) as usize;
+    let samples = &record.samples[record.released.saturating_sub(most.max(record.hold().len()))..record.released];
+    let mut cycles = Cycle::all(samples, record.sample_time, scene.controller.phase_target_radians());
+    let level = mean(held.iter().map(Cycle::amplitude));
+    let noise = 4.0 * mean(held.iter().map(|cycle| cycle.noise[0])).sqrt();
+    let is_near = |cycle: &&Cycle| {
+        let deviation = (cycle.amplitude() - level).abs();
+        deviation <= (SPREAD * level).max(noise) && cycle.phase_error.abs() <= PHASE_RANGE
+    };
+    let near = cycles.iter().rev().take_while(is_near).count();
+    cycles.drain(..cycles.len() - near.max(held.len()).min(cycles.len()));
+    cycles
+}
+
+/// Means over the hold: base amplitude, m, phase error, rad, and response amplitude, m.
+fn means(held: &[Cycle]) -> [Estimate; 3] {
+    let values = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&held.iter().map(value).collect::<Vec<f64>>()).value;
+    let [response, base] = [values(&Cycle::amplitude), values(&|cycle| cycle.base.norm())];
+    let [noise, base_noise] =
+        [0, 1].map(|i| mean(held.iter().map(|cycle| cycle.noise[i])).sqrt() / (held.len() as f64).sqrt());
+    let phase_noise = (noise / response).hypot(base_noise / base);
+    [
+        // Rounding and the steps of the command.
+        Estimate { value: base, uncertainty: base_noise.max(1e-8 * base) },
+        Estimate {
+            value: values(&|cycle| cycle.phase_error),
+            uncertainty: phase_noise,
+        },
+        Estimate { value: response, uncertainty: noise },
+    ]
+}
+
+/// Slopes of the backbone at the amplitude `c` by first-order theory, with a generous uncertainty.
+fn slopes(scene: &Scene, c: f64) -> Slopes {
+    let d = scene.dimensionless();
+    let flow = SlowFlow::new(d.lambda, d.r);
+    let at = |c: f64| flow.manifold.b(c, BranchSide::Right).map(|b| flow.backbone_at(b));
+    let step = 1e-3 * c;
+    let ([g, sigma], drift) = match (at(c - step), at(c + step), flow.drift(c)) {
+        (Some(low), Some(high), Some(drift)) => {
+            let slope = |low: f64, high: f64| (high - low) / (2.0 * step);
+            (
+                [slope(low.g, high.g), slope(low.sigma, high.sigma)],
+                [drift.g, drift.sigma],
+            )
+        }
+        _ => ([d.lambda, 0.0], [0.0; 2]),
+    };
+    let pair = |slope: f64| [slope, SLOPE * slope.abs() + 0.1];
+    Slopes {
+        base: pair(g).map(|g| d.amplitude(g) / d.b),
+        omega: pair(sigma).map(|sigma| d.omega_change(sigma) / d.b),
+        drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
+    }
+}
+
+/// Slope of the particle speed over the amplitude `c` by first-order theory.
+fn b_slope(scene: &Scene, c: f64) -> f64 {
+    let manifold = Manifold::new(scene.plant.restitution);
+    manifold
+        .b(c, BranchSide::Right)
+        .map_or(0.0, |b| 2.0 * c * manifold.slope(b))
 }

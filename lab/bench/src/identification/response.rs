@@ -6,10 +6,10 @@
 //! the linear mode: it needs the frequency `omega0` and the drive `c omega A/k`.
 
 use nalgebra::DVector;
-use vines_model::numerics::{HarmonicBasis, mean, noise};
+use vines_model::numerics::{HarmonicBasis, noise};
 use vines_model::regime::Regime;
 
-use crate::experiment::{Sample, drive_phases};
+use crate::experiment::Sample;
 use crate::scene::Scene;
 
 /// Largest residual of a steady motion, relative to the amplitude, unless it is noise.
@@ -42,9 +42,10 @@ struct Content {
 
 impl Content {
     /// Fits the samples; `None` for too few samples or no motion.
-    fn of(samples: &[Sample], sample_time: f64) -> Option<Self> {
+    fn of(samples: &[Sample], sample_time: f64, omega: f64) -> Option<Self> {
         let n = samples.len();
-        let phases = drive_phases(samples, sample_time, 0.0);
+        // The phase of the response is more uniform than that of a drive that a loop still corrects.
+        let phases: Vec<f64> = (0..n).map(|n| n as f64 * sample_time * omega).collect();
         let basis = HarmonicBasis::new(&phases, 1, &HARMONICS);
         if n < 2 * basis.terms() {
             return None;
@@ -69,16 +70,17 @@ impl Content {
 }
 
 /// The regime determined from the response of these samples. Of the rig, this uses only the results of a linear test at small
-/// amplitude (`omega0`, `c`, `k`) and the mass ratio, from which the expected third harmonic follows.
+/// amplitude (`omega0`, `c`, `k`) and the mass ratio, from which the expected third harmonic follows. `base` (m) is the base
+/// amplitude that holds the motion at phase resonance, and `omega` (rad/s) its frequency.
 #[must_use]
-pub fn regime_by_response(samples: &[Sample], scene: &Scene) -> Regime {
-    let Some(content) = Content::of(samples, scene.sample_time()) else {
+pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, omega: f64) -> Regime {
+    let Some(content) = Content::of(samples, scene.sample_time(), omega) else {
         return Regime::Unknown;
     };
     if content.rest > STEADY && content.noise < NOISE_SHARE * content.rest {
         return Regime::Other;
     }
-    if is_linear(samples, content.amplitude, scene) {
+    if is_linear(content.amplitude, scene, base, omega) {
         return Regime::NoImpacts;
     }
     // The particle's speed is about b omega; the order of magnitude is sufficient.
@@ -94,10 +96,8 @@ pub fn regime_by_response(samples: &[Sample], scene: &Scene) -> Regime {
 }
 
 /// Whether frequency and drive are those of the linear mode at this amplitude.
-fn is_linear(samples: &[Sample], amplitude: f64, scene: &Scene) -> bool {
+fn is_linear(amplitude: f64, scene: &Scene, drive: f64, omega: f64) -> bool {
     let (plant, omega0) = (&scene.plant, scene.dimensionless().omega0);
-    let omega = mean(samples.iter().map(|s| s.command.drive.omega));
-    let drive = mean(samples.iter().map(|s| s.command.drive.amplitude));
     let needed = plant.damping * omega0 / plant.stiffness * amplitude;
     let damping_rate = 0.5 * omega * drive / amplitude;
     (omega - omega0).abs() <= LINEAR[0] * damping_rate && (drive - needed).abs() <= LINEAR[1] * drive

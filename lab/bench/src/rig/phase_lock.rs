@@ -40,6 +40,8 @@ impl Controller for BuiltIn {
             },
             phase_error: output.phase_error,
             settled: output.settled,
+            state: Some(output.state),
+            fault: output.fault,
         })
     }
 

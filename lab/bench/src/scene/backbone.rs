@@ -39,10 +39,9 @@ pub struct Backbone {
     pub dwell_min: u32,
     /// Periods after which a point is taken, settled or not.
     pub dwell_max: u32,
-    /// Largest difference between the two halves of the averaged periods where noise is negligible: of the drive, relative, and of
-    /// the frequency, relative to the damping rate.
+    /// Largest part of the uncertainties of sigma and G that is not noise: remaining transients.
     pub tolerance: f64,
-    /// Largest standard error of the same quantities where noise dominates.
+    /// Largest standard uncertainties of sigma and G; noise lengthens the dwell until they are reached.
     pub precision: f64,
     /// What predicts the next point's frequency and drive.
     #[serde(alias = "feed")]
@@ -95,8 +94,8 @@ impl Backbone {
         )?;
         let (least, most) = (self.dwell_min, self.dwell_max);
         Quantity::new("backbone.dwell_min", least.into(), "(periods)").check(
-            (6..=1000).contains(&least),
-            "must be from 6 (to judge both halves) to 1000",
+            (8..=1000).contains(&least),
+            "must be from 8 (two halves of four periods) to 1000",
         )?;
         Quantity::new("backbone.dwell_max", most.into(), "(periods)").check(
             (least..=10_000).contains(&most),

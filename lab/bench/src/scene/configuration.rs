@@ -1,5 +1,7 @@
 //! A scene's settings in SI units, in the form that plant and controller use.
 
+use std::f64::consts::PI;
+
 use lovines::State;
 use phase_lock::{Config, LockCriterion};
 
@@ -21,45 +23,105 @@ impl Scene {
         let d = self.dimensionless();
         let omega0 = d.omega0;
         let c = &self.controller;
-        let amplitude = self.amplitude;
         let period = d.natural_period();
-        let defaults = Config::for_resonance(omega0, amplitude);
+        let damping = 0.5 * d.epsilon * d.lambda;
+        let approach_gain = c.approach_gain.unwrap_or_else(|| approach_gain(damping));
+        // Without periods or without a drive, steps.
+        let rate =
+            |periods: f64| Some(self.amplitude / (periods * period)).filter(|rate| *rate > 0.0 && rate.is_finite());
+        let defaults = Config::for_resonance(omega0, self.amplitude);
         Config {
             sample_time: self.sample_time(),
             omega_start: c.omega_start * omega0,
             omega_min: c.omega_min * omega0,
             omega_max: c.omega_max * omega0,
             bandwidth: c.bandwidth * omega0,
-            damping_rate: 0.5 * self.plant.damping / self.plant.primary_mass,
+            damping_rate: damping * omega0,
             phase_target: c.phase_target_radians(),
             delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0 + c.delay * self.sample_time(),
-            amplitude_max: d.amplitude(c.g_max),
-            response_max: c.c_max * self.plant.half_width,
-            ramp_time: c.ramp_periods * period,
-            release_time: c.release_periods * period,
-            omega_rate: c.omega_rate * omega0 / period,
-            acquire_timeout: c.acquire_periods * period,
-            lock: LockCriterion {
-                phase_tolerance: c.phase_tolerance.to_radians(),
-                frequency_drift: c.frequency_drift,
-                amplitude_drift: c.amplitude_drift,
-                dwell: c.dwell_periods,
-                ..defaults.lock
-            },
+            amplitude_max: Some(d.amplitude(self.g_max())),
+            response_max: Some(c.c_max * d.b),
+            ramp_rate: rate(c.ramp_periods),
+            release_rate: rate(c.release_periods),
+            omega_rate: c.omega_rate.map(|rate| rate * omega0 / period),
+            acquire_timeout: Some(self.lock_periods() * period),
+            signal_timeout: Some(c.silence_periods * period),
+            reference_connected: self.chain.reference,
+            approach_gain,
+            capture_response: self.captures().then_some(CAPTURE * d.b),
+            lock: self.lock_criterion(approach_gain),
             ..defaults
         }
+    }
+
+    /// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.
+    fn lock_criterion(&self, approach_gain: f64) -> LockCriterion {
+        let d = self.dimensionless();
+        let c = &self.controller;
+        let approached = PI * d.epsilon * d.lambda * (1.0 + approach_gain);
+        let defaults = LockCriterion::default();
+        LockCriterion {
+            phase_tolerance: c.phase_tolerance.to_radians(),
+            frequency_drift: c.frequency_tolerance * d.epsilon * approached,
+            amplitude_drift: c.amplitude_tolerance * approached,
+            dwell: c.dwell_periods,
+            ..defaults
+        }
+    }
+
+    /// Largest drive, base amplitude over `b epsilon`: as set, or four times the larger of the requested drive and that at which
+    /// impacts begin.
+    #[must_use]
+    pub fn g_max(&self) -> f64 {
+        let d = self.dimensionless();
+        let needed = d.g.max(self.impact_drive());
+        self.controller.g_max.unwrap_or(4.0 * needed)
+    }
+
+    /// Drive, base amplitude over `b epsilon`, that holds the linear mode at the amplitude at which impacts certainly occur.
+    #[must_use]
+    pub fn impact_drive(&self) -> f64 {
+        CAPTURE * self.dimensionless().lambda
+    }
+
+    /// Whether the controller captures a motion with impacts before it goes to the requested drive: as set, or where everything
+    /// is at rest at the start.
+    #[must_use]
+    pub fn captures(&self) -> bool {
+        let State { dq1, dq2, .. } = self.start;
+        self.controller.capture.unwrap_or(dq1 == 0.0 && dq2 == 0.0)
+    }
+
+    /// Time limit for the lock, natural periods: as set, or at least 2000 and 20 times the relaxation time.
+    #[must_use]
+    pub fn lock_periods(&self) -> f64 {
+        let d = self.dimensionless();
+        let relaxation = 1.0 / (d.epsilon * d.lambda);
+        let samples_per_period = self.controller.samples_per_period;
+        self.record
+            .lock_periods
+            .unwrap_or((20.0 * relaxation).max(2000.0).min(1e7 / samples_per_period))
     }
 
     /// Configuration of the controller for tracking: with the largest drive and the bandwidth of `[backbone]`.
     #[must_use]
     pub fn backbone_config(&self) -> Config {
         let d = self.dimensionless();
-        let limits = [self.backbone.g_max, self.controller.g_max];
-        let g_max = limits.into_iter().filter(|limit| *limit > 0.0);
         Config {
-            amplitude_max: d.amplitude(g_max.fold(f64::INFINITY, f64::min)),
+            amplitude_max: Some(d.amplitude(self.backbone.g_max.min(self.controller.g_max.unwrap_or(f64::INFINITY)))),
             bandwidth: self.backbone.bandwidth * d.omega0,
+            // The amplitude loop takes over as soon as the phase is near resonance.
+            approach_gain: 0.0,
             ..self.controller_config()
         }
     }
+}
+
+/// Response amplitude over b at which impacts certainly occur: a particle at rest in the middle is hit at 1.
+const CAPTURE: f64 = 1.1;
+
+/// Gain of the approach for a structure whose damping rate is `damping`, in units of omega0. A light damping leaves more to gain,
+/// but a large gain amplifies noise: the rate of the approach is the geometric mean of the damping rate and of 0.06 omega0.
+fn approach_gain(damping: f64) -> f64 {
+    ((0.06 / damping).sqrt() - 1.0).clamp(0.0, 30.0)
 }

@@ -25,26 +25,32 @@ pub struct Controller {
     pub phase_target: f64,
     /// Largest phase error that counts as locked, degrees.
     pub phase_tolerance: f64,
-    /// Largest relative drift of the frequency per period that counts as stationary.
-    pub frequency_drift: f64,
-    /// Largest relative drift of the response amplitude per period that counts as stationary.
-    pub amplitude_drift: f64,
+    /// Distance from the steady state that counts as settled: of the detuning, and of the response amplitude, relative. Judged by the
+    /// drift and the rate at which the steady state is approached; noise widens it.
+    pub frequency_tolerance: f64,
+    /// As `frequency_tolerance`, for the amplitude.
+    pub amplitude_tolerance: f64,
     /// How long all of this must hold, periods.
     pub dwell_periods: u32,
-    /// Largest drive allowed, base amplitude over `b epsilon`; 0 for none.
+    /// Largest drive allowed, base amplitude over `b epsilon`; by default four times the larger of the requested drive and that at which
+    /// impacts begin.
     #[serde(rename = "G_max")]
-    pub g_max: f64,
-    /// Response above which the drive is shut down, over b; 0 for no limit.
+    pub g_max: Option<f64>,
+    /// Response above which the drive is shut down, over b.
     #[serde(rename = "C_max")]
     pub c_max: f64,
     /// Duration of the ramp of the drive to its amplitude, and to zero after a fault, natural periods; 0 to jump.
     pub ramp_periods: f64,
     /// Duration of the ramp of the drive to zero at the release, natural periods; 0 to switch off at once.
     pub release_periods: f64,
-    /// Largest change of the frequency in a natural period, in units of omega0; 0 for none.
-    pub omega_rate: f64,
-    /// Longest time from the end of the ramp to the lock, natural periods; 0 for no limit.
-    pub acquire_periods: f64,
+    /// Largest change of the frequency in a natural period, in units of omega0; by default unlimited.
+    pub omega_rate: Option<f64>,
+    /// Longest time without a valid measurement, natural periods.
+    pub silence_periods: f64,
+    /// How much faster than under a constant drive the response approaches its steady state; by default from the damping.
+    pub approach_gain: Option<f64>,
+    /// Whether the response first rises until impacts begin; by default where the start is at rest.
+    pub capture: Option<bool>,
     /// Delay of the rig from the drive to the sensors, samples, in addition to that of `[chain]`; used where no sensor reads the base.
     pub delay: f64,
 }
@@ -59,15 +65,17 @@ impl Default for Controller {
             omega_max: 1.1,
             phase_target: -90.0,
             phase_tolerance: 0.3,
-            frequency_drift: 1e-6,
-            amplitude_drift: 1e-5,
+            frequency_tolerance: 3e-4,
+            amplitude_tolerance: 8e-5,
             dwell_periods: 20,
-            g_max: 0.0,
-            c_max: 0.0,
+            g_max: None,
+            c_max: 4.0,
             ramp_periods: 0.0,
             release_periods: 0.0,
-            omega_rate: 0.0,
-            acquire_periods: 0.0,
+            omega_rate: None,
+            silence_periods: 20.0,
+            approach_gain: None,
+            capture: None,
             delay: 0.0,
         }
     }
@@ -121,10 +129,10 @@ impl Controller {
             .check(target.abs() <= 180.0, "must lie between -180 and 180 degrees")?;
         let tolerance = self.phase_tolerance;
         Quantity::new("controller.phase_tolerance", tolerance, "degrees").positive()?;
-        let drift = self.frequency_drift;
-        Quantity::new("controller.frequency_drift", drift, "(relative, per period)").positive()?;
-        let drift = self.amplitude_drift;
-        Quantity::new("controller.amplitude_drift", drift, "(relative, per period)").positive()?;
+        let tolerance = self.frequency_tolerance;
+        Quantity::new("controller.frequency_tolerance", tolerance, "(detuning)").positive()?;
+        let tolerance = self.amplitude_tolerance;
+        Quantity::new("controller.amplitude_tolerance", tolerance, "(relative)").positive()?;
         let dwell = self.dwell_periods;
         Quantity::new("controller.dwell_periods", dwell.into(), "(periods)")
             .check((4..=400).contains(&dwell), "must be from 4 to 400")
@@ -132,15 +140,28 @@ impl Controller {
 
     fn check_limits(&self) -> Result<(), SceneError> {
         for (key, value, unit) in [
-            ("controller.G_max", self.g_max, "(over b epsilon)"),
-            ("controller.C_max", self.c_max, "(over b)"),
             ("controller.ramp_periods", self.ramp_periods, "(natural periods)"),
             ("controller.release_periods", self.release_periods, "(natural periods)"),
-            ("controller.omega_rate", self.omega_rate, "(omega0 per natural period)"),
-            ("controller.acquire_periods", self.acquire_periods, "(natural periods)"),
+            (
+                "controller.approach_gain",
+                self.approach_gain.unwrap_or(0.0),
+                "(relative)",
+            ),
             ("controller.delay", self.delay, "samples"),
         ] {
             Quantity::new(key, value, unit).not_negative()?;
+        }
+        for (key, value, unit) in [
+            ("controller.G_max", self.g_max.unwrap_or(1.0), "(over b epsilon)"),
+            ("controller.C_max", self.c_max, "(over b)"),
+            (
+                "controller.omega_rate",
+                self.omega_rate.unwrap_or(1.0),
+                "(omega0 per natural period)",
+            ),
+            ("controller.silence_periods", self.silence_periods, "(natural periods)"),
+        ] {
+            Quantity::new(key, value, unit).positive()?;
         }
         Ok(())
     }

@@ -18,11 +18,11 @@ pub enum Estimator {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Record {
-    /// Time limit for the lock, natural periods.
-    pub lock_periods: f64,
+    /// Time limit for the lock, natural periods; by default at least 2000, and 20 relaxation times.
+    pub lock_periods: Option<f64>,
     /// How long the settled lock is held and measured, natural periods.
     pub hold_periods: f64,
-    /// Length of the recorded decay, natural periods.
+    /// Length of the recorded decay, natural periods; 0: until the loss of synchrony that theory expects, and a quarter more.
     pub decay_periods: f64,
     /// Window of the fit along the decay, periods of the motion.
     pub window_periods: f64,
@@ -33,9 +33,9 @@ pub struct Record {
 impl Default for Record {
     fn default() -> Self {
         Self {
-            lock_periods: 2000.0,
+            lock_periods: None,
             hold_periods: 20.0,
-            decay_periods: 50.0,
+            decay_periods: 0.0,
             window_periods: 2.5,
             estimator: Estimator::Fit,
         }
@@ -48,17 +48,23 @@ const MOST_SAMPLES: f64 = 2e7;
 impl Record {
     pub(super) fn check(&self, controller: &Controller) -> Result<(), SceneError> {
         let unit = "(natural periods)";
-        Quantity::new("record.lock_periods", self.lock_periods, unit).positive()?;
+        let lock_periods = self.lock_periods.unwrap_or(2000.0);
+        Quantity::new("record.lock_periods", lock_periods, unit).positive()?;
         Quantity::new("record.hold_periods", self.hold_periods, unit).check(
             (3.0..=1e6).contains(&self.hold_periods),
             "must be from 3 (to count impacts and measure) to 1000000",
         )?;
-        Quantity::new("record.decay_periods", self.decay_periods, unit).positive()?;
+        Quantity::new("record.decay_periods", self.decay_periods, unit).not_negative()?;
+        let longest = if self.decay_periods > 0.0 {
+            self.decay_periods
+        } else {
+            1000.0
+        };
         Quantity::new("record.window_periods", self.window_periods, "(periods)").check(
-            (0.5..=self.decay_periods).contains(&self.window_periods),
-            format!("must be from 0.5 to decay_periods = {}", self.decay_periods),
+            (0.5..=longest).contains(&self.window_periods),
+            format!("must be from 0.5 to {longest} (decay_periods, or 1000)"),
         )?;
-        let samples = controller.samples_per_period * (self.lock_periods + self.hold_periods + self.decay_periods);
+        let samples = controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods);
         Quantity::new("samples_per_period times all periods of [record]", samples, "samples")
             .check(samples <= MOST_SAMPLES, "must be at most 20 million")
     }

@@ -4,7 +4,7 @@ use lovines::Parameters;
 use serde::Deserialize;
 
 use super::{
-    Backbone, Chain, Controller, Dimensionless, Record, Scene, SceneError,
+    Backbone, Chain, Controller, Definition, Dimensionless, Record, Scene, SceneError,
     plant::{PlantSection, StartSection},
     validate::Quantity,
 };
@@ -20,6 +20,7 @@ pub(super) struct Sections {
     record: Record,
     backbone: Backbone,
     chain: Chain,
+    resonance: Definition,
 }
 
 /// The base amplitude; exactly one of the two keys is given.
@@ -66,8 +67,16 @@ impl Sections {
             record: self.record,
             backbone: self.backbone,
             chain: self.chain,
+            resonance: self.resonance,
         };
         scene.controller.check()?;
+        let needed = scene.impact_drive();
+        Quantity::new("controller.G_max", scene.g_max(), "(over b epsilon)").check(
+            !scene.captures() || scene.g_max() >= needed,
+            format!(
+                "must be at least {needed:.3}: from rest, impacts begin only there; or set controller.capture = false"
+            ),
+        )?;
         scene.record.check(&scene.controller)?;
         scene.backbone.check(&scene.controller)?;
         scene.chain.check(&scene.controller)?;

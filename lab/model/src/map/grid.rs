@@ -1,5 +1,6 @@
 //! The grid: all points, on all cores.
 
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
@@ -11,8 +12,12 @@ use super::{
     run::{Point, observe},
 };
 use crate::Dimensionless;
+use crate::orbit::{BifurcationCurve, Limits, bifurcation_curves, random_state};
 use crate::regime::Regime;
 use crate::theory::SlowFlow;
+
+/// Usual largest number of periods that a cell is followed.
+pub const LIMIT: usize = 20_000;
 
 /// Settings of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -27,14 +32,14 @@ pub struct Plan {
     pub x: Range,
     /// Vertical axis.
     pub y: Range,
-    /// Periods before the record.
-    pub settle: usize,
-    /// Periods recorded.
-    pub record: usize,
+    /// Largest number of periods that a cell is followed.
+    pub limit: usize,
+    /// Starts per cell: that of the scene, and random ones.
+    pub starts: usize,
 }
 
 /// One cell of the map.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Cell {
     /// Detuning.
     pub sigma: f64,
@@ -48,6 +53,8 @@ pub struct Cell {
     pub point: Point,
     /// First-order theory has a stable symmetric 1:1 motion here.
     pub theory_stable: bool,
+    /// Other regimes that random starts lead to.
+    pub coexisting: Vec<Regime>,
 }
 
 /// The map, row by row from the smallest y, each from the smallest x.
@@ -57,6 +64,8 @@ pub struct Map {
     pub plan: Plan,
     /// Result.
     pub cells: Vec<Cell>,
+    /// Where the 1:1 motions bifurcate; only over sigma and G.
+    pub curves: Vec<BifurcationCurve>,
 }
 
 /// Why a map cannot be made.
@@ -65,8 +74,8 @@ pub enum MapError {
     /// Both axes have the same quantity.
     #[error("both axes are {0}: take two of sigma, G and r")]
     SameAxis(Axis),
-    /// No period is recorded, or so few that nothing can repeat.
-    #[error("{0} recorded periods are too few to find a pattern: at least 20 are needed")]
+    /// So few periods that nothing can be decided.
+    #[error("{0} periods are too few to decide a regime: at least 100 are needed")]
     TooShort(usize),
     /// Not a positive frequency.
     #[error("sigma = {sigma} (dimensionless) gives the frequency {omega} omega0, which must be above 0")]
@@ -113,8 +122,8 @@ impl Plan {
         if self.x.axis == self.y.axis {
             return Err(MapError::SameAxis(self.x.axis));
         }
-        if self.record < 20 {
-            return Err(MapError::TooShort(self.record));
+        if self.limit < 100 {
+            return Err(MapError::TooShort(self.limit));
         }
         let lowest = self.at(self.x.from, self.y.from).0;
         let omega = 1.0 + self.scene.epsilon * lowest;
@@ -135,7 +144,8 @@ impl Plan {
             .map(|n| {
                 let (x, y) = (self.x.at(n % self.x.points), self.y.at(n / self.x.points));
                 let (sigma, scene) = self.at(x, y);
-                let point = observe(&scene, sigma, self.start, (self.settle, self.record))?;
+                let point = observe(&scene, sigma, self.start, self.limit)?;
+                let coexisting = self.coexisting(&scene, sigma, n, point.regime)?;
                 done();
                 Ok(Cell {
                     sigma,
@@ -143,10 +153,44 @@ impl Plan {
                     r: scene.r,
                     point,
                     theory_stable: self.theory_stable(x, y),
+                    coexisting,
                 })
             })
             .collect::<Result<_, InvalidValue>>()?;
-        Ok(Map { plan: *self, cells })
+        Ok(Map { plan: *self, cells, curves: self.curves() })
+    }
+
+    /// Regimes other than `known` that the random starts of the n-th cell lead to.
+    fn coexisting(
+        &self,
+        scene: &Dimensionless,
+        sigma: f64,
+        n: usize,
+        known: Regime,
+    ) -> Result<Vec<Regime>, InvalidValue> {
+        let mut random = ChaCha8Rng::seed_from_u64(n as u64);
+        let mut found = Vec::new();
+        for _ in 1..self.starts {
+            let regime = observe(scene, sigma, random_state(&mut random), self.limit)?.regime;
+            if regime != known && !found.contains(&regime) {
+                found.push(regime);
+            }
+        }
+        found.sort();
+        Ok(found)
+    }
+
+    fn curves(&self) -> Vec<BifurcationCurve> {
+        let range = |axis: Axis| [self.x, self.y].into_iter().find(|one| one.axis == axis);
+        let (Some(sigma), Some(g)) = (range(Axis::Sigma), range(Axis::G)) else {
+            return Vec::new();
+        };
+        let limits = Limits {
+            sigma: [sigma.from, sigma.to],
+            g: [g.from, g.to],
+            ..Limits::default()
+        };
+        bifurcation_curves(&self.scene, &limits)
     }
 }
 

@@ -62,6 +62,17 @@ impl HarmonicBasis {
         Some(HarmonicFit { coefficients, columns: self.columns.clone() })
     }
 
+    /// Variances of a harmonic's sine and cosine coefficient of this degree, for values with noise of variance 1; NaN where the
+    /// terms are not independent. `harmonic` counts from 1.
+    #[must_use]
+    pub fn variances(&self, harmonic: usize, degree: usize) -> [f64; 2] {
+        let column = self.columns[harmonic - 1] + 2 * degree;
+        let Some(inverse) = self.factors.r().try_inverse() else {
+            return [f64::NAN; 2];
+        };
+        [column, column + 1].map(|row| inverse.row(row).norm_squared())
+    }
+
     /// The residual of a fit.
     #[must_use]
     pub fn residual(&self, values: &DVector<f64>, fit: &HarmonicFit) -> DVector<f64> {

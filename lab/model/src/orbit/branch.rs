@@ -41,6 +41,12 @@ pub enum Ended {
     /// The largest number of points was reached.
     #[serde(rename = "number of points")]
     Points,
+    /// It joins the branch whose symmetry it breaks or whose period it doubles; beyond that it is its own mirror image.
+    #[serde(rename = "joins a shorter pattern")]
+    Joins,
+    /// The complex pair of multipliers on the unit circle becomes real.
+    #[serde(rename = "strong resonance")]
+    Resonance,
     /// The pattern of impacts ends here: a graze, or impacts that accumulate.
     #[serde(rename = "graze")]
     Graze,
@@ -68,6 +74,8 @@ pub enum Bifurcation {
 pub struct Special {
     /// What happens.
     pub kind: Bifurcation,
+    /// The motion is stable on one side.
+    pub of_stable: bool,
     /// The motion there.
     pub motion: Periodic,
 }
@@ -79,8 +87,48 @@ pub struct Branch {
     pub points: Vec<Periodic>,
     /// Where stability changes, in order.
     pub special: Vec<Special>,
-    /// Why it ended.
-    pub ended: Ended,
+    /// Why it ended, before its first and after its last motion.
+    pub ended: [Ended; 2],
+}
+
+impl Bifurcation {
+    /// As in a table.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Bifurcation::Fold => "fold",
+            Bifurcation::SymmetryBreaking => "symmetry breaking",
+            Bifurcation::PeriodDoubling => "period doubling",
+            Bifurcation::Torus => "Neimark-Sacker",
+        }
+    }
+}
+
+impl Ended {
+    /// As in a table.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Ended::Range => "left the range",
+            Ended::Closed => "closed",
+            Ended::Points => "number of points",
+            Ended::Joins => "joins a shorter pattern",
+            Ended::Resonance => "strong resonance",
+            Ended::Graze => "graze",
+        }
+    }
+}
+
+impl Special {
+    /// As in a table. A modulation begins at a torus bifurcation only if the motion was stable before.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match (self.kind, self.of_stable) {
+            (Bifurcation::Torus, true) => "torus (modulation begins)",
+            (Bifurcation::Torus, false) => "Neimark-Sacker of an unstable motion",
+            (kind, _) => kind.name(),
+        }
+    }
 }
 
 impl Limits {

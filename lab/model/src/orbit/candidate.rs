@@ -1,4 +1,5 @@
-//! All phase-resonant symmetric motions at one frequency: a quadratic for the particle's speed.
+//! All symmetric motions at one frequency: at phase resonance or under a given excitation, the particle's speed is the root of a
+//! quadratic.
 //!
 //! Time starts at an impact on the wall w = +1; complex amplitudes Z stand for `Im(Z exp(i Omega tau))`.
 //!
@@ -14,8 +15,8 @@ use std::f64::consts::{FRAC_PI_2, PI};
 use nalgebra::{Complex, Matrix2, Vector2};
 
 use super::{AfterImpact, oscillator::Oscillator};
-use crate::Dimensionless;
 use crate::numerics::quadratic;
+use crate::{Definition, Dimensionless, Sensor};
 
 /// A symmetric motion that satisfies the impact law and the phase resonance, not yet checked for `|w| <= 1` in flight.
 #[derive(Debug, Clone, Copy)]
@@ -24,7 +25,7 @@ pub(super) struct Candidate {
     pub omega: f64,
     /// Speed of the particle; not physical unless positive.
     pub b: f64,
-    /// Amplitude of the first harmonic of v.
+    /// Amplitude of the first harmonic of the response.
     pub c: f64,
     /// Base amplitude over `b epsilon`.
     pub g: f64,
@@ -36,7 +37,9 @@ pub(super) struct Candidate {
     pub(super) before: Vector2<f64>,
     /// State (p, p') of the unit impulse response just after its impulse.
     pub(super) p: Vector2<f64>,
-    /// The first harmonic of v lags the base by pi/2, rather than leading it.
+    /// Phase of the first harmonic of the response relative to the reference, rad.
+    pub gamma: f64,
+    /// The first harmonic of the response lags the reference by pi/2, rather than leading it.
     pub(super) lags: bool,
 }
 
@@ -52,48 +55,94 @@ impl Candidate {
     }
 }
 
-/// The two candidates at `omega`, each a continuous branch where it exists.
-pub(super) fn candidates(scene: &Dimensionless, omega: f64) -> Option<[Candidate; 2]> {
-    let Dimensionless { epsilon, r, .. } = *scene;
-    let oscillator = Oscillator::new(epsilon * scene.lambda / 2.0);
+/// All symmetric motions at one frequency, whatever drives them: everything is linear in B.
+pub(super) struct Family {
+    omega: f64,
+    epsilon: f64,
+    alpha: f64,
+    beta: f64,
+    /// First harmonic of v or q1, as the sensor says, less that of y, over B.
+    kappa: Complex<f64>,
+    /// Factor of the sensor, and direction of the reference in the complex plane.
+    scale: f64,
+    reference: Complex<f64>,
+    /// Harmonic of the base over y.
+    base_over_y: Complex<f64>,
+    p: Vector2<f64>,
+}
 
-    // Unit impulses at tau = 0, -T, -2T…, alternating: half a period later the state is minus the one before.
-    let flight = oscillator.propagator(PI / omega);
-    let p = (Matrix2::identity() + flight).try_inverse()? * Vector2::new(0.0, 1.0);
-    let p_before = p - Vector2::new(0.0, 1.0);
+impl Family {
+    pub(super) fn new(scene: &Dimensionless, omega: f64) -> Option<Self> {
+        let Dimensionless { epsilon, r, .. } = *scene;
+        let oscillator = Oscillator::new(epsilon * scene.lambda / 2.0);
 
-    let alpha = 2.0 * epsilon * p_before[0] - FRAC_PI_2 / omega;
-    let beta = (2.0 * (1.0 + epsilon) / (1.0 + r) - 1.0 + 2.0 * epsilon * p_before[1]) / omega;
-    let harmonic = |b: f64| Complex::new(beta * b, 1.0 + alpha * b);
+        // Unit impulses at tau = 0, -T, -2T…, alternating: half a period later the state is minus the one before.
+        let flight = oscillator.propagator(PI / omega);
+        let p = (Matrix2::identity() + flight).try_inverse()? * Vector2::new(0.0, 1.0);
+        let p_before = p - Vector2::new(0.0, 1.0);
 
-    // v = y + B kappa in the first harmonic: impulses through the oscillator, and the particle's triangle wave.
-    let impulse = Complex::new(0.0, 2.0 * omega / PI);
-    let triangle = Complex::new(0.0, -4.0 / (PI * omega));
-    let kappa = (oscillator.compliance(omega) * impulse * -2.0 + triangle) * epsilon;
-    // F = y stiffness/base_force; only its direction matters for the phase.
-    let base_over_y = oscillator.stiffness(omega) / oscillator.base_force(omega);
-    let d = base_over_y.conj();
-    let u = d * kappa;
-
-    let speeds = quadratic(
-        d.re * (alpha * alpha + beta * beta) + u.re * beta + u.im * alpha,
-        2.0 * alpha * d.re + u.im,
-        d.re,
-    )?;
-    Some(speeds.map(|b| {
-        let y = harmonic(b);
-        let v = y + kappa * b;
-        let base = y * base_over_y;
-        Candidate {
+        // v = y + B kappa in the first harmonic: impulses through the oscillator, and the particle's triangle wave.
+        let impulse = Complex::new(0.0, 2.0 * omega / PI);
+        let Definition { sensor, reference, .. } = scene.definition;
+        let triangle = match sensor {
+            Sensor::V => Complex::new(0.0, -4.0 / (PI * omega)),
+            Sensor::Q1 | Sensor::Acceleration => Complex::new(0.0, 0.0),
+        };
+        Some(Self {
             omega,
+            epsilon,
+            alpha: 2.0 * epsilon * p_before[0] - FRAC_PI_2 / omega,
+            beta: (2.0 * (1.0 + epsilon) / (1.0 + r) - 1.0 + 2.0 * epsilon * p_before[1]) / omega,
+            kappa: (oscillator.compliance(omega) * impulse * -2.0 + triangle) * epsilon,
+            scale: if sensor == Sensor::Acceleration {
+                omega * omega
+            } else {
+                1.0
+            },
+            reference: Complex::from_polar(1.0, reference.phase(epsilon * scene.lambda, omega)),
+            base_over_y: oscillator.stiffness(omega) / oscillator.base_force(omega),
+            p,
+        })
+    }
+
+    /// The two motions at phase resonance, each a continuous branch where it exists.
+    pub(super) fn phase_resonant(&self) -> Option<[Candidate; 2]> {
+        let Self { alpha, beta, .. } = *self;
+        // Only the direction of the base's harmonic matters for the phase.
+        let d = (self.base_over_y * self.reference).conj();
+        let u = d * self.kappa;
+        let speeds = quadratic(
+            d.re * (alpha * alpha + beta * beta) + u.re * beta + u.im * alpha,
+            2.0 * alpha * d.re + u.im,
+            d.re,
+        )?;
+        Some(speeds.map(|b| self.at(b)))
+    }
+
+    /// The two motions under the excitation `g`: `|y|^2` is quadratic in B.
+    pub(super) fn driven(&self, g: f64) -> Option<[Candidate; 2]> {
+        let Self { alpha, beta, .. } = *self;
+        let y = self.epsilon * g / self.base_over_y.norm();
+        let speeds = quadratic(alpha * alpha + beta * beta, 2.0 * alpha, 1.0 - y * y)?;
+        Some(speeds.map(|b| self.at(b)))
+    }
+
+    fn at(&self, b: f64) -> Candidate {
+        let y = Complex::new(self.beta * b, 1.0 + self.alpha * b);
+        let v = y + self.kappa * b;
+        let base = y * self.base_over_y;
+        let p_before = self.p - Vector2::new(0.0, 1.0);
+        Candidate {
+            omega: self.omega,
             b,
-            c: v.norm(),
-            g: base.norm() / epsilon,
+            c: v.norm() * self.scale,
+            gamma: (v * (base * self.reference).conj()).arg(),
+            g: base.norm() / self.epsilon,
             base,
             y,
-            before: Vector2::new(y.im, omega * y.re) - p_before * (2.0 * epsilon * b),
-            p,
-            lags: (v * base.conj()).im < -1e-12 * v.norm() * base.norm(),
+            before: Vector2::new(y.im, self.omega * y.re) - p_before * (2.0 * self.epsilon * b),
+            p: self.p,
+            lags: (v * (base * self.reference).conj()).im < -1e-12 * v.norm() * base.norm(),
         }
-    }))
+    }
 }

@@ -8,8 +8,9 @@ use nalgebra::{Matrix4, Matrix6, SVector};
 
 use super::{
     branch::{Bifurcation, Branch, Ended, Limits, Special},
+    condition::Condition,
     pattern::{Returned, Unknowns, follow},
-    periodic::{Condition, Periodic, newton},
+    periodic::{Periodic, newton},
 };
 use crate::Dimensionless;
 use crate::numerics::try_bisection;
@@ -35,7 +36,10 @@ impl Curve<'_> {
         let returned = follow(self.scene, &self.start.pattern, x)?;
         let mut matrix = Matrix6::zeros();
         matrix.fixed_rows_mut::<4>(0).copy_from(&returned.by);
-        matrix.set_row(4, &self.condition.value(x, &returned).1);
+        matrix.set_row(
+            4,
+            &self.condition.value(self.scene, &self.start.pattern, x, &returned).1,
+        );
         matrix.set_row(5, &towards.transpose());
         let mut right = SVector::<f64, 6>::zeros();
         right[5] = 1.0;
@@ -49,7 +53,10 @@ impl Curve<'_> {
         let ahead = x + tangent * step;
         let found = newton(self.scene, &self.start.pattern, ahead, |x, returned: &Returned| {
             let plane = (tangent.dot(&(x - ahead)), tangent.transpose());
-            [self.condition.value(x, returned), plane]
+            [
+                self.condition.value(self.scene, &self.start.pattern, x, returned),
+                plane,
+            ]
         })?;
         ((found - ahead).norm() <= step.abs()).then_some(found)
     }
@@ -64,6 +71,23 @@ impl Curve<'_> {
 
     fn motion(&self, x: &Unknowns) -> Option<Periodic> {
         Periodic::at(self.scene, &self.start.pattern, x)
+    }
+
+    /// A bifurcation between the last motion of a closed branch and its start, at that distance.
+    fn special_at_start(&self, branch: &Branch, tangent: &Unknowns, distance: f64) -> Option<Special> {
+        let last = branch.points.last()?;
+        // A little beyond the start, which the plane at the end of the step may miss.
+        let within = || self.locate(last, tangent, 1.1 * distance);
+        (outside(last) != outside(self.start)).then(within)?
+    }
+
+    /// The last motion within a step before the one that the branch doubles.
+    fn joint(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Periodic> {
+        let x = from.unknowns();
+        let at = |part: f64| self.motion(&self.correct(&x, tangent, part * step)?);
+        let before = |part: f64| at(part).map(|one| !joins(from, &one)).ok_or(());
+        let (end, _) = try_bisection(0.0, 1.0, FINEST, before).ok()?;
+        at(end)
     }
 
     /// Where the number of multipliers outside the unit circle changes within a step.
@@ -86,7 +110,8 @@ impl Curve<'_> {
         } else {
             Bifurcation::PeriodDoubling
         };
-        Some(Special { kind, motion })
+        let of_stable = [Some(from.stable), at(1.0).map(|one| one.stable)].contains(&Some(true));
+        Some(Special { kind, of_stable, motion })
     }
 }
 
@@ -97,6 +122,14 @@ fn distance([re, im]: &[f64; 2]) -> f64 {
 fn outside(motion: &Periodic) -> usize {
     let moduli = motion.moduli();
     moduli.iter().filter(|one| **one > 1.0 + ON_CIRCLE).count()
+}
+
+/// Between two motions, their branch passes the motion that it doubles.
+fn joins(from: &Periodic, to: &Periodic) -> bool {
+    match (from.halves_apart(), to.halves_apart()) {
+        (Some(one), Some(other)) => one.dot(&other) < 0.0,
+        _ => false,
+    }
 }
 
 /// Follows the curve of `condition` from `start` towards `towards`, a direction in the space of the unknowns.
@@ -112,7 +145,7 @@ pub fn continue_from(
     let mut branch = Branch {
         points: vec![start.clone()],
         special: Vec::new(),
-        ended: Ended::Graze,
+        ended: [Ended::Graze; 2],
     };
     let origin = start.unknowns();
     let mut x = origin;
@@ -123,7 +156,7 @@ pub fn continue_from(
     let mut step = limits.step / 8.0;
     while step >= SHORTEST {
         if branch.points.len() >= limits.points {
-            branch.ended = Ended::Points;
+            branch.ended[1] = Ended::Points;
             return branch;
         }
         let Some((next, turned, motion)) = curve.advance(&x, &tangent, step) else {
@@ -131,7 +164,17 @@ pub fn continue_from(
             continue;
         };
         let last = branch.points.last().unwrap_or(start);
-        if outside(last) != outside(&motion) {
+        if joins(last, &motion) {
+            branch.points.extend(curve.joint(last, &tangent, step));
+            branch.ended[1] = Ended::Joins;
+            return branch;
+        }
+        if let Condition::Bifurcation(kind) = condition {
+            if kind == Bifurcation::Torus && !motion.on_circle_in_pairs() {
+                branch.ended[1] = Ended::Resonance;
+                return branch;
+            }
+        } else if outside(last) != outside(&motion) {
             branch.special.extend(curve.locate(last, &tangent, step));
         }
         branch.points.push(motion);
@@ -139,11 +182,14 @@ pub fn continue_from(
         let mut apart = next - origin;
         apart[0] = super::pattern::wrapped(apart[0]);
         if branch.points.len() > 10 && apart.norm() < step && turned.dot(&first_tangent) > 0.9 {
-            branch.ended = Ended::Closed;
+            branch
+                .special
+                .extend(curve.special_at_start(&branch, &turned, apart.norm()));
+            branch.ended[1] = Ended::Closed;
             return branch;
         }
         if !limits.contain(next[4], next[5]) {
-            branch.ended = Ended::Range;
+            branch.ended[1] = Ended::Range;
             return branch;
         }
         let straight = turned.dot(&tangent) > 0.5 * (1.0 + STRAIGHT);
@@ -161,7 +207,8 @@ pub fn continue_both_ways(scene: &Dimensionless, start: &Periodic, condition: Co
     let mut towards = Unknowns::zeros();
     towards[4] = 1.0;
     let mut up = continue_from(scene, start, condition, &towards, limits);
-    if up.ended == Ended::Closed {
+    if up.ended[1] == Ended::Closed {
+        up.ended[0] = Ended::Closed;
         return up;
     }
     let down = continue_from(scene, start, condition, &-towards, limits);
@@ -169,31 +216,29 @@ pub fn continue_both_ways(scene: &Dimensionless, start: &Periodic, condition: Co
     points.append(&mut up.points);
     let mut special: Vec<Special> = down.special.into_iter().rev().collect();
     special.append(&mut up.special);
-    Branch { points, special, ended: up.ended }
+    Branch { points, special, ended: [down.ended[1], up.ended[1]] }
 }
 
-/// Distance from the symmetric motion at which an asymmetric one is searched for.
+/// Distance at which the motions of another branch are searched for.
 const ASIDE: f64 = 1e-3;
 
-/// The branch of asymmetric motions that leaves a symmetry breaking, along the curve of `condition`; the other one is its mirror image.
+/// The branch of motions that leaves a symmetry breaking or a period doubling, along the curve of `condition`. Its mirror image, or
+/// itself one repetition later, leaves in the opposite direction and counts as the same branch.
 #[must_use]
-pub fn asymmetric_branch(
-    scene: &Dimensionless,
-    breaking: &Special,
-    condition: Condition,
-    limits: &Limits,
-) -> Option<Branch> {
-    let symmetric = &breaking.motion;
-    let returned = follow(scene, &symmetric.pattern, &symmetric.unknowns())?;
-    // The eigenvector of the half-period map for the multiplier -1.
+pub fn branch_off(scene: &Dimensionless, at: &Special, condition: Condition, limits: &Limits) -> Option<Branch> {
+    let from = &at.motion;
+    let returned = follow(scene, &from.pattern, &from.unknowns())?;
+    // The eigenvector of the map for the multiplier -1.
     let flipped = returned.monodromy + Matrix4::identity();
     let svd = flipped.svd(false, true);
     let aside = svd.v_t?.row(svd.singular_values.imin()).transpose();
     let mut towards = Unknowns::zeros();
     towards.fixed_rows_mut::<4>(0).copy_from(&aside);
-    let doubled = Periodic { pattern: symmetric.pattern.doubled(), ..symmetric.clone() };
+    let doubled = Periodic { pattern: from.pattern.doubled(), ..from.clone() };
     let curve = Curve { scene, start: &doubled, condition };
-    let x = curve.correct(&symmetric.unknowns(), &towards, ASIDE)?;
+    let x = curve.correct(&from.unknowns(), &towards, ASIDE)?;
     let start = curve.motion(&x)?;
-    Some(continue_from(scene, &start, condition, &towards, limits))
+    let mut branch = continue_from(scene, &start, condition, &towards, limits);
+    branch.ended[0] = Ended::Joins;
+    Some(branch)
 }

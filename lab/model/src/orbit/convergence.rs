@@ -3,16 +3,19 @@
 use serde::Serialize;
 
 use super::phase_resonant;
-use crate::{Dimensionless, theory::SlowFlow};
+use crate::{Dimensionless, theory::resonant};
 
 /// Theory minus exact orbit at one mass ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Difference {
     /// Mass ratio.
     pub epsilon: f64,
+    /// Detuning and amplitude of the exact orbit.
+    #[serde(skip)]
+    pub exact: [f64; 2],
     /// Of the detuning.
     pub sigma: f64,
-    /// Of the amplitude of v over b.
+    /// Of the amplitude of the response over b.
     #[serde(rename = "C")]
     pub c: f64,
     /// Of the particle speed over `b omega0`.
@@ -29,23 +32,21 @@ pub struct Convergence {
     pub slopes: [f64; 3],
 }
 
-/// Compares the stable phase-resonant solutions of theory and exact orbits at the scene's mass ratio and at this number of halvings of
+/// Compares the stable resonant solutions of theory and exact orbits at the scene's mass ratio and at this number of halvings of
 /// it, with constant lambda, r and G; None where one of them has no stable solution, or there is nothing to fit.
 #[must_use]
 pub fn convergence(scene: &Dimensionless, halvings: u32) -> Option<Convergence> {
-    let theory = SlowFlow::new(scene.lambda, scene.r)
-        .phase_resonant(scene.g)
-        .into_iter()
-        .find(|point| point.stable())?;
     let rows: Vec<Difference> = (0..=halvings)
         .map(|n| {
-            let epsilon = scene.epsilon / 2f64.powi(n as i32);
-            let exact = phase_resonant(&Dimensionless { epsilon, ..*scene })
+            let scene = Dimensionless { epsilon: scene.epsilon / 2f64.powi(n as i32), ..*scene };
+            let theory = resonant(&scene).into_iter().find(|point| point.stable())?;
+            let exact = phase_resonant(&scene)
                 .into_iter()
                 .filter(|orbit| orbit.stable)
                 .min_by(|one, other| (one.b - theory.b).abs().total_cmp(&(other.b - theory.b).abs()))?;
             Some(Difference {
-                epsilon,
+                epsilon: scene.epsilon,
+                exact: [exact.sigma, exact.c],
                 sigma: theory.sigma - exact.sigma,
                 c: theory.c - exact.c,
                 b: theory.b - exact.b,

@@ -7,7 +7,7 @@ use serde::Serialize;
 
 use super::bounce::Bounce;
 use super::impact_map::{ByAll, ImpactMap, RowByAll, Step};
-use crate::Dimensionless;
+use crate::{Definition, Dimensionless, Sensor};
 
 /// The pattern of a periodic motion. A mirrored one is minus itself after half of its period; its map covers that half.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -27,6 +27,28 @@ impl ImpactPattern {
         Self { walls: vec![1.0], half_periods: 1, mirrored: true }
     }
 
+    /// Two impacts per period, half a period apart.
+    #[must_use]
+    pub fn is_symmetric(&self) -> bool {
+        self.mirrored && self.periods() == 1 && self.impacts() == 2
+    }
+
+    /// As in a table.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let (impacts, periods) = (self.impacts(), self.periods());
+        match (impacts, periods) {
+            (2, 1) if self.mirrored => "symmetric 1:1".into(),
+            (2, 1) => "asymmetric 1:1".into(),
+            _ => {
+                let plural = |count: usize| if count == 1 { "" } else { "s" };
+                let mirrored = if self.mirrored { ", mirrored" } else { "" };
+                let (s, t) = (plural(impacts), plural(periods as usize));
+                format!("{impacts} impact{s} in {periods} period{t}{mirrored}")
+            }
+        }
+    }
+
     /// The same pattern over a whole period, as after symmetry breaking.
     #[must_use]
     pub fn doubled(&self) -> Self {
@@ -37,6 +59,20 @@ impl ImpactPattern {
             walls.extend(&self.walls);
         }
         Self { walls, half_periods: 2 * self.half_periods, mirrored: false }
+    }
+
+    /// The pattern of half the length that this one doubles; None if it does not repeat itself or its mirror image.
+    #[must_use]
+    pub fn halved(&self) -> Option<Self> {
+        let count = self.walls.len() / 2;
+        let (walls, rest) = self.walls.split_at(count);
+        let half = Self {
+            walls: walls.into(),
+            half_periods: self.half_periods / 2,
+            mirrored: !self.half_periods.is_multiple_of(4),
+        };
+        let same = walls.iter().zip(rest).all(|(one, other)| half.sign() * one == *other);
+        (!self.mirrored && self.walls.len().is_multiple_of(2) && count > 0 && same).then_some(half)
     }
 
     /// Impacts over the whole period of the motion.
@@ -55,11 +91,11 @@ impl ImpactPattern {
         }
     }
 
-    fn sign(&self) -> f64 {
+    pub(super) fn sign(&self) -> f64 {
         if self.mirrored { -1.0 } else { 1.0 }
     }
 
-    fn turn(&self) -> f64 {
+    pub(super) fn turn(&self) -> f64 {
         f64::from(self.half_periods) * PI
     }
 }
@@ -74,10 +110,10 @@ pub(super) struct Returned {
     pub residual: Vector4<f64>,
     /// Derivative of the residual by the unknowns.
     pub by: ByAll,
-    /// First harmonic of v: `Im(V exp(i phase))`.
-    pub v: Complex<f64>,
-    /// Derivative of V by the unknowns, real and imaginary part.
-    pub v_by: [RowByAll; 2],
+    /// First harmonic of the response relative to the reference: `Im(S exp(i phase))`.
+    pub s: Complex<f64>,
+    /// Derivative of S by the unknowns, real and imaginary part.
+    pub s_by: [RowByAll; 2],
     /// The bounces over the map, with the start and without the return.
     pub bounces: Vec<Bounce>,
     /// Time of flight after each.
@@ -130,8 +166,8 @@ pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknown
     by.column_mut(4).scale_mut(scene.epsilon);
 
     let harmonic = Harmonic::new(scene, &map, pattern);
-    let (v, v_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
-    Some(Returned { residual, by, v, v_by, bounces, durations, monodromy })
+    let (s, s_by) = harmonic.of(g, sum, &sum_by, scene.epsilon);
+    Some(Returned { residual, by, s, s_by, bounces, durations, monodromy })
 }
 
 /// The chain rule: derivatives of a step by the unknowns. The step itself also depends on Omega and G.
@@ -146,7 +182,7 @@ fn chained(step: &Step, by: &ByAll) -> (ByAll, RowByAll) {
     (all, impulse_by)
 }
 
-/// `V = direct G + impulses sum`: the base through the oscillator, and the impulses through oscillator and particle.
+/// `S = direct G + impulses sum`: the base through the oscillator, and the impulses through the oscillator and, for v, the particle.
 struct Harmonic {
     direct: [Complex<f64>; 2],
     impulses: [Complex<f64>; 2],
@@ -165,11 +201,23 @@ impl Harmonic {
         // (2i/duration) times the response to a force through the oscillator, less that of a free mass: the impulse on the
         // particle is the opposite one.
         let weight = Complex::new(0.0, 2.0 * omega / pattern.turn());
-        let inner = compliance + 1.0 / (omega * omega);
-        let inner_by = compliance_by - 2.0 / omega.powi(3);
+        let Definition { sensor, reference, .. } = scene.definition;
+        let particle = f64::from(u8::from(sensor == Sensor::V));
+        let inner = compliance + particle / (omega * omega);
+        let inner_by = compliance_by - 2.0 * particle / omega.powi(3);
+        // The factor of the sensor, seen from the reference, and its logarithmic derivative.
+        let damping = scene.epsilon * scene.lambda;
+        let (factor, slope) = if sensor == Sensor::Acceleration {
+            (omega * omega, 2.0 / omega)
+        } else {
+            (1.0, 0.0)
+        };
+        let seen = Complex::from_polar(factor, -reference.phase(damping, omega));
+        let seen_by = Complex::new(slope, -reference.phase_slope(damping, omega));
+        let read = |[z, by]: [Complex<f64>; 2]| [z * seen, (by + z * seen_by) * seen];
         Self {
-            direct: [direct, direct_by],
-            impulses: [weight * inner, weight * inner_by + weight / omega * inner],
+            direct: read([direct, direct_by]),
+            impulses: read([weight * inner, weight * inner_by + weight / omega * inner]),
         }
     }
 
@@ -181,7 +229,7 @@ impl Harmonic {
                 z
             }
         };
-        let v = zero_if_undriven(self.direct[0] * g) + self.impulses[0] * sum;
+        let s = zero_if_undriven(self.direct[0] * g) + self.impulses[0] * sum;
         let a = self.impulses[0];
         let mut by = [sum_by[0] * a.re - sum_by[1] * a.im, sum_by[0] * a.im + sum_by[1] * a.re];
         let own = [
@@ -195,7 +243,7 @@ impl Harmonic {
         for row in &mut by {
             row[4] *= epsilon;
         }
-        (v, by)
+        (s, by)
     }
 }
 

@@ -1,10 +1,11 @@
 //! A periodic motion of any pattern, its stability, and the Newton iteration that finds it.
 
-use nalgebra::{Complex, Matrix6, RowSVector, SVector};
+use nalgebra::{Complex, Matrix6, SVector, Vector4};
 use serde::Serialize;
 
 use super::{
     bounce::Bounce,
+    condition::{Condition, Row},
     impact_map::ImpactMap,
     pattern::{ImpactPattern, Returned, Unknowns, follow, wrapped},
 };
@@ -18,10 +19,10 @@ pub struct Periodic {
     pub g: f64,
     /// Detuning `(Omega - 1)/epsilon`.
     pub sigma: f64,
-    /// Amplitude of the harmonic of v at the base's frequency.
+    /// Amplitude of the response's harmonic at the base's frequency.
     #[serde(rename = "C")]
     pub c: f64,
-    /// Phase of that harmonic relative to the base, rad, in (-pi, pi].
+    /// Phase of that harmonic relative to the reference, rad, in (-pi, pi].
     pub gamma: f64,
     /// Speed of the particle over `b omega0`, averaged over time.
     #[serde(rename = "B")]
@@ -39,34 +40,6 @@ pub struct Periodic {
     pub(super) durations: Vec<f64>,
 }
 
-/// An equation that selects a motion, in addition to the four that close it.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub enum Condition {
-    /// sigma has this value.
-    Sigma(f64),
-    /// G has this value.
-    Excitation(f64),
-    /// The first harmonic of v lags (or leads) the base by a quarter of a period.
-    PhaseResonance,
-}
-
-impl Condition {
-    pub(super) fn value(&self, x: &Unknowns, returned: &Returned) -> (f64, RowSVector<f64, 6>) {
-        let mut row = RowSVector::<f64, 6>::zeros();
-        match *self {
-            Condition::Sigma(sigma) => {
-                row[4] = 1.0;
-                (x[4] - sigma, row)
-            }
-            Condition::Excitation(g) => {
-                row[5] = 1.0;
-                (x[5] - g, row)
-            }
-            Condition::PhaseResonance => (returned.v.re, returned.v_by[0]),
-        }
-    }
-}
-
 /// Size of the last Newton correction.
 const CONVERGED: f64 = 1e-12;
 const ROUNDS: usize = 30;
@@ -82,7 +55,7 @@ impl Periodic {
         conditions: [Condition; 2],
     ) -> Option<Self> {
         let x = newton(scene, pattern, *guess, |x, returned| {
-            conditions.map(|one| one.value(x, returned))
+            conditions.map(|one| one.value(scene, pattern, x, returned))
         })?;
         Self::at(scene, pattern, &x)
     }
@@ -109,8 +82,8 @@ impl Periodic {
         Some(Self {
             g: x[5],
             sigma: x[4],
-            c: returned.v.norm(),
-            gamma: wrapped(returned.v.arg()),
+            c: returned.s.norm(),
+            gamma: wrapped(returned.s.arg()),
             b: travelled / total,
             pattern: pattern.clone(),
             bounces: returned.bounces,
@@ -118,6 +91,28 @@ impl Periodic {
             stable: multipliers[3].norm() < 1.0,
             multipliers: multipliers.map(|one| [one.re, one.im]),
         })
+    }
+
+    /// How far the second half of the motion is from repeating the first one or its mirror image; None for a pattern that is not
+    /// the double of another. It changes sign where a branch passes the motion that it doubles.
+    pub(super) fn halves_apart(&self) -> Option<Vector4<f64>> {
+        let half = self.pattern.halved()?;
+        let (first, middle) = (&self.bounces[0], &self.bounces[half.walls.len()]);
+        let mut apart = middle.vector() * half.sign() - first.vector();
+        apart[0] = middle.phase - first.phase - half.turn();
+        Some(apart)
+    }
+
+    /// A complex pair of multipliers is on the unit circle.
+    pub(super) fn on_circle_in_pairs(&self) -> bool {
+        let mut pairs = self.multipliers.iter().filter(|[_, im]| im.abs() > 1e-3);
+        pairs.any(|[re, im]| (re.hypot(*im) - 1.0).abs() < 1e-6)
+    }
+
+    /// No multiplier is outside the unit circle, except for those that a bifurcation places on it.
+    #[must_use]
+    pub fn bounds_stability(&self) -> bool {
+        self.moduli()[3] < 1.0 + 1e-5
     }
 
     /// Moduli of the multipliers, ascending.
@@ -179,7 +174,7 @@ pub(super) fn newton(
     scene: &Dimensionless,
     pattern: &ImpactPattern,
     mut x: Unknowns,
-    conditions: impl Fn(&Unknowns, &Returned) -> [(f64, RowSVector<f64, 6>); 2],
+    conditions: impl Fn(&Unknowns, &Returned) -> [Row; 2],
 ) -> Option<Unknowns> {
     for _ in 0..ROUNDS {
         let returned = follow(scene, pattern, &x)?;

@@ -1,20 +1,20 @@
 //! Search for all phase-resonant orbits of a scene, over frequency.
 
 use super::{
-    Orbit,
-    candidate::{Candidate, candidates},
+    Condition, ImpactPattern, Orbit, Periodic,
+    candidate::{Candidate, Family},
     flight::Flight,
     multipliers,
 };
-use crate::Dimensionless;
 use crate::numerics::{bisection, golden_section};
+use crate::{Dimensionless, Resonance};
 
 /// Frequencies searched, over omega0.
 const SEARCHED: [f64; 2] = [0.2, 3.0];
 /// Points of the search; they are dense around omega0, where the detuning is of order one.
 const POINTS: usize = 30_000;
 
-/// All exact symmetric 1:1 orbits at phase resonance at the scene's G, by rising C; empty where there are none.
+/// All exact symmetric 1:1 orbits at resonance at the scene's G, by rising C; empty where there are none.
 ///
 /// Frequencies between 0.2 and 3 omega0 are searched on a grid of about 0.001 in the detuning where that is of
 /// order one, and every root is refined to the last bit.
@@ -23,8 +23,13 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
     let grid = grid(scene.epsilon);
     let mut orbits: Vec<Orbit> = (0..2)
         .flat_map(|branch| Branch { scene, branch }.frequencies(&grid))
+        .filter(resonates)
         .filter_map(|candidate| accept(scene, &candidate))
         .collect();
+    if scene.definition.resonance == Resonance::Peak {
+        let peak = |orbit: &Orbit| peak(scene, orbit, Condition::Excitation(scene.g));
+        orbits = orbits.iter().filter_map(peak).collect();
+    }
     orbits.sort_by(|one, other| one.c.total_cmp(&other.c));
     orbits.dedup_by(|one, other| (one.sigma - other.sigma).abs() < 1e-9 && (one.b - other.b).abs() < 1e-9);
     orbits
@@ -35,7 +40,35 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
 /// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.
 #[must_use]
 pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
-    candidates(scene, omega)
+    let orbits = Family::new(scene, omega)
+        .and_then(|family| family.phase_resonant())
+        .into_iter()
+        .flatten()
+        .filter(resonates)
+        .filter_map(|candidate| accept(scene, &candidate));
+    match scene.definition.resonance {
+        Resonance::Phase => orbits.collect(),
+        Resonance::Peak => orbits
+            .filter_map(|orbit| peak(scene, &orbit, Condition::Sigma(orbit.sigma)))
+            .collect(),
+    }
+}
+
+/// The orbit near a phase-resonant one whose amplitude is largest along its frequency response.
+fn peak(scene: &Dimensionless, near: &Orbit, condition: Condition) -> Option<Orbit> {
+    let conditions = [condition, Condition::Peak];
+    let found = Periodic::find(scene, &ImpactPattern::symmetric(), &near.unknowns(), conditions)?;
+    let scene = Dimensionless { g: found.g, ..*scene };
+    symmetric_orbits(&scene, found.sigma)
+        .into_iter()
+        .min_by(|one, other| (one.b - found.b).abs().total_cmp(&(other.b - found.b).abs()))
+}
+
+/// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.
+#[must_use]
+pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
+    Family::new(scene, 1.0 + scene.epsilon * sigma)
+        .and_then(|family| family.driven(scene.g))
         .into_iter()
         .flatten()
         .filter_map(|candidate| accept(scene, &candidate))
@@ -51,16 +84,18 @@ fn grid(epsilon: f64) -> Vec<f64> {
         .collect()
 }
 
-/// Keeps what is physical: the particle moves and stays inside its cavity, and the response lags the base.
+/// The response lags the base; without dissipation no base motion is needed, and no phase lag is defined.
+fn resonates(candidate: &Candidate) -> bool {
+    candidate.lags || candidate.g < 1e-12
+}
+
+/// Keeps what is physical: the particle moves and stays inside its cavity.
 fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
     let Candidate { omega, b, c, g, .. } = *candidate;
     let sizes = [b, c, g];
-    // Without dissipation no base motion is needed, and no phase lag is defined.
-    let conservative = g < 1e-12;
     let physical = sizes.iter().all(|size| size.is_finite())
         && b > 0.0
         && c > 1e-12
-        && (candidate.lags || conservative)
         && Flight::new(scene, candidate).stays_inside();
     if !physical {
         return None;
@@ -71,6 +106,7 @@ fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
         sigma: (omega - 1.0) / scene.epsilon,
         omega,
         c,
+        gamma: candidate.gamma,
         b,
         impact_velocity: 2.0 * b * (1.0 + scene.epsilon) / (1.0 + scene.r),
         start: candidate.after_impact(scene.epsilon),
@@ -87,7 +123,9 @@ struct Branch<'a> {
 
 impl Branch<'_> {
     fn at(&self, omega: f64) -> Option<Candidate> {
-        candidates(self.scene, omega).map(|both| both[self.branch])
+        Family::new(self.scene, omega)?
+            .phase_resonant()
+            .map(|both| both[self.branch])
     }
 
     /// G of the branch minus that of the scene.

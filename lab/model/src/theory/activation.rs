@@ -1,5 +1,7 @@
 //! Activation: the smallest excitation of a 1:1 regime.
 
+use std::f64::consts::FRAC_PI_2;
+
 use serde::Serialize;
 
 use crate::numerics::{bisection, golden_section};
@@ -12,7 +14,10 @@ use super::{
 /// Smallest base amplitudes G, over `b epsilon`, at one detuning (docs/theory.md, eq. 19).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Activation {
-    /// The linear response reaches the wall, C = 1: impacts begin by themselves, with the particle at rest.
+    /// The steady linear response reaches the wall, C = 1. Below, a particle at rest in the middle stays at rest once the start
+    /// of the drive is forgotten.
+    pub steady_linear: f64,
+    /// The beat after the drive is switched on reaches the wall: impacts begin from rest.
     pub from_rest: f64,
     /// Some 1:1 motion exists, stable or not.
     pub existence: f64,
@@ -47,6 +52,21 @@ impl SlowFlow {
             .any(|one| one.impacts_stable && one.slow_flow_stable)
     }
 
+    /// Largest amplitude of the linear response after the drive is switched on at rest, over the steady one: the largest
+    /// `|1 - exp(-(lambda/2 + i sigma) tau1)|`.
+    #[must_use]
+    pub fn overshoot(&self, sigma: f64) -> f64 {
+        if sigma == 0.0 {
+            return 1.0;
+        }
+        let size = |turned: f64| {
+            let left = (-0.5 * self.lambda * turned / sigma.abs()).exp();
+            (1.0 - left * turned.cos()).hypot(left * turned.sin())
+        };
+        // The first beat is the largest: every later one has decayed more.
+        size(golden_section(FRAC_PI_2, 3.0 * FRAC_PI_2, |turned| -size(turned))).max(1.0)
+    }
+
     /// The activation thresholds at the detuning `sigma`.
     #[must_use]
     pub fn activation(&self, sigma: f64) -> Activation {
@@ -57,7 +77,8 @@ impl SlowFlow {
         let range = (self.manifold.b_min(), B_SYMMETRY_BREAKING);
         let stable = smallest(range, |b| self.stable_at(sigma, b), g);
         Activation {
-            from_rest: self.lambda.hypot(2.0 * sigma),
+            steady_linear: self.lambda.hypot(2.0 * sigma),
+            from_rest: self.lambda.hypot(2.0 * sigma) / self.overshoot(sigma),
             // Where the two minima are one, rounding does not order them.
             existence: stable.map_or(all, |g| all.min(g)),
             stable,

@@ -6,12 +6,12 @@ use std::sync::{Arc, Mutex};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 
-use vines_net::{ControllerServer, ControllerService, RigServer, RigService, Session};
+use vines_net::{Address, Role, Served as Offered, Server, Service, Session};
 use vines_testbench::rig::{BuiltIn, Controller, Drive, GroundTruth, Rig, RigError, Sensors, Simulated};
 use vines_testbench::scene::{Override, PAPER, Scene};
 
 /// A free port of this machine.
-pub const ANYWHERE: &str = "127.0.0.1:0";
+const ANYWHERE: ([u8; 4], u16) = ([127, 0, 0, 1], 0);
 /// Time limit of a server.
 const LONGEST: Duration = Duration::from_secs(60);
 
@@ -23,7 +23,7 @@ pub fn scene(settings: &[&str]) -> Scene {
 
 /// A running server.
 pub struct Served {
-    pub address: SocketAddr,
+    pub address: Address,
     stop: Arc<AtomicBool>,
     sessions: Arc<Mutex<Vec<Session>>>,
     thread: Option<JoinHandle<()>>,
@@ -63,54 +63,55 @@ impl Drop for Served {
     }
 }
 
+/// Address of the socket, without the transport.
+pub fn socket(address: Address) -> SocketAddr {
+    match address {
+        Address::Tcp(socket) | Address::Udp(socket) => socket,
+    }
+}
+
 fn serve(
-    address: SocketAddr,
-    body: impl FnOnce(Box<dyn Fn() -> bool>, Box<dyn FnMut(&Session)>) + Send + 'static,
+    address: fn(SocketAddr) -> Address,
+    service: Service,
+    mut make: impl FnMut() -> Offered + Send + 'static,
 ) -> Served {
+    let mut server = Server::listen(address(ANYWHERE.into()), service).unwrap();
+    let address = server.address().unwrap();
     let (stop, sessions) = (Arc::new(AtomicBool::new(false)), Arc::default());
     let (flag, list) = (Arc::clone(&stop), Arc::<Mutex<Vec<Session>>>::clone(&sessions));
     let end = Instant::now() + LONGEST;
     let thread = std::thread::spawn(move || {
-        body(
-            Box::new(move || flag.load(Ordering::Relaxed) || Instant::now() >= end),
-            Box::new(move |session| list.lock().unwrap().push(session.clone())),
-        );
+        let stop = || flag.load(Ordering::Relaxed) || Instant::now() >= end;
+        let tell = |session: &Session| list.lock().unwrap().push(session.clone());
+        server.serve(|| Ok(make()), stop, tell).unwrap();
     });
     Served { address, stop, sessions, thread: Some(thread) }
 }
 
 /// Settings of a server for the plant of `scene`.
-pub fn service(scene: &Scene, paced: bool, silence: f64) -> RigService {
-    RigService {
+pub fn service(scene: &Scene, silence: f64) -> Service {
+    Service {
+        role: Role::Rig { max_amplitude: scene.plant.half_width },
         sample_time: scene.sample_time(),
-        paced,
         silence,
-        max_amplitude: scene.plant.half_width,
     }
 }
 
-/// Serves any rig.
-pub fn serve_rig(service: RigService, make: impl FnMut() -> Result<Box<dyn Rig>, RigError> + Send + 'static) -> Served {
-    let mut server = RigServer::listen(ANYWHERE.parse().unwrap(), service).unwrap();
-    serve(server.address().unwrap(), move |stop, tell| {
-        server.serve(make, stop, tell).unwrap();
-    })
+fn spied_rig(scene: &Scene, silence: f64, address: fn(SocketAddr) -> Address) -> (Served, Log) {
+    let (plant, log) = (Simulated::new(scene.plant, scene.start).unwrap(), Log::default());
+    let copy = Arc::clone(&log);
+    let make = move || Offered::Rig(Box::new(Spy(plant.clone(), Arc::clone(&copy))));
+    (serve(address, service(scene, silence), make), log)
 }
 
-/// Serves the plant of the scene in lock-step.
-pub fn lock_step_rig(scene: &Scene) -> Served {
-    let plant = Simulated::new(scene.plant, scene.start).unwrap();
-    serve_rig(service(scene, false, 5.0), move || Ok(Box::new(plant.clone())))
+/// Serves the plant of the scene in lock-step; the log contains every drive of the plant.
+pub fn lock_step_rig(scene: &Scene, silence: f64) -> (Served, Log) {
+    spied_rig(scene, silence, Address::Tcp)
 }
 
 /// Serves the plant of the scene in real time; the log contains every drive of the plant.
-pub fn paced_rig(scene: &Scene, silence: f64) -> (Served, Log) {
-    let (plant, log) = (Simulated::new(scene.plant, scene.start).unwrap(), Log::default());
-    let copy = Arc::clone(&log);
-    let served = serve_rig(service(scene, true, silence), move || {
-        Ok(Box::new(Spy(plant.clone(), Arc::clone(&copy))))
-    });
-    (served, log)
+pub fn real_time_rig(scene: &Scene, silence: f64) -> (Served, Log) {
+    spied_rig(scene, silence, Address::Udp)
 }
 
 /// Serves the controller of the scene.
@@ -125,11 +126,12 @@ pub fn serve_controller(
     silence: f64,
     mut make: impl FnMut() -> Box<dyn Controller> + Send + 'static,
 ) -> Served {
-    let service = ControllerService { sample_time: scene.sample_time(), silence };
-    let mut server = ControllerServer::listen(ANYWHERE.parse().unwrap(), service).unwrap();
-    serve(server.address().unwrap(), move |stop, tell| {
-        server.serve(|| Ok(make()), stop, tell).unwrap();
-    })
+    let service = Service {
+        role: Role::Controller,
+        sample_time: scene.sample_time(),
+        silence,
+    };
+    serve(Address::Tcp, service, move || Offered::Controller(make()))
 }
 
 /// The drives of a rig.

@@ -3,9 +3,10 @@
 use std::io::ErrorKind;
 use std::net::{SocketAddr, UdpSocket};
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
+use vines_net::Address;
 use vines_net::frame::{Frame, Kind};
 
 /// Treatment of a datagram.
@@ -32,9 +33,8 @@ const MOST: u64 = 200_000;
 /// A running proxy; it stops when it is dropped.
 pub struct Proxy {
     /// Address for clients.
-    pub address: SocketAddr,
+    pub address: Address,
     stop: Arc<AtomicBool>,
-    done: Arc<AtomicU64>,
 }
 
 impl Proxy {
@@ -46,14 +46,8 @@ impl Proxy {
             socket
         });
         let address = front.local_addr().unwrap();
-        let (stop, done) = (Arc::new(AtomicBool::new(false)), Arc::new(AtomicU64::new(0)));
-        let mut worker = Worker {
-            fate,
-            stranger,
-            done: Arc::clone(&done),
-            seen: [0; 2],
-            kept: [None, None],
-        };
+        let stop = Arc::new(AtomicBool::new(false));
+        let mut worker = Worker { fate, stranger, seen: [0; 2], kept: [None, None] };
         let stopped = Arc::clone(&stop);
         front.set_nonblocking(true).unwrap();
         back.set_nonblocking(true).unwrap();
@@ -78,12 +72,7 @@ impl Proxy {
                 }
             }
         });
-        Self { address, stop, done }
-    }
-
-    /// Number of datagrams with a treatment other than `Pass`.
-    pub fn done(&self) -> u64 {
-        self.done.load(Ordering::Relaxed)
+        Self { address: Address::Udp(address), stop }
     }
 }
 
@@ -107,7 +96,6 @@ fn receive(socket: &UdpSocket, bytes: &mut [u8]) -> Option<(usize, SocketAddr)> 
 struct Worker<F> {
     fate: F,
     stranger: UdpSocket,
-    done: Arc<AtomicU64>,
     seen: [u64; 2],
     kept: [Option<Vec<u8>>; 2],
 }
@@ -123,8 +111,6 @@ impl<F: FnMut(Kind, u64) -> Fate> Worker<F> {
         }
         let fate = (self.fate)(frame.kind, self.seen[direction]);
         self.seen[direction] += 1;
-        self.done
-            .fetch_add(u64::from(!matches!(fate, Fate::Pass)), Ordering::Relaxed);
         match fate {
             Fate::Pass => send(bytes),
             Fate::Lose => {}

@@ -4,18 +4,33 @@ use std::net::UdpSocket;
 use std::time::{Duration, Instant};
 
 use vines_net::frame::{Frame, Kind};
-use vines_net::{LinkError, NetController, NetRig, Refusal, RigServer};
+use vines_net::{Address, LinkError, NetController, NetRig, Refusal, Server};
 
-use crate::bench::{controller, lock_step_rig, scene, service};
+use crate::bench::{controller, lock_step_rig, real_time_rig, scene, service, socket};
 
 #[test]
 fn a_missing_server_is_reported_with_the_command_that_starts_it() {
     let silent = UdpSocket::bind("127.0.0.1:0").unwrap();
     let start = Instant::now();
-    let error = NetRig::connect(silent.local_addr().unwrap(), 1e-3).unwrap_err();
+    let place = silent.local_addr().unwrap();
+    for (error, command) in [
+        (
+            NetRig::connect(Address::Udp(place), 1e-3).unwrap_err(),
+            "vines rig --listen",
+        ),
+        (
+            NetRig::connect(Address::Tcp(place), 1e-3).unwrap_err(),
+            "vines rig --lock-step --listen",
+        ),
+        (
+            NetController::connect(place, 1e-3, None).unwrap_err(),
+            "vines controller --listen",
+        ),
+    ] {
+        assert!(matches!(error, LinkError::Unreachable { .. }));
+        assert!(error.to_string().contains(command), "{error}");
+    }
     assert!(start.elapsed() < Duration::from_secs(5));
-    assert!(matches!(error, LinkError::Unreachable { .. }));
-    assert!(error.to_string().contains("vines rig --listen"), "{error}");
 }
 
 #[test]
@@ -27,30 +42,30 @@ fn another_version_is_named_with_both_numbers() {
         other.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
         let (_, from) = other.recv_from(&mut bytes).unwrap();
         other
-            .send_to(b"VINE\x02\x00 and what follows in version 2", from)
+            .send_to(b"VINE\x03\x00 and what follows in version 3", from)
             .unwrap();
     });
-    let error = NetRig::connect(address, 1e-3).unwrap_err();
+    let error = NetRig::connect(Address::Udp(address), 1e-3).unwrap_err();
     newer.join().unwrap();
-    assert!(matches!(error, LinkError::Version { theirs: 2, .. }));
+    assert!(matches!(error, LinkError::Version { theirs: 3, .. }));
     let text = error.to_string();
-    assert!(text.contains("version 2") && text.contains("version 1"), "{text}");
+    assert!(text.contains("version 3") && text.contains("version 2"), "{text}");
 }
 
 #[test]
 fn a_client_of_another_version_is_informed_of_the_version_of_the_server() {
-    let server = lock_step_rig(&scene(&[]));
+    let (server, _) = real_time_rig(&scene(&[]), 1.0);
     let client = UdpSocket::bind("127.0.0.1:0").unwrap();
     client.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
     client
-        .send_to(b"VINE\x09\x00 hello from the future", server.address)
+        .send_to(b"VINE\x09\x00 hello from the future", socket(server.address))
         .unwrap();
     let mut bytes = [0; 256];
     let size = client.recv(&mut bytes).unwrap();
     let answer = Frame::decode(&bytes[..size]).unwrap();
     assert_eq!(
         (answer.kind, answer.values[..2].to_vec()),
-        (Kind::Refusal, vec![4.0, 1.0])
+        (Kind::Refusal, vec![4.0, 2.0])
     );
 }
 
@@ -64,18 +79,18 @@ fn refused(error: &LinkError) -> Refusal {
 #[test]
 fn a_rig_is_not_accepted_as_a_controller_nor_the_reverse() {
     let scene = scene(&[]);
-    let (rig, peer) = (lock_step_rig(&scene), controller(&scene, 5.0));
+    let ((rig, _), peer) = (lock_step_rig(&scene, 5.0), controller(&scene, 5.0));
     let sample_time = scene.sample_time();
     let error = NetRig::connect(peer.address, sample_time).unwrap_err();
     assert_eq!(refused(&error), Refusal::Role);
-    let error = NetController::connect(rig.address, sample_time, None).unwrap_err();
+    let error = NetController::connect(socket(rig.address), sample_time, None).unwrap_err();
     assert_eq!(refused(&error), Refusal::Role);
 }
 
 #[test]
 fn another_sample_time_is_refused_with_that_of_the_server() {
     let scene = scene(&[]);
-    let server = lock_step_rig(&scene);
+    let (server, _) = lock_step_rig(&scene, 5.0);
     let error = NetRig::connect(server.address, 2.0 * scene.sample_time()).unwrap_err();
     assert_eq!(refused(&error), Refusal::SampleTime(scene.sample_time()));
     assert!(error.to_string().contains("same scene"), "{error}");
@@ -84,19 +99,19 @@ fn another_sample_time_is_refused_with_that_of_the_server() {
 #[test]
 fn a_second_client_is_refused_during_the_session_of_the_first() {
     let scene = scene(&[]);
-    let server = lock_step_rig(&scene);
-    let _first = NetRig::connect(server.address, scene.sample_time()).unwrap();
-    let error = NetRig::connect(server.address, scene.sample_time()).unwrap_err();
-    assert_eq!(refused(&error), Refusal::Busy);
+    for (server, _) in [lock_step_rig(&scene, 10.0), real_time_rig(&scene, 10.0)] {
+        let mut first = NetRig::connect(server.address, scene.sample_time()).unwrap();
+        let error = NetRig::connect(server.address, scene.sample_time()).unwrap_err();
+        assert_eq!(refused(&error), Refusal::Busy);
+        crate::bench::shake(&mut first, &scene, 10).unwrap();
+    }
 }
 
 #[test]
 fn a_port_in_use_is_named() {
     let scene = scene(&[]);
-    let first = lock_step_rig(&scene);
-    let error = RigServer::listen(first.address, service(&scene, false, 1.0))
-        .err()
-        .unwrap();
+    let (first, _) = lock_step_rig(&scene, 5.0);
+    let error = Server::listen(first.address, service(&scene, 1.0)).err().unwrap();
     assert!(error.to_string().contains(&first.address.to_string()), "{error}");
     assert!(matches!(error, LinkError::Listen { .. }));
 }
@@ -104,7 +119,7 @@ fn a_port_in_use_is_named() {
 #[test]
 fn a_server_stopped_by_its_owner_reports_the_session_it_had() {
     let scene = scene(&[]);
-    let server = lock_step_rig(&scene);
+    let (server, _) = lock_step_rig(&scene, 5.0);
     let mut rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
     crate::bench::shake(&mut rig, &scene, 10).unwrap();
     let sessions = server.stop();

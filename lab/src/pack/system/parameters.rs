@@ -37,7 +37,7 @@ pub(super) fn step(scene: &Scene) -> f64 {
 pub(super) fn controller(scene: &Scene) -> Result<Vec<Named>, PackError> {
     let config = scene.controller_config();
     config.build()?;
-    let parameters = PARAMETERS.iter().filter(|parameter| parameter.is_in_fmu());
+    let parameters = PARAMETERS.iter();
     Ok(parameters
         .map(|parameter| (parameter.name, parameter.get(&config)))
         .chain([("active", Boolean(true))])

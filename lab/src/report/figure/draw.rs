@@ -7,7 +7,7 @@ use plotters::coord::{Shift, types::RangedCoordf64};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{FINE, Figure, FigureError, KeyEntry, Kind, Panel, Place, Series, line};
+use super::{FINE, Figure, FigureError, KeyEntry, Kind, Mark, Panel, Place, Series, line};
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
@@ -198,15 +198,19 @@ fn draw_key(area: &Area, entries: &[KeyEntry]) -> Drawn {
     let mut y = at(80);
     let name = (FONT, px(15)).into_text_style(area);
     for entry in entries {
-        if let Some((colour, letter, ink)) = entry.swatch {
-            let corners = [(at(6), y), (at(36), y + at(18))];
-            area.draw(&Rectangle::new(corners, colour.filled()))?;
-            area.draw(&Rectangle::new(corners, line(BLACK, 10)))?;
-            let font = (FONT, px(14)).into_text_style(area).color(&ink).pos(CENTRE);
-            area.draw_text(letter, &font, (at(21), y + at(9)))?;
-        } else {
-            let ends = vec![(at(6), y + at(9)), (at(36), y + at(9))];
-            area.draw(&PathElement::new(ends, line(BLACK, 22)))?;
+        match entry.mark {
+            Mark::Swatch(colour, letter, ink) => {
+                let corners = [(at(6), y), (at(36), y + at(18))];
+                area.draw(&Rectangle::new(corners, colour.filled()))?;
+                area.draw(&Rectangle::new(corners, line(BLACK, 10)))?;
+                let font = (FONT, px(14)).into_text_style(area).color(&ink).pos(CENTRE);
+                area.draw_text(letter, &font, (at(21), y + at(9)))?;
+            }
+            Mark::Line(colour) => {
+                let ends = vec![(at(6), y + at(9)), (at(36), y + at(9))];
+                area.draw(&PathElement::new(ends, line(colour, 22)))?;
+            }
+            Mark::Dot => area.draw(&Circle::new((at(21), y + at(9)), px(2), BLACK.filled()))?,
         }
         area.draw_text(entry.name, &name, (at(46), y + at(2)))?;
         y += at(27);

@@ -2,12 +2,12 @@
 
 use plotters::chart::SeriesLabelPosition;
 
-use super::{DECAY_LABEL, THINNED, decay_points, locked_point};
+use super::{DECAY_LABEL, THINNED, decay_points, error_bars, locked_point};
 use crate::comparison::Comparison;
 use crate::numerics::range;
 use crate::orbit::{self, Limits};
 use crate::report::figure::{AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, caption, clipped, line, thinned};
-use crate::report::theme::{EXACT, FAINT, THEORY, UNSTABLE};
+use crate::report::theme::{EXACT, FAINT, LOCK, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
 use crate::theory::{BranchSide, SlowFlow};
 
@@ -41,6 +41,33 @@ pub fn figure(found: &Comparison) -> Figure {
     let decay = decay.map(|point| (point.sigma, point.c));
     let inside = decay.filter(|(sigma, _)| (low..=high).contains(sigma));
     decay_points(&mut panel, inside, DECAY_LABEL);
+    let steady = found
+        .decay
+        .iter()
+        .map(|one| one.point)
+        .step_by(THINNED)
+        .filter(|point| point.c > fold);
+    let steady = steady.filter_map(|point| Some(((point.sigma_steady?, point.c), 1.96 * point.u_sigma_steady?)));
+    let steady: Vec<_> = steady
+        .filter(|((sigma, _), half)| sigma - half >= low && sigma + half <= high)
+        .collect();
+    panel.crosses(
+        steady.iter().map(|(place, _)| *place).collect(),
+        line(LOCK, 12),
+        "free decay, corrected for the drift",
+    );
+    error_bars(&mut panel, steady.into_iter(), false);
+    let lock = &found.lock;
+    error_bars(
+        &mut panel,
+        std::iter::once(((lock.sigma, lock.c), 1.96 * lock.u_sigma)),
+        false,
+    );
+    error_bars(
+        &mut panel,
+        std::iter::once(((lock.sigma, lock.c), 1.96 * lock.u_c)),
+        true,
+    );
     locked_point(&mut panel, (found.lock.sigma, found.lock.c));
     Figure::single(panel)
 }

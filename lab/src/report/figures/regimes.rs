@@ -1,10 +1,13 @@
 //! The regime map: coloured cells, a letter on each region, and the theory's stable island.
 
-use plotters::style::{BLACK, WHITE};
+use plotters::style::{BLACK, Color, WHITE};
 
 use crate::map::{Axis as MapAxis, Map, Range, outline};
+use crate::orbit::{Bifurcation, BifurcationCurve, Periodic};
 use crate::regime::Regime;
-use crate::report::figure::{Axis, DETUNING, Figure, FigureError, KeyEntry, Panel, Place, line};
+use crate::report::figure::{
+    Axis, DETUNING, Figure, FigureError, KeyEntry, Mark, Marked, Panel, Place, clipped, line, thinned,
+};
 use crate::report::theme;
 
 /// Size of the figure, px, and how much of its width belongs to the axes; the key stands beside them.
@@ -38,6 +41,19 @@ fn figure(map: &Map) -> Figure {
     let segments = outline(plan);
     panel.segments(segments.clone(), line(WHITE, 50));
     panel.segments(segments, line(BLACK, 22));
+    for curve in &map.curves {
+        draw_curve(&mut panel, map, curve);
+    }
+    let several = map
+        .cells
+        .iter()
+        .enumerate()
+        .filter(|(_, cell)| !cell.coexisting.is_empty());
+    let dots: Vec<Place> = several
+        .map(|(n, _)| (plan.x.at(n % plan.x.points), plan.y.at(n / plan.x.points)))
+        .collect();
+    let dotted = !dots.is_empty();
+    panel.circles(dots, 1, BLACK.filled(), "");
     for (regime, place) in letters(map) {
         let ink = theme::on_regime(regime);
         panel.centred_text(letter(regime).into(), place, 17, ink);
@@ -47,11 +63,57 @@ fn figure(map: &Map) -> Figure {
     let mut key: Vec<KeyEntry> = shown
         .map(|one| KeyEntry {
             name: one.name(),
-            swatch: Some((theme::regime(one), letter(one), theme::on_regime(one))),
+            mark: Mark::Swatch(theme::regime(one), letter(one), theme::on_regime(one)),
         })
         .collect();
-    key.push(KeyEntry { name: "stable 1:1, theory", swatch: None });
+    key.push(KeyEntry { name: "stable 1:1, theory", mark: Mark::Line(BLACK) });
+    let kinds = [
+        Bifurcation::Fold,
+        Bifurcation::SymmetryBreaking,
+        Bifurcation::PeriodDoubling,
+        Bifurcation::Torus,
+    ];
+    for kind in kinds
+        .into_iter()
+        .filter(|kind| map.curves.iter().any(|curve| curve.kind == *kind))
+    {
+        key.push(KeyEntry {
+            name: kind.name(),
+            mark: Mark::Line(theme::bifurcation(kind)),
+        });
+    }
+    if dotted {
+        key.push(KeyEntry { name: "several regimes", mark: Mark::Dot });
+    }
     Figure::new(SIZE, vec![panel]).with_key(key)
+}
+
+/// A bifurcation curve, solid where it bounds the stability of a motion.
+fn draw_curve(panel: &mut Panel, map: &Map, curve: &BifurcationCurve) {
+    let swapped = map.plan.x.axis == MapAxis::G;
+    let place = |one: &Periodic| {
+        if swapped {
+            (one.g, one.sigma)
+        } else {
+            (one.sigma, one.g)
+        }
+    };
+    let points: Vec<Marked> = curve
+        .branch
+        .points
+        .iter()
+        .map(|one| (place(one), one.bounds_stability()))
+        .collect();
+    let (x, y) = (map.plan.x, map.plan.y);
+    let colour = theme::bifurcation(curve.kind);
+    for piece in clipped(&points, (x.from, x.to), (y.from, y.to)) {
+        panel.curve(piece.iter().map(|one| one.0).collect(), line(WHITE, 36), "");
+        panel.pieces(
+            &thinned(&piece, (x.from, x.to), (y.from, y.to)),
+            [line(colour, 22), line(colour, 12)],
+            ["", ""],
+        );
+    }
 }
 
 fn caption(map: &Map) -> String {
@@ -65,11 +127,11 @@ fn caption(map: &Map) -> String {
             MapAxis::R => format!(", r = {}", plan.scene.r),
         });
     format!(
-        "ε = {:.5}, λ = {:.3}{}; each cell from the same start, {} periods after it",
+        "ε = {:.5}, λ = {:.3}{}; each cell from the same start, followed until it repeats, at most {} periods",
         plan.scene.epsilon,
         plan.scene.lambda,
         held.collect::<String>(),
-        plan.settle
+        plan.limit
     )
 }
 
@@ -87,9 +149,10 @@ fn letter(regime: Regime) -> &'static str {
         Regime::Symmetric => "S",
         Regime::Asymmetric => "A",
         Regime::Several => "n",
+        Regime::QuasiPeriodic => "Q",
         Regime::Modulated => "M",
         Regime::Chaotic => "C",
-        Regime::Sticking => "K",
+        Regime::Undecided => "U",
         Regime::Other | Regime::Unresolved | Regime::Unknown => "?",
     }
 }

@@ -1,4 +1,4 @@
-//! Frequency responses at several excitations, exact and first-order, with the backbone through their maxima.
+//! Frequency responses at several excitations, exact and first-order, with the backbone near their maxima.
 
 use plotters::chart::SeriesLabelPosition;
 use plotters::style::BLACK;
@@ -17,7 +17,8 @@ pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
     let flow = SlowFlow::new(p.lambda, p.r);
     let top = responses
         .iter()
-        .flat_map(|one| &one.symmetric.points)
+        .flat_map(Response::symmetric)
+        .flat_map(|one| &one.points)
         .filter(|one| one.b > flow.manifold.b_min())
         .fold(0.6, |most: f64, one| most.max(1.08 * one.c));
     let (x, y) = (DETUNINGS, (0.0, top));
@@ -35,7 +36,10 @@ pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
     for (n, response) in responses.iter().enumerate() {
         add_response(&mut panel, &flow, response, (x, y));
         // The label is below the left end of the curve, where the figure is empty.
-        let stable = response.symmetric.points.iter().filter(|one| one.stable);
+        let stable = response
+            .symmetric()
+            .flat_map(|one| &one.points)
+            .filter(|one| one.stable);
         let end = stable.min_by(|one, other| one.sigma.total_cmp(&other.sigma));
         if let Some(end) = end {
             let left = end.sigma.clamp(x.0 + 0.7, x.1);
@@ -69,7 +73,7 @@ fn add_response(panel: &mut Panel, flow: &SlowFlow, response: &Response, (x, y):
         }
     }
     let styles = [line(EXACT, 30), line(FAINT, 14)];
-    for branch in std::iter::once(&response.symmetric).chain(&response.asymmetric) {
+    for branch in response.components.iter().map(|one| &one.branch) {
         for piece in clipped(&marked(branch), x, y) {
             let labels = ["exact, stable", "exact, unstable"];
             panel.pieces(&thinned(&piece, x, y), styles, labels);

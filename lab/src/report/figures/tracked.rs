@@ -2,7 +2,7 @@
 
 use plotters::chart::SeriesLabelPosition;
 
-use super::{backbone::add_backbones, decay_points};
+use super::{backbone::add_backbones, decay_points, error_bars};
 use crate::backbone::Point;
 use crate::comparison::TrackedComparison;
 use crate::numerics::range;
@@ -40,6 +40,11 @@ fn amplitude_panel(tracked: &TrackedComparison) -> Panel {
     add_backbones(&mut panel, p, x, (0.0, top));
     let place = |one: Point| (one.sigma, one.c);
     decay_points(&mut panel, all.clone().map(place), "tracked");
+    error_bars(
+        &mut panel,
+        all.clone().map(|one| (place(one), 1.96 * one.u_sigma)),
+        false,
+    );
     let unsettled: Vec<_> = all.filter(|one| !one.settled).map(place).collect();
     if !unsettled.is_empty() {
         panel.crosses(unsettled, line(DECAY, 20), "not settled in time");
@@ -68,6 +73,7 @@ fn drive_panel(tracked: &TrackedComparison) -> Panel {
     panel.dashed(theory, line(THEORY, 20), "first-order theory");
     let exact = exact.filter(inside).collect();
     panel.curve(exact, line(EXACT, 16), "exact orbits");
-    decay_points(&mut panel, all.map(|one| (one.c, one.g)), "tracked");
+    decay_points(&mut panel, all.clone().map(|one| (one.c, one.g)), "tracked");
+    error_bars(&mut panel, all.map(|one| ((one.c, one.g), 1.96 * one.u_g)), true);
     panel
 }

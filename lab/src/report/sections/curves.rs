@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{SectionError, Subject};
-use crate::orbit::{Bifurcation, Branch, Limits, Periodic, Response, backbone, response};
+use crate::orbit::{Branch, Exploration, Limits, Periodic, Response, backbone, response};
 use crate::report::figures::{period, responses};
 use crate::report::files::csv;
 use crate::report::section::Section;
@@ -34,7 +34,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     let excitations = excitations(&p);
     let mut found: Vec<Response> = Vec::new();
     for (n, g) in excitations.iter().enumerate() {
-        found.extend(response(&Dimensionless { g: *g, ..p }, &limits));
+        found.push(response(&Dimensionless { g: *g, ..p }, &limits, Exploration::default()));
         done((n + 1) as f64 / (excitations.len() + 1) as f64);
     }
     let Some(curve) = backbone(&p, &limits) else {
@@ -42,10 +42,10 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         return Ok(section);
     };
     describe_backbone(&mut section, &curve);
-    if !found.is_empty() {
+    if found.iter().any(|one| !one.components.is_empty()) {
         section.figure(
             "responses",
-            "Frequency responses at several excitations: exact, first-order, and the backbone of the theory through their maxima. \
+            "Frequency responses at several excitations: exact, first-order, and the backbone of the theory near their maxima. \
              Where a response loses its symmetry, the asymmetric motions (blue, beside the dashed curve) take over.",
             responses::figure(&p, &found).svg()?,
         );
@@ -78,7 +78,7 @@ fn describe_backbone(section: &mut Section, curve: &Branch) {
         .iter()
         .map(|one| {
             let Periodic { sigma, c, g, .. } = one.motion;
-            format!("{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}", name(one.kind))
+            format!("{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}", one.name())
         })
         .collect();
     section.finding = format!(
@@ -103,12 +103,14 @@ fn describe_backbone(section: &mut Section, curve: &Branch) {
 
 /// Where stability changes on the responses.
 fn changes(found: &[Response]) -> Table {
-    let all = found
-        .iter()
-        .flat_map(|one| one.symmetric.special.iter().map(|special| (one.g, special)));
+    let all = found.iter().flat_map(|one| {
+        one.symmetric()
+            .flat_map(|branch| &branch.special)
+            .map(|special| (one.g, special))
+    });
     Table::new(["G", "what", "σ", "C", "B"]).rows(all.map(|(g, special)| {
         let Periodic { sigma, c, b, .. } = special.motion;
-        let mut cells = vec![format!("{g:.4}"), name(special.kind).into()];
+        let mut cells = vec![format!("{g:.4}"), special.name().into()];
         cells.extend([sigma, c, b].map(|one| format!("{one:.5}")));
         cells
     }))
@@ -118,7 +120,10 @@ fn changes(found: &[Response]) -> Table {
 fn locked<'a>(p: &Dimensionless, found: &'a [Response]) -> Option<&'a Periodic> {
     let distance = |one: &Periodic| (one.g - p.g).abs() + (one.gamma + std::f64::consts::FRAC_PI_2).abs();
     let response = found.iter().find(|one| one.g == p.g)?;
-    let stable = response.symmetric.points.iter().filter(|one| one.stable);
+    let stable = response
+        .symmetric()
+        .flat_map(|one| &one.points)
+        .filter(|one| one.stable);
     stable.min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
 
@@ -133,15 +138,6 @@ fn excitations(p: &Dimensionless) -> Vec<f64> {
     list.sort_by(f64::total_cmp);
     list.dedup_by(|one, other| (*one - *other).abs() < 0.03 * breaking);
     list
-}
-
-fn name(kind: Bifurcation) -> &'static str {
-    match kind {
-        Bifurcation::Fold => "fold",
-        Bifurcation::SymmetryBreaking => "symmetry breaking",
-        Bifurcation::PeriodDoubling => "period doubling",
-        Bifurcation::Torus => "torus (modulation begins)",
-    }
 }
 
 fn table(backbone: &Branch, responses: &[Response]) -> Vec<Row> {
@@ -160,9 +156,8 @@ fn table(backbone: &Branch, responses: &[Response]) -> Vec<Row> {
     };
     let mut all = rows("backbone".into(), backbone);
     for response in responses {
-        all.extend(rows(format!("response G={:.4}", response.g), &response.symmetric));
-        for branch in &response.asymmetric {
-            all.extend(rows(format!("asymmetric G={:.4}", response.g), branch));
+        for one in &response.components {
+            all.extend(rows(format!("G={:.4}: {}", response.g, one.name), &one.branch));
         }
     }
     all

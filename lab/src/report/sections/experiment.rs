@@ -6,7 +6,7 @@ use std::error::Error;
 use super::{SectionError, Subject};
 use crate::comparison::{COMPARED_ABOVE, Comparison};
 use crate::experiment::{self, ExperimentError, Plan, Record, Stage};
-use crate::identification::identify;
+use crate::identification::{DecayEnd, identify};
 use crate::report::figures::{backbone, history, manifold};
 use crate::report::files::{decay_csv, json};
 use crate::report::section::Section;
@@ -96,12 +96,24 @@ fn describe(section: &mut Section, found: &Comparison, target: f64) {
     describe_lock(section, found);
     if let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) {
         section.words(format!(
-            "Then the drive was switched off. The motion decayed from C = {:.4} to C = {:.4}, where the impacts lost synchrony. \
+            "Then the drive was switched off. The motion decayed from C = {:.4} to C = {:.4} ({} ended the points). \
              During the decay it moved along the backbone, and {} points of the backbone were identified.",
             first.point.c,
             last.point.c,
+            match found.decay_end {
+                DecayEnd::Synchrony => "the loss of synchrony",
+                DecayEnd::Fold => "the fold of the backbone",
+                DecayEnd::Record => "the end of the record",
+            },
             found.decay.len()
         ));
+    }
+    if let Some((raw, steady)) = found.rms_sigma_exact.zip(found.rms_steady_exact) {
+        section.budget(
+            "decay against the exact backbone",
+            format!("RMS {raw:.4} in σ over C > {COMPARED_ABOVE}; corrected for the drift: {steady:.4}"),
+            "The impacts follow a falling amplitude late. The correction is of first order in its rate; it is derived, not fitted.",
+        );
     }
     if let Some(rms) = found.rms_sigma_error {
         section.budget(
@@ -134,7 +146,10 @@ fn describe_lock(section: &mut Section, found: &Comparison) {
         section.budget(
             "lock, measured against the exact orbit",
             format!("{sigma:.1e} in σ, {:.3} % in C", percent(lock.c, exact.c)),
-            "The loop is released as soon as its drifts are below the limits of the scene; a longer wait brings it closer.",
+            &format!(
+                "Standard uncertainties: {:.1e} in σ, {:.1e} in C. The rest of the approach is extrapolated.",
+                lock.u_sigma, lock.u_c
+            ),
         );
     }
     if let Some(theory) = &found.theory {

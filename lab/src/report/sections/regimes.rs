@@ -3,16 +3,13 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::{SectionError, Subject};
-use crate::map::{Axis, Map, Plan};
+use crate::map::{Axis, LIMIT, Map, Plan};
 use crate::orbit::phase_resonant;
 use crate::regime::Regime;
 use crate::report::figures::regimes;
-use crate::report::files::map_csv;
+use crate::report::files::{bifurcations_csv, map_csv};
 use crate::report::section::Section;
 use crate::report::table::Table;
-
-/// Periods before the record, and periods recorded.
-const PERIODS: (usize, usize) = (400, 100);
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
     let mut section = Section::new("Regimes of the driven response");
@@ -26,8 +23,8 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         start: subject.scene.dimensionless_start(),
         x,
         y,
-        settle: PERIODS.0,
-        record: PERIODS.1,
+        limit: LIMIT,
+        starts: 1,
     };
     let (count, all) = (AtomicUsize::new(0), plan.cells());
     let map = plan.run(|| {
@@ -37,16 +34,18 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     describe(&mut section, &map);
     section.figure(
         "regimes",
-        "The regime map. The line is the border of the island in which first-order theory has a stable symmetric 1:1 motion.",
+        "The regime map. The black line is the border of the island in which first-order theory has a stable symmetric 1:1 motion. The \
+         coloured curves are exact bifurcations of the 1:1 motions, solid where they bound the stability of one.",
         regimes::svg(&map)?,
     );
     section.budget(
         "regime map",
         "one start per cell".into(),
-        "Where several regimes are stable, the start decides. Cells at a border may still be in a transient, \
-         and chaos that ends only after thousands of periods counts as lasting.",
+        "Where several regimes are stable, the start decides. Chaos that ends only after more periods than were simulated counts \
+         as lasting; docs/regimes.md says how often that happens.",
     );
     section.attach("regimes.csv", map_csv(&map)?);
+    section.attach("bifurcations.csv", bifurcations_csv(&map)?);
     Ok(section)
 }
 
@@ -60,10 +59,11 @@ fn describe(section: &mut Section, map: &Map) {
         percent(agree, inside)
     );
     section.words(format!(
-        "Each cell of the map over {} and {} is one plant, driven from the scene's start at a fixed frequency. After {} periods, \
-         the impacts of the next {} periods are classified by the pattern that repeats. Without such a pattern, the response is \
-         modulated if it is captured into 1:1 resonance and lost again, or if a small disturbance does not grow; otherwise it is chaotic.",
-        map.plan.x, map.plan.y, PERIODS.0, PERIODS.1
+        "Each cell of the map over {} and {} is one plant, driven from the scene's start at a fixed frequency until it repeats itself, \
+         at most for {} periods. A motion that has not repeated itself by then is chaotic if its largest Lyapunov exponent exceeds zero by \
+         four standard errors, modulated if also a fifth of its impacts or more are captured into 1:1 resonance for a while, \
+         quasi-periodic if the exponent is zero within its uncertainty, and otherwise undecided.",
+        map.plan.x, map.plan.y, LIMIT
     ));
     let rows = Regime::SIMULATED.into_iter().map(|regime| {
         let (cells, here) = map.count(regime);

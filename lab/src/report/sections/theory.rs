@@ -6,7 +6,7 @@ use crate::report::figures::{approach, backbones};
 use crate::report::files::csv;
 use crate::report::section::Section;
 use crate::report::table::Table;
-use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};
+use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, resonant};
 
 /// Halvings of epsilon in the convergence study.
 const HALVINGS: u32 = 6;
@@ -15,7 +15,7 @@ pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Sectio
     let mut section = Section::new("First-order theory and its accuracy");
     let p = subject.scene.dimensionless();
     let flow = SlowFlow::new(p.lambda, p.r);
-    let stable = flow.phase_resonant(p.g).into_iter().find(|one| one.stable());
+    let stable = resonant(&p).into_iter().find(|one| one.stable());
     section.words(format!(
         "In the theory, the motions lie on the slow invariant manifold C² = R²B² + (1 − πB/2)², R = (1 − r)/(1 + r). Its fold is at \
          C = {:.4}, B = {:.4}. Two symmetric impacts per period are stable from there to B = {B_SYMMETRY_BREAKING:.4}, for every r. \
@@ -70,8 +70,8 @@ fn describe_activation(section: &mut Section, flow: &SlowFlow, sigma: f64) {
         format!("needs less, G = {g:.4}, but only a particle that is already moving reaches it")
     });
     section.words(format!(
-        "How much base motion is needed? At σ = {sigma:.4}, impacts start from rest at G = {:.4}, where the linear response reaches \
-         the wall. A stable 1:1 motion {stable}.",
-        activation.from_rest
+        "How much base motion is needed? At σ = {sigma:.4}, the steady linear response reaches the wall at G = {:.4}. When the drive is \
+         switched on at rest, the first beat is larger than that: impacts start at G = {:.4}. A stable 1:1 motion {stable}.",
+        activation.steady_linear, activation.from_rest
     ));
 }

@@ -19,9 +19,16 @@ struct Row {
     sigma: f64,
     #[serde(rename = "G")]
     g: f64,
+    #[serde(rename = "u_C")]
+    u_c: f64,
+    u_sigma: f64,
+    #[serde(rename = "u_G")]
+    u_g: f64,
     periods: f64,
     settled: bool,
-    distance: Option<f64>,
+    sigma_less_exact: Option<f64>,
+    #[serde(rename = "G_less_exact")]
+    g_less_exact: Option<f64>,
 }
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
@@ -64,8 +71,8 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     if let Some(worst) = tracked.worst() {
         section.budget(
             "tracked backbone against the exact one",
-            format!("at most {worst:.1e} in C, σ and G"),
-            "Largest of the three differences from the nearest place on the exact curve, over all points.",
+            format!("at most {:.1e} in σ and G", worst.at_equal_c),
+            "Largest difference from the exact curve at the same C, over all settled points.",
         );
     }
     let rows = tracked.points.iter().map(|one| Row {
@@ -74,7 +81,11 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         g: one.point.g,
         periods: one.point.periods,
         settled: one.point.settled,
-        distance: one.exact.map(|exact| exact.nearest),
+        u_c: one.point.u_c,
+        u_sigma: one.point.u_sigma,
+        u_g: one.point.u_g,
+        sigma_less_exact: one.exact.and_then(|exact| exact.sigma),
+        g_less_exact: one.exact.and_then(|exact| exact.g),
     });
     section.attach("tracked.csv", csv(rows)?);
     Ok(section)

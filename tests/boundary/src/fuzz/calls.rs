@@ -9,7 +9,7 @@ use std::ptr::null_mut;
 
 use fmi2_component::Status;
 
-use super::Dice;
+use super::RandomSource;
 use crate::functions::Raw;
 use crate::master::{Interface, Master};
 use arguments::MOST;
@@ -55,23 +55,23 @@ impl<'a> Caller<'a> {
     }
 
     /// Makes a call; answers which, and its status.
-    pub fn call(&mut self, dice: &mut Dice) -> (&'static str, Status) {
+    pub fn call(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         // Now and then the other interface's.
-        let exchange = (self.interface == Interface::ModelExchange) != dice.one_in(12);
-        match dice.roll(16) {
-            0..=3 => self.values(dice),
-            4 => self.states(dice),
-            5..=6 => self.derivatives(dice),
-            7 => self.status(dice),
-            8..=10 => self.life(dice),
-            _ if exchange => self.exchange(dice),
-            _ => self.step(dice),
+        let exchange = (self.interface == Interface::ModelExchange) != random.one_in(12);
+        match random.below(16) {
+            0..=3 => self.values(random),
+            4 => self.states(random),
+            5..=6 => self.derivatives(random),
+            7 => self.status(random),
+            8..=10 => self.life(random),
+            _ if exchange => self.exchange(random),
+            _ => self.step(random),
         }
     }
 
-    fn references(&self, dice: &mut Dice, kind: usize) -> [u32; MOST] {
+    fn references(&self, random: &mut RandomSource, kind: usize) -> [u32; MOST] {
         // Now and then of another type.
-        let kind = if dice.one_in(12) { dice.roll(3) } else { kind };
-        std::array::from_fn(|_| self.known[kind][dice.roll(self.known[kind].len())])
+        let kind = if random.one_in(12) { random.below(3) } else { kind };
+        std::array::from_fn(|_| self.known[kind][random.below(self.known[kind].len())])
     }
 }

@@ -7,38 +7,38 @@ use fmi2_component::Status;
 
 use super::Caller;
 use super::arguments::WILD;
-use crate::fuzz::Dice;
+use crate::fuzz::RandomSource;
 
 impl Caller<'_> {
-    pub(super) fn life(&mut self, dice: &mut Dice) -> (&'static str, Status) {
+    pub(super) fn life(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
         let categories = [c"logAll".as_ptr(), c"\xfe%s".as_ptr(), null()];
-        let number = |dice: &mut Dice| {
-            if dice.one_in(4) { dice.pick(&WILD) } else { 0.0 }
+        let number = |random: &mut RandomSource| {
+            if random.one_in(4) { random.pick(&WILD) } else { 0.0 }
         };
         // Mostly what is in order.
-        let wanted = if dice.one_in(4) { dice.roll(6) } else { self.stage };
+        let wanted = if random.one_in(4) { random.below(6) } else { self.stage };
         // SAFETY: as the standard asks.
         let (name, status) = unsafe {
             match wanted {
                 0 => {
-                    self.time = number(dice);
-                    let (stop, defined) = (number(dice), c_int::from(dice.one_in(6)));
+                    self.time = number(random);
+                    let (stop, defined) = (number(random), c_int::from(random.one_in(6)));
                     (
                         "fmi2SetupExperiment",
-                        (f.fmi2SetupExperiment)(c, 1, number(dice), self.time, defined, stop),
+                        (f.fmi2SetupExperiment)(c, 1, number(random), self.time, defined, stop),
                     )
                 }
                 1 => ("fmi2EnterInitializationMode", (f.fmi2EnterInitializationMode)(c)),
                 2 => ("fmi2ExitInitializationMode", (f.fmi2ExitInitializationMode)(c)),
                 3 | 4 => {
-                    let (on, count) = (dice.roll(2) as c_int, dice.roll(4));
+                    let (on, count) = (random.below(2) as c_int, random.below(4));
                     (
                         "fmi2SetDebugLogging",
                         (f.fmi2SetDebugLogging)(c, on, count, categories.as_ptr()),
                     )
                 }
-                _ if dice.one_in(8) => ("fmi2Terminate", (f.fmi2Terminate)(c)),
+                _ if random.one_in(8) => ("fmi2Terminate", (f.fmi2Terminate)(c)),
                 _ => ("fmi2Reset", (f.fmi2Reset)(c)),
             }
         };
@@ -52,14 +52,14 @@ impl Caller<'_> {
         (name, status)
     }
 
-    pub(super) fn states(&mut self, dice: &mut Dice) -> (&'static str, Status) {
+    pub(super) fn states(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
-        let known = &mut self.states[dice.roll(3)];
-        let made_up = dice.pick(&[*known, *known, null_mut(), without_provenance_mut(3)]);
+        let known = &mut self.states[random.below(3)];
+        let made_up = random.pick(&[*known, *known, null_mut(), without_provenance_mut(3)]);
         let mut size = 0;
         // SAFETY: the blob is as long as it is said to be.
         unsafe {
-            match dice.roll(6) {
+            match random.below(6) {
                 0 => ("fmi2GetFMUstate", (f.fmi2GetFMUstate)(c, known)),
                 1 => ("fmi2SetFMUstate", (f.fmi2SetFMUstate)(c, made_up)),
                 2 => ("fmi2FreeFMUstate", (f.fmi2FreeFMUstate)(c, known)),
@@ -70,15 +70,15 @@ impl Caller<'_> {
                 4 => {
                     self.blob = vec![0; 4000];
                     let bytes = self.blob.as_mut_ptr();
-                    let size = dice.pick(&[0, 10, self.blob.len()]);
+                    let size = random.pick(&[0, 10, self.blob.len()]);
                     (
                         "fmi2SerializeFMUstate",
                         (f.fmi2SerializeFMUstate)(c, made_up, bytes, size),
                     )
                 }
                 _ => {
-                    if let Some(byte) = self.blob.get_mut(dice.roll(4000)) {
-                        *byte ^= dice.pick(&[0, 0, 1, 0x80]);
+                    if let Some(byte) = self.blob.get_mut(random.below(4000)) {
+                        *byte ^= random.pick(&[0, 0, 1, 0x80]);
                     }
                     let (bytes, size) = (self.blob.as_ptr(), self.blob.len());
                     (
@@ -90,13 +90,13 @@ impl Caller<'_> {
         }
     }
 
-    pub(super) fn status(&mut self, dice: &mut Dice) -> (&'static str, Status) {
+    pub(super) fn status(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
-        let kind = dice.roll(6) as c_int - 1;
+        let kind = random.below(6) as c_int - 1;
         let (mut real, mut integer, mut string, mut status) = (0.0, 0, null(), Status::Ok);
         // SAFETY: one place each.
         unsafe {
-            match dice.roll(5) {
+            match random.below(5) {
                 0 => ("fmi2GetStatus", (f.fmi2GetStatus)(c, kind, &mut status)),
                 1 => ("fmi2GetRealStatus", (f.fmi2GetRealStatus)(c, kind, &mut real)),
                 2 => ("fmi2GetIntegerStatus", (f.fmi2GetIntegerStatus)(c, kind, &mut integer)),

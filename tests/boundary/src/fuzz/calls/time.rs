@@ -7,21 +7,25 @@ use fmi2_component::abi::EventInfo;
 
 use super::Caller;
 use super::arguments::{WILD, numbers};
-use crate::fuzz::Dice;
+use crate::fuzz::RandomSource;
 
 impl Caller<'_> {
-    pub(super) fn step(&mut self, dice: &mut Dice) -> (&'static str, Status) {
+    pub(super) fn step(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
-        if dice.one_in(20) {
+        if random.one_in(20) {
             // SAFETY: the instance is alive; so below.
             return ("fmi2CancelStep", unsafe { (f.fmi2CancelStep)(c) });
         }
-        let step = match dice.roll(12) {
-            0 => dice.pick(&WILD),
-            1 => dice.between(0.0, 10.0),
-            _ => dice.between(0.0, 0.01),
+        let step = match random.below(12) {
+            0 => random.pick(&WILD),
+            1 => random.between(0.0, 10.0),
+            _ => random.between(0.0, 0.01),
         };
-        let time = if dice.one_in(12) { dice.pick(&WILD) } else { self.time };
+        let time = if random.one_in(12) {
+            random.pick(&WILD)
+        } else {
+            self.time
+        };
         let status = unsafe { (f.fmi2DoStep)(c, time, step, 0) };
         if status == Status::Ok {
             self.time = time + step;
@@ -29,14 +33,14 @@ impl Caller<'_> {
         ("fmi2DoStep", status)
     }
 
-    pub(super) fn exchange(&mut self, dice: &mut Dice) -> (&'static str, Status) {
+    pub(super) fn exchange(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
-        let count = dice.pick(&[5, 5, 5, 5, 3, 0, usize::MAX]);
-        let mut values = numbers(dice);
-        if dice.one_in(2) {
-            values = std::array::from_fn(|_| dice.between(-0.01, 0.01));
+        let count = random.pick(&[5, 5, 5, 5, 3, 0, usize::MAX]);
+        let mut values = numbers(random);
+        if random.one_in(2) {
+            values = std::array::from_fn(|_| random.between(-0.01, 0.01));
         }
-        let at = if dice.one_in(20) {
+        let at = if random.one_in(20) {
             null_mut()
         } else {
             values.as_mut_ptr()
@@ -44,7 +48,7 @@ impl Caller<'_> {
         let (mut event, mut end, mut info) = (0, 0, EventInfo::default());
         // SAFETY: as above.
         unsafe {
-            match dice.roll(12) {
+            match random.below(12) {
                 0 => ("fmi2EnterEventMode", (f.fmi2EnterEventMode)(c)),
                 1..=2 => ("fmi2NewDiscreteStates", (f.fmi2NewDiscreteStates)(c, &mut info)),
                 3..=4 => ("fmi2EnterContinuousTimeMode", (f.fmi2EnterContinuousTimeMode)(c)),

@@ -7,24 +7,24 @@ use fmi2_component::Status;
 
 use super::Caller;
 use super::arguments::{MOST, count, numbers, pointer};
-use crate::fuzz::Dice;
+use crate::fuzz::RandomSource;
 
 impl Caller<'_> {
-    pub(super) fn values(&mut self, dice: &mut Dice) -> (&'static str, Status) {
+    pub(super) fn values(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
-        let function = dice.roll(12);
+        let function = random.below(12);
         let kind = match function {
             7 | 8 => 1,
             9 | 10 => 2,
             _ => 0,
         };
-        let vr = self.references(dice, kind);
-        let (vr, count) = (pointer(dice, vr.as_ptr()), count(dice));
-        let mut reals = numbers(dice);
-        let mut integers = [dice.roll(5) as c_int - 1; MOST];
+        let vr = self.references(random, kind);
+        let (vr, count) = (pointer(random, vr.as_ptr()), count(random));
+        let mut reals = numbers(random);
+        let mut integers = [random.below(5) as c_int - 1; MOST];
         let mut strings: [*const c_char; MOST] = [c"\xff%n%s".as_ptr(); MOST];
-        strings[1] = dice.pick(&[null(), c"text".as_ptr()]);
-        let wrong = dice.one_in(12);
+        strings[1] = random.pick(&[null(), c"text".as_ptr()]);
+        let wrong = random.one_in(12);
         // SAFETY: arrays have MOST elements, which is no less than a count that is not absurd.
         unsafe {
             match function {
@@ -52,17 +52,17 @@ impl Caller<'_> {
         }
     }
 
-    pub(super) fn derivatives(&mut self, dice: &mut Dice) -> (&'static str, Status) {
+    pub(super) fn derivatives(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
-        let (unknowns, knowns) = (self.references(dice, 0), self.references(dice, 0));
-        let mut values = numbers(dice);
-        let vr = pointer(dice, unknowns.as_ptr());
-        let (count, other) = (count(dice), count(dice));
-        let order = [dice.roll(6) as c_int - 1; MOST];
+        let (unknowns, knowns) = (self.references(random, 0), self.references(random, 0));
+        let mut values = numbers(random);
+        let vr = pointer(random, unknowns.as_ptr());
+        let (count, other) = (count(random), count(random));
+        let order = [random.below(6) as c_int - 1; MOST];
         let mut answer = [0.0; MOST];
         // SAFETY: as above.
         unsafe {
-            match dice.roll(3) {
+            match random.below(3) {
                 0 => (
                     "fmi2SetRealInputDerivatives",
                     (f.fmi2SetRealInputDerivatives)(c, vr, count, order.as_ptr(), values.as_ptr()),

@@ -1,0 +1,92 @@
+//! Approach to the steady state: shapes the drive until the lock criterion is met.
+//!
+//! Under a constant drive the response amplitude approaches its steady state with the damping rate of the structure, which takes
+//! dozens of periods. At phase resonance it obeys `A' = g (E cos(error) - E_R)`, where `g` is `response_gain` and `E_R`, the drive
+//! that would hold the present amplitude, follows the amplitude. An observer with the low pass `F` of rate `w` estimates it
+//! without a derivative:
+//!
+//! ```text
+//! E_R = F(E cos(error)) - (w/g) (A - F(A))
+//! ```
+//!
+//! The drive is `E = E_0 + gain (E_0 - E_R)` with the setpoint `E_0`. In the steady state `E = E_R = E_0`. Around it,
+//! `A' = g (1 + gain) (E_0 - E_R)`: the same steady states as under a constant drive, with the same stability, approached
+//! `1 + gain` times as fast.
+
+use crate::config::Config;
+
+/// Rate of the observer, relative to the rate of the approach in the linear regime.
+const OBSERVER_RATE: f64 = 4.0;
+/// Range of the shaped drive, relative to its setpoint: wide enough to move the response, narrow enough to stay in the regime.
+const DRIVE_RANGE: [f64; 2] = [0.25, 3.0];
+
+/// A difference between setpoint and holding drive, relative to the setpoint, that changes its sign is a swing if it exceeds this.
+const LARGE_SWING: f64 = 0.1;
+/// Factor of the gain for each swing. Swings that persist mean that the response changes faster than the observer follows.
+const SWING_FACTOR: f64 = 0.7;
+
+/// Coefficients of the approach.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Approach {
+    gain: f64,
+    /// Share of its error that the observer corrects per sample.
+    step: f64,
+    /// Share of its error that the detector corrects per sample.
+    detector_step: f64,
+    /// `w/g`, m of drive per m of response.
+    slope: f64,
+}
+
+/// State of the observer.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct ApproachState {
+    /// The drive in phase with the response's velocity, m, with the lag of the detector, and with that of the observer.
+    detected: f64,
+    drive: f64,
+    /// Response amplitude with the lag of the observer, m.
+    response: f64,
+    /// Largest relative difference between the setpoint and the holding drive since it last changed its sign.
+    swing: f64,
+    /// Number of large swings.
+    swings: i32,
+}
+
+impl Approach {
+    /// The approach of a configuration.
+    pub fn new(config: &Config) -> Self {
+        let rate = (OBSERVER_RATE * (1.0 + config.approach_gain) * config.damping_rate).min(config.bandwidth);
+        let rate = if rate > 0.0 { rate } else { config.bandwidth };
+        Self {
+            gain: config.approach_gain,
+            step: -libm::expm1(-rate * config.sample_time),
+            detector_step: -libm::expm1(-config.bandwidth * config.sample_time),
+            slope: rate / config.response_gain,
+        }
+    }
+
+    /// Updates the observer with the drive amplitude and the response amplitude, m, and the phase error, rad. Returns the
+    /// drive that would hold the response, m.
+    pub fn observe(&self, state: &mut ApproachState, drive: f64, response: f64, error: f64) -> f64 {
+        state.detected += self.detector_step * (drive * libm::cos(error) - state.detected);
+        state.drive += self.step * (state.detected - state.drive);
+        state.response += self.step * (response - state.response);
+        state.drive - self.slope * (response - state.response)
+    }
+
+    /// The drive, m, on the way to `setpoint`, m, where `holding`, m, would hold the response.
+    pub fn shape(&self, state: &mut ApproachState, setpoint: f64, holding: f64) -> f64 {
+        let [low, high] = DRIVE_RANGE.map(|share| share * setpoint);
+        let missing = setpoint - holding;
+        let gain = self.gain * libm::pow(SWING_FACTOR, f64::from(state.swings));
+        if missing * state.swing < 0.0 {
+            state.swings += i32::from(state.swing.abs() > LARGE_SWING * setpoint);
+            state.swing = 0.0;
+        }
+        if missing.abs() > state.swing.abs() {
+            state.swing = missing;
+        }
+        (setpoint + gain * missing).clamp(low, high)
+    }
+}

@@ -1,0 +1,80 @@
+//! What the exact orbits of a scene say about a run without the expected lock.
+
+use vines_model::orbit::{Orbit, exact_backbone, phase_resonant};
+use vines_model::regime::Regime;
+
+use crate::experiment::Sample;
+use crate::identification::classify;
+use crate::scene::{Dimensionless, Scene};
+
+/// Detunings at which the backbone is searched for stable orbits, and their distance.
+const SEARCHED: [f64; 2] = [-6.0, 3.0];
+const STEP: f64 = 0.005;
+
+/// The stable symmetric 1:1 orbits at phase resonance, at any drive, by rising detuning.
+#[must_use]
+pub fn stable_orbits(d: &Dimensionless) -> Vec<Orbit> {
+    let steps = ((SEARCHED[1] - SEARCHED[0]) / STEP) as i32;
+    let omega = |n: i32| 1.0 + d.epsilon * (SEARCHED[0] + STEP * f64::from(n));
+    (0..=steps)
+        .flat_map(|n| exact_backbone(d, omega(n)))
+        .filter(|orbit| orbit.stable)
+        .collect()
+}
+
+/// The range of drives, base amplitude over `b epsilon`, with a stable symmetric 1:1 orbit at phase resonance.
+#[must_use]
+pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
+    let drives = stable_orbits(d).into_iter().map(|orbit| orbit.g);
+    drives.fold(None, |range, g| {
+        let [low, high] = range.unwrap_or([g, g]);
+        Some([low.min(g), high.max(g)])
+    })
+}
+
+/// Why a run that was expected to lock the symmetric 1:1 motion may not have done so: `regime` is that of its last periods, if they show
+/// one. `None` where the exact orbits know no reason.
+#[must_use]
+pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
+    let d = scene.dimensionless();
+    let stable: Vec<Orbit> = phase_resonant(&d).into_iter().filter(|orbit| orbit.stable).collect();
+    let Some(orbit) = stable.last() else {
+        let range = stable_range(&d).map_or("at no G".into(), |[low, high]| {
+            format!("for G from {low:.3} to {high:.3}")
+        });
+        return Some(format!(
+            "there is no stable symmetric 1:1 orbit at G = {:.4}; it is stable {range}",
+            d.g
+        ));
+    };
+    let place = format!(
+        "the stable symmetric 1:1 orbit of this G is at sigma = {:.4}, C = {:.4}",
+        orbit.sigma, orbit.c
+    );
+    match regime? {
+        Regime::Unknown | Regime::Unresolved => None,
+        Regime::NoImpacts => Some(format!(
+            "the particle does not reach the walls: from rest, impacts begin at G = {:.3}. Set controller.capture = true, or give it a \
+             velocity in [start]; {place}",
+            d.lambda
+        )),
+        Regime::Symmetric => Some(format!(
+            "the motion is symmetric but not on the stable orbit: {place}. A symmetric orbit of larger amplitude may be unstable and lose \
+             its symmetry slowly. Near the end of its stable range the loop may need a smaller \
+             controller.approach_gain or more record.lock_periods"
+        )),
+        regime => Some(format!(
+            "the motion is {}, and coexists with the wanted one: {place}. Try another G or another [start]",
+            regime.name()
+        )),
+    }
+}
+
+/// The regime of the last periods of a record that did not lock, from the impacts that the rig reports.
+#[must_use]
+pub fn last_regime(samples: &[Sample], scene: &Scene) -> Option<Regime> {
+    let count = (scene.record.hold_periods * scene.controller.samples_per_period) as usize;
+    let last = &samples[samples.len().saturating_sub(count)..];
+    let omega = last.last()?.command.drive.omega;
+    Some(classify(last, scene.sample_time(), omega).1)
+}

@@ -1,0 +1,255 @@
+//! Phase resonance from the balances of amplitude and phase: the estimator of locked and of tracked points.
+//!
+//! Near phase resonance, amplitude A and phase Theta of the response to a base of the amplitude E obey
+//!
+//! ```text
+//! A' = g (E cos phi - E_R(A)),      Theta' = omega_R(A) - (g E/A) sin phi,      g = omega0^2/(2 omega)
+//! ```
+//!
+//! with the phase error phi. The drive `E_R` and the frequency `omega_R` of phase resonance follow for any history of drive and
+//! frequency, from straight lines in time:
+//!
+//! ```text
+//! A - integral of g E cos phi = const - g E_R t,      Theta + integral of (g E/A) sin phi = const + omega_R t
+//! ```
+//!
+//! Where A varies within the periods used, `E_R` and `omega_R` are linear in it, which adds the integral of `A - mean A` to the
+//! lines. docs/estimators.md derives the uncertainties.
+
+use nalgebra::Complex;
+use vines_model::numerics::{Estimate, Line, Prior, Regression, mean};
+
+use super::Cycle;
+
+/// What is known of the backbone about a point in advance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Slopes {
+    /// Slope of the drive `E_R` over the amplitude, dimensionless: value and standard uncertainty.
+    pub base: [f64; 2],
+    /// The same of the frequency `omega_R`, rad/(s m).
+    pub omega: [f64; 2],
+    /// Changes of `E_R` and `omega_R` per rate of change of the amplitude, because the impacts follow it late: s and rad/m.
+    pub drift: [f64; 2],
+}
+
+/// The two lines, fitted to some periods.
+#[derive(Debug, Clone)]
+pub struct Balance {
+    /// Number of periods.
+    pub periods: usize,
+    /// Mean amplitude of the response, m.
+    pub response: Estimate,
+    /// Mean phase error, rad.
+    pub phase_error: Estimate,
+    /// Mean amplitude of the base, m.
+    pub base: Estimate,
+    /// Largest scatter of the residuals over the noise of the sensors.
+    pub excess: f64,
+    /// g.
+    gain: f64,
+    /// Coefficients: constant, time, and integral of the amplitude's deviation.
+    drive: Regression,
+    turning: Regression,
+    /// Sizes of the neglected terms of `E_R`, m, and `omega_R`, rad/s.
+    pub remainders: [f64; 2],
+    /// Standard uncertainties of `E_R` and `omega_R` by the phase errors and the base within the integrals.
+    within: [f64; 2],
+}
+
+/// Size of the neglected terms relative to those of the second order.
+const REMAINDER: f64 = 0.7;
+/// Relative uncertainty of the effect of a drift of the amplitude.
+const LATE: f64 = 0.15;
+
+impl Balance {
+    /// From at least four periods of an oscillator of the natural frequency `omega0`, rad/s.
+    #[must_use]
+    pub fn of(cycles: &[Cycle], omega0: f64, slopes: &Slopes) -> Option<Self> {
+        let n = cycles.len() as f64;
+        if cycles.len() < 4 {
+            return None;
+        }
+        let omega = mean(cycles.iter().map(|cycle| cycle.omega));
+        let gain = 0.5 * omega0 * omega0 / omega;
+        let motion = motion(cycles);
+        let response = mean(motion.iter().map(|one| one.0));
+        let base = mean(cycles.iter().map(|cycle| cycle.base.norm()));
+        let phase_error = mean(cycles.iter().map(|cycle| cycle.phase_error));
+        let [noise, base_noise] = [0, 1].map(|i| mean(cycles.iter().map(|cycle| cycle.noise[i])).sqrt());
+        // Rounding is the least noise.
+        let noise = noise.max(1e-14 * response);
+        let middle = mean(cycles.iter().map(|cycle| cycle.time));
+        let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
+        let deviation = integral(&time, motion.iter().map(|one| one.0 - response));
+        let columns = [vec![1.0; cycles.len()], time, deviation];
+        let drives = drives(cycles);
+        // The integral of A' is A.
+        // Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
+        let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
+        let [late, turned] = [1.0 + gain * slopes.drift[0], slopes.drift[1]];
+        let balanced = motion.into_iter().zip(&drives).map(|((amplitude, phase), drive)| {
+            let phase = phase + (gain * drive.work.im - inertia * drive.force.re) / response - turned * amplitude;
+            (
+                amplitude * late - inertia * drive.force.im - gain * drive.work.re,
+                phase,
+            )
+        });
+        let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
+        let prior = |[value, uncertainty]: [f64; 2]| [Prior { coefficient: 2, value, uncertainty }];
+        let [slope, width] = slopes.base;
+        let drive = Regression::fit(&columns, &amplitudes, &prior([-gain * slope, gain * width]), noise)?;
+        let turning = Regression::fit(&columns, &phases, &prior(slopes.omega), noise / response)?;
+        // The terms beyond these are as large as a share of them.
+        let slope = |values: Vec<f64>| Line::fit(&values).slope * n / (cycles[cycles.len() - 1].time - cycles[0].time);
+        let inertial = REMAINDER * inertia * slope(drives.iter().map(|drive| drive.force.re).collect());
+        let drift = LATE * slope(cycles.iter().map(Cycle::amplitude).collect());
+        let remainders = [
+            (inertial / gain).hypot(drift * slopes.drift[0]),
+            (inertial / response).hypot(drift * slopes.drift[1]),
+        ];
+        let phase_noise = (noise / response).hypot(base_noise / base);
+        let excess = drive.excess.max(turning.excess);
+        let of = |value: f64, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
+        Some(Self {
+            periods: cycles.len(),
+            response: of(response, noise),
+            phase_error: of(phase_error, phase_noise),
+            base: of(base, base_noise),
+            excess,
+            gain,
+            drive,
+            turning,
+            remainders,
+            within: [base_noise / n.sqrt(), gain * base / response * phase_noise / n.sqrt()],
+        })
+    }
+
+    /// `E_R`, m, and `omega_R`, rad/s, at the mean amplitude plus `ahead`, m.
+    #[must_use]
+    pub fn at(&self, ahead: f64) -> [Estimate; 2] {
+        let weights = [0.0, 1.0, ahead];
+        let drive = self.drive.estimate(&weights).scaled(-1.0 / self.gain);
+        let turning = self.turning.estimate(&weights);
+        [(drive, self.within[0]), (turning, self.within[1])]
+            .map(|(one, within)| Estimate::new(one.value, &[one.uncertainty, within]))
+    }
+
+    /// Slopes of `E_R` and `omega_R` over the amplitude.
+    #[must_use]
+    pub fn slopes(&self) -> [Estimate; 2] {
+        let weights = [0.0, 0.0, 1.0];
+        [
+            self.drive.estimate(&weights).scaled(-1.0 / self.gain),
+            self.turning.estimate(&weights),
+        ]
+    }
+
+    /// Distance, m, from the mean amplitude to the one that the base amplitude `base`, m, holds at phase resonance.
+    #[must_use]
+    pub fn ahead(&self, base: f64) -> f64 {
+        (base - self.at(0.0)[0].value) / self.slopes()[0].value
+    }
+
+    /// Frequency, rad/s, and amplitude, m, that a constant base amplitude leads to.
+    #[must_use]
+    pub fn limit(&self, base: Estimate) -> [Estimate; 2] {
+        let ahead = self.ahead(base.value);
+        let [drive, turning] = self.at(ahead);
+        let [by_base, by_omega] = self.slopes().map(|slope| slope.value);
+        // The uncertainty of the slope is in that of the drive at the limit.
+        let limit = Estimate::new(
+            self.response.value + ahead,
+            &[
+                self.response.uncertainty,
+                drive.uncertainty / by_base,
+                base.uncertainty / by_base,
+            ],
+        );
+        let change = by_omega * limit.uncertainty;
+        [Estimate::new(turning.value, &[turning.uncertainty, change]), limit]
+    }
+}
+
+/// Integral over time from the first value on, by the trapezoidal rule.
+fn integral(time: &[f64], rates: impl Iterator<Item = f64>) -> Vec<f64> {
+    let (mut sum, mut before) = (0.0, None);
+    time.iter()
+        .zip(rates)
+        .map(|(time, rate)| {
+            sum += before.map_or(0.0, |(earlier, slower): (f64, f64)| {
+                0.5 * (rate + slower) * (time - earlier)
+            });
+            before = Some((*time, rate));
+            sum
+        })
+        .collect()
+}
+
+/// The drive of a period, from the command, which has no noise; the sensor calibrates it.
+struct Drive {
+    /// Base amplitude by `exp(i phase error)`, m.
+    force: Complex<f64>,
+    /// Its integral from the first period on, m s; the mean over this period.
+    work: Complex<f64>,
+}
+
+fn drives(cycles: &[Cycle]) -> Vec<Drive> {
+    let total = |value: fn(&Cycle) -> f64| cycles.iter().map(value).sum::<f64>();
+    let gain = total(|cycle| cycle.base.norm()) / total(|cycle| cycle.commanded[0].norm());
+    let relative = |cycle: &Cycle| {
+        let turned = cycle.response[0] * cycle.commanded[0].conj();
+        turned / turned.norm()
+    };
+    // Target phase, and phase of the base relative to the command.
+    let turn: Complex<f64> = cycles
+        .iter()
+        .map(|cycle| relative(cycle).conj() * Complex::from_polar(1.0, cycle.phase_error))
+        .sum();
+    let mut sum = Complex::<f64>::default();
+    cycles
+        .iter()
+        .map(|cycle| {
+            let [middle, change] = cycle.commanded;
+            let growth = (change * middle.conj()).re / middle.norm();
+            let share = relative(cycle) * turn / turn.norm() * gain;
+            let before = sum;
+            sum += share * cycle.duration * middle.norm();
+            Drive {
+                force: share * middle.norm(),
+                work: before + share * cycle.duration * (0.5 * middle.norm() - growth / 6.0),
+            }
+        })
+        .collect()
+}
+
+/// Amplitudes and phases of the response, continuous from period to period, without the influence of their own drift.
+///
+/// Over one period from the phase 0 on, a drift z' of the complex amplitude per radian changes the fitted amplitude by
+/// -i conj(z')/2.
+fn motion(cycles: &[Cycle]) -> Vec<(f64, f64)> {
+    let mut before = cycles[0].response[0];
+    let mut turned = before.arg();
+    let phases: Vec<f64> = cycles
+        .iter()
+        .map(|cycle| {
+            turned += (cycle.response[0] * before.conj()).arg();
+            before = cycle.response[0];
+            cycle.drive_phase + turned
+        })
+        .collect();
+    let last = cycles.len() - 1;
+    (0..=last)
+        .map(|n| {
+            let (from, to) = (n.saturating_sub(1), (n + 1).min(last));
+            let time = (cycles[to].time - cycles[from].time) * cycles[n].omega;
+            let growth = (cycles[to].amplitude() - cycles[from].amplitude()) / time;
+            let amplitude = cycles[n].amplitude();
+            // The frequency of the drive may jump from period to period; that of the response does not.
+            let turning = amplitude * ((phases[to] - phases[from]) / time - 1.0);
+            let z = cycles[n].response[0];
+            let drift = Complex::new(growth, turning) * z / amplitude;
+            let correction = Complex::new(0.0, 0.5) * drift.conj() / z;
+            (amplitude * (1.0 + correction.re), phases[n] + correction.im)
+        })
+        .collect()
+}

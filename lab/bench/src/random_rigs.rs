@@ -1,0 +1,186 @@
+//! Locks of randomly drawn rigs, compared with their exact orbits.
+
+use nalgebra::DVector;
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
+use serde::Serialize;
+use thiserror::Error;
+use vines_model::numerics::{HarmonicBasis, mean};
+use vines_model::orbit::{Orbit, phase_resonant};
+use vines_model::regime::Regime;
+
+use crate::advice;
+use crate::experiment::{self, ExperimentError, Plan, Record, drive_phases};
+use crate::identification::classify;
+use crate::rig::{BuiltIn, Chain, Simulated};
+use crate::scene::{Dimensionless, Override, Scene, SceneError};
+
+/// Largest distance from an exact orbit, in sigma and C, of a correct lock.
+const CORRECT: f64 = 2e-3;
+/// A scene at rest, whose plant is replaced.
+const SCENE: &str = "[plant]\nepsilon = 0.01\nlambda = 1.0\nr = 0.65\n[excitation]\nG = 1.0\n";
+
+/// One rig and how its lock ended.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Row {
+    /// Its parameters, with a drive at which a stable symmetric orbit exists.
+    pub parameters: Dimensionless,
+    /// How the run ended.
+    pub outcome: Outcome,
+    /// Periods to the lock.
+    pub periods: Option<f64>,
+    /// Distance from the nearest stable orbit, the larger of those in sigma and C.
+    pub distance: Option<f64>,
+    /// The message, where the lock is not the expected one.
+    pub message: Option<String>,
+}
+
+/// How a run ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Outcome {
+    /// Locked on a stable symmetric orbit, within 2e-3.
+    #[serde(rename = "locked")]
+    Locked,
+    /// Locked in the right regime, but farther from the orbit.
+    #[serde(rename = "inaccurate")]
+    Inaccurate,
+    /// Locked in another regime; the message says in which.
+    #[serde(rename = "other regime")]
+    OtherRegime,
+    /// No lock, with a reason.
+    #[serde(rename = "no lock")]
+    NoLock,
+    /// No lock, and no reason.
+    #[serde(rename = "failed")]
+    Failed,
+}
+
+/// Why the rigs could not be drawn.
+#[derive(Debug, Error)]
+pub enum RandomRigError {
+    /// The scene refuses a setting.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// The plant refuses a parameter.
+    #[error(transparent)]
+    Plant(#[from] lovines::InvalidValue),
+    /// The controller refuses a setting.
+    #[error(transparent)]
+    Controller(#[from] phase_lock::ConfigError),
+}
+
+/// Draws `count` rigs and locks each from the start of the scene, at rest unless `settings` say otherwise: epsilon from 0.001 to 0.05
+/// and lambda from 0.1 to 3 (uniform logarithms), r from 0.2 to 0.97, and G across the range with a stable symmetric orbit.
+///
+/// # Errors
+/// Settings that scene or controller refuse.
+pub fn locks(count: usize, seed: u64, settings: &[Override]) -> Result<Vec<Row>, RandomRigError> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut uniform = move |low: f64, high: f64| low + (high - low) * (random.next_u64() as f64 / u64::MAX as f64);
+    let mut rows = Vec::with_capacity(count);
+    while rows.len() < count {
+        let epsilon = uniform(1e-3_f64.ln(), 0.05_f64.ln()).exp();
+        let lambda = uniform(0.1_f64.ln(), 3.0_f64.ln()).exp();
+        let r = uniform(0.2, 0.97);
+        let share = uniform(0.0, 1.0);
+        let d = Dimensionless::new(epsilon, lambda, r, 0.0);
+        let Some([low, high]) = advice::stable_range(&d) else {
+            continue;
+        };
+        let d = Dimensionless { g: low + share * (high - low), ..d };
+        let stable: Vec<Orbit> = phase_resonant(&d).into_iter().filter(|orbit| orbit.stable).collect();
+        if !stable.is_empty() {
+            rows.push(lock(&d, &stable, settings)?);
+        }
+    }
+    Ok(rows)
+}
+
+fn lock(d: &Dimensionless, stable: &[Orbit], settings: &[Override]) -> Result<Row, RandomRigError> {
+    let drawn = [
+        format!("plant.epsilon={:?}", d.epsilon),
+        format!("plant.lambda={:?}", d.lambda),
+        format!("plant.r={:?}", d.r),
+        format!("excitation.G={:?}", d.g),
+        "record.decay_periods=3".into(),
+    ];
+    let drawn = drawn
+        .iter()
+        .map(|setting| setting.parse())
+        .collect::<Result<Vec<Override>, _>>();
+    let settings = [drawn.map_err(SceneError::from)?, settings.to_vec()].concat();
+    let scene = Scene::parse("random rig", SCENE, &settings)?;
+    let rig = Simulated::new(scene.plant, scene.start)?;
+    let mut rig = Chain::around(Box::new(rig), &scene.chain, d, scene.controller.samples_per_period);
+    let mut controller = BuiltIn::new(&scene.controller_config())?;
+    let mut samples = Vec::new();
+    let outcome = experiment::run_into(
+        &mut samples,
+        rig.as_mut(),
+        &mut controller,
+        &Plan::of(&scene),
+        |_, _, _| {},
+    );
+    let outcome = outcome.map_err(|error| {
+        let reason = advice::reason(&scene, advice::last_regime(&samples, &scene));
+        (error, reason)
+    });
+    Ok(judge(&scene, stable, outcome))
+}
+
+/// Judges a record, or the error of a run and its reason.
+fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentError, Option<String>)>) -> Row {
+    let parameters = scene.dimensionless();
+    let row = Row {
+        parameters,
+        outcome: Outcome::Failed,
+        periods: None,
+        distance: None,
+        message: None,
+    };
+    let record = match outcome {
+        Ok(record) => record,
+        Err((error, reason)) => {
+            let outcome = if reason.is_some() {
+                Outcome::NoLock
+            } else {
+                Outcome::Failed
+            };
+            let message = reason.map_or_else(|| error.to_string(), |why| format!("no lock: {why}"));
+            return Row { outcome, message: Some(message), ..row };
+        }
+    };
+    let (sigma, c, regime) = held(&record, scene);
+    let distance = |orbit: &Orbit| (orbit.sigma - sigma).abs().max((orbit.c - c).abs());
+    let distance = stable.iter().map(distance).fold(f64::INFINITY, f64::min);
+    let row = Row {
+        periods: Some(record.settled as f64 / scene.controller.samples_per_period),
+        distance: Some(distance),
+        ..row
+    };
+    let locked_at = format!("locked at sigma = {sigma:.4}, C = {c:.4}");
+    match regime {
+        Regime::Symmetric if distance <= CORRECT => Row { outcome: Outcome::Locked, ..row },
+        regime => {
+            let why = advice::reason(scene, Some(regime)).unwrap_or_default();
+            let message = Some(format!("{locked_at}: {why}"));
+            let outcome = if regime == Regime::Symmetric {
+                Outcome::Inaccurate
+            } else {
+                Outcome::OtherRegime
+            };
+            Row { outcome, message, ..row }
+        }
+    }
+}
+
+/// Detuning, amplitude over b and regime over the hold.
+fn held(record: &Record, scene: &Scene) -> (f64, f64, Regime) {
+    let (d, hold) = (scene.dimensionless(), record.hold());
+    let omega = mean(hold.iter().map(|sample| sample.command.drive.omega));
+    let phases = drive_phases(hold, record.sample_time, 0.0);
+    let basis = HarmonicBasis::new(&phases, 0, &[Some(0); 3]);
+    let values = DVector::from_iterator(hold.len(), hold.iter().map(|sample| sample.sensors.response));
+    let c = basis.fit(&values).map_or(0.0, |fit| fit.harmonic(1).norm()) / d.b;
+    (d.sigma(omega), c, classify(hold, record.sample_time, omega).1)
+}

@@ -1,0 +1,107 @@
+//! What counts as resonance: the definition of the backbone, the reference of the phase, and the sensor of the response.
+
+use serde::{Deserialize, Serialize};
+
+/// How resonance is defined, and what is measured. The default is that of the study.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Definition {
+    /// What singles out the motions of the backbone.
+    #[serde(rename = "definition")]
+    pub resonance: Resonance,
+    /// What the phase refers to.
+    pub reference: Reference,
+    /// What is measured of the response.
+    pub sensor: Sensor,
+}
+
+/// What singles out the motions of the backbone.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Resonance {
+    /// The first harmonic of the response lags the reference by a quarter of a period.
+    #[default]
+    Phase,
+    /// Its amplitude is largest along the frequency response at constant G.
+    Peak,
+}
+
+/// What the phase of the response refers to.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Reference {
+    /// The base displacement e.
+    #[default]
+    Base,
+    /// The force k e + c e' that the base exerts on the primary mass.
+    Force,
+}
+
+/// What is measured of the response.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Sensor {
+    /// `v = q1 + epsilon q2`, the centre of mass times 1 + epsilon.
+    #[default]
+    V,
+    /// The displacement of the primary mass.
+    Q1,
+    /// The acceleration of the primary mass over omega0^2, with the sign of its displacement: `-q1''`.
+    Acceleration,
+}
+
+impl Definition {
+    /// All definitions that differ: at the peak, the reference does not matter.
+    #[must_use]
+    pub fn all() -> Vec<Self> {
+        let sensors = [Sensor::V, Sensor::Q1, Sensor::Acceleration];
+        let cases = [
+            (Resonance::Phase, Reference::Base),
+            (Resonance::Phase, Reference::Force),
+            (Resonance::Peak, Reference::Base),
+        ];
+        let with = |(resonance, reference)| sensors.map(|sensor| Self { resonance, reference, sensor });
+        cases.into_iter().flat_map(with).collect()
+    }
+
+    /// In words, as in a table.
+    #[must_use]
+    pub fn name(&self) -> String {
+        let sensor = self.sensor.name();
+        match (self.resonance, self.reference) {
+            (Resonance::Peak, _) => format!("peak of {sensor}"),
+            (Resonance::Phase, Reference::Base) => format!("phase of {sensor} to e"),
+            (Resonance::Phase, Reference::Force) => format!("phase of {sensor} to k e + c e'"),
+        }
+    }
+}
+
+impl Sensor {
+    /// As in a table.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Sensor::V => "v",
+            Sensor::Q1 => "q1",
+            Sensor::Acceleration => "acceleration",
+        }
+    }
+}
+
+impl Reference {
+    /// Phase of the reference relative to the base, rad, at the frequency `omega` over omega0 and for `2 zeta = epsilon lambda`.
+    pub(crate) fn phase(self, damping: f64, omega: f64) -> f64 {
+        match self {
+            Reference::Base => 0.0,
+            Reference::Force => (damping * omega).atan(),
+        }
+    }
+
+    /// Its derivative by omega.
+    pub(crate) fn phase_slope(self, damping: f64, omega: f64) -> f64 {
+        match self {
+            Reference::Base => 0.0,
+            Reference::Force => damping / (1.0 + (damping * omega).powi(2)),
+        }
+    }
+}

@@ -1,0 +1,189 @@
+//! The rules that decide the regime of a simulated motion.
+
+use std::f64::consts::PI;
+
+use super::run::{Point, Run};
+use crate::numerics::{mean, standard_deviation};
+use crate::orbit::stable_near;
+use crate::regime::{Regime, synchrony};
+
+/// Longest repetition in the search, half periods of the base.
+const LONGEST: usize = 192;
+/// Smallest number of half periods over which a motion repeats itself.
+const REPEATED: usize = 64;
+/// Largest difference of states that repeat: far above rounding, far below what separates two motions.
+const SAME: f64 = 1e-6;
+/// Below this, differences are rounding errors, which need not shrink.
+const ROUNDING: f64 = 1e-11;
+/// Differences below which a stable periodic motion is searched for.
+const SETTLING: f64 = 1e-3;
+/// A transient ends where the state is this close to that one repetition before.
+const TRANSIENT: f64 = 1e-2;
+/// Share of a motion without repetition that is left out of the averages, and number of blocks that the rest is cut into.
+const LEFT_OUT: f64 = 0.25;
+const BLOCKS: usize = 32;
+/// Standard errors by which a Lyapunov exponent differs from zero.
+const SIGNIFICANT: f64 = 4.0;
+/// Largest uncertainty of an exponent that is zero, per period.
+const ZERO: f64 = 2e-3;
+/// From this share of captured impacts on a chaotic motion is called modulated.
+const CAPTURES: f64 = 0.2;
+
+impl Run {
+    /// What is common to all regimes, over the half periods from `from` on.
+    fn point(&self, regime: Regime, from: usize) -> Point {
+        let periods = 0.5 * (self.halves() - from) as f64;
+        let [[before, rested], [all, rests]] = [self.counts[from], self.counts[self.halves()]];
+        Point {
+            regime,
+            followed: self.halves() / 2,
+            transient: 0.5 * from as f64,
+            recurrence: None,
+            exponent: None,
+            exponent_error: None,
+            synchrony: synchrony(&self.impacts[before..]),
+            impacts_per_period: (all - before) as f64 / periods,
+            impacts: 0,
+            periods: 0,
+            sticks_per_period: (rests - rested) as f64 / periods,
+        }
+    }
+
+    /// The particle rests, and the primary mass cannot reach it: the free part of its motion only decays.
+    pub(super) fn without_impacts(&self) -> Option<Point> {
+        let n = self.halves();
+        let [q1, dq1, q2, dq2] = self.states[n];
+        let reach = self.driven.reach(PI * n as f64, [q1, dq1]);
+        (dq2 == 0.0 && reach + q2.abs() < 1.0).then(|| {
+            let last = self.impacts.last().map_or(0.0, |one| one.time / PI);
+            self.point(Regime::NoImpacts, (last.ceil() as usize).min(n - 1))
+        })
+    }
+
+    /// Distance between the state at half period `n` and that `count` half periods earlier, or its mirror image.
+    fn distance(&self, n: usize, count: usize) -> f64 {
+        let sign = if count % 2 == 1 { -1.0 } else { 1.0 };
+        let (now, then) = (&self.states[n], &self.states[n - count]);
+        now.iter()
+            .zip(then)
+            .map(|(a, b)| (sign * a - b).abs())
+            .fold(0.0, f64::max)
+    }
+
+    /// The largest differences between states and those `count` half periods before, in the first and the second half of the last
+    /// repetitions; None unless all are below `bound`.
+    fn differences(&self, count: usize, bound: f64) -> Option<[f64; 2]> {
+        let n = self.halves();
+        let span = (2 * count).max(REPEATED).min(n - count);
+        let largest = |from: usize, to: usize| (from..=to).map(|one| self.distance(one, count)).fold(0.0, f64::max);
+        let close = self.distance(n, count) < bound && largest(n - span, n) < bound;
+        close.then(|| [largest(n - span, n - span / 2), largest(n - span / 2, n)])
+    }
+
+    fn counts(&self) -> std::ops::RangeInclusive<usize> {
+        1..=LONGEST.min(self.halves() / 4)
+    }
+
+    /// Repetitions approach each other, and there is a stable periodic motion close by: its multipliers decide.
+    pub(super) fn settling(&self) -> Option<Point> {
+        let n = self.halves();
+        let approach = |count| {
+            self.differences(count, SETTLING)
+                .is_some_and(|[first, second]| second <= first.max(ROUNDING))
+        };
+        self.counts().find(|count| approach(*count))?;
+        let motion = stable_near(&self.scene, self.sigma, PI * (n % 2) as f64, self.states[n])?;
+        let pattern = &motion.pattern;
+        let regime = match (pattern.impacts(), pattern.periods(), pattern.mirrored) {
+            (2, 1, true) => Regime::Symmetric,
+            (2, 1, false) if pattern.walls[0] != pattern.walls[1] => Regime::Asymmetric,
+            _ => Regime::Several,
+        };
+        let count = pattern.half_periods as usize;
+        Some(Point {
+            recurrence: Some(self.distance(n, count)),
+            exponent: Some(2.0 * motion.moduli()[3].ln() / count as f64),
+            exponent_error: Some(0.0),
+            impacts: pattern.impacts(),
+            periods: pattern.periods(),
+            ..self.begun(regime, count)
+        })
+    }
+
+    /// The motion repeats itself after the same number of half periods again and again, and the differences do not grow. This finds
+    /// what has no exact orbit: patterns with sticking, or with very many impacts.
+    pub(super) fn repeating(&self) -> Option<Point> {
+        let n = self.halves();
+        let (count, [first, second]) = self
+            .counts()
+            .find_map(|count| Some((count, self.differences(count, SAME)?)))?;
+        let impacts = self.counts[n][0] - self.counts[n - count][0];
+        if impacts == 0 || second > first.max(ROUNDING) {
+            return None;
+        }
+        // A repetition of an odd number of half periods is followed by its mirror image.
+        let whole = 1 + count % 2;
+        Some(Point {
+            recurrence: Some(second),
+            impacts: whole * impacts,
+            periods: (whole * count / 2) as u32,
+            ..self.begun(Regime::Several, count)
+        })
+    }
+
+    /// A regime that repeats itself after `count` half periods, from where its transient ended.
+    fn begun(&self, regime: Regime, count: usize) -> Point {
+        let n = self.halves();
+        let began = (count..=n)
+            .rev()
+            .find(|one| self.distance(*one, count) > TRANSIENT)
+            .unwrap_or(0);
+        Point {
+            transient: 0.5 * began as f64,
+            ..self.point(regime, began.min(n - count))
+        }
+    }
+
+    /// Largest Lyapunov exponent per period over the half periods from `from` on, and its standard error from the scatter of blocks.
+    pub(super) fn exponent(&self, from: usize) -> (f64, f64) {
+        let growth = &self.growth[from..];
+        let length = (growth.len() / BLOCKS).max(1);
+        let blocks: Vec<f64> = growth
+            .chunks_exact(length)
+            .map(|block| 2.0 * mean(block.iter().copied()))
+            .collect();
+        (
+            mean(blocks.iter().copied()),
+            standard_deviation(&blocks) / (blocks.len() as f64).sqrt(),
+        )
+    }
+
+    /// Nothing repeats: the Lyapunov exponent decides.
+    pub(super) fn irregular(&self) -> Point {
+        let n = self.halves();
+        let from = (LEFT_OUT * n as f64) as usize;
+        let (exponent, error) = self.exponent(from);
+        // The uncertainty; a growth that is only linear in time, as on a torus, gives the first number.
+        let linear = 2.0 * (0.5 * n as f64).ln() / (0.5 * n as f64);
+        let zero = linear.max(SIGNIFICANT * error);
+        let mut point = self.point(Regime::Undecided, from);
+        point.regime = if point.impacts_per_period == 0.0 {
+            Regime::Undecided
+        } else if exponent > zero {
+            if point.synchrony < CAPTURES {
+                Regime::Chaotic
+            } else {
+                Regime::Modulated
+            }
+        } else if exponent > -zero && zero < ZERO {
+            Regime::QuasiPeriodic
+        } else {
+            Regime::Undecided
+        };
+        Point {
+            exponent: Some(exponent),
+            exponent_error: Some(error),
+            ..point
+        }
+    }
+}

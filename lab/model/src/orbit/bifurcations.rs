@@ -1,0 +1,76 @@
+//! Bifurcation curves of the 1:1 motions in (sigma, G), by the same continuation with G as a second free parameter.
+
+use serde::Serialize;
+
+use super::{
+    Bifurcation, Branch, Condition, Exploration, Limits, Periodic, Special, components::apart, continue_both_ways,
+    response,
+};
+use crate::Dimensionless;
+use crate::numerics::equally_spaced;
+
+/// A curve in (sigma, G) on which 1:1 motions bifurcate.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct BifurcationCurve {
+    /// What happens on it.
+    pub kind: Bifurcation,
+    /// The motions on it. Where the others of their multipliers are inside the unit circle, the curve bounds stability.
+    #[serde(flatten)]
+    pub branch: Branch,
+}
+
+/// Excitations at which the curves are searched for.
+const LEVELS: usize = 25;
+
+/// The curves of folds, symmetry breakings, period doublings and Neimark-Sacker bifurcations of the symmetric and asymmetric 1:1
+/// motions that cross one of 25 levels of G in `limits`.
+#[must_use]
+pub fn bifurcation_curves(scene: &Dimensionless, limits: &Limits) -> Vec<BifurcationCurve> {
+    let mut found: Vec<BifurcationCurve> = Vec::new();
+    let exploration = Exploration { starts: 0, seed: 1, doublings: 1 };
+    let [low, high] = limits.g;
+    for g in equally_spaced(low, high, LEVELS).filter(|g| *g > 0.0) {
+        let scene = Dimensionless { g, ..*scene };
+        for component in response(&scene, limits, exploration).components {
+            let pattern = &component.branch.points[0].pattern;
+            if pattern.impacts() != 2 || pattern.periods() != 1 {
+                continue;
+            }
+            for special in &component.branch.special {
+                if !found.iter().any(|curve| curve.passes(&scene, special)) {
+                    let condition = Condition::Bifurcation(special.kind);
+                    let branch = continue_both_ways(&scene, &special.motion, condition, limits);
+                    found.push(BifurcationCurve { kind: special.kind, branch });
+                }
+            }
+        }
+    }
+    found.sort_by_key(|one| (one.kind.name(), !one.branch.points[0].pattern.mirrored));
+    found
+}
+
+impl BifurcationCurve {
+    /// As in a table: the bifurcation and the motions.
+    #[must_use]
+    pub fn name(&self) -> String {
+        format!("{} of {}", self.kind.name(), self.branch.points[0].pattern.name())
+    }
+
+    fn passes(&self, scene: &Dimensionless, special: &Special) -> bool {
+        let motion = &special.motion;
+        if self.kind != special.kind || self.branch.points[0].pattern.mirrored != motion.pattern.mirrored {
+            return false;
+        }
+        let distance = |one: &Periodic, other: &Periodic| apart(one, other).hypot(one.g - other.g);
+        self.branch.points.windows(2).any(|pair| {
+            let [from, to] = [&pair[0], &pair[1]];
+            if distance(from, motion).max(distance(to, motion)) > 1.2 * distance(from, to) + 1e-6 {
+                return false;
+            }
+            let part = ((motion.g - from.g) / (to.g - from.g)).clamp(0.0, 1.0);
+            let guess = from.unknowns() + (to.unknowns() - from.unknowns()) * if part.is_nan() { 0.5 } else { part };
+            let conditions = [Condition::Excitation(motion.g), Condition::Bifurcation(self.kind)];
+            Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|one| distance(&one, motion) < 1e-4)
+        })
+    }
+}

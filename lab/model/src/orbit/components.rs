@@ -1,0 +1,225 @@
+//! The exact frequency response at one excitation: all of its components.
+//!
+//! Symmetric 1:1 motions have a closed form at every sigma, so that none is missed on the grid of detunings that is searched, both ends of
+//! the range included. Motions of other patterns are reached by switching branches at symmetry breakings and period doublings,
+//! and by settling from random starts.
+
+use std::f64::consts::TAU;
+
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{Rng, SeedableRng},
+};
+use serde::Serialize;
+
+use super::{
+    Bifurcation, Branch, Condition, ImpactPattern, Limits, Periodic, branch_off, continue_both_ways, settle,
+    symmetric_orbits,
+};
+use crate::Dimensionless;
+use crate::numerics::equally_spaced;
+
+/// The exact frequency response at one excitation.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Response {
+    /// Base amplitude over `b epsilon`.
+    #[serde(rename = "G")]
+    pub g: f64,
+    /// Its components; those of one pattern are consecutive, symmetric 1:1 first.
+    pub components: Vec<Component>,
+}
+
+/// A curve of motions that continuation follows without a break.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct Component {
+    /// Pattern and number, as in "symmetric 1:1, 2 of 3".
+    pub name: String,
+    /// Its motions.
+    #[serde(flatten)]
+    pub branch: Branch,
+}
+
+/// How components of other patterns are searched for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Exploration {
+    /// Number of random starts.
+    pub starts: usize,
+    /// Seed of their random numbers.
+    pub seed: u64,
+    /// Number of symmetry breakings and period doublings in a row that are followed.
+    pub doublings: usize,
+}
+
+impl Default for Exploration {
+    fn default() -> Self {
+        Self { starts: 300, seed: 1, doublings: 3 }
+    }
+}
+
+/// Detunings at which symmetric motions are computed, over the range.
+const GRID: usize = 1200;
+/// Periods after which a random start has settled.
+const SETTLED: usize = 600;
+/// Largest difference of two motions that are the same.
+const SAME: f64 = 1e-6;
+
+/// A random state with the particle inside its cavity: (q1, q1', q2, q2'), dimensionless.
+pub fn random_state(random: &mut impl Rng) -> [f64; 4] {
+    let mut uniform = || random.next_u64() as f64 / u64::MAX as f64;
+    let (size, phase) = (1.5 * uniform(), TAU * uniform());
+    let q1 = size * phase.sin();
+    [
+        q1,
+        size * phase.cos(),
+        q1 + 1.98 * (uniform() - 0.5),
+        4.0 * (uniform() - 0.5),
+    ]
+}
+
+/// The exact frequency response at the scene's G over the range of sigma in `limits`.
+#[must_use]
+pub fn response(scene: &Dimensionless, limits: &Limits, exploration: Exploration) -> Response {
+    let condition = Condition::Excitation(scene.g);
+    let mut search = Search {
+        scene,
+        limits,
+        condition,
+        doublings: exploration.doublings,
+        found: Vec::new(),
+    };
+    let [low, high] = limits.sigma;
+    for sigma in equally_spaced(low, high, GRID) {
+        for orbit in symmetric_orbits(scene, sigma) {
+            let conditions = [Condition::Sigma(sigma), condition];
+            let pattern = ImpactPattern::symmetric();
+            if let Some(motion) = Periodic::find(scene, &pattern, &orbit.unknowns(), conditions) {
+                search.add(&motion);
+            }
+        }
+    }
+    let mut random = ChaCha8Rng::seed_from_u64(exploration.seed);
+    for _ in 0..exploration.starts {
+        let part = random.next_u64() as f64 / u64::MAX as f64;
+        let (sigma, state) = (low + part * (high - low), random_state(&mut random));
+        if let Ok(Some(motion)) = settle(scene, sigma, state, SETTLED) {
+            search.add(&motion);
+        }
+    }
+    search.named()
+}
+
+struct Search<'a> {
+    scene: &'a Dimensionless,
+    limits: &'a Limits,
+    condition: Condition,
+    doublings: usize,
+    found: Vec<Branch>,
+}
+
+impl Search<'_> {
+    /// Follows the component of a motion, and those that branch off it, unless it is known.
+    fn add(&mut self, motion: &Periodic) {
+        if !self.known(motion) {
+            let branch = continue_both_ways(self.scene, motion, self.condition, self.limits);
+            self.follow(branch, 0);
+        }
+    }
+
+    fn known(&self, motion: &Periodic) -> bool {
+        self.found.iter().any(|branch| branch.passes(self.scene, motion))
+    }
+
+    fn follow(&mut self, branch: Branch, depth: usize) {
+        let breaking = [Bifurcation::SymmetryBreaking, Bifurcation::PeriodDoubling];
+        let specials: Vec<_> = branch
+            .special
+            .iter()
+            .filter(|one| breaking.contains(&one.kind))
+            .cloned()
+            .collect();
+        // One that ended early, where continuation failed, may be a part of this one.
+        self.found
+            .retain(|old| !branch.passes(self.scene, &old.points[old.points.len() / 2]));
+        self.found.push(branch);
+        if depth == self.doublings {
+            return;
+        }
+        for special in specials {
+            let Some(branch) = branch_off(self.scene, &special, self.condition, self.limits) else {
+                continue;
+            };
+            // A branch that joins two such points is found from both.
+            if branch.points.len() > 1 && !self.known(&branch.points[branch.points.len() / 2]) {
+                self.follow(branch, depth + 1);
+            }
+        }
+    }
+
+    fn named(mut self) -> Response {
+        let order = |one: &Branch| {
+            let pattern = &one.points[0].pattern;
+            (
+                pattern.periods() as usize * pattern.impacts(),
+                pattern.periods(),
+                !pattern.mirrored,
+            )
+        };
+        self.found.sort_by_key(order);
+        let names: Vec<String> = self.found.iter().map(|one| one.points[0].pattern.name()).collect();
+        let components = self.found.into_iter().enumerate().map(|(n, branch)| {
+            let of = names.iter().filter(|name| **name == names[n]).count();
+            let number = names[..=n].iter().filter(|name| **name == names[n]).count();
+            Component { name: format!("{}, {number} of {of}", names[n]), branch }
+        });
+        Response { g: self.scene.g, components: components.collect() }
+    }
+}
+
+impl Response {
+    /// The components of symmetric 1:1 motions.
+    pub fn symmetric(&self) -> impl Iterator<Item = &Branch> {
+        let symmetric = |one: &&Branch| one.points[0].pattern.is_symmetric();
+        self.components.iter().map(|one| &one.branch).filter(symmetric)
+    }
+
+    /// A motion of the scene lies on one of the components.
+    #[must_use]
+    pub fn contains(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
+        self.components.iter().any(|one| one.branch.passes(scene, motion))
+    }
+}
+
+/// Numbers that a motion shares with its mirror image and with itself one period later.
+fn invariants(motion: &Periodic) -> [f64; 4] {
+    let (sine, cosine) = motion.gamma.sin_cos();
+    [motion.sigma, motion.c * cosine, motion.c * sine, motion.b]
+}
+
+pub(super) fn apart(one: &Periodic, other: &Periodic) -> f64 {
+    let (one, other) = (invariants(one), invariants(other));
+    one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+}
+
+impl Branch {
+    /// Whether this branch of a frequency response passes a motion or its mirror image.
+    #[must_use]
+    pub fn passes(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
+        let pattern = |one: &Periodic| (one.pattern.impacts(), one.pattern.periods(), one.pattern.mirrored);
+        if pattern(&self.points[0]) != pattern(motion) {
+            return false;
+        }
+        self.points.windows(2).any(|pair| {
+            let [from, to] = [&pair[0], &pair[1]];
+            let length = apart(from, to) + SAME;
+            // Where the curve bends, its points are close together.
+            if apart(from, motion).max(apart(to, motion)) > 1.2 * length {
+                return false;
+            }
+            let part = ((motion.sigma - from.sigma) / (to.sigma - from.sigma)).clamp(0.0, 1.0);
+            let guess = from.unknowns() + (to.unknowns() - from.unknowns()) * if part.is_nan() { 0.5 } else { part };
+            let conditions = [Condition::Sigma(motion.sigma), Condition::Excitation(motion.g)];
+            // At a fold Newton's method may fail.
+            Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|found| apart(&found, motion) < SAME)
+        })
+    }
+}

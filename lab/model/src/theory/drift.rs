@@ -1,0 +1,86 @@
+//! Amplitudes that drift along the manifold: how far a slowly changing motion differs from the steady one of the same amplitude.
+//!
+//! docs/estimators.md derives it. While C changes by `d = pi dC/dtau` from impact to impact, B and the phase x of v at an impact
+//! follow late:
+//!
+//! ```text
+//! B+ = r B- + (1 + r) (C cos x + (d/pi) sin x),      2 - C sin x - B+ (x+ + pi - x) - (C + d) sin x+ = 0
+//! ```
+//!
+//! Steady drift, `B+ - B- = d dB/dC` and `x+ - x = d dx/dC`, makes this two linear equations for the deviations of B and x.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use super::{manifold::BranchSide, slow_flow::SlowFlow};
+
+/// Change of detuning and drive by a drift of the amplitude, per unit of `dC/dtau`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Drift {
+    /// Of the detuning of phase resonance.
+    pub sigma: f64,
+    /// Of the drive of phase resonance G, beyond the drive that changes the amplitude.
+    pub g: f64,
+}
+
+impl SlowFlow {
+    /// The effect of a slow drift at the amplitude `c` on the right branch. `None` at the fold and below.
+    #[must_use]
+    pub fn drift(&self, c: f64) -> Option<Drift> {
+        let b = self.manifold.b(c, BranchSide::Right)?;
+        let rate = 1e-6 * c;
+        let [up, down] = [rate, -rate].map(|rate| self.flight(c, b, rate));
+        let slope = |i: usize| (up[i] - down[i]) / (2.0 * rate);
+        let drift = Drift {
+            // The damper acts on the velocity, which a change of C shifts in phase; and at phase resonance the damper's force
+            // on the base leads it by 2 zeta.
+            sigma: slope(0) + 1.5 * self.lambda / c,
+            g: slope(1),
+        };
+        (drift.sigma.is_finite() && drift.g.is_finite()).then_some(drift)
+    }
+
+    /// Detuning and drive of phase resonance by the flight in the middle of which the amplitude is `c` and changes at `rate`.
+    fn flight(&self, c: f64, b: f64, rate: f64) -> [f64; 2] {
+        let (change, r) = (PI * rate, self.manifold.dissipation);
+        let c = c - 0.5 * change;
+        let slope = 2.0 * c * self.manifold.slope(b);
+        let b = b - 0.5 * change * slope;
+        let (cos, sin) = (r * b, 1.0 - FRAC_PI_2 * b);
+        // x = atan2(C sin x, C cos x) on the manifold.
+        let b_step = change * slope;
+        let x_step = -(FRAC_PI_2 * cos + r * sin) * b_step / (c * c);
+        let x = sin.atan2(cos);
+        let restitution = (1.0 - r) / (1.0 + r);
+        // (1 - r) beta + (1 + r) C sin x xi = first,  pi beta + 2 C cos x xi = second.
+        let first = (1.0 + restitution) * rate * x.sin() - b_step;
+        let second = -PI * b_step - (b + cos) * x_step - change * x.sin();
+        let (a11, a12, a21, a22) = (1.0 - restitution, (1.0 + restitution) * sin, PI, 2.0 * cos);
+        let determinant = a11 * a22 - a12 * a21;
+        let beta = (first * a22 - a12 * second) / determinant;
+        let xi = (a11 * second - a21 * first) / determinant;
+        let (x, speed) = (x + xi, b + beta + b_step);
+        let (begin, length) = (1.0 - c * x.sin(), PI + x_step);
+        let (end, after) = (begin - speed * length, x + length);
+        let by_sin = begin * x.cos() - end * after.cos() - speed * (after.sin() - x.sin());
+        let by_cos = end * after.sin() - begin * x.sin() - speed * (after.cos() - x.cos());
+        let middle = c + 0.5 * change;
+        [by_sin / (length * middle), self.lambda * middle + 2.0 * by_cos / length]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn without_drift_a_flight_has_the_detuning_and_the_drive_of_the_backbone() {
+        let flow = SlowFlow::new(1.43, 0.65);
+        for c in [0.2, 0.45, 0.7] {
+            let b = flow.manifold.b(c, BranchSide::Right).unwrap();
+            let [sigma, g] = flow.flight(c, b, 0.0);
+            let backbone = flow.backbone_at(b);
+            assert!((sigma - backbone.sigma).abs() < 1e-12, "{sigma} {}", backbone.sigma);
+            assert!((g - backbone.g).abs() < 1e-12, "{g} {}", backbone.g);
+        }
+    }
+}

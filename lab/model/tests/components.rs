@@ -1,0 +1,192 @@
+//! The components of exact frequency responses: none is missed.
+
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{Rng, SeedableRng},
+};
+use vines_model::{
+    Dimensionless,
+    orbit::{
+        Bifurcation, Ended, Exploration, Limits, Periodic, Response, random_state, response, settle, symmetric_orbits,
+    },
+};
+
+fn scene(g: f64) -> Dimensionless {
+    Dimensionless::new(0.0084, 1.43, 0.65, g)
+}
+
+fn followed(g: f64) -> Response {
+    response(&scene(g), &Limits::default(), Exploration::default())
+}
+
+fn list(response: &Response) {
+    for one in &response.components {
+        let range = one
+            .branch
+            .points
+            .iter()
+            .fold((f64::MAX, f64::MIN), |(low, high), motion| {
+                (low.min(motion.sigma), high.max(motion.sigma))
+            });
+        let special: Vec<_> = one
+            .branch
+            .special
+            .iter()
+            .map(|one| (one.name(), one.motion.sigma))
+            .collect();
+        println!(
+            "G = {}: {}, sigma {range:.3?}, ended {:?}, {special:.4?}",
+            response.g, one.name, one.branch.ended
+        );
+    }
+}
+
+#[test]
+fn beside_the_closed_isola_the_response_has_the_component_of_slow_particles() {
+    for g in [0.98, 1.0, 1.005] {
+        let found = followed(g);
+        list(&found);
+        let symmetric: Vec<_> = found.symmetric().collect();
+        assert!(symmetric.len() >= 2, "G = {g}");
+        assert!(symmetric.iter().any(|one| one.ended == [Ended::Closed; 2]));
+        for one in &symmetric {
+            let folds = one.special.iter().filter(|one| one.kind == Bifurcation::Fold).count();
+            assert!(
+                one.ended != [Ended::Closed; 2] || folds == 2,
+                "a closed curve turns twice, G = {g}: {folds}"
+            );
+        }
+        // Random starts settle on these.
+        for sigma in [-0.4, -0.2, 0.0, 0.2] {
+            let Some(stable) = symmetric_orbits(&scene(g), sigma).into_iter().find(|one| one.stable) else {
+                assert!(g < 1.0, "a stable orbit at sigma = {sigma}");
+                continue;
+            };
+            let near = |one: &Periodic| (one.sigma - sigma).abs() < 0.06 && (one.c - stable.c).abs() < 0.02;
+            assert!(
+                symmetric.iter().any(|one| one.points.iter().any(near)),
+                "G = {g}, sigma = {sigma}"
+            );
+        }
+    }
+}
+
+#[test]
+fn a_response_that_leaves_the_range_has_its_left_branch_too() {
+    for g in [2.2, 2.7] {
+        let found = followed(g);
+        list(&found);
+        let orbits = symmetric_orbits(&scene(g), -2.0);
+        assert!(!orbits.is_empty());
+        for orbit in orbits {
+            let near = |one: &Periodic| (one.sigma + 2.0).abs() < 0.06 && (one.c - orbit.c).abs() < 0.05;
+            assert!(
+                found.symmetric().any(|one| one.points.iter().any(near)),
+                "G = {g}: {orbit:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn mirror_images_of_an_asymmetric_branch_are_one_branch() {
+    let found = followed(1.6);
+    list(&found);
+    let asymmetric: Vec<_> = found
+        .components
+        .iter()
+        .filter(|one| one.name.starts_with("asymmetric 1:1"))
+        .collect();
+    assert!(!asymmetric.is_empty());
+    for one in &asymmetric {
+        // Between its ends no motion is symmetric again.
+        let intervals = one
+            .branch
+            .points
+            .iter()
+            .map(|one| one.bounces[1].phase - one.bounces[0].phase - std::f64::consts::PI);
+        let signs: Vec<_> = intervals.filter(|one| one.abs() > 1e-6).map(f64::signum).collect();
+        assert!(signs.windows(2).all(|pair| pair[0] == pair[1]), "{}", one.name);
+    }
+}
+
+#[test]
+fn a_component_that_joins_another_at_both_ends_is_listed_once() {
+    let found = followed(2.7);
+    list(&found);
+    for (n, one) in found.components.iter().enumerate() {
+        let middle = &one.branch.points[one.branch.points.len() / 2];
+        for other in &found.components[n + 1..] {
+            assert!(
+                !other.branch.passes(&scene(2.7), middle),
+                "{} and {}",
+                one.name,
+                other.name
+            );
+        }
+    }
+}
+
+#[test]
+fn a_torus_is_reported_as_modulation_only_where_the_motion_was_stable() {
+    for g in [1.0, 1.1, 1.6, 2.2] {
+        for one in followed(g).components {
+            for special in one.branch.special.iter().filter(|one| one.name().starts_with("torus")) {
+                let near = |motion: &&Periodic| (motion.sigma - special.motion.sigma).abs() < 0.1;
+                assert!(
+                    one.branch.points.iter().filter(near).any(|one| one.stable),
+                    "{}",
+                    one.name
+                );
+            }
+        }
+    }
+}
+
+/// Settles from random starts at random detunings; counts the 1:1 motions, the others, and those of each that no component contains.
+fn missing(scene: &Dimensionless, count: usize, seed: u64) -> [usize; 4] {
+    let found = response(scene, &Limits::default(), Exploration::default());
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut counts = [0; 4];
+    for _ in 0..count {
+        let sigma = 12.0 * (random.next_u64() as f64 / u64::MAX as f64) - 6.0;
+        let Ok(Some(motion)) = settle(scene, sigma, random_state(&mut random), 800) else {
+            continue;
+        };
+        let other = usize::from(!(motion.pattern.impacts() == 2 && motion.pattern.periods() == 1));
+        counts[other] += 1;
+        if motion.stable && !found.contains(scene, &motion) {
+            println!(
+                "{scene:?}: {} at sigma = {sigma}, C = {} is missing",
+                motion.pattern.name(),
+                motion.c
+            );
+            counts[2 + other] += 1;
+        }
+    }
+    counts
+}
+
+#[test]
+fn no_stable_orbit_from_random_starts_is_missing_from_the_components() {
+    let mut random = ChaCha8Rng::seed_from_u64(20_261_121);
+    let mut sums = [0; 4];
+    // SCENES sets their number: docs/theory.md has a longer run.
+    let scenes: u64 = std::env::var("SCENES").map_or(4, |text| text.parse().expect("SCENES: a number"));
+    for n in 0..scenes {
+        let mut within = |low: f64, high: f64| low + (high - low) * (random.next_u64() as f64 / u64::MAX as f64);
+        let epsilon = within(0.003_f64.ln(), 0.05_f64.ln()).exp();
+        let scene = Dimensionless::new(epsilon, within(0.2, 2.0), within(0.3, 0.95), within(0.4, 3.0));
+        let counts = missing(&scene, 60, 100 + n);
+        println!(
+            "scene {n}: 1:1 {}, others {}, missing {} and {}",
+            counts[0], counts[1], counts[2], counts[3]
+        );
+        (0..4).for_each(|n| sums[n] += counts[n]);
+    }
+    println!(
+        "all: 1:1 {}, others {}, missing {} and {}",
+        sums[0], sums[1], sums[2], sums[3]
+    );
+    assert!(sums[0] > 40 && sums[2] == 0, "{sums:?}");
+}

@@ -1,0 +1,95 @@
+//! Resonance by phase and by peak, relative to the base and to its force, of v, q1 and the acceleration.
+
+use vines_model::{
+    Definition, Dimensionless, Reference, Resonance, Sensor,
+    orbit::{Exploration, Limits, Orbit, convergence, phase_resonant, response, symmetric_orbits},
+    theory::resonant,
+};
+
+// The default scene: M = 3.807 kg, k = 11.68e3 N/m, c = 2.53 N s/m, m = 0.032 kg.
+const EPSILON: f64 = 0.032 / 3.807;
+const LAMBDA: f64 = 1.427_381;
+
+fn scene(definition: Definition) -> Dimensionless {
+    Dimensionless { definition, ..Dimensionless::new(EPSILON, LAMBDA, 0.65, 1.1) }
+}
+
+fn orbit(definition: Definition) -> Orbit {
+    let orbits = phase_resonant(&scene(definition));
+    orbits
+        .into_iter()
+        .filter(|one| one.stable)
+        .max_by(|one, other| one.c.total_cmp(&other.c))
+        .expect("an orbit")
+}
+
+#[test]
+fn the_peak_is_the_largest_amplitude_of_the_frequency_response() {
+    for sensor in [Sensor::V, Sensor::Q1, Sensor::Acceleration] {
+        let definition = Definition { resonance: Resonance::Peak, sensor, ..Definition::default() };
+        let peak = orbit(definition);
+        let fine = Limits { step: 0.005, points: 20_000, ..Limits::default() };
+        let found = response(
+            &scene(definition),
+            &fine,
+            Exploration { starts: 0, seed: 1, doublings: 0 },
+        );
+        let motions = found.symmetric().flat_map(|one| &one.points).filter(|one| one.stable);
+        let largest = motions.max_by(|one, other| one.c.total_cmp(&other.c)).unwrap();
+        println!(
+            "{}: peak at sigma = {:.5}, C = {:.6}; largest on the response: {:.5}, {:.6}",
+            definition.name(),
+            peak.sigma,
+            peak.c,
+            largest.sigma,
+            largest.c
+        );
+        assert!((peak.sigma - largest.sigma).abs() < 0.004 && peak.c >= largest.c - 1e-12 && peak.c - largest.c < 1e-5);
+    }
+}
+
+#[test]
+fn definitions_differ_as_an_independent_computation_says() {
+    let with = |resonance, reference, sensor| orbit(Definition { resonance, reference, sensor });
+    let study = with(Resonance::Phase, Reference::Base, Sensor::V);
+    let peak = with(Resonance::Peak, Reference::Base, Sensor::V);
+    println!("phase {:.5}, peak {:.5}", study.sigma, peak.sigma);
+    assert!((study.sigma + 1.1394).abs() < 1e-4 && (peak.sigma + 1.1612).abs() < 1e-4);
+    // The same motion, read by the other sensor.
+    let q1 = Definition { sensor: Sensor::Q1, ..Definition::default() };
+    let nearest = |one: &Orbit, other: &Orbit| (one.b - study.b).abs().total_cmp(&(other.b - study.b).abs());
+    let q1 = symmetric_orbits(&scene(q1), study.sigma)
+        .into_iter()
+        .min_by(nearest)
+        .unwrap();
+    println!("v {:.5}, q1 {:.5}", study.c, q1.c);
+    assert!((study.c - 0.4480).abs() < 1e-4 && (q1.c - 0.4394).abs() < 1e-4);
+    // The force leads the base by 0.7 degrees.
+    let force = with(Resonance::Phase, Reference::Force, Sensor::V);
+    println!("force {:.5}", force.sigma);
+    assert!((force.sigma - study.sigma).abs() > 1e-4);
+}
+
+#[test]
+fn theory_approaches_the_exact_orbit_of_every_definition() {
+    for definition in Definition::all() {
+        let study = convergence(&scene(definition), 4).expect("stable solutions");
+        let [sigma, c, _] = study.slopes;
+        println!(
+            "{}: {:.5?}, exponents {sigma:.3}, {c:.3}",
+            definition.name(),
+            study.rows[0]
+        );
+        assert!(study.rows[0].sigma.abs() < 0.1 && study.rows[4].sigma.abs() < 0.1 * study.rows[0].sigma.abs() + 1e-4);
+        assert!(study.rows[4].c.abs() < 0.1 * study.rows[0].c.abs() + 1e-4);
+    }
+}
+
+#[test]
+fn the_default_definition_is_that_of_the_study() {
+    let scene = scene(Definition::default());
+    let flow = vines_model::theory::SlowFlow::new(scene.lambda, scene.r);
+    for (one, other) in resonant(&scene).iter().zip(flow.phase_resonant(scene.g)) {
+        assert!((one.sigma - other.sigma).abs() < 1e-12 && (one.c - other.c).abs() < 1e-12);
+    }
+}

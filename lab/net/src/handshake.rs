@@ -1,0 +1,156 @@
+//! The start of a session: Hello, and Welcome or Refusal.
+
+use std::fmt::{self, Display, Formatter};
+
+use super::frame::{Frame, Kind, VERSION, flag};
+use super::payload::read_command;
+use vines_testbench::rig::Drive;
+
+/// Largest relative difference of two sample times that count as equal.
+pub(super) const SAME_TIME: f64 = 1e-9;
+
+/// What a server offers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Role {
+    /// A controller.
+    Controller,
+    /// A rig.
+    Rig {
+        /// Largest drive amplitude, m. A drive above it is refused.
+        max_amplitude: f64,
+    },
+}
+
+/// Settings of a server.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Service {
+    /// What it offers.
+    pub role: Role,
+    /// Sample time, s.
+    pub sample_time: f64,
+    /// Longest silence of a client before its session is shut down, s.
+    pub silence: f64,
+}
+
+impl Service {
+    /// The answer to Hello.
+    pub(super) fn welcome(&self, hello: &Frame) -> Result<Frame, Refusal> {
+        let controller = self.role == Role::Controller;
+        if hello.has(flag::CONTROLLER) != controller {
+            return Err(Refusal::Role);
+        }
+        if (hello.values[0] / self.sample_time - 1.0).abs() > SAME_TIME {
+            return Err(Refusal::SampleTime(self.sample_time));
+        }
+        let mut welcome = Frame::new(Kind::Welcome, hello.session);
+        welcome.flags = if controller { flag::CONTROLLER } else { 0 };
+        welcome.values[..2].copy_from_slice(&[self.sample_time, self.silence]);
+        Ok(welcome)
+    }
+
+    /// The drive in a frame. What is not finite or above a limit must not reach a shaker.
+    pub(super) fn drive(&self, frame: &Frame) -> Result<Drive, Refusal> {
+        let largest = match self.role {
+            Role::Rig { max_amplitude } => max_amplitude,
+            Role::Controller => 0.0,
+        };
+        let limits = [std::f64::consts::PI / self.sample_time, largest, largest];
+        for (index, limit) in limits.into_iter().enumerate() {
+            let value = frame.values[index];
+            // The displacement has a sign.
+            let size = if index == 2 { value.abs() } else { value };
+            if !(0.0..=limit).contains(&size) {
+                return Err(Refusal::Drive { index, value, limit });
+            }
+        }
+        Ok(read_command(frame).drive)
+    }
+}
+
+/// Reason of a server to refuse a session, or to end it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Refusal {
+    /// Code 1: another client has a session.
+    Busy,
+    /// Code 2: the sample times differ; that of the server, s.
+    SampleTime(f64),
+    /// Code 3: the server is a rig and the client needs a controller, or the reverse.
+    Role,
+    /// Code 4: the versions differ; that of the server.
+    Version(u16),
+    /// Code 5: a value of a drive is not finite, or above its limit.
+    Drive {
+        /// Index of the value: frequency, amplitude, displacement.
+        index: usize,
+        /// The value, rad/s or m.
+        value: f64,
+        /// Its limit.
+        limit: f64,
+    },
+    /// Code 6: a frame that does not belong here: of another kind, another sample, or damaged.
+    Unexpected,
+    /// An unknown code.
+    Other(f64),
+}
+
+impl Refusal {
+    /// The frame that answers `cause`.
+    pub(super) fn answer(self, cause: &Frame) -> Frame {
+        let values = match self {
+            Self::Busy => [1.0, 0.0, 0.0, 0.0],
+            Self::SampleTime(seconds) => [2.0, seconds, 0.0, 0.0],
+            Self::Role => [3.0, 0.0, 0.0, 0.0],
+            Self::Version(version) => [4.0, version.into(), 0.0, 0.0],
+            Self::Drive { index, value, limit } => [5.0, index as f64, value, limit],
+            Self::Unexpected => [6.0, 0.0, 0.0, 0.0],
+            Self::Other(code) => [code, 0.0, 0.0, 0.0],
+        };
+        let mut frame = Frame { flags: 0, kind: Kind::Refusal, ..*cause };
+        frame.values = [0.0; 6];
+        frame.values[..4].copy_from_slice(&values);
+        frame
+    }
+
+    pub(super) fn read(frame: &Frame) -> Self {
+        let [code, first, value, limit, ..] = frame.values;
+        match code as u8 {
+            1 => Self::Busy,
+            2 => Self::SampleTime(first),
+            3 => Self::Role,
+            4 => Self::Version(first as u16),
+            5 => Self::Drive { index: first as usize, value, limit },
+            6 => Self::Unexpected,
+            _ => Self::Other(code),
+        }
+    }
+}
+
+impl Display for Refusal {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match *self {
+            Self::Busy => f.write_str("it has another client; sessions are served one at a time"),
+            Self::SampleTime(seconds) => write!(
+                f,
+                "its sample time is {seconds} s, which differs from that of this program: use the same scene for both"
+            ),
+            Self::Role => f.write_str("it is a rig where a controller is needed, or the reverse"),
+            Self::Version(version) => write!(
+                f,
+                "it has version {version} of the protocol, this program has {VERSION}"
+            ),
+            Self::Drive { index, value, limit } => {
+                let (name, unit, advice) = match index {
+                    0 => ("frequency", "rad/s", "the limit is half its sample rate"),
+                    1 => ("amplitude", "m", "`vines rig --max-amplitude` sets the limit"),
+                    _ => ("displacement", "m", "`vines rig --max-amplitude` sets the limit"),
+                };
+                write!(
+                    f,
+                    "the {name} of the drive is {value:e} {unit}, allowed is up to {limit:e} {unit}; {advice}"
+                )
+            }
+            Self::Unexpected => f.write_str("a frame was damaged, or was not that of the present sample"),
+            Self::Other(code) => write!(f, "reason {code}"),
+        }
+    }
+}

@@ -1,0 +1,254 @@
+//! Frames over TCP and UDP, with a deadline for receiving.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::address::{Address, is_loopback};
+use super::frame::{Frame, FrameError, SIZE};
+
+/// Shorter waits use polling: the time-outs of the system may be as coarse as 16 ms, which is several samples.
+const FINE: Duration = Duration::from_millis(20);
+/// Polling interval.
+const POLL: Duration = Duration::from_micros(50);
+/// Interval at which a server without connections looks for one.
+const ACCEPT: Duration = Duration::from_millis(5);
+/// Longest time for sending a frame over TCP to a peer that does not read.
+const SEND: Duration = Duration::from_secs(5);
+/// Longest time for a TCP client to say Hello while another one has a session.
+const HELLO: Duration = Duration::from_millis(50);
+
+/// A frame, or what arrived instead.
+pub(super) type Received = Result<Frame, FrameError>;
+
+/// The client's end of a connection.
+#[derive(Debug)]
+pub(super) enum Link {
+    Tcp(FrameStream),
+    Udp(UdpSocket),
+}
+
+impl Link {
+    pub fn connect(peer: Address, patience: Duration) -> io::Result<Self> {
+        match peer {
+            Address::Tcp(to) => Ok(Self::Tcp(FrameStream::new(TcpStream::connect_timeout(&to, patience)?)?)),
+            Address::Udp(to) => {
+                // Bound to loopback if the peer is on loopback.
+                let socket = UdpSocket::bind(SocketAddr::new(
+                    match (to, is_loopback(to.ip())) {
+                        (SocketAddr::V4(_), true) => Ipv4Addr::LOCALHOST.into(),
+                        (SocketAddr::V4(_), false) => Ipv4Addr::UNSPECIFIED.into(),
+                        (SocketAddr::V6(_), true) => Ipv6Addr::LOCALHOST.into(),
+                        (SocketAddr::V6(_), false) => Ipv6Addr::UNSPECIFIED.into(),
+                    },
+                    0,
+                ))?;
+                // Datagrams of other senders do not arrive from now on.
+                socket.connect(to)?;
+                Ok(Self::Udp(socket))
+            }
+        }
+    }
+
+    /// Sends a frame. One that cannot be sent shows when no answer arrives.
+    pub fn send(&mut self, frame: &Frame) -> io::Result<()> {
+        match self {
+            Self::Tcp(stream) => stream.send(frame),
+            Self::Udp(socket) => delivered(socket.send(&frame.encode())),
+        }
+    }
+
+    /// Waits for a frame until `deadline`. A frame that has arrived is returned even after the deadline.
+    pub fn receive(&mut self, deadline: Instant) -> io::Result<Option<Received>> {
+        match self {
+            Self::Tcp(stream) => stream.receive(deadline),
+            Self::Udp(socket) => Ok(receive_from(socket, deadline)?.map(|(frame, _)| frame)),
+        }
+    }
+}
+
+/// The server's end of all connections.
+#[derive(Debug)]
+pub(super) enum Listener {
+    Tcp(TcpListener, Vec<(SocketAddr, FrameStream)>),
+    Udp(UdpSocket),
+}
+
+impl Listener {
+    pub fn bind(address: Address) -> io::Result<Self> {
+        Ok(match address {
+            Address::Udp(address) => Self::Udp(UdpSocket::bind(address)?),
+            Address::Tcp(address) => {
+                let listener = TcpListener::bind(address)?;
+                listener.set_nonblocking(true)?;
+                Self::Tcp(listener, Vec::new())
+            }
+        })
+    }
+
+    pub fn address(&self) -> io::Result<Address> {
+        Ok(match self {
+            Self::Tcp(listener, _) => Address::Tcp(listener.local_addr()?),
+            Self::Udp(socket) => Address::Udp(socket.local_addr()?),
+        })
+    }
+
+    /// Waits for a frame until `deadline`, or less.
+    pub fn receive(&mut self, deadline: Instant) -> io::Result<Option<(Received, SocketAddr)>> {
+        let (listener, streams) = match self {
+            Self::Udp(socket) => return receive_from(socket, deadline),
+            Self::Tcp(listener, streams) => (listener, streams),
+        };
+        if let Ok((stream, from)) = listener.accept() {
+            streams.push((from, FrameStream::new(stream)?));
+        }
+        if streams.is_empty() {
+            thread::sleep(ACCEPT);
+        }
+        // The client of the session is the first one; others have only a moment.
+        for index in (0..streams.len()).rev() {
+            let (from, stream) = &mut streams[index];
+            let from = *from;
+            let until = if index == 0 {
+                deadline
+            } else {
+                deadline.min(Instant::now() + HELLO)
+            };
+            match stream.receive(until)? {
+                Some(Err(FrameError::Closed)) => {
+                    streams.remove(index);
+                    return Ok(Some((Err(FrameError::Closed), from)));
+                }
+                Some(received) => return Ok(Some((received, from))),
+                None if index > 0 => drop(streams.remove(index)),
+                None => {}
+            }
+        }
+        Ok(None)
+    }
+
+    /// Sends a frame. If a TCP client has left, the next call of `receive` says so.
+    pub fn send(&mut self, frame: &Frame, to: SocketAddr) -> io::Result<()> {
+        match self {
+            Self::Udp(socket) => delivered(socket.send_to(&frame.encode(), to)),
+            Self::Tcp(_, streams) => {
+                let stream = streams.iter_mut().find(|(from, _)| *from == to);
+                stream.map_or(Ok(()), |(_, stream)| stream.send(frame))
+            }
+        }
+    }
+
+    /// The session is that of this client.
+    pub fn prefer(&mut self, client: SocketAddr) {
+        if let Self::Tcp(_, streams) = self
+            && let Some(index) = streams.iter().position(|(from, _)| *from == client)
+        {
+            streams.swap(0, index);
+        }
+    }
+
+    /// Closes the connection of a client.
+    pub fn close(&mut self, client: SocketAddr) {
+        if let Self::Tcp(_, streams) = self {
+            streams.retain(|(from, _)| *from != client);
+        }
+    }
+}
+
+/// A TCP connection.
+#[derive(Debug)]
+pub(super) struct FrameStream {
+    stream: TcpStream,
+    bytes: [u8; SIZE],
+    /// Number of bytes of the next frame that have arrived.
+    filled: usize,
+}
+
+impl FrameStream {
+    fn new(stream: TcpStream) -> io::Result<Self> {
+        // Without this, the system collects small messages before it sends them.
+        stream.set_nodelay(true)?;
+        stream.set_write_timeout(Some(SEND))?;
+        Ok(Self { stream, bytes: [0; SIZE], filled: 0 })
+    }
+
+    fn send(&mut self, frame: &Frame) -> io::Result<()> {
+        self.stream.set_nonblocking(false)?;
+        // If this fails, the connection has been closed, which the next read reports.
+        let _ = self.stream.write_all(&frame.encode());
+        Ok(())
+    }
+
+    fn receive(&mut self, deadline: Instant) -> io::Result<Option<Received>> {
+        let Self { stream, bytes, filled } = self;
+        while *filled < SIZE {
+            let block = |time: Option<Duration>| {
+                stream.set_nonblocking(time.is_none())?;
+                time.map_or(Ok(()), |_| stream.set_read_timeout(time))
+            };
+            match wait(deadline, block, || (&*stream).read(&mut bytes[*filled..])) {
+                Ok(None) => return Ok(None),
+                Ok(Some(0)) | Err(_) => return Ok(Some(Err(FrameError::Closed))),
+                Ok(Some(more)) => *filled += more,
+            }
+        }
+        *filled = 0;
+        Ok(Some(Frame::decode(bytes)))
+    }
+}
+
+fn receive_from(socket: &UdpSocket, deadline: Instant) -> io::Result<Option<(Received, SocketAddr)>> {
+    // Longer than a frame: a datagram that is too long must not be cut to the valid length.
+    let mut bytes = [0; 256];
+    let block = |time: Option<Duration>| {
+        socket.set_nonblocking(time.is_none())?;
+        time.map_or(Ok(()), |_| socket.set_read_timeout(time))
+    };
+    let received = wait(deadline, block, || socket.recv_from(&mut bytes).map_err(undelivered))?;
+    Ok(received.map(|(size, from)| (Frame::decode(&bytes[..size]), from)))
+}
+
+/// Calls `receive` until it succeeds, or None at `deadline`. `block` sets the time-out of the socket; None: it does not wait.
+fn wait<T>(
+    deadline: Instant,
+    block: impl Fn(Option<Duration>) -> io::Result<()>,
+    mut receive: impl FnMut() -> io::Result<T>,
+) -> io::Result<Option<T>> {
+    loop {
+        let left = deadline.saturating_duration_since(Instant::now());
+        let coarse = left.checked_sub(FINE).filter(|wait| !wait.is_zero());
+        block(coarse)?;
+        match receive() {
+            Ok(received) => return Ok(Some(received)),
+            Err(error) if !is_passing(&error) => return Err(error),
+            Err(_) if left.is_zero() => return Ok(None),
+            Err(_) if coarse.is_none() => thread::sleep(left.min(POLL)),
+            Err(_) => {}
+        }
+    }
+}
+
+/// Nothing to read yet, or a full buffer.
+fn is_passing(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted
+    )
+}
+
+/// UDP continues after a report that an earlier datagram was not delivered.
+fn undelivered(error: io::Error) -> io::Error {
+    match error.kind() {
+        ErrorKind::ConnectionRefused | ErrorKind::ConnectionReset => ErrorKind::WouldBlock.into(),
+        _ => error,
+    }
+}
+
+/// A datagram that cannot be sent now counts as lost in the network.
+fn delivered(sent: io::Result<usize>) -> io::Result<()> {
+    match sent.map_err(undelivered) {
+        Err(error) if !is_passing(&error) => Err(error),
+        _ => Ok(()),
+    }
+}

@@ -1,0 +1,75 @@
+//! The drive of a served rig: the last valid one, or after a shutdown a ramp to zero.
+
+use vines_testbench::rig::Drive;
+
+/// Number of samples of the ramp to zero after a shutdown.
+pub const RAMP_SAMPLES: u32 = 100;
+
+/// A drive that can be shut down for the rest of a session.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Ramp {
+    drive: Drive,
+    /// Remaining samples of the ramp after the shutdown.
+    left: Option<u32>,
+}
+
+impl Ramp {
+    /// Sets a new drive; without effect after the shutdown.
+    pub fn set(&mut self, drive: Drive) {
+        if self.left.is_none() {
+            self.drive = drive;
+        }
+    }
+
+    /// Shuts the drive down for the rest of the session.
+    pub fn shut_down(&mut self) {
+        self.left.get_or_insert(RAMP_SAMPLES);
+    }
+
+    /// Whether the drive has been shut down.
+    pub fn is_shut_down(&self) -> bool {
+        self.left.is_some()
+    }
+
+    /// Whether the drive has been shut down and is zero.
+    pub fn is_down(&self) -> bool {
+        self.left == Some(0)
+    }
+
+    /// The drive of the next sample period.
+    pub fn next(&mut self) -> Drive {
+        let Some(left) = &mut self.left else {
+            return self.drive;
+        };
+        *left = left.saturating_sub(1);
+        let share = f64::from(*left) / f64::from(RAMP_SAMPLES);
+        Drive {
+            omega: self.drive.omega,
+            amplitude: share * self.drive.amplitude,
+            displacement: share * self.drive.displacement,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn after_a_shutdown_the_drive_ramps_to_zero_and_stays_there() {
+        let drive = Drive { omega: 2.0, amplitude: 1.0, displacement: 0.5 };
+        let mut ramp = Ramp::default();
+        ramp.set(drive);
+        assert_eq!(ramp.next(), drive);
+        ramp.shut_down();
+        let mut before = drive.amplitude;
+        while !ramp.is_down() {
+            let now = ramp.next().amplitude;
+            assert!(now < before && before - now < 0.011);
+            before = now;
+            ramp.set(drive);
+        }
+        let down = Drive { amplitude: 0.0, displacement: 0.0, ..drive };
+        assert_eq!(ramp.next(), down);
+    }
+}
