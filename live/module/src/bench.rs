@@ -28,7 +28,7 @@ pub struct Row {
 }
 
 /// Impacts that are kept to determine the regime from.
-const KEPT: usize = 120;
+const KEPT: usize = 40;
 
 /// The bench: rig, controller and clock.
 pub struct Bench {

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use vines_model::regime::{MEASURED, Regime, one_to_one, pattern};
+use vines_model::regime::{MEASURED, Regime, one_to_one};
 
 use crate::bench::Bench;
 
@@ -12,7 +12,7 @@ const QUIET: f64 = 20.0;
 const ENOUGH: usize = 12;
 
 impl Bench {
-    /// The regime of the last impacts, as the lab determines it.
+    /// The regime of the last impacts, as the lab determines it in an experiment.
     #[must_use]
     pub fn regime(&self) -> Regime {
         let since = self.impacts.last().map_or(self.phase, |last| self.phase - last.time);
@@ -22,9 +22,6 @@ impl Bench {
         if self.impacts.len() < ENOUGH {
             return Regime::Unknown;
         }
-        let recent = &self.impacts[self.impacts.len().saturating_sub(40)..];
-        pattern(&self.impacts)
-            .map(|pattern| pattern.regime)
-            .unwrap_or_else(|| one_to_one(recent, self.impacts_per_period(), MEASURED))
+        one_to_one(&self.impacts, self.impacts_per_period(), MEASURED)
     }
 }

@@ -64,6 +64,8 @@ impl Controller for Ahead<'_> {
             },
             phase_error: output.phase_error,
             settled: output.settled,
+            state: Some(output.state),
+            fault: output.fault,
         })
     }
 
