@@ -129,7 +129,11 @@ build_platform() (
         debian | rust-src)
             export RUSTC_BOOTSTRAP=1
             case $triple in
-                wasm32-*) options+=(-Z build-std=std,panic_abort -Z build-std-features=optimize_for_size) ;;
+                # Without the texts of panics, which a page cannot show.
+                wasm32-*)
+                    options+=(-Z build-std=std,panic_abort -Z build-std-features=optimize_for_size -Z panic-immediate-abort)
+                    options+=(--config 'profile.live.panic="immediate-abort"')
+                    ;;
                 *) options+=(-Z build-std=std,panic_unwind) ;;
             esac
             ;;

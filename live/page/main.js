@@ -172,9 +172,9 @@ class Page {
     const motion = recent.map((row) => [row[0], row[1] / (b * this.values.mass_ratio), row[2] / b, row[3] / b]);
     const top = Math.max(1.1, ...motion.map((row) => Math.max(Math.abs(row[1]), Math.abs(row[2]), Math.abs(row[3])))) * 1.05;
     plots.scope.begin([t0, Math.max(t1, t0 + period)], [-top, top]);
-    plots.scope.line(motion.map((row) => [row[0], row[1]]), "blue", { label: "base over ε b" });
+    plots.scope.line(motion.map((row) => [row[0], row[1]]), "blue", { label: "base/(ε b)" });
     plots.scope.line(motion.map((row) => [row[0], row[2]]), "ink", { label: "response v" });
-    plots.scope.line(motion.map((row) => [row[0], row[3]]), "red", { label: "relative displacement w" });
+    plots.scope.line(motion.map((row) => [row[0], row[3]]), "red", { label: "relative w" });
     plots.scope.end();
 
     const stride = Math.max(1, Math.floor(this.rows.length / 700));
@@ -201,8 +201,8 @@ class Page {
     const all = [...curves.exact, ...curves.theory];
     const xs = extent(all.map((point) => point[0]).filter((x) => x > -8 && x < 8).concat([Math.max(-8, Math.min(8, status.sigma))]), 0.5);
     plots.backbone.begin(xs, [0, cTop]);
-    plots.backbone.line(curves.theory, "ink", { label: "theory, first order", dash: [6, 4] });
-    plots.backbone.line(curves.exact.map((point) => (point[2] ? point : null)), "green", { label: "exact, stable" });
+    plots.backbone.line(curves.theory, "ink", { label: "theory", dash: [6, 4] });
+    plots.backbone.line(curves.exact.map((point) => (point[2] ? point : null)), "green", { label: "exact" });
     plots.backbone.line(curves.exact.map((point) => (point[2] ? null : point)), "green", { dash: [1, 3] });
     plots.backbone.line(this.trail.slice(-200), "blue", { width: 1 });
     plots.backbone.points(done.map((point) => [point[1], point[2]]), "violet", { label: "tracked", open: true });

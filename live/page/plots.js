@@ -2,7 +2,7 @@
 
 import { surface } from "./rig.js";
 
-const MARGIN = { left: 46, right: 10, top: 8, bottom: 34 };
+const MARGIN = { left: 56, right: 10, top: 24, bottom: 34 };
 
 export class Plot {
   constructor(canvas, colour, axes) {
@@ -33,9 +33,8 @@ export class Plot {
     c.fillText(this.xLabel, left + wide / 2, top + high + 29);
     c.save(); c.translate(11, top + high / 2); c.rotate(-Math.PI / 2); c.fillText(this.yLabel, 0, 0); c.restore();
     c.textAlign = "left";
-    this.entries = 0;
-    c.save();
-    c.beginPath(); c.rect(left, top, wide, high); c.clip();
+    this.legend = left;
+    this.#clip();
   }
 
   #at([x, y]) {
@@ -77,18 +76,27 @@ export class Plot {
     if (label && points.length) this.#legend(label, colour, null);
   }
 
+  // One row above the axes, outside the clipped area.
   #legend(label, colour, dash) {
     const { c } = this;
-    const [left, top] = this.box;
-    const y = top + 12 + 15 * this.entries++;
+    const x = this.legend, y = this.box[1] - 9;
+    c.restore();
     c.strokeStyle = c.fillStyle = this.colour(colour);
     c.setLineDash(dash ?? []);
     c.lineWidth = 2;
     c.beginPath();
-    if (dash) { c.moveTo(left + 8, y - 4); c.lineTo(left + 28, y - 4); c.stroke(); } else { c.arc(left + 18, y - 4, 3, 0, 7); c.fill(); }
+    if (dash) { c.moveTo(x, y - 4); c.lineTo(x + 18, y - 4); c.stroke(); } else { c.arc(x + 9, y - 4, 3.5, 0, 7); c.fill(); }
     c.setLineDash([]);
     c.fillStyle = this.colour("ink");
-    c.fillText(label, left + 33, y);
+    c.fillText(label, x + 23, y);
+    this.legend += 35 + c.measureText(label).width;
+    this.#clip();
+  }
+
+  #clip() {
+    const { c, box } = this;
+    c.save();
+    c.beginPath(); c.rect(...box); c.clip();
   }
 
   end() { this.c.restore(); }
