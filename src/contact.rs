@@ -69,8 +69,9 @@ pub struct ImpactLaw {
 /// The particle at a wall: velocities after an impact, if it approached, and after coming to rest, if it did.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Touch {
-    /// Velocity of the primary mass, m/s.
+    /// Velocity of the primary mass, m/s, and what was added to it: the sum of many small changes needs all their digits.
     pub primary: f64,
+    pub kick: f64,
     /// Velocity of the particle, m/s.
     pub particle: f64,
     /// Relative velocity `w'`, m/s.
@@ -126,6 +127,7 @@ impl ImpactLaw {
     ) -> Touch {
         let mut touch = Touch {
             primary,
+            kick: 0.0,
             particle,
             relative,
             impact: None,
@@ -135,14 +137,17 @@ impl ImpactLaw {
         if wall.sign() * relative > 0.0 {
             let (r, (head, tail)) = (self.restitution, self.primary_share);
             touch.impact = Some(relative);
-            touch.primary = primary - (head * relative + tail * relative);
+            touch.kick = -(head * relative + tail * relative);
+            touch.primary = primary + touch.kick;
             touch.relative = -r * relative;
             touch.particle = touch.primary - touch.relative;
             touch.dissipated = self.half_relative_mass * ((1.0 - r) * (1.0 + r)) * (relative * relative);
         }
         if rests(touch.primary, -wall.sign() * touch.relative) {
             touch.dissipated += self.half_relative_mass * touch.relative * touch.relative;
-            touch.primary -= self.particle_fraction * touch.relative;
+            let share = self.particle_fraction * touch.relative;
+            touch.kick -= share;
+            touch.primary -= share;
             touch.particle = touch.primary;
             touch.relative = 0.0;
             touch.stuck = true;

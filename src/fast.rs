@@ -13,6 +13,7 @@ mod arrival;
 mod cache;
 mod coefficients;
 mod flight;
+mod grid;
 mod hop;
 mod march;
 mod propagator;
@@ -21,7 +22,7 @@ mod start;
 mod verify;
 
 use crate::arithmetic::Sum;
-use crate::base_motion::{BaseMotion, Phase, shift};
+use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
 use crate::plant::{Masses, Rig};
 use crate::segment::Segment;
@@ -30,12 +31,17 @@ use cache::Cache;
 pub(crate) use cache::Keys;
 use coefficients::Coefficients;
 use propagator::{Increment, Point};
+use start::Start;
 use verify::Envelope;
 
 /// How often a phasor is rotated before it is computed from the phase again.
 const ROTATIONS: u32 = 16;
 /// Contact is looked for so many steps ahead: where it is far, most steps need not look at all.
 const AHEAD: f64 = 4.0;
+
+/// Longest time for which the motion is followed from point to point of the grid, in units of the fastest rate's time: for
+/// a longer one the closed form is as cheap.
+const LONGEST_COAST: f64 = 8.0;
 
 /// What comes next.
 pub(crate) enum Next {
@@ -95,8 +101,9 @@ impl FastPath {
 
     /// The drive was changed.
     #[inline(always)]
-    pub fn drive_changed(&mut self) {
+    pub fn drive_changed(&mut self, drive: &Drive) {
         self.contact_free = 0.0;
+        self.cache.step.drive_changed(drive);
     }
 
     /// The phasor and the phase of the base have moved on.
@@ -131,23 +138,29 @@ impl FastPath {
     /// Takes a step whose propagator is cached, if it meets no contact. Returns whether it was taken.
     #[inline]
     pub fn step(&mut self, moving: &mut Moving, duration: f64) -> bool {
-        if duration != self.cache.step.t || self.disabled {
+        let late = duration - self.cache.step.t;
+        if !self.cache.step.serves(&moving.base.drive, late) || self.disabled {
             return false;
         }
         let start = self.point(moving);
         if duration >= self.contact_free && !self.is_contact_free(moving, &start, duration) {
             return false;
         }
-        self.take_step(moving, &start);
+        self.take_step(moving, &start, late);
         true
     }
 
+    /// Takes a step that is longer than the cached one by `late` seconds.
     #[inline(always)]
-    fn take_step(&mut self, moving: &mut Moving, start: &Point) {
+    fn take_step(&mut self, moving: &mut Moving, start: &Point, late: f64) {
         let step = &mut self.cache.step;
-        let increment = step.increment(&moving.rig.alone, &moving.base.drive, start);
-        let (t, angle) = (step.t, step.angle);
-        let phase = moving.base.phase.rotated(angle, 0.0);
+        let drive = &moving.base.drive;
+        let mut increment = step.increment(drive, start);
+        if late != 0.0 {
+            increment = increment.later(&moving.rig.alone, drive, start, late);
+        }
+        let (t, angle) = (step.t + late, step.angle);
+        let phase = moving.base.phase.rotated(angle, drive.omega * late);
         self.apply(moving, &increment, phase, t);
         self.contact_free -= t;
     }
@@ -189,13 +202,14 @@ impl FastPath {
 
     /// Moves on by `t` seconds, in which no wall is met; `duration` is the length of the whole step.
     fn coast(&mut self, moving: &mut Moving, start: &Point, t: f64, duration: f64) -> Next {
-        self.evaluations += 1;
         let (oscillator, drive) = (&moving.rig.alone, moving.base.drive);
         let [_, u1, u2, u3] = drive.signal;
         let fastest = oscillator.fastest.max(drive.omega.abs());
         if t == duration && self.cache.repeats(oscillator, &drive, duration) {
-            self.take_step(moving, start);
-        } else if t * fastest <= short_step::LONGEST || u2 != 0.0 || u3 != 0.0 || drive.omega < 0.0 {
+            self.evaluations += 1;
+            self.take_step(moving, start, duration - self.cache.step.t);
+        } else if u2 != 0.0 || u3 != 0.0 || drive.omega < 0.0 || t * fastest > LONGEST_COAST {
+            self.evaluations += 1;
             let (x, v) = (moving.masses.x.value(), moving.masses.v.value());
             let segment = Segment::new(oscillator, *moving.base, (x, v));
             let (dx, dv) = segment.departure(t);
@@ -206,11 +220,11 @@ impl FastPath {
             self.contact_free -= t;
         } else {
             self.coefficients.prepare(oscillator, drive.omega);
-            let coefficients = &self.coefficients;
-            let propagator = self.cache.near(oscillator, coefficients, t);
-            let h = t - propagator.t;
-            let increment = propagator.shortly(coefficients, drive.amplitude, start, h);
-            let phase = (moving.base.phase).rotated(propagator.angle, coefficients.omega * h);
+            let increment = self.after(&Start::new(moving, *start), t);
+            if t * fastest > short_step::LONGEST {
+                self.cache.learn(&self.coefficients, t);
+            }
+            let phase = moving.base.phase.rotated(propagator::angle(drive.omega, t), 0.0);
             self.apply(moving, &increment, phase, t);
             self.contact_free -= t;
         }

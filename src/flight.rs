@@ -2,7 +2,7 @@
 
 use crate::clearance::{Bounds, Gap, first_closure};
 use crate::contact::Wall;
-use crate::segment::{Derivatives, Segment, Series, nearby, velocity_change};
+use crate::segment::{Derivatives, Instant, Segment, Series, position_change, velocity_change};
 
 /// A gap smaller than this fraction of the half-width cannot be told from none.
 const RESOLUTION: f64 = 1.0 / (1u64 << 60) as f64;
@@ -24,10 +24,12 @@ pub struct Landing {
     pub t: f64,
     /// The wall touched; `None` where the flight reached the time limit.
     pub wall: Option<Wall>,
-    /// Position (m) and velocity (m/s) of the primary mass.
-    pub primary: (f64, f64),
-    /// Relative position `w` (m) and velocity (m/s).
-    pub relative: (f64, f64),
+    /// Change of position of the primary mass, m: a sum of many small changes needs all their digits.
+    pub moved: f64,
+    /// Change of its velocity, m/s.
+    pub gained: f64,
+    /// Change of the relative position `w`, m, where no wall was touched.
+    pub drifted: f64,
     /// Evaluations of the motion.
     pub evaluations: u64,
 }
@@ -44,51 +46,40 @@ impl Flight {
     pub fn first_contact(&self, limit: f64, released: Option<Wall>) -> Landing {
         let from = released.map_or(0.0, |wall| self.clear_of(wall).min(limit));
         let look = |t: f64| {
-            let (change, d) = self.relative_change(t);
-            (Wall::BOTH.map(|wall| self.gap(wall, change, &d)), d)
+            let Instant { departure: (dx, dv), derivatives: d, .. } = self.instant(t);
+            (
+                Wall::BOTH.map(|wall| self.gap(wall, (self.start.1 * t + dx, dv), &d)),
+                d,
+            )
         };
         let scale = (self.motion.fastest(), RESOLUTION * self.half_width);
         let (closure, looks) = first_closure((from, limit), scale, look, self);
         match closure {
-            Some(closure) => {
-                let wall = Wall::BOTH[closure.which];
-                let d = &closure.derivatives;
-                let (_, dw_change) = self.relative_change(closure.t).0;
-                Landing {
-                    t: closure.t + closure.h,
-                    wall: Some(wall),
-                    primary: nearby(d, closure.h),
-                    relative: (
-                        wall.sign() * self.half_width,
-                        self.start.1 + (dw_change + velocity_change(d, closure.h)),
-                    ),
-                    evaluations: looks,
-                }
-            }
-            None => Landing { evaluations: looks + 1, ..self.unhindered(limit) },
+            Some(closure) => self.landing((closure.t, closure.h), Some(Wall::BOTH[closure.which]), looks),
+            None => self.landing((limit, 0.0), None, looks + 1),
         }
     }
 
-    /// The state after `t` seconds, with no regard to walls.
-    fn unhindered(&self, t: f64) -> Landing {
-        let ((w_change, dw_change), d) = self.relative_change(t);
+    /// The state `h` seconds after the instant `t`.
+    fn landing(&self, (t, h): (f64, f64), wall: Option<Wall>, evaluations: u64) -> Landing {
+        let Instant { moved, departure: (dx, dv), derivatives: d } = self.instant(t);
         Landing {
-            t,
-            wall: None,
-            primary: (d[0], d[1]),
-            relative: (self.start.0 + w_change, self.start.1 + dw_change),
-            evaluations: 1,
+            t: t + h,
+            wall,
+            moved: moved + position_change(&d, h),
+            gained: dv + velocity_change(&d, h),
+            drifted: self.start.1 * t + dx,
+            evaluations,
         }
     }
 
-    /// How `w` and its velocity have changed since the start, and the primary mass's derivatives.
-    fn relative_change(&self, t: f64) -> ((f64, f64), Derivatives) {
+    /// The motion of the primary mass after `t` seconds.
+    fn instant(&self, t: f64) -> Instant {
         if t == 0.0 {
-            return ((0.0, 0.0), self.motion.derivatives_at_start());
+            let derivatives = self.motion.derivatives_at_start();
+            return Instant { moved: 0.0, departure: (0.0, 0.0), derivatives };
         }
-        let now = self.motion.at(&self.series, t);
-        let (dx, dv) = now.departure;
-        ((self.start.1 * t + dx, dv), now.derivatives)
+        self.motion.at(&self.series, t)
     }
 
     /// The particle flies straight on, so that beyond the first derivative `w` moves as the primary mass does.

@@ -146,30 +146,32 @@ impl Oscillator {
 
     /// What the free motion over `t` seconds adds to position and velocity, as the sum of two maps: for a transition that is
     /// used many times. A rounded one would be a steady source or sink of energy, and shift the phase.
-    ///
-    /// In double-double arithmetic: a Taylor series over a time that is short against every rate, doubled as often as needed.
     pub(crate) fn exact_increment(&self, t: f64) -> (Transition, Transition) {
+        split(self.increment(t))
+    }
+
+    /// The same over `t`, `2 t`, `3 t` and so on, seconds.
+    pub(crate) fn exact_increments<const N: usize>(&self, t: f64) -> [(Transition, Transition); N] {
+        let once = self.increment(t);
+        let mut increment = [(0.0, 0.0); 4];
+        core::array::from_fn(|_| {
+            increment = both(&increment, &once);
+            split(increment)
+        })
+    }
+
+    /// In double-double arithmetic: a Taylor series over a time that is short against every rate, doubled as often as needed.
+    fn increment(&self, t: f64) -> Increment {
         let doublings = libm::ceil(libm::log2(2.0 * self.fastest * t)).max(0.0);
         let mut increment = self.short_increment(t * libm::exp2(-doublings));
         for _ in 0..doublings as u32 {
-            // `(1 + A)² = 1 + 2 A + A²`, which keeps the relative accuracy of a small `A`.
-            let [xx, xv, vx, vv] = increment;
-            let squared = |a, b, c, d| plus(times(a, b), times(c, d));
-            let square = [
-                squared(xx, xx, xv, vx),
-                squared(xx, xv, xv, vv),
-                squared(vx, xx, vv, vx),
-                squared(vx, xv, vv, vv),
-            ];
-            increment = core::array::from_fn(|n| plus(square[n], (2.0 * increment[n].0, 2.0 * increment[n].1)));
+            increment = both(&increment, &increment);
         }
-        let [xx, xv, vx, vv] = increment.map(split_coefficient);
-        let part = |xx, xv, vx, vv| Transition { xx, xv, vx, vv };
-        (part(xx.0, xv.0, vx.0, vv.0), part(xx.1, xv.1, vx.1, vv.1))
+        increment
     }
 
     /// The same over a short time, each entry with its rounding error.
-    fn short_increment(&self, t: f64) -> [(f64, f64); 4] {
+    fn short_increment(&self, t: f64) -> Increment {
         const DEGREE: usize = 26;
         let damping = times((2.0 * self.delta, self.errors.0), (t, 0.0));
         let spring = times((self.omega0_squared, self.errors.1), product(t, t));
@@ -223,6 +225,24 @@ impl Oscillator {
         };
         Transition { xx, xv: s, vx: -self.omega0_squared * s, vv }
     }
+}
+
+/// What a transition adds: `xx - 1`, `xv`, `vx`, `vv - 1`, each with its rounding error.
+type Increment = [(f64, f64); 4];
+
+/// What two transitions, one after the other, add: `(1 + A) (1 + B) = 1 + A + B + A B`, which keeps the relative accuracy of
+/// small ones.
+fn both(a: &Increment, b: &Increment) -> Increment {
+    let entry = |row: usize, column: usize| plus(times(a[row], b[column]), times(a[row + 1], b[column + 2]));
+    let product = [entry(0, 0), entry(0, 1), entry(2, 0), entry(2, 1)];
+    core::array::from_fn(|n| plus(product[n], plus(a[n], b[n])))
+}
+
+/// Each entry as the sum of two numbers.
+fn split(increment: Increment) -> (Transition, Transition) {
+    let [xx, xv, vx, vv] = increment.map(split_coefficient);
+    let part = |xx, xv, vx, vv| Transition { xx, xv, vx, vv };
+    (part(xx.0, xv.0, vx.0, vv.0), part(xx.1, xv.1, vx.1, vv.1))
 }
 
 #[cfg(test)]

@@ -182,11 +182,12 @@ impl Segment {
             let turned = |(z, forcing): (Complex64, Forcing)| z * rotation(forcing.omega, t);
             let phasor = self.driven.map_or(Complex64::ZERO, turned);
             let derivatives = self.by_equation(self.x0 + (self.v0 * t + dx), self.v0 + dv, phasor, t);
-            Instant { departure: (dx, dv), derivatives }
+            Instant { moved: self.v0 * t + dx, departure: (dx, dv), derivatives }
         } else {
             let derivatives = self.derivatives(t);
             let [x, v, ..] = derivatives;
             Instant {
+                moved: x - self.x0,
                 departure: (x - self.x0 - self.v0 * t, v - self.v0),
                 derivatives,
             }
@@ -197,6 +198,8 @@ impl Segment {
 /// The motion at one instant.
 #[derive(Clone, Copy, Debug)]
 pub struct Instant {
+    /// Change of position since the start, m.
+    pub moved: f64,
     /// What has changed since the start beyond uniform motion: `x - x0 - v0 t` (m) and `v - v0` (m/s).
     pub departure: (f64, f64),
     /// Position and its derivatives.
@@ -205,10 +208,12 @@ pub struct Instant {
 
 /// Position and velocity `h` seconds on by the local Taylor polynomial, for `h` far below every period.
 pub fn nearby(d: &Derivatives, h: f64) -> (f64, f64) {
-    (
-        d[0] + h * (d[1] + h * (d[2] / 2.0 + h * (d[3] / 6.0 + h * d[4] / 24.0))),
-        d[1] + velocity_change(d, h),
-    )
+    (d[0] + position_change(d, h), d[1] + velocity_change(d, h))
+}
+
+/// Change of position over the next `h` seconds by the local Taylor polynomial.
+pub fn position_change(d: &Derivatives, h: f64) -> f64 {
+    h * (d[1] + h * (d[2] / 2.0 + h * (d[3] / 6.0 + h * d[4] / 24.0)))
 }
 
 /// Change of velocity over the next `h` seconds by the local Taylor polynomial.

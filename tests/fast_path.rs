@@ -62,3 +62,54 @@ proptest! {
         }
     }
 }
+
+#[test]
+fn equal_steps_follow_a_drive_that_becomes_fast() {
+    let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
+    let start = State { q1: 0.3, dq1: 0.1, q2: 0.2, dq2: 0.0 };
+    let mut fast = Plant::new(parameters, start).unwrap();
+    let mut searched = plain(&fast);
+    for omega in [1.0, 1.1, 40.0, 0.9, 300.0] {
+        for _ in 0..5 {
+            let drive = Drive::harmonic(0.01, omega);
+            fast.advance(drive, 0.06).unwrap();
+            searched.advance(drive, 0.06).unwrap();
+            assert!(
+                distance(&fast, &searched) < 1e-13,
+                "{omega}: {:e}",
+                distance(&fast, &searched)
+            );
+        }
+    }
+}
+
+#[test]
+fn steps_whose_lengths_have_rounding_errors_are_as_exact_as_equal_ones() {
+    let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
+    let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
+    let signals = [
+        [0.0; 4],
+        [0.01, 0.0, 0.0, 0.0],
+        [0.01, -0.002, 0.0, 0.0],
+        [0.01, -0.002, 1e-4, 0.0],
+    ];
+    for (signal, error) in signals
+        .into_iter()
+        .flat_map(|signal| [1e-15, 1e-12, 9e-10].map(|error| (signal, error)))
+    {
+        let drive = Drive { signal, ..Drive::harmonic(0.0084 * 1.1, 0.990_417) };
+        let mut fast = Plant::new(parameters, start).unwrap();
+        let mut searched = plain(&fast);
+        for n in 0..400 {
+            let step = 0.06 * (1.0 + error * f64::from(n % 5 - 2));
+            fast.advance(drive, step).unwrap();
+            searched.advance(drive, step).unwrap();
+            assert!(
+                distance(&fast, &searched) < 1e-12,
+                "{signal:?} {error:e}: {:e}",
+                distance(&fast, &searched)
+            );
+        }
+        assert_eq!(fast.totals().impacts, searched.totals().impacts);
+    }
+}

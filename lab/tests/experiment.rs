@@ -73,7 +73,9 @@ fn the_lock_is_the_exact_orbit_for_every_sensor_and_reference() {
     };
     for reference in ["resonance.reference='base'", "resonance.reference='force'"] {
         for sensor in ["v", "q1", "acceleration"] {
-            let (sigma, c) = lock(&[reference, &format!("resonance.sensor='{sensor}'")]);
+            let sensor = format!("resonance.sensor='{sensor}'");
+            // The impacts leave a ripple on an accelerometer, which averages out over a long hold.
+            let (sigma, c) = lock(&[reference, &sensor, "record.hold_periods=200"]);
             assert!(sigma < 2e-3 && c < 2e-3, "{reference} {sensor}");
         }
     }

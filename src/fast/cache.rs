@@ -1,31 +1,33 @@
 //! What is kept between steps. Each entry is used only if its key matches.
 
 use super::coefficients::Coefficients;
-use super::march::FINE;
+use super::grid::Grid;
 use super::propagator::Propagator;
-use super::short_step::ShortStep;
+use super::short_step::{SAME, ShortStep};
 use crate::base_motion::Drive;
 use crate::oscillator::Oscillator;
 
-/// Propagators kept: a motion of so many different flights per period, or flights and parts of them, needs no new ones.
+/// Flights kept: a motion of so many different flights per period, or flights and parts of them, is predicted.
 const FLIGHTS: usize = 6;
+/// So many flights in a row must be the followers of those before until the next one is predicted.
+const ENOUGH: u8 = 3;
 
 /// Propagators.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Cache {
     /// Of a step that repeats.
     pub step: ShortStep,
-    /// Of flights, and of what is left of a step after one.
+    /// Of flights, and of what is left of a step after one. Until it is needed a propagator has only its key.
     flights: [Propagator; FLIGHTS],
     /// Which followed which when they were last used.
     followers: [u8; FLIGHTS],
     last: u8,
-    /// Whether the last one was the follower of the one before: only then is the next one predicted.
-    regular: bool,
+    /// So many in a row were the follower of the one before, up to [`ENOUGH`].
+    regular: u8,
     /// The one to be replaced next.
     oldest: u8,
-    /// Of stretches of a march: coarse and fine.
-    pub march: [Propagator; 2],
+    /// Of stretches of a march, and parts of them.
+    pub grid: Grid,
     /// Length of the last whole step without contact, s.
     last_duration: f64,
 }
@@ -34,12 +36,12 @@ impl Cache {
     /// Whether a whole step without contact can be taken with [`Self::step`]: it is short, and has been taken before.
     #[inline(always)]
     pub fn repeats(&mut self, oscillator: &Oscillator, drive: &Drive, duration: f64) -> bool {
-        if duration == self.step.t {
+        if self.step.serves(drive, duration - self.step.t) {
             return true;
         }
-        let again = duration == self.last_duration;
+        let again = (duration - self.last_duration).abs() <= SAME * duration;
         self.last_duration = duration;
-        if again && ShortStep::serves(oscillator, drive.omega, duration) {
+        if again && ShortStep::is_short(oscillator, drive.omega, duration) {
             self.step = ShortStep::new(oscillator, duration);
         }
         duration == self.step.t
@@ -48,60 +50,32 @@ impl Cache {
     /// The propagator that followed the last one before, if flights have been regular.
     #[inline(always)]
     pub fn expected(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) -> Option<&Propagator> {
-        if !self.regular {
+        if self.regular < ENOUGH {
             return None;
         }
-        let follower = self.followers[usize::from(self.last)];
-        Some(self.ready(oscillator, coefficients, follower))
+        let propagator = &mut self.flights[usize::from(self.followers[usize::from(self.last)]) % FLIGHTS];
+        propagator.prepare(oscillator, coefficients);
+        Some(propagator)
     }
 
-    /// The expected propagator was the right one.
+    /// A flight to a contact, or what was left of a step, took `t` seconds.
     #[inline(always)]
-    pub fn confirm(&mut self) {
-        self.last = self.followers[usize::from(self.last)];
-    }
-
-    /// A propagator at a time near `t`: one that is kept, or a new one at `t`.
-    #[inline]
-    pub fn near(&mut self, oscillator: &Oscillator, coefficients: &Coefficients, t: f64) -> &Propagator {
-        let is_near = |n: u8| (self.flights[usize::from(n)].t - t).abs() < coefficients.near;
+    pub fn learn(&mut self, coefficients: &Coefficients, t: f64) {
+        let is_near = |n: u8| (self.flights[usize::from(n) % FLIGHTS].t - t).abs() < coefficients.near;
         let expected = self.followers[usize::from(self.last)];
-        self.regular = is_near(expected);
-        let n = if self.regular {
+        let n = if is_near(expected) {
+            self.regular = (self.regular + 1).min(ENOUGH);
             expected
-        } else if let Some(n) = (0..FLIGHTS as u8).find(|&n| is_near(n)) {
-            n
         } else {
-            self.oldest = (self.oldest + 1) % FLIGHTS as u8;
-            self.flights[usize::from(self.oldest)] = Propagator::new(oscillator, t, false);
-            self.oldest
+            self.regular = 0;
+            (0..FLIGHTS as u8).find(|&n| is_near(n)).unwrap_or_else(|| {
+                self.oldest = (self.oldest + 1) % FLIGHTS as u8;
+                self.flights[usize::from(self.oldest)] = Propagator::at(t);
+                self.oldest
+            })
         };
-        let propagator = &mut self.flights[usize::from(n)];
-        if self.regular && !propagator.exact {
-            *propagator = Propagator::new(oscillator, propagator.t, true);
-        }
         self.followers[usize::from(self.last)] = n;
         self.last = n;
-        self.ready(oscillator, coefficients, n)
-    }
-
-    #[inline(always)]
-    fn ready(&mut self, oscillator: &Oscillator, coefficients: &Coefficients, n: u8) -> &Propagator {
-        let propagator = &mut self.flights[usize::from(n) % FLIGHTS];
-        propagator.prepare(oscillator, coefficients);
-        propagator
-    }
-
-    /// Makes the march's propagators those of these coefficients.
-    #[inline(always)]
-    pub fn prepare_march(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) {
-        let lengths = [coefficients.stretch, coefficients.stretch / FINE as f64];
-        for (propagator, t) in self.march.iter_mut().zip(lengths) {
-            if propagator.t != t {
-                *propagator = Propagator::new(oscillator, t, true);
-            }
-            propagator.prepare(oscillator, coefficients);
-        }
     }
 }
 
@@ -114,10 +88,10 @@ pub(crate) struct Keys {
     phasor: (f64, f64),
     rotations: u32,
     step: f64,
-    flights: [(f64, bool); FLIGHTS],
+    flights: [f64; FLIGHTS],
     followers: [u8; FLIGHTS],
     last: u8,
-    regular: bool,
+    regular: u8,
     oldest: u8,
     last_duration: f64,
 }
@@ -133,7 +107,7 @@ impl Keys {
             phasor: fast.phasor,
             rotations: fast.rotations,
             step: cache.step.t,
-            flights: cache.flights.map(|propagator| (propagator.t, propagator.exact)),
+            flights: cache.flights.map(|propagator| propagator.t),
             followers: cache.followers,
             last: cache.last,
             regular: cache.regular,
@@ -153,10 +127,7 @@ impl Keys {
             ..Default::default()
         };
         fast.cache = Cache {
-            flights: self.flights.map(|(t, exact)| {
-                let kept = kept(t).then(|| Propagator::new(oscillator, t, exact));
-                kept.unwrap_or_default()
-            }),
+            flights: self.flights.map(Propagator::at),
             followers: self.followers,
             last: self.last,
             regular: self.regular,

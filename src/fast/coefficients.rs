@@ -1,13 +1,16 @@
 //! Coefficients of the motion at one frequency of the base.
 
+use super::grid::POINTS;
 use crate::forcing::Forcing;
 use crate::oscillator::Oscillator;
 
 /// Farthest distance of an instant from that of a propagator, in units of the fastest rate's time: Taylor polynomials of degree
 /// 5 then leave out less than 1e-17.
 pub(super) const NEAR: f64 = 1.0 / 2048.0;
-/// Length of a stretch of a march, in the same unit.
-const STRETCH: f64 = 1.5;
+/// Length of a stretch of a march, in units of the fastest rate's time.
+const STRETCH: f64 = 2.3;
+/// Number of Taylor coefficients: of degrees 2 to 9.
+pub(super) const TERMS: usize = 8;
 
 /// What follows from an oscillator and a frequency.
 #[derive(Clone, Copy, Debug, Default)]
@@ -18,10 +21,12 @@ pub(super) struct Coefficients {
     pub forcing: Forcing,
     /// Farthest distance from a propagator's time, s.
     pub near: f64,
+    /// Distance of the points of a grid, s.
+    pub spacing: f64,
     /// Length of a stretch of a march, s.
     pub stretch: f64,
-    /// `y^(n)/n!` for n = 2 to 5, per `y`, `y'`, forcing `f` and `f'`, where `y'' + 2 delta y' + omega0² y = f`.
-    pub taylor: [[f64; 4]; 4],
+    /// `y^(n)/n!` for n from 2 on, per `y`, `y'`, forcing `f` and `f'`, where `y'' + 2 delta y' + omega0² y = f`.
+    pub taylor: [[f64; TERMS]; 4],
 }
 
 impl Coefficients {
@@ -40,23 +45,33 @@ impl Coefficients {
         let (mut last, mut now) = ([0.0, 1.0, 0.0, 0.0], [-omega0_squared, -2.0 * delta, 1.0, 0.0]);
         let mut forcing = [1.0, 0.0];
         let mut factorial = 1.0;
-        let taylor = [2.0, 3.0, 4.0, 5.0].map(|n| {
-            factorial *= n;
-            let term = now.map(|c: f64| c / factorial);
+        let mut taylor = [[0.0; TERMS]; 4];
+        for n in 0..TERMS {
+            factorial *= (n + 2) as f64;
+            for (terms, c) in taylor.iter_mut().zip(now) {
+                terms[n] = c / factorial;
+            }
             forcing = [-omega * omega * forcing[1], forcing[0]];
             let mut next: [f64; 4] = core::array::from_fn(|i| -2.0 * delta * now[i] - omega0_squared * last[i]);
             next[2] += forcing[0];
             next[3] += forcing[1];
             (last, now) = (now, next);
-            term
-        });
-        let rate = fastest.max(omega);
+        }
+        // The grid stays the same while the frequency of the base changes little.
+        let rate = if omega <= 1.25 * fastest {
+            fastest
+        } else {
+            1.25 * leading_bits(omega, 2)
+        };
+        // Multiples of so few bits are exact.
+        let spacing = leading_bits(STRETCH / POINTS as f64 / rate, 30);
         Self {
             key: Some(omega),
             omega,
             forcing: Forcing::new(oscillator, omega),
-            near: NEAR / rate,
-            stretch: STRETCH / rate,
+            near: NEAR / fastest.max(omega),
+            spacing,
+            stretch: spacing * POINTS as f64,
             taylor,
         }
     }
@@ -70,4 +85,9 @@ impl Coefficients {
             self.omega * (strength.re * cos - strength.im * sin),
         )
     }
+}
+
+/// The first so many bits of a number after its first one.
+fn leading_bits(x: f64, bits: u32) -> f64 {
+    f64::from_bits(x.to_bits() & (u64::MAX << (52 - bits)))
 }

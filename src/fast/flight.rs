@@ -11,8 +11,8 @@ use crate::plant::Rig;
 
 /// Largest displacements, in half-widths: the digits of `w` are those of `q1`.
 const WIDEST: f64 = 64.0;
-/// Largest damping ratio: above it the stretches of a march are too short for it to pay.
-const HEAVIEST: f64 = 0.5;
+/// Largest damping ratio: above it the stretches of a march are too short, and the plain solver needs fewer evaluations.
+const HEAVIEST: f64 = 6.0;
 
 /// What a flight leads to.
 pub(super) enum Found {
@@ -52,7 +52,10 @@ impl FastPath {
             },
         };
         match found {
-            Found::Contact(arrival) if arrival.t.value() <= left => self.land(moving, &arrival),
+            Found::Contact(arrival) if arrival.t.value() <= left => {
+                self.cache.learn(&self.coefficients, arrival.t.value());
+                self.land(moving, &arrival)
+            }
             Found::Contact(arrival) => {
                 self.contact_free = arrival.t.value();
                 self.coast(moving, &point, left, duration)
@@ -62,6 +65,7 @@ impl FastPath {
                 self.coast(moving, &point, t.min(left), duration)
             }
             Found::FreeAsBefore(increment, phase) => {
+                self.cache.learn(&self.coefficients, left);
                 self.apply(moving, &increment, phase, left);
                 Next::ContactFree(left)
             }
@@ -112,15 +116,13 @@ impl FastPath {
                 return None;
             }
             let phase = (start.base.phase).rotated(propagator.angle, coefficients.omega * h);
-            self.cache.confirm();
             return Some(Found::FreeAsBefore(increment, phase));
         }
-        let predicted = arrive(&self.coefficients, propagator, start, start.wall_ahead()).ok()?;
+        let predicted = arrive(&self.coefficients, propagator, start, start.wall_ahead())?;
         if !monotone(predicted.arrival.t.value()) {
             start.sample.ddw = start.acceleration(&self.coefficients, &point);
             return Some(self.march(start, left, Some(&predicted)));
         }
-        self.cache.confirm();
         Some(Found::Contact(predicted.arrival))
     }
 }

@@ -5,11 +5,10 @@
 //! the first contact; the other wall is out of reach if the height `u²/(2a)` is below the half-width.
 
 use super::FastPath;
-use super::arrival::Arrival;
+use super::arrival::{Arrival, Predicted};
+use super::grid::Mark;
 use super::start::Start;
 use crate::arithmetic::Sum;
-use crate::contact::Wall;
-use crate::segment::Segment;
 
 /// Longest hop, in units of the fastest rate's time: Taylor polynomials then leave out less than 1e-17.
 const LONGEST: f64 = 1.0 / 512.0;
@@ -36,40 +35,21 @@ impl FastPath {
 
     #[inline(never)]
     fn short_hop(&mut self, start: &Start, about: f64) -> Option<Arrival> {
-        let Start { rig, base, masses, .. } = start;
-        let wall = if masses.w.value() > 0.0 {
-            Wall::Plus
-        } else {
-            Wall::Minus
-        };
+        let wall = start.wall_ahead().other();
         let s = wall.sign();
-        let start = (masses.x.value(), masses.v.value());
-        let motion = Segment::new(&rig.alone, **base, start);
-        let d = motion.derivatives_at_start();
-        let (speed, pressing) = (-s * masses.dw, s * d[2]);
-        if motion.third_derivative_bound(&d, 1.25 * about) * about > 0.125 * pressing {
+        let (speed, pressing) = (-s * start.sample.dw, s * start.sample.ddw);
+        if start.envelope(&start.point, 1.25 * about).jerk * about > 0.125 * pressing {
             return None;
         }
-        self.evaluations += 1;
-        let [.., d3, d4, d5, d6] = d;
-        let (j, k, l, n) = (s * d3 / 3.0, s * d4 / 12.0, s * d5 / 60.0, s * d6 / 360.0);
+        let here = Mark { t: 0.0, point: start.point, sample: start.sample };
+        let near = self.near_point(start, &here, 0.0).nearby;
+        // Newton's method.
         let mut h = about;
         for _ in 0..4 {
-            h = 2.0 * speed / (pressing + h * (j + h * (k + h * (l + h * n))));
+            let (bent, quickened) = near.change(h);
+            h -= (s * bent - speed * h) / (s * quickened - speed);
         }
-        let fifth = d4 / 24.0 + h * (d5 / 120.0 + h * (d6 / 720.0));
-        let gained = h * (d[2] + h * (d3 / 2.0 + h * (d4 / 6.0 + h * (d5 / 24.0 + h * d6 / 120.0))));
-        let moved = h * (d[1] + h * (d[2] / 2.0 + h * (d3 / 6.0 + h * fifth)));
-        let phase = base.phase.advanced(base.drive.omega, h);
-        let (sin, cos) = libm::sincos(phase.radians());
-        Some(Arrival {
-            t: Sum::from(h),
-            x: masses.x.plus(moved),
-            v: masses.v.plus(gained),
-            dw: masses.dw + gained,
-            wall,
-            phase,
-            phasor: (cos, sin),
-        })
+        let when = (Sum::from(h), ((0.0, 0.0), self.coefficients.omega * h));
+        Some(Predicted::new(start, wall, when, near.at(h), 0.0).arrival)
     }
 }

@@ -34,10 +34,10 @@ pub(super) struct Propagator {
     pub t: f64,
     /// The key of the response, rad/s.
     omega: f64,
-    /// What the free motion adds: the sum of both.
+    /// What the free motion adds, if `complete`: the sum of both, because a propagator is used many times and the same rounding error
+    /// would add up.
     free: (Transition, Transition),
-    /// Whether that is exact beyond rounding: where a propagator is used many times, the same error would add up.
-    pub exact: bool,
+    complete: bool,
     response: Response,
     /// `omega t` in [0, 2π), and its rounding error.
     pub angle: (f64, f64),
@@ -49,7 +49,7 @@ impl Default for Propagator {
             t: f64::NAN,
             omega: f64::NAN,
             free: Default::default(),
-            exact: false,
+            complete: false,
             response: Response::default(),
             angle: (0.0, 0.0),
         }
@@ -62,23 +62,45 @@ pub(super) fn rotate(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
 
+/// Cosine and sine of a small angle from their Taylor series, up to degree `N + 2`.
+#[inline(always)]
+pub(super) fn rotation<const N: usize>(angle: f64) -> (f64, f64) {
+    let square = angle * angle;
+    let (mut cos, mut sin) = (1.0, 1.0);
+    for n in (1..=N / 2 + 1).rev() {
+        let n = 2.0 * n as f64;
+        cos = 1.0 - square * (1.0 / (n * (n - 1.0))) * cos;
+        sin = 1.0 - square * (1.0 / (n * (n + 1.0))) * sin;
+    }
+    (cos, angle * sin)
+}
+
 /// `E Im(z K)` for the phasor `z`.
 #[inline(always)]
 pub(super) fn forced(amplitude: f64, (cos, sin): (f64, f64), k: Complex64) -> f64 {
     amplitude * (k.re * sin + k.im * cos)
 }
 
+/// `omega t` in [0, 2π), and its rounding error.
+#[inline(always)]
+pub(super) fn angle(omega: f64, t: f64) -> (f64, f64) {
+    let (angle, error) = product(omega, t);
+    if angle < TAU {
+        (angle, error)
+    } else {
+        Phase::default().advanced(omega, t).parts()
+    }
+}
+
 impl Propagator {
-    /// The propagator over `t` seconds, `exact` beyond rounding or not.
-    pub fn new(oscillator: &Oscillator, t: f64, exact: bool) -> Self {
-        let free = if exact {
-            oscillator.exact_increment(t)
-        } else {
-            let Transition { xx, xv, vx, vv } = oscillator.transition(t);
-            let (xx, vv) = (xx - 1.0, vv - 1.0);
-            (Transition { xx, xv, vx, vv }, Transition::default())
-        };
-        Self { t, free, exact, ..Self::default() }
+    /// The propagator over `t` seconds, to be completed when it is needed.
+    pub fn at(t: f64) -> Self {
+        Self { t, ..Self::default() }
+    }
+
+    /// The propagator over `t` seconds; `free` is what the free motion adds in that time.
+    pub fn new(t: f64, free: (Transition, Transition)) -> Self {
+        Self { t, free, complete: true, ..Self::default() }
     }
 
     /// Makes the response that of these coefficients' frequency.
@@ -91,6 +113,9 @@ impl Propagator {
 
     #[inline(never)]
     fn respond(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) {
+        if !self.complete {
+            *self = Self::new(self.t, oscillator.exact_increment(self.t));
+        }
         let (head, tail) = &self.free;
         let free = Transition {
             xx: 1.0 + (head.xx + tail.xx),
@@ -104,12 +129,7 @@ impl Propagator {
         };
         let omega = coefficients.omega;
         self.response = coefficients.forcing.response(self.t, &free, decayed);
-        let (angle, error) = product(omega, self.t);
-        self.angle = if angle < TAU {
-            (angle, error)
-        } else {
-            Phase::default().advanced(omega, self.t).parts()
-        };
+        self.angle = angle(omega, self.t);
         self.omega = omega;
     }
 
@@ -127,16 +147,11 @@ impl Propagator {
         }
     }
 
-    /// Where `start` has moved to, without the correction of rounding errors: for a march.
+    /// Where `start` has moved to.
     #[inline(always)]
-    pub fn roughly(&self, amplitude: f64, start: &Point) -> Point {
-        let (y, dy) = self.free.0.of(start.y, start.dy);
-        let response = &self.response;
-        Point {
-            y: start.y + (y + forced(amplitude, start.phasor, response.position)),
-            dy: start.dy + (dy + forced(amplitude, start.phasor, response.velocity)),
-            phasor: rotate(start.phasor, (response.base.re, response.base.im)),
-        }
+    pub fn point(&self, amplitude: f64, start: &Point) -> Point {
+        let Increment { y, dy, phasor } = self.increment(amplitude, start);
+        Point { y: start.y + y, dy: start.dy + dy, phasor }
     }
 
     /// What is added to `start` at a time near that of the propagator, `h` seconds later.
@@ -146,53 +161,55 @@ impl Propagator {
         if h == 0.0 {
             return increment;
         }
-        Nearby::new(coefficients, amplitude, start, &increment).at(h)
+        Nearby::<4>::new(coefficients, amplitude, start, &increment).at(h)
     }
 }
 
-/// The motion near a propagator's time, as a Taylor polynomial.
-pub(super) struct Nearby {
-    at_propagator: Increment,
+/// The motion near an instant, as a Taylor polynomial of degree `N + 1`.
+pub(super) struct Nearby<const N: usize> {
+    /// What has been added to the start until then.
+    there: Increment,
     /// Velocity then, m/s.
     pub dy: f64,
-    /// `y^(n)/n!` for n = 2 to 5.
-    pub c: [f64; 4],
+    /// `y^(n)/n!` for n from 2 on.
+    pub c: [f64; N],
     omega: f64,
 }
 
-impl Nearby {
+impl<const N: usize> Nearby<N> {
     #[inline(always)]
-    pub fn new(coefficients: &Coefficients, amplitude: f64, start: &Point, at_propagator: &Increment) -> Self {
-        let (f, df) = coefficients.forcing_at(at_propagator.phasor);
+    pub fn new(coefficients: &Coefficients, amplitude: f64, start: &Point, there: &Increment) -> Self {
+        let (f, df) = coefficients.forcing_at(there.phasor);
         let (f, df) = (amplitude * f, amplitude * df);
-        let (y, dy) = (start.y + at_propagator.y, start.dy + at_propagator.dy);
-        let term = |n: usize| {
-            let [per_y, per_dy, per_f, per_df] = coefficients.taylor[n];
-            (per_y * y + per_dy * dy) + (per_f * f + per_df * df)
-        };
-        Self {
-            at_propagator: *at_propagator,
-            dy,
-            c: [term(0), term(1), term(2), term(3)],
-            omega: coefficients.omega,
+        let (y, dy) = (start.y + there.y, start.dy + there.dy);
+        let [per_y, per_dy, per_f, per_df] = &coefficients.taylor;
+        let mut c = [0.0; N];
+        for (n, c) in c.iter_mut().enumerate() {
+            *c = (per_y[n] * y + per_dy[n] * dy) + (per_f[n] * f + per_df[n] * df);
         }
+        Self { there: *there, dy, c, omega: coefficients.omega }
     }
 
-    /// What is added to the start, `h` seconds after the propagator's time.
+    /// What `h` seconds add to the displacement beyond uniform motion, m, and to the velocity, m/s.
+    #[inline(always)]
+    pub fn change(&self, h: f64) -> (f64, f64) {
+        let last = self.c[N - 1];
+        let (mut bent, mut quickened) = (last, (N + 1) as f64 * last);
+        for n in (0..N - 1).rev() {
+            bent = self.c[n] + h * bent;
+            quickened = (n + 2) as f64 * self.c[n] + h * quickened;
+        }
+        (h * h * bent, h * quickened)
+    }
+
+    /// What is added to the start, `h` seconds after that instant.
     #[inline(always)]
     pub fn at(&self, h: f64) -> Increment {
-        let [c2, c3, c4, c5] = self.c;
-        let h2 = h * h;
-        let bent = h2 * ((c2 + h * c3) + h2 * (c4 + h * c5));
-        let quickened = h * ((2.0 * c2 + h * (3.0 * c3)) + h2 * (4.0 * c4 + h * (5.0 * c5)));
-        let angle = self.omega * h;
-        let angle2 = angle * angle;
-        let sin = angle - angle * (angle2 * (1.0 / 6.0));
-        let cos = 1.0 - angle2 * (0.5 - angle2 * (1.0 / 24.0));
+        let (bent, quickened) = self.change(h);
         Increment {
-            y: self.at_propagator.y + (h * self.dy + bent),
-            dy: self.at_propagator.dy + quickened,
-            phasor: rotate(self.at_propagator.phasor, (cos, sin)),
+            y: self.there.y + (h * self.dy + bent),
+            dy: self.there.dy + quickened,
+            phasor: rotate(self.there.phasor, rotation::<N>(self.omega * h)),
         }
     }
 }

@@ -62,14 +62,6 @@ impl<'a> Start<'a> {
         self.base.drive.amplitude * f - (oscillator.omega0_squared * point.y + 2.0 * oscillator.delta * point.dy)
     }
 
-    /// Its rate of change where it is `ddw`, m/s³.
-    #[inline(always)]
-    pub fn jerk(&self, coefficients: &Coefficients, point: &Point, ddw: f64) -> f64 {
-        let oscillator = &self.rig.alone;
-        let (_, df) = coefficients.forcing_at(point.phasor);
-        self.base.drive.amplitude * df - (oscillator.omega0_squared * point.dy + 2.0 * oscillator.delta * ddw)
-    }
-
     #[inline(always)]
     pub fn envelope(&self, point: &Point, t: f64) -> Envelope {
         Envelope::new(&self.rig.alone, &self.base.drive, point, t)

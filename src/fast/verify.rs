@@ -83,11 +83,10 @@ impl Envelope {
     /// Whether both walls, at `w = ±b`, are certainly not met within `t` after an instant with this `w` and `w'`.
     #[inline(always)]
     pub fn open_from(&self, b: f64, w: f64, dw: f64, t: f64) -> bool {
-        // The bound is concave: it is above 0 in between if it is at the end.
+        // The bound of the gap to either wall is concave: it is above 0 in between if it is at the end.
         let lost = 0.5 * self.acceleration * t * t;
-        let (moved, rounding) = (dw * t, ROUNDING * (dw.abs() * t + lost));
-        let open = |s: f64| (b - s * w) - s * moved - lost > rounding;
-        open(1.0) & open(-1.0)
+        let moved = dw * t;
+        b - (w + moved).abs() - lost > ROUNDING * (moved.abs() + lost)
     }
 
     /// Whether both walls are certainly not met between two samples `t` apart, but for a contact at the second one.

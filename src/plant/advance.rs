@@ -109,7 +109,7 @@ impl Plant {
         }
         self.base.drive = drive;
         if self.begun {
-            self.fast.drive_changed();
+            self.fast.drive_changed(&drive);
         } else {
             self.begun = true;
             self.fast.state_changed(&self.base);
@@ -177,10 +177,16 @@ impl Plant {
         let flight = Flight::new(motion, (masses.w.value(), masses.dw), half_width);
         let landing = flight.first_contact(left, released);
         self.evaluations += landing.evaluations;
-        self.masses.x = Sum::from(landing.primary.0);
-        self.masses.v = Sum::from(landing.primary.1);
-        self.masses.w = Sum::from(landing.relative.0.clamp(-half_width, half_width));
-        self.masses.dw = landing.relative.1;
+        self.masses.x = masses.x.plus(landing.moved);
+        self.masses.v = masses.v.plus(landing.gained);
+        self.masses.dw += landing.gained;
+        let w = masses.w.plus(landing.drifted);
+        let outside = w.value().abs() > half_width;
+        self.masses.w = if outside {
+            Sum::from(half_width.copysign(w.value()))
+        } else {
+            w
+        };
         self.contact = Contact::Free;
         self.base_moves(landing.t);
         step.left = step.left.plus(-landing.t);

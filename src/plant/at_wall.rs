@@ -45,7 +45,7 @@ impl Plant {
             !(self.rig.law).certainly_leaves(speed, largest, &resolution)
                 && (self.rig.law).rests(speed, self.pressing(wall, primary), &resolution)
         });
-        self.masses.v = Sum::from(touch.primary);
+        self.masses.v = self.masses.v.plus(touch.kick);
         self.masses.particle = touch.particle;
         self.masses.dw = touch.relative;
         let t = step.now();

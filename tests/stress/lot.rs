@@ -2,7 +2,7 @@
 
 use crate::balance::{Walk, walk};
 use crate::common::{Scene, scene};
-use crate::follow::{Worst, follow};
+use crate::follow::{Name, Worst, follow};
 use crate::table::Table;
 use lovines::Drive;
 use proptest::prelude::*;
@@ -116,7 +116,7 @@ pub fn balance(n: usize, table: &mut Table) {
         worst.outside = worst.outside.max(one.outside);
         worst.events += one.events;
     }
-    let among = format!("{n} damped scenes, {} events", worst.events);
+    let among = format!("{n} damped scenes, {} events; worst: {hardest}", worst.events);
     table.row(
         "energy balance with damper and base misses, relative",
         &among,
@@ -129,7 +129,15 @@ pub fn balance(n: usize, table: &mut Table) {
         worst.outside,
         1e-12,
     );
-    table.progress(&format!("energy balance, hardest scene {hardest}"));
+}
+
+/// Follows one scene (`free:17`), and shows it and all that it did.
+pub fn one(name: &str) {
+    let (kind, number) = name.split_once(':').expect("a kind of scenes, a colon and a number");
+    let number = number.parse().expect("a number");
+    let (kind, _) = KINDS.iter().find(|(k, _)| *k == kind).expect("a kind of scenes");
+    let scene = draw(&strategy(kind), number);
+    println!("{scene:#?}\n{:#?}", follow(&scene, Name { kind, number }));
 }
 
 /// Follows so many scenes, each twice, and tells the worst of all.
@@ -145,7 +153,7 @@ pub fn scenes(n: usize, table: &mut Table) {
                     || strategy(kind),
                     |strategy, number| {
                         let scene = draw(strategy, number);
-                        match catch_unwind(|| follow(&scene, number)) {
+                        match catch_unwind(|| follow(&scene, Name { kind, number })) {
                             Ok(worst) => worst,
                             Err(_) => {
                                 eprintln!("{kind} scene {number} panics: {scene:?}");
@@ -166,8 +174,8 @@ pub fn scenes(n: usize, table: &mut Table) {
         let among = format!("{count} scenes, {} impacts", worst.impacts);
         table.row(
             &format!("{kind}: outside its cavity by, in half-widths"),
-            &among,
-            worst.outside,
+            &worst.outside.among(&among),
+            worst.outside.figure,
             1e-12,
         );
         all = all.and(worst);

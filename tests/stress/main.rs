@@ -1,5 +1,5 @@
 //! Hard scenes by the thousand, as a table: `scripts/stress --plant` runs the long form (`SCENES=100000`), the test suite a
-//! short one. docs/stress.md keeps the table of the long form.
+//! short one. docs/stress.md keeps the table of the long form. `SCENE=free:17` follows one scene only.
 
 #[path = "../common/balance.rs"]
 mod balance;
@@ -18,6 +18,9 @@ use table::Table;
 
 #[test]
 fn hard_scenes_are_survived() {
+    if let Ok(name) = std::env::var("SCENE") {
+        return lot::one(&name);
+    }
     let n = std::env::var("SCENES").map_or(1500, |n| n.parse().expect("a number of scenes"));
     let mut table = Table::begin();
     lot::scenes(n, &mut table);

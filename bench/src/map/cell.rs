@@ -85,7 +85,7 @@ impl Settled {
             brent: Some(brent_baseline(RIG, state, time(TIMED_TOLERANCE))),
             regime: found.regime.name(),
             pattern: (found.impacts, found.periods),
-            impacts_per_period: 0.0,
+            impacts_per_period: found.impacts_per_period,
             difference: repeats.then(|| difference(state, drive)).flatten(),
             plant,
             evaluations: None,
@@ -105,7 +105,6 @@ impl Settled {
         let units = units(outcome.impacts, effort.periods);
         self.ns.push(ns / units);
         self.evaluations = evaluations(&outcome).map(|n| n as f64 / units);
-        self.impacts_per_period = outcome.impacts as f64 / f64::from(effort.periods);
         if effort.methods == Methods::Both {
             self.run_brent(effort.brent_periods);
         }

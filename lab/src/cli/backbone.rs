@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
 use super::{
-    endpoint::{Endpoint, ReachArguments},
+    endpoint::{Endpoint, ReachArguments, check},
     failure::Failure,
     log_warnings, result,
     scene_arguments::SceneArguments,
@@ -61,6 +61,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     log_warnings();
     let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(Failure::input)?;
     writable(&arguments.out)?;
+    check(&scene)?;
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let tracked = track(&mut open.rig, &mut controller, &scene, |done, _| {

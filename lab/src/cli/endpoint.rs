@@ -95,12 +95,6 @@ impl Endpoint {
         scope: BindScope,
         pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
-        if scene.resonance.resonance == Resonance::Peak && scene.controller.phase_target == -90.0 {
-            return Err(Failure::input(
-                "resonance.definition = \"peak\" with controller.phase_target = -90 degrees: the loop holds a phase, so set phase_target to the \
-                 phase at the peak, which `vines orbit` prints",
-            ));
-        }
         Ok(match self {
             Self::BuiltIn => Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?),
             Self::Fmu(file) => Box::new(FmuController::load(file, &scene.controller_config()).map_err(Failure::run)?),
@@ -114,6 +108,18 @@ impl Endpoint {
             },
         })
     }
+}
+
+/// Refuses settings with which no experiment can begin, before anything is written or driven.
+pub(super) fn check(scene: &Scene) -> Result<(), Failure> {
+    if scene.resonance.resonance == Resonance::Peak && scene.controller.phase_target == -90.0 {
+        return Err(Failure::input(
+            "resonance.definition = \"peak\" with controller.phase_target = -90 degrees: the loop holds a phase, so set phase_target to the \
+             phase at the peak, which `vines orbit` prints",
+        ));
+    }
+    BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
+    Ok(())
 }
 
 /// `--allow-remote`, which several commands share.

@@ -11,12 +11,11 @@ use vines::{
     experiment::{self, ExperimentError, Plan, Sample, Stage},
     identification::{self, IdentificationError},
     pack, report,
-    rig::BuiltIn,
     scene::Scene,
 };
 
 use super::{
-    endpoint::{Endpoint, ReachArguments},
+    endpoint::{Endpoint, ReachArguments, check},
     failure::Failure,
     log_warnings,
     pack::beside_this_program,
@@ -67,8 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     log_warnings();
     let reach = arguments.reach.reach();
-    // Invalid settings are refused before anything is written or connected.
-    BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
+    check(&scene)?;
     let (mut open, fmus) = match &arguments.rig {
         Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&arguments.out)?),
         None => {

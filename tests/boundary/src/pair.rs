@@ -25,13 +25,13 @@ mod plant {
 
 /// Value references of the controller.
 mod controller {
-    pub const INPUTS: [u32; 2] = [26, 27];
-    pub const ACTIVE: u32 = 28;
+    pub const INPUTS: [u32; 2] = [31, 32];
+    pub const ACTIVE: u32 = 33;
     /// `omega` and `E`.
-    pub const DRIVE: [u32; 2] = [29, 30];
-    pub const REALS: [u32; 9] = [29, 30, 31, 32, 33, 34, 35, 36, 37];
-    pub const BOOLEANS: [u32; 2] = [38, 39];
-    pub const INTEGERS: [u32; 2] = [40, 41];
+    pub const DRIVE: [u32; 2] = [34, 35];
+    pub const REALS: [u32; 9] = [34, 35, 36, 37, 38, 39, 40, 41, 42];
+    pub const BOOLEANS: [u32; 2] = [43, 44];
+    pub const INTEGERS: [u32; 2] = [45, 46];
 }
 
 /// The two, exchanging values at communication points. The controller's commands reach the plant one step later.

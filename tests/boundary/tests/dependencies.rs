@@ -272,6 +272,8 @@ fn unknowns_of_the_controller() {
             let value = start.unwrap();
             let change = match kind.as_str() {
                 "Real" if value == 0.0 => 1e-2,
+                // -1 is "none": the next value that is allowed.
+                "Real" if value == -1.0 => 2.0,
                 "Real" => 1e-3 * value.abs(),
                 "Boolean" => 1.0 - 2.0 * value,
                 _ => 1.0,
