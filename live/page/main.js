@@ -222,7 +222,7 @@ class Page {
       ["Detuning σ", status.sigma.toFixed(6)],
       ["Amplitude C", status.C.toFixed(6)],
       ["Particle speed B", status.B.toFixed(6)],
-      ["Phase error", `${status.phaseError.toFixed(4)}°`],
+      ["Phase error", `${(Math.round(status.phaseError * 1e4) / 1e4 + 0).toFixed(4)}°`],
       ["Excitation G", status.G.toFixed(4)],
       ["Impacts", `${status.impacts}, ${status.perPeriod.toFixed(3)} per period`],
       ["Dissipated by impacts", `${(status.dissipated * 1e3).toPrecision(4)} mJ`],

@@ -77,7 +77,7 @@ for (const { name, options } of BROWSERS) {
         const one = window.live.page;
         one.play(false);
         one.start({});
-        one.goTo(2000 * one.step, 2001);
+        one.goTo(12000 * one.step, 12001);
         one.change("track", 1);
         one.goTo(one.points.at(-1)[0], 1e6);
         const exact = one.bench.exact(4000).sort((p, q) => p[1] - q[1]);
@@ -138,7 +138,7 @@ for (const { name, options } of BROWSERS) {
           const key = element.replace(" slider", "");
           const value = () => page.evaluate((key) => window.live.page.values[key], key);
           const was = await value();
-          await page.keyboard.press(element === "closed" ? "Space" : "ArrowRight");
+          await page.keyboard.press(element === "closed" ? " " : "ArrowRight");
           if ((await value()) === was) await page.keyboard.press("ArrowLeft");
           assert.notEqual(await value(), was, element);
         }
@@ -148,7 +148,7 @@ for (const { name, options } of BROWSERS) {
       await page.evaluate(() => document.activeElement.blur());
       const state = () => page.evaluate(() => ({ playing: window.live.page.playing, driving: window.live.page.driving, speed: window.live.page.speed, help: !document.getElementById("about").hidden }));
       const was = await state();
-      for (const key of ["d", "]", "?", "Space"]) await page.keyboard.press(key);
+      for (const key of ["d", "]", "?", " "]) await page.keyboard.press(key);
       const now = await state();
       for (const key of Object.keys(was)) assert.notEqual(now[key], was[key], key);
       const before = await page.evaluate(() => window.live.page.shown);
