@@ -84,7 +84,7 @@ unpack_rust_web() {
     rm -rf "$folder"
 }
 
-# linker PLATFORM: what links for it, `host`, `mingw` or `zig`; fails naming what is missing.
+# linker PLATFORM: what links for it, `host`, `mingw`, `lld` or `zig`; fails naming what is missing.
 linker() {
     local triple=${TRIPLES[$1]}
     case $triple in
@@ -94,6 +94,7 @@ linker() {
             echo mingw
             ;;
         "$(host_triple)") if [ -n "${portable:-}" ]; then echo zig; else echo host; fi ;;
+        wasm32-*) echo lld ;;
         *-apple-darwin) if [ "$(uname)" = Darwin ]; then echo host; else echo zig; fi ;;
         *) echo zig ;;
     esac
@@ -108,14 +109,14 @@ mingw() {
 }
 
 # build_platform PLATFORM FOLDER [options of cargo build]: the packages of the options, stripped and the same bytes wherever
-# they are built, in FOLDER/TRIPLE/release.
+# they are built, in FOLDER/TRIPLE/release (or another profile, in `profile`).
 build_platform() (
     platform=$1 folder=$2
     triple=${TRIPLES[$platform]}
     kind=$(toolchain "$platform")
     with=$(linker "$platform")
     shift 2
-    options=(--release --locked --target-dir "$folder" "$@")
+    options=(--profile "${profile:-release}" --locked --target-dir "$folder" "$@")
     [ -t 2 ] || options+=(--quiet)
     # What a library says of paths would be another on every machine.
     flags=(-Cstrip=symbols "--remap-path-prefix=$PWD=." "--remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}=cargo")
@@ -127,7 +128,14 @@ build_platform() (
             ;;&
         debian | rust-src)
             export RUSTC_BOOTSTRAP=1
-            options+=(-Z build-std=std,panic_unwind)
+            case $triple in
+                # Without the texts of panics, which a page cannot show.
+                wasm32-*)
+                    options+=(-Z build-std=std,panic_abort -Z build-std-features=optimize_for_size -Z panic-immediate-abort)
+                    options+=(--config 'profile.live.panic="immediate-abort"')
+                    ;;
+                *) options+=(-Z build-std=std,panic_unwind) ;;
+            esac
             ;;
     esac
     flags+=("--remap-path-prefix=$("${RUSTC:-rustc}" --print sysroot)=rust")
@@ -140,6 +148,10 @@ build_platform() (
             export "$variable=$(mingw "$triple")"
             # Without it the header holds the time of day.
             flags+=(-Clink-arg=-Wl,--no-insert-timestamp)
+            ;;
+        lld)
+            export RUSTC_BOOTSTRAP=1
+            export CARGO_TARGET_WASM32_UNKNOWN_UNKNOWN_LINKER="$(rustc --print sysroot)/lib/rustlib/$(host_triple)/bin/rust-lld"
             ;;
         zig)
             portable_environment || { cat .venv-portable.log >&2; fail "cargo-zigbuild, which links for $platform, could not be installed"; }

@@ -1,0 +1,254 @@
+//! Plant and controller, coupled sample by sample as `vines identify` couples them.
+
+use std::f64::consts::TAU;
+
+use lovines::{Event, Plant, Wall};
+use phase_lock::{Input, Move, Output, PhaseLock, State};
+use vines_model::regime::Impact;
+use vines_testbench::rig::Drive;
+use vines_testbench::scene::Scene;
+
+use crate::rig::NoisyRig;
+use crate::settings::{COUNT, Settings, changed, default_scene, index, settings_of};
+use crate::tracking::Tracking;
+
+/// One sample of the record.
+#[derive(Debug, Clone, Copy)]
+pub struct Row {
+    /// Time, s.
+    pub time: f64,
+    /// Displacement of the base, m, as its sensor reads it.
+    pub base: f64,
+    /// Response, m, as its sensor reads it.
+    pub response: f64,
+    /// Relative displacement of primary mass and particle, m.
+    pub relative: f64,
+    /// Output of the controller.
+    pub output: Output,
+}
+
+/// Impacts that are kept to determine the regime from.
+const KEPT: usize = 40;
+
+/// The bench: rig, controller and clock.
+pub struct Bench {
+    /// The scene, with the settings applied.
+    pub scene: Scene,
+    /// The settings that it was made from.
+    pub settings: Settings,
+    /// The controller.
+    pub lock: PhaseLock,
+    /// State of the controller.
+    pub state: State,
+    /// Samples since the start.
+    pub samples: u64,
+    /// Whether the drive is requested.
+    pub active: bool,
+    /// Output of the controller at the last sample.
+    pub output: Output,
+    /// The last impacts; times are phases of the drive, rad.
+    pub impacts: Vec<Impact>,
+    /// Phase of the drive since the start, rad.
+    pub phase: f64,
+    /// The tracking of the backbone, while it runs.
+    pub tracking: Option<Tracking>,
+    pub(crate) rig: NoisyRig,
+    /// The plant at the last sample, and the drive from there on.
+    before: (Plant, Drive),
+}
+
+impl Bench {
+    /// The bench of the settings at its start.
+    ///
+    /// # Errors
+    /// The message for a value that plant or controller refuse.
+    pub fn new(settings: Settings) -> Result<Self, String> {
+        let scene = changed(&default_scene(), &settings);
+        let plant = Plant::new(scene.plant, scene.start).map_err(|error| error.to_string())?;
+        let lock = scene.controller_config().build().map_err(|error| error.to_string())?;
+        let state = lock.start();
+        Ok(Self {
+            lock,
+            state,
+            samples: 0,
+            active: true,
+            output: lock.idle(),
+            impacts: Vec::new(),
+            phase: 0.0,
+            tracking: None,
+            rig: NoisyRig::new(plant, settings[index::NOISE] * 0.01 * scene.plant.half_width),
+            before: (plant, Drive::default()),
+            settings,
+            scene,
+        })
+    }
+
+    /// The settings of the default scene.
+    #[must_use]
+    pub fn default_settings() -> [f64; COUNT] {
+        settings_of(&default_scene())
+    }
+
+    /// Applies changed settings to the running bench. A change of the half-gap or of the mass ratio restarts it.
+    ///
+    /// # Errors
+    /// The message for a value that is refused; then nothing changes.
+    pub fn apply(&mut self, settings: Settings) -> Result<(), String> {
+        let differs = |one: usize| settings[one] != self.settings[one];
+        if differs(index::GAP) || differs(index::MASS_RATIO) {
+            *self = Self::new(settings)?;
+            return Ok(());
+        }
+        let scene = changed(&default_scene(), &settings);
+        let lock = scene.controller_config().build().map_err(|error| error.to_string())?;
+        self.rig
+            .plant
+            .set_parameters(scene.plant)
+            .map_err(|error| error.to_string())?;
+        self.rig.noise = settings[index::NOISE] * 0.01 * scene.plant.half_width;
+        self.tracking = None;
+        (self.lock, self.scene, self.settings) = (lock, scene, settings);
+        Ok(())
+    }
+
+    /// Switches the drive.
+    pub fn drive(&mut self, on: bool) {
+        self.active = on;
+        self.tracking = None;
+    }
+
+    /// One sample: sensors, controller, drive. Returns the row of the record.
+    ///
+    /// # Errors
+    /// The message for a drive that the plant refuses.
+    pub fn sample(&mut self) -> Result<Row, String> {
+        let due = self.tracking.as_mut().and_then(|tracking| tracking.due(self.samples));
+        if let Some(to) = due {
+            self.hold_response(to)?;
+        }
+        let time = self.time();
+        let sensors = self.rig.read();
+        let input = Input {
+            response: sensors.response,
+            reference: sensors.reference,
+            active: self.active,
+        };
+        self.output = self.lock.process(&mut self.state, input);
+        let drive = self.requested();
+        let row = Row {
+            time,
+            base: sensors.reference.unwrap_or_default(),
+            response: sensors.response,
+            relative: self.rig.plant.relative_displacement(),
+            output: self.output,
+        };
+        self.before = (self.rig.plant, drive);
+        self.step(drive)?;
+        self.samples += 1;
+        Ok(row)
+    }
+
+    /// What the controller asks for, or the constant drive of the open loop.
+    fn requested(&self) -> Drive {
+        if self.settings[index::CLOSED] != 0.0 {
+            let Output { omega, amplitude, drive, .. } = self.output;
+            return Drive { omega, amplitude, displacement: drive };
+        }
+        let omega = self.scene.dimensionless().omega(self.settings[index::DETUNING]);
+        let amplitude = if self.active { self.scene.amplitude } else { 0.0 };
+        Drive { omega, amplitude, ..Drive::default() }
+    }
+
+    fn step(&mut self, drive: Drive) -> Result<(), String> {
+        let (impacts, phase) = (&mut self.impacts, self.phase);
+        let mut count = |event: Event| {
+            if let Event::Impact { t, velocity, .. } = event {
+                impacts.push(Impact { time: phase + drive.omega * t, velocity });
+            }
+        };
+        let step = self.lock.config().sample_time;
+        self.rig
+            .step(drive, step, &mut count)
+            .map_err(|error| error.to_string())?;
+        let surplus = self.impacts.len().saturating_sub(KEPT);
+        self.impacts.drain(..surplus);
+        self.phase += drive.omega * step;
+        Ok(())
+    }
+
+    fn hold_response(&mut self, to: Move) -> Result<(), String> {
+        self.lock
+            .hold_response(&mut self.state, to)
+            .map_err(|error| error.to_string())
+    }
+
+    /// Time of the next sample, s.
+    #[must_use]
+    pub fn time(&self) -> f64 {
+        self.samples as f64 * self.lock.config().sample_time
+    }
+
+    /// The plant `ahead` seconds after the last sample: for slow motion between two samples.
+    #[must_use]
+    pub fn between(&self, ahead: f64) -> Plant {
+        let (mut plant, drive) = self.before;
+        // The drive was accepted for the whole sample period; a shorter step cannot be refused.
+        let drive = lovines::Drive::harmonic(drive.amplitude, drive.omega);
+        let _ = plant.advance_with(drive, ahead.max(0.0), &mut (|_| {}) as &mut dyn FnMut(Event));
+        plant
+    }
+
+    /// Time from the last sample to the first impact after it and before the next sample, s; its wall.
+    #[must_use]
+    pub fn first_impact(&self, later_than: f64) -> Option<(f64, Wall)> {
+        let (mut plant, drive) = self.before;
+        let mut first = None;
+        let mut note = |event: Event| {
+            if let Event::Impact { t, wall, .. } = event
+                && first.is_none()
+                && t > later_than
+            {
+                first = Some((t, wall));
+            }
+        };
+        let drive = lovines::Drive::harmonic(drive.amplitude, drive.omega);
+        plant
+            .advance_with(
+                drive,
+                self.lock.config().sample_time,
+                &mut note as &mut dyn FnMut(Event),
+            )
+            .ok()?;
+        first
+    }
+
+    /// Speed of the particle over `b omega0`.
+    #[must_use]
+    pub fn particle_speed(&self) -> f64 {
+        self.scene.dimensionless().speed(self.rig.plant.state().dq2.abs())
+    }
+
+    /// Impacts per period of the drive over those that are kept.
+    #[must_use]
+    pub fn impacts_per_period(&self) -> f64 {
+        match (self.impacts.first(), self.impacts.last()) {
+            (Some(first), Some(last)) if last.time > first.time => {
+                (self.impacts.len() - 1) as f64 * TAU / (last.time - first.time)
+            }
+            _ => 0.0,
+        }
+    }
+
+    /// Frequency (rad/s) and amplitude (m) of the drive.
+    #[must_use]
+    pub fn drive_now(&self) -> (f64, f64) {
+        let drive = self.before.1;
+        (drive.omega, drive.amplitude)
+    }
+
+    /// The plant at the next sample.
+    #[must_use]
+    pub fn plant(&self) -> &Plant {
+        &self.rig.plant
+    }
+}

@@ -1,0 +1,262 @@
+//! The C exports. The page writes settings into [`settings_address`] and reads results from [`output_address`].
+//!
+//! | call | result in the output array |
+//! |---|---|
+//! | [`run`] | rows of the record: time (s), base, response, relative displacement (m), phase error (degrees), frequency (rad/s), base amplitude, response amplitude (m) |
+//! | [`look`] | time (s), base, q1, q2, relative displacement (m), particle's velocity (m/s), wall that it rests on (-1, 0, 1) |
+//! | [`status`] | see there |
+//! | [`manifold`] | pairs (B, C) |
+//! | [`theory_backbone`], [`exact_backbone`] | triples (sigma, C, 1 if stable) |
+//! | [`tracked`] | quintuples (time it is known, s; sigma; C; G; 1 if settled) |
+
+use std::cell::RefCell;
+
+use crate::bench::Bench;
+use crate::curves;
+use crate::settings::{COUNT, Settings};
+
+/// Largest number of values of one call.
+const CAPACITY: usize = 1 << 16;
+/// Columns of a row of the record.
+const COLUMNS: usize = 8;
+
+struct Page {
+    bench: Option<Bench>,
+    settings: Settings,
+    output: Vec<f64>,
+    message: String,
+}
+
+thread_local! {
+    // A page has one bench and one thread.
+    static PAGE: RefCell<Page> = const {
+        RefCell::new(Page { bench: None, settings: [0.0; COUNT], output: Vec::new(), message: String::new() })
+    };
+}
+
+/// Runs `action`, puts its values into the output array and returns how many there are; -1 and a message at an error.
+fn values(action: impl FnOnce(&mut Bench, &mut Vec<f64>) -> Result<(), String>) -> i32 {
+    PAGE.with_borrow_mut(|page| {
+        let Page { bench, output, message, .. } = page;
+        output.clear();
+        output.reserve_exact(CAPACITY);
+        let result = bench.as_mut().ok_or_else(|| "restart first".to_owned());
+        match result.and_then(|bench| action(bench, output)) {
+            Ok(()) => output.len() as i32,
+            Err(error) => {
+                *message = error;
+                -1
+            }
+        }
+    })
+}
+
+/// Address of the settings, `f64` each, in the order and the units of live/settings.json. The first call fills in the default
+/// scene.
+// SAFETY of the exported names: none of them is a symbol of the C library or of the Rust runtime.
+#[unsafe(no_mangle)]
+pub extern "C" fn settings_address() -> *mut f64 {
+    PAGE.with_borrow_mut(|page| {
+        if page.bench.is_none() {
+            page.settings = Bench::default_settings();
+        }
+        page.settings.as_mut_ptr()
+    })
+}
+
+/// Address of the output array, `f64` each.
+#[unsafe(no_mangle)]
+pub extern "C" fn output_address() -> *const f64 {
+    PAGE.with_borrow(|page| page.output.as_ptr())
+}
+
+/// Address of the message of the last error, UTF-8.
+#[unsafe(no_mangle)]
+pub extern "C" fn message_address() -> *const u8 {
+    PAGE.with_borrow(|page| page.message.as_ptr())
+}
+
+/// Length of that message, bytes.
+#[unsafe(no_mangle)]
+pub extern "C" fn message_length() -> usize {
+    PAGE.with_borrow(|page| page.message.len())
+}
+
+fn with_settings(action: impl FnOnce(&mut Option<Bench>, Settings) -> Result<(), String>) -> i32 {
+    PAGE.with_borrow_mut(|page| match action(&mut page.bench, page.settings) {
+        Ok(()) => 0,
+        Err(message) => {
+            page.message = message;
+            -1
+        }
+    })
+}
+
+/// A bench at the start of the settings. Returns 0, or -1 and a message.
+#[unsafe(no_mangle)]
+pub extern "C" fn restart() -> i32 {
+    with_settings(|bench, settings| {
+        *bench = Some(Bench::new(settings)?);
+        Ok(())
+    })
+}
+
+/// Applies the settings to the running bench. Returns 0, or -1 and a message.
+#[unsafe(no_mangle)]
+pub extern "C" fn apply() -> i32 {
+    with_settings(|bench, settings| match bench {
+        Some(bench) => bench.apply(settings),
+        None => Err("restart first".to_owned()),
+    })
+}
+
+/// Switches the drive on (not 0) or off.
+#[unsafe(no_mangle)]
+pub extern "C" fn drive(on: i32) -> i32 {
+    values(|bench, _| {
+        bench.drive(on != 0);
+        Ok(())
+    })
+}
+
+/// Takes `samples` samples; returns the number of values of their rows.
+#[unsafe(no_mangle)]
+pub extern "C" fn run(samples: u32) -> i32 {
+    values(|bench, output| {
+        for _ in 0..(samples as usize).min(CAPACITY / COLUMNS) {
+            let row = bench.sample()?;
+            let controller = &row.output;
+            output.extend([
+                row.time,
+                row.base,
+                row.response,
+                row.relative,
+                controller.phase_error.to_degrees(),
+                controller.omega,
+                controller.amplitude,
+                controller.response_amplitude,
+            ]);
+        }
+        Ok(())
+    })
+}
+
+/// The plant `ahead` seconds after the last sample, at most one sample period.
+#[unsafe(no_mangle)]
+pub extern "C" fn look(ahead: f64) -> i32 {
+    values(|bench, output| {
+        let step = bench.lock.config().sample_time;
+        let ahead = ahead.clamp(0.0, step);
+        let plant = bench.between(ahead);
+        let state = plant.state();
+        let wall = plant.contact().map_or(0.0, |_| plant.relative_displacement().signum());
+        output.extend([
+            bench.time() - step + ahead,
+            plant.base_displacement(),
+            state.q1,
+            state.q2,
+            plant.relative_displacement(),
+            state.dq2,
+            wall,
+        ]);
+        Ok(())
+    })
+}
+
+/// Time from the last sample to its first impact later than `after` seconds, s; 0 values if there is none before the next sample.
+#[unsafe(no_mangle)]
+pub extern "C" fn next_impact(after: f64) -> i32 {
+    values(|bench, output| {
+        output.extend(bench.first_impact(after).map(|(t, _)| t));
+        Ok(())
+    })
+}
+
+/// The numbers of the page: time (s), sample time (s), omega0 (rad/s), sigma, C, B, phase error (degrees), G, locked, settled, state
+/// and fault of the loop, impacts since the start, impacts per period, energy dissipated (J).
+#[unsafe(no_mangle)]
+pub extern "C" fn status() -> i32 {
+    values(|bench, output| {
+        let (d, out) = (bench.scene.dimensionless(), bench.output);
+        let closed = bench.settings[crate::settings::index::CLOSED] != 0.0;
+        let (omega, amplitude) = bench.drive_now();
+        let totals = bench.plant().totals();
+        let yes = |condition: bool| f64::from(u8::from(condition));
+        output.extend([
+            bench.time(),
+            bench.lock.config().sample_time,
+            d.omega0,
+            d.sigma(omega),
+            out.response_amplitude / d.b,
+            bench.particle_speed(),
+            out.phase_error.to_degrees(),
+            d.excitation(amplitude),
+            yes(out.locked && closed),
+            yes(out.settled && closed),
+            f64::from(out.state as u8),
+            out.fault.map_or(0.0, |fault| f64::from(fault as u8)),
+            totals.impacts as f64,
+            bench.impacts_per_period(),
+            totals.dissipated,
+        ]);
+        Ok(())
+    })
+}
+
+/// Puts the names of the regime, of the loop's state and of its fault (or nothing) into the message, separated by `|`.
+#[unsafe(no_mangle)]
+pub extern "C" fn words() {
+    PAGE.with_borrow_mut(|page| {
+        if let Some(bench) = &page.bench {
+            let output = &bench.output;
+            let fault = output.fault.map(|fault| format!("{fault:?}")).unwrap_or_default();
+            page.message = format!("{}|{:?}|{fault}", bench.regime().name(), output.state);
+        }
+    });
+}
+
+/// `points` points of the slow invariant manifold up to `b_max`.
+#[unsafe(no_mangle)]
+pub extern "C" fn manifold(b_max: f64, points: u32) -> i32 {
+    values(|bench, output| {
+        output.extend(curves::manifold(&bench.scene.dimensionless(), b_max, points as usize).flatten());
+        Ok(())
+    })
+}
+
+/// `points` points of the backbone by first-order theory.
+#[unsafe(no_mangle)]
+pub extern "C" fn theory_backbone(points: u32) -> i32 {
+    values(|bench, output| {
+        output.extend(curves::backbone(&bench.scene.dimensionless(), points as usize).flatten());
+        Ok(())
+    })
+}
+
+/// At most `points` points of the backbone by exact orbits.
+#[unsafe(no_mangle)]
+pub extern "C" fn exact_backbone(points: u32) -> i32 {
+    values(|bench, output| {
+        output.extend(curves::exact(&bench.scene.dimensionless(), points as usize).flatten());
+        Ok(())
+    })
+}
+
+/// Starts to track the backbone, level by level, from the present state.
+#[unsafe(no_mangle)]
+pub extern "C" fn track() -> i32 {
+    values(|bench, _| bench.track())
+}
+
+/// The points of the tracked backbone, each with the time from which it is known.
+#[unsafe(no_mangle)]
+pub extern "C" fn tracked() -> i32 {
+    values(|bench, output| {
+        let step = bench.lock.config().sample_time;
+        for point in bench.tracking.iter().flat_map(|tracking| &tracking.points) {
+            let settled = f64::from(u8::from(point.settled));
+            output.extend([point.sample as f64 * step, point.sigma, point.c, point.g, settled]);
+        }
+        Ok(())
+    })
+}

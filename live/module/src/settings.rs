@@ -1,0 +1,92 @@
+//! Settings of the page, and the scene that they make.
+
+use lovines::{Parameters, State};
+use vines_testbench::scene::{Backbone, Chain, Controller, Definition, Dimensionless, Record, Scene};
+
+/// Constants from scenes/paper.toml and live/settings.json: the default scene, and an index for each setting.
+mod generated {
+    #![allow(missing_docs)]
+    include!(concat!(env!("OUT_DIR"), "/generated.rs"));
+}
+pub use generated::{COUNT, index};
+use generated::{EXCITATION, PLANT, START};
+
+/// Values of the settings, in the order and the units of live/settings.json.
+pub type Settings = [f64; COUNT];
+
+/// The scene in scenes/paper.toml.
+#[must_use]
+pub fn default_scene() -> Scene {
+    let [primary_mass, stiffness, damping, particle_mass, half_width, restitution] = PLANT;
+    let plant = Parameters {
+        primary_mass,
+        stiffness,
+        damping,
+        particle_mass,
+        half_width,
+        restitution,
+    };
+    let [q1, dq1, q2, dq2] = START;
+    Scene {
+        plant,
+        start: State { q1, dq1, q2, dq2 },
+        amplitude: Dimensionless::of(&plant, 0.0).amplitude(EXCITATION[0]),
+        controller: Controller::default(),
+        record: Record::default(),
+        backbone: Backbone::default(),
+        chain: Chain::default(),
+        resonance: Definition::default(),
+    }
+}
+
+/// The settings of a scene, with the loop closed and without noise.
+#[must_use]
+pub fn settings_of(scene: &Scene) -> Settings {
+    let d = scene.dimensionless();
+    let mut values = [0.0; COUNT];
+    values[index::EXCITATION] = d.g;
+    values[index::RESTITUTION] = d.r;
+    values[index::DAMPING] = d.lambda;
+    values[index::MASS_RATIO] = d.epsilon;
+    values[index::GAP] = d.b * 1e3;
+    values[index::PHASE_TARGET] = scene.controller.phase_target;
+    values[index::BANDWIDTH] = scene.controller.bandwidth;
+    values[index::START_SPEED] = d.speed(scene.start.dq2);
+    values[index::CLOSED] = 1.0;
+    values
+}
+
+/// `scene` with the values that differ from its own replaced. The others keep all their bits.
+#[must_use]
+pub fn changed(scene: &Scene, values: &Settings) -> Scene {
+    let before = settings_of(scene);
+    let differs = |one: usize| values[one] != before[one];
+    let mut scene = scene.clone();
+    let omega0 = scene.dimensionless().omega0;
+    let plant = &mut scene.plant;
+    if differs(index::MASS_RATIO) {
+        plant.particle_mass = values[index::MASS_RATIO] * plant.primary_mass;
+    }
+    if differs(index::MASS_RATIO) || differs(index::DAMPING) {
+        plant.damping = values[index::DAMPING] * plant.particle_mass * omega0;
+    }
+    if differs(index::RESTITUTION) {
+        plant.restitution = values[index::RESTITUTION];
+    }
+    if differs(index::GAP) {
+        plant.half_width = values[index::GAP] * 1e-3;
+    }
+    let d = Dimensionless::of(plant, 0.0);
+    if [index::EXCITATION, index::MASS_RATIO, index::GAP]
+        .into_iter()
+        .any(differs)
+    {
+        scene.amplitude = d.amplitude(values[index::EXCITATION]);
+    }
+    if differs(index::START_SPEED) || differs(index::GAP) {
+        scene.start.dq2 = values[index::START_SPEED] * d.b * d.omega0;
+    }
+    scene.controller.phase_target = values[index::PHASE_TARGET];
+    scene.controller.bandwidth = values[index::BANDWIDTH];
+    scene
+}

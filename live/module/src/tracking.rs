@@ -1,0 +1,115 @@
+//! The tracking of the backbone: the lab's own, run ahead on a copy of the bench. The bench then repeats it sample by sample with
+//! the same bits.
+
+use std::cell::Cell;
+
+use phase_lock::{Input, Move, PhaseLock, State};
+use vines_testbench::backbone::track;
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Sensors};
+
+use crate::bench::Bench;
+
+/// A point of the tracked backbone, dimensionless.
+#[derive(Debug, Clone, Copy)]
+pub struct Point {
+    /// Number of the sample after which the point is known.
+    pub sample: u64,
+    /// Detuning.
+    pub sigma: f64,
+    /// Amplitude of the response.
+    pub c: f64,
+    /// Excitation.
+    pub g: f64,
+    /// Whether the point had settled.
+    pub settled: bool,
+}
+
+/// The moves that are still to be made, and the points that they lead to.
+pub struct Tracking {
+    /// Moves and the sample before which each is made, in reverse.
+    moves: Vec<(u64, Move)>,
+    /// All points.
+    pub points: Vec<Point>,
+}
+
+impl Tracking {
+    /// The move to be made before the given sample.
+    pub fn due(&mut self, sample: u64) -> Option<Move> {
+        self.moves.pop_if(|(at, _)| *at <= sample).map(|(_, to)| to)
+    }
+}
+
+/// The controller on a copy of the bench; notes its moves.
+struct Ahead<'a> {
+    lock: PhaseLock,
+    state: State,
+    samples: &'a Cell<u64>,
+    moves: Vec<(u64, Move)>,
+}
+
+impl Controller for Ahead<'_> {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        let input = Input {
+            response: sensors.response,
+            reference: sensors.reference,
+            active,
+        };
+        let output = self.lock.process(&mut self.state, input);
+        self.samples.set(self.samples.get() + 1);
+        Ok(Command {
+            drive: Drive {
+                omega: output.omega,
+                amplitude: output.amplitude,
+                displacement: output.drive,
+            },
+            phase_error: output.phase_error,
+            settled: output.settled,
+            state: Some(output.state),
+            fault: output.fault,
+        })
+    }
+
+    fn hold_response(&mut self, to: Move) -> Result<(), ControllerError> {
+        self.moves.push((self.samples.get(), to));
+        Ok(self.lock.hold_response(&mut self.state, to)?)
+    }
+}
+
+impl Bench {
+    /// Tracks the backbone from here on.
+    ///
+    /// # Errors
+    /// The message of a lab's error, such as no lock; then the bench runs on as before.
+    pub fn track(&mut self) -> Result<(), String> {
+        let lock = self
+            .scene
+            .backbone_config()
+            .build()
+            .map_err(|error| error.to_string())?;
+        let samples = Cell::new(self.samples);
+        let mut controller = Ahead {
+            lock,
+            state: self.state,
+            samples: &samples,
+            moves: Vec::new(),
+        };
+        let mut rig = self.rig.clone();
+        let mut begun = Vec::new();
+        let tracked = track(&mut rig, &mut controller, &self.scene, |_, _| begun.push(samples.get()))
+            .map_err(|error| error.to_string())?;
+        let ends = begun.into_iter().skip(1).chain([samples.get()]);
+        let points = tracked.points.iter().zip(ends);
+        let points = points.map(|(point, sample)| Point {
+            sample,
+            sigma: point.sigma,
+            c: point.c,
+            g: point.g,
+            settled: point.settled,
+        });
+        controller.moves.reverse();
+        self.tracking = Some(Tracking { moves: controller.moves, points: points.collect() });
+        self.lock = lock;
+        self.active = true;
+        Ok(())
+    }
+}

@@ -1,0 +1,74 @@
+//! The live bench is the lab's experiment, sample by sample.
+
+use vines_live::bench::Bench;
+use vines_live::settings::{default_scene, index};
+use vines_testbench::experiment::{Plan, run};
+use vines_testbench::rig::{BuiltIn, Simulated};
+use vines_testbench::scene::{PAPER, Scene};
+
+fn paper() -> Scene {
+    Scene::parse("paper.toml", PAPER, &[]).unwrap()
+}
+
+#[test]
+fn the_default_scene_is_that_of_the_lab() {
+    assert_eq!(default_scene(), paper());
+}
+
+#[test]
+fn the_default_lock_has_the_bits_of_the_lab() {
+    let scene = paper();
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let record = run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
+    let mut bench = Bench::new(Bench::default_settings()).unwrap();
+    for (n, sample) in record.samples[..record.released].iter().enumerate() {
+        let row = bench.sample().unwrap();
+        assert_eq!(row.response.to_bits(), sample.sensors.response.to_bits(), "sample {n}");
+        assert_eq!(
+            row.output.omega.to_bits(),
+            sample.command.drive.omega.to_bits(),
+            "sample {n}"
+        );
+    }
+    assert!(bench.output.locked);
+}
+
+#[test]
+fn slow_motion_between_two_samples_ends_at_the_next_one() {
+    let mut bench = Bench::new(Bench::default_settings()).unwrap();
+    for _ in 0..500 {
+        bench.sample().unwrap();
+        let step = bench.lock.config().sample_time;
+        assert_eq!(bench.between(step).state(), bench.plant().state());
+    }
+}
+
+#[test]
+fn the_tracked_backbone_is_repeated_with_the_same_bits() {
+    let mut bench = Bench::new(Bench::default_settings()).unwrap();
+    for _ in 0..2000 {
+        bench.sample().unwrap();
+    }
+    bench.track().unwrap();
+    let points = bench.tracking.as_ref().unwrap().points.clone();
+    assert!(points.len() > 20);
+    let d = bench.scene.dimensionless();
+    for point in points {
+        while bench.samples < point.sample {
+            bench.sample().unwrap();
+        }
+        let c = bench.output.response_amplitude / d.b;
+        assert!((c - point.c).abs() < 2e-3, "{c} instead of {}", point.c);
+    }
+}
+
+#[test]
+fn a_refused_setting_changes_nothing_and_says_why() {
+    let mut bench = Bench::new(Bench::default_settings()).unwrap();
+    let mut settings = bench.settings;
+    settings[index::RESTITUTION] = 1.5;
+    let message = bench.apply(settings).unwrap_err();
+    assert!(message.contains("1.5"), "{message}");
+    assert_eq!(bench.scene, paper());
+}

@@ -1,0 +1,69 @@
+// The WebAssembly module: plant, controller and theory. Its exports are described in live/module/src/exports.rs.
+
+const COLUMNS = ["time", "base", "response", "relative", "phaseError", "omega", "amplitude", "responseAmplitude"];
+const STATUS = ["time", "sampleTime", "omega0", "sigma", "C", "B", "phaseError", "G", "locked", "settled", "state", "fault", "impacts", "perPeriod", "dissipated"];
+const LOOK = ["time", "base", "q1", "q2", "relative", "speed", "wall"];
+
+const named = (names, values) => Object.fromEntries(names.map((name, i) => [name, values[i]]));
+
+export async function load(url, settings) {
+  if (typeof WebAssembly !== "object") throw new Error("This browser cannot run WebAssembly, which the simulation needs. Try a current Firefox, Chromium, Edge or Safari.");
+  const answer = await fetch(url);
+  if (!answer.ok) throw new Error(`The simulation ${url} could not be loaded (HTTP ${answer.status}). Build the page with scripts/live.`);
+  const { instance } = await WebAssembly.instantiate(await answer.arrayBuffer(), {});
+  return new Bench(instance.exports, settings);
+}
+
+class Bench {
+  columns = COLUMNS;
+
+  constructor(exports, settings) {
+    this.exports = exports;
+    this.keys = settings.map((setting) => setting.key);
+    this.defaults = Object.fromEntries(this.keys.map((key, i) => [key, this.#settings()[i]]));
+  }
+
+  // The memory may grow, and its views become invalid: every access makes a new one.
+  #settings() {
+    return new Float64Array(this.exports.memory.buffer, this.exports.settings_address(), this.keys.length);
+  }
+
+  #write(values) {
+    this.#settings().set(this.keys.map((key) => values[key]));
+  }
+
+  message() {
+    const bytes = new Uint8Array(this.exports.memory.buffer, this.exports.message_address(), this.exports.message_length());
+    return new TextDecoder().decode(bytes);
+  }
+
+  #check(count) {
+    if (count < 0) throw new Error(this.message());
+    return count;
+  }
+
+  #values(count) {
+    this.#check(count);
+    return new Float64Array(this.exports.memory.buffer, this.exports.output_address(), count);
+  }
+
+  restart(values) { this.#write(values); this.#check(this.exports.restart()); }
+  apply(values) { this.#write(values); this.#check(this.exports.apply()); }
+  drive(on) { this.#check(this.exports.drive(on ? 1 : 0)); }
+  track() { this.#check(this.exports.track()); }
+  // Rows of the record, COLUMNS values each; valid until the next call.
+  run(samples) { return this.#values(this.exports.run(samples)); }
+  look(ahead) { return named(LOOK, this.#values(this.exports.look(ahead))); }
+  nextImpact(after) { return this.#values(this.exports.next_impact(after))[0]; }
+  status() { return named(STATUS, this.#values(this.exports.status())); }
+  // [regime, state of the loop, fault]
+  words() { this.exports.words(); return this.message().split("|"); }
+  #rows(count, width) {
+    const values = this.#values(count);
+    return Array.from({ length: count / width }, (_, i) => Array.from(values.subarray(i * width, (i + 1) * width)));
+  }
+  manifold(bMax, points) { return this.#rows(this.exports.manifold(bMax, points), 2); }
+  theory(points) { return this.#rows(this.exports.theory_backbone(points), 3); }
+  exact(points) { return this.#rows(this.exports.exact_backbone(points), 3); }
+  tracked() { return this.#rows(this.exports.tracked(), 5); }
+}

@@ -1,0 +1,122 @@
+// Plots on canvas: axes with ticks, lines, points.
+
+import { surface } from "./rig.js";
+
+const MARGIN = { left: 56, right: 10, top: 24, bottom: 34 };
+
+export class Plot {
+  constructor(canvas, colour, axes) {
+    Object.assign(this, { canvas, colour, ...axes });
+  }
+
+  // Begins a picture with the ranges x and y, [low, high] each.
+  begin(x, y) {
+    const { context: c, width, height } = surface(this.canvas);
+    Object.assign(this, { c, x, y, box: [MARGIN.left, MARGIN.top, width - MARGIN.left - MARGIN.right, height - MARGIN.top - MARGIN.bottom] });
+    c.clearRect(0, 0, width, height);
+    const [left, top, wide, high] = this.box;
+    c.font = "12px system-ui, sans-serif";
+    c.lineWidth = 1;
+    c.strokeStyle = this.colour("line");
+    c.fillStyle = this.colour("faint");
+    c.textAlign = "center";
+    for (const tick of ticks(x, wide / 70)) {
+      this.#line([[tick, y[0]], [tick, y[1]]]);
+      c.fillText(shown(tick), this.#at([tick, 0])[0], top + high + 14);
+    }
+    c.textAlign = "right";
+    for (const tick of ticks(y, high / 34)) {
+      this.#line([[x[0], tick], [x[1], tick]]);
+      c.fillText(shown(tick), left - 5, this.#at([0, tick])[1] + 4);
+    }
+    c.textAlign = "center";
+    c.fillText(this.xLabel, left + wide / 2, top + high + 29);
+    c.save(); c.translate(11, top + high / 2); c.rotate(-Math.PI / 2); c.fillText(this.yLabel, 0, 0); c.restore();
+    c.textAlign = "left";
+    this.legend = left;
+    this.#clip();
+  }
+
+  #at([x, y]) {
+    const [left, top, wide, high] = this.box;
+    return [left + ((x - this.x[0]) / (this.x[1] - this.x[0])) * wide, top + (1 - (y - this.y[0]) / (this.y[1] - this.y[0])) * high];
+  }
+
+  #line(points) {
+    const { c } = this;
+    c.beginPath();
+    let pen = false;
+    for (const point of points) {
+      if (!point || !Number.isFinite(point[0] + point[1])) { pen = false; continue; }
+      const [x, y] = this.#at(point);
+      if (pen) c.lineTo(x, y); else c.moveTo(x, y);
+      pen = true;
+    }
+    c.stroke();
+  }
+
+  line(points, colour, { label, dash = [], width = 1.7 } = {}) {
+    const { c } = this;
+    c.strokeStyle = this.colour(colour);
+    c.lineWidth = width;
+    c.setLineDash(dash);
+    this.#line(points);
+    c.setLineDash([]);
+    if (label) this.#legend(label, colour, dash);
+  }
+
+  points(points, colour, { label, radius = 3, open = false } = {}) {
+    const { c } = this;
+    c.fillStyle = c.strokeStyle = this.colour(colour);
+    c.lineWidth = 1.5;
+    for (const point of points) {
+      c.beginPath(); c.arc(...this.#at(point), radius, 0, 7);
+      if (open) c.stroke(); else c.fill();
+    }
+    if (label && points.length) this.#legend(label, colour, null);
+  }
+
+  // One row above the axes, outside the clipped area.
+  #legend(label, colour, dash) {
+    const { c } = this;
+    const x = this.legend, y = this.box[1] - 9;
+    c.restore();
+    c.strokeStyle = c.fillStyle = this.colour(colour);
+    c.setLineDash(dash ?? []);
+    c.lineWidth = 2;
+    c.beginPath();
+    if (dash) { c.moveTo(x, y - 4); c.lineTo(x + 18, y - 4); c.stroke(); } else { c.arc(x + 9, y - 4, 3.5, 0, 7); c.fill(); }
+    c.setLineDash([]);
+    c.fillStyle = this.colour("ink");
+    c.fillText(label, x + 23, y);
+    this.legend += 35 + c.measureText(label).width;
+    this.#clip();
+  }
+
+  #clip() {
+    const { c, box } = this;
+    c.save();
+    c.beginPath(); c.rect(...box); c.clip();
+  }
+
+  end() { this.c.restore(); }
+}
+
+function ticks([low, high], count) {
+  const rough = (high - low) / Math.max(2, count);
+  const power = 10 ** Math.floor(Math.log10(rough));
+  const step = [1, 2, 5, 10].map((factor) => factor * power).find((one) => one >= rough);
+  const values = [];
+  for (let i = Math.ceil(low / step); i * step <= high; i++) values.push(i * step);
+  return values;
+}
+
+const shown = (value) => String(Number(value.toPrecision(5))).replace("-", "−");
+
+export const extent = (values, least) => {
+  let low = Infinity, high = -Infinity;
+  for (const value of values) { low = Math.min(low, value); high = Math.max(high, value); }
+  if (!(high >= low)) return [-least, least];
+  const middle = 0.5 * (low + high), half = Math.max(least, 0.55 * (high - low));
+  return [middle - half, middle + half];
+};
