@@ -21,7 +21,8 @@ REGIMES = {
     "n impacts": "#009e73",
     "modulated": "#f0e442",
     "chaotic": "#d55e00",
-    "sticking": "#cc79a7",
+    "quasi-periodic": "#cc79a7",
+    "undecided": "#333333",
 }
 NOTE = (
     "Each cell is the default rig after 400 periods or more at that drive. One step of 200 periods is timed (50 with "
