@@ -7,7 +7,7 @@ use lovines::{Drive, Plant, State};
 use serde::Serialize;
 use vines_model::{Dimensionless, map::observe, regime::Regime};
 
-use super::reference::{Lock, RIG, drive, evaluations, settle, timed};
+use super::reference::{Lock, RIG, drive, evaluations, more, settle, timed};
 use super::{Effort, Methods, median};
 use crate::methods::{BrentBaseline, brent_baseline};
 
@@ -73,9 +73,11 @@ impl Settled {
     /// A frequency that is not positive, or a value that the plant does not accept.
     pub fn new(sigma: f64, g: f64) -> anyhow::Result<Self> {
         let drive = drive(sigma, g)?;
-        let plant = settle(drive)?;
+        let mut plant = settle(drive)?;
         let scene = Dimensionless::of(&RIG, drive.amplitude);
         let found = observe(&scene, sigma, scene.state(&plant.state()), FOLLOWED)?;
+        // What is timed is the regime, not the transient before it.
+        more(&mut plant, drive, (found.followed + FOLLOWED) as u32)?;
         let repeats = found.periods > 0 || found.regime == Regime::NoImpacts;
         let state = numbers(&plant.state());
         Ok(Self {
