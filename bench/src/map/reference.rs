@@ -50,14 +50,13 @@ pub fn settle(drive: Drive) -> anyhow::Result<Plant> {
     Ok(plant)
 }
 
-/// So many more periods in one step.
+/// So many more periods in one step; answers the events.
 ///
 /// # Errors
 /// A drive that the plant does not accept.
-pub fn more(plant: &mut Plant, drive: Drive, periods: u32) -> anyhow::Result<()> {
+pub fn more(plant: &mut Plant, drive: Drive, periods: u32) -> anyhow::Result<Outcome> {
     let duration = f64::from(periods) * TAU / drive.omega;
-    plant.advance(drive, duration)?;
-    Ok(())
+    Ok(plant.advance(drive, duration)?)
 }
 
 /// Evaluations of the motion in a step.
