@@ -1,4 +1,4 @@
-//! Scenes drawn by lot.
+//! Random scenes.
 
 use lovines::{Drive, Parameters, State};
 use proptest::prelude::*;

@@ -1,7 +1,7 @@
 //! Impacts: what each keeps, and what a million without loss add up to.
 
 use crate::common::scene;
-use crate::lot::draw;
+use crate::random::draw;
 use crate::table::Table;
 use lovines::{Drive, Parameters, Plant, State};
 use proptest::prelude::*;

@@ -1,7 +1,7 @@
 //! Walls just before the farthest point of a motion, and just beyond it, for random rigs and drives.
 
 use crate::common::{Scene, scene};
-use crate::lot::draw;
+use crate::random::draw;
 use crate::table::Table;
 use lovines::base_motion::BaseMotion;
 use lovines::oscillator::Oscillator;

@@ -8,7 +8,7 @@ mod common;
 mod elastic;
 mod follow;
 mod graze;
-mod lot;
+mod random;
 mod spacing;
 mod steps;
 mod table;
@@ -19,12 +19,12 @@ use table::Table;
 #[test]
 fn hard_scenes_are_survived() {
     if let Ok(name) = std::env::var("SCENE") {
-        return lot::one(&name);
+        return random::one(&name);
     }
     let n = std::env::var("SCENES").map_or(1500, |n| n.parse().expect("a number of scenes"));
     let mut table = Table::begin();
-    lot::scenes(n, &mut table);
-    lot::balance(n / 10, &mut table);
+    random::scenes(n, &mut table);
+    random::balance(n / 10, &mut table);
     elastic::one_by_one(n, &mut table);
     elastic::drift(1_000_000, &mut table);
     graze::both_ways(n / 10, &mut table);

@@ -9,8 +9,8 @@ mod rigs;
 use std::cell::RefCell;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicU64, Ordering};
-use std::sync::{Mutex, PoisonError};
 
+use rayon::prelude::*;
 use vines_model::orbit;
 
 use crate::backbone::track;
@@ -113,31 +113,23 @@ pub fn calibrate(
         .iter()
         .map(|(_, scene)| ExactCurve::of(&scene.dimensionless()))
         .collect();
-    let (next, found) = (AtomicU64::new(0), Mutex::new(Calibration::default()));
     let count = (seeds.end - seeds.start) * scenes.len() as u64;
-    let work = || {
-        loop {
-            let n = next.fetch_add(1, Ordering::Relaxed);
-            if n >= count {
-                break;
-            }
-            let at = (n % scenes.len() as u64) as usize;
-            let (ratio, mut scene) = scenes[at].clone();
-            scene.chain.seed = seeds.start + n / scenes.len() as u64;
-            let run = run(&scene, ratio, &curves[at]);
-            let mut all = found.lock().unwrap_or_else(PoisonError::into_inner);
-            all.runs += 1;
-            all.outcomes.extend(run.outcomes);
-            all.missing.extend(run.missing);
-            progress(all.runs);
-        }
-    };
-    std::thread::scope(|scope| {
-        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
-            scope.spawn(work);
-        }
+    let done = AtomicU64::new(0);
+    let runs = (0..count).into_par_iter().map(|n| {
+        let at = (n % scenes.len() as u64) as usize;
+        let (ratio, mut scene) = scenes[at].clone();
+        scene.chain.seed = seeds.start + n / scenes.len() as u64;
+        let run = run(&scene, ratio, &curves[at]);
+        progress(done.fetch_add(1, Ordering::Relaxed) + 1);
+        run
     });
-    Ok(found.into_inner().unwrap_or_else(PoisonError::into_inner))
+    // In the order of the runs, whichever core was first.
+    let runs: Vec<Calibration> = runs.collect();
+    Ok(Calibration {
+        runs: count,
+        outcomes: runs.iter().flat_map(|run| run.outcomes.iter().copied()).collect(),
+        missing: runs.into_iter().flat_map(|run| run.missing).collect(),
+    })
 }
 
 /// One run: a lock with its decay, and a tracked backbone.

@@ -3,6 +3,7 @@
 use nalgebra::DVector;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
+use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
 use vines_model::numerics::{HarmonicBasis, mean};
@@ -69,7 +70,7 @@ pub enum RandomRigError {
     Controller(#[from] phase_lock::ConfigError),
 }
 
-/// Draws `count` rigs and locks each from the start of the scene, at rest unless `settings` say otherwise: epsilon from 0.001 to 0.05
+/// Draws `count` rigs and locks each, on all cores, from the start of the scene, at rest unless `settings` say otherwise: epsilon from 0.001 to 0.05
 /// and lambda from 0.1 to 3 (uniform logarithms), r from 0.2 to 0.97, and G across the range with a stable symmetric orbit.
 ///
 /// # Errors
@@ -77,8 +78,8 @@ pub enum RandomRigError {
 pub fn locks(count: usize, seed: u64, settings: &[Override]) -> Result<Vec<Row>, RandomRigError> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut uniform = move |low: f64, high: f64| low + (high - low) * (random.next_u64() as f64 / u64::MAX as f64);
-    let mut rows = Vec::with_capacity(count);
-    while rows.len() < count {
+    let mut rigs = Vec::with_capacity(count);
+    while rigs.len() < count {
         let epsilon = uniform(1e-3_f64.ln(), 0.05_f64.ln()).exp();
         let lambda = uniform(0.1_f64.ln(), 3.0_f64.ln()).exp();
         let r = uniform(0.2, 0.97);
@@ -90,10 +91,10 @@ pub fn locks(count: usize, seed: u64, settings: &[Override]) -> Result<Vec<Row>,
         let d = Dimensionless { g: low + share * (high - low), ..d };
         let stable: Vec<Orbit> = phase_resonant(&d).into_iter().filter(|orbit| orbit.stable).collect();
         if !stable.is_empty() {
-            rows.push(lock(&d, &stable, settings)?);
+            rigs.push((d, stable));
         }
     }
-    Ok(rows)
+    rigs.par_iter().map(|(d, stable)| lock(d, stable, settings)).collect()
 }
 
 fn lock(d: &Dimensionless, stable: &[Orbit], settings: &[Override]) -> Result<Row, RandomRigError> {

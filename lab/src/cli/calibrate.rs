@@ -8,7 +8,7 @@ use vines::calibration::{self, Calibration, Coverage, Kind, OTHER_RIGS, Part, RA
 use vines::report::{self, Table};
 use vines::scene::Scene;
 
-use super::{failure::Failure, json, written};
+use super::{failure::Failure, json, writable, written};
 
 /// The scene whose settings the rigs change.
 const SCENE: &str = include_str!("../../../scenes/dimensionless.toml");
@@ -48,6 +48,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+    writable(&arguments.out)?;
     let rigs = if arguments.other_rigs { &OTHER_RIGS } else { &RIGS };
     let seeds = arguments.first_seed..arguments.first_seed + arguments.seeds;
     let bar = ProgressBar::new(arguments.seeds * (rigs.len() * RATIOS.len()) as u64);

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use lovines::{Event, Plant, Wall};
 use phase_lock::{Input, Move, Output, PhaseLock, State};
 use vines_model::regime::Impact;
-use vines_testbench::rig::Drive;
+use vines_testbench::rig::{Command, Drive};
 use vines_testbench::scene::Scene;
 
 use crate::rig::NoisyRig;
@@ -151,8 +151,7 @@ impl Bench {
     /// What the controller asks for, or the constant drive of the open loop.
     fn requested(&self) -> Drive {
         if self.settings[index::CLOSED] != 0.0 {
-            let Output { omega, amplitude, drive, .. } = self.output;
-            return Drive { omega, amplitude, displacement: drive };
+            return Command::from(self.output).drive;
         }
         let omega = self.scene.dimensionless().omega(self.settings[index::DETUNING]);
         let amplitude = if self.active { self.scene.amplitude } else { 0.0 };

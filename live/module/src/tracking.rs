@@ -5,7 +5,7 @@ use std::cell::Cell;
 
 use phase_lock::{Input, Move, PhaseLock, State};
 use vines_testbench::backbone::track;
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Sensors};
+use vines_testbench::rig::{Command, Controller, ControllerError, Sensors};
 
 use crate::bench::Bench;
 
@@ -14,6 +14,8 @@ use crate::bench::Bench;
 pub struct Point {
     /// Number of the sample after which the point is known.
     pub sample: u64,
+    /// Frequency of the drive at that sample, rad/s, which the bench repeats.
+    pub omega: f64,
     /// Detuning.
     pub sigma: f64,
     /// Amplitude of the response.
@@ -43,7 +45,8 @@ impl Tracking {
 struct Ahead<'a> {
     lock: PhaseLock,
     state: State,
-    samples: &'a Cell<u64>,
+    /// Samples taken, and the frequency at the last one.
+    last: &'a Cell<(u64, f64)>,
     moves: Vec<(u64, Move)>,
 }
 
@@ -55,22 +58,12 @@ impl Controller for Ahead<'_> {
             active,
         };
         let output = self.lock.process(&mut self.state, input);
-        self.samples.set(self.samples.get() + 1);
-        Ok(Command {
-            drive: Drive {
-                omega: output.omega,
-                amplitude: output.amplitude,
-                displacement: output.drive,
-            },
-            phase_error: output.phase_error,
-            settled: output.settled,
-            state: Some(output.state),
-            fault: output.fault,
-        })
+        self.last.set((self.last.get().0 + 1, output.omega));
+        Ok(output.into())
     }
 
     fn hold_response(&mut self, to: Move) -> Result<(), ControllerError> {
-        self.moves.push((self.samples.get(), to));
+        self.moves.push((self.last.get().0, to));
         Ok(self.lock.hold_response(&mut self.state, to)?)
     }
 }
@@ -86,21 +79,17 @@ impl Bench {
             .backbone_config()
             .build()
             .map_err(|error| error.to_string())?;
-        let samples = Cell::new(self.samples);
-        let mut controller = Ahead {
-            lock,
-            state: self.state,
-            samples: &samples,
-            moves: Vec::new(),
-        };
+        let last = Cell::new((self.samples, 0.0));
+        let mut controller = Ahead { lock, state: self.state, last: &last, moves: Vec::new() };
         let mut rig = self.rig.clone();
         let mut begun = Vec::new();
-        let tracked = track(&mut rig, &mut controller, &self.scene, |_, _| begun.push(samples.get()))
+        let tracked = track(&mut rig, &mut controller, &self.scene, |_, _| begun.push(last.get()))
             .map_err(|error| error.to_string())?;
-        let ends = begun.into_iter().skip(1).chain([samples.get()]);
+        let ends = begun.into_iter().skip(1).chain([last.get()]);
         let points = tracked.points.iter().zip(ends);
-        let points = points.map(|(point, sample)| Point {
+        let points = points.map(|(point, (sample, omega))| Point {
             sample,
+            omega,
             sigma: point.sigma,
             c: point.c,
             g: point.g,

@@ -1,6 +1,6 @@
 //! The built-in phase-locked loop as a controller of the bench.
 
-use phase_lock::{Config, ConfigError, Input, Move, PhaseLock, State};
+use phase_lock::{Config, ConfigError, Input, Move, Output, PhaseLock, State};
 
 use super::{Command, Controller, ControllerError, Drive, Sensors};
 
@@ -22,6 +22,22 @@ impl BuiltIn {
     }
 }
 
+impl From<Output> for Command {
+    fn from(output: Output) -> Self {
+        Self {
+            drive: Drive {
+                omega: output.omega,
+                amplitude: output.amplitude,
+                displacement: output.drive,
+            },
+            phase_error: output.phase_error,
+            settled: output.settled,
+            state: Some(output.state),
+            fault: output.fault,
+        }
+    }
+}
+
 impl Controller for BuiltIn {
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
         let output = self.lock.process(
@@ -32,17 +48,7 @@ impl Controller for BuiltIn {
                 active,
             },
         );
-        Ok(Command {
-            drive: Drive {
-                omega: output.omega,
-                amplitude: output.amplitude,
-                displacement: output.drive,
-            },
-            phase_error: output.phase_error,
-            settled: output.settled,
-            state: Some(output.state),
-            fault: output.fault,
-        })
+        Ok(output.into())
     }
 
     fn hold_response(&mut self, to: Move) -> Result<(), ControllerError> {

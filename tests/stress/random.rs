@@ -1,4 +1,4 @@
-//! Scenes drawn by lot, on all cores. Each comes from a number of its own, which is told of the hardest ones.
+//! Random scenes, on all cores. Each has a number, which is printed for the hardest ones.
 
 use crate::balance::{Walk, walk};
 use crate::common::{Scene, scene};
