@@ -15,7 +15,11 @@ fn scene(settings: &[&str]) -> Scene {
 fn tracked(settings: &[&str]) -> TrackedComparison {
     let scene = scene(settings);
     let mut rig = Chain::new(
-        Box::new(Simulated::new(scene.plant, scene.start).unwrap()),
+        Box::new(
+            Simulated::new(scene.plant, scene.start)
+                .unwrap()
+                .with_sensors(scene.resonance),
+        ),
         &scene.chain,
         &scene.dimensionless(),
         scene.controller.samples_per_period,
@@ -155,6 +159,30 @@ fn below_the_fold_the_motion_is_reported_as_irregular_and_not_settled() {
         (last.regime, last.regime_by_impacts),
         (Regime::Other, Some(Regime::Other))
     );
+}
+
+#[test]
+fn scratch() {
+    for more in [
+        vec![],
+        vec!["resonance.sensor=\"q1\""],
+        vec!["resonance.sensor=\"acceleration\""],
+        vec!["resonance.reference=\"force\""],
+        vec!["chain.snr=40"],
+        vec!["plant.r=0.8", "plant.epsilon=0.0042", "backbone.C_from=0.65", "backbone.C_to=0.3"],
+        vec!["plant.r=0.8", "plant.epsilon=0.02", "backbone.C_from=0.65", "backbone.C_to=0.3"],
+        vec!["plant.r=0.8", "plant.epsilon=0.002","backbone.C_from=0.65", "backbone.C_to=0.3"],
+    ] {
+        for definition in ["phase", "peak"] {
+        let def = format!("resonance.definition=\"{definition}\"");
+        let mut all = vec![&*def];
+        all.extend(more.iter().copied());
+        let report = tracked(&all);
+        for one in &report.points {
+            let e = one.exact.unwrap();
+            println!("  {:.3} sigma {:.4} G {:.4} phase {:.3} u {:.1e} {:.1e} err {:?} {:?} {:.1} {} {}", one.point.c, one.point.sigma, one.point.g, one.point.phase_error_deg, one.point.u_sigma, one.point.u_g, e.sigma, e.g, one.point.periods, one.point.settled, one.point.regime);
+        }}
+    }
 }
 
 /// A controller that only ever holds a drive.

@@ -100,11 +100,11 @@ pub trait Controller {
     /// Errors of the implementation: a refused call, a lost connection.
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError>;
 
-    /// Controls the amplitude of the response from now on, and moves it as stated.
+    /// Controls the amplitude of the response from now on, moves it as stated, and holds the phase `phase_target`, rad.
     ///
     /// # Errors
     /// A controller that cannot control the response, or cannot do so now.
-    fn hold_response(&mut self, _to: Move) -> Result<(), ControllerError> {
+    fn hold_response(&mut self, _to: Move, _phase_target: f64) -> Result<(), ControllerError> {
         Err(ControllerError::NoResponseLoop)
     }
 }

@@ -59,7 +59,7 @@ fn drive_panel(tracked: &TrackedComparison) -> Panel {
     let flow = SlowFlow::new(p.lambda, p.r);
     let theory = flow.backbone(flow.manifold.b_min(), 1.3, 600);
     let theory = theory.iter().map(|one| (one.c, one.g));
-    let exact = tracked.exact.orbits().iter().map(|one| (one.c, one.g));
+    let exact = tracked.exact.places().iter().map(|one| (one[0], one[2]));
     let (_, most) = range((0.0, 0.1), all.clone().map(|one| one.g));
     let high = 1.3 * most;
     let inside = |place: &(f64, f64)| place.0 <= top && place.1 <= high;
