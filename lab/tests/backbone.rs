@@ -1,7 +1,7 @@
 //! The backbone, tracked with the response held by the loop.
 
 use vines::backbone::{TrackError, track};
-use vines::comparison::TrackedComparison;
+use vines::comparison::{ExactCurve, TrackedComparison, TrackedPoint};
 use vines::identification::Regime;
 use vines::rig::{BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated};
 use vines::scene::{Override, Scene};
@@ -162,26 +162,19 @@ fn below_the_fold_the_motion_is_reported_as_irregular_and_not_settled() {
 }
 
 #[test]
-fn scratch() {
-    for more in [
-        vec![],
-        vec!["resonance.sensor=\"q1\""],
-        vec!["resonance.sensor=\"acceleration\""],
-        vec!["resonance.reference=\"force\""],
-        vec!["chain.snr=40"],
-        vec!["plant.r=0.8", "plant.epsilon=0.0042", "backbone.C_from=0.65", "backbone.C_to=0.3"],
-        vec!["plant.r=0.8", "plant.epsilon=0.02", "backbone.C_from=0.65", "backbone.C_to=0.3"],
-        vec!["plant.r=0.8", "plant.epsilon=0.002","backbone.C_from=0.65", "backbone.C_to=0.3"],
-    ] {
-        for definition in ["phase", "peak"] {
-        let def = format!("resonance.definition=\"{definition}\"");
-        let mut all = vec![&*def];
-        all.extend(more.iter().copied());
-        let report = tracked(&all);
-        for one in &report.points {
-            let e = one.exact.unwrap();
-            println!("  {:.3} sigma {:.4} G {:.4} phase {:.3} u {:.1e} {:.1e} err {:?} {:?} {:.1} {} {}", one.point.c, one.point.sigma, one.point.g, one.point.phase_error_deg, one.point.u_sigma, one.point.u_g, e.sigma, e.g, one.point.periods, one.point.settled, one.point.regime);
-        }}
+fn peaks_of_the_response_are_tracked_apart_from_phase_resonance() {
+    for sensor in ["v", "q1"] {
+        let sensor = format!("resonance.sensor=\"{sensor}\"");
+        let settings = ["backbone.C_to=0.3", "backbone.points=6", &sensor];
+        let report = tracked(&[&settings[..], &["resonance.definition=\"peak\""]].concat());
+        assert!(report.worst().unwrap().at_equal_c <= 1.5e-3);
+        let phase = ExactCurve::of(&scene(&settings).dimensionless());
+        for TrackedPoint { point, exact } in &report.points {
+            let error = exact.unwrap().sigma.unwrap();
+            assert!(point.settled && error.abs() < 4.0 * point.u_sigma, "{point:?}: {error}");
+            // The two curves are half of the theory's own error apart.
+            assert!((point.sigma - phase.at(point.c).unwrap()[0]).abs() > 0.01, "{point:?}");
+        }
     }
 }
 

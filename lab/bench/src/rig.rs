@@ -3,6 +3,7 @@
 
 mod chain;
 mod error;
+mod measured;
 mod phase_lock;
 mod simulated;
 
@@ -10,6 +11,7 @@ pub use ::phase_lock::{Fault, LoopState, Move};
 pub use chain::Chain;
 pub(crate) use chain::NormalDistribution;
 pub use error::{ControllerError, RigError};
+pub use measured::Measured;
 pub use phase_lock::BuiltIn;
 pub use simulated::Simulated;
 

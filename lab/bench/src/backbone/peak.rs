@@ -8,6 +8,7 @@
 use super::point::Point;
 use super::predictor::{self, Known};
 use crate::scene::Predictor;
+use vines_model::numerics::mean;
 use vines_model::theory::SlowFlow;
 
 /// Phases from resonance at which every level is held, rad.
@@ -25,32 +26,44 @@ pub fn peaks(scans: &[Vec<Point>], flow: &SlowFlow, epsilon: f64) -> Vec<Point> 
     let levels = scans.iter().map(Vec::len).min().unwrap_or(0);
     (0..levels)
         .map(|level| {
-            let points: Vec<Point> = scans.iter().map(|scan| scan[level]).collect();
-            let c = points.iter().map(|one| one.c).sum::<f64>() / points.len() as f64;
-            let known: Vec<Known> = scans.iter().map(|scan| at_level(scan, level, c, flow)).collect();
-            peak(&points, &known, epsilon)
+            let c = mean(scans.iter().map(|scan| scan[level].c));
+            let points: Vec<Point> = scans.iter().map(|scan| at_level(scan, level, c, flow)).collect();
+            peak(&points, epsilon)
         })
         .collect()
 }
 
 /// A point corrected to the amplitude `c`, by the parabola through its neighbours in the same scan.
-fn at_level(scan: &[Point], level: usize, c: f64, flow: &SlowFlow) -> Known {
-    let near = level.saturating_sub(1)..=(level + 1).min(scan.len() - 1);
-    // The last one is the one that is corrected.
-    let order = near.filter(|n| *n != level).chain([level]);
-    let usable = |n: &usize| *n == level || (scan[*n].settled && scan[*n].reached);
-    let known: Vec<Known> = order.filter(usable).map(|n| scan[n].known()).collect();
+fn at_level(scan: &[Point], level: usize, c: f64, flow: &SlowFlow) -> Point {
+    let first = level.saturating_sub(1).min(scan.len().saturating_sub(3));
+    let usable = |n: &usize| *n != level && scan[*n].settled && scan[*n].reached;
+    let others = (first..scan.len().min(first + 3)).filter(usable);
+    // The nearest is the last but one, the last is the one that is corrected.
+    let mut order: Vec<usize> = others.collect();
+    order.sort_by_key(|n| std::cmp::Reverse(n.abs_diff(level)));
+    let known: Vec<Known> = order.into_iter().chain([level]).map(|n| scan[n].known()).collect();
+    let by = |predictor, known| predictor::change(predictor, known, c, flow);
     let predictor = if known.len() == 1 {
         Predictor::Theory
     } else {
         Predictor::Previous
     };
-    let (g, sigma) = predictor::change(predictor, &known, c, flow);
-    let own = scan[level].known();
-    Known { c, g: own.g + g, sigma: own.sigma + sigma }
+    let (change, simpler) = (
+        by(predictor, &known),
+        by(Predictor::Previous, &known[1.min(known.len() - 1)..]),
+    );
+    let own = scan[level];
+    Point {
+        c,
+        g: own.g + change.0,
+        sigma: own.sigma + change.1,
+        u_g: own.u_g.hypot(change.0 - simpler.0),
+        u_sigma: own.u_sigma.hypot(change.1 - simpler.1),
+        ..own
+    }
 }
 
-fn peak(points: &[Point], known: &[Known], epsilon: f64) -> Point {
+fn peak(points: &[Point], epsilon: f64) -> Point {
     let phases: Vec<f64> = points.iter().map(|one| one.phase_error_deg.to_radians()).collect();
     let sum = |weights: &[f64], value: &dyn Fn(usize) -> f64| -> f64 {
         weights.iter().enumerate().map(|(n, weight)| weight * value(n)).sum()
@@ -65,13 +78,13 @@ fn peak(points: &[Point], known: &[Known], epsilon: f64) -> Point {
     let mut x = 0.0_f64;
     for _ in 0..ROUNDS {
         let [values, slopes] = parabola(&phases, x);
-        x = -(sum(&slopes, &|n| known[n].g) / sum(&values, &|n| known[n].g)).atan();
+        x = -(sum(&slopes, &|n| points[n].g) / sum(&values, &|n| points[n].g)).atan();
     }
     let [values, slopes] = parabola(&phases, x);
     let resonance = Known {
-        c: known[0].c,
-        g: sum(&values, &|n| known[n].g),
-        sigma: sum(&values, &|n| known[n].sigma),
+        c: points[0].c,
+        g: sum(&values, &|n| points[n].g),
+        sigma: sum(&values, &|n| points[n].sigma),
     };
     let [g, sigma] = at_phase(&resonance, x, epsilon);
     let u_phase = size(&slopes, &|n| points[n].u_g) / resonance.g;

@@ -204,8 +204,8 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
     let [g, sigma] = change
         .filter(|change| change.iter().all(|one| one.is_finite()))
         .unwrap_or([0.0; 2]);
-    let last = last.map(|(point, _)| point.known());
-    let periods = move_periods(scene, last.as_ref(), level);
+    let from = last.map(|(point, _)| point.known());
+    let periods = move_periods(scene, from.as_ref(), level);
     let to = Move {
         response: level * d.b,
         duration: periods * d.natural_period(),
@@ -213,13 +213,16 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
         omega: d.omega_change(sigma),
     };
     bench.controller.hold_response(to, bench.target + phase)?;
-    hold(bench, scene, order, periods + if last.is_none() { FIRST } else { 0.0 })
+    let changed = last.map_or(FIRST, |(_, held)| if held == phase { 0.0 } else { PHASE });
+    hold(bench, scene, order, periods + changed)
 }
 
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
 /// Periods of the first level more than those of the move: the start of the loop disturbs the particle, too.
 const FIRST: f64 = 32.0;
+/// Periods of a change of the phase more than those of the move, for the same reason.
+const PHASE: f64 = 8.0;
 /// Share of the drive that a move may need in addition to the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
 

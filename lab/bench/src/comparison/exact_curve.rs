@@ -36,13 +36,19 @@ impl ExactCurve {
     pub fn of(scene: &Dimensionless) -> Self {
         let limits = Limits { step: STEP, points: 20_000, ..Limits::default() };
         let mut points = backbone(scene, &limits).map_or(Vec::new(), |branch| branch.points);
-        if points.first().zip(points.last()).is_some_and(|(first, last)| first.b > last.b) {
+        if points
+            .first()
+            .zip(points.last())
+            .is_some_and(|(first, last)| first.b > last.b)
+        {
             points.reverse();
         }
         // From the fold on: C rises with B there.
         let fold = (0..points.len()).min_by(|&a, &b| points[a].c.total_cmp(&points[b].c));
         let rising = points.into_iter().skip(fold.unwrap_or(0));
-        let places = rising.take_while(|one| one.b < SPEED_MAX).map(|one| [one.c, one.sigma, one.g]);
+        let places = rising
+            .take_while(|one| one.b < SPEED_MAX)
+            .map(|one| [one.c, one.sigma, one.g]);
         Self { places: places.collect() }
     }
 
