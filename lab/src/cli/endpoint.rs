@@ -116,7 +116,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Failure> {
     if scene.resonance.resonance == Resonance::Peak && scene.controller.phase_target == -90.0 {
         return Err(Failure::input(
             "resonance.definition = \"peak\" with controller.phase_target = -90 degrees: the loop holds a phase, so set phase_target to the \
-             phase at the peak, which `vines orbit` prints",
+             phase at the peak, which `vines orbit` computes and `vines backbone` measures",
         ));
     }
     BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;

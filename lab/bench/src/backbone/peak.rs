@@ -8,8 +8,7 @@
 use super::point::Point;
 use super::predictor::{self, Known};
 use crate::scene::Predictor;
-use vines_model::numerics::mean;
-use vines_model::theory::SlowFlow;
+use vines_model::{Dimensionless, numerics::mean};
 
 /// Phases from resonance at which every level is held, rad.
 pub const PHASES: [f64; 3] = [-0.25, 0.0, 0.25];
@@ -22,19 +21,19 @@ pub fn at_phase(known: &Known, x: f64, epsilon: f64) -> [f64; 2] {
 }
 
 /// The peaks at the levels at which all phases were held: `scans` has the points of each phase, level by level.
-pub fn peaks(scans: &[Vec<Point>], flow: &SlowFlow, epsilon: f64) -> Vec<Point> {
+pub fn peaks(scans: &[Vec<Point>], scene: &Dimensionless) -> Vec<Point> {
     let levels = scans.iter().map(Vec::len).min().unwrap_or(0);
     (0..levels)
         .map(|level| {
             let c = mean(scans.iter().map(|scan| scan[level].c));
-            let points: Vec<Point> = scans.iter().map(|scan| at_level(scan, level, c, flow)).collect();
-            peak(&points, epsilon)
+            let points: Vec<Point> = scans.iter().map(|scan| at_level(scan, level, c, scene)).collect();
+            peak(&points, scene.epsilon)
         })
         .collect()
 }
 
 /// A point corrected to the amplitude `c`, by the parabola through its neighbours in the same scan.
-fn at_level(scan: &[Point], level: usize, c: f64, flow: &SlowFlow) -> Point {
+fn at_level(scan: &[Point], level: usize, c: f64, scene: &Dimensionless) -> Point {
     let first = level.saturating_sub(1).min(scan.len().saturating_sub(3));
     let usable = |n: &usize| *n != level && scan[*n].settled && scan[*n].reached;
     let others = (first..scan.len().min(first + 3)).filter(usable);
@@ -42,7 +41,7 @@ fn at_level(scan: &[Point], level: usize, c: f64, flow: &SlowFlow) -> Point {
     let mut order: Vec<usize> = others.collect();
     order.sort_by_key(|n| std::cmp::Reverse(n.abs_diff(level)));
     let known: Vec<Known> = order.into_iter().chain([level]).map(|n| scan[n].known()).collect();
-    let by = |predictor, known| predictor::change(predictor, known, c, flow);
+    let by = |predictor, known| predictor::change(predictor, known, c, scene);
     let predictor = if known.len() == 1 {
         Predictor::Theory
     } else {
@@ -165,7 +164,7 @@ mod tests {
             }
         };
         let scans = PHASES.map(|x| vec![point(x)]);
-        let found = peaks(&scans, &SlowFlow::new(1.43, 0.65), 0.0)[0];
+        let found = peaks(&scans, &Dimensionless::new(1e-12, 1.43, 0.65, 1.1))[0];
         let drive = |x: f64| at_phase(&resonance(x), x, 0.0)[0];
         let x = vines_model::numerics::golden_section(-0.2, 0.2, drive);
         assert!((found.phase_error_deg.to_radians() - x).abs() < 1e-6, "{found:?}");

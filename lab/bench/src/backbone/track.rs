@@ -154,10 +154,7 @@ pub fn track(
     }
     let points = match scene.resonance.resonance {
         Resonance::Phase => scans.swap_remove(0),
-        Resonance::Peak => {
-            let d = scene.dimensionless();
-            peak::peaks(&scans, &SlowFlow::new(d.lambda, d.r), d.epsilon)
-        }
+        Resonance::Peak => peak::peaks(&scans, &scene.dimensionless()),
     };
     Ok(Tracked { points, periods_to_lock, periods: bench.periods, ended })
 }
@@ -190,9 +187,8 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
     last: Option<(Point, f64)>,
 ) -> Result<Point, TrackError> {
     let d = scene.dimensionless();
-    let flow = SlowFlow::new(d.lambda, d.r);
     let Order { level, phase, ref known } = *order;
-    let (g, sigma) = predictor::change(scene.backbone.predictor, known, level, &flow);
+    let (g, sigma) = predictor::change(scene.backbone.predictor, known, level, &d);
     let expected = known
         .last()
         .map(|one| Known { c: level, g: one.g + g, sigma: one.sigma + sigma });

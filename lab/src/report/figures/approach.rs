@@ -4,7 +4,7 @@ use plotters::chart::SeriesLabelPosition;
 use plotters::style::Color;
 
 use crate::numerics::equally_spaced;
-use crate::report::figure::{AMPLITUDE, Axis, Figure, Marked, Panel, Place, SPEED, caption, line};
+use crate::report::figure::{AMPLITUDE_OF_V, Axis, Figure, Marked, Panel, Place, SPEED, caption, line};
 use crate::report::theme::{DECAY, EXACT, LOCK, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
 use crate::theory::{BackbonePoint, SlowFlow, impacts_stable};
@@ -18,6 +18,7 @@ const POINTS: usize = 300;
 /// Impact sequences with the drive on, which end at the locked point, and one without it, from there down to the fold.
 pub fn figure(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
     let flow = SlowFlow::new(p.lambda, p.r);
+    let lock = &flow.backbone_at(lock.b);
     let gamma = -std::f64::consts::FRAC_PI_2;
     let x = (0.0, 1.6 * lock.c);
     let y = (0.0, 1.35 * lock.b);
@@ -29,7 +30,7 @@ pub fn figure(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
         let all = std::iter::once((c, b)).chain(places);
         all.take_while(inside).collect()
     };
-    let mut panel = Panel::new(Axis::new(x, AMPLITUDE), Axis::new(y, SPEED))
+    let mut panel = Panel::new(Axis::new(x, AMPLITUDE_OF_V), Axis::new(y, SPEED))
         .heading(
             "Approach to the slow invariant manifold, impact by impact",
             &caption(p, lock.g),

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::{SectionError, Subject};
-use crate::orbit::{Branch, Exploration, Limits, Periodic, Response, backbone, response};
+use crate::orbit::{Branch, Exploration, Limits, Periodic, Response, backbone, phase_resonant, response};
 use crate::report::figures::{period, responses};
 use crate::report::files::csv;
 use crate::report::section::Section;
@@ -116,9 +116,10 @@ fn changes(found: &[Response]) -> Table {
     }))
 }
 
-/// The stable motion at the scene's excitation that is nearest to phase resonance.
+/// The stable motion at the scene's excitation that is nearest to resonance.
 fn locked<'a>(p: &Dimensionless, found: &'a [Response]) -> Option<&'a Periodic> {
-    let distance = |one: &Periodic| (one.g - p.g).abs() + (one.gamma + std::f64::consts::FRAC_PI_2).abs();
+    let resonant = phase_resonant(p).into_iter().find(|one| one.stable)?;
+    let distance = |one: &Periodic| (one.sigma - resonant.sigma).hypot(one.c - resonant.c);
     let response = found.iter().find(|one| one.g == p.g)?;
     let stable = response
         .symmetric()
