@@ -21,7 +21,8 @@ pub fn figure(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
     let lock = &flow.backbone_at(lock.b);
     let gamma = -std::f64::consts::FRAC_PI_2;
     let x = (0.0, 1.6 * lock.c);
-    let y = (0.0, 1.35 * lock.b);
+    // The legend is above the manifold.
+    let y = (0.0, 1.75 * lock.b);
     let inside = |place: &Place| place.0 <= x.1 && (y.0..=y.1).contains(&place.1);
     let sequence = |g: f64, (c, b): Place| -> Vec<Place> {
         let phases = (b, flow.psi(lock.b, gamma));
@@ -35,7 +36,7 @@ pub fn figure(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
             "Approach to the slow invariant manifold, impact by impact",
             &caption(p, lock.g),
         )
-        .legend(SeriesLabelPosition::LowerRight);
+        .legend(SeriesLabelPosition::UpperLeft);
     let manifold: Vec<Marked> = equally_spaced(0.0, y.1, POINTS + 1)
         .map(|b| ((flow.manifold.c(b), b), impacts_stable(&flow.manifold, b)))
         .filter(|(place, _)| inside(place))

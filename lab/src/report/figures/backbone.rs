@@ -8,7 +8,7 @@ use crate::numerics::range;
 use crate::orbit::{self, Limits};
 use crate::report::figure::{Axis, DETUNING, Figure, Marked, Panel, amplitude, caption, clipped, line, thinned};
 use crate::report::theme::{EXACT, FAINT, LOCK, THEORY, UNSTABLE};
-use crate::scene::Dimensionless;
+use crate::scene::{Definition, Dimensionless};
 use crate::theory::{self, BranchSide, SlowFlow};
 
 /// Amplitude drawn up to at least this, C.
@@ -30,8 +30,12 @@ pub fn figure(found: &Comparison) -> Figure {
     let margin = 0.06 * (high - low);
     let (low, high) = (low - margin, high + margin);
 
+    let title = match p.definition == Definition::default() {
+        true => "Backbone: phase resonance of the centre of mass".into(),
+        false => format!("Backbone: {}", p.definition.name()),
+    };
     let mut panel = Panel::new(Axis::new((low, high), DETUNING), Axis::new((0.0, top), amplitude(p)))
-        .heading(&format!("Backbone: {}", p.definition.name()), &caption(p, found.lock.g))
+        .heading(&title, &caption(p, found.lock.g))
         .legend(SeriesLabelPosition::UpperRight);
     add_backbones(&mut panel, p, (low, high), (0.0, top));
     let decay = found.decay.iter().map(|one| one.point).step_by(THINNED);

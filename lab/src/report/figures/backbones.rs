@@ -50,7 +50,7 @@ pub fn figure(p: &Dimensionless) -> Figure {
 fn label_place(flow: &SlowFlow, points: &[Marked]) -> Place {
     let fold = flow.backbone_at(flow.manifold.b_min());
     if fold.c > 0.05 {
-        return (fold.sigma.max(0.1) + 0.06, fold.c - 0.022);
+        return (fold.sigma.max(0.1) - 0.2, fold.c + 0.045);
     }
     let right = points.iter().filter(|one| one.0.0 > DETUNINGS.0 + 0.2 && one.0.0 < 0.0);
     let left = right.min_by(|one, other| one.0.0.total_cmp(&other.0.0));

@@ -33,17 +33,19 @@ pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
     let mut panel = Panel::new(Axis::new(x, DETUNING), Axis::new(y, amplitude(p)))
         .heading("Frequency responses and backbone", &caption)
         .legend(SeriesLabelPosition::UpperRight);
-    for (n, response) in responses.iter().enumerate() {
+    for response in responses {
         add_response(&mut panel, p, response, (x, y));
-        // The label is below the left end of the curve, where the figure is empty.
+        // The label is beside the left end of the curve, or above its end at the axis.
         let stable = response
             .symmetric()
             .flat_map(|one| &one.points)
             .filter(|one| one.stable);
         let end = stable.min_by(|one, other| one.sigma.total_cmp(&other.sigma));
         if let Some(end) = end {
-            let left = end.sigma.clamp(x.0 + 0.7, x.1);
-            let place = (left, (0.1 - 0.035 * n as f64) * top);
+            let place = match end.sigma > x.0 + 0.9 {
+                true => (end.sigma - 0.45, end.c),
+                false => (end.sigma.max(x.0) + 0.5, end.c + 0.14 * top),
+            };
             panel.centred_text(format!("G = {:.3}", response.g), place, 14, BLACK);
         }
     }
