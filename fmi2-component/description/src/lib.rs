@@ -7,7 +7,6 @@
 mod error;
 mod names;
 mod read;
-mod xml;
 
 pub use error::Error;
 pub use names::unknown_names;
