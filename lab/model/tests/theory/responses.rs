@@ -1,6 +1,5 @@
 //! Driven motions at any detuning: frequency responses and activation.
 
-
 use vines_model::{
     Dimensionless,
     theory::{B_SYMMETRY_BREAKING, Manifold, SlowFlow},
