@@ -170,7 +170,13 @@ mod tests {
         assert!((found.phase_error_deg.to_radians() - x).abs() < 1e-6, "{found:?}");
         assert!((found.g - drive(x)).abs() < 1e-12 && x < -0.015);
         assert!((found.sigma - at_phase(&resonance(x), x, 0.0)[1]).abs() < 1e-6);
-        // Two drives 0.5 rad apart give the slope.
-        assert!((found.u_phase_deg.to_radians() - 1e-4 * 2.0_f64.sqrt() / 0.5).abs() < 2e-6);
+        // The phase that each drive moves by its own uncertainty.
+        let moved = (0..scans.len()).map(|n| {
+            let mut scans = scans.clone();
+            scans[n][0].g += scans[n][0].u_g;
+            peaks(&scans, &Dimensionless::new(1e-12, 1.43, 0.65, 1.1))[0].phase_error_deg - found.phase_error_deg
+        });
+        let expected = moved.map(|one| one * one).sum::<f64>().sqrt();
+        assert!((found.u_phase_deg / expected - 1.0).abs() < 5e-3, "{found:?}, {expected}");
     }
 }
