@@ -49,8 +49,8 @@ pub(crate) enum Next {
     ContactFree(f64),
     /// A verified contact after this time, s, with this wall: the plant has moved on to it.
     Contact(Sum, Wall),
-    /// Unknown: the plain solver has to search.
-    Search,
+    /// Unknown: the plain solver has to search, for so long at most, s.
+    Search(f64),
 }
 
 /// The parts of a plant that move, and the rig.

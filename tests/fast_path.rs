@@ -40,6 +40,24 @@ fn crossings_meet_the_impacts_of_the_plain_search() {
     }
 }
 
+#[test]
+fn a_wall_that_is_nearly_touched_makes_only_a_short_part_of_a_long_flight_costly() {
+    let omega = 1.0 - 0.0084 * 4.4;
+    let drive = Drive::harmonic(0.0084 * 1.4, omega);
+    let start = State { q1: -0.0233, dq1: 0.1524, q2: -0.8405, dq2: 5.8e-4 };
+    let mut fast = Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), start).unwrap();
+    let mut searched = plain(&fast);
+    let periods = 200.0;
+    let outcome = fast.advance(drive, periods * TAU / omega).unwrap();
+    let all = searched.advance(drive, periods * TAU / omega).unwrap();
+    assert!(distance(&fast, &searched) < 1e-13 && outcome.impacts == 0);
+    let evaluations = (outcome.evaluations, all.evaluations);
+    assert!(
+        (evaluations.0 as f64) < 0.5 * periods && evaluations.1 as f64 > 2.0 * periods,
+        "{evaluations:?}"
+    );
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(1000) })]
 

@@ -31,7 +31,7 @@ impl FastPath {
     #[inline]
     pub fn next(&mut self, moving: &mut Moving, left: f64, duration: f64) -> Next {
         if self.disabled {
-            return Next::Search;
+            return Next::Search(left);
         }
         let point = self.point(moving);
         let (rig, base) = (moving.rig, &*moving.base);
@@ -40,7 +40,7 @@ impl FastPath {
             return self.coast(moving, &point, left, duration);
         }
         if !applies(rig, base, &point) {
-            return Next::Search;
+            return Next::Search(left);
         }
         self.coefficients.prepare(&rig.alone, base.drive.omega);
         let mut start = Start::new(moving, point);
@@ -69,7 +69,7 @@ impl FastPath {
                 self.apply(moving, &increment, phase, left);
                 Next::ContactFree(left)
             }
-            Found::Nothing => Next::Search,
+            Found::Nothing => Next::Search(self.coefficients.stretch.min(left)),
         }
     }
 

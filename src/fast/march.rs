@@ -64,6 +64,8 @@ impl FastPath {
                     n /= 2;
                     divided += 1;
                 }
+                // What is verified is kept: the plain solver searches as little as possible.
+                None if from.t > 0.0 => break,
                 None => return Found::Nothing,
             }
         }

@@ -143,7 +143,7 @@ impl Plant {
             };
             let next = match self.contact {
                 Contact::Free => self.fast.next(&mut moving, left, duration),
-                _ => Next::Search,
+                _ => Next::Search(left),
             };
             match next {
                 Next::ContactFree(t) if t == left => step.left = Sum::default(),
@@ -152,7 +152,7 @@ impl Plant {
                     step.left = step.left.minus(t);
                     self.touch(wall, &mut step);
                 }
-                Next::Search => self.search(left, &mut step),
+                Next::Search(limit) => self.search(limit, &mut step),
             }
             self.evaluations += self.fast.evaluations();
         }
@@ -163,9 +163,9 @@ impl Plant {
         step.outcome
     }
 
-    /// Follows the flight to its first contact by certified search, or to the end of the step.
+    /// Follows the flight to its first contact by certified search, or for `limit` seconds.
     #[inline(never)]
-    fn search(&mut self, left: f64, step: &mut Step<impl FnMut(Event)>) {
+    fn search(&mut self, limit: f64, step: &mut Step<impl FnMut(Event)>) {
         let released = match self.contact {
             Contact::Released(wall) => Some(wall),
             _ => None,
@@ -175,7 +175,7 @@ impl Plant {
         let motion = Segment::new(&self.rig.alone, self.base, start);
         let half_width = self.rig.parameters.half_width;
         let flight = Flight::new(motion, (masses.w.value(), masses.dw), half_width);
-        let landing = flight.first_contact(left, released);
+        let landing = flight.first_contact(limit, released);
         self.evaluations += landing.evaluations;
         self.masses.x = masses.x.plus(landing.moved);
         self.masses.v = masses.v.plus(landing.gained);
