@@ -184,6 +184,9 @@ impl Oscillator {
                 c = [c[1], (-next, -error)];
                 x = plus(x, c[1]);
                 v = plus(v, times(c[1], (n as f64, 0.0)));
+                if c[0].0.abs().max(c[1].0.abs()) <= 1e-35 * x.0.abs() {
+                    break;
+                }
             }
             (x, v)
         };

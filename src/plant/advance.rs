@@ -93,27 +93,25 @@ impl Plant {
     }
 
     /// Makes `drive` the current one; the base may jump.
+    #[inline(always)]
     fn set_drive(&mut self, drive: Drive) {
-        let before = &self.base.drive;
-        let jumps = drive.signal[0] != before.signal[0] || drive.amplitude != before.amplitude;
-        if self.begun && jumps {
-            let sin = self.fast.phasor().1;
-            let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
-            if jump != 0.0 {
-                let kick = 2.0 * self.rig.alone.delta * jump;
-                self.masses.v = self.masses.v.plus(kick);
-                self.masses.dw += kick;
-                // The impulse acts on the primary mass alone; contact is decided anew.
-                self.contact = Contact::Free;
-            }
-        }
+        let before = self.base.drive;
         self.base.drive = drive;
-        if self.begun {
-            self.fast.drive_changed(&drive);
-        } else {
+        if !self.begun {
             self.begun = true;
             self.fast.state_changed(&self.base);
+            return;
         }
+        let sin = self.fast.phasor().1;
+        let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
+        let kick = 2.0 * self.rig.alone.delta * jump;
+        if jump != 0.0 {
+            self.masses.v = self.masses.v.plus(kick);
+            self.masses.dw += kick;
+            // The impulse acts on the primary mass alone; contact is decided anew.
+            self.contact = Contact::Free;
+        }
+        self.fast.drive_changed(&self.rig.alone, &before, &drive, kick);
     }
 
     /// Follows the motion from event to event to the end of the step.
