@@ -44,13 +44,6 @@ impl Drive {
         (u2 | u3) << 1 == 0
     }
 
-    /// Whether the signal is held.
-    #[inline(always)]
-    pub(crate) fn is_held(&self) -> bool {
-        let [_, u1, u2, u3] = self.signal.map(f64::to_bits);
-        (u1 | u2 | u3) << 1 == 0
-    }
-
     /// Checks every value.
     ///
     /// # Errors

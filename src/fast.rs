@@ -169,7 +169,7 @@ impl FastPath {
     fn apply(&mut self, moving: &mut Moving, increment: &Increment, phase: Phase, t: f64) {
         let Moving { rig, masses, base } = moving;
         let dx = increment.y + base.drive.signal[1] * t;
-        if !base.drive.is_held() {
+        if base.drive.signal[1] != 0.0 || !base.drive.is_straight() {
             base.drive.signal = shift(base.drive.signal, t);
         }
         masses.x = masses.x.plus(dx);
