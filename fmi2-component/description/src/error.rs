@@ -52,3 +52,9 @@ impl From<roxmltree::Error> for Error {
         Self::Xml(error.to_string())
     }
 }
+
+impl From<serde_xml_rs::Error> for Error {
+    fn from(error: serde_xml_rs::Error) -> Self {
+        Self::Xml(error.to_string())
+    }
+}

@@ -7,6 +7,7 @@
 mod error;
 mod names;
 mod read;
+mod xml;
 
 pub use error::Error;
 pub use names::unknown_names;

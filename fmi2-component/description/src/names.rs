@@ -3,7 +3,7 @@
 use roxmltree::{Document, Node};
 
 use crate::error::Error;
-use crate::read::{child, elements, label};
+use crate::read;
 
 /// Attributes and elements that an element may have.
 struct Known {
@@ -82,6 +82,18 @@ pub fn unknown_names(xml: &str) -> Result<Vec<String>, Error> {
         }
     }
     Ok(faults)
+}
+
+fn elements<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
+    node.children().filter(Node::is_element)
+}
+
+fn child<'a, 'i>(node: Node<'a, 'i>, name: &str) -> Option<Node<'a, 'i>> {
+    elements(node).find(|element| element.has_tag_name(name))
+}
+
+fn label(element: Node) -> String {
+    read::label(element.tag_name().name(), element.attribute("name"))
 }
 
 fn check(element: Node, known: &Known, faults: &mut Vec<String>) {

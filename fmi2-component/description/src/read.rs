@@ -2,158 +2,146 @@
 
 use std::str::FromStr;
 
-use roxmltree::{Document, Node};
+use roxmltree::Document;
 
 use crate::error::Error;
+use crate::xml;
 use crate::{Content, DefaultExperiment, Description, Kind, ModelStructure, ScalarVariable, SimpleType, Unknown};
 
 pub(crate) fn description(text: &str) -> Result<Description, Error> {
     let document = Document::parse(text)?;
-    let root = document.root_element();
-    if !root.has_tag_name("fmiModelDescription") {
-        return Err(Error::Root(root.tag_name().name().to_owned()));
+    let name = document.root_element().tag_name().name();
+    if name != "fmiModelDescription" {
+        return Err(Error::Root(name.to_owned()));
     }
-    let name = |element: Node| required(element, "name");
-    let interface = |tag: &str| {
-        let element = child(root, tag);
-        element.map(|element| required(element, "modelIdentifier")).transpose()
+    let root: xml::Description = serde_xml_rs::from_str(text)?;
+    let whole = "fmiModelDescription";
+    let identifier = |interface: Option<xml::Interface>, element: &str| {
+        interface
+            .map(|i| required(i.model_identifier, element, "modelIdentifier"))
+            .transpose()
     };
-    let experiment = |key: &str| text_of(child(root, "DefaultExperiment")?, key);
-    let structure = child(root, "ModelStructure");
-    let unknowns = |tag: &str| match structure.and_then(|structure| child(structure, tag)) {
-        Some(list) => each(list, "Unknown", unknown),
-        None => Ok(Vec::new()),
+    let names = |list: Vec<xml::Named>, element: &'static str| {
+        let names = list.into_iter().map(|named| required(named.name, element, "name"));
+        names.collect::<Result<Vec<_>, _>>()
     };
+    let events = root.number_of_event_indicators;
     Ok(Description {
-        fmi_version: required(root, "fmiVersion")?,
-        model_name: required(root, "modelName")?,
-        guid: text_of(root, "guid").unwrap_or_default(),
-        description: text_of(root, "description").unwrap_or_default(),
-        version: text_of(root, "version").unwrap_or_default(),
-        number_of_event_indicators: number(root, "numberOfEventIndicators")?.unwrap_or(0),
-        model_exchange: interface("ModelExchange")?,
-        co_simulation: interface("CoSimulation")?,
+        fmi_version: required(root.fmi_version, whole, "fmiVersion")?,
+        model_name: required(root.model_name, whole, "modelName")?,
+        guid: root.guid.unwrap_or_default(),
+        description: root.description.unwrap_or_default(),
+        version: root.version.unwrap_or_default(),
+        number_of_event_indicators: number(events, whole, "numberOfEventIndicators")?.unwrap_or(0),
+        model_exchange: identifier(root.model_exchange, "ModelExchange")?,
+        co_simulation: identifier(root.co_simulation, "CoSimulation")?,
         default_experiment: DefaultExperiment {
-            start_time: experiment("startTime"),
-            stop_time: experiment("stopTime"),
-            step_size: experiment("stepSize"),
+            start_time: root.default_experiment.start_time,
+            stop_time: root.default_experiment.stop_time,
+            step_size: root.default_experiment.step_size,
         },
-        units: listed(root, "UnitDefinitions", "Unit", name)?,
-        types: listed(root, "TypeDefinitions", "SimpleType", simple_type)?,
-        categories: listed(root, "LogCategories", "Category", name)?,
-        variables: listed(root, "ModelVariables", "ScalarVariable", variable)?,
+        units: names(root.unit_definitions.units, "Unit")?,
+        types: each(root.type_definitions.types, simple_type)?,
+        categories: names(root.log_categories.categories, "Category")?,
+        variables: each(root.model_variables.variables, variable)?,
         structure: ModelStructure {
-            outputs: unknowns("Outputs")?,
-            derivatives: unknowns("Derivatives")?,
-            initial_unknowns: unknowns("InitialUnknowns")?,
+            outputs: each(root.model_structure.outputs.unknowns, unknown)?,
+            derivatives: each(root.model_structure.derivatives.unknowns, unknown)?,
+            initial_unknowns: each(root.model_structure.initial_unknowns.unknowns, unknown)?,
         },
     })
 }
 
-pub(crate) fn elements<'a, 'i>(node: Node<'a, 'i>) -> impl Iterator<Item = Node<'a, 'i>> + use<'a, 'i> {
-    node.children().filter(Node::is_element)
+fn each<T, U>(list: Vec<T>, read: fn(T) -> Result<U, Error>) -> Result<Vec<U>, Error> {
+    list.into_iter().map(read).collect()
 }
 
-pub(crate) fn child<'a, 'i>(node: Node<'a, 'i>, tag: &str) -> Option<Node<'a, 'i>> {
-    elements(node).find(|element| element.has_tag_name(tag))
+/// The lists of an element that has them; serde-xml-rs cannot flatten them into a struct of their own.
+macro_rules! lists {
+    ($element:ident) => {
+        [
+            (Kind::Real, $element.real),
+            (Kind::Integer, $element.integer),
+            (Kind::Boolean, $element.boolean),
+            (Kind::String, $element.string),
+            (Kind::Enumeration, $element.enumeration),
+        ]
+    };
 }
 
-/// The elements `tag` of `parent`.
-fn each<T>(parent: Node, tag: &str, read: impl Fn(Node) -> Result<T, Error>) -> Result<Vec<T>, Error> {
-    let found = elements(parent).filter(|element| element.has_tag_name(tag));
-    found.map(read).collect()
-}
-
-/// The elements `tag` of the element `list` of `root`.
-fn listed<T>(root: Node, list: &str, tag: &str, read: impl Fn(Node) -> Result<T, Error>) -> Result<Vec<T>, Error> {
-    child(root, list).map_or(Ok(Vec::new()), |list| each(list, tag, read))
-}
-
-fn simple_type(element: Node) -> Result<SimpleType, Error> {
+fn simple_type(element: xml::SimpleType) -> Result<SimpleType, Error> {
+    let label = label("SimpleType", element.name.as_deref());
+    let lists = lists!(element);
     Ok(SimpleType {
-        name: required(element, "name")?,
-        content: contents(element)?,
+        name: required(element.name, &label, "name")?,
+        content: contents(lists, &label)?,
     })
 }
 
-fn variable(element: Node) -> Result<ScalarVariable, Error> {
-    let reference = number(element, "valueReference")?;
+fn variable(element: xml::ScalarVariable) -> Result<ScalarVariable, Error> {
+    let label = label("ScalarVariable", element.name.as_deref());
+    let lists = lists!(element);
+    let reference = number(element.value_reference, &label, "valueReference")?;
     Ok(ScalarVariable {
-        name: required(element, "name")?,
-        value_reference: reference.ok_or_else(|| missing(element, "valueReference"))?,
-        description: text_of(element, "description").unwrap_or_default(),
-        causality: text_of(element, "causality"),
-        variability: text_of(element, "variability"),
-        initial: text_of(element, "initial"),
-        content: contents(element)?,
+        name: required(element.name, &label, "name")?,
+        value_reference: reference.ok_or_else(|| missing(&label, "valueReference"))?,
+        description: element.description.unwrap_or_default(),
+        causality: element.causality,
+        variability: element.variability,
+        initial: element.initial,
+        content: contents(lists, &label)?,
     })
 }
 
 /// The elements of each type inside a variable or a declared type.
-fn contents(parent: Node) -> Result<Vec<Content>, Error> {
-    let kind = |element: Node| match element.tag_name().name() {
-        "Real" => Some(Kind::Real),
-        "Integer" => Some(Kind::Integer),
-        "Boolean" => Some(Kind::Boolean),
-        "String" => Some(Kind::String),
-        "Enumeration" => Some(Kind::Enumeration),
-        _ => None,
-    };
-    let typed = elements(parent).filter_map(|element| Some((kind(element)?, element)));
-    typed
-        .map(|(kind, element)| {
-            let derivative = element.attribute("derivative");
-            Ok(Content {
-                kind,
-                declared_type: text_of(element, "declaredType"),
-                unit: text_of(element, "unit"),
-                start: text_of(element, "start"),
-                min: text_of(element, "min"),
-                max: text_of(element, "max"),
-                nominal: text_of(element, "nominal"),
-                // A message names the variable.
-                derivative: parsed(derivative, parent, "derivative")?,
-            })
+type Lists = [(Kind, Vec<xml::Content>); 5];
+
+fn contents(lists: Lists, label: &str) -> Result<Vec<Content>, Error> {
+    let all = lists
+        .into_iter()
+        .flat_map(|(kind, list)| list.into_iter().map(move |c| (kind, c)));
+    all.map(|(kind, content)| {
+        Ok(Content {
+            kind,
+            declared_type: content.declared_type,
+            unit: content.unit,
+            start: content.start,
+            min: content.min,
+            max: content.max,
+            nominal: content.nominal,
+            derivative: number(content.derivative, label, "derivative")?,
         })
-        .collect()
+    })
+    .collect()
 }
 
-fn unknown(element: Node) -> Result<Unknown, Error> {
+fn unknown(element: xml::Unknown) -> Result<Unknown, Error> {
+    let index = number(element.index, "Unknown", "index")?;
     Ok(Unknown {
-        index: number(element, "index")?.ok_or_else(|| missing(element, "index"))?,
-        dependencies: text_of(element, "dependencies"),
-        dependencies_kind: text_of(element, "dependenciesKind"),
+        index: index.ok_or_else(|| missing("Unknown", "index"))?,
+        dependencies: element.dependencies,
+        dependencies_kind: element.dependencies_kind,
     })
 }
 
 /// The element and its name, for messages.
-pub(crate) fn label(element: Node) -> String {
-    let tag = element.tag_name().name();
-    let name = element.attribute("name");
+pub(crate) fn label(tag: &str, name: Option<&str>) -> String {
     name.map_or_else(|| tag.to_owned(), |name| format!("{tag} {name}"))
 }
 
-fn missing(element: Node, attribute: &'static str) -> Error {
-    Error::Missing { element: label(element), attribute }
+fn missing(element: &str, attribute: &'static str) -> Error {
+    Error::Missing { element: element.to_owned(), attribute }
 }
 
-fn text_of(element: Node, attribute: &str) -> Option<String> {
-    element.attribute(attribute).map(str::to_owned)
+fn required(value: Option<String>, element: &str, attribute: &'static str) -> Result<String, Error> {
+    value.ok_or_else(|| missing(element, attribute))
 }
 
-fn required(element: Node, attribute: &'static str) -> Result<String, Error> {
-    text_of(element, attribute).ok_or_else(|| missing(element, attribute))
-}
-
-fn number<T: FromStr>(element: Node, attribute: &'static str) -> Result<Option<T>, Error> {
-    parsed(element.attribute(attribute), element, attribute)
-}
-
-fn parsed<T: FromStr>(value: Option<&str>, element: Node, attribute: &'static str) -> Result<Option<T>, Error> {
-    let parsed = value.map(|value| value.trim().parse());
+fn number<T: FromStr>(value: Option<String>, element: &str, attribute: &'static str) -> Result<Option<T>, Error> {
+    let parsed = value.as_deref().map(|value| value.trim().parse());
     parsed.transpose().map_err(|_| Error::Number {
-        element: label(element),
+        element: element.to_owned(),
         attribute,
-        value: value.unwrap_or_default().to_owned(),
+        value: value.clone().unwrap_or_default(),
     })
 }
