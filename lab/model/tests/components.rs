@@ -16,7 +16,11 @@ fn scene(g: f64) -> Dimensionless {
 }
 
 fn followed(g: f64) -> Response {
-    response(&scene(g), &Limits::default(), Exploration::default())
+    response(
+        &scene(g),
+        &Limits::default(),
+        Exploration { starts: 100, ..Exploration::default() },
+    )
 }
 
 fn list(response: &Response) {
