@@ -3,8 +3,12 @@
 use super::table::{Table, number, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use crate::identification::{DecayEnd, Regime};
+use crate::map::Map;
 use crate::orbit::Orbit;
-use crate::scene::{Definition, Dimensionless};
+use crate::scene::{Definition, Dimensionless, Sensor};
+
+/// Periods over which the ripple of an acceleration averages out.
+const RIPPLE: usize = 200;
 
 /// The numbers that a result belongs to, in one line.
 #[must_use]
@@ -19,6 +23,22 @@ pub fn parameters(p: &Dimensionless) -> String {
 fn rig(p: &Dimensionless) -> String {
     let Dimensionless { epsilon, lambda, r, .. } = p;
     format!("epsilon = {epsilon:.6}, lambda = {lambda:.4}, r = {r}")
+}
+
+/// How often each regime occurs on a map.
+#[must_use]
+pub fn regimes(map: &Map) -> Table {
+    let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
+    let share = |count: usize, of: usize| match of {
+        0 => "-".into(),
+        _ => format!("{:.1} %", 100.0 * count as f64 / of as f64),
+    };
+    let rows = Regime::SIMULATED.into_iter().map(|regime| {
+        let (all, here) = map.count(regime);
+        let shares = [share(all, map.cells.len()), share(here, inside)];
+        [vec![regime.name().to_string(), all.to_string()], shares.into()].concat()
+    });
+    Table::new(["regime", "cells", "share", "inside the theory's stable island"]).rows(rows)
 }
 
 /// An identification: the locked point beside theory and exact orbit, then the decay.
@@ -45,8 +65,13 @@ pub fn identification(found: &Comparison) -> String {
     } else {
         ""
     };
+    let ripple = if found.parameters.definition.sensor == Sensor::Acceleration && lock.averaged < RIPPLE {
+        "  (the impacts leave a ripple on an acceleration: hold 200 periods, record.hold_periods, for 1e-3 in sigma and C)\n"
+    } else {
+        ""
+    };
     format!(
-        "{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{}\n{}\n{}\n",
+        "{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{ripple}{}\n{}\n{}\n",
         rig(&found.parameters),
         with_uncertainty(lock.g, lock.u_g),
         lock.periods_to_lock,
@@ -132,6 +157,7 @@ pub fn tracked(found: &TrackedComparison) -> String {
         let mut cells = pairs.map(|(value, u)| with_uncertainty(value, u)).to_vec();
         let equal = exact.and_then(|exact| Some(exact.sigma?.abs().max(exact.g?.abs())));
         cells.extend([
+            format!("{:+.2}°", point.phase_error_deg),
             format!("{:.1}", point.periods),
             point.averaged.to_string(),
             equal.map_or("-".into(), |error| format!("{error:.1e}")),
@@ -143,6 +169,7 @@ pub fn tracked(found: &TrackedComparison) -> String {
         "C",
         "sigma",
         "G",
+        "off target",
         "periods",
         "averaged",
         "error",
