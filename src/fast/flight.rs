@@ -73,7 +73,7 @@ impl FastPath {
                 self.apply(moving, &increment, phase, left);
                 Next::ContactFree(left)
             }
-            Found::Nothing => Next::Search(self.coefficients.stretch.min(left)),
+            Found::Nothing => Next::Search(left),
         }
     }
 
