@@ -71,6 +71,8 @@ pub(crate) struct FastPath {
     rotations: u32,
     coefficients: Coefficients,
     cache: Cache,
+    /// What comes next could not be verified: it need not be tried again.
+    unverified: bool,
     evaluations: u64,
 }
 

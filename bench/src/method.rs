@@ -85,7 +85,7 @@ fn run<M: Method>(
     let steps = M::steps(&scene.steps);
     let mut checks = checks.iter().copied().peekable();
     // The clock is asked now and then only: it costs as much as a step without impact.
-    let asked_every = (steps.len() / 1000).max(1);
+    let asked_every = (steps.len() / 50).max(1);
     let mut method = M::start(scene, setting)?;
     let began = Instant::now();
     for (n, step) in steps.iter().enumerate() {

@@ -34,6 +34,9 @@ impl FastPath {
         if self.disabled {
             return Next::Search(left);
         }
+        if core::mem::take(&mut self.unverified) {
+            return Next::Search(self.coefficients.stretch.min(left));
+        }
         let point = self.point(moving);
         let (rig, base) = (moving.rig, &*moving.base);
         let soon = left * rig.alone.fastest.max(base.drive.omega.abs()) <= 1.0;
@@ -70,7 +73,7 @@ impl FastPath {
                 self.apply(moving, &increment, phase, left);
                 Next::ContactFree(left)
             }
-            Found::Nothing => Next::Search(self.coefficients.stretch.min(left)),
+            Found::Nothing => Next::Search(left),
         }
     }
 

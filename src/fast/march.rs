@@ -64,7 +64,10 @@ impl FastPath {
                     divided += 1;
                 }
                 // What is verified is kept: the plain solver searches as little as possible.
-                None if from.t > 0.0 => break,
+                None if from.t > 0.0 => {
+                    self.unverified = true;
+                    break;
+                }
                 None => return Found::Nothing,
             }
         }
