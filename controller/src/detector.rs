@@ -27,6 +27,13 @@ impl Estimate {
         self.coefficients.harmonic[0]
     }
 
+    /// Scales the estimate to a signal whose amplitude has changed by this factor.
+    pub fn scale(&mut self, factor: f64) {
+        for Complex { re, im } in &mut self.coefficients.harmonic {
+            (*re, *im) = (*re * factor, *im * factor);
+        }
+    }
+
     /// Amplitude of the fundamental, m.
     pub fn amplitude(&self) -> f64 {
         self.fundamental().magnitude()
@@ -85,8 +92,9 @@ impl PhaseDetector {
         }
     }
 
-    /// Updates the estimate with a sample, m. `rotor` is `exp(i phase)` of the oscillator.
-    pub fn update(&self, estimate: &mut Estimate, sample: f64, rotor: Complex) {
+    /// Updates the estimate with a sample, m. `rotor` is `exp(i phase)` of the oscillator. Returns the difference between the sample and
+    /// its prediction, m.
+    pub fn update(&self, estimate: &mut Estimate, sample: f64, rotor: Complex) -> f64 {
         let (residual, step) = match self {
             Self::Adaptive(harmonics) => {
                 let residual = harmonics.update(&mut estimate.coefficients, sample, rotor);
@@ -101,6 +109,7 @@ impl PhaseDetector {
             }
         };
         estimate.residual_power += step * (residual * residual - estimate.residual_power);
+        residual
     }
 }
 

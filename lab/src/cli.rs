@@ -7,6 +7,7 @@ mod controller;
 mod decay;
 mod endpoint;
 mod failure;
+mod faults;
 mod identify;
 mod interrupt;
 mod map;
@@ -62,6 +63,7 @@ enum Command {
     Calibrate(calibrate::Arguments),
     Chain(chain::Arguments),
     Decay(decay::Arguments),
+    Faults(faults::Arguments),
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Map(map::Arguments),
@@ -84,6 +86,7 @@ pub fn run() -> ExitCode {
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Chain(arguments) => chain::run(&arguments),
         Command::Decay(arguments) => decay::run(&arguments),
+        Command::Faults(arguments) => faults::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),

@@ -12,4 +12,4 @@ mod track;
 
 pub use point::{Point, Tracked};
 pub use settle::{Criterion, Found};
-pub use track::{TrackError, track};
+pub use track::track;

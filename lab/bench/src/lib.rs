@@ -11,6 +11,7 @@ pub mod chain_effects;
 pub mod comparison;
 pub mod estimators;
 pub mod experiment;
+pub mod faults;
 pub mod identification;
 pub mod random_rigs;
 pub mod rig;

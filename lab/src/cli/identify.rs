@@ -169,11 +169,7 @@ fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {
     if !done.is_multiple_of(64) && done != of {
         return;
     }
-    let message = match stage {
-        Stage::Locking => "searching for phase resonance",
-        Stage::Holding => "holding the lock",
-        Stage::Decaying => "recording the decay",
-    };
+    let message = stage.name();
     if bar.message() != message {
         bar.set_message(message);
         bar.set_length(of as u64);

@@ -1,41 +1,14 @@
 //! The tracking of the backbone.
 
-use thiserror::Error;
-
 use super::point::{Point, Tracked};
 use super::predictor::{self, Known};
 use super::settle::{Criterion, Found};
-use crate::experiment::Sample;
+use crate::experiment::{Bench, ExperimentError, Sample, Stage};
 use crate::identification::{Cycle, Slopes, classify, regime_by_response};
-use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError};
+use crate::rig::{Controller, LoopState, Move, Rig};
 use crate::scene::Scene;
 use vines_model::numerics::Estimate;
 use vines_model::theory::SlowFlow;
-
-/// Why tracking ended early.
-#[derive(Debug, Error)]
-pub enum TrackError {
-    /// The rig failed.
-    #[error(transparent)]
-    Rig(#[from] RigError),
-    /// The controller failed.
-    #[error(transparent)]
-    Controller(#[from] ControllerError),
-    /// The loop did not come near phase resonance in the time allowed.
-    #[error("no lock within {periods:.0} periods of the drive; see record.lock_periods and the [controller] section")]
-    NoLock {
-        /// Time limit, periods.
-        periods: f64,
-    },
-    /// The controller switched the drive off.
-    #[error("the controller switched the drive off after {periods:.1} periods: {fault}")]
-    Tripped {
-        /// Time since the start, periods of the drive.
-        periods: f64,
-        /// The reason.
-        fault: Fault,
-    },
-}
 
 /// Phase error, rad, below which the control of the response begins.
 const NEAR: f64 = 0.35;
@@ -43,57 +16,23 @@ const NEAR: f64 = 0.35;
 const NEAR_FOR: usize = 3;
 
 /// A bench that reads period by period.
-struct Bench<'a, R: ?Sized, C: ?Sized> {
-    rig: &'a mut R,
-    controller: &'a mut C,
-    sample_time: f64,
+struct Periodic<'a, R: Rig + ?Sized, C: ?Sized> {
+    bench: Bench<'a, R, C>,
     target: f64,
-    taken: usize,
-    /// Phase of the drive since the start, turns: the periods so far.
-    periods: f64,
-    samples: Vec<Sample>,
 }
 
-impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
-    fn sample(&mut self) -> Result<Command, TrackError> {
-        let sensors = self.rig.sense()?;
-        let command = match self.controller.sample(sensors, true) {
-            Ok(command) => command,
-            Err(error) => {
-                // A failed controller must not leave the rig driven.
-                let _ = self.rig.advance(Drive::default(), self.sample_time);
-                return Err(error.into());
-            }
-        };
-        self.samples.push(Sample {
-            time: self.taken as f64 * self.sample_time,
-            sensors,
-            command,
-            ground_truth: self.rig.ground_truth()?,
-        });
-        self.taken += 1;
-        self.rig.advance(command.drive, self.sample_time)?;
-        if command.state.is_some_and(LoopState::is_latched) {
-            self.rig.advance(Drive::default(), self.sample_time)?;
-            return Err(TrackError::Tripped {
-                periods: self.periods,
-                fault: command.fault.unwrap_or(Fault::LockLost),
-            });
-        }
-        Ok(command)
-    }
-
+impl<R: Rig + ?Sized, C: Controller + ?Sized> Periodic<'_, R, C> {
     /// One period of the drive.
-    fn cycle(&mut self) -> Result<Cycle, TrackError> {
+    fn cycle(&mut self, stage: Stage) -> Result<Cycle, ExperimentError> {
+        let bench = &mut self.bench;
         loop {
-            let begin = self.samples.len();
-            let first = self.periods;
-            while self.periods < first.floor() + 1.0 {
-                let command = self.sample()?;
-                self.periods += command.drive.omega * self.sample_time / std::f64::consts::TAU;
+            let begin = bench.samples.len();
+            let first = bench.periods;
+            while bench.periods < first.floor() + 1.0 {
+                bench.sample(stage)?;
             }
             let phase = first * std::f64::consts::TAU;
-            if let Some(cycle) = Cycle::of(&self.samples[begin..], self.sample_time, phase, self.target) {
+            if let Some(cycle) = Cycle::of(&bench.samples[begin..], bench.sample_time, phase, self.target) {
                 return Ok(cycle);
             }
         }
@@ -109,20 +48,16 @@ pub fn track(
     controller: &mut (impl Controller + ?Sized),
     scene: &Scene,
     mut progress: impl FnMut(usize, usize),
-) -> Result<Tracked, TrackError> {
+) -> Result<Tracked, ExperimentError> {
     let settings = scene.backbone;
     let levels = settings.levels();
-    let mut bench = Bench {
-        rig,
-        controller,
-        sample_time: scene.sample_time(),
+    let mut samples: Vec<Sample> = Vec::new();
+    let mut periodic = Periodic {
+        bench: Bench::new(rig, controller, scene.sample_time(), &mut samples),
         target: scene.controller.phase_target_radians(),
-        taken: 0,
-        samples: Vec::new(),
-        periods: 0.0,
     };
-    approach(&mut bench, scene.lock_periods())?;
-    let periods_to_lock = bench.periods;
+    approach(&mut periodic, scene.lock_periods())?;
+    let periods_to_lock = periodic.bench.periods;
     let d = scene.dimensionless();
     let slow_flow = SlowFlow::new(d.lambda, d.r);
     let mut points: Vec<Point> = Vec::new();
@@ -136,14 +71,14 @@ pub fn track(
             .collect();
         let (g, sigma) = predictor::change(settings.predictor, &known, level, &slow_flow);
         let periods = move_periods(scene, known.last(), level);
-        bench.controller.hold_response(Move {
+        periodic.bench.controller.hold_response(Move {
             response: level * d.b,
             duration: periods * d.natural_period(),
             amplitude: d.amplitude(g),
             omega: d.omega_change(sigma),
         })?;
         let wait = periods + if points.is_empty() { FIRST } else { 0.0 };
-        match hold(&mut bench, scene, level, wait, &slopes(scene, &known, level)) {
+        match hold(&mut periodic, scene, level, wait, &slopes(scene, &known, level)) {
             Ok(point) => points.push(point),
             // What was measured is kept.
             Err(error) if !points.is_empty() => {
@@ -153,7 +88,12 @@ pub fn track(
             Err(error) => return Err(error),
         }
     }
-    Ok(Tracked { points, periods_to_lock, periods: bench.periods, ended })
+    Ok(Tracked {
+        points,
+        periods_to_lock,
+        periods: periodic.bench.periods,
+        ended,
+    })
 }
 
 /// Largest relative difference of the response from its level that counts as reached.
@@ -195,16 +135,22 @@ fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
 }
 
 /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
-fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(bench: &mut Bench<R, C>, most: f64) -> Result<(), TrackError> {
+fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
+    periodic: &mut Periodic<R, C>,
+    most: f64,
+) -> Result<(), ExperimentError> {
     let mut near = 0;
     while near < NEAR_FOR {
-        if bench.periods >= most {
-            return Err(TrackError::NoLock { periods: most });
+        periodic.bench.samples.clear();
+        let cycle = periodic.cycle(Stage::Locking)?;
+        let Some(Sample { command, .. }) = periodic.bench.samples.last().copied() else {
+            continue;
+        };
+        if periodic.bench.periods >= most {
+            return Err(periodic.bench.no_lock(&command));
         }
-        bench.samples.clear();
-        let cycle = bench.cycle()?;
         // A motion that is being captured is not to be held yet.
-        let captured = bench.samples.last().and_then(|sample| sample.command.state) != Some(LoopState::Capturing);
+        let captured = command.state != Some(LoopState::Capturing);
         let driven = cycle.base.norm() > 0.0 && captured;
         near = if driven && cycle.phase_error.abs() < NEAR {
             near + 1
@@ -217,17 +163,17 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(bench: &mut Bench<R, C>, mo
 
 /// Moves to the level and holds it until the point has settled.
 fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
-    bench: &mut Bench<R, C>,
+    periodic: &mut Periodic<R, C>,
     scene: &Scene,
     level: f64,
     move_periods: f64,
     slopes: &Slopes,
-) -> Result<Point, TrackError> {
+) -> Result<Point, ExperimentError> {
     let (settings, d) = (&scene.backbone, scene.dimensionless());
-    let start = bench.periods;
-    bench.samples.clear();
-    while bench.periods - start < move_periods {
-        bench.cycle()?;
+    let start = periodic.bench.periods;
+    periodic.bench.samples.clear();
+    while periodic.bench.periods - start < move_periods {
+        periodic.cycle(Stage::Tracking)?;
     }
     let criterion = Criterion {
         omega0: d.omega0,
@@ -243,7 +189,7 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     let mut cycles: Vec<Cycle> = Vec::new();
     let most = settings.dwell_max as usize;
     let found = loop {
-        cycles.push(bench.cycle()?);
+        cycles.push(periodic.cycle(Stage::Tracking)?);
         let found = criterion.best(&cycles);
         if cycles.len() >= most || found.is_some_and(|found| criterion.is_met(&found) && is_reached(&found)) {
             break found;
@@ -254,6 +200,7 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         .iter()
         .map(|cycle| cycle.samples)
         .sum();
+    let bench = &periodic.bench;
     let averaged = &bench.samples[bench.samples.len() - samples..];
     let [base, omega] = said.at;
     Ok(Point {
