@@ -27,11 +27,9 @@ impl Estimate {
         self.coefficients.harmonic[0]
     }
 
-    /// Scales the estimate to a signal whose amplitude has changed by this factor.
-    pub fn scale(&mut self, factor: f64) {
-        for Complex { re, im } in &mut self.coefficients.harmonic {
-            (*re, *im) = (*re * factor, *im * factor);
-        }
+    /// Sum of the amplitudes of the harmonics above the fundamental, m.
+    pub fn harmonics(&self) -> f64 {
+        self.coefficients.harmonic[1..].iter().map(|one| one.magnitude()).sum()
     }
 
     /// Amplitude of the fundamental, m.

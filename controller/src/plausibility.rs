@@ -4,15 +4,25 @@
 use core::f64::consts::TAU;
 
 use crate::config::Config;
+use crate::detector::Estimate;
 
-/// Time in the closed loop before the check begins, in time constants of the detector.
-const WARM_UP: f64 = 6.0;
+/// Time in the closed loop before the check begins, in time constants of the detector, and in turns.
+const WARM_UP: [f64; 2] = [6.0, 10.0];
+/// Ratio of the drive to the drive with the lag of the detector, or its inverse, from which the drive changes fast, and turns for which
+/// its sensor is not compared after that.
+const FAST: f64 = 1.2;
+const SETTLES: f64 = 4.0;
 /// Phase, rad, after which a reading that does not change at all needs a smaller difference: this share of the limit. Shorter pauses are
 /// those of a connection that loses a few samples.
 const PAUSE: f64 = TAU / 12.0;
 const PAUSE_SHARE: f64 = 0.15;
-/// Differences that count as normal, in units of the largest one of the last two periods.
+/// Differences that count as normal, in units of the largest one of a period.
 const NORMAL: f64 = 2.0;
+
+/// Sum of the amplitudes of all harmonics above the fundamental, as a share of the limit, above which a sensor saturates, and turns for
+/// which it must last: a change of the drive disturbs the harmonics for one or two.
+const DISTORTION: f64 = 0.5;
+const LASTS: f64 = 5.0;
 
 /// Coefficients of the check.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -31,6 +41,10 @@ pub struct Differences {
     largest: [[f64; 3]; 2],
     /// Phase since the start of the period, rad.
     phase: f64,
+    /// Phase for which each channel has been distorted, rad.
+    distorted: [f64; 2],
+    /// Phase since the amplitude of each channel changed fast, rad.
+    steady: [f64; 2],
     /// Whether the last readings were plausible.
     implausible: bool,
 }
@@ -40,21 +54,23 @@ impl Plausibility {
     pub fn new(config: &Config) -> Self {
         Self {
             limit: config.residual_max,
-            warm_up: WARM_UP / config.bandwidth,
+            warm_up: (WARM_UP[0] / config.bandwidth).max(WARM_UP[1] * TAU / config.omega_start),
         }
     }
 
-    /// Takes differences between readings and their predictions, m, in signals of those amplitudes, m, whose readings have not changed
-    /// for those times, s. `omega` in rad/s.
+    /// Takes differences between readings and their predictions, m, the estimates, the factors by which the amplitude has
+    /// changed since, and the times for which the readings have not
+    /// changed, s. `omega` in rad/s.
     pub fn take(
         &self,
         state: &mut Differences,
-        differences: [(f64, f64); 2],
+        differences: [(f64, &Estimate, f64); 2],
         unchanged: [f64; 2],
         omega: f64,
         sample_time: f64,
     ) {
-        state.phase += omega * sample_time;
+        let turn = omega * sample_time;
+        state.phase += turn;
         if state.phase >= TAU {
             state.phase = 0.0;
             for [now, last, before] in &mut state.largest {
@@ -63,13 +79,22 @@ impl Plausibility {
         }
         state.implausible = false;
         for (n, [now, last, before]) in state.largest.iter_mut().enumerate() {
-            let (difference, amplitude) = differences[n];
+            let (difference, estimate, change) = differences[n];
+            let amplitude = estimate.amplitude();
             let share = if unchanged[n] * omega > PAUSE { PAUSE_SHARE } else { 1.0 };
             let difference = difference.abs();
-            let normal = NORMAL * last.max(*before);
-            state.implausible |= self
-                .limit
-                .is_some_and(|limit| difference > share * limit * amplitude + normal);
+            // A fault may have begun at the end of the last period.
+            let normal = NORMAL * last.min(*before);
+            if let Some(limit) = self.limit {
+                let fast = !(1.0 / FAST..FAST).contains(&change);
+                let [steady, distorted] = [&mut state.steady[n], &mut state.distorted[n]];
+                *steady = if fast { 0.0 } else { *steady + turn };
+                let compared = *steady > SETTLES * TAU;
+                let clear = !compared || estimate.harmonics() <= DISTORTION * limit * amplitude;
+                *distorted = if clear { 0.0 } else { *distorted + turn };
+                let expected = share * limit * change * amplitude + normal;
+                state.implausible |= compared && difference > expected || *distorted > LASTS * TAU;
+            }
             *now = now.max(difference);
         }
     }

@@ -37,6 +37,8 @@ pub struct Sensing {
     /// Longest time without a valid response, s.
     signal_timeout: Option<f64>,
     plausibility: Plausibility,
+    /// Share of its error that the detector corrects per sample.
+    detector_step: f64,
 }
 
 /// State of both channels.
@@ -46,7 +48,7 @@ pub struct Channels {
     /// Estimate of the response.
     pub response: Estimate,
     reference: Estimate,
-    /// The drive in the last sample, m.
+    /// The drive with the lag of the detector, m.
     drive: f64,
     differences: Differences,
     /// The last reading of each channel, m, and the time for which it has not changed, s.
@@ -109,6 +111,7 @@ impl Sensing {
             sample_time: config.sample_time,
             signal_timeout: config.signal_timeout,
             plausibility: Plausibility::new(config),
+            detector_step: -libm::expm1(-config.bandwidth * config.sample_time),
         }
     }
 
@@ -168,19 +171,25 @@ impl Sensing {
     /// Updates the detectors, and compares the readings with what they predicted.
     fn predict(&self, state: &mut Channels, response: f64, reference: Option<f64>, drive: PresentDrive) {
         let difference = self.detector.update(&mut state.response, response, drive.rotor);
-        let mut differences = [(difference, state.response.amplitude()), (0.0, 0.0)];
+        let (mut differences, mut change) = ([difference, 0.0], 1.0);
         if let Some(reading) = reference {
-            if drive.amplitude > 0.0 && state.drive > 0.0 {
-                // The base follows the drive at once.
-                state.reference.scale(drive.amplitude / state.drive);
-            }
-            let difference = self.detector.update(&mut state.reference, reading, drive.rotor);
-            differences[1] = (difference, state.reference.amplitude());
+            let predicted = reading - self.detector.update(&mut state.reference, reading, drive.rotor);
+            // The base follows the drive at once, the detector does not.
+            change = if state.drive > 0.0 {
+                drive.amplitude / state.drive
+            } else {
+                1.0
+            };
+            differences[1] = reading - change * predicted;
         }
-        state.drive = drive.amplitude;
+        state.drive += self.detector_step * (drive.amplitude - state.drive);
+        let seen = [
+            (differences[0], &state.response, 1.0),
+            (differences[1], &state.reference, change),
+        ];
         self.plausibility.take(
             &mut state.differences,
-            differences,
+            seen,
             state.unchanged,
             drive.omega,
             self.sample_time,

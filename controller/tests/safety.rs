@@ -98,7 +98,7 @@ fn acquiring_times_out() {
 
 #[test]
 fn a_lost_lock_is_latched() {
-    let mut bench = Bench::new(config());
+    let mut bench = Bench::new(Config { residual_max: None, ..config() });
     bench.run_to_lock(2000).expect("a lock");
     bench.resonator.omega_0 *= 1.1;
     let output = bench.run(100);
@@ -208,7 +208,7 @@ fn a_sensor_that_stops_while_the_response_is_controlled_trips_within_half_a_peri
 
 #[test]
 fn a_sensor_that_reads_only_noise_trips_before_the_lock() {
-    let mut bench = Bench::new(Config { response_max: None, ..config() });
+    let mut bench = Bench::new(Config { response_max: None, residual_max: None, ..config() });
     let mut noise = rig::Noise(7);
     let tripped = (0..100 * 100).find(|_| {
         let base = bench.resonator.base;

@@ -7,7 +7,7 @@ use phase_lock::{PhaseLock, State};
 #[derive(Clone, Copy)]
 pub struct PhaseLockController {
     /// Opaque.
-    pub words: [u64; 256],
+    pub words: [u64; 320],
 }
 
 /// Content of the storage.
