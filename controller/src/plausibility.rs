@@ -9,9 +9,10 @@ use crate::detector::Estimate;
 /// Time in the closed loop before the check begins, in time constants of the detector, and in turns.
 const WARM_UP: [f64; 2] = [6.0, 10.0];
 /// Ratio of the drive to the drive with the lag of the detector, or its inverse, from which the drive changes fast, and turns for which
-/// its sensor is not compared after that.
+/// its sensor may differ more after that, by this share of the larger amplitude.
 const FAST: f64 = 1.2;
 const SETTLES: f64 = 4.0;
+const SLACK: f64 = 0.8;
 /// Phase, rad, after which a reading that does not change at all needs a smaller difference: this share of the limit. Shorter pauses are
 /// those of a connection that loses a few samples.
 const PAUSE: f64 = TAU / 12.0;
@@ -89,11 +90,12 @@ impl Plausibility {
                 let fast = !(1.0 / FAST..FAST).contains(&change);
                 let [steady, distorted] = [&mut state.steady[n], &mut state.distorted[n]];
                 *steady = if fast { 0.0 } else { *steady + turn };
-                let compared = *steady > SETTLES * TAU;
-                let clear = !compared || estimate.harmonics() <= DISTORTION * limit * amplitude;
+                let settled = *steady > SETTLES * TAU;
+                let clear = !settled || estimate.harmonics() <= DISTORTION * limit * amplitude;
                 *distorted = if clear { 0.0 } else { *distorted + turn };
-                let expected = share * limit * change * amplitude + normal;
-                state.implausible |= compared && difference > expected || *distorted > LASTS * TAU;
+                let slack = if settled { 0.0 } else { SLACK * change.max(1.0) };
+                let expected = (share * limit * change + slack) * amplitude + normal;
+                state.implausible |= difference > expected || *distorted > LASTS * TAU;
             }
             *now = now.max(difference);
         }

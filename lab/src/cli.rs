@@ -3,6 +3,7 @@
 mod backbone;
 mod calibrate;
 mod chain;
+mod check;
 mod controller;
 mod decay;
 mod endpoint;
@@ -62,6 +63,7 @@ enum Command {
     Backbone(backbone::Arguments),
     Calibrate(calibrate::Arguments),
     Chain(chain::Arguments),
+    Check(check::Arguments),
     Decay(decay::Arguments),
     Faults(faults::Arguments),
     Orbit(orbit::Arguments),
@@ -85,6 +87,7 @@ pub fn run() -> ExitCode {
         Command::Backbone(arguments) => backbone::run(&arguments),
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Chain(arguments) => chain::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
         Command::Decay(arguments) => decay::run(&arguments),
         Command::Faults(arguments) => faults::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),

@@ -11,5 +11,5 @@ pub use vines_model::{map, numerics, orbit, regime, theory};
 pub use vines_net as net;
 pub use vines_testbench::{
     advice, backbone, calibration, chain_effects, comparison, estimators, experiment, faults, identification,
-    random_rigs, rig, scene,
+    loop_check, random_rigs, rig, scene,
 };

@@ -13,8 +13,9 @@ use crate::experiment::{self, ExperimentError, Plan};
 use crate::rig::{BuiltIn, Chain, Rig, Simulated};
 use crate::scene::Scene;
 
-pub use inject::{FAULTS, Kind};
-use inject::{FaultyController, FaultyRig, Log};
+use inject::FaultyController;
+pub use inject::{FAULTS, Kind, Sensor};
+pub(crate) use inject::{FaultyRig, Log};
 
 /// What the bench does when the fault begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

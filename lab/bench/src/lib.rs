@@ -13,6 +13,7 @@ pub mod estimators;
 pub mod experiment;
 pub mod faults;
 pub mod identification;
+pub mod loop_check;
 pub mod random_rigs;
 pub mod rig;
 pub mod scene;

@@ -7,6 +7,7 @@ use indicatif::ProgressBar;
 use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
 use super::{
+    check::LoopCheckArguments,
     endpoint::{Endpoint, ReachArguments, check},
     failure::Failure,
     log_warnings, result,
@@ -51,6 +52,9 @@ pub(super) struct Arguments {
     #[command(flatten)]
     reach: ReachArguments,
 
+    #[command(flatten)]
+    loop_check: LoopCheckArguments,
+
     /// Print tracked.json instead of the table
     #[arg(long)]
     json: bool,
@@ -63,6 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     writable(&arguments.out)?;
     check(&scene)?;
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
+    arguments.loop_check.before(&mut open.rig, &scene)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let tracked = track(&mut open.rig, &mut controller, &scene, |done, _| {
         bar.set_position(done as u64);

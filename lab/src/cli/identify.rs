@@ -15,6 +15,7 @@ use vines::{
 };
 
 use super::{
+    check::LoopCheckArguments,
     endpoint::{Endpoint, ReachArguments, check},
     failure::Failure,
     log_warnings,
@@ -57,6 +58,9 @@ pub(super) struct Arguments {
     #[command(flatten)]
     reach: ReachArguments,
 
+    #[command(flatten)]
+    loop_check: LoopCheckArguments,
+
     /// Print identification.json instead of the table
     #[arg(long)]
     json: bool,
@@ -74,6 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             (Endpoint::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
         }
     };
+    arguments.loop_check.before(&mut open.rig, &scene)?;
     let mut controller = arguments.controller.controller(&scene, reach, open.pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(&plan);
