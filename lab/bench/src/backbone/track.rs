@@ -1,12 +1,15 @@
 //! The tracking of the backbone.
 
+use std::ops::{Deref, DerefMut};
+
+use super::peak;
 use super::point::{Point, Tracked};
 use super::predictor::{self, Known};
 use super::settle::{Criterion, Found};
-use crate::experiment::{Bench, ExperimentError, Sample, Stage};
+use crate::experiment::{self, ExperimentError, Sample, Stage};
 use crate::identification::{Cycle, Slopes, classify, regime_by_response};
 use crate::rig::{Controller, LoopState, Move, Rig};
-use crate::scene::Scene;
+use crate::scene::{Resonance, Scene};
 use vines_model::numerics::Estimate;
 use vines_model::theory::SlowFlow;
 
@@ -16,23 +19,38 @@ const NEAR: f64 = 0.35;
 const NEAR_FOR: usize = 3;
 
 /// A bench that reads period by period.
-struct Periodic<'a, R: Rig + ?Sized, C: ?Sized> {
-    bench: Bench<'a, R, C>,
+struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
+    bench: experiment::Bench<'a, R, C>,
+    stage: Stage,
     target: f64,
 }
 
-impl<R: Rig + ?Sized, C: Controller + ?Sized> Periodic<'_, R, C> {
+impl<'a, R: Rig + ?Sized, C: ?Sized> Deref for Bench<'a, R, C> {
+    type Target = experiment::Bench<'a, R, C>;
+
+    fn deref(&self) -> &Self::Target {
+        &self.bench
+    }
+}
+
+impl<R: Rig + ?Sized, C: ?Sized> DerefMut for Bench<'_, R, C> {
+    fn deref_mut(&mut self) -> &mut Self::Target {
+        &mut self.bench
+    }
+}
+
+impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
     /// One period of the drive.
-    fn cycle(&mut self, stage: Stage) -> Result<Cycle, ExperimentError> {
-        let bench = &mut self.bench;
+    fn cycle(&mut self) -> Result<Cycle, ExperimentError> {
         loop {
-            let begin = bench.samples.len();
-            let first = bench.periods;
-            while bench.periods < first.floor() + 1.0 {
-                bench.sample(stage)?;
+            let begin = self.samples.len();
+            let first = self.periods;
+            while self.periods < first.floor() + 1.0 {
+                let stage = self.stage;
+                self.sample(stage)?;
             }
             let phase = first * std::f64::consts::TAU;
-            if let Some(cycle) = Cycle::of(&bench.samples[begin..], bench.sample_time, phase, self.target) {
+            if let Some(cycle) = Cycle::of(&self.samples[begin..], self.sample_time, phase, self.target) {
                 return Ok(cycle);
             }
         }
@@ -51,55 +69,112 @@ pub fn track(
 ) -> Result<Tracked, ExperimentError> {
     let settings = scene.backbone;
     let levels = settings.levels();
-    let mut samples: Vec<Sample> = Vec::new();
-    let mut periodic = Periodic {
-        bench: Bench::new(rig, controller, scene.sample_time(), &mut samples),
+    let mut samples = Vec::new();
+    let mut bench = Bench {
+        bench: experiment::Bench::new(rig, controller, scene.sample_time(), &mut samples),
+        stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
     };
-    approach(&mut periodic, scene.lock_periods())?;
-    let periods_to_lock = periodic.bench.periods;
-    let d = scene.dimensionless();
-    let slow_flow = SlowFlow::new(d.lambda, d.r);
-    let mut points: Vec<Point> = Vec::new();
+    approach(&mut bench, scene.lock_periods())?;
+    let periods_to_lock = bench.periods;
+    bench.stage = Stage::Tracking;
+    let phases: &[f64] = match scene.resonance.resonance {
+        Resonance::Phase => &[0.0],
+        Resonance::Peak => &peak::PHASES,
+    };
+    let mut scans: Vec<Vec<Point>> = vec![Vec::new(); phases.len()];
+    // The last point, and the phase at which it was held.
+    let mut last: Option<(Point, f64)> = None;
     let mut ended = None;
-    for (n, &level) in levels.iter().enumerate() {
+    'levels: for (n, &level) in levels.iter().enumerate() {
         progress(n, levels.len());
-        let known: Vec<Known> = points
-            .iter()
-            .filter(|point| point.g.is_finite() && point.sigma.is_finite())
-            .map(|point| Known { c: point.c, g: point.g, sigma: point.sigma })
-            .collect();
-        let (g, sigma) = predictor::change(settings.predictor, &known, level, &slow_flow);
-        let periods = move_periods(scene, known.last(), level);
-        periodic.bench.controller.hold_response(Move {
-            response: level * d.b,
-            duration: periods * d.natural_period(),
-            amplitude: d.amplitude(g),
-            omega: d.omega_change(sigma),
-        })?;
-        let wait = periods + if points.is_empty() { FIRST } else { 0.0 };
-        match hold(&mut periodic, scene, level, wait, &slopes(scene, &known, level)) {
-            Ok(point) => points.push(point),
-            // What was measured is kept.
-            Err(error) if !points.is_empty() => {
-                ended = Some(error.to_string());
-                break;
+        for k in 0..phases.len() {
+            // The next level begins at the phase at which this one ends.
+            let scan = if n % 2 == 0 { k } else { phases.len() - 1 - k };
+            let order = &Order { level, phase: phases[scan], known: known(&scans[scan], last) };
+            match go(&mut bench, scene, order, last) {
+                Ok(point) => {
+                    scans[scan].push(point);
+                    last = Some((point, order.phase));
+                }
+                // What was measured is kept.
+                Err(error) if last.is_some() => {
+                    ended = Some(error.to_string());
+                    break 'levels;
+                }
+                Err(error) => return Err(error),
             }
-            Err(error) => return Err(error),
         }
     }
-    Ok(Tracked {
-        points,
-        periods_to_lock,
-        periods: periodic.bench.periods,
-        ended,
-    })
+    let points = match scene.resonance.resonance {
+        Resonance::Phase => scans.swap_remove(0),
+        Resonance::Peak => peak::peaks(&scans, &scene.dimensionless()),
+    };
+    let periods = bench.periods;
+    Ok(Tracked { points, periods_to_lock, periods, ended })
+}
+
+/// What is to be held next.
+struct Order {
+    /// Response amplitude over b.
+    level: f64,
+    /// Phase error, rad.
+    phase: f64,
+    /// The points before.
+    known: Vec<Known>,
+}
+
+/// The points of a scan; before its first, the last one of another.
+fn known(scan: &[Point], last: Option<(Point, f64)>) -> Vec<Known> {
+    let finite = |known: &Known| known.g.is_finite() && known.sigma.is_finite();
+    let own: Vec<Known> = scan.iter().map(Point::known).filter(finite).collect();
+    match own.is_empty() {
+        true => last.iter().map(|(point, _)| point.known()).filter(finite).collect(),
+        false => own,
+    }
+}
+
+/// Goes to the next level or phase and holds it.
+fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
+    bench: &mut Bench<R, C>,
+    scene: &Scene,
+    order: &Order,
+    last: Option<(Point, f64)>,
+) -> Result<Point, ExperimentError> {
+    let d = scene.dimensionless();
+    let Order { level, phase, ref known } = *order;
+    let (g, sigma) = predictor::change(scene.backbone.predictor, known, level, &d);
+    let expected = known
+        .last()
+        .map(|one| Known { c: level, g: one.g + g, sigma: one.sigma + sigma });
+    let present = last.map(|(point, phase)| peak::at_phase(&point.known(), phase, d.epsilon));
+    let change = expected.zip(present).map(|(expected, present)| {
+        let then = peak::at_phase(&expected, phase, d.epsilon);
+        [then[0] - present[0], then[1] - present[1]]
+    });
+    let [g, sigma] = change
+        .filter(|change| change.iter().all(|one| one.is_finite()))
+        .unwrap_or([0.0; 2]);
+    let from = last.map(|(point, _)| point.known());
+    let periods = move_periods(scene, from.as_ref(), level);
+    let to = Move {
+        response: level * d.b,
+        duration: periods * d.natural_period(),
+        amplitude: d.amplitude(g),
+        omega: d.omega_change(sigma),
+    };
+    let target = bench.target + phase;
+    bench.controller.hold_response(to, target)?;
+    let changed = last.map_or(FIRST, |(_, held)| if held == phase { 0.0 } else { PHASE });
+    hold(bench, scene, order, periods + changed)
 }
 
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
 /// Periods of the first level more than those of the move: the start of the loop disturbs the particle, too.
 const FIRST: f64 = 32.0;
+/// Periods of a change of the phase more than those of the move, for the same reason.
+const PHASE: f64 = 8.0;
 /// Share of the drive that a move may need in addition to the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
 
@@ -136,18 +211,18 @@ fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
 
 /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
 fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
-    periodic: &mut Periodic<R, C>,
+    bench: &mut Bench<R, C>,
     most: f64,
 ) -> Result<(), ExperimentError> {
     let mut near = 0;
     while near < NEAR_FOR {
-        periodic.bench.samples.clear();
-        let cycle = periodic.cycle(Stage::Locking)?;
-        let Some(Sample { command, .. }) = periodic.bench.samples.last().copied() else {
+        bench.samples.clear();
+        let cycle = bench.cycle()?;
+        let Some(Sample { command, .. }) = bench.samples.last().copied() else {
             continue;
         };
-        if periodic.bench.periods >= most {
-            return Err(periodic.bench.no_lock(&command));
+        if bench.periods >= most {
+            return Err(bench.no_lock(&command));
         }
         // A motion that is being captured is not to be held yet.
         let captured = command.state != Some(LoopState::Capturing);
@@ -163,24 +238,25 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
 
 /// Moves to the level and holds it until the point has settled.
 fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
-    periodic: &mut Periodic<R, C>,
+    bench: &mut Bench<R, C>,
     scene: &Scene,
-    level: f64,
+    order: &Order,
     move_periods: f64,
-    slopes: &Slopes,
 ) -> Result<Point, ExperimentError> {
+    let Order { level, phase, ref known } = *order;
     let (settings, d) = (&scene.backbone, scene.dimensionless());
-    let start = periodic.bench.periods;
-    periodic.bench.samples.clear();
-    while periodic.bench.periods - start < move_periods {
-        periodic.cycle(Stage::Tracking)?;
+    let start = bench.periods;
+    bench.samples.clear();
+    while bench.periods - start < move_periods {
+        bench.cycle()?;
     }
     let criterion = Criterion {
         omega0: d.omega0,
         precision: [d.amplitude(settings.precision), d.omega_change(settings.precision)],
         tolerance: [d.amplitude(settings.tolerance), d.omega_change(settings.tolerance)],
         fewest: settings.dwell_min as usize,
-        slopes: *slopes,
+        slopes: slopes(scene, known, level),
+        phase,
     };
     let is_reached = |found: &Found| {
         let Estimate { value, uncertainty } = found.response.scaled(1.0 / d.b);
@@ -189,7 +265,7 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     let mut cycles: Vec<Cycle> = Vec::new();
     let most = settings.dwell_max as usize;
     let found = loop {
-        cycles.push(periodic.cycle(Stage::Tracking)?);
+        cycles.push(bench.cycle()?);
         let found = criterion.best(&cycles);
         if cycles.len() >= most || found.is_some_and(|found| criterion.is_met(&found) && is_reached(&found)) {
             break found;
@@ -200,7 +276,6 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         .iter()
         .map(|cycle| cycle.samples)
         .sum();
-    let bench = &periodic.bench;
     let averaged = &bench.samples[bench.samples.len() - samples..];
     let [base, omega] = said.at;
     Ok(Point {

@@ -304,7 +304,7 @@ impl Controller for FaultyController {
         Ok(command)
     }
 
-    fn hold_response(&mut self, to: Move) -> Result<(), ControllerError> {
-        self.controller.hold_response(to)
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
+        self.controller.hold_response(to, phase_target)
     }
 }
