@@ -3,6 +3,7 @@
 //! A fault begins at one sample of a run that was healthy until then. The drive that the rig gets is recorded until the run has ended.
 
 mod inject;
+mod table;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
@@ -14,8 +15,9 @@ use crate::rig::{BuiltIn, Chain, Rig, Simulated};
 use crate::scene::Scene;
 
 use inject::FaultyController;
-pub use inject::{FAULTS, Kind, Sensor};
 pub(crate) use inject::{FaultyRig, Log};
+pub use inject::{Kind, Sensor};
+pub use table::FAULTS;
 
 /// What the bench does when the fault begins.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
