@@ -154,7 +154,7 @@ impl Sensing {
         state.invalid = self.longer(state.invalid, !measured.valid);
         if state.seen && state.unchanged.iter().any(|time| time * omega > UNCHANGED) {
             Some(Fault::Sensor)
-        } else if self.plausibility.refuses(&state.differences, state.closed) {
+        } else if state.seen && self.plausibility.refuses(&state.differences, state.closed) {
             Some(Fault::Implausible)
         } else if self.signal_timeout.is_some_and(|limit| state.invalid > limit) {
             Some(Fault::NoSignal)

@@ -50,7 +50,11 @@ impl Scene {
                 None => Some(amplitude_max * omega0),
             },
             release_rate: rate(self.amplitude, c.release_periods),
-            omega_rate: Some(c.omega_rate.unwrap_or(c.omega_max - c.omega_min) * omega0 / period),
+            omega_rate: Some(match c.omega_rate {
+                Some(rate) => rate * omega0 / period,
+                // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
+                None => (c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period),
+            }),
             acquire_timeout: Some(self.lock_periods() * period),
             signal_timeout: Some(c.silence_periods * period),
             residual_max: Some(c.residual_max.unwrap_or_else(|| self.residual())),

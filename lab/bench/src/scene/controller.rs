@@ -44,7 +44,8 @@ pub struct Controller {
     pub ramp_periods: Option<f64>,
     /// Duration of the ramp of the drive to zero at the release, natural periods; 0 to switch off at once.
     pub release_periods: f64,
-    /// Largest change of the frequency in a natural period, in units of omega0; by default the distance of the two limits.
+    /// Largest change of the frequency in a natural period, in units of omega0; by default the distance of the two limits, or
+    /// as much in half a time constant of the detector if that is shorter.
     pub omega_rate: Option<f64>,
     /// Longest time without a valid measurement, natural periods.
     pub silence_periods: f64,
