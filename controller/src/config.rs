@@ -115,14 +115,19 @@ pub struct Config {
     pub acquire_timeout: Option<f64>,
     /// Longest time in the closed loop without a valid measurement, s: with too small an amplitude or too much noise.
     pub signal_timeout: Option<f64>,
+    /// Largest difference between a reading and its prediction by the detector, as a share of the amplitude of the channel, beyond twice
+    /// the differences of the last periods. `None`: any.
+    pub residual_max: Option<f64>,
     /// Whether a sensor measures the base. Without it the internal oscillator with the configured `delay` is the reference.
     pub reference_connected: bool,
 }
 
 impl Config {
     /// Suitable initial values for a structure with a resonance near `omega` (rad/s) and a base amplitude in m:
-    /// 100 samples per period, ±20 % of frequency, a bandwidth of a tenth of `omega`, no ramps, at most four times the base
-    /// amplitude, and 2000 periods for the lock. Only the limit of the response must be set.
+    /// 100 samples per period, ±20 % of frequency, a bandwidth of a tenth of `omega`, at most four times the base
+    /// amplitude, changed no faster than a base with this amplitude moves, the range of the frequency in no less than a period, and
+    /// 2000 periods for the lock. Only the limit of the
+    /// response must be set. The release is a step.
     #[must_use]
     pub fn for_resonance(omega: f64, amplitude: f64) -> Self {
         Self {
@@ -130,10 +135,10 @@ impl Config {
             omega_start: omega,
             omega_min: 0.8 * omega,
             omega_max: 1.2 * omega,
-            omega_rate: None,
+            omega_rate: Some(0.4 * omega * omega / TAU),
             amplitude,
             amplitude_max: Some(4.0 * amplitude),
-            ramp_rate: None,
+            ramp_rate: Some(4.0 * amplitude * omega),
             release_rate: None,
             base_bandwidth: 0.0,
             phase_target: -FRAC_PI_2,
@@ -150,6 +155,7 @@ impl Config {
             response_max: None,
             acquire_timeout: Some(2000.0 * TAU / omega),
             signal_timeout: Some(20.0 * TAU / omega),
+            residual_max: Some(0.3),
             reference_connected: true,
         }
     }

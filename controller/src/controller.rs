@@ -126,7 +126,7 @@ impl PhaseLock {
         };
         let measured = self.sensing.measure(&mut state.channels, &input, drive);
         let watched = if state.loop_state.is_closed() {
-            self.sensing.watch(&mut state.channels, &input, &measured, drive.omega)
+            self.sensing.watch(&mut state.channels, &measured, drive.omega)
         } else {
             self.sensing.stop_watching(&mut state.channels);
             None

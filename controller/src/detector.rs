@@ -27,6 +27,11 @@ impl Estimate {
         self.coefficients.harmonic[0]
     }
 
+    /// Sum of the amplitudes of the harmonics above the fundamental, m.
+    pub fn harmonics(&self) -> f64 {
+        self.coefficients.harmonic[1..].iter().map(|one| one.magnitude()).sum()
+    }
+
     /// Amplitude of the fundamental, m.
     pub fn amplitude(&self) -> f64 {
         self.fundamental().magnitude()
@@ -85,8 +90,9 @@ impl PhaseDetector {
         }
     }
 
-    /// Updates the estimate with a sample, m. `rotor` is `exp(i phase)` of the oscillator.
-    pub fn update(&self, estimate: &mut Estimate, sample: f64, rotor: Complex) {
+    /// Updates the estimate with a sample, m. `rotor` is `exp(i phase)` of the oscillator. Returns the difference between the sample and
+    /// its prediction, m.
+    pub fn update(&self, estimate: &mut Estimate, sample: f64, rotor: Complex) -> f64 {
         let (residual, step) = match self {
             Self::Adaptive(harmonics) => {
                 let residual = harmonics.update(&mut estimate.coefficients, sample, rotor);
@@ -101,6 +107,7 @@ impl PhaseDetector {
             }
         };
         estimate.residual_power += step * (residual * residual - estimate.residual_power);
+        residual
     }
 }
 

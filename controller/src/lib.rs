@@ -62,6 +62,7 @@ mod harmonics;
 mod loop_filter;
 mod oscillator;
 mod parameters;
+mod plausibility;
 mod range;
 mod sample_clock;
 mod sensing;

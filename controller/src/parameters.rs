@@ -42,6 +42,7 @@ macro_rules! parameters {
             config response_max: optional, "m", Optional;
             config acquire_timeout: optional, "s", Optional;
             config signal_timeout: optional, "s", Optional;
+            config residual_max: optional, "", Optional;
             config reference_connected: boolean, "", Boolean;
             config response_gain: real, "1/s", Positive;
             config approach_gain: real, "", NotNegative;

@@ -1,15 +1,18 @@
 //! The measurements of a sample: phase error, amplitudes, and whether they are valid.
 
-use core::f64::consts::PI;
+use core::f64::consts::FRAC_PI_3;
 
 use crate::angle::{Complex, wrap};
 use crate::config::Config;
 use crate::detector::{Estimate, PhaseDetector};
+use crate::plausibility::{Differences, Plausibility};
 use crate::signals::Input;
 use crate::supervisor::Fault;
 
 /// Largest valid reading, m. Smaller readings cause no overflow.
 const READING_MAX: f64 = 1e100;
+/// Phase, rad, for which no signal of more than eight steps of its converter stays the same.
+const UNCHANGED: f64 = FRAC_PI_3;
 /// Smallest valid amplitude of the reference, as a share of the drive amplitude.
 const REFERENCE_SHARE: f64 = 0.1;
 
@@ -33,6 +36,9 @@ pub struct Sensing {
     sample_time: f64,
     /// Longest time without a valid response, s.
     signal_timeout: Option<f64>,
+    plausibility: Plausibility,
+    /// Share of its error that the detector corrects per sample.
+    detector_step: f64,
 }
 
 /// State of both channels.
@@ -42,9 +48,14 @@ pub struct Channels {
     /// Estimate of the response.
     pub response: Estimate,
     reference: Estimate,
-    /// The last reading of the response, m, and the time for which it has not changed, s.
-    last: f64,
-    unchanged: f64,
+    /// The drive with the lag of the detector, m.
+    drive: f64,
+    differences: Differences,
+    /// The last reading of each channel, m, and the time for which it has not changed, s.
+    last: [f64; 2],
+    unchanged: [f64; 2],
+    /// Time in the closed loop, s.
+    closed: f64,
     /// Time since the loop was closed or the measurement was last valid, s.
     invalid: f64,
     /// Whether the measurement has been valid since the loop was closed.
@@ -99,6 +110,8 @@ impl Sensing {
             has_reference: config.reference_connected,
             sample_time: config.sample_time,
             signal_timeout: config.signal_timeout,
+            plausibility: Plausibility::new(config),
+            detector_step: -libm::expm1(-config.bandwidth * config.sample_time),
         }
     }
 
@@ -106,12 +119,15 @@ impl Sensing {
     pub fn measure(&self, state: &mut Channels, input: &Input, drive: PresentDrive) -> Measurement {
         let channel = input.reference.filter(|_| self.has_reference);
         let fault = self.fault(input.response, channel);
+        // Without a sensor on the base nothing is expected to change.
+        let readings = [input.response, channel.unwrap_or(f64::NAN)];
+        for (n, reading) in readings.into_iter().enumerate() {
+            state.unchanged[n] = self.longer(state.unchanged[n], reading == state.last[n]);
+        }
+        state.last = readings;
         // The detectors ignore an invalid reading and keep their estimates.
         if fault != Some(Fault::Sensor) {
-            self.detector.update(&mut state.response, input.response, drive.rotor);
-            if let Some(reading) = channel {
-                self.detector.update(&mut state.reference, reading, drive.rotor);
-            }
+            self.predict(state, input.response, channel, drive);
         }
         let reference = if channel.is_some() {
             self.measured_reference(&state.reference, drive)
@@ -132,14 +148,14 @@ impl Sensing {
     }
 
     /// Watches the signals while the loop is closed: a sensor that has stopped, or a response that cannot be measured.
-    pub fn watch(&self, state: &mut Channels, input: &Input, measured: &Measurement, omega: f64) -> Option<Fault> {
-        let add = |time: f64, condition: bool| if condition { time + self.sample_time } else { 0.0 };
+    pub fn watch(&self, state: &mut Channels, measured: &Measurement, omega: f64) -> Option<Fault> {
         state.seen |= measured.valid;
-        state.invalid = add(state.invalid, !measured.valid);
-        state.unchanged = add(state.unchanged, state.seen && input.response == state.last);
-        state.last = input.response;
-        if state.unchanged * omega > PI {
+        state.closed += self.sample_time;
+        state.invalid = self.longer(state.invalid, !measured.valid);
+        if state.seen && state.unchanged.iter().any(|time| time * omega > UNCHANGED) {
             Some(Fault::Sensor)
+        } else if state.seen && self.plausibility.refuses(&state.differences, state.closed) {
+            Some(Fault::Implausible)
         } else if self.signal_timeout.is_some_and(|limit| state.invalid > limit) {
             Some(Fault::NoSignal)
         } else {
@@ -149,7 +165,40 @@ impl Sensing {
 
     /// Ends the watch when the loop opens.
     pub fn stop_watching(&self, state: &mut Channels) {
-        (state.unchanged, state.invalid, state.seen) = (0.0, 0.0, false);
+        (state.invalid, state.closed, state.seen) = (0.0, 0.0, false);
+    }
+
+    /// Updates the detectors, and compares the readings with what they predicted.
+    fn predict(&self, state: &mut Channels, response: f64, reference: Option<f64>, drive: PresentDrive) {
+        let difference = self.detector.update(&mut state.response, response, drive.rotor);
+        let (mut differences, mut change) = ([difference, 0.0], 1.0);
+        if let Some(reading) = reference {
+            let predicted = reading - self.detector.update(&mut state.reference, reading, drive.rotor);
+            // The base follows the drive at once, the detector does not.
+            change = if state.drive > 0.0 {
+                drive.amplitude / state.drive
+            } else {
+                1.0
+            };
+            differences[1] = reading - change * predicted;
+        }
+        state.drive += self.detector_step * (drive.amplitude - state.drive);
+        let seen = [
+            (differences[0], &state.response, 1.0),
+            (differences[1], &state.reference, change),
+        ];
+        self.plausibility.take(
+            &mut state.differences,
+            seen,
+            state.unchanged,
+            drive.omega,
+            self.sample_time,
+        );
+    }
+
+    /// A time, s, after one more sample of a condition.
+    fn longer(&self, time: f64, condition: bool) -> f64 {
+        if condition { time + self.sample_time } else { 0.0 }
     }
 
     fn fault(&self, response: f64, reference: Option<f64>) -> Option<Fault> {

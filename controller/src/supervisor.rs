@@ -29,7 +29,7 @@ pub enum LoopState {
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum Fault {
-    /// A sensor read NaN, infinity, or more than 1e100 m, or the reading of the response did not change for half a period.
+    /// A sensor read NaN, infinity, or more than 1e100 m, or a reading did not change for a sixth of a period.
     Sensor = 1,
     /// The response exceeded `response_max`.
     ResponseTooLarge = 2,
@@ -39,6 +39,8 @@ pub enum Fault {
     LockLost = 4,
     /// No valid measurement for `signal_timeout`: the amplitude of a channel is too small, or its noise too large.
     NoSignal = 5,
+    /// A reading differed from its prediction by more than `residual_max`.
+    Implausible = 6,
 }
 
 impl LoopState {
@@ -69,12 +71,13 @@ impl LoopState {
 
 impl Fault {
     /// All faults.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Sensor,
         Self::ResponseTooLarge,
         Self::TimedOut,
         Self::LockLost,
         Self::NoSignal,
+        Self::Implausible,
     ];
 
     /// The fault of that number; none for 0.
@@ -87,13 +90,14 @@ impl Fault {
 impl fmt::Display for Fault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
-            Self::Sensor => "a sensor read no number, or the response did not change for half a period",
+            Self::Sensor => "a sensor read no number, or did not change for a sixth of a period",
             Self::ResponseTooLarge => "the response exceeded its limit",
             Self::TimedOut => "the time limit for the lock is over",
             Self::LockLost => "the lock was lost",
             Self::NoSignal => {
                 "the response or the base could not be measured: too small an amplitude, or too much noise"
             }
+            Self::Implausible => "a reading differed from its prediction: a sensor, the drive or the clock has failed",
         })
     }
 }

@@ -48,14 +48,14 @@ fn never_locks_without_a_drive() {
 
 #[test]
 fn a_reference_that_fails_ends_the_lock() {
-    let mut bench = Bench::new(config());
+    let mut bench = Bench::new(Config { residual_max: None, ..config() });
     bench.run_to_lock(2000).expect("a lock");
     let mut output = bench.sample();
-    for _ in 0..20_000 {
+    for _ in 0..52 {
         let q = bench.resonator.q;
         output = bench.sample_reading(q, Some(0.0));
     }
-    assert_eq!(output.state, LoopState::LockLost);
+    assert_eq!((output.state, output.fault), (LoopState::Tripped, Some(Fault::Sensor)));
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn acquiring_times_out() {
 
 #[test]
 fn a_lost_lock_is_latched() {
-    let mut bench = Bench::new(config());
+    let mut bench = Bench::new(Config { residual_max: None, ..config() });
     bench.run_to_lock(2000).expect("a lock");
     bench.resonator.omega_0 *= 1.1;
     let output = bench.run(100);
@@ -193,7 +193,7 @@ fn a_response_that_fades_out_does_not_make_the_drive_exceed_its_limit_or_its_rat
 #[test]
 fn a_sensor_that_stops_while_the_response_is_controlled_trips_within_half_a_period() {
     for stuck_at_zero in [true, false] {
-        let mut bench = holding(config());
+        let mut bench = holding(Config { residual_max: None, ramp_rate: None, ..config() });
         let value = if stuck_at_zero { 0.0 } else { bench.resonator.q };
         let tripped = (0..200).find_map(|n| {
             let base = bench.resonator.base;
@@ -208,7 +208,7 @@ fn a_sensor_that_stops_while_the_response_is_controlled_trips_within_half_a_peri
 
 #[test]
 fn a_sensor_that_reads_only_noise_trips_before_the_lock() {
-    let mut bench = Bench::new(Config { response_max: None, ..config() });
+    let mut bench = Bench::new(Config { response_max: None, residual_max: None, ..config() });
     let mut noise = rig::Noise(7);
     let tripped = (0..100 * 100).find(|_| {
         let base = bench.resonator.base;
@@ -226,4 +226,35 @@ fn a_base_sensor_that_is_dead_from_the_start_trips() {
         bench.sample_reading(q, Some(0.0)).state == LoopState::Tripped
     });
     assert!(tripped.is_some(), "a base that reads 0 is not \"not connected\"");
+}
+
+/// Samples until the trip when the readings of a locked bench pass through `fault`, which gets response, base and the samples since.
+fn samples_to_trip(fault: impl Fn(f64, f64, i32) -> [f64; 2]) -> Option<i32> {
+    let mut bench = Bench::new(config());
+    bench.run_to_lock(2000).expect("a lock");
+    (0..100).find(|n| {
+        let [response, base] = fault(bench.resonator.q, bench.resonator.base, *n);
+        bench.sample_reading(response, Some(base)).state == LoopState::Tripped
+    })
+}
+
+#[test]
+fn reversed_swapped_and_dead_sensors_trip_within_a_tenth_of_a_period() {
+    assert!(samples_to_trip(|q, e, _| [-q, e]).is_some_and(|n| n <= 10));
+    assert!(samples_to_trip(|q, e, _| [q, -e]).is_some_and(|n| n <= 10));
+    assert!(samples_to_trip(|q, e, _| [e, q]).is_some_and(|n| n <= 10));
+    assert!(samples_to_trip(|_, e, _| [0.0, e]).is_some_and(|n| n <= 10));
+}
+
+#[test]
+fn the_plausibility_check_does_not_trip_at_a_change_of_the_drive() {
+    let mut bench = Bench::new(Config { ramp_rate: None, ..config() });
+    for amplitude in [1.0, 3.0, 0.2, 1.0] {
+        bench.run(50);
+        bench
+            .controller
+            .retune(amplitude * AMPLITUDE, -1.5)
+            .expect("a sensible drive");
+    }
+    assert_eq!(bench.run(50).fault, None);
 }

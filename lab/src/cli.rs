@@ -3,10 +3,12 @@
 mod backbone;
 mod calibrate;
 mod chain;
+mod check;
 mod controller;
 mod decay;
 mod endpoint;
 mod failure;
+mod faults;
 mod identify;
 mod interrupt;
 mod map;
@@ -61,7 +63,9 @@ enum Command {
     Backbone(backbone::Arguments),
     Calibrate(calibrate::Arguments),
     Chain(chain::Arguments),
+    Check(check::Arguments),
     Decay(decay::Arguments),
+    Faults(faults::Arguments),
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Map(map::Arguments),
@@ -83,7 +87,9 @@ pub fn run() -> ExitCode {
         Command::Backbone(arguments) => backbone::run(&arguments),
         Command::Calibrate(arguments) => calibrate::run(&arguments),
         Command::Chain(arguments) => chain::run(&arguments),
+        Command::Check(arguments) => check::run(&arguments),
         Command::Decay(arguments) => decay::run(&arguments),
+        Command::Faults(arguments) => faults::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),

@@ -10,6 +10,6 @@ pub use vines_fmu as fmu;
 pub use vines_model::{map, numerics, orbit, regime, theory};
 pub use vines_net as net;
 pub use vines_testbench::{
-    advice, backbone, calibration, chain_effects, comparison, estimators, experiment, identification, random_rigs, rig,
-    scene,
+    advice, backbone, calibration, chain_effects, comparison, estimators, experiment, faults, identification,
+    loop_check, random_rigs, rig, scene,
 };

@@ -1,7 +1,8 @@
 //! The backbone, tracked with the response held by the loop.
 
-use vines::backbone::{TrackError, track};
+use vines::backbone::track;
 use vines::comparison::{ExactCurve, TrackedComparison, TrackedPoint};
+use vines::experiment::ExperimentError;
 use vines::identification::Regime;
 use vines::rig::{BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated};
 use vines::scene::{Override, Scene};
@@ -212,7 +213,7 @@ fn a_controller_that_cannot_hold_the_response_is_refused() {
     let outcome = track(&mut Obedient(0.0), &mut Steady, &scene(&[]), |_, _| {});
     assert!(matches!(
         outcome,
-        Err(TrackError::Controller(ControllerError::NoResponseLoop))
+        Err(ExperimentError::Controller(ControllerError::NoResponseLoop))
     ));
 }
 
@@ -247,7 +248,7 @@ fn a_sensor_that_stops_ends_tracking_and_keeps_the_points_before() {
     let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
     let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
     let reason = tracked.ended.unwrap();
-    assert!(reason.contains("did not change for half a period"), "{reason}");
+    assert!(reason.contains("a reading differed from its prediction"), "{reason}");
     assert!((5..15).contains(&tracked.points.len()), "{}", tracked.points.len());
     for point in &tracked.points {
         assert!(

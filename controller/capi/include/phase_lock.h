@@ -35,7 +35,7 @@ typedef enum PhaseLockStage {
 typedef enum PhaseLockFault {
   // No fault.
   PHASE_LOCK_FAULT_NONE = 0,
-  // A sensor read NaN, infinity, or more than 1e100 m, or the response did not change for half a period.
+  // A sensor read NaN, infinity, or more than 1e100 m, or the response did not change for a sixth of a period.
   PHASE_LOCK_FAULT_SENSOR = 1,
   // The response exceeded response_max.
   PHASE_LOCK_FAULT_RESPONSE_TOO_LARGE = 2,
@@ -45,6 +45,8 @@ typedef enum PhaseLockFault {
   PHASE_LOCK_FAULT_LOCK_LOST = 4,
   // No valid measurement for signal_timeout.
   PHASE_LOCK_FAULT_NO_SIGNAL = 5,
+  // A reading differed from its prediction by more than residual_max.
+  PHASE_LOCK_FAULT_IMPLAUSIBLE = 6,
 } PhaseLockFault;
 
 // An optional value; all zeros: not present.
@@ -105,6 +107,8 @@ typedef struct PhaseLockConfig {
   struct PhaseLockOptional acquire_timeout;
   // Longest time in the closed loop without a valid measurement, s.
   struct PhaseLockOptional signal_timeout;
+  // Largest difference between a reading and its prediction, as a share of the amplitude, beyond twice those of the last periods.
+  struct PhaseLockOptional residual_max;
   // Whether a sensor measures the base.
   bool reference_connected;
   // The response approaches its steady state 1 + approach_gain times as fast as under a constant drive; 0: constant drive.
@@ -122,7 +126,7 @@ typedef struct PhaseLockConfig {
 // Storage of a controller and its state, initialised by phase_lock_init. May be copied; its content is private.
 typedef struct PhaseLockController {
   // Opaque.
-  uint64_t words[256];
+  uint64_t words[320];
 } PhaseLockController;
 
 // Sensor readings of a sample, and the operator's request.

@@ -124,6 +124,7 @@ impl From<Output> for PhaseLockOutput {
                 Some(Fault::TimedOut) => PhaseLockFault::TimedOut,
                 Some(Fault::LockLost) => PhaseLockFault::LockLost,
                 Some(Fault::NoSignal) => PhaseLockFault::NoSignal,
+                Some(Fault::Implausible) => PhaseLockFault::Implausible,
             },
             locked: o.locked,
             settled: o.settled,

@@ -7,7 +7,7 @@ use phase_lock::{PhaseLock, State};
 #[derive(Clone, Copy)]
 pub struct PhaseLockController {
     /// Opaque.
-    pub words: [u64; 256],
+    pub words: [u64; 320],
 }
 
 /// Content of the storage.
@@ -82,6 +82,8 @@ pub struct PhaseLockConfig {
     pub acquire_timeout: PhaseLockOptional,
     /// Longest time in the closed loop without a valid measurement, s.
     pub signal_timeout: PhaseLockOptional,
+    /// Largest difference between a reading and its prediction, as a share of the amplitude, beyond twice those of the last periods.
+    pub residual_max: PhaseLockOptional,
     /// Whether a sensor measures the base.
     pub reference_connected: bool,
     /// The response approaches its steady state 1 + approach_gain times as fast as under a constant drive; 0: constant drive.
@@ -138,7 +140,7 @@ pub enum PhaseLockStage {
 pub enum PhaseLockFault {
     /// No fault.
     None = 0,
-    /// A sensor read NaN, infinity, or more than 1e100 m, or the response did not change for half a period.
+    /// A sensor read NaN, infinity, or more than 1e100 m, or the response did not change for a sixth of a period.
     Sensor = 1,
     /// The response exceeded response_max.
     ResponseTooLarge = 2,
@@ -148,6 +150,8 @@ pub enum PhaseLockFault {
     LockLost = 4,
     /// No valid measurement for signal_timeout.
     NoSignal = 5,
+    /// A reading differed from its prediction by more than residual_max.
+    Implausible = 6,
 }
 
 /// Drive until the next sample, and the controller's estimates.

@@ -12,7 +12,6 @@ mod predictor;
 mod settle;
 mod track;
 
-pub use bench::TrackError;
 pub use point::{Point, Tracked};
 pub use settle::{Criterion, Found};
 pub use track::track;

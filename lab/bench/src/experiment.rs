@@ -2,14 +2,16 @@
 //!
 //! It follows the state of the controller: a controller that switches the drive off ends the experiment at once.
 
+mod bench;
 mod record;
 
 use thiserror::Error;
 
-use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Rig, RigError};
+use crate::rig::{Controller, ControllerError, Drive, Fault, Rig, RigError};
 use crate::scene::Scene;
 use vines_model::theory::{B_SYMMETRY_BREAKING, BackbonePoint, SlowFlow};
 
+pub(crate) use bench::Bench;
 pub use record::{Record, Sample, drive_phases, table};
 
 /// Durations of the stages, in samples.
@@ -70,8 +72,23 @@ pub enum Stage {
     Locking,
     /// Phase resonance is held and measured.
     Holding,
+    /// The response is held at one level after another.
+    Tracking,
     /// The drive is off.
     Decaying,
+}
+
+impl Stage {
+    /// What the experiment does in it.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Locking => "searching for phase resonance",
+            Self::Holding => "holding the lock",
+            Self::Tracking => "tracking the backbone",
+            Self::Decaying => "recording the decay",
+        }
+    }
 }
 
 /// Why an experiment ended early.
@@ -97,12 +114,12 @@ pub enum ExperimentError {
         omega: f64,
     },
     /// The controller switched the drive off.
-    #[error("the controller switched the drive off after {periods:.1} periods while {stage}: {fault}")]
+    #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}", stage.name())]
     Tripped {
         /// Time since the start, periods of the drive.
         periods: f64,
         /// Stage of the experiment.
-        stage: &'static str,
+        stage: Stage,
         /// The reason.
         fault: Fault,
     },
@@ -135,7 +152,7 @@ pub fn run_into(
     plan: &Plan,
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    let mut bench = Bench { rig, controller, sample_time: plan.sample_time, samples };
+    let mut bench = Bench::new(rig, controller, plan.sample_time, samples);
     let mut settled = 0;
     loop {
         let command = bench.sample(Stage::Locking)?;
@@ -156,6 +173,7 @@ pub fn run_into(
         bench.sample(Stage::Decaying)?;
         progress(Stage::Decaying, n + 1, plan.decay);
     }
+    drop(bench);
     let samples = std::mem::take(samples);
     Ok(Record {
         sample_time: plan.sample_time,
@@ -163,93 +181,4 @@ pub fn run_into(
         samples,
         settled,
     })
-}
-
-/// Rig and controller, and the samples so far.
-struct Bench<'a, R: ?Sized, C: ?Sized> {
-    rig: &'a mut R,
-    controller: &'a mut C,
-    sample_time: f64,
-    samples: &'a mut Vec<Sample>,
-}
-
-impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
-    fn sample(&mut self, stage: Stage) -> Result<Command, ExperimentError> {
-        let sensors = self.rig.sense()?;
-        let active = stage != Stage::Decaying;
-        let asked = self.controller.sample(sensors, active).map_err(ExperimentError::from);
-        let command = match asked.and_then(checked) {
-            Ok(command) => command,
-            Err(error) => {
-                // A failed controller must not leave the rig driven. An error of the rig would not change the result.
-                let _ = self.rig.advance(Drive::default(), self.sample_time);
-                return Err(error);
-            }
-        };
-        self.samples.push(Sample {
-            time: self.samples.len() as f64 * self.sample_time,
-            sensors,
-            command,
-            ground_truth: self.rig.ground_truth()?,
-        });
-        self.rig.advance(command.drive, self.sample_time)?;
-        if active && command.state.is_some_and(LoopState::is_latched) {
-            self.ramp_down(command)?;
-            return Err(self.tripped(stage, &command));
-        }
-        Ok(command)
-    }
-
-    /// Follows the controller's ramp after a fault until the drive is off.
-    fn ramp_down(&mut self, mut command: Command) -> Result<(), ExperimentError> {
-        while command.drive.amplitude > 0.0 {
-            let asked = self.controller.sample(self.rig.sense()?, true)?;
-            // A ramp never rises, whatever the controller says.
-            let amplitude = if asked.drive.amplitude < command.drive.amplitude {
-                asked.drive.amplitude
-            } else {
-                0.0
-            };
-            command = Command { drive: Drive { amplitude, ..asked.drive }, ..asked };
-            self.rig.advance(checked(command)?.drive, self.sample_time)?;
-        }
-        Ok(())
-    }
-
-    fn tripped(&self, stage: Stage, command: &Command) -> ExperimentError {
-        match command.fault {
-            Some(Fault::TimedOut) => self.no_lock(command),
-            fault => ExperimentError::Tripped {
-                periods: self.periods(command),
-                stage: match stage {
-                    Stage::Locking => "searching for phase resonance",
-                    Stage::Holding => "holding the lock",
-                    Stage::Decaying => "recording the decay",
-                },
-                fault: fault.unwrap_or(Fault::LockLost),
-            },
-        }
-    }
-
-    fn no_lock(&self, command: &Command) -> ExperimentError {
-        ExperimentError::NoLock {
-            periods: self.periods(command),
-            phase_error: command.phase_error.to_degrees(),
-            omega: command.drive.omega,
-        }
-    }
-
-    fn periods(&self, command: &Command) -> f64 {
-        self.samples.len() as f64 * self.sample_time * command.drive.omega / std::f64::consts::TAU
-    }
-}
-
-/// A command with a drive that a rig can take.
-fn checked(command: Command) -> Result<Command, ExperimentError> {
-    let Drive { omega, amplitude, displacement } = command.drive;
-    if [omega, amplitude, displacement].iter().all(|value| value.is_finite()) {
-        Ok(command)
-    } else {
-        Err(ExperimentError::NotANumber(command.drive))
-    }
 }

@@ -7,6 +7,7 @@ use indicatif::ProgressBar;
 use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
 use super::{
+    check::LoopCheckArguments,
     endpoint::{Endpoint, ReachArguments},
     failure::Failure,
     log_warnings, result,
@@ -55,6 +56,9 @@ pub(super) struct Arguments {
     #[command(flatten)]
     reach: ReachArguments,
 
+    #[command(flatten)]
+    loop_check: LoopCheckArguments,
+
     /// Print tracked.json instead of the table
     #[arg(long)]
     json: bool,
@@ -66,6 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(Failure::input)?;
     writable(&arguments.out)?;
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
+    arguments.loop_check.before(&mut open.rig, &scene)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let tracked = track(&mut open.rig, &mut controller, &scene, |done, _| {
         bar.set_position(done as u64);

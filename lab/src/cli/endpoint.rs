@@ -14,7 +14,10 @@ use vines::{
     scene::{Resonance, Scene},
 };
 
-use super::{failure::Failure, interrupt::Interruptible};
+use super::{
+    failure::Failure,
+    interrupt::{Interruptible, stop_flag},
+};
 
 /// An implementation, as written on the command line.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,7 +91,8 @@ impl Endpoint {
             }
         };
         let (d, samples) = (scene.dimensionless(), scene.controller.samples_per_period);
-        let rig = Interruptible::around(Chain::around(rig, &scene.chain, &d, samples), scene.sample_time())?;
+        let rig = Chain::around(rig, &scene.chain, &d, samples);
+        let rig = Interruptible::around(rig, scene.sample_time(), &stop_flag()?);
         Ok(OpenRig { rig, pace, timing })
     }
 

@@ -2,10 +2,7 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use vines::{
-    backbone::TrackError, experiment::ExperimentError, net::LinkError, pack::PackError, rig::RigError,
-    scene::SceneError,
-};
+use vines::{experiment::ExperimentError, net::LinkError, pack::PackError, rig::RigError, scene::SceneError};
 
 use super::interrupt::{INTERRUPTED, Interrupted};
 
@@ -67,15 +64,6 @@ impl From<ExperimentError> for Failure {
     fn from(error: ExperimentError) -> Self {
         match &error {
             ExperimentError::Rig(cause) => Self::of_rig(cause, &error),
-            _ => Self::run(error),
-        }
-    }
-}
-
-impl From<TrackError> for Failure {
-    fn from(error: TrackError) -> Self {
-        match &error {
-            TrackError::Rig(cause) => Self::of_rig(cause, &error),
             _ => Self::run(error),
         }
     }

@@ -15,6 +15,7 @@ use vines::{
 };
 
 use super::{
+    check::LoopCheckArguments,
     endpoint::{Endpoint, ReachArguments, check},
     failure::Failure,
     log_warnings,
@@ -57,6 +58,9 @@ pub(super) struct Arguments {
     #[command(flatten)]
     reach: ReachArguments,
 
+    #[command(flatten)]
+    loop_check: LoopCheckArguments,
+
     /// Print identification.json instead of the table
     #[arg(long)]
     json: bool,
@@ -74,6 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             (Endpoint::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
         }
     };
+    arguments.loop_check.before(&mut open.rig, &scene)?;
     let mut controller = arguments.controller.controller(&scene, reach, open.pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(&plan);
@@ -169,11 +174,7 @@ fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {
     if !done.is_multiple_of(64) && done != of {
         return;
     }
-    let message = match stage {
-        Stage::Locking => "searching for phase resonance",
-        Stage::Holding => "holding the lock",
-        Stage::Decaying => "recording the decay",
-    };
+    let message = stage.name();
     if bar.message() != message {
         bar.set_message(message);
         bar.set_length(of as u64);

@@ -3,7 +3,7 @@
 use std::{
     process,
     sync::{
-        Arc,
+        Arc, OnceLock,
         atomic::{AtomicBool, Ordering},
     },
 };
@@ -17,7 +17,11 @@ pub(super) const INTERRUPTED: u8 = 130;
 
 /// A flag that a signal sets. A second signal ends the program at once.
 pub(super) fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
-    let flag = Arc::new(AtomicBool::new(false));
+    static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+    if let Some(flag) = FLAG.get() {
+        return Ok(Arc::clone(flag));
+    }
+    let flag = Arc::clone(FLAG.get_or_init(Arc::default));
     let signal = Arc::clone(&flag);
     ctrlc::set_handler(move || {
         if signal.swap(true, Ordering::Relaxed) {
@@ -42,8 +46,8 @@ pub(super) struct Interruptible {
 
 impl Interruptible {
     /// `sample_time` in s.
-    pub(super) fn around(rig: Box<dyn Rig>, sample_time: f64) -> Result<Self, Failure> {
-        Ok(Self { rig, sample_time, stop: stop_flag()? })
+    pub(super) fn around(rig: Box<dyn Rig>, sample_time: f64, stop: &Arc<AtomicBool>) -> Self {
+        Self { rig, sample_time, stop: Arc::clone(stop) }
     }
 }
 

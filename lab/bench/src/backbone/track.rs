@@ -1,10 +1,11 @@
 //! The tracking of the backbone.
 
-use super::bench::{Bench, TrackError};
+use super::bench::Bench;
 use super::peak;
 use super::point::{Point, Tracked};
 use super::predictor::{self, Known};
 use super::settle::{Criterion, Found};
+use crate::experiment::{self, ExperimentError, Sample, Stage};
 use crate::identification::{Cycle, Slopes, classify, regime_by_response};
 use crate::rig::{Controller, LoopState, Move, Rig};
 use crate::scene::{Resonance, Scene};
@@ -25,20 +26,18 @@ pub fn track(
     controller: &mut (impl Controller + ?Sized),
     scene: &Scene,
     mut progress: impl FnMut(usize, usize),
-) -> Result<Tracked, TrackError> {
+) -> Result<Tracked, ExperimentError> {
     let settings = scene.backbone;
     let levels = settings.levels();
+    let mut samples = Vec::new();
     let mut bench = Bench {
-        rig,
-        controller,
-        sample_time: scene.sample_time(),
+        bench: experiment::Bench::new(rig, controller, scene.sample_time(), &mut samples),
+        stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
-        taken: 0,
-        samples: Vec::new(),
-        periods: 0.0,
     };
     approach(&mut bench, scene.lock_periods())?;
     let periods_to_lock = bench.periods;
+    bench.stage = Stage::Tracking;
     let phases: &[f64] = match scene.resonance.resonance {
         Resonance::Phase => &[0.0],
         Resonance::Peak => &peak::PHASES,
@@ -71,7 +70,8 @@ pub fn track(
         Resonance::Phase => scans.swap_remove(0),
         Resonance::Peak => peak::peaks(&scans, &scene.dimensionless()),
     };
-    Ok(Tracked { points, periods_to_lock, periods: bench.periods, ended })
+    let periods = bench.periods;
+    Ok(Tracked { points, periods_to_lock, periods, ended })
 }
 
 /// What is to be held next.
@@ -100,7 +100,7 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
     scene: &Scene,
     order: &Order,
     last: Option<(Point, f64)>,
-) -> Result<Point, TrackError> {
+) -> Result<Point, ExperimentError> {
     let d = scene.dimensionless();
     let Order { level, phase, ref known } = *order;
     let (g, sigma) = predictor::change(scene.backbone.predictor, known, level, &d);
@@ -123,7 +123,8 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
         amplitude: d.amplitude(g),
         omega: d.omega_change(sigma),
     };
-    bench.controller.hold_response(to, bench.target + phase)?;
+    let target = bench.target + phase;
+    bench.controller.hold_response(to, target)?;
     let changed = last.map_or(FIRST, |(_, held)| if held == phase { 0.0 } else { PHASE });
     hold(bench, scene, order, periods + changed)
 }
@@ -169,16 +170,22 @@ fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
 }
 
 /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
-fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(bench: &mut Bench<R, C>, most: f64) -> Result<(), TrackError> {
+fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
+    bench: &mut Bench<R, C>,
+    most: f64,
+) -> Result<(), ExperimentError> {
     let mut near = 0;
     while near < NEAR_FOR {
-        if bench.periods >= most {
-            return Err(TrackError::NoLock { periods: most });
-        }
         bench.samples.clear();
         let cycle = bench.cycle()?;
+        let Some(Sample { command, .. }) = bench.samples.last().copied() else {
+            continue;
+        };
+        if bench.periods >= most {
+            return Err(bench.no_lock(&command));
+        }
         // A motion that is being captured is not to be held yet.
-        let captured = bench.samples.last().and_then(|sample| sample.command.state) != Some(LoopState::Capturing);
+        let captured = command.state != Some(LoopState::Capturing);
         let driven = cycle.base.norm() > 0.0 && captured;
         near = if driven && cycle.phase_error.abs() < NEAR {
             near + 1
@@ -209,7 +216,7 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     scene: &Scene,
     order: &Order,
     move_periods: f64,
-) -> Result<Point, TrackError> {
+) -> Result<Point, ExperimentError> {
     let level = order.level;
     let (settings, d) = (&scene.backbone, scene.dimensionless());
     let start = bench.periods;

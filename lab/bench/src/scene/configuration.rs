@@ -5,7 +5,7 @@ use std::f64::consts::PI;
 use lovines::State;
 use phase_lock::{Config, LockCriterion};
 
-use super::{Scene, plant::symbols};
+use super::{Scene, Sensor, plant::symbols};
 
 impl Scene {
     /// Parameters and start of the plant, under the names of the FMU's variables.
@@ -27,8 +27,10 @@ impl Scene {
         let damping = 0.5 * d.epsilon * d.lambda;
         let approach_gain = c.approach_gain.unwrap_or_else(|| approach_gain(damping));
         // Without periods or without a drive, steps.
-        let rate =
-            |periods: f64| Some(self.amplitude / (periods * period)).filter(|rate| *rate > 0.0 && rate.is_finite());
+        let rate = |amplitude: f64, periods: f64| {
+            Some(amplitude / (periods * period)).filter(|rate| *rate > 0.0 && rate.is_finite())
+        };
+        let amplitude_max = d.amplitude(self.g_max());
         let defaults = Config::for_resonance(omega0, self.amplitude);
         Config {
             sample_time: self.sample_time(),
@@ -40,13 +42,22 @@ impl Scene {
             phase_target: c.phase_target_radians(),
             delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0
                 + (c.delay + f64::from(u8::from(self.resonance.is_late()))) * self.sample_time(),
-            amplitude_max: Some(d.amplitude(self.g_max())),
+            amplitude_max: Some(amplitude_max),
             response_max: Some(c.c_max * d.b),
-            ramp_rate: rate(c.ramp_periods),
-            release_rate: rate(c.release_periods),
-            omega_rate: c.omega_rate.map(|rate| rate * omega0 / period),
+            ramp_rate: match c.ramp_periods {
+                Some(periods) => rate(self.amplitude, periods),
+                // The velocity of a base that moves with the largest amplitude.
+                None => Some(amplitude_max * omega0),
+            },
+            release_rate: rate(self.amplitude, c.release_periods),
+            omega_rate: Some(match c.omega_rate {
+                Some(rate) => rate * omega0 / period,
+                // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
+                None => (c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period),
+            }),
             acquire_timeout: Some(self.lock_periods() * period),
             signal_timeout: Some(c.silence_periods * period),
+            residual_max: Some(c.residual_max.unwrap_or_else(|| self.residual())),
             reference_connected: self.chain.reference,
             approach_gain,
             capture_response: self.captures().then_some(CAPTURE * d.b),
@@ -68,6 +79,19 @@ impl Scene {
             dwell: c.dwell_periods,
             ..defaults
         }
+    }
+
+    /// Largest plausible difference between a reading and its prediction, as a share of the amplitude.
+    fn residual(&self) -> f64 {
+        let impulse = match self.resonance.sensor {
+            // An impact changes the velocity by epsilon (1 + r) times that of the particle, twice b omega0 or so, within a sample.
+            Sensor::Acceleration => {
+                let d = self.dimensionless();
+                2.0 * d.epsilon * (1.0 + d.r) * self.controller.samples_per_period / std::f64::consts::TAU
+            }
+            Sensor::V | Sensor::Q1 => 0.0,
+        };
+        RESIDUAL + impulse
     }
 
     /// Largest drive, base amplitude over `b epsilon`: as set, or four times the larger of the requested drive and that at which
@@ -118,6 +142,8 @@ impl Scene {
     }
 }
 
+/// Share of the amplitude by which a reading may differ from its prediction: a resonant response changes slowly.
+const RESIDUAL: f64 = 0.3;
 /// Response amplitude over b at which impacts certainly occur: a particle at rest in the middle is hit at 1.
 const CAPTURE: f64 = 1.1;
 

@@ -39,14 +39,19 @@ pub struct Controller {
     /// Response above which the drive is shut down, over b.
     #[serde(rename = "C_max")]
     pub c_max: f64,
-    /// Duration of the ramp of the drive to its amplitude, and to zero after a fault, natural periods; 0 to jump.
-    pub ramp_periods: f64,
+    /// Duration of the ramp of the drive to its amplitude, and to zero after a fault, natural periods; 0 to jump. By default the
+    /// amplitude changes as fast as a base with the largest one moves.
+    pub ramp_periods: Option<f64>,
     /// Duration of the ramp of the drive to zero at the release, natural periods; 0 to switch off at once.
     pub release_periods: f64,
-    /// Largest change of the frequency in a natural period, in units of omega0; by default unlimited.
+    /// Largest change of the frequency in a natural period, in units of omega0; by default the distance of the two limits, or
+    /// as much in half a time constant of the detector if that is shorter.
     pub omega_rate: Option<f64>,
     /// Longest time without a valid measurement, natural periods.
     pub silence_periods: f64,
+    /// Largest difference between a reading and its prediction, as a share of the amplitude, beyond twice those of the last periods; by
+    /// default 0.3, and for an accelerometer what an impact adds.
+    pub residual_max: Option<f64>,
     /// How much faster than under a constant drive the response approaches its steady state; by default from the damping.
     pub approach_gain: Option<f64>,
     /// Whether the response first rises until impacts begin; by default where the start is at rest.
@@ -70,10 +75,11 @@ impl Default for Controller {
             dwell_periods: 20,
             g_max: None,
             c_max: 4.0,
-            ramp_periods: 0.0,
+            ramp_periods: None,
             release_periods: 0.0,
             omega_rate: None,
             silence_periods: 20.0,
+            residual_max: None,
             approach_gain: None,
             capture: None,
             delay: 0.0,
@@ -140,7 +146,11 @@ impl Controller {
 
     fn check_limits(&self) -> Result<(), SceneError> {
         for (key, value, unit) in [
-            ("controller.ramp_periods", self.ramp_periods, "(natural periods)"),
+            (
+                "controller.ramp_periods",
+                self.ramp_periods.unwrap_or(0.0),
+                "(natural periods)",
+            ),
             ("controller.release_periods", self.release_periods, "(natural periods)"),
             (
                 "controller.approach_gain",
@@ -160,6 +170,11 @@ impl Controller {
                 "(omega0 per natural period)",
             ),
             ("controller.silence_periods", self.silence_periods, "(natural periods)"),
+            (
+                "controller.residual_max",
+                self.residual_max.unwrap_or(1.0),
+                "(of the amplitude)",
+            ),
         ] {
             Quantity::new(key, value, unit).positive()?;
         }

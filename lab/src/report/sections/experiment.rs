@@ -62,7 +62,7 @@ fn recorded(
         // Most locks come long before the time limit.
         let part = match stage {
             Stage::Locking => 0.6 * part,
-            Stage::Holding => 0.6 + 0.1 * part,
+            Stage::Holding | Stage::Tracking => 0.6 + 0.1 * part,
             Stage::Decaying => 0.7 + 0.2 * part,
         };
         if part > reported.get() + 0.01 {

@@ -1,0 +1,108 @@
+//! Plausibility of readings: one that differs from the detector's prediction by far more than those of the last periods shows that a
+//! sensor, the drive or the clock has failed, often within a few samples.
+
+use core::f64::consts::TAU;
+
+use crate::config::Config;
+use crate::detector::Estimate;
+
+/// Time in the closed loop before the check begins, in time constants of the detector, and in turns.
+const WARM_UP: [f64; 2] = [6.0, 10.0];
+/// Ratio of the drive to the drive with the lag of the detector, or its inverse, from which the drive changes fast, and turns for which
+/// its sensor may differ more after that, by this share of the larger amplitude.
+const FAST: f64 = 1.2;
+const SETTLES: f64 = 4.0;
+const SLACK: f64 = 0.8;
+/// Phase, rad, after which a reading that does not change at all needs a smaller difference: this share of the limit. Shorter pauses are
+/// those of a connection that loses a few samples.
+const PAUSE: f64 = TAU / 12.0;
+const PAUSE_SHARE: f64 = 0.15;
+/// Differences that count as normal, in units of the largest one of a period.
+const NORMAL: f64 = 2.0;
+
+/// Sum of the amplitudes of all harmonics above the fundamental, as a share of the limit, above which a sensor saturates, and turns for
+/// which it must last: a change of the drive disturbs the harmonics for one or two.
+const DISTORTION: f64 = 0.5;
+const LASTS: f64 = 5.0;
+
+/// Coefficients of the check.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Plausibility {
+    /// Largest difference beyond the normal one, as a share of the amplitude.
+    limit: Option<f64>,
+    /// s
+    warm_up: f64,
+}
+
+/// Largest differences in this period and in the two before it, m, for each channel.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Differences {
+    largest: [[f64; 3]; 2],
+    /// Phase since the start of the period, rad.
+    phase: f64,
+    /// Phase for which each channel has been distorted, rad.
+    distorted: [f64; 2],
+    /// Phase since the amplitude of each channel changed fast, rad.
+    steady: [f64; 2],
+    /// Whether the last readings were plausible.
+    implausible: bool,
+}
+
+impl Plausibility {
+    /// The check of a configuration.
+    pub fn new(config: &Config) -> Self {
+        Self {
+            limit: config.residual_max,
+            warm_up: (WARM_UP[0] / config.bandwidth).max(WARM_UP[1] * TAU / config.omega_start),
+        }
+    }
+
+    /// Takes differences between readings and their predictions, m, the estimates, the factors by which the amplitude has
+    /// changed since, and the times for which the readings have not
+    /// changed, s. `omega` in rad/s.
+    pub fn take(
+        &self,
+        state: &mut Differences,
+        differences: [(f64, &Estimate, f64); 2],
+        unchanged: [f64; 2],
+        omega: f64,
+        sample_time: f64,
+    ) {
+        let turn = omega * sample_time;
+        state.phase += turn;
+        if state.phase >= TAU {
+            state.phase = 0.0;
+            for [now, last, before] in &mut state.largest {
+                (*before, *last, *now) = (*last, *now, 0.0);
+            }
+        }
+        state.implausible = false;
+        for (n, [now, last, before]) in state.largest.iter_mut().enumerate() {
+            let (difference, estimate, change) = differences[n];
+            let amplitude = estimate.amplitude();
+            let share = if unchanged[n] * omega > PAUSE { PAUSE_SHARE } else { 1.0 };
+            let difference = difference.abs();
+            // A fault may have begun at the end of the last period.
+            let normal = NORMAL * last.min(*before);
+            if let Some(limit) = self.limit {
+                let fast = !(1.0 / FAST..FAST).contains(&change);
+                let [steady, distorted] = [&mut state.steady[n], &mut state.distorted[n]];
+                *steady = if fast { 0.0 } else { *steady + turn };
+                let settled = *steady > SETTLES * TAU;
+                let clear = !settled || estimate.harmonics() <= DISTORTION * limit * amplitude;
+                *distorted = if clear { 0.0 } else { *distorted + turn };
+                let slack = if settled { 0.0 } else { SLACK * change.max(1.0) };
+                let expected = (share * limit * change + slack) * amplitude + normal;
+                state.implausible |= difference > expected || *distorted > LASTS * TAU;
+            }
+            *now = now.max(difference);
+        }
+    }
+
+    /// Whether the last readings show a fault, `closed` seconds after the loop was closed.
+    pub fn refuses(&self, state: &Differences, closed: f64) -> bool {
+        state.implausible && closed > self.warm_up
+    }
+}
