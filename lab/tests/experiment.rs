@@ -15,7 +15,7 @@ fn scene(settings: &[&str]) -> Scene {
     Scene::parse("dimensionless.toml", text, &overrides).unwrap()
 }
 
-fn plan(scene: &Scene) -> Plan {
+fn plan(scene: &Scene) -> Plan<'_> {
     Plan::of(scene)
 }
 

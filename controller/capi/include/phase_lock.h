@@ -111,6 +111,8 @@ typedef struct PhaseLockConfig {
   double approach_gain;
   // Response amplitude, m, at which impacts certainly occur; it is visited first, so that a particle at rest joins the motion.
   struct PhaseLockOptional capture_response;
+  // Largest response amplitude, m, of the motion that is wanted; a captured motion is led below it.
+  struct PhaseLockOptional captured_max;
   // Time for which the lock criterion must hold, periods.
   uint32_t dwell;
   // Number of harmonics of the adaptive filter, 1 to 8; 0: synchronous demodulator.
@@ -122,7 +124,7 @@ typedef struct PhaseLockConfig {
 // Storage of a controller and its state, initialised by phase_lock_init. May be copied; its content is private.
 typedef struct PhaseLockController {
   // Opaque.
-  uint64_t words[256];
+  uint64_t words[272];
 } PhaseLockController;
 
 // Sensor readings of a sample, and the operator's request.

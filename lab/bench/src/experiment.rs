@@ -6,6 +6,7 @@ mod record;
 
 use thiserror::Error;
 
+use crate::identification::{Regime, classify, regime_by_response};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Rig, RigError};
 use crate::scene::Scene;
 use vines_model::theory::{B_SYMMETRY_BREAKING, BackbonePoint, SlowFlow};
@@ -13,34 +14,42 @@ use vines_model::theory::{B_SYMMETRY_BREAKING, BackbonePoint, SlowFlow};
 pub use record::{Record, Sample, drive_phases, table};
 
 /// Durations of the stages, in samples.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plan {
+#[derive(Debug, Clone, Copy)]
+pub struct Plan<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
     /// Time from sample to sample, s.
     pub sample_time: f64,
     /// Time limit for the lock.
     pub lock: usize,
+    /// How long a motion that is not 1:1 may last before the lock.
+    pub irregular: usize,
     /// How long the lock is held and recorded once it has settled.
     pub hold: usize,
     /// Length of the recorded decay.
     pub decay: usize,
 }
 
-impl Plan {
+impl<'a> Plan<'a> {
     /// The plan of a scene.
     #[must_use]
-    pub fn of(scene: &Scene) -> Self {
+    pub fn of(scene: &'a Scene) -> Self {
         let sample_time = scene.sample_time();
         let period = scene.dimensionless().natural_period();
         let samples = |periods: f64| (periods * period / sample_time).round() as usize;
         Self {
+            scene,
             sample_time,
             lock: samples(scene.lock_periods()),
+            irregular: samples(IRREGULAR[0].max(IRREGULAR[1] * scene.relaxation_periods())),
             hold: samples(scene.record.hold_periods),
             decay: samples(decay_periods(scene)),
         }
     }
 }
 
+/// How long a motion that is not 1:1 may last before the lock: periods, and relaxation times of the structure.
+const IRREGULAR: [f64; 2] = [300.0, 6.0];
 /// Length of the recorded decay over the one that theory expects.
 const DECAY_MARGIN: f64 = 1.25;
 /// Longest recorded decay, natural periods, that is not asked for.
@@ -96,6 +105,12 @@ pub enum ExperimentError {
         /// Last frequency, rad/s.
         omega: f64,
     },
+    /// The motion stays irregular.
+    #[error("no lock: for {periods:.0} periods the motion has not been a 1:1 motion, and only that can be locked")]
+    Irregular {
+        /// How long, natural periods.
+        periods: f64,
+    },
     /// The controller switched the drive off.
     #[error("the controller switched the drive off after {periods:.1} periods while {stage}: {fault}")]
     Tripped {
@@ -136,7 +151,7 @@ pub fn run_into(
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
     let mut bench = Bench { rig, controller, sample_time: plan.sample_time, samples };
-    let mut settled = 0;
+    let (mut settled, mut irregular) = (0, 0);
     loop {
         let command = bench.sample(Stage::Locking)?;
         progress(Stage::Locking, settled, plan.lock);
@@ -144,8 +159,22 @@ pub fn run_into(
             break;
         }
         settled += 1;
-        if settled >= plan.lock {
-            return Err(bench.no_lock(&command));
+        if settled.is_multiple_of(plan.hold) {
+            irregular = if bench.is_irregular(plan, &command) {
+                irregular + plan.hold
+            } else {
+                0
+            };
+        }
+        if irregular >= plan.irregular || settled >= plan.lock {
+            // The reason why there is no lock matters more than an error of the rig.
+            let _ = bench.rig.advance(Drive::default(), plan.sample_time);
+            let periods = irregular as f64 * plan.sample_time / plan.scene.dimensionless().natural_period();
+            return Err(if irregular >= plan.irregular {
+                ExperimentError::Irregular { periods }
+            } else {
+                bench.no_lock(&command)
+            });
         }
     }
     for n in 0..plan.hold {
@@ -198,6 +227,17 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
             return Err(self.tripped(stage, &command));
         }
         Ok(command)
+    }
+
+    /// Whether the last samples, as many as those of the hold, are neither those of a 1:1 motion nor of the linear mode.
+    fn is_irregular(&self, plan: &Plan, command: &Command) -> bool {
+        let last = &self.samples[self.samples.len().saturating_sub(plan.hold)..];
+        let Drive { omega, amplitude, .. } = command.drive;
+        let regime = match classify(last, self.sample_time, omega).1 {
+            Regime::Unknown => regime_by_response(last, plan.scene, amplitude, omega),
+            told => told,
+        };
+        command.state != Some(LoopState::Capturing) && regime == Regime::Other
     }
 
     /// Follows the controller's ramp after a fault until the drive is off.

@@ -99,13 +99,11 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
             .map(|c| mean(c.iter().copied()))
             .collect();
         let value = Estimate::mean(&per_period);
+        // The hold belongs to the periods that give the limit: their noise is the same, and only the rest counts.
+        let rest = (limit.uncertainty.powi(2) - response.uncertainty.powi(2)).abs().sqrt();
         Estimate::new(
             value.value + b_slope * remaining,
-            &[
-                value.uncertainty,
-                b_slope * limit.uncertainty / d.b,
-                b_slope * response.uncertainty / d.b,
-            ],
+            &[value.uncertainty, b_slope * rest / d.b],
         )
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
