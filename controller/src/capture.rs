@@ -30,7 +30,7 @@ const BELOW: f64 = 0.97;
 /// Response above which the motion is another one, as a share of the largest wanted one.
 const ABOVE: f64 = 1.0005;
 /// Periods in which the response falls by a factor of e on the descent, if the frequency follows.
-const DESCENT: f64 = 100.0;
+const DESCENT: f64 = 60.0;
 /// Phase error, rad, at which the descent waits for the frequency: near the fold the resonance frequency changes fast.
 const FOLLOWED: f64 = 0.1;
 /// Smallest drive of the descent, as a share of that which holds the response: without a drive the phase is undefined.

@@ -9,6 +9,7 @@ use thiserror::Error;
 use crate::identification::{Regime, classify, regime_by_response};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Rig, RigError};
 use crate::scene::Scene;
+use vines_model::orbit::phase_resonant;
 use vines_model::theory::{B_SYMMETRY_BREAKING, BackbonePoint, SlowFlow};
 
 pub use record::{Record, Sample, drive_phases, table};
@@ -22,7 +23,7 @@ pub struct Plan<'a> {
     pub sample_time: f64,
     /// Time limit for the lock.
     pub lock: usize,
-    /// How long a motion that is not 1:1 may last before the lock.
+    /// How long the motion may be other than 1:1 before the lock, in total.
     pub irregular: usize,
     /// How long the lock is held and recorded once it has settled.
     pub hold: usize,
@@ -41,15 +42,24 @@ impl<'a> Plan<'a> {
             scene,
             sample_time,
             lock: samples(scene.lock_periods()),
-            irregular: samples(IRREGULAR[0].max(IRREGULAR[1] * scene.relaxation_periods())),
+            irregular: samples(irregular_periods(scene)),
             hold: samples(scene.record.hold_periods),
             decay: samples(decay_periods(scene)),
         }
     }
 }
 
-/// How long a motion that is not 1:1 may last before the lock: periods, and relaxation times of the structure.
-const IRREGULAR: [f64; 2] = [300.0, 6.0];
+/// How long the motion may be other than 1:1 before the lock, in total, in natural periods: some relaxation times of the structure, or
+/// less where the exact orbits show that there is nothing to lock.
+fn irregular_periods(scene: &Scene) -> f64 {
+    let d = scene.dimensionless();
+    if phase_resonant(&d).iter().any(|orbit| orbit.stable) || !scene.controller.is_at_phase_resonance() {
+        f64::max(600.0, 10.0 * scene.relaxation_periods())
+    } else {
+        60.0
+    }
+}
+
 /// Length of the recorded decay over the one that theory expects.
 const DECAY_MARGIN: f64 = 1.25;
 /// Longest recorded decay, natural periods, that is not asked for.
@@ -106,7 +116,7 @@ pub enum ExperimentError {
         omega: f64,
     },
     /// The motion stays irregular.
-    #[error("no lock: for {periods:.0} periods the motion has not been a 1:1 motion, and only that can be locked")]
+    #[error("no lock: for {periods:.0} periods in total the motion was not 1:1, and only such a motion can be locked")]
     Irregular {
         /// How long, natural periods.
         periods: f64,
@@ -160,8 +170,8 @@ pub fn run_into(
         }
         settled += 1;
         if settled.is_multiple_of(plan.hold) {
-            irregular = if bench.is_irregular(plan, &command) {
-                irregular + plan.hold
+            irregular += if bench.is_irregular(plan, &command) {
+                plan.hold
             } else {
                 0
             };

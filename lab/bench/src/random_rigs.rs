@@ -193,7 +193,7 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
                 ..row
             }
         }
-        Err(IdentificationError::Regime { regime, sigma, c }) => {
+        Err(IdentificationError::Regime { regime, sigma, c, .. }) => {
             let off = distance(sigma, c);
             Row {
                 outcome: Outcome::OtherRegime,

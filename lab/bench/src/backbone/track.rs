@@ -8,7 +8,7 @@ use super::settle::{Criterion, Found};
 use crate::experiment::Sample;
 use crate::identification::{Cycle, Slopes, classify, regime_by_response};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError};
-use crate::scene::Scene;
+use crate::scene::{Predictor, Scene};
 use vines_model::numerics::Estimate;
 use vines_model::theory::SlowFlow;
 
@@ -142,7 +142,7 @@ pub fn track(
             amplitude: d.amplitude(g),
             omega: d.omega_change(sigma),
         })?;
-        let wait = periods + if points.is_empty() { FIRST } else { 0.0 };
+        let wait = periods + if points.is_empty() { FIRST } else { -LAST };
         match hold(&mut bench, scene, level, wait, &slopes(scene, &known, level)) {
             Ok(point) => points.push(point),
             // What was measured is kept.
@@ -160,6 +160,8 @@ pub fn track(
 const REACHED: f64 = 0.01;
 /// Periods of the first level more than those of the move: the start of the loop disturbs the particle, too.
 const FIRST: f64 = 32.0;
+/// Last periods of a move, in which the response is within 1 % of its level.
+const LAST: f64 = 1.0;
 /// Share of the drive that a move may need in addition to the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
 
@@ -174,14 +176,16 @@ fn move_periods(scene: &Scene, from: Option<&Known>, level: f64) -> f64 {
 /// Slopes of the backbone by the last two points, or what is known without them: their order of magnitude.
 fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
     let d = scene.dimensionless();
-    let drift = SlowFlow::new(d.lambda, d.r)
-        .drift(level)
-        .map_or([0.0; 2], |drift| [drift.g, drift.sigma]);
+    let flow = SlowFlow::new(d.lambda, d.r);
+    let drift = flow.drift(level).map_or([0.0; 2], |drift| [drift.g, drift.sigma]);
     let (g, sigma) = match known {
         [.., one, other] if one.c != other.c => {
-            let slope = |from: f64, to: f64| (to - from) / (other.c - one.c);
-            let pair = |slope: f64| [slope, 0.5 * slope.abs() + 0.5];
-            (pair(slope(one.g, other.g)), pair(slope(one.sigma, other.sigma)))
+            // Towards the fold the slopes grow from level to level.
+            let half = 0.05 * (other.c - one.c);
+            let at = |c: f64| predictor::change(Predictor::Previous, known, c, &flow);
+            let ((g, sigma), (g_before, sigma_before)) = (at(level + half), at(level - half));
+            let pair = |change: f64| [change / (2.0 * half), 0.5 * (change / (2.0 * half)).abs() + 0.5];
+            (pair(g - g_before), pair(sigma - sigma_before))
         }
         _ => ([1.0, 2.0], [0.0, 5.0]),
     };

@@ -3,10 +3,7 @@
 use serde::Serialize;
 use vines_model::Dimensionless;
 
-use super::{
-    PHASE_RESONANCE,
-    exact_curve::{Distance, ExactCurve},
-};
+use super::exact_curve::{Distance, ExactCurve};
 use crate::backbone::{Point, Tracked};
 use crate::scene::Scene;
 
@@ -42,7 +39,7 @@ impl TrackedComparison {
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
         let parameters = scene.dimensionless();
         let curve = ExactCurve::of(&parameters);
-        let at_resonance = scene.controller.phase_target == PHASE_RESONANCE;
+        let at_resonance = scene.controller.is_at_phase_resonance();
         let compare = |point: &Point| TrackedPoint {
             point: *point,
             exact: at_resonance
