@@ -1,7 +1,9 @@
 //! Prediction of the drive and the frequency at the next level.
 
-use crate::scene::Predictor;
-use vines_model::theory::{BranchSide, SlowFlow};
+use crate::identification::Slopes;
+use crate::scene::{Predictor, Scene};
+use vines_model::Dimensionless;
+use vines_model::theory::{SlowFlow, backbone_at_level};
 
 /// A working point: response amplitude, drive amplitude, detuning; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -12,20 +14,16 @@ pub struct Known {
 }
 
 /// Change of `(G, sigma)` from the last known point to the level `c`; zeros where nothing is known.
-pub fn change(feed: Predictor, known: &[Known], c: f64, slow_flow: &SlowFlow) -> (f64, f64) {
+pub fn change(feed: Predictor, known: &[Known], c: f64, scene: &Dimensionless) -> (f64, f64) {
     match (feed, known) {
         (Predictor::None, _) | (_, []) => (0.0, 0.0),
-        (Predictor::Theory, [.., last]) => by_theory(slow_flow, last.c, c).unwrap_or((0.0, 0.0)),
+        (Predictor::Theory, [.., last]) => by_theory(scene, last.c, c).unwrap_or((0.0, 0.0)),
         (Predictor::Previous, _) => extrapolate(&known[known.len().saturating_sub(3)..], c),
     }
 }
 
-fn by_theory(slow_flow: &SlowFlow, from: f64, to: f64) -> Option<(f64, f64)> {
-    let at = |c| {
-        let b = slow_flow.manifold.b(c, BranchSide::Right)?;
-        Some(slow_flow.backbone_at(b))
-    };
-    let (from, to) = (at(from)?, at(to)?);
+fn by_theory(scene: &Dimensionless, from: f64, to: f64) -> Option<(f64, f64)> {
+    let (from, to) = (backbone_at_level(scene, from)?, backbone_at_level(scene, to)?);
     Some((to.g - from.g, to.sigma - from.sigma))
 }
 
@@ -42,42 +40,77 @@ fn extrapolate(points: &[Known], c: f64) -> (f64, f64) {
     (g - last.g, sigma - last.sigma)
 }
 
+/// Share of the drive that a move may need in addition to the drive that holds the response.
+const MOVE_SHARE: f64 = 0.8;
+
+/// Periods of the move to a level: those of the scene, or as many as the drive needs to change the response that much.
+pub fn move_periods(scene: &Scene, from: Option<&Known>, level: f64) -> f64 {
+    let slowest = from.map_or(0.0, |from| {
+        2.0 * (level - from.c).abs() / (MOVE_SHARE * scene.dimensionless().epsilon * from.g * std::f64::consts::TAU)
+    });
+    scene.backbone.move_periods.max(slowest)
+}
+
+/// Slopes of the backbone at a level by the last points, or what is known without them: their order of magnitude.
+pub fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
+    let d = scene.dimensionless();
+    let flow = SlowFlow::new(d.lambda, d.r);
+    let drift = flow.drift(level).map_or([0.0; 2], |drift| [drift.g, drift.sigma]);
+    let (g, sigma) = match known {
+        [.., one, other] if one.c != other.c => {
+            // Towards the fold the slopes grow from level to level.
+            let half = 0.05 * (other.c - one.c);
+            let at = |c: f64| change(Predictor::Previous, known, c, &d);
+            let ((g, sigma), (g_before, sigma_before)) = (at(level + half), at(level - half));
+            let pair = |change: f64| [change / (2.0 * half), 0.5 * (change / (2.0 * half)).abs() + 0.5];
+            (pair(g - g_before), pair(sigma - sigma_before))
+        }
+        _ => ([1.0, 2.0], [0.0, 5.0]),
+    };
+    Slopes {
+        base: g.map(|g| d.amplitude(g) / d.b),
+        omega: sigma.map(|sigma| d.omega_change(sigma) / d.b),
+        drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
+        // The spread of a held amplitude is small.
+        curvature: [0.0; 2],
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
+    use vines_model::Sensor;
 
     fn known(c: f64) -> Known {
         Known { c, g: 1.0 + c * c, sigma: -3.0 + 2.0 * c }
     }
 
-    fn slow_flow() -> SlowFlow {
-        SlowFlow::new(1.43, 0.65)
+    fn scene() -> Dimensionless {
+        Dimensionless::new(0.0084, 1.43, 0.65, 1.1)
     }
 
     #[test]
     fn three_points_foresee_a_parabola_exactly() {
         let before = [0.7, 0.65, 0.6].map(known);
-        let (g, sigma) = change(Predictor::Previous, &before, 0.55, &slow_flow());
+        let (g, sigma) = change(Predictor::Previous, &before, 0.55, &scene());
         assert!((g - (known(0.55).g - known(0.6).g)).abs() < 1e-12);
         assert!((sigma + 0.1).abs() < 1e-12);
     }
 
     #[test]
     fn one_point_foresees_no_change() {
-        assert_eq!(
-            change(Predictor::Previous, &[known(0.7)], 0.6, &slow_flow()),
-            (0.0, 0.0)
-        );
+        assert_eq!(change(Predictor::Previous, &[known(0.7)], 0.6, &scene()), (0.0, 0.0));
     }
 
     #[test]
     fn theory_foresees_the_difference_between_two_levels() {
-        let flow = slow_flow();
-        let (g, sigma) = change(Predictor::Theory, &[known(0.5)], 0.4, &flow);
-        let expected =
-            flow.backbone_sigma(0.4, BranchSide::Right).unwrap() - flow.backbone_sigma(0.5, BranchSide::Right).unwrap();
+        let mut scene = scene();
+        scene.definition.sensor = Sensor::Q1;
+        let (g, sigma) = change(Predictor::Theory, &[known(0.5)], 0.4, &scene);
+        let at = |c| backbone_at_level(&scene, c).unwrap().sigma;
+        let expected = at(0.4) - at(0.5);
         assert!((sigma - expected).abs() < 1e-12 && g < 0.0);
         // Below the fold the theory has no backbone.
-        assert_eq!(change(Predictor::Theory, &[known(0.5)], 0.1, &flow), (0.0, 0.0));
+        assert_eq!(change(Predictor::Theory, &[known(0.5)], 0.1, &scene), (0.0, 0.0));
     }
 }
