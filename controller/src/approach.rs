@@ -16,7 +16,7 @@
 use crate::config::Config;
 
 /// Rate of the observer, relative to the rate of the approach in the linear regime.
-const OBSERVER_RATE: f64 = 8.0;
+const OBSERVER_RATE: f64 = 4.0;
 /// Range of the shaped drive, relative to its setpoint: wide enough to move the response, narrow enough to stay in the regime.
 const DRIVE_RANGE: [f64; 2] = [0.25, 3.0];
 

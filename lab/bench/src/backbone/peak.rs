@@ -177,6 +177,9 @@ mod tests {
             peaks(&scans, &Dimensionless::new(1e-12, 1.43, 0.65, 1.1))[0].phase_error_deg - found.phase_error_deg
         });
         let expected = moved.map(|one| one * one).sum::<f64>().sqrt();
-        assert!((found.u_phase_deg / expected - 1.0).abs() < 5e-3, "{found:?}, {expected}");
+        assert!(
+            (found.u_phase_deg / expected - 1.0).abs() < 5e-3,
+            "{found:?}, {expected}"
+        );
     }
 }

@@ -99,8 +99,9 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
             .map(|c| mean(c.iter().copied()))
             .collect();
         let value = Estimate::mean(&per_period);
-        // The hold belongs to the periods that give the limit: their noise is the same, and only the rest counts.
-        let rest = (limit.uncertainty.powi(2) - response.uncertainty.powi(2)).abs().sqrt();
+        // The hold belongs to the periods that give the limit: of their noise, a half is common to both.
+        let [one, other] = [limit, response].map(|estimate| estimate.uncertainty.powi(2));
+        let rest = ((one - other).abs() + 0.5 * one.min(other)).sqrt();
         Estimate::new(
             value.value + b_slope * remaining,
             &[value.uncertainty, b_slope * rest / d.b],
