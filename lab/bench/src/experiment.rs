@@ -170,16 +170,12 @@ pub fn run_into(
         }
         settled += 1;
         if settled.is_multiple_of(plan.hold) {
-            irregular += if bench.is_irregular(plan, &command) {
-                plan.hold
-            } else {
-                0
-            };
+            irregular += usize::from(bench.is_irregular(plan, &command)) * plan.hold;
         }
         if irregular >= plan.irregular || settled >= plan.lock {
-            // The reason why there is no lock matters more than an error of the rig.
+            // The reason matters more than an error of the rig.
             let _ = bench.rig.advance(Drive::default(), plan.sample_time);
-            let periods = irregular as f64 * plan.sample_time / plan.scene.dimensionless().natural_period();
+            let periods = irregular as f64 / plan.scene.controller.samples_per_period;
             return Err(if irregular >= plan.irregular {
                 ExperimentError::Irregular { periods }
             } else {

@@ -40,6 +40,12 @@ fn extrapolate(points: &[Known], c: f64) -> (f64, f64) {
     (g - last.g, sigma - last.sigma)
 }
 
+/// Periods of the first level more than those of the move: the start of the loop disturbs the particle, too.
+pub const FIRST: f64 = 32.0;
+/// Last periods of a move, in which the response is within 1 % of its level.
+pub const LAST: f64 = 1.0;
+/// Periods of a change of the phase more than those of the move, for the same reason.
+pub const PHASE: f64 = 8.0;
 /// Share of the drive that a move may need in addition to the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
 

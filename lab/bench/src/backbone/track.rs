@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::peak;
 use super::point::{Point, Tracked};
-use super::predictor::{self, Known};
+use super::predictor::{self, FIRST, Known, LAST, PHASE};
 use super::settle::{Criterion, Found};
 use crate::experiment::Sample;
 use crate::identification::{Cycle, classify, regime_by_response};
@@ -214,12 +214,6 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
 
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
-/// Periods of the first level more than those of the move: the start of the loop disturbs the particle, too.
-const FIRST: f64 = 32.0;
-/// Last periods of a move, in which the response is within 1 % of its level.
-const LAST: f64 = 1.0;
-/// Periods of a change of the phase more than those of the move, for the same reason.
-const PHASE: f64 = 8.0;
 /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
 fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(bench: &mut Bench<R, C>, most: f64) -> Result<(), TrackError> {
     let mut near = 0;
