@@ -37,7 +37,9 @@ pub struct Tracking {
 impl Tracking {
     /// The move to be made before the given sample, and its phase target, rad.
     pub fn due(&mut self, sample: u64) -> Option<(Move, f64)> {
-        self.moves.pop_if(|(at, ..)| *at <= sample).map(|(_, to, phase)| (to, phase))
+        self.moves
+            .pop_if(|(at, ..)| *at <= sample)
+            .map(|(_, to, phase)| (to, phase))
     }
 }
 
