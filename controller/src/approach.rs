@@ -25,11 +25,18 @@ const LARGE_SWING: f64 = 0.1;
 /// Factor of the gain for each swing. Swings that persist mean that the response changes faster than the observer follows.
 const SWING_FACTOR: f64 = 0.7;
 
+/// An approach that takes this long swings, in time constants of the structure; from then on the gain falls.
+const LATE: f64 = 20.0;
+/// Time constant with which it falls, in those of the structure.
+const PATIENCE: f64 = 8.0;
+
 /// Coefficients of the approach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Approach {
     gain: f64,
+    /// rad/s
+    damping_rate: f64,
     /// Share of its error that the observer corrects per sample.
     step: f64,
     /// Share of its error that the detector corrects per sample.
@@ -46,7 +53,9 @@ pub struct ApproachState {
     detected: f64,
     drive: f64,
     /// Response amplitude with the lag of the observer, m.
-    response: f64,
+    pub response: f64,
+    /// The drive that would hold the response, m.
+    pub holding: f64,
     /// Largest relative difference between the setpoint and the holding drive since it last changed its sign.
     swing: f64,
     /// Number of large swings.
@@ -60,6 +69,7 @@ impl Approach {
         let rate = if rate > 0.0 { rate } else { config.bandwidth };
         Self {
             gain: config.approach_gain,
+            damping_rate: config.damping_rate,
             step: -libm::expm1(-rate * config.sample_time),
             detector_step: -libm::expm1(-config.bandwidth * config.sample_time),
             slope: rate / config.response_gain,
@@ -72,14 +82,17 @@ impl Approach {
         state.detected += self.detector_step * (drive * libm::cos(error) - state.detected);
         state.drive += self.step * (state.detected - state.drive);
         state.response += self.step * (response - state.response);
-        state.drive - self.slope * (response - state.response)
+        state.holding = state.drive - self.slope * (response - state.response);
+        state.holding
     }
 
     /// The drive, m, on the way to `setpoint`, m, where `holding`, m, would hold the response.
-    pub fn shape(&self, state: &mut ApproachState, setpoint: f64, holding: f64) -> f64 {
+    pub fn shape(&self, state: &mut ApproachState, setpoint: f64, holding: f64, elapsed: f64) -> f64 {
         let [low, high] = DRIVE_RANGE.map(|share| share * setpoint);
         let missing = setpoint - holding;
-        let gain = self.gain * libm::pow(SWING_FACTOR, f64::from(state.swings));
+        let late = (self.damping_rate * elapsed - LATE).max(0.0);
+        let patience = libm::exp(-late / PATIENCE);
+        let gain = patience * self.gain * libm::pow(SWING_FACTOR, f64::from(state.swings));
         if missing * state.swing < 0.0 {
             state.swings += i32::from(state.swing.abs() > LARGE_SWING * setpoint);
             state.swing = 0.0;

@@ -3,6 +3,12 @@
 //! A particle that lies still is hit only if the response reaches the walls. The amplitude loop therefore raises the response of the
 //! linear mode to an amplitude at which impacts certainly occur. Then the [approach](crate::approach) brings the drive down to its
 //! setpoint, and on this way the impacts synchronise.
+//!
+//! Several motions may belong to the same drive: above `captured_max` an asymmetric or irregular one, below it one or two symmetric
+//! ones. A response that rises above `captured_max`, or whose impacts end, is captured again. A *descent* then leads it down slowly:
+//! the drive stays below the one that would hold the response, so that the motion follows the backbone whatever its stability under
+//! a constant drive. The first repetition ends the descent below `captured_max`; the others go on until the response needs more
+//! than the setpoint of the drive: from there, the setpoint leads it down to the orbit above the fold.
 
 use core::f64::consts::TAU;
 
@@ -19,21 +25,63 @@ const REACHED: f64 = 0.97;
 /// Duration of the rise, periods; a limited drive extends it.
 const RISE: f64 = 20.0;
 
+/// Response at which the first descents end, as a share of the largest wanted one.
+const BELOW: f64 = 0.97;
+/// Response above which the motion is another one, as a share of the largest wanted one.
+const ABOVE: f64 = 1.0005;
+/// Periods in which the response falls by a factor of e on the descent, if the frequency follows.
+const DESCENT: f64 = 60.0;
+/// Phase error, rad, at which the descent waits for the frequency: near the fold the resonance frequency changes fast.
+const FOLLOWED: f64 = 0.1;
+/// Smallest drive of the descent, as a share of that which holds the response: without a drive the phase is undefined.
+const LEAST: f64 = 0.4;
+/// Growth of the response on the descent by which the motion is lost.
+const LOST: f64 = 1.15;
+/// Smallest power that the impacts take, as a share of the largest before, of a motion that is not lost: at the lower end of the
+/// symmetric motion it is a third.
+const KEPT: f64 = 0.2;
+/// Largest number of repetitions. The last one accepts any motion.
+const REPETITIONS: u32 = 5;
+
 /// Coefficients of the capture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Capture {
     /// Response amplitude at which impacts occur, m; `None` without a capture.
     level: Option<f64>,
+    /// Largest response amplitude of the wanted motion, m.
+    largest: f64,
+    /// Setpoint of the drive, m.
+    amplitude: f64,
+    /// Largest drive, m.
+    amplitude_max: f64,
+    /// Drive, m, that the damping of the structure needs for a response of 1 m.
+    damping: f64,
+    /// Drive, m, that is missing for a response of 1 m to fall at the rate of the descent.
+    fall: f64,
     /// s
     sample_time: f64,
 }
 
-/// Progress of the capture: periods for which the present condition has held.
+/// Progress of the capture.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CaptureState {
+    /// Periods for which the present condition has held.
     periods: f64,
+    /// Smallest response amplitude on the descent, m.
+    lowest: Option<f64>,
+    /// Largest product of the response and the drive that the impacts need, m².
+    taken: f64,
+    /// Number of repetitions.
+    repetitions: u32,
+}
+
+impl CaptureState {
+    /// Starts again.
+    pub fn repeat(&mut self) {
+        *self = Self { repetitions: self.repetitions + 1, ..Self::default() };
+    }
 }
 
 /// Measurements that the capture uses.
@@ -45,6 +93,10 @@ pub struct Observation {
     pub drive: f64,
     /// Response amplitude, m.
     pub response: f64,
+    /// Its mean over the lag of the observer, m.
+    pub mean: f64,
+    /// Drive that would hold the response, m.
+    pub holding: f64,
     /// Phase error, rad, if it is valid.
     pub error: Option<f64>,
 }
@@ -52,8 +104,14 @@ pub struct Observation {
 impl Capture {
     /// The capture of a configuration.
     pub fn new(config: &Config) -> Self {
+        let largest = config.captured_max.unwrap_or(f64::INFINITY);
         Self {
             level: config.capture_response,
+            largest,
+            amplitude: config.amplitude,
+            amplitude_max: config.amplitude_limit(),
+            damping: config.damping_rate / config.response_gain,
+            fall: config.omega_start / (TAU * DESCENT * config.response_gain),
             sample_time: config.sample_time,
         }
     }
@@ -63,20 +121,50 @@ impl Capture {
         self.level.is_some()
     }
 
-    /// One sample: starts the amplitude loop near phase resonance. Returns whether the capture is complete.
+    /// Whether the motion of this mean response amplitude, m, is another one, which calls for a repetition.
+    pub fn has_escaped(&self, state: &CaptureState, mean: f64) -> bool {
+        self.is_on() && mean > ABOVE * self.largest && state.repetitions < REPETITIONS
+    }
+
+    /// The drive, m, of a descent and of the approach after a repetition; `None` before. `holding`, m, would hold the response, m,
+    /// at the phase error, rad.
+    pub fn drive(&self, state: &CaptureState, holding: f64, response: f64, error: f64) -> Option<f64> {
+        let follows = (1.0 - error.abs() / FOLLOWED).max(0.0);
+        let fall = follows * self.fall * response / f64::from(state.repetitions.max(2) - 1);
+        let least = (holding - fall).max(LEAST * holding);
+        let in_phase = match state.lowest {
+            Some(_) => least,
+            None if state.repetitions > 0 => least.max(self.amplitude),
+            None => return None,
+        };
+        Some((in_phase / libm::cos(error)).min(self.amplitude_max))
+    }
+
+    /// One sample: starts the amplitude loop near phase resonance, then the descent. Returns whether the capture is complete.
     pub fn advance(
         &self,
         state: &mut CaptureState,
         amplitude_loop: &mut Option<AmplitudeState>,
         seen: &Observation,
     ) -> bool {
-        let Some(level) = self.level else {
-            return true;
-        };
+        match (self.level, state.lowest) {
+            (None, _) => true,
+            (Some(_), Some(lowest)) => self.descend(state, lowest.min(seen.mean), seen),
+            (Some(level), None) => self.rise(state, amplitude_loop, level, seen),
+        }
+    }
+
+    fn rise(
+        &self,
+        state: &mut CaptureState,
+        amplitude_loop: &mut Option<AmplitudeState>,
+        level: f64,
+        seen: &Observation,
+    ) -> bool {
         let is_rising = amplitude_loop.is_some();
         let is_near = seen.error.is_some_and(|error| error.abs() < NEAR);
         if is_near && (!is_rising || seen.response >= REACHED * level) {
-            state.periods += seen.omega * self.sample_time / TAU;
+            state.periods += self.periods(seen);
         } else if !is_rising {
             state.periods = 0.0;
         }
@@ -84,16 +172,49 @@ impl Capture {
             return false;
         }
         state.periods = 0.0;
-        if !is_rising {
-            let rise = Move {
-                response: level,
-                duration: RISE * TAU / seen.omega,
-                ..Move::default()
-            };
-            let mut started = AmplitudeState::constant(seen.response, seen.drive);
-            started.start(rise, self.sample_time);
-            *amplitude_loop = Some(started);
+        if is_rising {
+            *amplitude_loop = None;
+            let any_motion = self.largest.is_infinite();
+            state.lowest = Some(seen.mean).filter(|_| !any_motion);
+            return any_motion;
         }
-        is_rising
+        let rise = Move {
+            response: level,
+            duration: RISE * TAU / seen.omega,
+            ..Move::default()
+        };
+        let mut started = AmplitudeState::constant(seen.response, seen.drive);
+        started.start(rise, self.sample_time);
+        *amplitude_loop = Some(started);
+        false
+    }
+
+    fn descend(&self, state: &mut CaptureState, lowest: f64, seen: &Observation) -> bool {
+        state.lowest = Some(lowest);
+        let is_below = seen.mean < BELOW * self.largest;
+        let taken = (seen.holding - self.damping * seen.mean) * seen.mean;
+        if is_below {
+            state.taken = state.taken.max(taken);
+        }
+        if seen.mean > LOST * lowest || taken < KEPT * state.taken {
+            state.repeat();
+            return state.repetitions > REPETITIONS;
+        }
+        let has_passed = state.repetitions < 2 || seen.holding > self.amplitude;
+        state.periods = if is_below && has_passed {
+            state.periods + self.periods(seen)
+        } else {
+            0.0
+        };
+        let complete = state.periods >= PERIODS;
+        if complete {
+            *state = CaptureState { repetitions: state.repetitions, ..CaptureState::default() };
+        }
+        complete
+    }
+
+    /// Periods per sample.
+    fn periods(&self, seen: &Observation) -> f64 {
+        seen.omega * self.sample_time / TAU
     }
 }

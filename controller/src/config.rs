@@ -106,6 +106,9 @@ pub struct Config {
     /// Response amplitude, m, at which impacts certainly occur. The response rises to it before the drive goes to its setpoint, so
     /// that a particle at rest joins the motion. `None`: the drive goes to its setpoint at once.
     pub capture_response: Option<f64>,
+    /// Largest response amplitude, m, of the motion that is wanted. A captured motion is led below it, and captured again if it rises
+    /// above it. `None`: any motion is wanted.
+    pub captured_max: Option<f64>,
     /// Lock criterion.
     pub lock: LockCriterion,
     /// Reading of the response sensor above which the drive is switched off, m.
@@ -151,6 +154,7 @@ impl Config {
             response_gain: 0.5 * omega,
             approach_gain: 0.0,
             capture_response: None,
+            captured_max: None,
             lock: LockCriterion::default(),
             response_max: None,
             acquire_timeout: Some(2000.0 * TAU / omega),

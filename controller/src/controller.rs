@@ -154,10 +154,15 @@ impl PhaseLock {
             fault,
             ready: state.ready,
             capture: self.capture.is_on(),
+            escaped: state.amplitude_loop.is_none()
+                && self.capture.has_escaped(&state.capture, state.approach.response),
             settled: state.dwell.settled(),
             lost: state.lost,
             timed_out: timeout.is_some_and(|timeout| elapsed >= timeout),
         });
+        if before == LoopState::Acquiring && next == LoopState::Capturing {
+            state.capture.repeat();
+        }
         state.loop_state = next;
         if next == LoopState::Locked && state.tuning.1 != self.config.phase_target {
             // A new phase target: the distance from it does not mean that the lock is lost.
@@ -218,6 +223,8 @@ impl PhaseLock {
                 omega: state.frequency.omega,
                 drive: state.drive.amplitude,
                 response: state.channels.response.amplitude(),
+                mean: state.approach.response,
+                holding: state.approach.holding,
                 error: measured.valid.then_some(measured.error),
             },
         );
@@ -239,6 +246,7 @@ impl PhaseLock {
         let reading = state.channels.response.amplitude();
         let near = measured.valid && measured.error.abs() < PHASE_RANGE;
         let before = state.drive.amplitude;
+        let elapsed = state.acquiring as f64 * self.config.sample_time;
         let holding = self
             .approach
             .observe(&mut state.approach, before, reading, measured.error);
@@ -253,8 +261,9 @@ impl PhaseLock {
         } else {
             let amplitude = self.config.amplitude;
             let setpoint = match holding {
-                Some(holding) if state.loop_state == LoopState::Acquiring => {
-                    self.approach.shape(&mut state.approach, amplitude, holding)
+                Some(holding) if state.loop_state != LoopState::Locked => {
+                    let captured = self.capture.drive(&state.capture, holding, reading, measured.error);
+                    captured.unwrap_or_else(|| self.approach.shape(&mut state.approach, amplitude, holding, elapsed))
                 }
                 _ => amplitude,
             };

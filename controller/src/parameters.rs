@@ -47,6 +47,7 @@ macro_rules! parameters {
             config response_gain: real, "1/s", Positive;
             config approach_gain: real, "", NotNegative;
             config capture_response: optional, "m", Optional;
+            config captured_max: optional, "m", Optional;
         }
     };
 }

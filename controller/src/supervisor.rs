@@ -113,6 +113,8 @@ pub struct Conditions {
     pub ready: bool,
     /// A motion with impacts is to be captured first.
     pub capture: bool,
+    /// The motion is not the captured one.
+    pub escaped: bool,
     /// The lock criterion is met.
     pub settled: bool,
     /// The phase error or the validity of the response ends the lock.
@@ -147,6 +149,7 @@ impl LoopState {
             Self::Idle | Self::ShutDown => (Self::Ramping, None),
             Self::Ramping if conditions.ready && conditions.capture => (Self::Capturing, None),
             Self::Ramping | Self::Capturing if conditions.ready => (Self::Acquiring, None),
+            Self::Acquiring if conditions.escaped => (Self::Capturing, None),
             Self::Acquiring if conditions.settled => (Self::Locked, None),
             Self::Capturing | Self::Acquiring if conditions.timed_out => (Self::Tripped, Some(Fault::TimedOut)),
             Self::Locked if conditions.lost => (Self::LockLost, Some(Fault::LockLost)),
@@ -166,6 +169,7 @@ mod tests {
         settled: true,
         lost: false,
         capture: false,
+        escaped: false,
         timed_out: false,
     };
 

@@ -115,6 +115,8 @@ typedef struct PhaseLockConfig {
   double approach_gain;
   // Response amplitude, m, at which impacts certainly occur; it is visited first, so that a particle at rest joins the motion.
   struct PhaseLockOptional capture_response;
+  // Largest response amplitude, m, of the motion that is wanted; a captured motion is led below it.
+  struct PhaseLockOptional captured_max;
   // Time for which the lock criterion must hold, periods.
   uint32_t dwell;
   // Number of harmonics of the adaptive filter, 1 to 8; 0: synchronous demodulator.

@@ -90,6 +90,8 @@ pub struct PhaseLockConfig {
     pub approach_gain: f64,
     /// Response amplitude, m, at which impacts certainly occur; it is visited first, so that a particle at rest joins the motion.
     pub capture_response: PhaseLockOptional,
+    /// Largest response amplitude, m, of the motion that is wanted; a captured motion is led below it.
+    pub captured_max: PhaseLockOptional,
     /// Time for which the lock criterion must hold, periods.
     pub dwell: u32,
     /// Number of harmonics of the adaptive filter, 1 to 8; 0: synchronous demodulator.

@@ -10,6 +10,8 @@ use crate::scene::{Dimensionless, Scene};
 /// Detunings at which the backbone is searched for stable orbits, and their distance.
 const SEARCHED: [f64; 2] = [-6.0, 3.0];
 const STEP: f64 = 0.005;
+/// Parts of a step in which the end of the stable range is located.
+const FINER: i32 = 20;
 
 /// The stable symmetric 1:1 orbits at phase resonance, at any drive, by rising detuning.
 #[must_use]
@@ -20,6 +22,21 @@ pub fn stable_orbits(d: &Dimensionless) -> Vec<Orbit> {
         .flat_map(|n| exact_backbone(d, omega(n)))
         .filter(|orbit| orbit.stable)
         .collect()
+}
+
+/// The largest response amplitude over b of these orbits, by falling steps from the largest that was found.
+#[must_use]
+pub fn largest_stable(d: &Dimensionless) -> Option<f64> {
+    let largest = |orbits: Vec<Orbit>| {
+        orbits
+            .into_iter()
+            .filter(|orbit| orbit.stable)
+            .max_by(|one, other| one.c.total_cmp(&other.c))
+    };
+    let first = largest(stable_orbits(d))?;
+    let steps = (1..FINER).map(|n| first.sigma + STEP * f64::from(n) / f64::from(FINER));
+    let finer = steps.filter_map(|sigma| largest(exact_backbone(d, 1.0 + d.epsilon * sigma)));
+    Some(finer.map(|orbit| orbit.c).fold(first.c, f64::max))
 }
 
 /// The range of drives, base amplitude over `b epsilon`, with a stable symmetric 1:1 orbit at phase resonance.
@@ -51,6 +68,15 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
         "the stable symmetric 1:1 orbit of this G is at sigma = {:.4}, C = {:.4}",
         orbit.sigma, orbit.c
     );
+    let (omega, [low, high]) = (
+        1.0 + d.epsilon * orbit.sigma,
+        [scene.controller.omega_min, scene.controller.omega_max],
+    );
+    if !(low..=high).contains(&omega) {
+        return Some(format!(
+            "{place}, thus at omega = {omega:.4} omega0, which controller.omega_min = {low} and controller.omega_max = {high} exclude"
+        ));
+    }
     match regime? {
         Regime::Unknown | Regime::Unresolved => None,
         Regime::NoImpacts => Some(format!(

@@ -20,9 +20,6 @@ pub use tracked::{TrackedComparison, TrackedPoint, Worst};
 /// Nearer to the fold (C = Cmin) the slow flow is no longer slow compared with a period.
 pub const COMPARED_ABOVE: f64 = 0.2;
 
-/// Phase of the response at phase resonance, degrees: theory and exact orbits hold for it only.
-const PHASE_RESONANCE: f64 = -90.0;
-
 /// An identified system beside theory and exact orbits; dimensionless throughout.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Comparison {
@@ -68,7 +65,7 @@ impl Comparison {
         let (parameters, lock) = (found.parameters, found.lock);
         // At the peak the user gives the phase.
         let peak = scene.resonance.resonance == Resonance::Peak;
-        let at_resonance = peak || scene.controller.phase_target == PHASE_RESONANCE;
+        let at_resonance = peak || scene.controller.is_at_phase_resonance();
         let distance = |sigma: f64, c: f64| (sigma - lock.sigma).hypot(c - lock.c);
         let theory = resonant(&parameters)
             .into_iter()

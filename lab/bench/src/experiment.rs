@@ -9,37 +9,55 @@ use thiserror::Error;
 
 use crate::rig::{Controller, ControllerError, Drive, Fault, Rig, RigError};
 use crate::scene::Scene;
+use vines_model::orbit::phase_resonant;
 use vines_model::theory::{B_SYMMETRY_BREAKING, BackbonePoint, SlowFlow};
 
 pub(crate) use bench::Bench;
 pub use record::{Record, Sample, drive_phases, table};
 
 /// Durations of the stages, in samples.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Plan {
+#[derive(Debug, Clone, Copy)]
+pub struct Plan<'a> {
+    /// The scene.
+    pub scene: &'a Scene,
     /// Time from sample to sample, s.
     pub sample_time: f64,
     /// Time limit for the lock.
     pub lock: usize,
+    /// How long the motion may be other than 1:1 before the lock, in total.
+    pub irregular: usize,
     /// How long the lock is held and recorded once it has settled.
     pub hold: usize,
     /// Length of the recorded decay.
     pub decay: usize,
 }
 
-impl Plan {
+impl<'a> Plan<'a> {
     /// The plan of a scene.
     #[must_use]
-    pub fn of(scene: &Scene) -> Self {
+    pub fn of(scene: &'a Scene) -> Self {
         let sample_time = scene.sample_time();
         let period = scene.dimensionless().natural_period();
         let samples = |periods: f64| (periods * period / sample_time).round() as usize;
         Self {
+            scene,
             sample_time,
             lock: samples(scene.lock_periods()),
+            irregular: samples(irregular_periods(scene)),
             hold: samples(scene.record.hold_periods),
             decay: samples(decay_periods(scene)),
         }
+    }
+}
+
+/// How long the motion may be other than 1:1 before the lock, in total, in natural periods: some relaxation times of the structure, or
+/// less where the exact orbits show that there is nothing to lock.
+fn irregular_periods(scene: &Scene) -> f64 {
+    let d = scene.dimensionless();
+    if phase_resonant(&d).iter().any(|orbit| orbit.stable) || !scene.controller.is_at_phase_resonance() {
+        f64::max(600.0, 10.0 * scene.relaxation_periods())
+    } else {
+        60.0
     }
 }
 
@@ -113,6 +131,12 @@ pub enum ExperimentError {
         /// Last frequency, rad/s.
         omega: f64,
     },
+    /// The motion stays irregular.
+    #[error("no lock: for {periods:.0} periods in total the motion was not 1:1, and only such a motion can be locked")]
+    Irregular {
+        /// How long, natural periods.
+        periods: f64,
+    },
     /// The controller switched the drive off.
     #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}", stage.name())]
     Tripped {
@@ -153,7 +177,7 @@ pub fn run_into(
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
     let mut bench = Bench::new(rig, controller, plan.sample_time, samples);
-    let mut settled = 0;
+    let (mut settled, mut irregular) = (0, 0);
     loop {
         let command = bench.sample(Stage::Locking)?;
         progress(Stage::Locking, settled, plan.lock);
@@ -161,8 +185,16 @@ pub fn run_into(
             break;
         }
         settled += 1;
-        if settled >= plan.lock {
-            return Err(bench.no_lock(&command));
+        if settled.is_multiple_of(plan.hold) {
+            irregular += usize::from(bench.is_irregular(plan, &command)) * plan.hold;
+        }
+        if irregular >= plan.irregular || settled >= plan.lock {
+            let periods = irregular as f64 / plan.scene.controller.samples_per_period;
+            return Err(if irregular >= plan.irregular {
+                ExperimentError::Irregular { periods }
+            } else {
+                bench.no_lock(&command)
+            });
         }
     }
     for n in 0..plan.hold {

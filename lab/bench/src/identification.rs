@@ -18,6 +18,7 @@ pub use balance::{Balance, Slopes};
 pub use cycle::Cycle;
 pub use decay::{DecayEnd, DecayPoint, DecayPoints, decay_points};
 pub use lock::Lock;
+use regime::longer_after;
 pub use regime::{classify, impacts};
 pub use response::regime_by_response;
 pub use vines_model::regime::{Impact, Regime};
@@ -28,7 +29,8 @@ pub enum IdentificationError {
     /// The loop locked another regime than symmetric 1:1.
     #[error(
         "the loop is locked at sigma = {sigma:.4}, C = {c:.4}, but the regime is {regime}, not symmetric 1:1 with two \
-         impacts per period. Try another [start] (the particle must be moving) or another G"
+         impacts per period. Try another [start] (the particle must be moving) or another G{}",
+        mirrored(*longer)
     )]
     Regime {
         /// What was found instead.
@@ -37,12 +39,24 @@ pub enum IdentificationError {
         sigma: f64,
         /// Amplitude at the lock.
         c: f64,
+        /// The wall, -1 or 1, after which an asymmetric motion's longer flight begins, if the rig reports the impacts.
+        longer: Option<i8>,
     },
     /// The hold contains no periodic motion.
     #[error(
         "the hold contains no periodic motion: the response or the base reads zero; check the sensors and record.hold_periods"
     )]
     NoMotion,
+}
+
+/// Names the one of two mirror images that was followed.
+fn mirrored(longer: Option<i8>) -> String {
+    longer.map_or_else(String::new, |wall| {
+        format!(
+            ". An asymmetric motion has a mirror image with the same sigma and C; this is the one whose longer flight begins at w = {}b",
+            if wall > 0 { '+' } else { '-' }
+        )
+    })
 }
 
 /// What a record says; dimensionless throughout.
@@ -64,7 +78,14 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
     let lock = lock::measure(record, scene).ok_or(IdentificationError::NoMotion)?;
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
     if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
-        return Err(IdentificationError::Regime { regime: lock.regime, sigma: lock.sigma, c: lock.c });
+        return Err(IdentificationError::Regime {
+            regime: lock.regime,
+            sigma: lock.sigma,
+            c: lock.c,
+            longer: (lock.regime == Regime::Asymmetric)
+                .then(|| longer_after(record.hold()))
+                .flatten(),
+        });
     }
     let decay = decay_points(record, scene);
     Ok(Identification { parameters: scene.dimensionless(), lock, decay })

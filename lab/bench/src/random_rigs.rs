@@ -1,25 +1,27 @@
 //! Locks of randomly drawn rigs, compared with their exact orbits.
 
-use nalgebra::DVector;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
-use vines_model::numerics::{HarmonicBasis, mean};
 use vines_model::orbit::{Orbit, phase_resonant};
-use vines_model::regime::Regime;
 
 use crate::advice;
-use crate::experiment::{self, ExperimentError, Plan, Record, drive_phases};
-use crate::identification::classify;
+use crate::experiment::{self, ExperimentError, Plan, Record};
+use crate::identification::{self, IdentificationError};
 use crate::rig::{BuiltIn, Chain, Simulated};
 use crate::scene::{Dimensionless, Override, Scene, SceneError};
 
 /// Largest distance from an exact orbit, in sigma and C, of a correct lock.
 const CORRECT: f64 = 2e-3;
-/// A scene at rest, whose plant is replaced.
-const SCENE: &str = "[plant]\nepsilon = 0.01\nlambda = 1.0\nr = 0.65\n[excitation]\nG = 1.0\n";
+/// Distance from which on a lock belongs to another orbit.
+const NEAR: f64 = 0.02;
+/// Largest distance that counts as noise, in standard uncertainties.
+const NOISE: f64 = 4.0;
+/// A scene at rest, whose plant is replaced. Rigs of the largest mass ratio resonate up to 20 % from omega0.
+const SCENE: &str = "[plant]\nepsilon = 0.01\nlambda = 1.0\nr = 0.65\n[excitation]\nG = 1.0\n\
+                     [controller]\nomega_min = 0.8\nomega_max = 1.2\n";
 
 /// One rig and how its lock ended.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -151,37 +153,55 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
             return Row { outcome, message: Some(message), ..row };
         }
     };
-    let (sigma, c, regime) = held(&record, scene);
-    let distance = |orbit: &Orbit| (orbit.sigma - sigma).abs().max((orbit.c - c).abs());
-    let distance = stable.iter().map(distance).fold(f64::INFINITY, f64::min);
-    let row = Row {
-        periods: Some(record.settled as f64 / scene.controller.samples_per_period),
-        distance: Some(distance),
-        ..row
+    let periods = record.settled as f64 / scene.controller.samples_per_period;
+    let row = Row { periods: Some(periods), ..row };
+    let distance = |sigma: f64, c: f64| {
+        let distances = stable
+            .iter()
+            .map(|orbit| [(orbit.sigma - sigma).abs(), (orbit.c - c).abs()]);
+        let largest = |[sigma, c]: &[f64; 2]| sigma.max(*c);
+        distances
+            .min_by(|one, other| largest(one).total_cmp(&largest(other)))
+            .unwrap_or([f64::INFINITY; 2])
     };
-    let locked_at = format!("locked at sigma = {sigma:.4}, C = {c:.4}");
-    match regime {
-        Regime::Symmetric if distance <= CORRECT => Row { outcome: Outcome::Locked, ..row },
-        regime => {
-            let why = advice::reason(scene, Some(regime)).unwrap_or_default();
-            let message = Some(format!("{locked_at}: {why}"));
-            let outcome = if regime == Regime::Symmetric {
-                Outcome::Inaccurate
+    let message = |sigma: f64, c: f64, why: &str| Some(format!("locked at sigma = {sigma:.4}, C = {c:.4}: {why}"));
+    let reason = |regime| advice::reason(scene, Some(regime)).unwrap_or_default();
+    match identification::identify(&record, scene) {
+        Ok(found) => {
+            let lock = found.lock;
+            let off = distance(lock.sigma, lock.c);
+            let row = Row { distance: Some(off[0].max(off[1])), ..row };
+            if off[0].max(off[1]) <= CORRECT {
+                return Row { outcome: Outcome::Locked, ..row };
+            }
+            let is_noise = off[0] <= NOISE * lock.u_sigma && off[1] <= NOISE * lock.u_c;
+            let why = if is_noise {
+                format!(
+                    "the difference is within the noise: the standard uncertainties are {:.1e} in sigma and {:.1e} in C",
+                    lock.u_sigma, lock.u_c
+                )
+            } else if off[0].max(off[1]) < NEAR {
+                "the response still approaches the orbit, slowly; set smaller controller.frequency_tolerance and \
+                 controller.amplitude_tolerance"
+                    .into()
             } else {
-                Outcome::OtherRegime
+                reason(lock.regime)
             };
-            Row { outcome, message, ..row }
+            Row {
+                outcome: Outcome::Inaccurate,
+                message: message(lock.sigma, lock.c, &why),
+                ..row
+            }
         }
+        Err(IdentificationError::Regime { regime, sigma, c, .. }) => {
+            let off = distance(sigma, c);
+            Row {
+                outcome: Outcome::OtherRegime,
+                distance: Some(off[0].max(off[1])),
+                message: message(sigma, c, &reason(regime)),
+                ..row
+            }
+        }
+        Err(error) => Row { message: Some(error.to_string()), ..row },
     }
-}
-
-/// Detuning, amplitude over b and regime over the hold.
-fn held(record: &Record, scene: &Scene) -> (f64, f64, Regime) {
-    let (d, hold) = (scene.dimensionless(), record.hold());
-    let omega = mean(hold.iter().map(|sample| sample.command.drive.omega));
-    let phases = drive_phases(hold, record.sample_time, 0.0);
-    let basis = HarmonicBasis::new(&phases, 0, &[Some(0); 3]);
-    let values = DVector::from_iterator(hold.len(), hold.iter().map(|sample| sample.sensors.response));
-    let c = basis.fit(&values).map_or(0.0, |fit| fit.harmonic(1).norm()) / d.b;
-    (d.sigma(omega), c, classify(hold, record.sample_time, omega).1)
 }

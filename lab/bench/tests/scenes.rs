@@ -203,6 +203,12 @@ fn a_drive_limit_below_the_first_impacts_is_refused_with_the_drive_that_is_neede
 }
 
 #[test]
+fn levels_are_round_numbers() {
+    let levels = paper(&[]).unwrap().backbone.levels();
+    assert_eq!(levels[..3], [0.7, 0.68, 0.66]);
+}
+
+#[test]
 fn limits_follow_from_the_numbers_of_the_rig() {
     let scene = paper(&[]).unwrap();
     let (config, d) = (scene.controller_config(), scene.dimensionless());

@@ -113,9 +113,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 
 /// The failure of an experiment that ended early, with the reason that the exact orbits know, and what was measured in a file.
 fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &Path) -> Failure {
-    let reason = matches!(error, ExperimentError::NoLock { .. })
-        .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
-        .flatten();
+    let reason = matches!(
+        error,
+        ExperimentError::NoLock { .. } | ExperimentError::Irregular { .. }
+    )
+    .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
+    .flatten();
     let failure = Failure::from(error);
     let kept = match report::write_interrupted(samples, out) {
         Ok(files) => written(&files).trim_end().to_string(),

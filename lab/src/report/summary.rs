@@ -86,8 +86,7 @@ pub fn identification(found: &Comparison) -> String {
     )
 }
 
-/// The phase-resonant orbits at this G that the lock did not follow, where there is more than one that a loop could lock; and whether
-/// the motion has a mirror image.
+/// The phase-resonant orbits at this G that the lock did not follow, where there is more than one that a loop could lock.
 fn others(found: &Comparison) -> String {
     let followed = |orbit: &&Orbit| found.exact.as_ref().is_some_and(|exact| exact == *orbit);
     let other = found.orbits.iter().filter(|orbit| orbit.stable && !followed(orbit));
@@ -101,9 +100,6 @@ fn others(found: &Comparison) -> String {
         .collect();
     if found.exact.as_ref().is_some_and(|exact| !exact.stable) {
         text += "  (the nearest exact orbit is unstable under a constant drive and frequency; the loop holds it)\n";
-    }
-    if found.lock.regime == Regime::Asymmetric {
-        text += "  (asymmetric motions come in pairs, mirror images with the same sigma and C; one of the two was followed)\n";
     }
     text
 }

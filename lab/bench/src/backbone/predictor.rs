@@ -1,8 +1,9 @@
 //! Prediction of the drive and the frequency at the next level.
 
-use crate::scene::Predictor;
+use crate::identification::Slopes;
+use crate::scene::{Predictor, Scene};
 use vines_model::Dimensionless;
-use vines_model::theory::backbone_at_level;
+use vines_model::theory::{SlowFlow, backbone_at_level};
 
 /// A working point: response amplitude, drive amplitude, detuning; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,6 +38,48 @@ fn extrapolate(points: &[Known], c: f64) -> (f64, f64) {
     }
     let last = points[points.len() - 1];
     (g - last.g, sigma - last.sigma)
+}
+
+/// Periods of the first level more than those of the move: the start of the loop disturbs the particle, too.
+pub const FIRST: f64 = 32.0;
+/// Last periods of a move, in which the response is within 1 % of its level.
+pub const LAST: f64 = 1.0;
+/// Periods of a change of the phase more than those of the move, for the same reason.
+pub const PHASE: f64 = 8.0;
+/// Share of the drive that a move may need in addition to the drive that holds the response.
+const MOVE_SHARE: f64 = 0.8;
+
+/// Periods of the move to a level: those of the scene, or as many as the drive needs to change the response that much.
+pub fn move_periods(scene: &Scene, from: Option<&Known>, level: f64) -> f64 {
+    let slowest = from.map_or(0.0, |from| {
+        2.0 * (level - from.c).abs() / (MOVE_SHARE * scene.dimensionless().epsilon * from.g * std::f64::consts::TAU)
+    });
+    scene.backbone.move_periods.max(slowest)
+}
+
+/// Slopes of the backbone at a level by the last points, or what is known without them: their order of magnitude.
+pub fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
+    let d = scene.dimensionless();
+    let flow = SlowFlow::new(d.lambda, d.r);
+    let drift = flow.drift(level).map_or([0.0; 2], |drift| [drift.g, drift.sigma]);
+    let (g, sigma) = match known {
+        [.., one, other] if one.c != other.c => {
+            // Towards the fold the slopes grow from level to level.
+            let half = 0.05 * (other.c - one.c);
+            let at = |c: f64| change(Predictor::Previous, known, c, &d);
+            let ((g, sigma), (g_before, sigma_before)) = (at(level + half), at(level - half));
+            let pair = |change: f64| [change / (2.0 * half), 0.5 * (change / (2.0 * half)).abs() + 0.5];
+            (pair(g - g_before), pair(sigma - sigma_before))
+        }
+        _ => ([1.0, 2.0], [0.0, 5.0]),
+    };
+    Slopes {
+        base: g.map(|g| d.amplitude(g) / d.b),
+        omega: sigma.map(|sigma| d.omega_change(sigma) / d.b),
+        drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
+        // The spread of a held amplitude is small.
+        curvature: [0.0; 2],
+    }
 }
 
 #[cfg(test)]

@@ -110,7 +110,9 @@ impl Criterion {
             return None;
         }
         let [first, second] = [first, second].map(|half| half.at(amplitude - half.response.value));
-        let slopes = whole.slopes().map(|slope| slope.value * whole.u_level);
+        let slopes = whole
+            .slopes()
+            .map(|slope| (slope.value.abs() + slope.uncertainty) * whole.u_level);
         let estimates = whole.at(0.0);
         let drifts = [0, 1].map(|i| {
             let noise = first[i].uncertainty.hypot(second[i].uncertainty);

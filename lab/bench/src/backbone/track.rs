@@ -3,14 +3,13 @@
 use super::bench::Bench;
 use super::peak;
 use super::point::{Point, Tracked};
-use super::predictor::{self, Known};
+use super::predictor::{self, FIRST, Known, LAST, PHASE};
 use super::settle::{Criterion, Found};
 use crate::experiment::{self, ExperimentError, Sample, Stage};
-use crate::identification::{Cycle, Slopes, classify, regime_by_response};
+use crate::identification::{Cycle, classify, regime_by_response};
 use crate::rig::{Controller, LoopState, Move, Rig};
 use crate::scene::{Resonance, Scene};
 use vines_model::numerics::Estimate;
-use vines_model::theory::SlowFlow;
 
 /// Phase error, rad, below which the control of the response begins.
 const NEAR: f64 = 0.35;
@@ -116,7 +115,7 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
         .filter(|change| change.iter().all(|one| one.is_finite()))
         .unwrap_or([0.0; 2]);
     let from = last.map(|(point, _)| point.known());
-    let periods = move_periods(scene, from.as_ref(), level);
+    let periods = predictor::move_periods(scene, from.as_ref(), level);
     let to = Move {
         response: level * d.b,
         duration: periods * d.natural_period(),
@@ -125,50 +124,12 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
     };
     let target = bench.target + phase;
     bench.controller.hold_response(to, target)?;
-    let changed = last.map_or(FIRST, |(_, held)| if held == phase { 0.0 } else { PHASE });
+    let changed = last.map_or(FIRST, |(_, held)| if held == phase { -LAST } else { PHASE });
     hold(bench, scene, order, periods + changed)
 }
 
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
-/// Periods of the first level more than those of the move: the start of the loop disturbs the particle, too.
-const FIRST: f64 = 32.0;
-/// Periods of a change of the phase more than those of the move, for the same reason.
-const PHASE: f64 = 8.0;
-/// Share of the drive that a move may need in addition to the drive that holds the response.
-const MOVE_SHARE: f64 = 0.8;
-
-/// Periods of the move to a level: those of the scene, or as many as the drive needs to change the response that much.
-fn move_periods(scene: &Scene, from: Option<&Known>, level: f64) -> f64 {
-    let slowest = from.map_or(0.0, |from| {
-        2.0 * (level - from.c).abs() / (MOVE_SHARE * scene.dimensionless().epsilon * from.g * std::f64::consts::TAU)
-    });
-    scene.backbone.move_periods.max(slowest)
-}
-
-/// Slopes of the backbone by the last two points, or what is known without them: their order of magnitude.
-fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
-    let d = scene.dimensionless();
-    let drift = SlowFlow::new(d.lambda, d.r)
-        .drift(level)
-        .map_or([0.0; 2], |drift| [drift.g, drift.sigma]);
-    let (g, sigma) = match known {
-        [.., one, other] if one.c != other.c => {
-            let slope = |from: f64, to: f64| (to - from) / (other.c - one.c);
-            let pair = |slope: f64| [slope, 0.5 * slope.abs() + 0.5];
-            (pair(slope(one.g, other.g)), pair(slope(one.sigma, other.sigma)))
-        }
-        _ => ([1.0, 2.0], [0.0, 5.0]),
-    };
-    Slopes {
-        base: g.map(|g| d.amplitude(g) / d.b),
-        omega: sigma.map(|sigma| d.omega_change(sigma) / d.b),
-        drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
-        // The spread of a held amplitude is small.
-        curvature: [0.0; 2],
-    }
-}
-
 /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
 fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
     bench: &mut Bench<R, C>,
@@ -205,7 +166,7 @@ fn criterion(scene: &Scene, order: &Order) -> Criterion {
         precision: pair(settings.precision),
         tolerance: pair(settings.tolerance),
         fewest: settings.dwell_min as usize,
-        slopes: slopes(scene, &order.known, order.level),
+        slopes: predictor::slopes(scene, &order.known, order.level),
         phase: order.phase,
     }
 }

@@ -3,10 +3,7 @@
 use serde::Serialize;
 use vines_model::Dimensionless;
 
-use super::{
-    PHASE_RESONANCE,
-    exact_curve::{Distance, ExactCurve},
-};
+use super::exact_curve::{Distance, ExactCurve};
 use crate::backbone::{Point, Tracked};
 use crate::scene::{Resonance, Scene};
 
@@ -43,7 +40,7 @@ impl TrackedComparison {
         let parameters = scene.dimensionless();
         let curve = ExactCurve::of(&parameters);
         let peak = scene.resonance.resonance == Resonance::Peak;
-        let at_resonance = peak || scene.controller.phase_target == PHASE_RESONANCE;
+        let at_resonance = peak || scene.controller.is_at_phase_resonance();
         let compare = |point: &Point| TrackedPoint {
             point: *point,
             exact: at_resonance

@@ -99,13 +99,12 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
             .map(|c| mean(c.iter().copied()))
             .collect();
         let value = Estimate::mean(&per_period);
+        // The hold belongs to the periods that give the limit: of their noise, a half is common to both.
+        let [one, other] = [limit, response].map(|estimate| estimate.uncertainty.powi(2));
+        let rest = ((one - other).abs() + 0.5 * one.min(other)).sqrt();
         Estimate::new(
             value.value + b_slope * remaining,
-            &[
-                value.uncertainty,
-                b_slope * limit.uncertainty / d.b,
-                b_slope * response.uncertainty / d.b,
-            ],
+            &[value.uncertainty, b_slope * rest / d.b],
         )
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use vines_model::numerics::mean;
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
 use crate::experiment::Sample;
@@ -15,6 +16,17 @@ pub fn impacts(samples: &[Sample]) -> Vec<Impact> {
         .filter(|pair| pair[1].impacts > pair[0].impacts)
         .map(|pair| Impact { time: pair[1].impact_time, velocity: pair[1].impact_velocity })
         .collect()
+}
+
+/// The wall, -1 or 1, after which the longer flights begin, on average; `None` without impacts.
+pub(super) fn longer_after(samples: &[Sample]) -> Option<i8> {
+    let impacts = impacts(samples);
+    let after = |wall: f64| {
+        let flights = impacts.windows(2).filter(move |pair| pair[0].velocity * wall > 0.0);
+        mean(flights.map(|pair| pair[1].time - pair[0].time))
+    };
+    let difference = after(1.0) - after(-1.0);
+    (!difference.is_nan()).then_some(if difference > 0.0 { 1 } else { -1 })
 }
 
 /// Impacts per period of `omega` (rad/s) over the samples, and the regime they make.

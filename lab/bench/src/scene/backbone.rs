@@ -58,9 +58,9 @@ impl Default for Backbone {
             bandwidth: 0.15,
             move_periods: 4.0,
             dwell_min: 8,
-            dwell_max: 60,
+            dwell_max: 90,
             tolerance: 5e-4,
-            precision: 1.2e-3,
+            precision: 1.25e-3,
             predictor: Predictor::Previous,
         }
     }
@@ -71,8 +71,10 @@ impl Backbone {
     #[must_use]
     pub fn levels(&self) -> Vec<f64> {
         let steps = f64::from(self.points.max(2) - 1);
+        // Rounded as a person would write them: 0.68, not 0.6799999999999999.
         (0..self.points)
             .map(|n| self.c_from + (self.c_to - self.c_from) * f64::from(n) / steps)
+            .map(|level| (1e9 * level).round() / 1e9)
             .collect()
     }
 

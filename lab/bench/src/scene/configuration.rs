@@ -4,8 +4,10 @@ use std::f64::consts::PI;
 
 use lovines::State;
 use phase_lock::{Config, LockCriterion};
+use vines_model::orbit::phase_resonant;
 
 use super::{Scene, Sensor, plant::symbols};
+use crate::advice;
 
 impl Scene {
     /// Parameters and start of the plant, under the names of the FMU's variables.
@@ -61,6 +63,7 @@ impl Scene {
             reference_connected: self.chain.reference,
             approach_gain,
             capture_response: self.captures().then_some(CAPTURE * d.b),
+            captured_max: self.captured_max().map(|c| c * d.b),
             lock: self.lock_criterion(approach_gain),
             ..defaults
         }
@@ -117,11 +120,24 @@ impl Scene {
         self.controller.capture.unwrap_or(dq1 == 0.0 && dq2 == 0.0)
     }
 
+    /// Largest response amplitude over b of a stable symmetric 1:1 motion, where such a motion of this drive is to be captured.
+    fn captured_max(&self) -> Option<f64> {
+        let d = self.dimensionless();
+        let exists = self.captures() && phase_resonant(&d).iter().any(|orbit| orbit.stable);
+        exists.then(|| advice::largest_stable(&d)).flatten()
+    }
+
+    /// Natural periods in which the amplitude of the linear mode falls by a factor of e.
+    #[must_use]
+    pub fn relaxation_periods(&self) -> f64 {
+        let d = self.dimensionless();
+        1.0 / (PI * d.epsilon * d.lambda)
+    }
+
     /// Time limit for the lock, natural periods: as set, or at least 2000 and 20 times the relaxation time.
     #[must_use]
     pub fn lock_periods(&self) -> f64 {
-        let d = self.dimensionless();
-        let relaxation = 1.0 / (d.epsilon * d.lambda);
+        let relaxation = PI * self.relaxation_periods();
         let samples_per_period = self.controller.samples_per_period;
         self.record
             .lock_periods
