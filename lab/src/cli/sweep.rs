@@ -20,6 +20,7 @@ Results; the regime is always computed, as by `vines map`:
   regime     regime, periods to settle, impacts per period, pattern, Lyapunov exponent, synchrony, sticking
   response   amplitude C, and the powers that impacts and damper dissipate
   orbits     the exact symmetric 1:1 orbits at the drive of the cell, and their stability
+  lock       the locked point: the experiment of `vines identify`, without its decay and without a measurement chain
 
 The store is a Zarr group (version 3) that xarray.open_zarr reads; docs/scale.md describes it. It is written chunk by chunk. The same
 command goes on with a sweep that was interrupted. A cell that fails has its reason in the variable `failure`.
@@ -27,6 +28,7 @@ command goes on with a sweep that was interrupted. A cell that fails has its rea
 Examples:
   vines sweep --axis sigma=-5:5:101 --axis excitation.G=0.1:3:59 --out map.zarr
   vines sweep --axis start.q1=random:-0.01:0.01 --axis start.dq1=random:-1:1 --samples 10000 --sigma=-1.14 --out basin.zarr
+  vines sweep --axis sigma=-5:5:1000 --axis excitation.G=0.1:3:1000 --shard 3/8 --out map.zarr
   vines sweep --axis plant.r=0.3:1:71 --axis plant.b=0.005:0.02:61 --results response,orbits --out gap.zarr";
 
 /// Sweep over any numbers of a scene and of its start, to a Zarr store
@@ -56,7 +58,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "PERIODS", default_value_t = Settings::default().periods)]
     periods: usize,
 
-    /// What to compute: regime, response, orbits
+    /// What to compute: regime, response, orbits, lock
     #[arg(long, value_name = "GROUPS", default_value = "regime", value_delimiter = ',')]
     results: Vec<String>,
 
@@ -67,6 +69,14 @@ pub(super) struct Arguments {
     /// Folder of the store; made if it is not there
     #[arg(long, value_name = "DIR", default_value = "sweep.zarr")]
     out: PathBuf,
+
+    /// Compute only the I-th of N parts, I from 1; parts may share a store on a common file system
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<Shard>,
+
+    /// Collect the chunks of these stores of the same sweep instead of computing
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
+    merge: Vec<PathBuf>,
 
     /// Confirms a sweep of more than 2 hours or 20 GB
     #[arg(long)]
@@ -84,6 +94,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         chunk: arguments.chunk,
     };
     let plan = Plan::new(arguments.scene.family()?, settings).map_err(Failure::input)?;
+    if !arguments.merge.is_empty() {
+        return merge(&plan, arguments);
+    }
     let estimate = sweep::estimate(&plan).map_err(Failure::input)?;
     if estimate.is_large() && !arguments.yes {
         let Estimate { cells, hours, bytes } = estimate;
@@ -116,6 +129,28 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     )))
 }
 
+/// The part `I/N` of a sweep.
+fn shard(text: &str) -> Result<Shard, String> {
+    let parts = text
+        .split_once('/')
+        .and_then(|(one, of)| Some((one.parse::<u64>().ok()?, of.parse().ok()?)));
+    match parts {
+        Some((one, of)) if (1..=of).contains(&one) => Ok(Shard { number: one - 1, of }),
+        _ => Err("expected I/N with I from 1 to N, for instance 3/8".into()),
+    }
+}
+
+fn merge(plan: &Plan, arguments: &Arguments) -> Result<String, Failure> {
+    let out = arguments.out.display();
+    match sweep::merge(plan, &arguments.out, &arguments.merge).map_err(Failure::input)? {
+        0 => Ok(format!("{} cells, complete\nWritten: {out}\n", plan.cells())),
+        missing => Err(Failure::run(format!(
+            "{missing} of {} cells are in none of these stores; {out} has the others. Without --merge, the same command computes them",
+            plan.cells()
+        ))),
+    }
+}
+
 /// Runs the sweep with a bar that shows the progress, until it is complete or a signal stops it.
 fn watched(plan: &Plan, arguments: &Arguments, monitor: &Monitor) -> Result<bool, Failure> {
     let signal = stop_flag()?;
@@ -123,7 +158,7 @@ fn watched(plan: &Plan, arguments: &Arguments, monitor: &Monitor) -> Result<bool
         .unwrap_or_else(|_| ProgressStyle::default_bar());
     let bar = ProgressBar::new(plan.cells()).with_style(style);
     thread::scope(|scope| {
-        let work = scope.spawn(|| sweep::run(plan, &arguments.out, Shard::ALL, monitor));
+        let work = scope.spawn(|| sweep::run(plan, &arguments.out, arguments.shard.unwrap_or(Shard::ALL), monitor));
         let mut started = false;
         while !work.is_finished() {
             thread::sleep(Duration::from_millis(20));

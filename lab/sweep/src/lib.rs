@@ -10,11 +10,15 @@ mod cell;
 mod folder;
 mod plan;
 mod run;
+mod settings;
 mod sobol;
 mod store;
+mod variables;
 
 pub use axis::{Axis, SIGMA, Values};
-pub use cell::{ABSENT, Results};
-pub use plan::{Plan, PlanError, Settings};
-pub use run::{Estimate, Monitor, Shard, estimate, run};
+pub use cell::Results;
+pub use plan::Plan;
+pub use run::{Estimate, Monitor, Shard, estimate, merge, run};
+pub use settings::{PlanError, Settings};
 pub use store::StoreError;
+pub use variables::ABSENT;

@@ -1,7 +1,7 @@
 //! Runs a sweep on all cores, chunk by chunk.
 
 use std::{
-    path::Path,
+    path::{Path, PathBuf},
     sync::{
         Mutex,
         atomic::{AtomicBool, AtomicU64, Ordering::Relaxed},
@@ -101,6 +101,32 @@ pub fn run(plan: &Plan, folder: &Path, shard: Shard, monitor: &Monitor) -> Resul
             Ok(true)
         }
     }
+}
+
+/// Collects the chunks of other stores of the same sweep. Returns the number of cells that are still missing.
+///
+/// # Errors
+/// A folder that cannot be used, or a store of another sweep.
+pub fn merge(plan: &Plan, folder: &Path, from: &[PathBuf]) -> Result<u64, StoreError> {
+    let sources = from
+        .iter()
+        .map(|one| Store::existing(plan, one))
+        .collect::<Result<Vec<_>, _>>()?;
+    let store = Store::open(plan, folder)?;
+    let mut missing = 0;
+    for index in (0..plan.chunks()).map(|n| plan.chunk_index(n)) {
+        if store.has(&index) {
+            continue;
+        }
+        match sources.iter().find(|source| source.has(&index)) {
+            Some(source) => store.copy(&index, source)?,
+            None => missing += plan.chunk_cells(&index),
+        }
+    }
+    if missing == 0 {
+        store.tidy()?;
+    }
+    Ok(missing)
 }
 
 /// All cells of a chunk; None if it was stopped.

@@ -14,9 +14,10 @@ use zarrs::array::{
 };
 
 use crate::{
-    cell::{ABSENT, Cell, Read, Variable, variables},
+    cell::Cell,
     folder::Folder,
     plan::Plan,
+    variables::{ABSENT, Read, Variable, variables},
 };
 
 /// Why a store cannot be used.
@@ -34,7 +35,7 @@ pub enum StoreError {
         differs: String,
     },
     /// The folder holds something else.
-    #[error("{} is not empty and not the store of a sweep; write to another folder", .0.display())]
+    #[error("{} is not the store of a sweep; name another folder", .0.display())]
     NotAStore(PathBuf),
     /// Reading or writing failed.
     #[error("cannot write to {}: {source}. Complete chunks stay; the same command goes on with the sweep", folder.display())]
@@ -79,6 +80,14 @@ impl Store {
             Err(error) => return Err(failed(error.into())),
         }
         Ok(store)
+    }
+
+    /// Opens the store of `plan` in a folder that must have it.
+    pub(crate) fn existing(plan: &Plan, root: &Path) -> Result<Self, StoreError> {
+        match root.join(GROUP).is_file() {
+            true => Self::open(plan, root),
+            false => Err(StoreError::NotAStore(root.into())),
+        }
     }
 
     fn create(&self, plan: &Plan) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
@@ -170,8 +179,25 @@ impl Store {
                 }
             }
         };
-        let failed = |error: ArrayError| StoreError::Write { folder: self.root.clone(), source: error.into() };
-        self.arrays.iter().try_for_each(write).map_err(failed)
+        self.arrays
+            .iter()
+            .try_for_each(write)
+            .map_err(|error| self.failed(error))
+    }
+
+    /// Copies a chunk of another store of the same sweep.
+    pub(crate) fn copy(&self, index: &[u64], from: &Self) -> Result<(), StoreError> {
+        self.arrays.iter().try_for_each(|(_, array)| {
+            let key = array.chunk_key(index);
+            let content = fs::read(from.folder.path(key.as_str())).map_err(|error| from.failed(error))?;
+            self.folder
+                .write(key.as_str(), &content)
+                .map_err(|error| self.failed(error))
+        })
+    }
+
+    fn failed(&self, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> StoreError {
+        StoreError::Write { folder: self.root.clone(), source: source.into() }
     }
 
     /// Removes what kills have left. Only for a complete store, to which nobody else writes.

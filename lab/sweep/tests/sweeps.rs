@@ -3,7 +3,7 @@
 use std::{collections::BTreeMap, fs, path::Path, sync::atomic::Ordering::Relaxed};
 
 use vines_model::map::{LIMIT, Plan as MapPlan};
-use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, estimate, run};
+use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, estimate, merge, run};
 use vines_testbench::scene::Family;
 
 fn settings(axes: &[&str]) -> Settings {
@@ -91,7 +91,7 @@ fn a_sweep_over_sigma_and_g_has_the_bits_of_the_map() {
 #[test]
 fn on_a_symmetric_motion_the_response_is_that_of_the_exact_orbit() {
     let folder = tempfile::tempdir().unwrap();
-    let results = Results { response: true, orbits: true };
+    let results = Results::parse(["response", "orbits"]).unwrap();
     let plan = plan(Settings {
         results,
         chunk: 100,
@@ -142,6 +142,46 @@ fn shards_stops_and_resumptions_give_the_same_bytes() {
     assert!(run(&plan, parts.path(), Shard::ALL, &monitor).unwrap());
     assert_eq!((monitor.found.load(Relaxed), monitor.computed.load(Relaxed)), (60, 0));
     assert!(files(whole.path()) == files(parts.path()));
+}
+
+#[test]
+fn shards_in_stores_of_their_own_merge_to_the_same_bytes() {
+    let [whole, first, second, merged] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
+    let plan = plan(settings(&["start.dq2=0.1:0.6:9", "plant.r=0.5,0.65"])).unwrap();
+    assert!(run(&plan, whole.path(), Shard::ALL, &Monitor::default()).unwrap());
+    for (number, folder) in [&first, &second].into_iter().enumerate() {
+        assert!(
+            run(
+                &plan,
+                folder.path(),
+                Shard { number: number as u64, of: 2 },
+                &Monitor::default()
+            )
+            .unwrap()
+        );
+    }
+    assert_eq!(merge(&plan, merged.path(), &[first.path().into()]).unwrap(), 6);
+    assert_eq!(
+        merge(&plan, merged.path(), &[first.path().into(), second.path().into()]).unwrap(),
+        0
+    );
+    assert!(files(whole.path()) == files(merged.path()));
+    let error = merge(&plan, merged.path(), &["missing".into()])
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("missing is not the store"), "{error}");
+}
+
+#[test]
+fn the_locked_point_of_a_cell_is_that_of_the_experiment() {
+    let folder = tempfile::tempdir().unwrap();
+    let results = Results::parse(["lock"]).unwrap();
+    let plan = plan(Settings { results, chunk: 100, ..settings(&["excitation.G=0.1,1.1"]) }).unwrap();
+    assert!(run(&plan, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
+    // As the README shows for the default scene; at G = 0.1, nothing is hit.
+    let sigma = numbers(folder.path(), "lock_sigma");
+    assert!(sigma[0].is_nan() && (sigma[1] + 1.139_376).abs() < 4e-6, "{sigma:?}");
+    assert!((numbers(folder.path(), "lock_C")[1] - 0.448_018).abs() < 4e-6);
 }
 
 #[test]
@@ -235,6 +275,6 @@ fn a_store_of_another_sweep_or_other_files_stay_as_they_are() {
     let error = run(&other, notes.path(), Shard::ALL, &Monitor::default())
         .unwrap_err()
         .to_string();
-    assert!(error.contains("not empty"), "{error}");
+    assert!(error.contains("not the store of a sweep"), "{error}");
     assert_eq!(files(notes.path()).len(), 1);
 }
