@@ -1,6 +1,11 @@
 //! `vines sweep`: any numbers of a scene over grids, lists and random or Sobol designs, to a Zarr store.
 
-use std::{path::PathBuf, sync::atomic::Ordering::Relaxed, thread, time::Duration};
+use std::{
+    path::PathBuf,
+    sync::atomic::{AtomicBool, Ordering::Relaxed},
+    thread,
+    time::Duration,
+};
 
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
@@ -20,7 +25,7 @@ Results; the regime is always computed, as by `vines map`:
   regime     regime, periods to settle, impacts per period, pattern, Lyapunov exponent, synchrony, sticking
   response   amplitude C, and the powers that impacts and damper dissipate
   orbits     the exact symmetric 1:1 orbits at the drive of the cell, and their stability
-  lock       the locked point: the experiment of `vines identify`, without its decay and without a measurement chain
+  lock       the locked point: the experiment of `vines identify`, without its decay
 
 The store is a Zarr group (version 3) that xarray.open_zarr reads; docs/scale.md describes it. It is written chunk by chunk. The same
 command goes on with a sweep that was interrupted. A cell that fails has its reason in the variable `failure`.
@@ -97,7 +102,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if !arguments.merge.is_empty() {
         return merge(&plan, arguments);
     }
-    let estimate = sweep::estimate(&plan).map_err(Failure::input)?;
+    let estimate = sweep::estimate(&plan, &AtomicBool::new(false)).map_err(Failure::input)?;
     if estimate.is_large() && !arguments.yes {
         let Estimate { cells, hours, bytes } = estimate;
         return Err(Failure::input(format!(

@@ -102,11 +102,10 @@ pub(crate) fn compute(scene: &Scene, sigma: f64, g: Option<f64>, periods: usize,
 fn locked(scene: &Scene) -> Result<Lock, String> {
     let message = |error: &dyn std::fmt::Display| format!("no locked point: {error}");
     let plan = experiment::Plan { decay: 0, ..experiment::Plan::of(scene) };
-    let mut rig = Simulated::new(scene.plant, scene.start)
-        .map_err(|error| message(&error))?
-        .with_sensors(scene.resonance);
+    let mut rig = Simulated::of(scene).map_err(|error| message(&error))?;
     let mut controller = BuiltIn::new(&scene.controller_config()).map_err(|error| message(&error))?;
-    let record = experiment::run(&mut rig, &mut controller, &plan, |_, _, _| {}).map_err(|error| message(&error))?;
+    let record =
+        experiment::run(rig.as_mut(), &mut controller, &plan, |_, _, _| {}).map_err(|error| message(&error))?;
     let found = identification::identify(&record, scene).map_err(|error| message(&error))?;
     Ok(found.lock)
 }

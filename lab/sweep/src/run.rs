@@ -175,16 +175,16 @@ impl Estimate {
 const TRIED: usize = 64;
 const TRIAL: Duration = Duration::from_secs(1);
 
-/// Estimates the cost of a sweep from a few of its cells.
+/// Estimates the cost of a sweep from a few of its cells; the flag ends it early.
 ///
 /// # Errors
 /// If all of them fail: the reason of the first.
-pub fn estimate(plan: &Plan) -> Result<Estimate, String> {
+pub fn estimate(plan: &Plan, stop: &AtomicBool) -> Result<Estimate, String> {
     let start = Instant::now();
     // Positions that do not follow a regular grid: the golden ratio.
     let tried: Vec<Cell> = (0..TRIED)
         .map(|n| (0.5 + 0.618_033_988_749_895 * n as f64).fract())
-        .take_while(|_| start.elapsed() < TRIAL)
+        .take_while(|n| *n == 0.5 || start.elapsed() < TRIAL && !stop.load(Relaxed))
         .map(|position| plan.cell_near(position))
         .collect();
     if tried.iter().all(|cell| !cell.failure.is_empty()) {

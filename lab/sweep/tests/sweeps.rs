@@ -1,6 +1,11 @@
 //! Sweeps against single cells and the regime map, and what is refused.
 
-use std::{collections::BTreeMap, fs, path::Path, sync::atomic::Ordering::Relaxed};
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::Path,
+    sync::atomic::{AtomicBool, Ordering::Relaxed},
+};
 
 use vines_model::map::{LIMIT, Plan as MapPlan};
 use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, estimate, merge, run};
@@ -229,7 +234,11 @@ fn axes_that_make_no_sense_are_refused_with_their_name_and_value() {
     assert!(refused(Settings { periods: 99, ..settings(&["plant.r=0.3:0.5:3"]) }).contains("99 periods"));
     assert!(refused(Settings { sigma: Some(f64::NAN), ..settings(&["plant.r=0.3:0.5:3"]) }).contains("NaN"));
     assert!(refused(settings(&["plant.r=0.3:0.5:9999999999", "plant.b=1:2:9999999999"])).contains("2^53"));
-    let none = estimate(&plan(settings(&["plant.r=1.2:1.4:3"])).unwrap()).unwrap_err();
+    let none = estimate(
+        &plan(settings(&["plant.r=1.2:1.4:3"])).unwrap(),
+        &AtomicBool::new(false),
+    )
+    .unwrap_err();
     assert!(
         none.contains("all of") && none.contains("above 0 and at most 1"),
         "{none}"
@@ -243,7 +252,7 @@ fn a_sweep_of_10_12_cells_is_estimated_and_found_large() {
         ..settings(&["plant.r=0.3:1:1000000", "sigma=-5:5:1000000"])
     })
     .unwrap();
-    let estimate = estimate(&plan).unwrap();
+    let estimate = estimate(&plan, &AtomicBool::new(false)).unwrap();
     println!("{estimate:?}");
     assert_eq!(estimate.cells, 1_000_000_000_000);
     assert!(estimate.is_large() && estimate.bytes > 1e13 && estimate.hours > 100.0);

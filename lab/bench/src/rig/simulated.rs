@@ -2,9 +2,10 @@
 
 use lovines::{InvalidValue, Parameters, Plant, State};
 
+use crate::scene::Scene;
 use vines_model::{Definition, Reference, Sensor};
 
-use super::{Drive, GroundTruth, Rig, RigError, Sensors};
+use super::{Chain, Drive, GroundTruth, Rig, RigError, Sensors};
 
 /// The plant, stepped directly.
 #[derive(Clone)]
@@ -25,6 +26,21 @@ impl Simulated {
         let mut rig = Self { plant, definition: Definition::default(), before: [0.0; 3] };
         rig.step_begins(0.0);
         Ok(rig)
+    }
+
+    /// The rig of a scene, with its measurement chain.
+    ///
+    /// # Errors
+    /// An invalid parameter or start.
+    pub fn of(scene: &Scene) -> Result<Box<dyn Rig>, InvalidValue> {
+        let plant = Self::new(scene.plant, scene.start)?.with_sensors(scene.resonance);
+        let samples = scene.controller.samples_per_period;
+        Ok(Chain::around(
+            Box::new(plant),
+            &scene.chain,
+            &scene.dimensionless(),
+            samples,
+        ))
     }
 
     /// The same with the sensors of a definition. An accelerometer averages over a sample period, so that it does not miss the impulses
