@@ -79,7 +79,10 @@ def test_a_copy_continues_with_the_same_bits():
 @pytest.mark.parametrize(
     ("wrong", "parts"),
     [
-        (lambda: vines.Plant({**vines.Scene().settings["plant"], "k": -1.0}), ["k (stiffness)", "-1", "N/m", "1e-100 to 1e100"]),
+        (
+            lambda: vines.Plant({**vines.Scene().settings["plant"], "k": -1.0}),
+            ["k (stiffness)", "-1", "N/m", "1e-100 to 1e100"],
+        ),
         (lambda: vines.Plant(q2=0.02), ["0.02", "m", "-b to b"]),
         (lambda: vines.Plant(q3=0.0), ["q3", "q1, dq1, q2, dq2"]),
         (lambda: vines.Batch(vines.Scene(), {"dq2": [0.1, np.nan]}), ["plant 1", "NaN", "m/s"]),
@@ -96,7 +99,7 @@ def test_a_copy_continues_with_the_same_bits():
     ],
 )
 def test_a_value_that_is_not_allowed_is_a_value_error_with_value_and_range(wrong, parts):
-    with pytest.raises(ValueError, match=".") as error:
+    with pytest.raises(ValueError) as error:  # noqa: PT011
         wrong()
     for part in parts:
         assert part in str(error.value)

@@ -1,16 +1,32 @@
 from collections.abc import Callable
-from typing import Any
+from typing import Any, final
 
 import numpy as np
 from numpy.typing import NDArray
 
+__all__ = [
+    "PhaseLock",
+    "Plants",
+    "Scene",
+    "backbone",
+    "chunks",
+    "identify",
+    "orbits",
+    "regime",
+    "sweep",
+    "theory",
+    "version",
+]
+
 version: str
 
+@final
 class Scene:
     def __new__(cls, text: str | None, origin: str, overrides: list[str]) -> Scene: ...
     def settings(self) -> str: ...
     def dimensionless(self) -> str: ...
 
+@final
 class Plants:
     def __new__(cls, parameters: NDArray[np.float64], starts: NDArray[np.float64]) -> Plants: ...
     def __len__(self) -> int: ...
@@ -29,6 +45,7 @@ class Plants:
     def walls(self) -> NDArray[np.int8]: ...
     def totals(self) -> tuple[NDArray[np.uint64], NDArray[np.float64]]: ...
 
+@final
 class PhaseLock:
     def __new__(cls, scene: Scene) -> PhaseLock: ...
     @property

@@ -31,7 +31,9 @@ def _column(values: list[Any]) -> NDArray[Any]:
 
 
 def _dataset(table: Table, dimension: str, units: dict[str, str], **attributes: Any) -> "xarray.Dataset":
-    columns = {name: (dimension, values) for name, values in table.items() if values.ndim == 1 and values.dtype != object}
+    columns = {
+        name: (dimension, values) for name, values in table.items() if values.ndim == 1 and values.dtype != object
+    }
     return dataset(columns, {name: units.get(name, "1") for name in columns}, **attributes)
 
 
@@ -46,7 +48,8 @@ class Identification:
     exact : Orbit or None
         The exact phase-resonant orbit nearest to the lock.
     decay : dict of ndarray
-        Points along the free decay: tau, C, B, sigma, sigma_steady, their standard uncertainties, sigma_theory and sigma_exact.
+        Points along the free decay: tau, C, B, sigma, sigma_steady, their standard uncertainties, sigma_theory and
+        sigma_exact.
     decay_end : str
         What ended the points.
     rms_sigma_error, rms_sigma_exact, rms_steady_exact : float or None
@@ -108,7 +111,8 @@ class Backbone:
     Attributes
     ----------
     points : dict of ndarray
-        C, sigma, G, their standard uncertainties u_C, u_sigma and u_G, level, periods, settled, reached, regime and others.
+        C, sigma, G, their standard uncertainties u_C, u_sigma and u_G, level, periods, settled, reached, regime
+        and others.
     periods : float
         All periods, from the start to the last point.
     """
@@ -118,7 +122,9 @@ class Backbone:
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the points as a dataset over the dimension `point`."""
-        return _dataset(self.points, "point", {"phase_error_deg": "degree", "u_phase_deg": "degree"}, periods=self.periods)
+        return _dataset(
+            self.points, "point", {"phase_error_deg": "degree", "u_phase_deg": "degree"}, periods=self.periods
+        )
 
 
 def backbone(scene: Scene | None = None) -> Backbone:
@@ -147,7 +153,9 @@ def backbone(scene: Scene | None = None) -> Backbone:
     array([0.6, 0.5, 0.4])
     """
     found = json.loads(_native.backbone((scene or Scene())._native))
-    points = [{**point, **{f"{k}_difference": v for k, v in (point.pop("exact") or {}).items()}} for point in found["points"]]
+    points = [
+        {**point, **{f"{k}_difference": v for k, v in (point.pop("exact") or {}).items()}} for point in found["points"]
+    ]
     return Backbone(points=_table(points), periods=found["periods"])
 
 
@@ -158,7 +166,8 @@ class Orbit:
     Attributes
     ----------
     G, sigma, C, B : float
-        Base amplitude over b epsilon, detuning, amplitude of the first harmonic of the response over b, speed of the particle over b omega0.
+        Base amplitude over b epsilon, detuning, amplitude of the first harmonic of the response over b,
+        speed of the particle over b omega0.
     gamma : float
         Phase of the response relative to the reference, rad.
     multipliers : tuple of float
@@ -217,7 +226,8 @@ class Theory:
     Attributes
     ----------
     backbone : dict of ndarray
-        C, B, sigma, G, branch, impacts_stable and slow_flow_stable along the backbone, from the fold to symmetry breaking.
+        C, B, sigma, G, branch, impacts_stable and slow_flow_stable along the backbone, from the fold to
+        symmetry breaking.
     solutions : dict of ndarray
         The same at phase resonance and the scene's G.
     B_min, C_min : float

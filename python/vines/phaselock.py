@@ -96,8 +96,8 @@ class PhaseLock:
         Output
             Drive until the next sample, and estimates.
         """
-        *values, state, fault = self._native.sample(response, reference, active)
-        return Output(*values, state=_STATES[state], fault=fault)  # type: ignore[arg-type]
+        found = self._native.sample(response, reference, active)
+        return Output(*found[:8], _STATES[found[8]], found[9])
 
     def copy(self) -> "PhaseLock":
         """Return a copy that continues with the same bits."""

@@ -82,13 +82,17 @@ class Batch:
         self, parameters: Scene | Mapping[str, ArrayLike], starts: Mapping[str, ArrayLike] | None = None
     ) -> None:
         first: dict[str, ArrayLike] = dict.fromkeys(_START, 0.0)
+        values: Mapping[str, ArrayLike]
         if isinstance(parameters, Scene):
             settings = parameters.settings
-            parameters, first = settings["plant"], settings["start"]
+            values, first = settings["plant"], settings["start"]
+        else:
+            values = parameters
         given = dict(first) | dict(starts or {})
-        _check("parameters", parameters, _PARAMETERS)
+        _check("parameters", values, _PARAMETERS)
         _check("starts", given, _START)
-        columns = [np.asarray(values, dtype=np.float64) for values in [*(parameters[n] for n in _PARAMETERS), *(given[n] for n in _START)]]
+        given = {**values, **given}
+        columns = [np.asarray(given[name], dtype=np.float64) for name in (*_PARAMETERS, *_START)]
         rows = np.stack(np.broadcast_arrays(*np.atleast_1d(*columns)), axis=-1)
         if rows.ndim != 2:
             raise ValueError(f"parameters and starts of shape {rows.shape[:-1]}: one-dimensional arrays are allowed")
@@ -123,9 +127,11 @@ class Batch:
         ValueError
             A value that is not allowed. No plant is advanced then.
         """
-        given = (np.asarray(one, dtype=np.float64) for one in (duration, amplitude, omega))
-        arrays = [np.ascontiguousarray(np.broadcast_to(one, (len(self),))) for one in given]
-        found = self._native.advance(*arrays, events)
+
+        def array(given: ArrayLike) -> NDArray[np.float64]:
+            return np.ascontiguousarray(np.broadcast_to(np.asarray(given, dtype=np.float64), (len(self),)))
+
+        found = self._native.advance(array(duration), array(amplitude), array(omega), events)
         return None if found is None else Events(*found)
 
     def copy(self) -> "Batch":
@@ -194,7 +200,9 @@ class Plant(Batch):
     def __init__(self, parameters: Scene | Mapping[str, float] | None = None, **start: float) -> None:
         super().__init__(Scene() if parameters is None else parameters, start)
 
-    def advance(self, duration: float, *, amplitude: float = 0.0, omega: float = 0.0) -> Events:  # type: ignore[override]
+    def advance(  # type: ignore[override]
+        self, duration: float, *, amplitude: float = 0.0, omega: float = 0.0
+    ) -> Events:
         """Advance the plant; see `Batch.advance`."""
         events = super().advance(duration, amplitude=amplitude, omega=omega)
         assert events is not None

@@ -19,8 +19,8 @@ class Scene:
     text : str, optional
         A scene as TOML text instead.
     **sections : mapping
-        Values that replace those of the scene, by section: `plant={"r": 0.7}`. docs/guide.md and scenes/paper.toml have all sections and
-        keys with their units.
+        Values that replace those of the scene, by section: `plant={"r": 0.7}`. scenes/paper.toml has all
+        sections and keys with their units.
 
     Raises
     ------
@@ -36,7 +36,7 @@ class Scene:
     >>> Scene(plant={"r": 1.7})
     Traceback (most recent call last):
         ...
-    ValueError: [plant] or [start]: r (coefficient of restitution) = 1.7 is refused; allowed is a number above 0 and at most 1
+    ValueError: [plant] or [start]: r (coefficient of restitution) = 1.7 is refused; allowed is a number above 0 and ...
     """
 
     def __init__(
@@ -59,7 +59,7 @@ class Scene:
 
     @property
     def settings(self) -> dict[str, Any]:
-        """All settings, by section: plant, start and amplitude in SI units, the others in the units of the scene file."""
+        """All settings, by section: plant, start and amplitude in SI units, the others in those of the scene file."""
         return dict(json.loads(self._native.settings()))
 
     @property

@@ -39,7 +39,8 @@ def sweep(
     scene : Scene or None
         None: the default scene.
     axes : mapping of str to values
-        By name, `"sigma"` or `"section.key"` of a scene: a tuple (first, last, number), a list, or a tuple ("random" or "sobol", first, last).
+        By name, `"sigma"` or `"section.key"` of a scene: a tuple (first, last, number), a list, or a tuple
+        ("random" or "sobol", first, last).
     out : path-like
         Folder of the store.
     sigma : float, optional
@@ -69,7 +70,8 @@ def sweep(
     Raises
     ------
     ValueError
-        An unknown axis, a value that is not allowed, a large sweep that is not confirmed, or a store of another sweep, which stays as it is.
+        An unknown axis, a value that is not allowed, a large sweep that is not confirmed, or a store of
+        another sweep, which stays as it is.
     OSError
         The store cannot be written. Complete chunks stay.
     KeyboardInterrupt
@@ -96,7 +98,8 @@ def sweep(
     cells, chunks, hours, size, large = _native.chunks(scene._native, axes, settings)
     if large and not confirm:
         raise ValueError(
-            f"{cells} cells would take about {hours:.1f} h on this machine and {size / 1e9:.1f} GB before compression; confirm with confirm=True"
+            f"{cells} cells would take about {hours:.1f} h on this machine and {size / 1e9:.1f} GB before compression; "
+            "confirm with confirm=True"
         )
     with _bar(cells, progress) as bar:
         if client is None:
@@ -106,7 +109,8 @@ def sweep(
             _distributed(client, (scene, axes, settings, fspath(out)), chunks, cells, bar)
             # Nothing is left to compute; this removes what a killed worker has left.
             _native.sweep(scene._native, axes, settings, fspath(out), (0, 1), None)
-    return xarray.open_zarr(out)
+    opened: xarray.Dataset = xarray.open_zarr(out)
+    return opened
 
 
 def _values(values: Values) -> Values:
@@ -118,7 +122,7 @@ def _values(values: Values) -> Values:
 def _bar(cells: int, progress: bool) -> Any:
     if not progress:
         return nullcontext()
-    from tqdm.auto import tqdm
+    from tqdm.auto import tqdm  # type: ignore[import-untyped]
 
     return tqdm(total=cells, unit="cell")
 
@@ -139,7 +143,8 @@ def _distributed(client: Any, arguments: Any, chunks: int, cells: int, bar: Any)
         return None if part is None else client.submit(_chunk, part, chunks, *arguments, pure=False)
 
     at_once = 4 * max(1, sum(client.nthreads().values()))
-    running = as_completed([one for one in (submit() for _ in range(at_once)) if one is not None])
+    started = [one for one in (submit() for _ in range(at_once)) if one is not None]
+    running: Any = as_completed(started)  # type: ignore[no-untyped-call]
     for finished in running:
         finished.result()
         if bar is not None:
