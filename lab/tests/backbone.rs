@@ -1,7 +1,7 @@
 //! The backbone, tracked with the response held by the loop.
 
 use vines::backbone::{TrackError, track};
-use vines::comparison::TrackedComparison;
+use vines::comparison::{ExactCurve, TrackedComparison, TrackedPoint};
 use vines::identification::Regime;
 use vines::rig::{BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated};
 use vines::scene::{Override, Scene};
@@ -15,7 +15,11 @@ fn scene(settings: &[&str]) -> Scene {
 fn tracked(settings: &[&str]) -> TrackedComparison {
     let scene = scene(settings);
     let mut rig = Chain::new(
-        Box::new(Simulated::new(scene.plant, scene.start).unwrap()),
+        Box::new(
+            Simulated::new(scene.plant, scene.start)
+                .unwrap()
+                .with_sensors(scene.resonance),
+        ),
         &scene.chain,
         &scene.dimensionless(),
         scene.controller.samples_per_period,
@@ -155,6 +159,23 @@ fn below_the_fold_the_motion_is_reported_as_irregular_and_not_settled() {
         (last.regime, last.regime_by_impacts),
         (Regime::Other, Some(Regime::Other))
     );
+}
+
+#[test]
+fn peaks_of_the_response_are_tracked_apart_from_phase_resonance() {
+    for sensor in ["v", "q1"] {
+        let sensor = format!("resonance.sensor=\"{sensor}\"");
+        let settings = ["backbone.C_to=0.3", "backbone.points=6", &sensor];
+        let report = tracked(&[&settings[..], &["resonance.definition=\"peak\""]].concat());
+        assert!(report.worst().unwrap().at_equal_c <= 1.5e-3);
+        let phase = ExactCurve::of(&scene(&settings).dimensionless());
+        for TrackedPoint { point, exact } in &report.points {
+            let error = exact.unwrap().sigma.unwrap();
+            assert!(point.settled && error.abs() < 4.0 * point.u_sigma, "{point:?}: {error}");
+            // The two curves are half of the theory's own error apart.
+            assert!((point.sigma - phase.at(point.c).unwrap()[0]).abs() > 0.01, "{point:?}");
+        }
+    }
 }
 
 /// A controller that only ever holds a drive.

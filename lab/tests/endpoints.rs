@@ -135,6 +135,23 @@ fn built_in_fmu_and_lock_step_network_give_the_same_bits() {
 }
 
 #[test]
+fn the_sensors_of_the_scene_are_those_of_every_rig() {
+    let plant = fmu("LoViNes.fmu");
+    let sensors = [
+        "--set",
+        "resonance.sensor='acceleration'",
+        "--set",
+        "resonance.reference='force'",
+    ];
+    let with = |rig: &str| identified(&[&["--rig", rig], &sensors[..]].concat());
+    let direct = with("built-in");
+    assert_ne!(sigma(&direct), sigma(&identified(&["--rig", "built-in"])));
+    assert_eq!(with(plant.to_str().unwrap()), direct);
+    let rig = Server::start(&[&["rig", "--lock-step"], &sensors[..]].concat());
+    assert_eq!(with(&rig.1), direct);
+}
+
+#[test]
 fn a_rig_in_real_time_gives_the_same_sigma_within_5e_3() {
     let direct = identified(&["--rig", "built-in"]);
     let rig = Server::start(&["rig", "--json"]);
@@ -238,6 +255,8 @@ fn a_rig_of_another_scene_is_refused() {
         1,
         "same scene",
     );
+    let other = Server::start(&["rig", "--lock-step", "--set", "resonance.sensor='q1'"]);
+    fails(&["identify", "--rig", &other.1], 1, "measures q1 and e");
 }
 
 #[test]

@@ -1,4 +1,5 @@
-// The page in real browsers: VINES_PAGE is its folder, VINES_LOCK the sample and the bits of the native lock.
+// The page in real browsers: VINES_PAGE is its folder, VINES_LOCK the sample and the bits of the native lock, and the
+// native program's least time for a sample, ns.
 
 import assert from "node:assert/strict";
 import { createServer } from "node:http";
@@ -9,7 +10,7 @@ import puppeteer from "puppeteer-core";
 
 const FOLDER = process.env.VINES_PAGE;
 const SCREENS = process.env.VINES_SCREENS;
-const [SAMPLE, BITS] = process.env.VINES_LOCK.split(" ");
+const [SAMPLE, BITS, NATIVE] = process.env.VINES_LOCK.split(" ");
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".json": "application/json", ".wasm": "application/wasm" };
 const BROWSERS = [
   { name: "chromium", options: { executablePath: "/usr/bin/chromium", args: ["--no-sandbox", "--disable-quic", "--no-first-run", "--disable-background-networking", "--disable-component-update", "--disable-sync"] } },
@@ -66,6 +67,27 @@ for (const { name, options } of BROWSERS) {
         return { bits: view.getBigUint64(0).toString(16).padStart(16, "0"), settled: one.bench.status().settled, samples: one.samples };
       }, Number(SAMPLE));
       assert.deepEqual(found, { bits: BITS, settled: 1, samples: Number(SAMPLE) });
+      assert.deepEqual(errors, []);
+      await page.close();
+    });
+
+    test("the time for a sample is reported beside the native one", async () => {
+      const { page, errors } = await open();
+      await ready(page);
+      const least = await page.evaluate((samples) => {
+        const one = window.live.page;
+        one.play(false);
+        one.start({});
+        one.bench.run(20 * samples);
+        // Clocks of browsers are coarse: blocks of some milliseconds.
+        return Math.min(...Array.from({ length: 40 }, () => {
+          const start = performance.now();
+          for (let block = 0; block < 20; block++) one.bench.run(samples);
+          return ((performance.now() - start) * 1e6) / (20 * samples);
+        }));
+      }, 1000);
+      assert.ok(least > 0);
+      console.log(`${name}: ${least.toFixed(0)} ns for a sample, ${(least / Number(NATIVE)).toFixed(2)} times the native ${NATIVE} ns`);
       assert.deepEqual(errors, []);
       await page.close();
     });

@@ -95,8 +95,8 @@ def check_lock(own_lock: dict[str, float], figure: Callable[..., None]) -> Calla
 
     def check_lock(name: str, bench: Bench, tape: Tape) -> Lock:
         lock = measure(bench, tape)
-        figure(f"{name}: sigma off the lab's own lock", abs(lock.sigma - own_lock["sigma"]), at_most=5e-3)
-        figure(f"{name}: C off the lab's own lock, relative", abs(lock.amplitude / own_lock["C"] - 1), at_most=5e-3)
+        figure(f"{name}: sigma off the lab's own lock", abs(lock.sigma - own_lock["sigma"]), at_most=1e-4)
+        figure(f"{name}: C off the lab's own lock, relative", abs(lock.amplitude / own_lock["C"] - 1), at_most=1e-4)
         figure(f"{name}: impacts per period off 2", abs(lock.impacts_per_period - 2), at_most=0.03)
         return lock
 

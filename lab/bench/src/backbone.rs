@@ -5,6 +5,7 @@
 //! the *response*, and the drive follows. A predictor computes drive and frequency of the next point from the points before, so that
 //! the loops have little to correct.
 
+mod peak;
 mod point;
 mod predictor;
 mod settle;

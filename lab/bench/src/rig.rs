@@ -3,6 +3,7 @@
 
 mod chain;
 mod error;
+mod measured;
 mod phase_lock;
 mod simulated;
 
@@ -10,6 +11,7 @@ pub use ::phase_lock::{Fault, LoopState, Move};
 pub use chain::Chain;
 pub(crate) use chain::NormalDistribution;
 pub use error::{ControllerError, RigError};
+pub use measured::Measured;
 pub use phase_lock::BuiltIn;
 pub use simulated::Simulated;
 
@@ -100,11 +102,11 @@ pub trait Controller {
     /// Errors of the implementation: a refused call, a lost connection.
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError>;
 
-    /// Controls the amplitude of the response from now on, and moves it as stated.
+    /// Controls the amplitude of the response from now on, moves it as stated, and holds the phase `phase_target`, rad.
     ///
     /// # Errors
     /// A controller that cannot control the response, or cannot do so now.
-    fn hold_response(&mut self, _to: Move) -> Result<(), ControllerError> {
+    fn hold_response(&mut self, _to: Move, _phase_target: f64) -> Result<(), ControllerError> {
         Err(ControllerError::NoResponseLoop)
     }
 }

@@ -4,13 +4,14 @@ use std::path::Path;
 
 use fmi::fmi2::instance::Common;
 use phase_lock::Value;
-use vines_testbench::rig::{Drive, GroundTruth, Rig, RigError, Sensors};
+use vines_testbench::rig::{Drive, GroundTruth, Measured, Rig, RigError, Sensors};
+use vines_testbench::scene::{Reference as ReferenceSignal, Scene, Sensor};
 
 use crate::instance::{Fmu, FmuError, Kind, Reference};
 
 /// A plant FMU, stepped sample by sample.
 ///
-/// It needs the inputs `omega` and `E` and the output `v`; with the input `e` it can be driven by held samples, too. Where it has `base`, that is the reference sensor; where it has
+/// It needs the inputs `omega` and `E` and the output that the sensor reads, `v` or `q1`, from which an acceleration follows; with the input `e` it can be driven by held samples, too. Where it has `base`, that is the reference sensor; where it has
 /// `impacts`, `impact_time`, `impact_velocity` and `der(q2)`, it reports its impacts. The parameters `M`, `k`, `c`, `m`, `b`, `r`
 /// and the start `q1`, `der(q1)`, `q2`, `der(q2)` are set as far as the FMU has them.
 pub struct FmuRig {
@@ -32,24 +33,35 @@ struct Inside {
 }
 
 impl FmuRig {
-    /// Loads the plant at `path` and initialises it with parameters and a start, under the names of `LoViNes.fmu`.
+    /// Loads the plant at `path` and initialises it with the parameters and the start of a scene, under the names of `LoViNes.fmu`. It
+    /// has the sensors of the scene.
     ///
     /// # Errors
     /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
-    pub fn load(path: &Path, values: &[(&str, f64)]) -> Result<Self, FmuError> {
+    pub fn load(path: &Path, scene: &Scene) -> Result<Measured<Self>, FmuError> {
         let mut fmu = Fmu::load(path, "plant")?;
         let inputs = [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?];
-        let response = fmu.need(Kind::Real, "v")?;
+        let definition = scene.resonance;
+        let response = match definition.sensor {
+            Sensor::V => fmu.need(Kind::Real, "v")?,
+            Sensor::Q1 | Sensor::Acceleration => fmu.need(Kind::Real, "q1")?,
+        };
+        let reference = match definition.reference {
+            ReferenceSignal::Base => fmu.find(Kind::Real, "base"),
+            ReferenceSignal::Force => Some(fmu.need(Kind::Real, "base")?),
+        };
+        let values = scene.start_values();
         let values = values.iter().map(|(name, value)| (*name, Value::Real(*value)));
         fmu.start(&values.collect::<Vec<_>>())?;
-        Ok(Self {
+        let rig = Self {
             inputs,
             held: fmu.find(Kind::Real, "e"),
             response,
-            reference: fmu.find(Kind::Real, "base"),
+            reference,
             inside: Inside::of(&fmu),
             fmu,
-        })
+        };
+        Ok(Measured::new(rig, definition, &scene.plant))
     }
 }
 

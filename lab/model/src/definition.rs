@@ -64,14 +64,31 @@ impl Definition {
         cases.into_iter().flat_map(with).collect()
     }
 
+    /// Whether the sensors need differences of samples, so that response and reference are read one sample late.
+    #[must_use]
+    pub fn is_late(&self) -> bool {
+        self.sensor == Sensor::Acceleration || self.reference == Reference::Force
+    }
+
+    /// The channels, as a rig at a network address states them: 0, 1 and 2 for v, q1 and the acceleration, and 4 more for the force.
+    #[must_use]
+    pub fn channels(&self) -> u8 {
+        self.sensor as u8 + 4 * self.reference as u8
+    }
+
+    /// The channels in words: response and reference.
+    #[must_use]
+    pub fn channel_names(&self) -> String {
+        format!("{} and {}", self.sensor.name(), self.reference.name())
+    }
+
     /// In words, as in a table.
     #[must_use]
     pub fn name(&self) -> String {
         let sensor = self.sensor.name();
-        match (self.resonance, self.reference) {
-            (Resonance::Peak, _) => format!("peak of {sensor}"),
-            (Resonance::Phase, Reference::Base) => format!("phase of {sensor} to e"),
-            (Resonance::Phase, Reference::Force) => format!("phase of {sensor} to k e + c e'"),
+        match self.resonance {
+            Resonance::Peak => format!("peak of {sensor}"),
+            Resonance::Phase => format!("phase of {sensor} to {}", self.reference.name()),
         }
     }
 }
@@ -89,6 +106,15 @@ impl Sensor {
 }
 
 impl Reference {
+    /// As in a table.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Reference::Base => "e",
+            Reference::Force => "k e + c e'",
+        }
+    }
+
     /// Phase of the reference relative to the base, rad, at the frequency `omega` over omega0 and for `2 zeta = epsilon lambda`.
     pub(crate) fn phase(self, damping: f64, omega: f64) -> f64 {
         match self {

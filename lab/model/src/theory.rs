@@ -29,7 +29,7 @@ pub use epmc::Epmc;
 pub use equilibrium::Equilibrium;
 pub use manifold::{BranchSide, Manifold};
 pub use modulation::{ImpactSequence, Modulation};
-pub use resonance::{free_sigma, resonant};
+pub use resonance::{backbone, backbone_at_level, free_sigma, reading, resonant};
 pub use response::ResponsePoint;
 pub use slow_flow::{Coefficients, SlowFlow};
 pub use stability::{B_SYMMETRY_BREAKING, half_period_map, half_period_multipliers, impacts_stable};

@@ -26,6 +26,8 @@ pub(super) struct Client {
     sample_time: f64,
     /// Longest silence of the server.
     pub silence: Duration,
+    /// What the sensors of a rig read ([`Definition::channels`](vines_testbench::scene::Definition::channels)).
+    pub channels: u8,
     pub counters: Counters,
     /// Number of the present sample.
     pub at: u64,
@@ -55,6 +57,7 @@ impl Client {
             session: hello.session,
             sample_time,
             silence: CONNECT,
+            channels: 0,
             counters: Counters::default(),
             at: 0,
             last: hello,
@@ -65,6 +68,7 @@ impl Client {
             if answer.kind == Kind::Welcome {
                 // Client and server use the same limit.
                 client.silence = Duration::try_from_secs_f64(answer.values[1]).unwrap_or(CONNECT);
+                client.channels = answer.values[2] as u8;
                 return Ok(client);
             }
         }

@@ -42,6 +42,16 @@ pub enum LinkError {
     /// The peer refuses the session.
     #[error("{peer} refuses: {reason}")]
     Refused { peer: Address, reason: Refusal },
+    /// The peer has other sensors.
+    #[error(
+        "{peer} measures {theirs}, the [resonance] section of the scene needs {ours}: use the same scene for both, or set resonance.sensor \
+         and resonance.reference to what the rig measures"
+    )]
+    Sensors {
+        peer: Address,
+        theirs: String,
+        ours: String,
+    },
     /// The peer is silent.
     #[error("{peer} has been silent for {seconds} s, at t = {time} s of the experiment")]
     Silent { peer: Address, seconds: f64, time: f64 },

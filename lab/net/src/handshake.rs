@@ -5,6 +5,7 @@ use std::fmt::{self, Display, Formatter};
 use super::frame::{Frame, Kind, VERSION, flag};
 use super::payload::read_command;
 use vines_testbench::rig::Drive;
+use vines_testbench::scene::Definition;
 
 /// Largest relative difference of two sample times that count as equal.
 pub(super) const SAME_TIME: f64 = 1e-9;
@@ -18,6 +19,8 @@ pub enum Role {
     Rig {
         /// Largest drive amplitude, m. A drive above it is refused.
         max_amplitude: f64,
+        /// What its sensors read.
+        sensors: Definition,
     },
 }
 
@@ -44,14 +47,18 @@ impl Service {
         }
         let mut welcome = Frame::new(Kind::Welcome, hello.session);
         welcome.flags = if controller { flag::CONTROLLER } else { 0 };
-        welcome.values[..2].copy_from_slice(&[self.sample_time, self.silence]);
+        let channels = match self.role {
+            Role::Rig { sensors, .. } => sensors.channels(),
+            Role::Controller => 0,
+        };
+        welcome.values[..3].copy_from_slice(&[self.sample_time, self.silence, channels.into()]);
         Ok(welcome)
     }
 
     /// The drive in a frame. What is not finite or above a limit must not reach a shaker.
     pub(super) fn drive(&self, frame: &Frame) -> Result<Drive, Refusal> {
         let largest = match self.role {
-            Role::Rig { max_amplitude } => max_amplitude,
+            Role::Rig { max_amplitude, .. } => max_amplitude,
             Role::Controller => 0.0,
         };
         let limits = [std::f64::consts::PI / self.sample_time, largest, largest];

@@ -10,6 +10,7 @@ use super::frame::{Frame, Kind};
 use super::payload::{Reading, read_reading, write_command};
 use super::report::{Counters, Timing};
 use vines_testbench::rig::{Command, Drive, GroundTruth, Rig, RigError, Sensors};
+use vines_testbench::scene::Definition;
 
 /// Longest time for the report of a rig in real time.
 const REPORT: Duration = Duration::from_millis(200);
@@ -42,6 +43,24 @@ impl NetRig {
             newest: None,
             timing: Arc::default(),
         })
+    }
+
+    /// Refuses a rig whose sensors are not those of `expected`.
+    ///
+    /// # Errors
+    /// Other sensors.
+    pub fn with_sensors(self, expected: Definition) -> Result<Self, LinkError> {
+        let theirs = Definition::all()
+            .into_iter()
+            .find(|one| one.channels() == self.client.channels);
+        match expected.channels() == self.client.channels {
+            true => Ok(self),
+            false => Err(LinkError::Sensors {
+                peer: self.client.peer,
+                theirs: theirs.map_or("unknown".into(), |one| one.channel_names()),
+                ours: expected.channel_names(),
+            }),
+        }
     }
 
     /// The longest silence, s, of a rig in real time; None for a rig in lock-step.

@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
 use super::{
-    endpoint::{Endpoint, ReachArguments, check},
+    endpoint::{Endpoint, ReachArguments},
     failure::Failure,
     log_warnings, result,
     scene_arguments::SceneArguments,
@@ -16,11 +16,14 @@ use super::{
 
 const HELP: &str = "\
 Holds the response at one level after another, and measures the drive and the frequency:
-  C         amplitude of the first harmonic of the centre of mass, over b
-  sigma     detuning (Omega - 1)/epsilon at which the response lags the base by 90 degrees
-  G         base amplitude over b epsilon
-  averaged  periods at the end of the dwell that the point is averaged over
-  error     difference in sigma or G, whichever is larger, from the exact backbone at the same C
+  C           amplitude of the first harmonic of the response that the scene's sensor reads, over b
+  sigma       detuning (Omega - 1)/epsilon of resonance as [resonance] defines it
+  G           base amplitude over b epsilon
+  off target  phase of the response relative to the reference, less controller.phase_target
+  averaged    periods at the end of the dwell that the point is averaged over
+  error       difference in sigma or G, whichever is larger, from the exact backbone at the same C
+With resonance.definition = \"peak\" each level is held at three phases, controller.phase_target and 14 degrees on both sides of it: at a
+constant response, the drive is smallest at the peak. `off target` is then the phase of the peak less controller.phase_target.
 Numbers after ± are standard uncertainties; those of sigma and G hold at the C of the same line. A level that the response does not
 reach, because the drive is at a limit, is named as such.
 
@@ -28,6 +31,7 @@ Examples:
   vines backbone                                          29 levels from C = 0.7 down to 0.14
   vines backbone --set backbone.C_to=0.2 --set backbone.points=11
   vines backbone --set chain.snr=40 --set chain.seed=7    with sensor noise
+  vines backbone --set resonance.definition='\"peak\"'     the backbone of the peaks of the response
   vines backbone --set backbone.predictor='\"theory\"'           with theory as the predictor
   vines backbone --rig LoViNes.fmu --out out/fmu          another rig: an FMU, or a network address
 
@@ -61,7 +65,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     log_warnings();
     let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(Failure::input)?;
     writable(&arguments.out)?;
-    check(&scene)?;
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let tracked = track(&mut open.rig, &mut controller, &scene, |done, _| {

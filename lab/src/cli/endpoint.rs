@@ -75,9 +75,10 @@ impl Endpoint {
                 let plant = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
                 Box::new(plant.with_sensors(scene.resonance))
             }
-            Self::Fmu(file) => Box::new(FmuRig::load(file, &scene.start_values()).map_err(Failure::run)?),
+            Self::Fmu(file) => Box::new(FmuRig::load(file, scene).map_err(Failure::run)?),
             Self::Network(address) => {
                 let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time())?;
+                let rig = rig.with_sensors(scene.resonance)?;
                 pace = rig.pace();
                 timing = rig.timing();
                 Box::new(rig)
@@ -115,7 +116,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Failure> {
     if scene.resonance.resonance == Resonance::Peak && scene.controller.phase_target == -90.0 {
         return Err(Failure::input(
             "resonance.definition = \"peak\" with controller.phase_target = -90 degrees: the loop holds a phase, so set phase_target to the \
-             phase at the peak, which `vines orbit` prints",
+             phase at the peak, which `vines orbit` computes and `vines backbone` measures",
         ));
     }
     BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;

@@ -145,6 +145,9 @@ fn summary(map: &Map) -> String {
             map.plan.starts
         );
     }
+    if !map.curves.is_empty() {
+        text.push('\n');
+    }
     for curve in &map.curves {
         let Branch { points, ended: [one, other], .. } = &curve.branch;
         let (name, count) = (curve.name(), points.len());

@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     };
     let max_amplitude = arguments.max_amplitude.unwrap_or(scene.plant.half_width);
     let service = Service {
-        role: Role::Rig { max_amplitude },
+        role: Role::Rig { max_amplitude, sensors: scene.resonance },
         sample_time: scene.sample_time(),
         silence: arguments.silence.unwrap_or(default),
     };

@@ -5,7 +5,7 @@ use serde::Serialize;
 use vines::{
     report::{Table, number, summary::parameters},
     scene::Dimensionless,
-    theory::{Activation, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, SlowFlow, resonant},
+    theory::{Activation, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, SlowFlow, backbone, resonant},
 };
 
 use super::{failure::Failure, json, scene_arguments::SceneArguments, yes_no};
@@ -95,7 +95,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         sigma,
         activation: flow.activation(sigma),
         equilibria: at_sigma.unwrap_or_default(),
-        backbone: flow.backbone(highest / points as f64, highest, points),
+        backbone: backbone(&scene, highest / points as f64, highest, points),
     };
     if arguments.json {
         return json(&report);

@@ -7,7 +7,7 @@ use plotters::chart::SeriesLabelPosition;
 use plotters::style::{Color, RGBColor, ShapeStyle};
 use thiserror::Error;
 
-use crate::scene::Dimensionless;
+use crate::scene::{Dimensionless, Sensor};
 
 pub use stability::{Marked, clipped, thinned};
 
@@ -16,7 +16,7 @@ pub type Place = (f64, f64);
 
 /// Axis labels that several figures share.
 pub const DETUNING: &str = "detuning σ = (ω/ω₀ − 1)/ε";
-pub const AMPLITUDE: &str = "amplitude C of v, over b";
+pub const AMPLITUDE_OF_V: &str = "amplitude C of v, over b";
 pub const SPEED: &str = "particle speed B, over b ω₀";
 
 /// Usual size of a figure, px.
@@ -197,6 +197,15 @@ impl Panel {
         for run in stability::runs(points, true) {
             self.curve(run, styles[0], labels[0]);
         }
+    }
+}
+
+/// The label of an axis of amplitudes as the scene's sensor reads them.
+pub fn amplitude(p: &Dimensionless) -> &'static str {
+    match p.definition.sensor {
+        Sensor::V => AMPLITUDE_OF_V,
+        Sensor::Q1 => "amplitude C of q₁, over b",
+        Sensor::Acceleration => "amplitude C of −q₁″, over b ω₀²",
     }
 }
 

@@ -4,7 +4,10 @@ use super::table::{Table, number, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use crate::identification::{DecayEnd, Regime};
 use crate::orbit::Orbit;
-use crate::scene::{Definition, Dimensionless};
+use crate::scene::{Definition, Dimensionless, Sensor};
+
+/// Periods over which the ripple of an acceleration averages out.
+const RIPPLE: usize = 200;
 
 /// The numbers that a result belongs to, in one line.
 #[must_use]
@@ -45,8 +48,13 @@ pub fn identification(found: &Comparison) -> String {
     } else {
         ""
     };
+    let ripple = if found.parameters.definition.sensor == Sensor::Acceleration && lock.averaged < RIPPLE {
+        "  (the impacts leave a ripple on an acceleration: hold 200 periods, record.hold_periods, for 1e-3 in sigma and C)\n"
+    } else {
+        ""
+    };
     format!(
-        "{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{}\n{}\n{}\n",
+        "{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{ripple}{}\n{}\n{}\n",
         rig(&found.parameters),
         with_uncertainty(lock.g, lock.u_g),
         lock.periods_to_lock,
@@ -132,6 +140,7 @@ pub fn tracked(found: &TrackedComparison) -> String {
         let mut cells = pairs.map(|(value, u)| with_uncertainty(value, u)).to_vec();
         let equal = exact.and_then(|exact| Some(exact.sigma?.abs().max(exact.g?.abs())));
         cells.extend([
+            format!("{:+.2}°", point.phase_error_deg),
             format!("{:.1}", point.periods),
             point.averaged.to_string(),
             equal.map_or("-".into(), |error| format!("{error:.1e}")),
@@ -143,6 +152,7 @@ pub fn tracked(found: &TrackedComparison) -> String {
         "C",
         "sigma",
         "G",
+        "off target",
         "periods",
         "averaged",
         "error",

@@ -123,8 +123,8 @@ impl Bench {
     /// The message for a drive that the plant refuses.
     pub fn sample(&mut self) -> Result<Row, String> {
         let due = self.tracking.as_mut().and_then(|tracking| tracking.due(self.samples));
-        if let Some(to) = due {
-            self.hold_response(to)?;
+        if let Some((to, phase_target)) = due {
+            self.hold_response(to, phase_target)?;
         }
         let time = self.time();
         let sensors = self.rig.read();
@@ -175,9 +175,11 @@ impl Bench {
         Ok(())
     }
 
-    fn hold_response(&mut self, to: Move) -> Result<(), String> {
-        self.lock
-            .hold_response(&mut self.state, to)
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), String> {
+        let amplitude = self.lock.config().amplitude;
+        let retuned = self.lock.retune(amplitude, phase_target);
+        retuned
+            .and_then(|()| self.lock.hold_response(&mut self.state, to))
             .map_err(|error| error.to_string())
     }
 

@@ -28,16 +28,18 @@ pub struct Point {
 
 /// The moves that are still to be made, and the points that they lead to.
 pub struct Tracking {
-    /// Moves and the sample before which each is made, in reverse.
-    moves: Vec<(u64, Move)>,
+    /// Moves with their phase targets (rad) and the sample before which each is made, in reverse.
+    moves: Vec<(u64, Move, f64)>,
     /// All points.
     pub points: Vec<Point>,
 }
 
 impl Tracking {
-    /// The move to be made before the given sample.
-    pub fn due(&mut self, sample: u64) -> Option<Move> {
-        self.moves.pop_if(|(at, _)| *at <= sample).map(|(_, to)| to)
+    /// The move to be made before the given sample, and its phase target, rad.
+    pub fn due(&mut self, sample: u64) -> Option<(Move, f64)> {
+        self.moves
+            .pop_if(|(at, ..)| *at <= sample)
+            .map(|(_, to, phase)| (to, phase))
     }
 }
 
@@ -47,7 +49,7 @@ struct Ahead<'a> {
     state: State,
     /// Samples taken, and the frequency at the last one.
     last: &'a Cell<(u64, f64)>,
-    moves: Vec<(u64, Move)>,
+    moves: Vec<(u64, Move, f64)>,
 }
 
 impl Controller for Ahead<'_> {
@@ -62,8 +64,9 @@ impl Controller for Ahead<'_> {
         Ok(output.into())
     }
 
-    fn hold_response(&mut self, to: Move) -> Result<(), ControllerError> {
-        self.moves.push((self.last.get().0, to));
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
+        self.moves.push((self.last.get().0, to, phase_target));
+        self.lock.retune(self.lock.config().amplitude, phase_target)?;
         Ok(self.lock.hold_response(&mut self.state, to)?)
     }
 }

@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::predictor::Known;
 use crate::identification::Regime;
 
 /// One point of the backbone; dimensionless.
@@ -9,7 +10,7 @@ use crate::identification::Regime;
 pub struct Point {
     /// Target level.
     pub level: f64,
-    /// Amplitude of the fundamental of v.
+    /// Amplitude of the fundamental of the response.
     #[serde(rename = "C")]
     pub c: f64,
     /// Detuning.
@@ -17,7 +18,7 @@ pub struct Point {
     /// Base amplitude over `b epsilon`.
     #[serde(rename = "G")]
     pub g: f64,
-    /// Mean phase error, degrees.
+    /// Mean phase error, degrees; of a peak, its phase less the phase target.
     pub phase_error_deg: f64,
     /// Standard uncertainties of C, and of sigma and G at this C.
     #[serde(rename = "u_C")]
@@ -41,6 +42,12 @@ pub struct Point {
     pub regime: Regime,
     /// The regime determined from the impacts, if the rig is a simulation.
     pub regime_by_impacts: Option<Regime>,
+}
+
+impl Point {
+    pub(super) fn known(&self) -> Known {
+        Known { c: self.c, g: self.g, sigma: self.sigma }
+    }
 }
 
 /// The tracked backbone.

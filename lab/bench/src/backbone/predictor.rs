@@ -1,7 +1,8 @@
 //! Prediction of the drive and the frequency at the next level.
 
 use crate::scene::Predictor;
-use vines_model::theory::{BranchSide, SlowFlow};
+use vines_model::Dimensionless;
+use vines_model::theory::backbone_at_level;
 
 /// A working point: response amplitude, drive amplitude, detuning; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -12,20 +13,16 @@ pub struct Known {
 }
 
 /// Change of `(G, sigma)` from the last known point to the level `c`; zeros where nothing is known.
-pub fn change(feed: Predictor, known: &[Known], c: f64, slow_flow: &SlowFlow) -> (f64, f64) {
+pub fn change(feed: Predictor, known: &[Known], c: f64, scene: &Dimensionless) -> (f64, f64) {
     match (feed, known) {
         (Predictor::None, _) | (_, []) => (0.0, 0.0),
-        (Predictor::Theory, [.., last]) => by_theory(slow_flow, last.c, c).unwrap_or((0.0, 0.0)),
+        (Predictor::Theory, [.., last]) => by_theory(scene, last.c, c).unwrap_or((0.0, 0.0)),
         (Predictor::Previous, _) => extrapolate(&known[known.len().saturating_sub(3)..], c),
     }
 }
 
-fn by_theory(slow_flow: &SlowFlow, from: f64, to: f64) -> Option<(f64, f64)> {
-    let at = |c| {
-        let b = slow_flow.manifold.b(c, BranchSide::Right)?;
-        Some(slow_flow.backbone_at(b))
-    };
-    let (from, to) = (at(from)?, at(to)?);
+fn by_theory(scene: &Dimensionless, from: f64, to: f64) -> Option<(f64, f64)> {
+    let (from, to) = (backbone_at_level(scene, from)?, backbone_at_level(scene, to)?);
     Some((to.g - from.g, to.sigma - from.sigma))
 }
 
@@ -45,39 +42,38 @@ fn extrapolate(points: &[Known], c: f64) -> (f64, f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use vines_model::Sensor;
 
     fn known(c: f64) -> Known {
         Known { c, g: 1.0 + c * c, sigma: -3.0 + 2.0 * c }
     }
 
-    fn slow_flow() -> SlowFlow {
-        SlowFlow::new(1.43, 0.65)
+    fn scene() -> Dimensionless {
+        Dimensionless::new(0.0084, 1.43, 0.65, 1.1)
     }
 
     #[test]
     fn three_points_foresee_a_parabola_exactly() {
         let before = [0.7, 0.65, 0.6].map(known);
-        let (g, sigma) = change(Predictor::Previous, &before, 0.55, &slow_flow());
+        let (g, sigma) = change(Predictor::Previous, &before, 0.55, &scene());
         assert!((g - (known(0.55).g - known(0.6).g)).abs() < 1e-12);
         assert!((sigma + 0.1).abs() < 1e-12);
     }
 
     #[test]
     fn one_point_foresees_no_change() {
-        assert_eq!(
-            change(Predictor::Previous, &[known(0.7)], 0.6, &slow_flow()),
-            (0.0, 0.0)
-        );
+        assert_eq!(change(Predictor::Previous, &[known(0.7)], 0.6, &scene()), (0.0, 0.0));
     }
 
     #[test]
     fn theory_foresees_the_difference_between_two_levels() {
-        let flow = slow_flow();
-        let (g, sigma) = change(Predictor::Theory, &[known(0.5)], 0.4, &flow);
-        let expected =
-            flow.backbone_sigma(0.4, BranchSide::Right).unwrap() - flow.backbone_sigma(0.5, BranchSide::Right).unwrap();
+        let mut scene = scene();
+        scene.definition.sensor = Sensor::Q1;
+        let (g, sigma) = change(Predictor::Theory, &[known(0.5)], 0.4, &scene);
+        let at = |c| backbone_at_level(&scene, c).unwrap().sigma;
+        let expected = at(0.4) - at(0.5);
         assert!((sigma - expected).abs() < 1e-12 && g < 0.0);
         // Below the fold the theory has no backbone.
-        assert_eq!(change(Predictor::Theory, &[known(0.5)], 0.1, &flow), (0.0, 0.0));
+        assert_eq!(change(Predictor::Theory, &[known(0.5)], 0.1, &scene), (0.0, 0.0));
     }
 }

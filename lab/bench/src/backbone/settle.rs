@@ -18,6 +18,8 @@ pub struct Criterion {
     pub precision: [f64; 2],
     /// Largest parts of them that are not noise.
     pub tolerance: [f64; 2],
+    /// Phase error at which the point is held, rad.
+    pub phase: f64,
     /// Fewest periods.
     pub fewest: usize,
     /// Slopes of the backbone, as far as they are known.
@@ -57,7 +59,7 @@ impl Found {
     }
 }
 
-/// Phase error, rad, up to which the balances hold.
+/// Largest deviation of the phase, rad, from that which is held.
 const PHASE_RANGE: f64 = 0.3;
 /// Largest relative deviation of the amplitude within the periods, unless it is noise.
 const SPREAD: f64 = 0.01;
@@ -102,7 +104,7 @@ impl Criterion {
         let noise = 4.0 * cycles[0].noise[0].sqrt();
         let is_near = |cycle: &Cycle| {
             let deviation = (cycle.amplitude() - amplitude).abs();
-            deviation <= (SPREAD * amplitude).max(noise) && cycle.phase_error.abs() <= PHASE_RANGE
+            deviation <= (SPREAD * amplitude).max(noise) && (cycle.phase_error - self.phase).abs() <= PHASE_RANGE
         };
         if !cycles.iter().all(is_near) {
             return None;

@@ -2,13 +2,14 @@
 
 use thiserror::Error;
 
+use super::peak;
 use super::point::{Point, Tracked};
 use super::predictor::{self, Known};
 use super::settle::{Criterion, Found};
 use crate::experiment::Sample;
 use crate::identification::{Cycle, Slopes, classify, regime_by_response};
 use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError};
-use crate::scene::Scene;
+use crate::scene::{Resonance, Scene};
 use vines_model::numerics::Estimate;
 use vines_model::theory::SlowFlow;
 
@@ -123,43 +124,101 @@ pub fn track(
     };
     approach(&mut bench, scene.lock_periods())?;
     let periods_to_lock = bench.periods;
-    let d = scene.dimensionless();
-    let slow_flow = SlowFlow::new(d.lambda, d.r);
-    let mut points: Vec<Point> = Vec::new();
+    let phases: &[f64] = match scene.resonance.resonance {
+        Resonance::Phase => &[0.0],
+        Resonance::Peak => &peak::PHASES,
+    };
+    let mut scans: Vec<Vec<Point>> = vec![Vec::new(); phases.len()];
+    // The last point, and the phase at which it was held.
+    let mut last: Option<(Point, f64)> = None;
     let mut ended = None;
-    for (n, &level) in levels.iter().enumerate() {
+    'levels: for (n, &level) in levels.iter().enumerate() {
         progress(n, levels.len());
-        let known: Vec<Known> = points
-            .iter()
-            .filter(|point| point.g.is_finite() && point.sigma.is_finite())
-            .map(|point| Known { c: point.c, g: point.g, sigma: point.sigma })
-            .collect();
-        let (g, sigma) = predictor::change(settings.predictor, &known, level, &slow_flow);
-        let periods = move_periods(scene, known.last(), level);
-        bench.controller.hold_response(Move {
-            response: level * d.b,
-            duration: periods * d.natural_period(),
-            amplitude: d.amplitude(g),
-            omega: d.omega_change(sigma),
-        })?;
-        let wait = periods + if points.is_empty() { FIRST } else { 0.0 };
-        match hold(&mut bench, scene, level, wait, &slopes(scene, &known, level)) {
-            Ok(point) => points.push(point),
-            // What was measured is kept.
-            Err(error) if !points.is_empty() => {
-                ended = Some(error.to_string());
-                break;
+        for k in 0..phases.len() {
+            // The next level begins at the phase at which this one ends.
+            let scan = if n % 2 == 0 { k } else { phases.len() - 1 - k };
+            let order = &Order { level, phase: phases[scan], known: known(&scans[scan], last) };
+            match go(&mut bench, scene, order, last) {
+                Ok(point) => {
+                    scans[scan].push(point);
+                    last = Some((point, order.phase));
+                }
+                // What was measured is kept.
+                Err(error) if last.is_some() => {
+                    ended = Some(error.to_string());
+                    break 'levels;
+                }
+                Err(error) => return Err(error),
             }
-            Err(error) => return Err(error),
         }
     }
+    let points = match scene.resonance.resonance {
+        Resonance::Phase => scans.swap_remove(0),
+        Resonance::Peak => peak::peaks(&scans, &scene.dimensionless()),
+    };
     Ok(Tracked { points, periods_to_lock, periods: bench.periods, ended })
+}
+
+/// What is to be held next.
+struct Order {
+    /// Response amplitude over b.
+    level: f64,
+    /// Phase error, rad.
+    phase: f64,
+    /// The points before.
+    known: Vec<Known>,
+}
+
+/// The points of a scan; before its first, the last one of another.
+fn known(scan: &[Point], last: Option<(Point, f64)>) -> Vec<Known> {
+    let finite = |known: &Known| known.g.is_finite() && known.sigma.is_finite();
+    let own: Vec<Known> = scan.iter().map(Point::known).filter(finite).collect();
+    match own.is_empty() {
+        true => last.iter().map(|(point, _)| point.known()).filter(finite).collect(),
+        false => own,
+    }
+}
+
+/// Goes to the next level or phase and holds it.
+fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
+    bench: &mut Bench<R, C>,
+    scene: &Scene,
+    order: &Order,
+    last: Option<(Point, f64)>,
+) -> Result<Point, TrackError> {
+    let d = scene.dimensionless();
+    let Order { level, phase, ref known } = *order;
+    let (g, sigma) = predictor::change(scene.backbone.predictor, known, level, &d);
+    let expected = known
+        .last()
+        .map(|one| Known { c: level, g: one.g + g, sigma: one.sigma + sigma });
+    let present = last.map(|(point, phase)| peak::at_phase(&point.known(), phase, d.epsilon));
+    let change = expected.zip(present).map(|(expected, present)| {
+        let then = peak::at_phase(&expected, phase, d.epsilon);
+        [then[0] - present[0], then[1] - present[1]]
+    });
+    let [g, sigma] = change
+        .filter(|change| change.iter().all(|one| one.is_finite()))
+        .unwrap_or([0.0; 2]);
+    let from = last.map(|(point, _)| point.known());
+    let periods = move_periods(scene, from.as_ref(), level);
+    let to = Move {
+        response: level * d.b,
+        duration: periods * d.natural_period(),
+        amplitude: d.amplitude(g),
+        omega: d.omega_change(sigma),
+    };
+    bench.controller.hold_response(to, bench.target + phase)?;
+    let changed = last.map_or(FIRST, |(_, held)| if held == phase { 0.0 } else { PHASE });
+    hold(bench, scene, order, periods + changed)
 }
 
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
 /// Periods of the first level more than those of the move: the start of the loop disturbs the particle, too.
 const FIRST: f64 = 32.0;
+/// Periods of a change of the phase more than those of the move, for the same reason.
+const PHASE: f64 = 8.0;
 /// Share of the drive that a move may need in addition to the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
 
@@ -219,10 +278,10 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(bench: &mut Bench<R, C>, mo
 fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     bench: &mut Bench<R, C>,
     scene: &Scene,
-    level: f64,
+    order: &Order,
     move_periods: f64,
-    slopes: &Slopes,
 ) -> Result<Point, TrackError> {
+    let Order { level, phase, ref known } = *order;
     let (settings, d) = (&scene.backbone, scene.dimensionless());
     let start = bench.periods;
     bench.samples.clear();
@@ -234,7 +293,8 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         precision: [d.amplitude(settings.precision), d.omega_change(settings.precision)],
         tolerance: [d.amplitude(settings.tolerance), d.omega_change(settings.tolerance)],
         fewest: settings.dwell_min as usize,
-        slopes: *slopes,
+        slopes: slopes(scene, known, level),
+        phase,
     };
     let is_reached = |found: &Found| {
         let Estimate { value, uncertainty } = found.response.scaled(1.0 / d.b);

@@ -3,23 +3,19 @@
 use serde::Serialize;
 
 use vines_model::Dimensionless;
-use vines_model::numerics::{equally_spaced, golden_section, range};
-use vines_model::orbit::{Orbit, exact_backbone};
-use vines_model::theory::SlowFlow;
+use vines_model::numerics::golden_section;
+use vines_model::orbit::{Limits, backbone};
 
-/// Frequencies at which the curve is computed over its whole range, ...
-const FREQUENCIES: usize = 3000;
-/// ... and about its lowest frequency, where it turns back: number of frequencies, and range of the detuning.
-const TURN: (usize, f64) = (1200, 0.02);
-/// Largest difference in C between neighbours.
-const JUMP: f64 = 0.03;
+/// Largest step along the curve, which bounds the error of the polygon to 1e-5.
+const STEP: f64 = 4e-3;
 /// Largest particle speed of the curve: beyond symmetry breaking.
 const SPEED_MAX: f64 = 1.35;
 
 /// The exact backbone beyond the fold as a fine polygon, by increasing particle speed.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ExactCurve {
-    orbits: Vec<Orbit>,
+    /// C, sigma and G.
+    places: Vec<[f64; 3]>,
 }
 
 /// Difference of a point from the exact backbone.
@@ -38,67 +34,48 @@ impl ExactCurve {
     /// The curve of a scene.
     #[must_use]
     pub fn of(scene: &Dimensionless) -> Self {
-        let flow = SlowFlow::new(scene.lambda, scene.r);
-        let theory = flow.backbone(flow.manifold.b_min(), SPEED_MAX, 400);
-        let sigmas = theory.iter().map(|point| point.sigma);
-        let (low, high) = range((f64::MAX, f64::MIN), sigmas);
-        let (low, high) = (low - 0.5, high + 0.5);
-        let between = |low: f64, high: f64, steps: usize| {
-            equally_spaced(low, high, steps + 1)
-                .flat_map(|sigma| exact_backbone(scene, 1.0 + scene.epsilon * sigma))
-                .filter(|orbit| orbit.b < SPEED_MAX)
-        };
-        let mut orbits: Vec<Orbit> = between(low, high, FREQUENCIES).collect();
-        let lowest = orbits.iter().map(|orbit| orbit.sigma).fold(f64::MAX, f64::min);
-        let (steps, width) = TURN;
-        orbits.extend(between(lowest - 0.1 * width, lowest + width, steps));
-        orbits.sort_by(|a, b| a.b.total_cmp(&b.b));
-        // Another family of orbits can have the same particle speeds: the curve is followed from its largest speed.
-        let mut last = orbits.last().map_or(0.0, |orbit| orbit.c);
-        let mut orbits: Vec<Orbit> = orbits
-            .into_iter()
-            .rev()
-            .filter(|orbit| {
-                let next = (orbit.c - last).abs() < JUMP;
-                last = if next { orbit.c } else { last };
-                next
-            })
-            .collect();
-        orbits.reverse();
+        let limits = Limits { step: STEP, points: 20_000, ..Limits::default() };
+        let mut points = backbone(scene, &limits).map_or(Vec::new(), |branch| branch.points);
+        if points
+            .first()
+            .zip(points.last())
+            .is_some_and(|(first, last)| first.b > last.b)
+        {
+            points.reverse();
+        }
         // From the fold on: C rises with B there.
-        let fold = (0..orbits.len())
-            .min_by(|&a, &b| orbits[a].c.total_cmp(&orbits[b].c))
-            .unwrap_or(0);
-        orbits.drain(..fold);
-        Self { orbits }
+        let fold = (0..points.len()).min_by(|&a, &b| points[a].c.total_cmp(&points[b].c));
+        let rising = points.into_iter().skip(fold.unwrap_or(0));
+        let places = rising
+            .take_while(|one| one.b < SPEED_MAX)
+            .map(|one| [one.c, one.sigma, one.g]);
+        Self { places: places.collect() }
     }
 
-    /// Its orbits, from the fold on.
+    /// C, sigma and G of its orbits, from the fold on.
     #[must_use]
-    pub fn orbits(&self) -> &[Orbit] {
-        &self.orbits
+    pub fn places(&self) -> &[[f64; 3]] {
+        &self.places
     }
 
     /// `[sigma, G]` at the amplitude `c`; `None` outside the curve.
     #[must_use]
     pub fn at(&self, c: f64) -> Option<[f64; 2]> {
         let pair = self
-            .orbits
+            .places
             .windows(2)
-            .rfind(|pair| (pair[0].c - c) * (pair[1].c - c) <= 0.0 && pair[0].c != pair[1].c)?;
-        let x = (c - pair[0].c) / (pair[1].c - pair[0].c);
-        let between = |from: f64, to: f64| from + x * (to - from);
-        Some([between(pair[0].sigma, pair[1].sigma), between(pair[0].g, pair[1].g)])
+            .rfind(|pair| (pair[0][0] - c) * (pair[1][0] - c) <= 0.0 && pair[0][0] != pair[1][0])?;
+        let x = (c - pair[0][0]) / (pair[1][0] - pair[0][0]);
+        Some([1, 2].map(|i| pair[0][i] + x * (pair[1][i] - pair[0][i])))
     }
 
     /// How far `(C, sigma, G)` lies from the curve; `None` where there is no curve.
     #[must_use]
     pub fn distance(&self, c: f64, sigma: f64, g: f64) -> Option<Distance> {
-        let at = |orbit: &Orbit| [orbit.c, orbit.sigma, orbit.g];
         let segments = self
-            .orbits
+            .places
             .windows(2)
-            .map(|pair| to_segment([c, sigma, g], at(&pair[0]), at(&pair[1])));
+            .map(|pair| to_segment([c, sigma, g], pair[0], pair[1]));
         let nearest = segments.reduce(f64::min)?;
         let same = self.at(c);
         Some(Distance {

@@ -8,7 +8,7 @@ use super::{
     exact_curve::{Distance, ExactCurve},
 };
 use crate::backbone::{Point, Tracked};
-use crate::scene::Scene;
+use crate::scene::{Resonance, Scene};
 
 /// A tracked backbone beside the exact one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -37,12 +37,13 @@ pub struct TrackedPoint {
 }
 
 impl TrackedComparison {
-    /// Compares the points with the exact backbone of the scene; that is for phase resonance only.
+    /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than that of resonance.
     #[must_use]
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
         let parameters = scene.dimensionless();
         let curve = ExactCurve::of(&parameters);
-        let at_resonance = scene.controller.phase_target == PHASE_RESONANCE;
+        let peak = scene.resonance.resonance == Resonance::Peak;
+        let at_resonance = peak || scene.controller.phase_target == PHASE_RESONANCE;
         let compare = |point: &Point| TrackedPoint {
             point: *point,
             exact: at_resonance

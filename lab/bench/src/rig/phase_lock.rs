@@ -51,7 +51,8 @@ impl Controller for BuiltIn {
         Ok(output.into())
     }
 
-    fn hold_response(&mut self, to: Move) -> Result<(), ControllerError> {
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
+        self.lock.retune(self.lock.config().amplitude, phase_target)?;
         Ok(self.lock.hold_response(&mut self.state, to)?)
     }
 }

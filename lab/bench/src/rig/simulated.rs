@@ -3,29 +3,25 @@
 use lovines::{InvalidValue, Parameters, Plant, State};
 
 use crate::scene::Scene;
-use vines_model::{Definition, Reference, Sensor};
+use vines_model::{Definition, Sensor};
 
-use super::{Chain, Drive, GroundTruth, Rig, RigError, Sensors};
+use super::{Chain, Drive, GroundTruth, Measured, Rig, RigError, Sensors};
 
 /// The plant, stepped directly.
 #[derive(Clone)]
 pub struct Simulated {
     plant: Plant,
-    definition: Definition,
-    /// Velocity of the primary mass and reading of the reference at the beginning of the last step, and its duration.
-    before: [f64; 3],
+    sensor: Sensor,
 }
 
 impl Simulated {
-    /// A plant at its start.
+    /// A plant at its start; its response is v.
     ///
     /// # Errors
     /// An invalid parameter or start.
     pub fn new(parameters: Parameters, start: State) -> Result<Self, InvalidValue> {
         let plant = Plant::new(parameters, start)?;
-        let mut rig = Self { plant, definition: Definition::default(), before: [0.0; 3] };
-        rig.step_begins(0.0);
-        Ok(rig)
+        Ok(Self { plant, sensor: Sensor::V })
     }
 
     /// The rig of a scene, with its measurement chain.
@@ -43,59 +39,31 @@ impl Simulated {
         ))
     }
 
-    /// The same with the sensors of a definition. An accelerometer averages over a sample period, so that it does not miss the impulses
-    /// of the walls; its reference is averaged likewise, and both lag by half a sample.
+    /// The same with the sensors of a definition.
     #[must_use]
-    pub fn with_sensors(mut self, definition: Definition) -> Self {
-        self.definition = definition;
-        self.step_begins(0.0);
-        self
-    }
-
-    fn step_begins(&mut self, step: f64) {
-        self.before = [self.plant.state().dq1, self.reference(), step];
-    }
-
-    /// The base displacement, or the force `k e + c e'` of a harmonic base over k, m.
-    fn reference(&self) -> f64 {
-        let e = self.plant.base_displacement();
-        let base = self.plant.base();
-        match self.definition.reference {
-            Reference::Base => e,
-            Reference::Force => {
-                let p = self.plant.parameters();
-                let rate = base.drive.amplitude * base.drive.omega * base.phase.radians().cos();
-                e + p.damping / p.stiffness * rate
-            }
-        }
+    pub fn with_sensors(mut self, definition: Definition) -> Measured<Self> {
+        self.sensor = definition.sensor;
+        let parameters = *self.plant.parameters();
+        Measured::new(self, definition, &parameters)
     }
 }
 
 impl Rig for Simulated {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        let State { q1, dq1, .. } = self.plant.state();
-        let (reference, [velocity, earlier, step]) = (self.reference(), self.before);
-        let (response, reference) = match self.definition.sensor {
-            Sensor::V => (self.plant.centre(), reference),
-            Sensor::Q1 => (q1, reference),
-            Sensor::Acceleration if step > 0.0 => {
-                let square = self.plant.parameters().natural_frequency().powi(2);
-                ((velocity - dq1) / (step * square), 0.5 * (reference + earlier))
-            }
-            Sensor::Acceleration => (0.0, reference),
+        let response = match self.sensor {
+            Sensor::V => self.plant.centre(),
+            Sensor::Q1 | Sensor::Acceleration => self.plant.state().q1,
         };
-        Ok(Sensors { response, reference: Some(reference) })
+        Ok(Sensors { response, reference: Some(self.plant.base_displacement()) })
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.step_begins(step);
         let drive = lovines::Drive::harmonic(drive.amplitude, drive.omega);
         self.plant.advance(drive, step)?;
         Ok(())
     }
 
     fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.step_begins(step);
         self.plant.advance(lovines::Drive::held(displacement), step)?;
         Ok(())
     }

@@ -38,7 +38,8 @@ impl Scene {
             bandwidth: c.bandwidth * omega0,
             damping_rate: damping * omega0,
             phase_target: c.phase_target_radians(),
-            delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0 + c.delay * self.sample_time(),
+            delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0
+                + (c.delay + f64::from(u8::from(self.resonance.is_late()))) * self.sample_time(),
             amplitude_max: Some(d.amplitude(self.g_max())),
             response_max: Some(c.c_max * d.b),
             ramp_rate: rate(c.ramp_periods),

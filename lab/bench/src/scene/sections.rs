@@ -4,7 +4,7 @@ use lovines::Parameters;
 use serde::Deserialize;
 
 use super::{
-    Backbone, Chain, Controller, Definition, Dimensionless, Record, Scene, SceneError,
+    Backbone, Chain, Controller, Definition, Dimensionless, Record, Reference, Scene, SceneError,
     plant::{PlantSection, StartSection},
     validate::Quantity,
 };
@@ -95,6 +95,11 @@ impl Sections {
         scene.record.check(&scene.controller)?;
         scene.backbone.check(&scene.controller)?;
         scene.chain.check(&scene.controller)?;
+        if scene.resonance.reference == Reference::Force && !scene.chain.reference {
+            let message = "resonance.reference = \"force\" with chain.reference = false: the force k e + c e' follows from the base \
+                           sensor; switch it on, or take the reference \"base\"";
+            return Err(SceneError::Keys { origin: origin.into(), message: message.into() });
+        }
         let fastest = scene.controller.omega_max * scene.dimensionless().omega0;
         lovines::Drive::harmonic(scene.amplitude, fastest)
             .validate()

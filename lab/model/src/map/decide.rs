@@ -111,7 +111,7 @@ impl Run {
     }
 
     /// The motion repeats itself after the same number of half periods again and again, and the differences do not grow. This finds
-    /// what has no exact orbit: patterns with sticking, or with very many impacts.
+    /// what has no exact orbit, patterns with sticking or very many impacts, and what Newton's method misses close to a bifurcation.
     pub(super) fn repeating(&self) -> Option<Point> {
         let n = self.halves();
         let (count, [first, second]) = self
@@ -123,11 +123,17 @@ impl Run {
         }
         // A repetition of an odd number of half periods is followed by its mirror image.
         let whole = 1 + count % 2;
+        let walls = self.impacts.iter().rev().take(2).map(|one| one.velocity.signum());
+        let regime = match (count, impacts) {
+            (1, 1) => Regime::Symmetric,
+            (2, 2) if walls.sum::<f64>() == 0.0 => Regime::Asymmetric,
+            _ => Regime::Several,
+        };
         Some(Point {
             recurrence: Some(second),
             impacts: whole * impacts,
             periods: (whole * count / 2) as u32,
-            ..self.begun(Regime::Several, count)
+            ..self.begun(regime, count)
         })
     }
 

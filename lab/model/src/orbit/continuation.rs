@@ -73,6 +73,41 @@ impl Curve<'_> {
         Periodic::at(self.scene, &self.start.pattern, x)
     }
 
+    /// Whether the branch ends within a step, before `motion`; the bifurcations in the step are added.
+    fn ends(&self, branch: &mut Branch, tangent: &Unknowns, step: f64, motion: &Periodic) -> bool {
+        let last = branch.points.last().unwrap_or(self.start);
+        if joins(last, motion) {
+            branch.points.extend(self.joint(last, tangent, step));
+            branch.ended[1] = Ended::Joins;
+            return true;
+        }
+        match self.condition {
+            Condition::Bifurcation(Bifurcation::Torus) if !motion.on_circle_in_pairs() => {
+                branch.ended[1] = Ended::Resonance;
+                return true;
+            }
+            Condition::Bifurcation(_) => {}
+            _ if outside(last) != outside(motion) => branch.special.extend(self.locate(last, tangent, step)),
+            _ => {}
+        }
+        false
+    }
+
+    /// Whether the branch is back at its start after a step to `next`.
+    fn closes(&self, branch: &mut Branch, next: &Unknowns, turned: &Unknowns, step: f64, first: &Unknowns) -> bool {
+        // A phase difference of 2 pi is the same motion.
+        let mut apart = next - self.start.unknowns();
+        apart[0] = super::pattern::wrapped(apart[0]);
+        if branch.points.len() <= 10 || apart.norm() >= step || turned.dot(first) <= 0.9 {
+            return false;
+        }
+        branch
+            .special
+            .extend(self.special_at_start(branch, turned, apart.norm()));
+        branch.ended[1] = Ended::Closed;
+        true
+    }
+
     /// A bifurcation between the last motion of a closed branch and its start, at that distance.
     fn special_at_start(&self, branch: &Branch, tangent: &Unknowns, distance: f64) -> Option<Special> {
         let last = branch.points.last()?;
@@ -147,8 +182,7 @@ pub fn continue_from(
         special: Vec::new(),
         ended: [Ended::Graze; 2],
     };
-    let origin = start.unknowns();
-    let mut x = origin;
+    let mut x = start.unknowns();
     let Some(mut tangent) = curve.tangent(&x, towards) else {
         return branch;
     };
@@ -163,29 +197,11 @@ pub fn continue_from(
             step /= 2.0;
             continue;
         };
-        let last = branch.points.last().unwrap_or(start);
-        if joins(last, &motion) {
-            branch.points.extend(curve.joint(last, &tangent, step));
-            branch.ended[1] = Ended::Joins;
+        if curve.ends(&mut branch, &tangent, step, &motion) {
             return branch;
         }
-        if let Condition::Bifurcation(kind) = condition {
-            if kind == Bifurcation::Torus && !motion.on_circle_in_pairs() {
-                branch.ended[1] = Ended::Resonance;
-                return branch;
-            }
-        } else if outside(last) != outside(&motion) {
-            branch.special.extend(curve.locate(last, &tangent, step));
-        }
         branch.points.push(motion);
-        // A phase difference of 2 pi is the same motion.
-        let mut apart = next - origin;
-        apart[0] = super::pattern::wrapped(apart[0]);
-        if branch.points.len() > 10 && apart.norm() < step && turned.dot(&first_tangent) > 0.9 {
-            branch
-                .special
-                .extend(curve.special_at_start(&branch, &turned, apart.norm()));
-            branch.ended[1] = Ended::Closed;
+        if curve.closes(&mut branch, &next, &turned, step, &first_tangent) {
             return branch;
         }
         if !limits.contain(next[4], next[5]) {

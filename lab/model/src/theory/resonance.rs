@@ -8,47 +8,64 @@ use std::f64::consts::{FRAC_2_PI, FRAC_PI_2};
 use nalgebra::Complex;
 
 use super::{backbone::BackbonePoint, manifold::BranchSide, slow_flow::SlowFlow};
-use crate::numerics::golden_section;
+use crate::numerics::equally_spaced;
 use crate::{Dimensionless, Resonance, Sensor};
 
 /// All solutions of first-order theory that are resonant by the scene's definition, at its G, by increasing B. `C` is the amplitude that
 /// the sensor reads.
 #[must_use]
 pub fn resonant(scene: &Dimensionless) -> Vec<BackbonePoint> {
-    let theory = Reading { scene, flow: SlowFlow::new(scene.lambda, scene.r) };
+    let theory = Reading::of(scene);
     let points = theory.flow.phase_resonant(scene.g).into_iter();
     points
-        .filter_map(|point| match scene.definition.resonance {
-            Resonance::Phase => theory.at_phase(&point),
-            Resonance::Peak => theory.at_peak(&point),
-        })
+        .filter_map(|point| theory.speed(point.b).map(|b| theory.resonance(b)))
         .collect()
+}
+
+/// `points` samples of the backbone by the scene's definition at equal steps of B, from `from` to `to`. `C` as in [`resonant`].
+#[must_use]
+pub fn backbone(scene: &Dimensionless, from: f64, to: f64, points: usize) -> Vec<BackbonePoint> {
+    let theory = Reading::of(scene);
+    equally_spaced(from, to, points).map(|b| theory.resonance(b)).collect()
+}
+
+/// The backbone by the scene's definition where its sensor reads the amplitude `c`, on the right branch; None below the fold.
+#[must_use]
+pub fn backbone_at_level(scene: &Dimensionless, c: f64) -> Option<BackbonePoint> {
+    let theory = Reading::of(scene);
+    theory.speed_at_level(c).map(|b| theory.resonance(b))
 }
 
 /// The detuning of the free decay at the amplitude `c` that the scene's sensor reads, on the right branch; None below the fold.
 #[must_use]
 pub fn free_sigma(scene: &Dimensionless, c: f64) -> Option<f64> {
-    let theory = Reading { scene, flow: SlowFlow::new(scene.lambda, scene.r) };
-    let mut amplitude = c;
-    // Sensors differ from v by a factor of 1 + O(epsilon): each round gains as much.
-    for _ in 0..ROUNDS {
-        let b = theory.flow.manifold.b(amplitude, BranchSide::Right)?;
-        amplitude = c / theory.seen(b, theory.flow.free_detuning(b)).norm();
-    }
-    theory.flow.backbone_sigma(amplitude, BranchSide::Right)
+    let theory = Reading::of(scene);
+    theory.speed_at_level(c).map(|b| theory.flow.free_detuning(b))
+}
+
+/// The amplitude that the scene's sensor reads over that of v, at the particle speed `b` and the detuning `sigma`.
+#[must_use]
+pub fn reading(scene: &Dimensionless, b: f64, sigma: f64) -> f64 {
+    Reading::of(scene).seen(b, sigma).norm()
 }
 
 /// Rounds of a fixed-point iteration.
 const ROUNDS: usize = 12;
-/// Phases beside phase resonance at which a peak is searched for, rad.
+/// Largest distance of a peak from phase resonance of v, rad.
 const ASIDE: f64 = 0.3;
+/// Relative step of a difference quotient.
+const STEP: f64 = 1e-5;
 
 struct Reading<'a> {
     scene: &'a Dimensionless,
     flow: SlowFlow,
 }
 
-impl Reading<'_> {
+impl<'a> Reading<'a> {
+    fn of(scene: &'a Dimensionless) -> Self {
+        Self { scene, flow: SlowFlow::new(scene.lambda, scene.r) }
+    }
+
     /// The harmonic that the sensor reads over that of v, at the particle speed `b` and the detuning `sigma`.
     fn seen(&self, b: f64, sigma: f64) -> Complex<f64> {
         let Dimensionless { epsilon, definition, .. } = *self.scene;
@@ -73,9 +90,9 @@ impl Reading<'_> {
         [g, self.flow.free_detuning(b) - g * gamma.cos() / (2.0 * c)]
     }
 
-    /// The speed near `from` at which the excitation for the phase `gamma(b)` is that of the scene, by the secant method.
-    fn speed(&self, from: f64, gamma: impl Fn(f64) -> f64) -> Option<f64> {
-        let excess = |b: f64| self.driven(b, gamma(b))[0] - self.scene.g;
+    /// The speed near `from` at which the excitation for resonance is that of the scene, by the secant method.
+    fn speed(&self, from: f64) -> Option<f64> {
+        let excess = |b: f64| self.driven(b, self.phase(b))[0] - self.scene.g;
         let (mut last, mut b) = (from * (1.0 + 1e-4), from);
         let mut at_last = excess(last);
         for _ in 0..50 {
@@ -92,27 +109,52 @@ impl Reading<'_> {
         (excess(b).abs() < 1e-10 * self.scene.g && (b - from).abs() < 0.3 * from).then_some(b)
     }
 
-    fn at_phase(&self, point: &BackbonePoint) -> Option<BackbonePoint> {
-        let Dimensionless { epsilon, lambda, definition, .. } = *self.scene;
-        let reference = definition.reference.phase(epsilon * lambda, 1.0);
-        let gamma = |b: f64| -FRAC_PI_2 + reference - self.seen(b, 0.0).arg();
-        let b = self.speed(point.b, gamma)?;
-        Some(self.point(b, gamma(b)))
-    }
-
-    fn at_peak(&self, point: &BackbonePoint) -> Option<BackbonePoint> {
-        if self.scene.definition.sensor != Sensor::Acceleration {
-            // The amplitude is a function of B alone, which is extreme at phase resonance of v (eq. 15).
-            return Some(self.point(point.b, -FRAC_PI_2));
+    /// The speed on the right branch at which the sensor reads the amplitude `c`.
+    fn speed_at_level(&self, c: f64) -> Option<f64> {
+        let mut amplitude = c;
+        // Sensors differ from v by a factor of 1 + O(epsilon): each round gains as much.
+        for _ in 0..ROUNDS {
+            let b = self.flow.manifold.b(amplitude, BranchSide::Right)?;
+            amplitude = c / self.seen(b, self.flow.free_detuning(b)).norm();
         }
-        let speed = |aside: f64| self.speed(point.b, |_| -FRAC_PI_2 + aside);
-        let smallness = |aside: f64| speed(aside).map_or(0.0, |b| -self.point(b, -FRAC_PI_2 + aside).c);
-        let aside = golden_section(-ASIDE, ASIDE, smallness);
-        Some(self.point(speed(aside)?, -FRAC_PI_2 + aside))
+        self.flow.manifold.b(amplitude, BranchSide::Right)
     }
 
-    fn point(&self, b: f64, gamma: f64) -> BackbonePoint {
-        let [g, sigma] = self.driven(b, gamma);
+    /// Phase of v, rad, at which the motion of the particle speed `b` is resonant.
+    fn phase(&self, b: f64) -> f64 {
+        let Dimensionless { epsilon, lambda, definition, .. } = *self.scene;
+        match (definition.resonance, definition.sensor) {
+            (Resonance::Phase, _) => {
+                definition.reference.phase(epsilon * lambda, 1.0) - FRAC_PI_2 - self.seen(b, 0.0).arg()
+            }
+            // The amplitude is a function of B alone, which is extreme at phase resonance of v (eq. 15).
+            (Resonance::Peak, Sensor::V | Sensor::Q1) => -FRAC_PI_2,
+            (Resonance::Peak, Sensor::Acceleration) => self.aside(b) - FRAC_PI_2,
+        }
+    }
+
+    /// Distance x of the peak of the acceleration from phase resonance of v, rad. The amplitude is `f(B) (1 + epsilon sigma)^2`, with
+    /// `sigma = sigma_R - (L/2C) tan x`, and the excitation `L(B)/cos x`, with `L = loss/C`. Along a response the excitation is constant,
+    /// and at the peak the amplitude is, too.
+    fn aside(&self, b: f64) -> f64 {
+        let epsilon = self.scene.epsilon;
+        let c = self.flow.manifold.c(b);
+        let mut tangent = 0.0_f64;
+        for _ in 0..ROUNDS {
+            let excitation = |b: f64| self.flow.loss(b) / self.flow.manifold.c(b);
+            let sigma = |b: f64| self.flow.free_detuning(b) - excitation(b) * tangent / (2.0 * self.flow.manifold.c(b));
+            let amplitude = |b: f64| (self.flow.manifold.c(b) * self.seen(b, sigma(b)).norm()).ln();
+            let slope = |f: &dyn Fn(f64) -> f64| (f(b * (1.0 + STEP)) - f(b * (1.0 - STEP))) / (2.0 * STEP * b);
+            let omega = 1.0 + epsilon * sigma(b);
+            let ratio = -epsilon * slope(&excitation) / (c * omega * slope(&amplitude));
+            tangent = ratio * (1.0 + tangent * tangent);
+        }
+        // At the fold, where B is no function of the amplitude, there is no peak.
+        tangent.atan().clamp(-ASIDE, ASIDE)
+    }
+
+    fn resonance(&self, b: f64) -> BackbonePoint {
+        let [g, sigma] = self.driven(b, self.phase(b));
         let point = self.flow.backbone_at(b);
         BackbonePoint { c: point.c * self.seen(b, sigma).norm(), sigma, g, ..point }
     }

@@ -91,7 +91,10 @@ fn serve(
 /// Settings of a server for the plant of `scene`.
 pub fn service(scene: &Scene, silence: f64) -> Service {
     Service {
-        role: Role::Rig { max_amplitude: scene.plant.half_width },
+        role: Role::Rig {
+            max_amplitude: scene.plant.half_width,
+            sensors: scene.resonance,
+        },
         sample_time: scene.sample_time(),
         silence,
     }

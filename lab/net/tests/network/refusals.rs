@@ -5,6 +5,7 @@ use std::time::{Duration, Instant};
 
 use vines_net::frame::{Frame, Kind};
 use vines_net::{Address, LinkError, NetController, NetRig, Refusal, Server};
+use vines_testbench::scene::Definition;
 
 use crate::bench::{controller, lock_step_rig, real_time_rig, scene, service, socket};
 
@@ -94,6 +95,21 @@ fn another_sample_time_is_refused_with_that_of_the_server() {
     let error = NetRig::connect(server.address, 2.0 * scene.sample_time()).unwrap_err();
     assert_eq!(refused(&error), Refusal::SampleTime(scene.sample_time()));
     assert!(error.to_string().contains("same scene"), "{error}");
+}
+
+#[test]
+fn a_rig_with_other_sensors_than_those_of_the_scene_is_refused() {
+    let scene = scene(&["resonance.sensor='q1'"]);
+    let (server, _) = lock_step_rig(&scene, 5.0);
+    let connect = || NetRig::connect(server.address, scene.sample_time()).unwrap();
+    assert!(connect().with_sensors(scene.resonance).is_ok());
+    let error = connect().with_sensors(Definition::default()).unwrap_err();
+    assert!(
+        error
+            .to_string()
+            .contains("measures q1 and e, the [resonance] section of the scene needs v and e"),
+        "{error}"
+    );
 }
 
 #[test]

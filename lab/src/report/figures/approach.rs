@@ -4,7 +4,7 @@ use plotters::chart::SeriesLabelPosition;
 use plotters::style::Color;
 
 use crate::numerics::equally_spaced;
-use crate::report::figure::{AMPLITUDE, Axis, Figure, Marked, Panel, Place, SPEED, caption, line};
+use crate::report::figure::{AMPLITUDE_OF_V, Axis, Figure, Marked, Panel, Place, SPEED, caption, line};
 use crate::report::theme::{DECAY, EXACT, LOCK, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
 use crate::theory::{BackbonePoint, SlowFlow, impacts_stable};
@@ -18,9 +18,11 @@ const POINTS: usize = 300;
 /// Impact sequences with the drive on, which end at the locked point, and one without it, from there down to the fold.
 pub fn figure(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
     let flow = SlowFlow::new(p.lambda, p.r);
+    let lock = &flow.backbone_at(lock.b);
     let gamma = -std::f64::consts::FRAC_PI_2;
     let x = (0.0, 1.6 * lock.c);
-    let y = (0.0, 1.35 * lock.b);
+    // The legend is above the manifold.
+    let y = (0.0, 1.75 * lock.b);
     let inside = |place: &Place| place.0 <= x.1 && (y.0..=y.1).contains(&place.1);
     let sequence = |g: f64, (c, b): Place| -> Vec<Place> {
         let phases = (b, flow.psi(lock.b, gamma));
@@ -29,12 +31,12 @@ pub fn figure(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
         let all = std::iter::once((c, b)).chain(places);
         all.take_while(inside).collect()
     };
-    let mut panel = Panel::new(Axis::new(x, AMPLITUDE), Axis::new(y, SPEED))
+    let mut panel = Panel::new(Axis::new(x, AMPLITUDE_OF_V), Axis::new(y, SPEED))
         .heading(
             "Approach to the slow invariant manifold, impact by impact",
             &caption(p, lock.g),
         )
-        .legend(SeriesLabelPosition::LowerRight);
+        .legend(SeriesLabelPosition::UpperLeft);
     let manifold: Vec<Marked> = equally_spaced(0.0, y.1, POINTS + 1)
         .map(|b| ((flow.manifold.c(b), b), impacts_stable(&flow.manifold, b)))
         .filter(|(place, _)| inside(place))

@@ -6,10 +6,10 @@ use super::{DECAY_LABEL, THINNED, decay_points, error_bars, locked_point};
 use crate::comparison::Comparison;
 use crate::numerics::range;
 use crate::orbit::{self, Limits};
-use crate::report::figure::{AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, caption, clipped, line, thinned};
+use crate::report::figure::{Axis, DETUNING, Figure, Marked, Panel, amplitude, caption, clipped, line, thinned};
 use crate::report::theme::{EXACT, FAINT, LOCK, THEORY, UNSTABLE};
-use crate::scene::Dimensionless;
-use crate::theory::{BranchSide, SlowFlow};
+use crate::scene::{Definition, Dimensionless};
+use crate::theory::{self, BranchSide, SlowFlow};
 
 /// Amplitude drawn up to at least this, C.
 const TOP: f64 = 0.8;
@@ -20,7 +20,7 @@ pub fn figure(found: &Comparison) -> Figure {
     let slow_flow = SlowFlow::new(p.lambda, p.r);
     let top = (1.25 * found.lock.c).max(TOP);
     let reach = slow_flow.manifold.b(top, BranchSide::Right).unwrap_or(1.0);
-    let theory = slow_flow.backbone(slow_flow.manifold.b_min(), reach, 400);
+    let theory = theory::backbone(p, slow_flow.manifold.b_min(), reach, 400);
     // Below the fold there is no backbone, and the frequency of the remaining motion is arbitrary.
     let fold = slow_flow.manifold.c_min();
     let above = found.decay.iter().map(|one| one.point);
@@ -30,11 +30,12 @@ pub fn figure(found: &Comparison) -> Figure {
     let margin = 0.06 * (high - low);
     let (low, high) = (low - margin, high + margin);
 
-    let mut panel = Panel::new(Axis::new((low, high), DETUNING), Axis::new((0.0, top), AMPLITUDE))
-        .heading(
-            "Backbone: phase resonance of the centre of mass",
-            &caption(p, found.lock.g),
-        )
+    let title = match p.definition == Definition::default() {
+        true => "Backbone: phase resonance of the centre of mass".into(),
+        false => format!("Backbone: {}", p.definition.name()),
+    };
+    let mut panel = Panel::new(Axis::new((low, high), DETUNING), Axis::new((0.0, top), amplitude(p)))
+        .heading(&title, &caption(p, found.lock.g))
         .legend(SeriesLabelPosition::UpperRight);
     add_backbones(&mut panel, p, (low, high), (0.0, top));
     let decay = found.decay.iter().map(|one| one.point).step_by(THINNED);
@@ -77,8 +78,7 @@ pub fn add_backbones(panel: &mut Panel, p: &Dimensionless, x: (f64, f64), y: (f6
     let flow = SlowFlow::new(p.lambda, p.r);
     let fold = flow.manifold.b_min();
     let reach = flow.manifold.b(y.1, BranchSide::Right).unwrap_or(1.0);
-    let theory: Vec<Marked> = flow
-        .backbone(fold, reach, 400)
+    let theory: Vec<Marked> = theory::backbone(p, fold, reach, 400)
         .iter()
         .map(|point| ((point.sigma, point.c), point.stable()))
         .collect();

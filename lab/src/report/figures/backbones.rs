@@ -2,10 +2,10 @@
 
 use plotters::chart::SeriesLabelPosition;
 
-use crate::report::figure::{AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, Place, line};
+use crate::report::figure::{Axis, DETUNING, Figure, Marked, Panel, Place, amplitude, line};
 use crate::report::theme::{EXACT, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
-use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};
+use crate::theory::{self, B_SYMMETRY_BREAKING, SlowFlow};
 
 /// Coefficients of restitution beside the scene's own.
 const OTHERS: [f64; 4] = [0.3, 0.5, 0.8, 1.0];
@@ -19,18 +19,19 @@ pub fn figure(p: &Dimensionless) -> Figure {
     values.push(p.r);
     values.sort_by(f64::total_cmp);
     let caption = format!(
-        "λ = {:.3}; amplitudes over b; first order in ε, at phase resonance",
-        p.lambda
+        "λ = {:.3}; amplitudes over b; first order in ε; {}",
+        p.lambda,
+        p.definition.name()
     );
-    let mut panel = Panel::new(Axis::new(DETUNINGS, DETUNING), Axis::new((0.0, TOP), AMPLITUDE))
+    let mut panel = Panel::new(Axis::new(DETUNINGS, DETUNING), Axis::new((0.0, TOP), amplitude(p)))
         .heading("Backbones for several coefficients of restitution r", &caption)
         .legend(SeriesLabelPosition::UpperRight);
     for r in values {
         let own = r == p.r;
         let (colour, width, size) = if own { (EXACT, 34, 17) } else { (THEORY, 18, 14) };
         let flow = SlowFlow::new(p.lambda, r);
-        let points: Vec<Marked> = flow
-            .backbone(1e-3, 1.5 * B_SYMMETRY_BREAKING, POINTS)
+        let scene = Dimensionless { r, ..*p };
+        let points: Vec<Marked> = theory::backbone(&scene, 1e-3, 1.5 * B_SYMMETRY_BREAKING, POINTS)
             .into_iter()
             .filter(|point| point.c <= TOP && (DETUNINGS.0..=DETUNINGS.1).contains(&point.sigma))
             .map(|point| ((point.sigma, point.c), point.stable()))
@@ -49,7 +50,7 @@ pub fn figure(p: &Dimensionless) -> Figure {
 fn label_place(flow: &SlowFlow, points: &[Marked]) -> Place {
     let fold = flow.backbone_at(flow.manifold.b_min());
     if fold.c > 0.05 {
-        return (fold.sigma.max(0.1) + 0.06, fold.c - 0.022);
+        return (fold.sigma.max(0.1) - 0.2, fold.c + 0.045);
     }
     let right = points.iter().filter(|one| one.0.0 > DETUNINGS.0 + 0.2 && one.0.0 < 0.0);
     let left = right.min_by(|one, other| one.0.0.total_cmp(&other.0.0));

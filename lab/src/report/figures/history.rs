@@ -9,10 +9,10 @@ use super::{DECAY_LABEL, THINNED, decay_points};
 use crate::comparison::Comparison;
 use crate::experiment::Record;
 use crate::numerics::{HarmonicBasis, range};
-use crate::report::figure::{AMPLITUDE, Axis, Figure, Panel, Place, caption, line};
+use crate::report::figure::{Axis, Figure, Panel, Place, amplitude, caption, line};
 use crate::report::theme::{DECAY, EXACT, THEORY};
 use crate::scene::Scene;
-use crate::theory::{BranchSide, SlowFlow};
+use crate::theory::{SlowFlow, backbone_at_level, reading};
 
 const SIZE: (u32, u32) = (980, 760);
 const UPPER: u32 = 400;
@@ -37,8 +37,8 @@ pub fn figure(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
     let flow = SlowFlow::new(found.parameters.lambda, found.parameters.r);
     let per_period = found.parameters.epsilon * TAU;
     let fold = flow.manifold.c_min();
-    let decay = flow.manifold.b(found.lock.c, BranchSide::Right);
-    let decay = decay.and_then(|b| flow.decay(b));
+    let decay = backbone_at_level(&found.parameters, found.lock.c);
+    let decay = decay.and_then(|point| flow.decay(point.b));
     let decay = decay.map(|decay| decay.samples(400)).unwrap_or_default();
     let points = found.decay.iter().map(|one| one.point);
     let data = Data {
@@ -46,7 +46,10 @@ pub fn figure(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
         driven: driven(record, scene),
         theory: decay
             .iter()
-            .map(|one| [one.tau1 / per_period, one.c, one.sigma])
+            .map(|one| {
+                let c = one.c * reading(&found.parameters, one.b, one.sigma);
+                [one.tau1 / per_period, c, one.sigma]
+            })
             .collect(),
         points: points
             .filter(|one| one.c >= 0.9 * fold)
@@ -59,7 +62,7 @@ pub fn figure(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
     let (low, high) = range((-1.5, 0.5), all().map(|one| one[2]));
     let margin = 0.1 * (high - low);
     let rows = [
-        (1, (0.0, top * 1.35), AMPLITUDE),
+        (1, (0.0, top * 1.35), amplitude(&found.parameters)),
         (2, (low - margin, high + margin), "detuning σ"),
     ];
     let panels = rows.into_iter().flat_map(|(row, range, label)| {
@@ -81,7 +84,7 @@ impl Data<'_> {
         let mut panel = Panel::new(Axis::new((0.0, end), "time, in periods of the oscillator alone"), y);
         if row == 1 {
             let caption = caption(parameters, lock.g);
-            panel = panel.heading("Seeking and holding phase resonance", &caption);
+            panel = panel.heading("Seeking and holding resonance", &caption);
         }
         let measured = self.driven.iter().map(|one| (one[0], one[row])).collect();
         panel.curve(measured, line(DECAY, 16), "measured");
@@ -120,7 +123,7 @@ impl Data<'_> {
     }
 }
 
-/// Amplitude and commanded frequency up to the release, from windows of two periods: least squares of v by the commanded
+/// Amplitude and commanded frequency up to the release, from windows of two periods: least squares of the response by the commanded
 /// harmonic and a constant.
 fn driven(record: &Record, scene: &Scene) -> Vec<Triple> {
     let d = scene.dimensionless();

@@ -5,24 +5,26 @@ use plotters::chart::SeriesLabelPosition;
 use super::{DECAY_LABEL, THINNED, decay_points, locked_point};
 use crate::comparison::Comparison;
 use crate::numerics::equally_spaced;
-use crate::report::figure::{AMPLITUDE, Axis, Figure, Panel, Place, SPEED, caption, line};
+use crate::report::figure::{Axis, Figure, Panel, Place, SPEED, amplitude, caption, line};
 use crate::report::theme::{THEORY, UNSTABLE};
-use crate::theory::{B_SYMMETRY_BREAKING, Manifold};
+use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, reading};
 
 const POINTS: usize = 300;
 const TOP: f64 = 1.4;
 
 /// The manifold, the decay and the locked point.
 pub fn figure(found: &Comparison) -> Figure {
-    let manifold = Manifold::new(found.parameters.r);
+    let p = &found.parameters;
+    let flow = SlowFlow::new(p.lambda, p.r);
+    let manifold = flow.manifold;
     let right = (1.25 * found.lock.c).max(0.8);
     let between = |from: f64, to: f64| -> Vec<Place> {
         equally_spaced(from, to, POINTS + 1)
-            .map(|b| (manifold.c(b), b))
+            .map(|b| (manifold.c(b) * reading(p, b, flow.free_detuning(b)), b))
             .filter(|(c, _)| *c <= right)
             .collect()
     };
-    let mut panel = Panel::new(Axis::new((0.0, right), AMPLITUDE), Axis::new((0.0, TOP), SPEED))
+    let mut panel = Panel::new(Axis::new((0.0, right), amplitude(p)), Axis::new((0.0, TOP), SPEED))
         .heading(
             "Slow invariant manifold and the free decay on it",
             &caption(&found.parameters, found.lock.g),

@@ -13,8 +13,8 @@ use crate::report::theme;
 /// Size of the figure, px, and how much of its width belongs to the axes; the key stands beside them.
 const SIZE: (u32, u32) = (980, 600);
 const WIDTH: u32 = 770;
-/// Regions narrower than this many cells get no letter.
-const NARROW: usize = 2;
+/// Regions in which no square of 2 n + 1 cells fits, with this n, get no letter.
+const NARROW: usize = 1;
 
 /// The map as SVG.
 ///
@@ -88,16 +88,21 @@ fn figure(map: &Map) -> Figure {
     Figure::new(SIZE, vec![panel]).with_key(key)
 }
 
-/// A bifurcation curve, solid where it bounds the stability of a motion.
-fn draw_curve(panel: &mut Panel, map: &Map, curve: &BifurcationCurve) {
+/// Where a motion lies on a map over sigma and G.
+fn place_on(map: &Map) -> impl Fn(&Periodic) -> Place {
     let swapped = map.plan.x.axis == MapAxis::G;
-    let place = |one: &Periodic| {
+    move |one| {
         if swapped {
             (one.g, one.sigma)
         } else {
             (one.sigma, one.g)
         }
-    };
+    }
+}
+
+/// A bifurcation curve, solid where it bounds the stability of a motion.
+fn draw_curve(panel: &mut Panel, map: &Map, curve: &BifurcationCurve) {
+    let place = place_on(map);
     let points: Vec<Marked> = curve
         .branch
         .points
@@ -176,31 +181,60 @@ fn stripes(map: &Map, regime: Regime) -> Vec<[Place; 2]> {
     found
 }
 
-/// For each regime, the place farthest from its border.
+/// For each regime, the places farthest from its border and from the curves, far apart from each other.
 fn letters(map: &Map) -> Vec<(Regime, Place)> {
     let (columns, rows) = (map.plan.x.points, map.plan.y.points);
-    let at = |column: usize, row: usize| map.cells[row * columns + column].point.regime;
-    // Largest half-width of a square around the cell that contains no other regime.
+    let free = without_curves(map);
+    // Largest half-width of a square around the cell that contains no other regime and no curve.
     let depth = |column: usize, row: usize| {
         let most = column.min(row).min(columns - 1 - column).min(rows - 1 - row);
+        let own = free[row * columns + column];
         let alike = |reach: usize| {
-            (column - reach..=column + reach)
-                .all(|x| at(x, row - reach) == at(column, row) && at(x, row + reach) == at(column, row))
+            let lines = [row - reach, row + reach];
+            (column - reach..=column + reach).all(|x| lines.iter().all(|y| free[y * columns + x] == own))
                 && (row - reach..=row + reach)
-                    .all(|y| at(column - reach, y) == at(column, row) && at(column + reach, y) == at(column, row))
+                    .all(|y| free[y * columns + column - reach] == own && free[y * columns + column + reach] == own)
         };
         (1..=most).take_while(|reach| alike(*reach)).count()
     };
-    Regime::SIMULATED
-        .into_iter()
-        .filter_map(|regime| {
-            let cells = (0..rows).flat_map(|row| (0..columns).map(move |column| (column, row)));
-            let (deepest, column, row) = cells
-                .filter(|(column, row)| at(*column, *row) == regime)
-                .map(|(column, row)| (depth(column, row), column, row))
-                .max_by_key(|one| one.0)?;
-            let place = (map.plan.x.at(column), map.plan.y.at(row));
-            (deepest >= NARROW).then_some((regime, place))
-        })
-        .collect()
+    let mut found: Vec<(Regime, [usize; 2])> = Vec::new();
+    for regime in Regime::SIMULATED {
+        let own = (0..free.len()).filter(|n| free[*n] == Some(regime));
+        let mut cells: Vec<(usize, [usize; 2])> = own
+            .map(|n| [n % columns, n / columns])
+            .map(|[column, row]| (depth(column, row), [column, row]))
+            .collect();
+        cells.sort_by_key(|one| std::cmp::Reverse(one.0));
+        let enough = cells.first().map_or(0, |deepest| deepest.0 / 2).max(NARROW);
+        for (_, place) in cells.into_iter().take_while(|one| one.0 >= enough) {
+            let far = |(other, [x, y]): &(Regime, [usize; 2])| {
+                *other != regime || x.abs_diff(place[0]) > columns / 3 || y.abs_diff(place[1]) > rows / 3
+            };
+            if found.iter().all(far) {
+                found.push((regime, place));
+            }
+        }
+    }
+    let place = |[column, row]: [usize; 2]| (map.plan.x.at(column), map.plan.y.at(row));
+    found.into_iter().map(|(regime, cell)| (regime, place(cell))).collect()
+}
+
+/// The regimes of the cells, except where a curve passes.
+fn without_curves(map: &Map) -> Vec<Option<Regime>> {
+    let mut free: Vec<Option<Regime>> = map.cells.iter().map(|cell| Some(cell.point.regime)).collect();
+    let bifurcations = map.curves.iter().flat_map(|curve| {
+        let place = place_on(map);
+        curve.branch.points.iter().map(place)
+    });
+    let (x, y) = (map.plan.x, map.plan.y);
+    let index = |range: Range, value: f64| {
+        let n = ((value - range.from) / range.step()).round();
+        (n >= 0.0 && n < range.points as f64).then_some(n as usize)
+    };
+    for place in bifurcations.chain(outline(&map.plan).into_iter().flatten()) {
+        if let (Some(column), Some(row)) = (index(x, place.0), index(y, place.1)) {
+            free[row * x.points + column] = None;
+        }
+    }
+    free
 }

@@ -4,10 +4,10 @@ use plotters::chart::SeriesLabelPosition;
 use plotters::style::BLACK;
 
 use crate::orbit::{Branch, Response};
-use crate::report::figure::{AMPLITUDE, Axis, DETUNING, Figure, Marked, Panel, Place, clipped, line, thinned};
+use crate::report::figure::{Axis, DETUNING, Figure, Marked, Panel, Place, amplitude, clipped, line, thinned};
 use crate::report::theme::{EXACT, FAINT, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
-use crate::theory::{B_SYMMETRY_BREAKING, ResponsePoint, SlowFlow};
+use crate::theory::{self, B_SYMMETRY_BREAKING, ResponsePoint, SlowFlow};
 
 const POINTS: usize = 600;
 const DETUNINGS: (f64, f64) = (-5.0, 5.0);
@@ -30,25 +30,26 @@ pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
         p.r,
         list.join(", ")
     );
-    let mut panel = Panel::new(Axis::new(x, DETUNING), Axis::new(y, AMPLITUDE))
+    let mut panel = Panel::new(Axis::new(x, DETUNING), Axis::new(y, amplitude(p)))
         .heading("Frequency responses and backbone", &caption)
         .legend(SeriesLabelPosition::UpperRight);
-    for (n, response) in responses.iter().enumerate() {
-        add_response(&mut panel, &flow, response, (x, y));
-        // The label is below the left end of the curve, where the figure is empty.
+    for response in responses {
+        add_response(&mut panel, p, response, (x, y));
+        // The label is beside the left end of the curve, or above its end at the axis.
         let stable = response
             .symmetric()
             .flat_map(|one| &one.points)
             .filter(|one| one.stable);
         let end = stable.min_by(|one, other| one.sigma.total_cmp(&other.sigma));
         if let Some(end) = end {
-            let left = end.sigma.clamp(x.0 + 0.7, x.1);
-            let place = (left, (0.1 - 0.035 * n as f64) * top);
+            let place = match end.sigma > x.0 + 0.9 {
+                true => (end.sigma - 0.45, end.c),
+                false => (end.sigma.max(x.0) + 0.5, end.c + 0.14 * top),
+            };
             panel.centred_text(format!("G = {:.3}", response.g), place, 14, BLACK);
         }
     }
-    let backbone: Vec<Marked> = flow
-        .backbone(flow.manifold.b_min(), 1.4 * B_SYMMETRY_BREAKING, POINTS)
+    let backbone: Vec<Marked> = theory::backbone(p, flow.manifold.b_min(), 1.4 * B_SYMMETRY_BREAKING, POINTS)
         .iter()
         .map(|one| ((one.sigma, one.c), true))
         .collect();
@@ -59,12 +60,13 @@ pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
 }
 
 /// One response, by theory and exact.
-fn add_response(panel: &mut Panel, flow: &SlowFlow, response: &Response, (x, y): (Place, Place)) {
+fn add_response(panel: &mut Panel, p: &Dimensionless, response: &Response, (x, y): (Place, Place)) {
     let styles = [line(THEORY, 12), line(UNSTABLE, 8)];
-    for curve in flow.frequency_responses(response.g, POINTS) {
+    for curve in SlowFlow::new(p.lambda, p.r).frequency_responses(response.g, POINTS) {
         let mark = |one: &ResponsePoint| {
             let stable = one.motion.impacts_stable && one.motion.slow_flow_stable;
-            ((one.sigma, one.motion.c), stable)
+            let c = one.motion.c * theory::reading(p, one.motion.b, one.sigma);
+            ((one.sigma, c), stable)
         };
         let points: Vec<Marked> = curve.iter().map(mark).collect();
         for piece in clipped(&points, x, y) {

@@ -6,9 +6,9 @@ use super::{backbone::add_backbones, decay_points, error_bars};
 use crate::backbone::Point;
 use crate::comparison::TrackedComparison;
 use crate::numerics::range;
-use crate::report::figure::{AMPLITUDE, Axis, DETUNING, Figure, Panel, SIZE, caption, line};
+use crate::report::figure::{Axis, DETUNING, Figure, Panel, SIZE, amplitude, caption, line};
 use crate::report::theme::{DECAY, EXACT, THEORY};
-use crate::theory::SlowFlow;
+use crate::theory::{self, SlowFlow};
 
 fn points(tracked: &TrackedComparison) -> impl Iterator<Item = Point> + Clone {
     tracked.points.iter().map(|one| one.point)
@@ -34,7 +34,7 @@ fn amplitude_panel(tracked: &TrackedComparison) -> Panel {
     let x = (low - 0.1 * (high - low), high + 0.1 * (high - low));
     let (least, most) = range((f64::MAX, f64::MIN), all.clone().map(|one| one.g));
     let text = caption(p, most).replace(&format!("G = {most:.3}"), &format!("G from {least:.3} to {most:.3}"));
-    let mut panel = Panel::new(Axis::new(x, DETUNING), Axis::new((0.0, top), AMPLITUDE))
+    let mut panel = Panel::new(Axis::new(x, DETUNING), Axis::new((0.0, top), amplitude(p)))
         .heading("Backbone, tracked with the loop closed", &text)
         .legend(SeriesLabelPosition::UpperRight);
     add_backbones(&mut panel, p, x, (0.0, top));
@@ -57,14 +57,14 @@ fn drive_panel(tracked: &TrackedComparison) -> Panel {
     let all = points(tracked);
     let top = all.clone().fold(0.5, |most: f64, one| most.max(1.15 * one.c));
     let flow = SlowFlow::new(p.lambda, p.r);
-    let theory = flow.backbone(flow.manifold.b_min(), 1.3, 600);
+    let theory = theory::backbone(p, flow.manifold.b_min(), 1.3, 600);
     let theory = theory.iter().map(|one| (one.c, one.g));
-    let exact = tracked.exact.orbits().iter().map(|one| (one.c, one.g));
+    let exact = tracked.exact.places().iter().map(|one| (one[0], one[2]));
     let (_, most) = range((0.0, 0.1), all.clone().map(|one| one.g));
     let high = 1.3 * most;
     let inside = |place: &(f64, f64)| place.0 <= top && place.1 <= high;
     let mut panel = Panel::new(
-        Axis::new((0.0, top), AMPLITUDE),
+        Axis::new((0.0, top), amplitude(p)),
         Axis::new((0.0, high), "drive G, base amplitude over b ε"),
     )
     .heading("The drive that holds each level", "")

@@ -3,7 +3,9 @@
 use serde::Serialize;
 
 use super::{SectionError, Subject};
-use crate::orbit::{Branch, Exploration, Limits, Periodic, Response, backbone, response};
+use crate::orbit::{
+    Branch, Condition, Exploration, ImpactPattern, Limits, Periodic, Response, backbone, phase_resonant, response,
+};
 use crate::report::figures::{period, responses};
 use crate::report::files::csv;
 use crate::report::section::Section;
@@ -57,7 +59,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
             changes,
         );
     }
-    if let Some(motion) = locked(&p, &found) {
+    if let Some(motion) = locked(&p) {
         let flow = SlowFlow::new(p.lambda, p.r);
         let theory = flow.phase_resonant(p.g);
         let theory = theory.iter().find(|one| one.stable());
@@ -65,7 +67,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
             "period",
             "One period of the locked motion. Above: the primary mass with its walls, and the particle between them; circles \
              mark the impacts. Below: centre of mass and relative displacement, exact and by first-order theory.",
-            period::figure(&p, motion, theory).svg()?,
+            period::figure(&p, &motion, theory).svg()?,
         );
     }
     section.attach("curves.csv", csv(table(&curve, &found))?);
@@ -116,15 +118,11 @@ fn changes(found: &[Response]) -> Table {
     }))
 }
 
-/// The stable motion at the scene's excitation that is nearest to phase resonance.
-fn locked<'a>(p: &Dimensionless, found: &'a [Response]) -> Option<&'a Periodic> {
-    let distance = |one: &Periodic| (one.g - p.g).abs() + (one.gamma + std::f64::consts::FRAC_PI_2).abs();
-    let response = found.iter().find(|one| one.g == p.g)?;
-    let stable = response
-        .symmetric()
-        .flat_map(|one| &one.points)
-        .filter(|one| one.stable);
-    stable.min_by(|a, b| distance(a).total_cmp(&distance(b)))
+/// The stable resonant motion at the scene's excitation.
+fn locked(p: &Dimensionless) -> Option<Periodic> {
+    let orbit = phase_resonant(p).into_iter().find(|one| one.stable)?;
+    let conditions = [Condition::Excitation(p.g), Condition::backbone(p)];
+    Periodic::find(p, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions)
 }
 
 /// The scene's excitation, and others from just above the onset of stable motions to beyond symmetry breaking.

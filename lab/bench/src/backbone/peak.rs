@@ -1,0 +1,185 @@
+//! The peak of the response from points at several phases.
+//!
+//! Along a frequency response, at constant G, the amplitude is largest where at constant amplitude the drive is smallest: both are
+//! the point at which the curves of constant G and of constant C touch. The loop therefore holds each level at several phases
+//! about resonance. The balances of amplitude and phase convert each point to the drive and the detuning of resonance, which hardly depend on
+//! the phase x from resonance, so that a parabola in x describes them. The drive at the phase x is `G(x)/cos x`; its minimum is the peak.
+
+use super::point::Point;
+use super::predictor::{self, Known};
+use crate::scene::Predictor;
+use vines_model::{Dimensionless, numerics::mean};
+
+/// Phases from resonance at which every level is held, rad.
+pub const PHASES: [f64; 3] = [-0.25, 0.0, 0.25];
+
+/// Drive and detuning that hold the resonance `(C, G, sigma)` at the phase `x`, rad, from it.
+pub fn at_phase(known: &Known, x: f64, epsilon: f64) -> [f64; 2] {
+    let g = known.g / x.cos();
+    let omega = 1.0 + epsilon * known.sigma;
+    [g, known.sigma - g * x.sin() / (2.0 * known.c * omega)]
+}
+
+/// The peaks at the levels at which all phases were held: `scans` has the points of each phase, level by level.
+pub fn peaks(scans: &[Vec<Point>], scene: &Dimensionless) -> Vec<Point> {
+    let levels = scans.iter().map(Vec::len).min().unwrap_or(0);
+    (0..levels)
+        .map(|level| {
+            let c = mean(scans.iter().map(|scan| scan[level].c));
+            let points: Vec<Point> = scans.iter().map(|scan| at_level(scan, level, c, scene)).collect();
+            peak(&points, scene.epsilon)
+        })
+        .collect()
+}
+
+/// A point corrected to the amplitude `c`, by the parabola through its neighbours in the same scan.
+fn at_level(scan: &[Point], level: usize, c: f64, scene: &Dimensionless) -> Point {
+    let first = level.saturating_sub(1).min(scan.len().saturating_sub(3));
+    let usable = |n: &usize| *n != level && scan[*n].settled && scan[*n].reached;
+    let others = (first..scan.len().min(first + 3)).filter(usable);
+    // The nearest is the last but one, the last is the one that is corrected.
+    let mut order: Vec<usize> = others.collect();
+    order.sort_by_key(|n| std::cmp::Reverse(n.abs_diff(level)));
+    let known: Vec<Known> = order.into_iter().chain([level]).map(|n| scan[n].known()).collect();
+    let by = |predictor, known| predictor::change(predictor, known, c, scene);
+    let predictor = if known.len() == 1 {
+        Predictor::Theory
+    } else {
+        Predictor::Previous
+    };
+    let (change, simpler) = (
+        by(predictor, &known),
+        by(Predictor::Previous, &known[1.min(known.len() - 1)..]),
+    );
+    let own = scan[level];
+    Point {
+        c,
+        g: own.g + change.0,
+        sigma: own.sigma + change.1,
+        u_g: own.u_g.hypot(change.0 - simpler.0),
+        u_sigma: own.u_sigma.hypot(change.1 - simpler.1),
+        ..own
+    }
+}
+
+fn peak(points: &[Point], epsilon: f64) -> Point {
+    let phases: Vec<f64> = points.iter().map(|one| one.phase_error_deg.to_radians()).collect();
+    let sum = |weights: &[f64], value: &dyn Fn(usize) -> f64| -> f64 {
+        weights.iter().enumerate().map(|(n, weight)| weight * value(n)).sum()
+    };
+    let size = |weights: &[f64], value: &dyn Fn(usize) -> f64| {
+        let squares = weights
+            .iter()
+            .enumerate()
+            .map(|(n, weight)| (weight * value(n)).powi(2));
+        squares.sum::<f64>().sqrt()
+    };
+    let mut x = 0.0_f64;
+    for _ in 0..ROUNDS {
+        let [values, slopes] = parabola(&phases, x);
+        x = -(sum(&slopes, &|n| points[n].g) / sum(&values, &|n| points[n].g)).atan();
+    }
+    let [values, slopes] = parabola(&phases, x);
+    let resonance = Known {
+        c: points[0].c,
+        g: sum(&values, &|n| points[n].g),
+        sigma: sum(&values, &|n| points[n].sigma),
+    };
+    let [g, sigma] = at_phase(&resonance, x, epsilon);
+    let u_phase = size(&slopes, &|n| points[n].u_g) / resonance.g;
+    let centre = points[points.len() / 2];
+    Point {
+        c: resonance.c,
+        sigma,
+        g,
+        phase_error_deg: x.to_degrees(),
+        u_c: size(&vec![1.0 / points.len() as f64; points.len()], &|n| points[n].u_c),
+        u_sigma: size(&values, &|n| points[n].u_sigma).hypot(u_phase * g / (2.0 * resonance.c)),
+        u_g: size(&values, &|n| points[n].u_g),
+        u_phase_deg: u_phase.to_degrees(),
+        periods: points.iter().map(|one| one.periods).sum(),
+        averaged: points.iter().map(|one| one.averaged).sum(),
+        settled: points.iter().all(|one| one.settled),
+        reached: points.iter().all(|one| one.reached),
+        ..centre
+    }
+}
+
+/// Rounds of the fixed-point iteration, each of which gains a factor of the order of epsilon.
+const ROUNDS: usize = 12;
+
+/// Weights of the values at the places `at` in the parabola through them: of its value and of its slope at `x`.
+fn parabola(at: &[f64], x: f64) -> [Vec<f64>; 2] {
+    let weights = |n: usize| {
+        let others: Vec<f64> = at
+            .iter()
+            .enumerate()
+            .filter(|(m, _)| *m != n)
+            .map(|(_, one)| *one)
+            .collect();
+        let scale: f64 = others.iter().map(|one| at[n] - one).product();
+        let value: f64 = others.iter().map(|one| x - one).product();
+        let slope: f64 = (0..others.len())
+            .map(|m| {
+                others
+                    .iter()
+                    .enumerate()
+                    .filter(|(k, _)| *k != m)
+                    .map(|(_, one)| x - one)
+                    .product::<f64>()
+            })
+            .sum();
+        [value / scale, slope / scale]
+    };
+    [0, 1].map(|which| (0..at.len()).map(|n| weights(n)[which]).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::identification::Regime;
+
+    #[test]
+    fn the_peak_is_where_the_drive_at_a_constant_level_is_smallest() {
+        // At resonance: G = 1 + 0.02 x, sigma = -1 + 0.1 x.
+        let resonance = |x: f64| Known { c: 0.5, g: 1.0 + 0.02 * x, sigma: -1.0 + 0.1 * x };
+        let point = |x: f64| {
+            let Known { c, g, sigma } = resonance(x);
+            Point {
+                level: c,
+                c,
+                sigma,
+                g,
+                phase_error_deg: x.to_degrees(),
+                u_c: 0.0,
+                u_sigma: 0.0,
+                u_g: 1e-4,
+                u_phase_deg: 0.0,
+                periods: 10.0,
+                averaged: 8,
+                settled: true,
+                reached: true,
+                regime: Regime::Symmetric,
+                regime_by_impacts: None,
+            }
+        };
+        let scans = PHASES.map(|x| vec![point(x)]);
+        let found = peaks(&scans, &Dimensionless::new(1e-12, 1.43, 0.65, 1.1))[0];
+        let drive = |x: f64| at_phase(&resonance(x), x, 0.0)[0];
+        let x = vines_model::numerics::golden_section(-0.2, 0.2, drive);
+        assert!((found.phase_error_deg.to_radians() - x).abs() < 1e-6, "{found:?}");
+        assert!((found.g - drive(x)).abs() < 1e-12 && x < -0.015);
+        assert!((found.sigma - at_phase(&resonance(x), x, 0.0)[1]).abs() < 1e-6);
+        // The phase that each drive moves by its own uncertainty.
+        let moved = (0..scans.len()).map(|n| {
+            let mut scans = scans.clone();
+            scans[n][0].g += scans[n][0].u_g;
+            peaks(&scans, &Dimensionless::new(1e-12, 1.43, 0.65, 1.1))[0].phase_error_deg - found.phase_error_deg
+        });
+        let expected = moved.map(|one| one * one).sum::<f64>().sqrt();
+        assert!(
+            (found.u_phase_deg / expected - 1.0).abs() < 5e-3,
+            "{found:?}, {expected}"
+        );
+    }
+}

@@ -1,0 +1,85 @@
+//! A rig read by the sensors of a definition of resonance.
+
+use lovines::Parameters;
+use vines_model::{Definition, Reference, Sensor};
+
+use super::{Drive, GroundTruth, Rig, RigError, Sensors};
+
+/// A rig whose response is a displacement and whose reference is the base, with the sensors of a definition of resonance.
+///
+/// An acceleration is the second difference of the displacement: an accelerometer that averages over two sample periods with the weights of
+/// a triangle, which keep the instants of the walls' impulses. The force `k e + c e'` over k takes e' from a difference of e. Both
+/// belong to the sample before; then response and reference are both read one sample late.
+#[derive(Debug, Clone)]
+pub struct Measured<R> {
+    rig: R,
+    definition: Definition,
+    /// c/k, s, and omega0, rad/s.
+    plant: [f64; 2],
+    now: Sensors,
+    /// The readings before, the latest first, each with the time to the next one, s.
+    before: [(Sensors, f64); 2],
+}
+
+impl<R: Rig> Measured<R> {
+    /// The rig `rig` with the parameters `plant` and the sensors of `definition`.
+    #[must_use]
+    pub fn new(rig: R, definition: Definition, plant: &Parameters) -> Self {
+        Self {
+            rig,
+            definition,
+            plant: [plant.damping / plant.stiffness, plant.natural_frequency()],
+            now: Sensors::default(),
+            before: [(Sensors::default(), 0.0); 2],
+        }
+    }
+
+    /// Second difference over the displacement, times `step` (s): at omega0 exactly that of a sine.
+    fn gain(&self, step: f64) -> f64 {
+        let sine = (0.5 * self.plant[1] * step).sin();
+        4.0 * sine * sine / step
+    }
+
+    fn step_begins(&mut self, step: f64) {
+        self.before = [(self.now, step), self.before[0]];
+    }
+}
+
+impl<R: Rig> Rig for Measured<R> {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.now = self.rig.sense()?;
+        let [(middle, late), (first, early)] = self.before;
+        if !self.definition.is_late() || early == 0.0 {
+            return Ok(if self.definition.is_late() { middle } else { self.now });
+        }
+        let [leading, _] = self.plant;
+        let rates = [
+            (self.now.response - middle.response) / late,
+            (middle.response - first.response) / early,
+        ];
+        let response = match self.definition.sensor {
+            Sensor::V | Sensor::Q1 => middle.response,
+            Sensor::Acceleration => (rates[1] - rates[0]) / self.gain(0.5 * (late + early)),
+        };
+        let force = |((now, middle), first): ((f64, f64), f64)| middle + leading * (now - first) / (late + early);
+        let reference = match self.definition.reference {
+            Reference::Base => middle.reference,
+            Reference::Force => self.now.reference.zip(middle.reference).zip(first.reference).map(force),
+        };
+        Ok(Sensors { response, reference })
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.step_begins(step);
+        self.rig.advance(drive, step)
+    }
+
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        self.step_begins(step);
+        self.rig.hold(displacement, step)
+    }
+
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        self.rig.ground_truth()
+    }
+}
