@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
+
 import vines
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")

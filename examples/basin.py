@@ -7,8 +7,9 @@ import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
-import vines
 from matplotlib.colors import ListedColormap
+
+import vines
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
 folder.mkdir(parents=True, exist_ok=True)

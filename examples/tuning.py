@@ -9,6 +9,7 @@ from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
+
 import vines
 
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")

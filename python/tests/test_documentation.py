@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+
 import vines
 
 MODULES = [vines, *(importlib.import_module(f"vines.{one.name}") for one in pkgutil.iter_modules(vines.__path__))]

@@ -7,8 +7,9 @@ import time
 
 import numpy as np
 import pytest
-import vines
 from fmpy import extract, instantiate_fmu, read_model_description
+
+import vines
 
 DRIVE = {"amplitude": 9.2e-5, "omega": 54.9}
 

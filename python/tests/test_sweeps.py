@@ -8,8 +8,9 @@ import time
 from pathlib import Path
 
 import pytest
-import vines
 from dask.distributed import Client, LocalCluster
+
+import vines
 
 AXES = {"sigma": (-3.0, 3.0, 31), "start.dq2": (-0.6, 0.7, 40)}
 SETTINGS = {"periods": 200, "chunk": 40}
