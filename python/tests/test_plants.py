@@ -38,13 +38,13 @@ def fmu_states(start, steps, duration):
 def test_a_plant_has_the_bits_of_the_fmu():
     plant = vines.Plant(vines.Scene(), dq2=0.5)
     states = []
-    for _ in range(3000):
+    for _ in range(4096):
         plant.advance(1.0 / 1024, **DRIVE)
         states.append(list(plant.state.values()))
     assert plant.impacts > 40
     order = [list(plant.state).index(name) for name in ("q1", "dq1", "q2", "dq2")]
     scene = vines.Scene().settings["plant"]
-    expected = fmu_states(scene | {"der(q2)": 0.5}, 3000, 1.0 / 1024)
+    expected = fmu_states(scene | {"der(q2)": 0.5}, 4096, 1.0 / 1024)
     assert np.array_equal(np.array(states)[:, order], expected)
 
 
