@@ -60,7 +60,7 @@ pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
 
 /// The leading half of the digits, and the rest (Veltkamp).
 #[inline(always)]
-fn halves(x: f64) -> (f64, f64) {
+pub(crate) fn halves(x: f64) -> (f64, f64) {
     let scaled = 134_217_729.0 * x; // 2^27 + 1
     let high = scaled - (scaled - x);
     (high, x - high)
@@ -69,11 +69,17 @@ fn halves(x: f64) -> (f64, f64) {
 /// `a b` as a rounded product and its rounding error (Dekker, with Veltkamp's splitting: no FMA instruction needed).
 #[inline(always)]
 pub(crate) fn product(a: f64, b: f64) -> (f64, f64) {
-    let rounded = a * b;
-    let ((a1, a2), (b1, b2)) = (halves(a), halves(b));
-    let error = ((a1 * b1 - rounded) + a1 * b2 + a2 * b1) + a2 * b2;
+    let (rounded, error) = product_with(a, (b, halves(b)));
     // Above 1e300 the splitting overflows; such products are not physical.
     (rounded, if error.is_finite() { error } else { 0.0 })
+}
+
+/// The same; the second factor comes with its halves.
+#[inline(always)]
+pub(crate) fn product_with(a: f64, (b, (b1, b2)): (f64, (f64, f64))) -> (f64, f64) {
+    let (a1, a2) = halves(a);
+    let rounded = a * b;
+    (rounded, ((a1 * b1 - rounded) + a1 * b2 + a2 * b1) + a2 * b2)
 }
 
 /// `a / b` as a rounded quotient and its rounding error.

@@ -37,6 +37,13 @@ impl Drive {
         Self { signal: [displacement, 0.0, 0.0, 0.0], ..Self::default() }
     }
 
+    /// Whether the signal is a straight line.
+    #[inline(always)]
+    pub(crate) fn is_straight(&self) -> bool {
+        let [.., u2, u3] = self.signal.map(f64::to_bits);
+        (u2 | u3) << 1 == 0
+    }
+
     /// Checks every value.
     ///
     /// # Errors

@@ -15,6 +15,7 @@ mod coefficients;
 mod flight;
 mod grid;
 mod hop;
+mod horizon;
 mod march;
 mod propagator;
 mod short_step;
@@ -24,21 +25,19 @@ mod verify;
 use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
+use crate::oscillator::Oscillator;
 use crate::plant::{Masses, Rig};
 use crate::segment::Segment;
 use cache::Cache;
 #[cfg(feature = "serde")]
 pub(crate) use cache::Keys;
 use coefficients::Coefficients;
+use horizon::Horizon;
 use propagator::{Increment, Point};
 use start::Start;
-use verify::Envelope;
 
 /// How often a phasor is rotated before it is computed from the phase again.
 const ROTATIONS: u32 = 16;
-/// Contact is looked for so many steps ahead: where it is far, most steps need not look at all.
-const AHEAD: f64 = 4.0;
-
 /// Longest time for which the motion is followed from point to point of the grid, in units of the fastest rate's time: for
 /// a longer one the closed form is as cheap.
 const LONGEST_COAST: f64 = 8.0;
@@ -49,8 +48,8 @@ pub(crate) enum Next {
     ContactFree(f64),
     /// A verified contact after this time, s, with this wall: the plant has moved on to it.
     Contact(Sum, Wall),
-    /// Unknown: the plain solver has to search.
-    Search,
+    /// Unknown: the plain solver has to search, for so long at most, s.
+    Search(f64),
 }
 
 /// The parts of a plant that move, and the rig.
@@ -64,8 +63,8 @@ pub(crate) struct Moving<'a> {
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct FastPath {
     pub disabled: bool,
-    /// No contact for this time from now on, s.
-    contact_free: f64,
+    /// How long there is no contact from now on.
+    contact_free: Horizon,
     /// `e^{i phase}` of the base: cosine and sine.
     phasor: (f64, f64),
     /// Rotations since it was computed from the phase.
@@ -89,7 +88,7 @@ impl FastPath {
 
     /// The state was changed from outside.
     pub fn state_changed(&mut self, base: &BaseMotion) {
-        self.contact_free = 0.0;
+        self.contact_free = Horizon::default();
         self.resynchronise(base.phase);
     }
 
@@ -99,10 +98,10 @@ impl FastPath {
         self.state_changed(base);
     }
 
-    /// The drive was changed.
+    /// The drive changes, and the velocity of the primary mass by `kick`, m/s.
     #[inline(always)]
-    pub fn drive_changed(&mut self, drive: &Drive) {
-        self.contact_free = 0.0;
+    pub fn drive_changed(&mut self, oscillator: &Oscillator, before: &Drive, drive: &Drive, kick: f64) {
+        self.contact_free.drive_changed(oscillator, before, drive, kick);
         self.cache.step.drive_changed(drive);
     }
 
@@ -143,7 +142,7 @@ impl FastPath {
             return false;
         }
         let start = self.point(moving);
-        if duration >= self.contact_free && !self.is_contact_free(moving, &start, duration) {
+        if duration >= self.contact_free.t && !self.is_contact_free(moving, &start, duration) {
             return false;
         }
         self.take_step(moving, &start, late);
@@ -155,24 +154,23 @@ impl FastPath {
     fn take_step(&mut self, moving: &mut Moving, start: &Point, late: f64) {
         let step = &mut self.cache.step;
         let drive = &moving.base.drive;
-        let mut increment = step.increment(drive, start);
+        let (mut increment, angle) = step.increment(drive, start);
         if late != 0.0 {
             increment = increment.later(&moving.rig.alone, drive, start, late);
         }
-        let (t, angle) = (step.t + late, step.angle);
+        let t = step.t + late;
         let phase = moving.base.phase.rotated(angle, drive.omega * late);
         self.apply(moving, &increment, phase, t);
-        self.contact_free -= t;
+        self.contact_free.t -= t;
     }
 
     /// Adds an increment to displacements, velocities and base.
     #[inline(always)]
     fn apply(&mut self, moving: &mut Moving, increment: &Increment, phase: Phase, t: f64) {
         let Moving { rig, masses, base } = moving;
-        let signal = &mut base.drive.signal;
-        let dx = increment.y + signal[1] * t;
-        if signal[1] != 0.0 || signal[2] != 0.0 || signal[3] != 0.0 {
-            *signal = shift(*signal, t);
+        let dx = increment.y + base.drive.signal[1] * t;
+        if base.drive.signal[1] != 0.0 || !base.drive.is_straight() {
+            base.drive.signal = shift(base.drive.signal, t);
         }
         masses.x = masses.x.plus(dx);
         masses.v = masses.v.plus(increment.dy);
@@ -185,39 +183,34 @@ impl FastPath {
         self.turned(base, phase, increment.phasor);
     }
 
-    /// Whether a bound from the start alone shows that no wall is met within `t`; looks further ahead where that is as cheap.
+    /// Whether a bound from the start alone shows that no wall is met within `t`; it may reach further.
     #[inline(always)]
     fn is_contact_free(&mut self, moving: &Moving, start: &Point, t: f64) -> bool {
-        let open = |t: f64| {
-            let envelope = Envelope::new(&moving.rig.alone, &moving.base.drive, start, t);
-            let (w, dw) = (moving.masses.w.value(), moving.masses.dw);
-            envelope.open_from(moving.rig.parameters.half_width, w, dw, t)
-        };
-        if open(AHEAD * t) {
-            self.contact_free = AHEAD * t;
-            return true;
-        }
-        open(t)
+        self.contact_free = Horizon::ahead(moving, start, t);
+        self.contact_free.t >= t
     }
 
     /// Moves on by `t` seconds, in which no wall is met; `duration` is the length of the whole step.
     fn coast(&mut self, moving: &mut Moving, start: &Point, t: f64, duration: f64) -> Next {
         let (oscillator, drive) = (&moving.rig.alone, moving.base.drive);
-        let [_, u1, u2, u3] = drive.signal;
         let fastest = oscillator.fastest.max(drive.omega.abs());
         if t == duration && self.cache.repeats(oscillator, &drive, duration) {
             self.evaluations += 1;
             self.take_step(moving, start, duration - self.cache.step.t);
-        } else if u2 != 0.0 || u3 != 0.0 || drive.omega < 0.0 || t * fastest > LONGEST_COAST {
+        } else if !drive.is_straight() || drive.omega < 0.0 || t * fastest > LONGEST_COAST {
             self.evaluations += 1;
             let (x, v) = (moving.masses.x.value(), moving.masses.v.value());
             let segment = Segment::new(oscillator, *moving.base, (x, v));
             let (dx, dv) = segment.departure(t);
             let phase = moving.base.phase.advanced(drive.omega, t);
-            let increment = Increment { y: dx + (v - u1) * t, dy: dv, phasor: self.phasor };
+            let increment = Increment {
+                y: dx + (v - drive.signal[1]) * t,
+                dy: dv,
+                phasor: self.phasor,
+            };
             self.apply(moving, &increment, phase, t);
             self.resynchronise(phase);
-            self.contact_free -= t;
+            self.contact_free.t -= t;
         } else {
             self.coefficients.prepare(oscillator, drive.omega);
             let increment = self.after(&Start::new(moving, *start), t);
@@ -226,7 +219,7 @@ impl FastPath {
             }
             let phase = moving.base.phase.rotated(propagator::angle(drive.omega, t), 0.0);
             self.apply(moving, &increment, phase, t);
-            self.contact_free -= t;
+            self.contact_free.t -= t;
         }
         Next::ContactFree(t)
     }

@@ -4,13 +4,15 @@
 
 mod derivatives;
 mod exchange;
+mod limits;
 mod log;
 mod model_exchange;
 mod outputs;
 mod reach;
+mod settings;
 
+use crate::fmu::limits::lost;
 use crate::fmu::model_exchange::hybrid::Hybrid;
-use crate::plant::MOST_IMPACTS;
 use crate::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
 use fmi2_component::{Archive, Component, Key, Log, Refusal};
 use outputs::Outputs;
@@ -61,10 +63,6 @@ enum Rig {
     Equations(Hybrid),
 }
 
-/// The longest step that is taken, in radians of the fastest rate: more than a million periods. Even where nothing hits, the
-/// search for the first contact looks at the motion once in every two radians or so, and a call is to end.
-const LONGEST_STEP: f64 = 1e7;
-
 /// The highest order of input derivatives that is followed.
 const DERIVATIVES: u32 = 3;
 
@@ -75,42 +73,6 @@ fn logging(plant: &mut Plant, drive: Drive, step: f64, on_event: impl FnMut(Even
     plant.advance_with(drive, step, on_event)
 }
 
-/// Why a step could not be finished.
-#[cold]
-fn lost(resolved: bool, time: f64, (step, elapsed): (f64, f64)) -> Refusal {
-    Refusal::error(if resolved {
-        format!(
-            "there are {MOST_IMPACTS} impacts within the first {elapsed} s of the step of {step} s at t = {time} s; expected \
-             are velocities and a half-width of the cavity that make sense together, or a shorter step"
-        )
-    } else {
-        format!(
-            "displacements have become so large in the step at t = {time} s that their rounding is wider than the cavity; \
-             expected are start values and inputs of a sensible size"
-        )
-    })
-}
-
-/// Why a step is not begun.
-#[cold]
-fn too_far(drive: &Drive) -> Refusal {
-    Refusal::error(format!(
-        "the base would go further than 2^52 half-widths of the cavity, where the rounding of displacements is wider than it \
-         (e = {} m and its derivatives, E = {} m); expected are inputs of a sensible size",
-        drive.signal[0], drive.amplitude
-    ))
-}
-
-/// Why a step is not begun.
-#[cold]
-fn too_long(step: f64, rate: f64) -> Refusal {
-    let longest = LONGEST_STEP / rate;
-    Refusal::error(format!(
-        "communicationStepSize = {step} s is refused; allowed are at most {longest} s, which is {LONGEST_STEP} rad of \
-         the fastest rate"
-    ))
-}
-
 #[derive(Clone, Copy, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
 enum Progress {
     /// It is not yet made of the values set.
@@ -118,97 +80,6 @@ enum Progress {
     /// It stands at its start: the outputs with exact start values are just those.
     Initialised,
     UnderWay,
-}
-
-impl LoViNes {
-    /// A parameter or an input, as it was set.
-    fn setting(&self, variable: Real) -> Option<f64> {
-        let p = &self.parameters;
-        Some(match variable {
-            Real::M => p.primary_mass,
-            Real::k => p.stiffness,
-            Real::c => p.damping,
-            Real::m => p.particle_mass,
-            Real::b => p.half_width,
-            Real::r => p.restitution,
-            Real::e => self.drive.signal[0],
-            Real::E => self.drive.amplitude,
-            Real::omega => self.drive.omega,
-            Real::q1_start => self.start.q1,
-            Real::der_q1_start => self.start.dq1,
-            Real::q2_start => self.start.q2,
-            Real::der_q2_start => self.start.dq2,
-            _ => return None,
-        })
-    }
-
-    /// Whether a step can be done at all; steps up to that length need not be looked at again.
-    #[inline(never)]
-    fn judge(&self, step: f64) -> Result<(), Refusal> {
-        let rate = self.fastest.max(self.drive.omega.abs());
-        self.drive.validate()?;
-        if step * rate > LONGEST_STEP {
-            return Err(too_long(step, rate));
-        }
-        // However short the step: slopes become forces.
-        if !self.reach.holds_base(&self.drive, step.max(1.0 / self.fastest)) {
-            return Err(too_far(&self.drive));
-        }
-        self.longest.set(step);
-        Ok(())
-    }
-
-    /// Tells the rig of changed inputs.
-    #[inline]
-    fn input(&mut self) {
-        self.inputs_set = true;
-        self.outputs.forget_base();
-        self.longest = unknown();
-        if let Rig::Equations(hybrid) = &mut self.rig {
-            hybrid.drive = self.drive;
-        }
-    }
-
-    /// Sets a parameter or a start value.
-    #[cold]
-    fn configure(&mut self, variable: Real, value: f64) -> Result<(), Refusal> {
-        let mut parameters = self.parameters;
-        let slot = match variable {
-            // One value under two names: some masters set parameters only, others start values of outputs only.
-            Real::q1 | Real::q1_start => &mut self.start.q1,
-            Real::der_q1 | Real::der_q1_start => &mut self.start.dq1,
-            Real::q2 | Real::q2_start => &mut self.start.q2,
-            Real::der_q2 | Real::der_q2_start => &mut self.start.dq2,
-            Real::M => &mut self.parameters.primary_mass,
-            Real::m => &mut self.parameters.particle_mass,
-            Real::b => &mut self.parameters.half_width,
-            Real::k => &mut parameters.stiffness,
-            Real::c => &mut parameters.damping,
-            Real::r => &mut parameters.restitution,
-            _ => return Err(Refusal::error("this variable is computed, not set")),
-        };
-        *slot = value;
-        self.outputs = Outputs::default();
-        if matches!(variable, Real::k | Real::c | Real::r) {
-            self.set_parameters(parameters)?;
-        }
-        Ok(())
-    }
-
-    /// Tells the rig of changed parameters.
-    fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
-        if self.progress != Progress::None {
-            match &mut self.rig {
-                Rig::Steps(plant) => plant.set_parameters(parameters)?,
-                Rig::Equations(hybrid) => hybrid.set_parameters(parameters)?,
-            }
-        }
-        self.parameters = parameters;
-        self.fastest = parameters.fastest_rate();
-        self.reach = Reach::of(&parameters);
-        self.longest = unknown();
-        Ok(())
-    }
 }
 
 impl Component for LoViNes {

@@ -175,22 +175,22 @@ impl Oscillator {
         const DEGREE: usize = 26;
         let damping = times((2.0 * self.delta, self.errors.0), (t, 0.0));
         let spring = times((self.omega0_squared, self.errors.1), product(t, t));
-        // Coefficients for the start (1, 0) or (0, t); the velocity is that of `t x'`.
-        let column = |first: [(f64, f64); 2]| {
-            let (mut c, mut x, mut v) = (first, (0.0, 0.0), (0.0, 0.0));
-            for n in 2..DEGREE {
-                let sum = plus(times(damping, times(c[1], ((n - 1) as f64, 0.0))), times(spring, c[0]));
-                let (next, error) = divided(sum, ((n - 1) * n) as f64);
-                c = [c[1], (-next, -error)];
-                x = plus(x, c[1]);
-                v = plus(v, times(c[1], (n as f64, 0.0)));
+        // Coefficients for the start (0, t); the velocity is that of `t x'`.
+        let (mut c, mut x, mut v) = ([(0.0, 0.0), (1.0, 0.0)], (0.0, 0.0), (0.0, 0.0));
+        for n in 2..DEGREE {
+            let sum = plus(times(damping, times(c[1], ((n - 1) as f64, 0.0))), times(spring, c[0]));
+            let (next, error) = divided(sum, ((n - 1) * n) as f64);
+            c = [c[1], (-next, -error)];
+            x = plus(x, c[1]);
+            v = plus(v, times(c[1], (n as f64, 0.0)));
+            if c[0].0.abs().max(c[1].0.abs()) <= 1e-35 * x.0.abs() {
+                break;
             }
-            (x, v)
-        };
-        let (xx, vx) = column([(1.0, 0.0), (0.0, 0.0)]);
-        let (xv, vv) = column([(0.0, 0.0), (1.0, 0.0)]);
-        let (one, t2) = ((1.0, 0.0), (t, 0.0));
-        [xx, times(plus(one, xv), t2), divided(vx, t), vv]
+        }
+        // `xx = vv + 2 delta xv` and `vx = -omega0² xv`.
+        let per_t = plus((1.0, 0.0), x);
+        let (vx, error) = times((self.omega0_squared, self.errors.1), times(per_t, (t, 0.0)));
+        [plus(v, times(damping, per_t)), times(per_t, (t, 0.0)), (-vx, -error), v]
     }
 
     /// The transition from `exp(-delta t) sin(omega_d t)` and `exp(-delta t) cos(omega_d t)`.

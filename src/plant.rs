@@ -5,104 +5,20 @@
 
 mod advance;
 mod at_wall;
+mod events;
 #[cfg(feature = "serde")]
 mod snapshot;
 
 use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive};
-use crate::contact::{Contact, ImpactLaw, Touch, Wall};
+use crate::contact::{Contact, ImpactLaw, Wall};
 use crate::fast::FastPath;
 use crate::oscillator::Oscillator;
 use crate::parameters::{InvalidValue, Parameters};
+pub use events::{Event, Outcome, State, Totals};
 
 /// Largest number of impacts per step. Bounds the work of any input.
 pub const MOST_IMPACTS: u64 = 10_000_000;
-
-/// Positions (m) and velocities (m/s) of both masses.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct State {
-    /// Displacement of the primary mass.
-    pub q1: f64,
-    /// Velocity of the primary mass.
-    pub dq1: f64,
-    /// Displacement of the particle.
-    pub q2: f64,
-    /// Velocity of the particle.
-    pub dq2: f64,
-}
-
-/// An event of a step; times are in seconds since the step began.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Event {
-    /// The particle hit a wall.
-    Impact {
-        /// When, s.
-        t: f64,
-        /// Which wall.
-        wall: Wall,
-        /// Relative velocity `w'` just before, m/s.
-        velocity: f64,
-    },
-    /// The particle came to rest on a wall.
-    Stuck {
-        /// When, s.
-        t: f64,
-        /// Which wall.
-        wall: Wall,
-    },
-    /// The wall ceased to push and released the particle.
-    Released {
-        /// When, s.
-        t: f64,
-        /// Which wall.
-        wall: Wall,
-    },
-}
-
-/// The events of a step, counted, and how far the step came.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Outcome {
-    /// Impacts followed one by one.
-    pub impacts: u64,
-    /// How often the particle came to rest on a wall.
-    pub stuck: u64,
-    /// How often a wall released it.
-    pub released: u64,
-    /// Time by which the plant advanced, s: less than the step where it was cut short.
-    pub elapsed: f64,
-    /// Whether the step ended early, at [`MOST_IMPACTS`] or as many releases.
-    pub cut_short: bool,
-    /// Evaluations of the motion (closed form, propagator or series).
-    pub evaluations: u64,
-}
-
-/// Totals since the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Totals {
-    /// Impacts followed one by one. A chatter is followed until its hops can no longer be resolved.
-    pub impacts: u64,
-    /// Time of the last impact, s; 0 before the first.
-    pub impact_time: f64,
-    /// Relative velocity `w'` just before the last impact, m/s; 0 before the first.
-    pub impact_velocity: f64,
-    /// Energy dissipated by impacts, J.
-    pub dissipated: f64,
-}
-
-impl Totals {
-    /// Counts an impact, if `touch` is one, and what it dissipated.
-    #[inline(always)]
-    pub(crate) fn add(&mut self, touch: &Touch, time: f64) {
-        if let Some(velocity) = touch.impact {
-            self.impacts += 1;
-            self.impact_time = time;
-            self.impact_velocity = velocity;
-        }
-        self.dissipated += touch.dissipated;
-    }
-}
 
 /// The parameters and what follows from them.
 #[derive(Clone, Copy, Debug)]

@@ -2,7 +2,7 @@
 
 mod common;
 
-use common::scene;
+use common::{Scene, scene};
 use lovines::{Drive, Parameters, Plant, State};
 use proptest::prelude::*;
 use std::f64::consts::TAU;
@@ -40,27 +40,73 @@ fn crossings_meet_the_impacts_of_the_plain_search() {
     }
 }
 
+#[test]
+fn a_wall_that_is_nearly_touched_makes_only_a_short_part_of_a_long_flight_costly() {
+    let omega = 1.0 - 0.0084 * 4.4;
+    let drive = Drive::harmonic(0.0084 * 1.4, omega);
+    let start = State { q1: -0.0233, dq1: 0.1524, q2: -0.8405, dq2: 5.8e-4 };
+    let mut fast = Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), start).unwrap();
+    let mut searched = plain(&fast);
+    let periods = 200.0;
+    let outcome = fast.advance(drive, periods * TAU / omega).unwrap();
+    let all = searched.advance(drive, periods * TAU / omega).unwrap();
+    assert!(distance(&fast, &searched) < 1e-13 && outcome.impacts == 0);
+    let evaluations = (outcome.evaluations, all.evaluations);
+    assert!(
+        (evaluations.0 as f64) < 0.5 * periods && evaluations.1 as f64 > 2.0 * periods,
+        "{evaluations:?}"
+    );
+}
+
 proptest! {
     #![proptest_config(ProptestConfig { failure_persistence: None, ..ProptestConfig::with_cases(1000) })]
 
     #[test]
     fn the_first_impacts_of_any_scene_are_those_of_the_plain_search(s in scene(true)) {
-        let mut fast = Plant::new(s.parameters, s.start).unwrap();
-        let mut searched = plain(&fast);
-        // Impacts drive neighbours apart: only while there are few does a small distance mean agreement.
-        let step = s.step.min(1.0);
-        for _ in 0..20 {
-            fast.advance(s.drive, step).unwrap();
-            searched.advance(s.drive, step).unwrap();
-            if fast.totals().impacts.max(searched.totals().impacts) > 3 {
-                break;
-            }
-            prop_assert_eq!(fast.totals().impacts, searched.totals().impacts);
-            let state = searched.state();
-            let size = 1.0 + [state.q1, state.dq1, state.q2, state.dq2].iter().fold(0.0f64, |a, x| a.max(x.abs()));
-            prop_assert!(distance(&fast, &searched) <= 1e-10 * size, "{:e}", distance(&fast, &searched));
-        }
+        agree(&s, 20, s.step.min(1.0), |_| s.drive)?;
     }
+
+    #[test]
+    fn a_drive_that_changes_at_every_sample_meets_the_impacts_of_the_plain_search(
+        s in scene(true), step in 0.005..0.12f64, change in -6.0..0.5f64, what in 1..16u8,
+    ) {
+        // Any selection of offset, slope, amplitude and frequency changes.
+        let changed = |n: u32, which: u8| {
+            let part = (f64::from(n * 4 + u32::from(which)) * 0.618_033_988_749_895).fract() - 0.5;
+            if what >> which & 1 == 1 { 10f64.powf(change) * part } else { 0.0 }
+        };
+        agree(&s, 60, step, |n| Drive {
+            signal: [s.drive.signal[0] + 0.1 * changed(n, 0), 0.1 * changed(n, 1), 0.0, 0.0],
+            amplitude: s.drive.amplitude * (1.0 + changed(n, 2)),
+            omega: s.drive.omega * (1.0 + changed(n, 3)),
+        })?;
+    }
+}
+
+/// Follows a scene with and without the fast path. Impacts drive neighbours apart: only while there are few does a small distance mean
+/// agreement.
+fn agree(s: &Scene, steps: u32, step: f64, drive: impl Fn(u32) -> Drive) -> Result<(), TestCaseError> {
+    let mut fast = Plant::new(s.parameters, s.start).unwrap();
+    let mut searched = plain(&fast);
+    for n in 0..steps {
+        fast.advance(drive(n), step).unwrap();
+        searched.advance(drive(n), step).unwrap();
+        if fast.totals().impacts.max(searched.totals().impacts) > 3 {
+            break;
+        }
+        prop_assert_eq!(fast.totals().impacts, searched.totals().impacts);
+        let state = searched.state();
+        let size = 1.0
+            + [state.q1, state.dq1, state.q2, state.dq2]
+                .iter()
+                .fold(0.0f64, |a, x| a.max(x.abs()));
+        prop_assert!(
+            distance(&fast, &searched) <= 1e-10 * size,
+            "{:e}",
+            distance(&fast, &searched)
+        );
+    }
+    Ok(())
 }
 
 #[test]

@@ -1,18 +1,15 @@
-// The page: controls, clock, pictures and links.
+// The page: clock and pictures.
 
+import { $, SPEEDS, bind, bindScenes, control, say } from "./controls.js";
+import { read } from "./link.js";
 import { load } from "./module.js";
 import { Rig } from "./rig.js";
 import { Plot, extent } from "./plots.js";
 
-const SPEEDS = [0.01, 0.03, 0.1, 0.3, 1, 3, 10, 30];
 // Rows of the record that are kept for the pictures and for CSV: 34 minutes of the default scene.
 const MOST_ROWS = 1 << 20;
 // Most samples in one frame: a slower machine falls behind the clock instead of freezing the page.
 const MOST_SAMPLES = 6000;
-// Changes that a link repeats; more would make it too long.
-const MOST_CHANGES = 150;
-
-const $ = (id) => document.getElementById(id);
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
 const colours = new Map();
 const colour = (name) => {
@@ -20,11 +17,6 @@ const colour = (name) => {
   return colours.get(name);
 };
 matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => colours.clear());
-
-function say(text) {
-  $("message").textContent = text;
-  $("message").hidden = !text;
-}
 
 class Page {
   playing = true;
@@ -43,7 +35,7 @@ class Page {
       backbone: plot("backbone", "detuning σ", "amplitude C"),
     };
     this.#controls();
-    this.#scenes();
+    bindScenes(this);
   }
 
   // ---- the motion ----
@@ -62,7 +54,7 @@ class Page {
     this.rows = [];
     this.trail = [];
     this.#curves();
-    this.#showControls();
+    this.showControls();
     this.#run(1);
     this.status = this.bench.status();
     this.step = this.status.sampleTime;
@@ -101,7 +93,7 @@ class Page {
       this.changes.pop();
       say(error.message);
     }
-    this.#showControls();
+    this.showControls();
   }
 
   #run(count) {
@@ -243,44 +235,10 @@ class Page {
     $("speed").replaceChildren(...SPEEDS.map((speed) => new Option(speed < 1 ? `1/${Math.round(1 / speed)}` : `${speed}×`, speed)));
     $("speed").onchange = () => (this.speed = Number($("speed").value));
     $("settings").onsubmit = (event) => event.preventDefault();
-    $("settings").replaceChildren(...this.table.settings.map((setting) => this.#control(setting)));
+    $("settings").replaceChildren(...this.table.settings.map((setting) => control(this, setting)));
   }
 
-  #control({ key, symbol, name, unit, min, max, step, help }) {
-    const box = document.createElement("div");
-    const label = document.createElement("label");
-    const input = document.createElement("input");
-    box.title = help;
-    input.id = key;
-    label.htmlFor = key;
-    if (unit === "bool") {
-      box.className = "check";
-      input.type = "checkbox";
-      input.onchange = () => this.change(key, input.checked ? 1 : 0);
-      label.textContent = name;
-      box.append(input, label);
-      return box;
-    }
-    box.className = "setting";
-    label.innerHTML = symbol ? `${name} <i>${symbol}</i>` : name;
-    if (unit) label.append(Object.assign(document.createElement("span"), { className: "unit", textContent: ` ${unit}` }));
-    Object.assign(input, { type: "number", min, max, step: "any" });
-    const slider = Object.assign(document.createElement("input"), { type: "range", min, max, step });
-    slider.setAttribute("aria-label", name);
-    const set = (value) => {
-      if (!Number.isFinite(value) || value < min || value > max) {
-        say(`${name} = ${value} is refused: allowed are ${min} to ${max}${unit ? ` ${unit}` : ""}.`);
-        return this.#showControls();
-      }
-      return this.change(key, value);
-    };
-    slider.oninput = () => set(Number(slider.value));
-    input.onchange = () => set(input.value === "" ? NaN : Number(input.value));
-    box.append(label, input, slider);
-    return box;
-  }
-
-  #showControls() {
+  showControls() {
     for (const { key, unit } of this.table.settings) {
       const input = $(key), value = this.values[key];
       if (unit === "bool") input.checked = value !== 0;
@@ -295,73 +253,15 @@ class Page {
     $("track").disabled = this.values.closed === 0;
   }
 
-  #scenes() {
-    $("scene").replaceChildren(...this.table.scenes.map((scene, i) => new Option(scene.name, i)));
-    const go = () => {
-      const scene = this.table.scenes[Number($("scene").value)];
-      $("scene").title = scene.help;
-      say("");
-      this.start(scene.values);
-    };
-    $("scene").onchange = go;
-  }
-
   play(on) {
     this.playing = on;
-    this.#showControls();
+    this.showControls();
   }
 
   setSpeed(speed) {
     this.speed = speed;
     $("speed").value = speed;
   }
-
-  // ---- links and files ----
-
-  link() {
-    const parts = Object.entries(this.first).filter(([key, value]) => value !== this.bench.defaults[key]);
-    const address = new URL(location.href);
-    const query = new URLSearchParams(parts.map(([key, value]) => [key, String(value)]));
-    if (this.changes.length <= MOST_CHANGES) {
-      if (this.changes.length) query.set("changes", this.changes.map((change) => change.join(":")).join(","));
-      query.set("samples", String(this.samples));
-    }
-    address.hash = query.toString();
-    return address.href;
-  }
-
-  csv() {
-    const header = "time [s],base [m],response [m],relative displacement [m],phase error [deg],omega [rad/s],base amplitude [m],response amplitude [m]";
-    return `${header}\n${this.rows.map((row) => row.join(",")).join("\n")}\n`;
-  }
-}
-
-// Settings, changes and samples of a link; throws a sentence if it is invalid.
-export function read(hash, table) {
-  const query = new URLSearchParams(hash.replace(/^#/, ""));
-  const limits = Object.fromEntries(table.settings.map((setting) => [setting.key, setting]));
-  const number = (text, name, low, high) => {
-    const value = Number(text);
-    if (text.trim() === "" || !(value >= low && value <= high)) throw new Error(`The link is invalid: ${name} = "${text}"; allowed are ${low} to ${high}. The default scene is shown.`);
-    return value;
-  };
-  const setting = (key, text) => {
-    if (key === "drive" || key === "track") return number(text, key, 0, 1);
-    if (!limits[key]) throw new Error(`The link is invalid: there is no setting "${key}". The default scene is shown.`);
-    return number(text, limits[key].name, limits[key].min, limits[key].max);
-  };
-  const values = {};
-  let changes = [], samples = 0;
-  for (const [key, text] of query) {
-    if (key === "samples") samples = number(text, "samples", 0, 3e6);
-    else if (key === "changes") {
-      changes = text.split(",").map((one) => {
-        const [at, name, value] = one.split(":");
-        return [number(at ?? "", "the time of a change", 0, 3e6), name, setting(name, value ?? "")];
-      });
-    } else values[key] = setting(key, text);
-  }
-  return { values, changes, samples };
 }
 
 async function main() {
@@ -397,45 +297,6 @@ async function main() {
     requestAnimationFrame(frame);
   };
   requestAnimationFrame(frame);
-}
-
-function bind(page) {
-  const actions = {
-    play: () => page.play(!page.playing),
-    impact: () => { page.play(false); page.toNextImpact(); },
-    drive: () => page.change("drive", page.driving ? 0 : 1),
-    track: () => page.change("track", 1),
-    restart: () => { say(""); page.start(page.values); },
-    link: async () => {
-      const link = page.link();
-      history.replaceState(null, "", link);
-      try { await navigator.clipboard.writeText(link); say(""); $("link").textContent = "Copied"; }
-      catch { $("link").textContent = "In the address bar"; }
-      setTimeout(() => ($("link").textContent = "Copy link"), 1500);
-    },
-    csv: () => {
-      const file = Object.assign(document.createElement("a"), { href: URL.createObjectURL(new Blob([page.csv()], { type: "text/csv" })), download: "vines.csv" });
-      file.click();
-      setTimeout(() => URL.revokeObjectURL(file.href), 1000);
-    },
-    help: () => {
-      $("about").hidden = !$("about").hidden;
-      $("help").setAttribute("aria-expanded", String(!$("about").hidden));
-    },
-  };
-  for (const [id, action] of Object.entries(actions)) $(id).onclick = action;
-  const keys = { " ": "play", ".": "impact", d: "drive", t: "track", r: "restart", "?": "help" };
-  document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) return;
-    if (event.key === " " && event.target.tagName === "BUTTON") return;
-    const change = { "[": -1, "]": 1 }[event.key];
-    if (change) {
-      const next = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, SPEEDS.indexOf(page.speed) + change))];
-      page.setSpeed(next);
-    } else if (keys[event.key] && !$(keys[event.key]).disabled) actions[keys[event.key]]();
-    else return;
-    event.preventDefault();
-  });
 }
 
 main().catch((error) => say(error.message));

@@ -119,10 +119,11 @@ for (const { name, options } of BROWSERS) {
     test("a link repeats the motion bit by bit", async () => {
       const { page } = await open("#excitation=1.3&changes=500:restitution:0.7,1500:drive:0&samples=3000");
       await ready(page);
-      const first = await page.evaluate(() => [window.live.page.link(), window.live.page.rows.at(-1)]);
+      const state = async () => [(await import("/link.js")).link(window.live.page), window.live.page.rows.at(-1)];
+      const first = await page.evaluate(state);
       const { page: other } = await open(first[0].slice(first[0].indexOf("#")));
       await ready(other);
-      assert.deepEqual(await other.evaluate(() => [window.live.page.link(), window.live.page.rows.at(-1)]), first);
+      assert.deepEqual(await other.evaluate(state), first);
       assert.equal(first[1].length, 8);
       await page.close();
       await other.close();

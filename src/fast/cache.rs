@@ -2,6 +2,8 @@
 
 use super::coefficients::Coefficients;
 use super::grid::Grid;
+#[cfg(feature = "serde")]
+use super::horizon::Horizon;
 use super::propagator::Propagator;
 use super::short_step::{SAME, ShortStep};
 use crate::base_motion::Drive;
@@ -84,7 +86,7 @@ impl Cache {
 #[derive(serde::Serialize, serde::Deserialize)]
 pub(crate) struct Keys {
     disabled: bool,
-    contact_free: f64,
+    contact_free: Horizon,
     phasor: (f64, f64),
     rotations: u32,
     step: f64,

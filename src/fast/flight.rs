@@ -2,6 +2,7 @@
 
 use super::arrival::{Arrival, arrive};
 use super::coefficients::Coefficients;
+use super::horizon::Horizon;
 use super::propagator::{Increment, Point};
 use super::start::Start;
 use super::verify::is_monotone;
@@ -31,16 +32,16 @@ impl FastPath {
     #[inline]
     pub fn next(&mut self, moving: &mut Moving, left: f64, duration: f64) -> Next {
         if self.disabled {
-            return Next::Search;
+            return Next::Search(left);
         }
         let point = self.point(moving);
         let (rig, base) = (moving.rig, &*moving.base);
         let soon = left * rig.alone.fastest.max(base.drive.omega.abs()) <= 1.0;
-        if left < self.contact_free || (soon && self.is_contact_free(moving, &point, left)) {
+        if left < self.contact_free.t || (soon && self.is_contact_free(moving, &point, left)) {
             return self.coast(moving, &point, left, duration);
         }
         if !applies(rig, base, &point) {
-            return Next::Search;
+            return Next::Search(left);
         }
         self.coefficients.prepare(&rig.alone, base.drive.omega);
         let mut start = Start::new(moving, point);
@@ -57,11 +58,11 @@ impl FastPath {
                 self.land(moving, &arrival)
             }
             Found::Contact(arrival) => {
-                self.contact_free = arrival.t.value();
+                self.contact_free = Horizon::unchanged(arrival.t.value());
                 self.coast(moving, &point, left, duration)
             }
             Found::Free(t) => {
-                self.contact_free = t;
+                self.contact_free = Horizon::unchanged(t);
                 self.coast(moving, &point, t.min(left), duration)
             }
             Found::FreeAsBefore(increment, phase) => {
@@ -69,7 +70,7 @@ impl FastPath {
                 self.apply(moving, &increment, phase, left);
                 Next::ContactFree(left)
             }
-            Found::Nothing => Next::Search,
+            Found::Nothing => Next::Search(self.coefficients.stretch.min(left)),
         }
     }
 
@@ -95,7 +96,7 @@ impl FastPath {
         masses.v = arrival.v;
         masses.dw = arrival.dw;
         self.turned(base, arrival.phase, arrival.phasor);
-        self.contact_free = 0.0;
+        self.contact_free = Horizon::default();
         Next::Contact(arrival.t, arrival.wall)
     }
 
@@ -131,11 +132,10 @@ impl FastPath {
 #[inline(always)]
 fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
     let oscillator = &rig.alone;
-    let [offset, slope, u2, u3] = base.drive.signal;
+    let [offset, slope, ..] = base.drive.signal;
     let widest = WIDEST * rig.parameters.half_width;
     let fastest = widest * oscillator.omega0;
-    u2 == 0.0
-        && u3 == 0.0
+    base.drive.is_straight()
         && base.drive.omega >= 0.0
         && oscillator.delta <= HEAVIEST * oscillator.omega0
         && offset.abs().max(base.drive.amplitude.abs()).max(point.y.abs()) <= widest

@@ -14,6 +14,8 @@ use crate::oscillator::Oscillator;
 pub(super) const POINTS: usize = 24;
 /// Farthest distance of an instant from its point, in distances between points.
 const REACH: f64 = 0.75;
+/// Up to here after a mark it serves as its own point.
+const ITSELF: f64 = 0.7;
 
 /// The propagators over 1 to [`POINTS`] times the spacing.
 #[derive(Clone, Copy, Debug, Default)]
@@ -24,14 +26,6 @@ pub(super) struct Grid {
 }
 
 impl Grid {
-    /// Makes this the grid of these coefficients.
-    #[inline(always)]
-    pub fn prepare(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) {
-        if self.spacing != coefficients.spacing {
-            self.build(oscillator, coefficients.spacing);
-        }
-    }
-
     #[inline(never)]
     fn build(&mut self, oscillator: &Oscillator, spacing: f64) {
         self.spacing = spacing;
@@ -42,6 +36,9 @@ impl Grid {
     /// The propagator over `n` times the spacing, n from 1 on.
     #[inline(always)]
     fn over(&mut self, oscillator: &Oscillator, coefficients: &Coefficients, n: usize) -> &Propagator {
+        if self.spacing != coefficients.spacing {
+            self.build(oscillator, coefficients.spacing);
+        }
         let propagator = &mut self.propagators[(n - 1) % POINTS];
         propagator.prepare(oscillator, coefficients);
         propagator
@@ -76,7 +73,11 @@ impl FastPath {
     pub(super) fn near_point(&mut self, start: &Start, from: &Mark, t: f64) -> NearPoint {
         self.evaluations += 1;
         let (coefficients, amplitude) = (&self.coefficients, start.base.drive.amplitude);
-        let n = (((t - from.t) / coefficients.spacing + 0.5) as usize).min(POINTS);
+        // The nearest point, but near the mark the mark itself: it needs no propagator.
+        let n = match (t - from.t) / coefficients.spacing {
+            part if part < ITSELF => 0,
+            part => ((part + 0.5) as usize).min(POINTS),
+        };
         let increment = match n {
             0 => Increment { y: 0.0, dy: 0.0, phasor: from.point.phasor },
             _ => (self.cache.grid)
@@ -95,7 +96,6 @@ impl FastPath {
 
     /// What the motion adds in `t` seconds after the start.
     pub(super) fn after(&mut self, start: &Start, t: f64) -> Increment {
-        self.cache.grid.prepare(&start.rig.alone, &self.coefficients);
         let mut mark = Mark { t: 0.0, point: start.point, sample: start.sample };
         while t - mark.t > self.coefficients.stretch {
             mark = self.mark(start, &mark, POINTS);

@@ -33,7 +33,6 @@ impl FastPath {
     /// halved, down to [`SHORTEST`].
     #[inline(never)]
     pub(super) fn march(&mut self, start: &Start, left: f64, predicted: Option<&Predicted>) -> Found {
-        self.cache.grid.prepare(&start.rig.alone, &self.coefficients);
         let mut from = Mark { t: 0.0, point: start.point, sample: start.sample };
         // Points of the grid in the next stretch.
         let mut n = POINTS;
@@ -64,6 +63,8 @@ impl FastPath {
                     n /= 2;
                     divided += 1;
                 }
+                // What is verified is kept: the plain solver searches as little as possible.
+                None if from.t > 0.0 => break,
                 None => return Found::Nothing,
             }
         }

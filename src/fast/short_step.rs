@@ -6,7 +6,7 @@
 //! neither a sine nor a division. That holds for every damping ratio, at resonance and away from it.
 
 use super::propagator::{Increment, Point, forced, rotate, rotation};
-use crate::arithmetic::product;
+use crate::arithmetic::{halves, product_with};
 use crate::base_motion::Drive;
 use crate::oscillator::{Oscillator, Transition};
 use num_complex::Complex64;
@@ -15,24 +15,31 @@ use num_complex::Complex64;
 pub(super) const LONGEST: f64 = 1.0 / 8.0;
 /// Steps whose lengths differ by less, relative, are the same but for a correction of first order; the second order is below 1e-20.
 pub(super) const SAME: f64 = 1e-9;
-/// Number of the `G_n`.
-const MOMENTS: usize = 9;
+/// Half the number of the `G_n`.
+const MOMENTS: usize = 5;
 
 /// The propagator of one step length.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct ShortStep {
     /// The key: length of the step, s; NaN where there is none.
     pub t: f64,
+    halves: (f64, f64),
     /// What the free motion adds: the sum of both.
     free: (Transition, Transition),
     /// Velocity per base displacement and, over the frequency, per base velocity: `omega0² xv` and `2 delta xv`.
     pushed: (f64, f64),
-    /// `G_n`, in the unit of `t^n`.
-    moments: [f64; MOMENTS],
-    /// The key of the response, rad/s.
+    /// `G_n`, in the unit of `t^n`, two at a time.
+    moments: [[f64; 2]; MOMENTS],
+    response: Response,
+}
+
+/// What a harmonic base adds in one step.
+#[derive(Clone, Copy, Debug)]
+struct Response {
+    /// The key, rad/s.
     omega: f64,
     /// `omega t`, and its rounding error.
-    pub angle: (f64, f64),
+    angle: (f64, f64),
     rotation: (f64, f64),
     position: Complex64,
     velocity: Complex64,
@@ -42,14 +49,17 @@ impl Default for ShortStep {
     fn default() -> Self {
         Self {
             t: f64::NAN,
+            halves: (0.0, 0.0),
             free: Default::default(),
             pushed: (0.0, 0.0),
-            moments: [0.0; MOMENTS],
-            omega: f64::NAN,
-            angle: (0.0, 0.0),
-            rotation: (1.0, 0.0),
-            position: Complex64::ZERO,
-            velocity: Complex64::ZERO,
+            moments: [[0.0; 2]; MOMENTS],
+            response: Response {
+                omega: f64::NAN,
+                angle: (0.0, 0.0),
+                rotation: (1.0, 0.0),
+                position: Complex64::ZERO,
+                velocity: Complex64::ZERO,
+            },
         }
     }
 }
@@ -61,12 +71,13 @@ impl ShortStep {
         let per_velocity = free.0.xv + free.1.xv;
         Self {
             t,
+            halves: halves(t),
             free,
             pushed: (
                 oscillator.omega0_squared * per_velocity,
                 2.0 * oscillator.delta * per_velocity,
             ),
-            moments: core::array::from_fn(|n| moment(oscillator, n, t)),
+            moments: core::array::from_fn(|n| [2 * n, 2 * n + 1].map(|n| moment(oscillator, n, t))),
             ..Self::default()
         }
     }
@@ -79,7 +90,7 @@ impl ShortStep {
     /// Whether it serves for a step that is longer by `late` seconds: masters compute equal steps with rounding errors.
     #[inline(always)]
     pub fn serves(&self, drive: &Drive, late: f64) -> bool {
-        late == 0.0 || (late.abs() <= SAME * self.t && drive.signal[2] == 0.0 && drive.signal[3] == 0.0)
+        late == 0.0 || (late.abs() <= SAME * self.t && drive.is_straight())
     }
 
     /// Forgets the step if it is not short against the drive.
@@ -90,41 +101,52 @@ impl ShortStep {
         }
     }
 
-    /// The response at another frequency.
+    /// The response at a frequency.
     #[inline(always)]
-    fn respond(&mut self, omega: f64) {
+    fn respond(&self, omega: f64) -> Response {
         let g = &self.moments;
         let square = -omega * omega;
-        let even = g[0] + square * (g[2] + square * (g[4] + square * (g[6] + square * g[8])));
-        let odd = omega * (g[1] + square * (g[3] + square * (g[5] + square * g[7])));
-        self.position = Complex64::new(even, odd);
+        // Those of even and of odd n, at once.
+        let [even, odd] = (0..MOMENTS - 1).rev().fold(g[MOMENTS - 1], |[even, odd], n| {
+            [g[n][0] + square * even, g[n][1] + square * odd]
+        });
+        let odd = omega * odd;
         // `K' = i omega K + F xv`.
         let (steady, moving) = self.pushed;
-        self.velocity = Complex64::new(steady - omega * odd, omega * (moving + even));
-        self.angle = product(omega, self.t);
-        self.rotation = rotation::<8>(self.angle.0);
-        self.omega = omega;
+        let angle = product_with(omega, (self.t, self.halves));
+        Response {
+            omega,
+            angle,
+            rotation: rotation::<8>(angle.0),
+            position: Complex64::new(even, odd),
+            velocity: Complex64::new(steady - omega * odd, omega * (moving + even)),
+        }
     }
 
-    /// What one step adds to `start` under `drive`.
+    /// What one step adds to `start` under `drive`, and the angle by which its oscillator turns.
     #[inline(always)]
-    pub fn increment(&mut self, drive: &Drive, start: &Point) -> Increment {
-        if self.omega != drive.omega {
-            self.respond(drive.omega);
+    pub fn increment(&mut self, drive: &Drive, start: &Point) -> (Increment, (f64, f64)) {
+        // A copy: what was just stored is slow to load.
+        let mut response = self.response;
+        if response.omega != drive.omega {
+            response = self.respond(drive.omega);
+            self.response = response;
         }
         let (head, tail) = &self.free;
         let (y, dy) = head.of(start.y, start.dy);
         let (mut more_y, mut more_dy) = tail.of(start.y, start.dy);
-        let [_, _, u2, u3] = drive.signal;
-        if u2 != 0.0 || u3 != 0.0 {
-            more_y += 2.0 * u2 * self.moments[2] + 6.0 * u3 * self.moments[3];
-            more_dy += 2.0 * u2 * self.moments[1] + 6.0 * u3 * self.moments[2];
+        if !drive.is_straight() {
+            let [_, _, u2, u3] = drive.signal;
+            let [[_, g1], [g2, g3], ..] = self.moments;
+            more_y += 2.0 * u2 * g2 + 6.0 * u3 * g3;
+            more_dy += 2.0 * u2 * g1 + 6.0 * u3 * g2;
         }
-        Increment {
-            y: y + (more_y + forced(drive.amplitude, start.phasor, self.position)),
-            dy: dy + (more_dy + forced(drive.amplitude, start.phasor, self.velocity)),
-            phasor: rotate(start.phasor, self.rotation),
-        }
+        let increment = Increment {
+            y: y + (more_y + forced(drive.amplitude, start.phasor, response.position)),
+            dy: dy + (more_dy + forced(drive.amplitude, start.phasor, response.velocity)),
+            phasor: rotate(start.phasor, response.rotation),
+        };
+        (increment, response.angle)
     }
 }
 

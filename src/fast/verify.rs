@@ -14,13 +14,11 @@ use crate::base_motion::Drive;
 use crate::oscillator::Oscillator;
 
 /// Rounding error of a gap, in half-widths, and of a bound, relative.
-const ROUNDING: f64 = 1e-14;
+pub(super) const ROUNDING: f64 = 1e-14;
 
 /// Bounds of the motion over a time.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Envelope {
-    /// `|w''|` is at most this, m/s².
-    pub acceleration: f64,
     /// `|w'''|` is at most this, m/s³, if the signal is a straight line.
     pub jerk: f64,
 }
@@ -36,13 +34,13 @@ pub(super) struct Sample {
 
 /// `|f|` is at most this over the next `t` seconds, m/s².
 #[inline(always)]
-fn forcing(oscillator: &Oscillator, drive: &Drive, t: f64) -> f64 {
+pub(super) fn forcing(oscillator: &Oscillator, drive: &Drive, t: f64) -> f64 {
     let damping = 2.0 * oscillator.delta;
     let forcing = drive.amplitude.abs() * (oscillator.omega0_squared + damping * drive.omega.abs());
-    let [_, _, u2, u3] = drive.signal;
-    if u2 == 0.0 && u3 == 0.0 {
+    if drive.is_straight() {
         return forcing;
     }
+    let [_, _, u2, u3] = drive.signal;
     let (u2, u3) = (u2.abs(), u3.abs() * t);
     forcing
         + oscillator.omega0_squared * t * t * (u2 + u3)
@@ -52,7 +50,7 @@ fn forcing(oscillator: &Oscillator, drive: &Drive, t: f64) -> f64 {
 
 /// `R²` at an instant, (m/s)².
 #[inline(always)]
-fn speed_squared(oscillator: &Oscillator, at: &Point) -> f64 {
+pub(super) fn speed_squared(oscillator: &Oscillator, at: &Point) -> f64 {
     at.dy * at.dy + oscillator.omega0_squared * (at.y * at.y)
 }
 
@@ -75,18 +73,8 @@ impl Envelope {
         let speed = speed_squared(oscillator, start).sqrt() + forcing * t;
         let acceleration = (omega0 + damping) * speed + forcing;
         Self {
-            acceleration,
             jerk: damping * acceleration + omega0_squared * speed + omega * forcing,
         }
-    }
-
-    /// Whether both walls, at `w = ±b`, are certainly not met within `t` after an instant with this `w` and `w'`.
-    #[inline(always)]
-    pub fn open_from(&self, b: f64, w: f64, dw: f64, t: f64) -> bool {
-        // The bound of the gap to either wall is concave: it is above 0 in between if it is at the end.
-        let lost = 0.5 * self.acceleration * t * t;
-        let moved = dw * t;
-        b - (w + moved).abs() - lost > ROUNDING * (moved.abs() + lost)
     }
 
     /// Whether both walls are certainly not met between two samples `t` apart, but for a contact at the second one.

@@ -93,27 +93,25 @@ impl Plant {
     }
 
     /// Makes `drive` the current one; the base may jump.
+    #[inline(always)]
     fn set_drive(&mut self, drive: Drive) {
-        let before = &self.base.drive;
-        let jumps = drive.signal[0] != before.signal[0] || drive.amplitude != before.amplitude;
-        if self.begun && jumps {
-            let sin = self.fast.phasor().1;
-            let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
-            if jump != 0.0 {
-                let kick = 2.0 * self.rig.alone.delta * jump;
-                self.masses.v = self.masses.v.plus(kick);
-                self.masses.dw += kick;
-                // The impulse acts on the primary mass alone; contact is decided anew.
-                self.contact = Contact::Free;
-            }
-        }
+        let before = self.base.drive;
         self.base.drive = drive;
-        if self.begun {
-            self.fast.drive_changed(&drive);
-        } else {
+        if !self.begun {
             self.begun = true;
             self.fast.state_changed(&self.base);
+            return;
         }
+        let sin = self.fast.phasor().1;
+        let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
+        let kick = 2.0 * self.rig.alone.delta * jump;
+        if jump != 0.0 {
+            self.masses.v = self.masses.v.plus(kick);
+            self.masses.dw += kick;
+            // The impulse acts on the primary mass alone; contact is decided anew.
+            self.contact = Contact::Free;
+        }
+        self.fast.drive_changed(&self.rig.alone, &before, &drive, kick);
     }
 
     /// Follows the motion from event to event to the end of the step.
@@ -143,7 +141,7 @@ impl Plant {
             };
             let next = match self.contact {
                 Contact::Free => self.fast.next(&mut moving, left, duration),
-                _ => Next::Search,
+                _ => Next::Search(left),
             };
             match next {
                 Next::ContactFree(t) if t == left => step.left = Sum::default(),
@@ -152,7 +150,7 @@ impl Plant {
                     step.left = step.left.minus(t);
                     self.touch(wall, &mut step);
                 }
-                Next::Search => self.search(left, &mut step),
+                Next::Search(limit) => self.search(limit, &mut step),
             }
             self.evaluations += self.fast.evaluations();
         }
@@ -163,9 +161,9 @@ impl Plant {
         step.outcome
     }
 
-    /// Follows the flight to its first contact by certified search, or to the end of the step.
+    /// Follows the flight to its first contact by certified search, or for `limit` seconds.
     #[inline(never)]
-    fn search(&mut self, left: f64, step: &mut Step<impl FnMut(Event)>) {
+    fn search(&mut self, limit: f64, step: &mut Step<impl FnMut(Event)>) {
         let released = match self.contact {
             Contact::Released(wall) => Some(wall),
             _ => None,
@@ -175,7 +173,7 @@ impl Plant {
         let motion = Segment::new(&self.rig.alone, self.base, start);
         let half_width = self.rig.parameters.half_width;
         let flight = Flight::new(motion, (masses.w.value(), masses.dw), half_width);
-        let landing = flight.first_contact(left, released);
+        let landing = flight.first_contact(limit, released);
         self.evaluations += landing.evaluations;
         self.masses.x = masses.x.plus(landing.moved);
         self.masses.v = masses.v.plus(landing.gained);

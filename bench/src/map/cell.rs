@@ -13,9 +13,6 @@ use crate::methods::{BrentBaseline, brent_baseline};
 
 /// Periods over which a motion without repetition is followed before its regime is decided, as in `vines map`.
 const FOLLOWED: usize = 400;
-/// Difference of impacts per period up to which the plant is in the regime; so many times as long may pass until it is.
-const ARRIVED: f64 = 0.01;
-const LONGEST: usize = 50;
 /// Periods over which the plant is compared with the closed form and Brent's method, and the latter's tolerance, s.
 const COMPARED: u32 = 20;
 const TOLERANCE: f64 = 1e-15;
@@ -76,21 +73,11 @@ impl Settled {
     /// A frequency that is not positive, or a value that the plant does not accept.
     pub fn new(sigma: f64, g: f64) -> anyhow::Result<Self> {
         let drive = drive(sigma, g)?;
-        let mut plant = settle(drive)?;
         let scene = Dimensionless::of(&RIG, drive.amplitude);
-        let found = observe(&scene, sigma, scene.state(&plant.state()), FOLLOWED)?;
-        // What is timed is the regime, not the transient before it. An irregular transient has another length here, since rounding
-        // differs.
-        let arrived = |outcome: &lovines::Outcome| {
-            let per_period = outcome.impacts as f64 / FOLLOWED as f64;
-            found.periods == 0 || (per_period - found.impacts_per_period).abs() < ARRIVED
-        };
-        more(&mut plant, drive, found.followed as u32)?;
-        for _ in 0..LONGEST {
-            if arrived(&more(&mut plant, drive, FOLLOWED as u32)?) {
-                break;
-            }
-        }
+        let found = observe(&scene, sigma, scene.state(&settle(drive)?.state()), FOLLOWED)?;
+        // What is timed is the regime that was found, not the transient before it, whose length depends on rounding.
+        let mut plant = begin(std::array::from_fn(|n| found.state[n] * scale(n)), drive)?;
+        more(&mut plant, drive, FOLLOWED as u32)?;
         let repeats = found.periods > 0 || found.regime == Regime::NoImpacts;
         let state = numbers(&plant.state());
         Ok(Self {

@@ -216,6 +216,16 @@ mod tests {
         let unknown = unknown_names(&xml).unwrap();
         assert_eq!(unknown.len(), 1);
         assert!(unknown[0].contains("area") && unknown[0].contains("vendor"));
+        // Elements with elements of their own, before and after that of the type.
+        let other = "<Annotations><Tool name=\"t\"><a b=\"1\">text</a></Tool></Annotations>";
+        let plain = Description::parse(TANK).unwrap();
+        for (from, to) in [
+            ("<Real", format!("{other}<Real")),
+            ("</ScalarVariable>", format!("{other}</ScalarVariable>")),
+        ] {
+            let parsed = Description::parse(&TANK.replace(from, &to)).unwrap();
+            assert_eq!(parsed, plain);
+        }
     }
 
     #[test]

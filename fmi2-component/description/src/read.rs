@@ -56,7 +56,8 @@ fn each<T, U>(list: Vec<T>, read: fn(T) -> Result<U, Error>) -> Result<Vec<U>, E
     list.into_iter().map(read).collect()
 }
 
-/// The lists of an element that has them; serde-xml-rs cannot flatten them into a struct of their own.
+/// The lists of an element that has them. serde-xml-rs cannot flatten them into a struct of their own, and a list of variants (`#content`) fails
+/// beside other elements, such as annotations.
 macro_rules! lists {
     ($element:ident) => {
         [

@@ -5,12 +5,14 @@
 //! the *response*, and the drive follows. A predictor computes drive and frequency of the next point from the points before, so that
 //! the loops have little to correct.
 
+mod bench;
 mod peak;
 mod point;
 mod predictor;
 mod settle;
 mod track;
 
+pub use bench::TrackError;
 pub use point::{Point, Tracked};
 pub use settle::{Criterion, Found};
-pub use track::{TrackError, track};
+pub use track::track;

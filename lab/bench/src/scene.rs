@@ -14,7 +14,8 @@ mod validate;
 
 use std::path::Path;
 
-use lovines::{Parameters, State};
+pub use lovines::Parameters;
+use lovines::State;
 use serde::{Deserialize, Serialize};
 
 pub use backbone::{Backbone, Predictor};

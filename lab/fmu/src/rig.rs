@@ -5,7 +5,7 @@ use std::path::Path;
 use fmi::fmi2::instance::Common;
 use phase_lock::Value;
 use vines_testbench::rig::{Drive, GroundTruth, Measured, Rig, RigError, Sensors};
-use vines_testbench::scene::{Reference as ReferenceSignal, Scene, Sensor};
+use vines_testbench::scene::{Definition, Parameters, Reference as ReferenceSignal, Sensor};
 
 use crate::instance::{Fmu, FmuError, Kind, Reference};
 
@@ -33,15 +33,19 @@ struct Inside {
 }
 
 impl FmuRig {
-    /// Loads the plant at `path` and initialises it with the parameters and the start of a scene, under the names of `LoViNes.fmu`. It
-    /// has the sensors of the scene.
+    /// Loads the plant at `path` and initialises it with parameters and a start, under the names of `LoViNes.fmu`. It has the sensors of
+    /// `definition`, for a plant with the parameters `plant`.
     ///
     /// # Errors
     /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
-    pub fn load(path: &Path, scene: &Scene) -> Result<Measured<Self>, FmuError> {
+    pub fn load(
+        path: &Path,
+        values: &[(&str, f64)],
+        definition: Definition,
+        plant: &Parameters,
+    ) -> Result<Measured<Self>, FmuError> {
         let mut fmu = Fmu::load(path, "plant")?;
         let inputs = [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?];
-        let definition = scene.resonance;
         let response = match definition.sensor {
             Sensor::V => fmu.need(Kind::Real, "v")?,
             Sensor::Q1 | Sensor::Acceleration => fmu.need(Kind::Real, "q1")?,
@@ -50,7 +54,6 @@ impl FmuRig {
             ReferenceSignal::Base => fmu.find(Kind::Real, "base"),
             ReferenceSignal::Force => Some(fmu.need(Kind::Real, "base")?),
         };
-        let values = scene.start_values();
         let values = values.iter().map(|(name, value)| (*name, Value::Real(*value)));
         fmu.start(&values.collect::<Vec<_>>())?;
         let rig = Self {
@@ -61,7 +64,7 @@ impl FmuRig {
             inside: Inside::of(&fmu),
             fmu,
         };
-        Ok(Measured::new(rig, definition, &scene.plant))
+        Ok(Measured::new(rig, definition, plant))
     }
 }
 

@@ -16,7 +16,11 @@ fn scene(g: f64) -> Dimensionless {
 }
 
 fn followed(g: f64) -> Response {
-    response(&scene(g), &Limits::default(), Exploration::default())
+    response(
+        &scene(g),
+        &Limits::default(),
+        Exploration { starts: 100, ..Exploration::default() },
+    )
 }
 
 fn list(response: &Response) {
@@ -145,7 +149,9 @@ fn a_torus_is_reported_as_modulation_only_where_the_motion_was_stable() {
 
 /// Settles from random starts at random detunings; counts the 1:1 motions, the others, and those of each that no component contains.
 fn missing(scene: &Dimensionless, count: usize, seed: u64) -> [usize; 4] {
-    let found = response(scene, &Limits::default(), Exploration::default());
+    let default = Exploration::default();
+    let starts = std::env::var("STARTS").map_or(default.starts, |text| text.parse().expect("STARTS: a number"));
+    let found = response(scene, &Limits::default(), Exploration { starts, ..default });
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut counts = [0; 4];
     for _ in 0..count {
@@ -171,7 +177,7 @@ fn missing(scene: &Dimensionless, count: usize, seed: u64) -> [usize; 4] {
 fn no_stable_orbit_from_random_starts_is_missing_from_the_components() {
     let mut random = ChaCha8Rng::seed_from_u64(20_261_121);
     let mut sums = [0; 4];
-    // SCENES sets their number: docs/theory.md has a longer run.
+    // SCENES sets their number, STARTS that of the random starts: docs/theory.md has longer runs.
     let scenes: u64 = std::env::var("SCENES").map_or(4, |text| text.parse().expect("SCENES: a number"));
     for n in 0..scenes {
         let mut within = |low: f64, high: f64| low + (high - low) * (random.next_u64() as f64 / u64::MAX as f64);

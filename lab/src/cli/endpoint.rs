@@ -75,7 +75,10 @@ impl Endpoint {
                 let plant = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
                 Box::new(plant.with_sensors(scene.resonance))
             }
-            Self::Fmu(file) => Box::new(FmuRig::load(file, scene).map_err(Failure::run)?),
+            Self::Fmu(file) => {
+                let rig = FmuRig::load(file, &scene.start_values(), scene.resonance, &scene.plant);
+                Box::new(rig.map_err(Failure::run)?)
+            }
             Self::Network(address) => {
                 let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time())?;
                 let rig = rig.with_sensors(scene.resonance)?;

@@ -8,8 +8,10 @@ use indicatif::{ProgressBar, ProgressStyle};
 use vines::{
     map::{Axis, LIMIT, Map, Plan, Range},
     orbit::{Branch, phase_resonant},
-    regime::Regime,
-    report::{self, Table, summary::parameters},
+    report::{
+        self,
+        summary::{parameters, regimes},
+    },
     scene::Scene,
 };
 
@@ -27,6 +29,7 @@ Every cell is one plant, driven at a fixed frequency from the scene's start:
 A cell is followed until it repeats itself, or for --periods; the table has the periods followed, the duration of the transient,
 the recurrence, the exponent with its standard error, the share of captured impacts, and how often the particle sticks to a wall.
 
+Modulated and chaotic cells are so for --periods: chaos may end later (docs/regimes.md says how often).
 Where several regimes are stable the start decides; a particle at rest may stay so where a moving one does not.
 
 Examples:
@@ -114,31 +117,16 @@ fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
 }
 
 fn summary(map: &Map) -> String {
-    let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
-    let share = |count: usize, of: usize| match of {
-        0 => "-".into(),
-        _ => format!("{:.1} %", 100.0 * count as f64 / of as f64),
-    };
-    let rows = Regime::SIMULATED.into_iter().map(|regime| {
-        let (all, here) = map.count(regime);
-        [
-            regime.name().to_string(),
-            all.to_string(),
-            share(all, map.cells.len()),
-            share(here, inside),
-        ]
-    });
-    let table = Table::new(["regime", "cells", "share", "inside the theory's stable island"]);
     let mut text = format!(
         "Regimes over {} and {}\n  {}\n\n{}",
         map.plan.x,
         map.plan.y,
         parameters(&map.plan.scene),
-        table.rows(rows).text()
+        regimes(map).text()
     );
     if map.plan.starts > 1 {
         let count = map.cells.iter().filter(|cell| !cell.coexisting.is_empty()).count();
-        let part = share(count, map.cells.len());
+        let part = format!("{:.1} %", 100.0 * count as f64 / map.cells.len() as f64);
         let _ = writeln!(
             text,
             "\n{} starts per cell lead to several regimes in {count} cells ({part})",

@@ -99,29 +99,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         });
     }
     if arguments.response {
-        if 1.0 + scene.epsilon * arguments.range[0] <= 0.0 {
-            return Err(Failure::input(format!(
-                "--range from sigma = {} (dimensionless): 1 + epsilon sigma must be above 0",
-                arguments.range[0]
-            )));
-        }
-        let exploration = Exploration { starts: arguments.starts, ..Exploration::default() };
-        let found = response(&scene, &limits, exploration);
-        if found.components.is_empty() {
-            return Err(Failure::run(format!(
-                "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {} to {}; raise excitation.G or --starts",
-                scene.g, limits.sigma[0], limits.sigma[1]
-            )));
-        }
-        return shown(&scene, "Exact frequency response", &found, arguments.json, || {
-            let count = found.components.len();
-            let all = found.components.iter().map(|one| curve(&one.name, &one.branch));
-            format!(
-                "{count} component{}\n\n{}",
-                if count == 1 { "" } else { "s" },
-                all.collect::<String>()
-            )
-        });
+        return components(arguments, &scene, &limits);
     }
     if arguments.convergence {
         return converged(&scene, arguments.json);
@@ -139,6 +117,33 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         parameters(&scene),
         listing(&scene, &orbits)
     ))
+}
+
+/// All components of the frequency response.
+fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> Result<String, Failure> {
+    if 1.0 + scene.epsilon * arguments.range[0] <= 0.0 {
+        return Err(Failure::input(format!(
+            "--range from sigma = {} (dimensionless): 1 + epsilon sigma must be above 0",
+            arguments.range[0]
+        )));
+    }
+    let exploration = Exploration { starts: arguments.starts, ..Exploration::default() };
+    let found = response(scene, limits, exploration);
+    if found.components.is_empty() {
+        return Err(Failure::run(format!(
+            "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {} to {}; raise excitation.G or --starts",
+            scene.g, limits.sigma[0], limits.sigma[1]
+        )));
+    }
+    shown(scene, "Exact frequency response", &found, arguments.json, || {
+        let count = found.components.len();
+        let all = found.components.iter().map(|one| curve(&one.name, &one.branch));
+        format!(
+            "{count} component{}\n\n{}",
+            if count == 1 { "" } else { "s" },
+            all.collect::<String>()
+        )
+    })
 }
 
 /// Parses FIRST:LAST.

@@ -147,7 +147,7 @@ pub(super) fn decay_csv(found: &Comparison) -> Result<String, WriteError> {
 }
 
 /// The points of a tracked backbone.
-fn tracked_csv(found: &TrackedComparison) -> Result<String, WriteError> {
+pub(super) fn tracked_csv(found: &TrackedComparison) -> Result<String, WriteError> {
     #[derive(Serialize)]
     struct Compared {
         distance: Option<f64>,

@@ -3,6 +3,7 @@
 use super::table::{Table, number, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use crate::identification::{DecayEnd, Regime};
+use crate::map::Map;
 use crate::orbit::Orbit;
 use crate::scene::{Definition, Dimensionless, Sensor};
 
@@ -22,6 +23,22 @@ pub fn parameters(p: &Dimensionless) -> String {
 fn rig(p: &Dimensionless) -> String {
     let Dimensionless { epsilon, lambda, r, .. } = p;
     format!("epsilon = {epsilon:.6}, lambda = {lambda:.4}, r = {r}")
+}
+
+/// How often each regime occurs on a map.
+#[must_use]
+pub fn regimes(map: &Map) -> Table {
+    let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
+    let share = |count: usize, of: usize| match of {
+        0 => "-".into(),
+        _ => format!("{:.1} %", 100.0 * count as f64 / of as f64),
+    };
+    let rows = Regime::SIMULATED.into_iter().map(|regime| {
+        let (all, here) = map.count(regime);
+        let shares = [share(all, map.cells.len()), share(here, inside)];
+        [vec![regime.name().to_string(), all.to_string()], shares.into()].concat()
+    });
+    Table::new(["regime", "cells", "share", "inside the theory's stable island"]).rows(rows)
 }
 
 /// An identification: the locked point beside theory and exact orbit, then the decay.

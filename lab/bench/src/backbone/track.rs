@@ -1,105 +1,20 @@
 //! The tracking of the backbone.
 
-use thiserror::Error;
-
+use super::bench::{Bench, TrackError};
 use super::peak;
 use super::point::{Point, Tracked};
 use super::predictor::{self, Known};
 use super::settle::{Criterion, Found};
-use crate::experiment::Sample;
 use crate::identification::{Cycle, Slopes, classify, regime_by_response};
-use crate::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Rig, RigError};
+use crate::rig::{Controller, LoopState, Move, Rig};
 use crate::scene::{Resonance, Scene};
 use vines_model::numerics::Estimate;
 use vines_model::theory::SlowFlow;
-
-/// Why tracking ended early.
-#[derive(Debug, Error)]
-pub enum TrackError {
-    /// The rig failed.
-    #[error(transparent)]
-    Rig(#[from] RigError),
-    /// The controller failed.
-    #[error(transparent)]
-    Controller(#[from] ControllerError),
-    /// The loop did not come near phase resonance in the time allowed.
-    #[error("no lock within {periods:.0} periods of the drive; see record.lock_periods and the [controller] section")]
-    NoLock {
-        /// Time limit, periods.
-        periods: f64,
-    },
-    /// The controller switched the drive off.
-    #[error("the controller switched the drive off after {periods:.1} periods: {fault}")]
-    Tripped {
-        /// Time since the start, periods of the drive.
-        periods: f64,
-        /// The reason.
-        fault: Fault,
-    },
-}
 
 /// Phase error, rad, below which the control of the response begins.
 const NEAR: f64 = 0.35;
 /// Periods for which the phase error must have been that small.
 const NEAR_FOR: usize = 3;
-
-/// A bench that reads period by period.
-struct Bench<'a, R: ?Sized, C: ?Sized> {
-    rig: &'a mut R,
-    controller: &'a mut C,
-    sample_time: f64,
-    target: f64,
-    taken: usize,
-    /// Phase of the drive since the start, turns: the periods so far.
-    periods: f64,
-    samples: Vec<Sample>,
-}
-
-impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
-    fn sample(&mut self) -> Result<Command, TrackError> {
-        let sensors = self.rig.sense()?;
-        let command = match self.controller.sample(sensors, true) {
-            Ok(command) => command,
-            Err(error) => {
-                // A failed controller must not leave the rig driven.
-                let _ = self.rig.advance(Drive::default(), self.sample_time);
-                return Err(error.into());
-            }
-        };
-        self.samples.push(Sample {
-            time: self.taken as f64 * self.sample_time,
-            sensors,
-            command,
-            ground_truth: self.rig.ground_truth()?,
-        });
-        self.taken += 1;
-        self.rig.advance(command.drive, self.sample_time)?;
-        if command.state.is_some_and(LoopState::is_latched) {
-            self.rig.advance(Drive::default(), self.sample_time)?;
-            return Err(TrackError::Tripped {
-                periods: self.periods,
-                fault: command.fault.unwrap_or(Fault::LockLost),
-            });
-        }
-        Ok(command)
-    }
-
-    /// One period of the drive.
-    fn cycle(&mut self) -> Result<Cycle, TrackError> {
-        loop {
-            let begin = self.samples.len();
-            let first = self.periods;
-            while self.periods < first.floor() + 1.0 {
-                let command = self.sample()?;
-                self.periods += command.drive.omega * self.sample_time / std::f64::consts::TAU;
-            }
-            let phase = first * std::f64::consts::TAU;
-            if let Some(cycle) = Cycle::of(&self.samples[begin..], self.sample_time, phase, self.target) {
-                return Ok(cycle);
-            }
-        }
-    }
-}
 
 /// Tracks the backbone of `scene`.
 ///
@@ -274,6 +189,20 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(bench: &mut Bench<R, C>, mo
     Ok(())
 }
 
+/// The criterion for a settled point.
+fn criterion(scene: &Scene, order: &Order) -> Criterion {
+    let (settings, d) = (&scene.backbone, scene.dimensionless());
+    let pair = |size: f64| [d.amplitude(size), d.omega_change(size)];
+    Criterion {
+        omega0: d.omega0,
+        precision: pair(settings.precision),
+        tolerance: pair(settings.tolerance),
+        fewest: settings.dwell_min as usize,
+        slopes: slopes(scene, &order.known, order.level),
+        phase: order.phase,
+    }
+}
+
 /// Moves to the level and holds it until the point has settled.
 fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     bench: &mut Bench<R, C>,
@@ -281,21 +210,14 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     order: &Order,
     move_periods: f64,
 ) -> Result<Point, TrackError> {
-    let Order { level, phase, ref known } = *order;
+    let level = order.level;
     let (settings, d) = (&scene.backbone, scene.dimensionless());
     let start = bench.periods;
     bench.samples.clear();
     while bench.periods - start < move_periods {
         bench.cycle()?;
     }
-    let criterion = Criterion {
-        omega0: d.omega0,
-        precision: [d.amplitude(settings.precision), d.omega_change(settings.precision)],
-        tolerance: [d.amplitude(settings.tolerance), d.omega_change(settings.tolerance)],
-        fewest: settings.dwell_min as usize,
-        slopes: slopes(scene, known, level),
-        phase,
-    };
+    let criterion = criterion(scene, order);
     let is_reached = |found: &Found| {
         let Estimate { value, uncertainty } = found.response.scaled(1.0 / d.b);
         (value - level).abs() <= (REACHED * level).max(4.0 * uncertainty)

@@ -46,6 +46,7 @@ impl Run {
             impacts: 0,
             periods: 0,
             sticks_per_period: (rests - rested) as f64 / periods,
+            state: self.states[self.halves()],
         }
     }
 

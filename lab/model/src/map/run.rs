@@ -35,6 +35,9 @@ pub struct Point {
     pub periods: u32,
     /// How often the particle comes to rest on a wall, per period of the base.
     pub sticks_per_period: f64,
+    /// (q1, q1', q2, q2') at the end, at phase 0 of the base.
+    #[serde(skip)]
+    pub state: [f64; 4],
 }
 
 /// Periods after which the motion is examined for the first time; from then on whenever their number has grown by [`LATER`].

@@ -30,13 +30,9 @@ pub(super) struct Candidate {
     /// Base amplitude over `b epsilon`.
     pub g: f64,
     /// Harmonic amplitude of the base displacement over b.
-    pub(super) base: Complex<f64>,
-    /// Harmonic part of q1.
-    pub(super) y: Complex<f64>,
+    base: Complex<f64>,
     /// State (q1, q1') just before the impact at the wall w = +1.
-    pub(super) before: Vector2<f64>,
-    /// State (p, p') of the unit impulse response just after its impulse.
-    pub(super) p: Vector2<f64>,
+    before: Vector2<f64>,
     /// Phase of the first harmonic of the response relative to the reference, rad.
     pub gamma: f64,
     /// The first harmonic of the response lags the reference by pi/2, rather than leading it.
@@ -139,9 +135,7 @@ impl Family {
             gamma: (v * (base * self.reference).conj()).arg(),
             g: base.norm() / self.epsilon,
             base,
-            y,
             before: Vector2::new(y.im, self.omega * y.re) - p_before * (2.0 * self.epsilon * b),
-            p: self.p,
             lags: (v * (base * self.reference).conj()).im < -1e-12 * v.norm() * base.norm(),
         }
     }

@@ -52,7 +52,7 @@ pub struct Exploration {
 
 impl Default for Exploration {
     fn default() -> Self {
-        Self { starts: 300, seed: 1, doublings: 3 }
+        Self { starts: 900, seed: 1, doublings: 3 }
     }
 }
 

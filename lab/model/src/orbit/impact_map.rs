@@ -7,7 +7,7 @@ use nalgebra::{RowSVector, SMatrix};
 
 use super::bounce::{Bounce, State};
 use super::forced_oscillator::ForcedOscillator;
-use super::particle_flight::Flight;
+use super::particle_flight::ParticleFlight;
 use crate::Dimensionless;
 
 /// Derivative of four state variables by (phase, q1, q1', q2', Omega, G) where it began.
@@ -50,17 +50,22 @@ impl ImpactMap {
     /// impacts accumulate.
     #[must_use]
     pub fn next(&self, from: &Bounce) -> Option<Bounce> {
-        self.landed(&Flight::new(&self.oscillator, from))
+        self.landed(&ParticleFlight::new(&self.oscillator, from))
     }
 
     /// The state just after the first impact that follows from (q1, q1', q2, q2') at a phase of the base, rad, with the
     /// particle inside its cavity; None as for [`Self::next`].
     #[must_use]
     pub fn first(&self, phase: f64, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
-        self.landed(&Flight::between(&self.oscillator, phase, [q1, dq1, q2, dq2], q1 - q2))
+        self.landed(&ParticleFlight::between(
+            &self.oscillator,
+            phase,
+            [q1, dq1, q2, dq2],
+            q1 - q2,
+        ))
     }
 
-    fn landed(&self, flight: &Flight) -> Option<Bounce> {
+    fn landed(&self, flight: &ParticleFlight) -> Option<Bounce> {
         let (duration, wall) = flight.contact()?;
         let [q1, dq1] = flight.primary(duration).into();
         let dw = dq1 - flight.dq2;
@@ -76,7 +81,7 @@ impl ImpactMap {
 
     /// The same with its derivatives.
     pub(super) fn step(&self, from: &Bounce) -> Option<Step> {
-        let flight = Flight::new(&self.oscillator, from);
+        let flight = ParticleFlight::new(&self.oscillator, from);
         let (t, wall) = flight.contact()?;
         let [q1, dq1] = flight.primary(t).into();
         let dw = dq1 - from.dq2;
@@ -125,7 +130,7 @@ impl ImpactMap {
 
     /// State at the time `t` after a bounce, before the next.
     pub(super) fn state(&self, from: &Bounce, t: f64) -> State {
-        let [q1, dq1] = Flight::new(&self.oscillator, from).primary(t).into();
+        let [q1, dq1] = ParticleFlight::new(&self.oscillator, from).primary(t).into();
         [q1, dq1, from.q2() + from.dq2 * t, from.dq2]
     }
 }

@@ -16,7 +16,7 @@ const LONGEST: f64 = 64.0;
 const STEPS: usize = 4000;
 
 /// A flight of the particle.
-pub(super) struct Flight<'a> {
+pub(super) struct ParticleFlight<'a> {
     oscillator: &'a ForcedOscillator,
     /// Where it begins: phase of the base, particle, and relative displacement and velocity.
     pub(super) phase: f64,
@@ -30,7 +30,7 @@ pub(super) struct Flight<'a> {
     curvature: f64,
 }
 
-impl<'a> Flight<'a> {
+impl<'a> ParticleFlight<'a> {
     /// The flight after a bounce.
     pub(super) fn new(oscillator: &'a ForcedOscillator, from: &Bounce) -> Self {
         let state = [from.q1, from.dq1, from.q2(), from.dq2];

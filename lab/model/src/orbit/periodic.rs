@@ -43,6 +43,8 @@ pub struct Periodic {
 /// Size of the last Newton correction.
 const CONVERGED: f64 = 1e-12;
 const ROUNDS: usize = 30;
+/// Closing error of a motion that is known in closed form, and is not one with an earlier contact.
+const CLOSED: f64 = 1e-8;
 
 impl Periodic {
     /// The motion with the pattern `pattern` near the unknowns `guess` that satisfies both conditions, by Newton's method with
@@ -67,9 +69,18 @@ impl Periodic {
         Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
     }
 
+    /// The motion at unknowns that may satisfy the closing equations; None if they do not.
+    pub(super) fn closed(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
+        let returned = follow(scene, pattern, x).filter(|returned| returned.residual.norm() < CLOSED)?;
+        Some(Self::of(pattern, x, returned))
+    }
+
     /// The motion at unknowns that satisfy the closing equations.
     pub(super) fn at(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknowns) -> Option<Self> {
-        let returned = follow(scene, pattern, x)?;
+        Some(Self::of(pattern, x, follow(scene, pattern, x)?))
+    }
+
+    fn of(pattern: &ImpactPattern, x: &Unknowns, returned: Returned) -> Self {
         let mut multipliers: [Complex<f64>; 4] = returned.monodromy.complex_eigenvalues().into();
         multipliers.sort_by(|one, other| one.norm().total_cmp(&other.norm()));
         let total: f64 = returned.durations.iter().sum();
@@ -79,7 +90,7 @@ impl Periodic {
             .zip(&returned.durations)
             .map(|(bounce, duration)| bounce.dq2.abs() * duration)
             .sum();
-        Some(Self {
+        Self {
             g: x[5],
             sigma: x[4],
             c: returned.s.norm(),
@@ -90,7 +101,7 @@ impl Periodic {
             durations: returned.durations,
             stable: multipliers[3].norm() < 1.0,
             multipliers: multipliers.map(|one| [one.re, one.im]),
-        })
+        }
     }
 
     /// How far the second half of the motion is from repeating the first one or its mirror image; None for a pattern that is not

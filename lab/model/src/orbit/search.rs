@@ -1,10 +1,8 @@
 //! Search for all phase-resonant orbits of a scene, over frequency.
 
 use super::{
-    Condition, ImpactPattern, Orbit, Periodic,
+    Condition, ImpactPattern, Orbit, Periodic, Unknowns,
     candidate::{Candidate, Family},
-    flight::Flight,
-    multipliers,
 };
 use crate::numerics::{bisection, golden_section};
 use crate::{Dimensionless, Resonance};
@@ -89,29 +87,28 @@ fn resonates(candidate: &Candidate) -> bool {
     candidate.lags || candidate.g < 1e-12
 }
 
-/// Keeps what is physical: the particle moves and stays inside its cavity.
+/// Keeps what is physical: the particle moves, and its next contact is that of the candidate, half a period later.
 fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
     let Candidate { omega, b, c, g, .. } = *candidate;
     let sizes = [b, c, g];
-    let physical = sizes.iter().all(|size| size.is_finite())
-        && b > 0.0
-        && c > 1e-12
-        && Flight::new(scene, candidate).stays_inside();
-    if !physical {
+    if sizes.iter().any(|size| !size.is_finite()) || b <= 0.0 || c <= 1e-12 {
         return None;
     }
-    let multipliers = multipliers::moduli(scene, candidate);
+    let start = candidate.after_impact(scene.epsilon);
+    let sigma = (omega - 1.0) / scene.epsilon;
+    let unknowns = Unknowns::from([start.phase, start.q1, start.dq1, start.dq2, sigma, g]);
+    let motion = Periodic::closed(scene, &ImpactPattern::symmetric(), &unknowns)?;
     Some(Orbit {
         g,
-        sigma: (omega - 1.0) / scene.epsilon,
+        sigma,
         omega,
         c,
         gamma: candidate.gamma,
         b,
         impact_velocity: 2.0 * b * (1.0 + scene.epsilon) / (1.0 + scene.r),
-        start: candidate.after_impact(scene.epsilon),
-        multipliers,
-        stable: multipliers[3] < 1.0,
+        start,
+        multipliers: motion.moduli(),
+        stable: motion.stable,
     })
 }
 

@@ -58,6 +58,10 @@ fn figure(map: &Map) -> Figure {
         let ink = theme::on_regime(regime);
         panel.centred_text(letter(regime).into(), place, 17, ink);
     }
+    Figure::new(SIZE, vec![panel]).with_key(key(map, dotted))
+}
+
+fn key(map: &Map, dotted: bool) -> Vec<KeyEntry> {
     let shown = Regime::SIMULATED.into_iter();
     let shown = shown.filter(|one| map.count(*one).0 > 0);
     let mut key: Vec<KeyEntry> = shown
@@ -85,7 +89,7 @@ fn figure(map: &Map) -> Figure {
     if dotted {
         key.push(KeyEntry { name: "several regimes", mark: Mark::Dot });
     }
-    Figure::new(SIZE, vec![panel]).with_key(key)
+    key
 }
 
 /// Where a motion lies on a map over sigma and G.

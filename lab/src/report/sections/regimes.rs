@@ -9,7 +9,7 @@ use crate::regime::Regime;
 use crate::report::figures::regimes;
 use crate::report::files::{bifurcations_csv, map_csv};
 use crate::report::section::Section;
-use crate::report::table::Table;
+use crate::report::summary;
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
     let mut section = Section::new("Regimes of the driven response");
@@ -65,16 +65,6 @@ fn describe(section: &mut Section, map: &Map) {
          quasi-periodic if the exponent is zero within its uncertainty, and otherwise undecided.",
         map.plan.x, map.plan.y, LIMIT
     ));
-    let rows = Regime::SIMULATED.into_iter().map(|regime| {
-        let (cells, here) = map.count(regime);
-        [
-            regime.name().to_string(),
-            cells.to_string(),
-            format!("{:.1} %", percent(cells, all)),
-            format!("{:.1} %", percent(here, inside)),
-        ]
-    });
-    let headings = ["regime", "cells", "share", "share inside the theory's island"];
-    section.table("How often each regime occurs.", Table::new(headings).rows(rows));
+    section.table("How often each regime occurs.", summary::regimes(map));
     section.words(section.finding.clone());
 }

@@ -1,35 +1,13 @@
 //! The backbone tracked with the loop closed, level by level.
 
-use serde::Serialize;
-
 use super::{SectionError, Subject};
 use crate::backbone::track;
 use crate::comparison::{TrackedComparison, TrackedPoint};
 use crate::identification::Regime;
 use crate::report::figures::tracked as figure;
-use crate::report::files::csv;
+use crate::report::files::tracked_csv;
 use crate::report::section::Section;
 use crate::rig::BuiltIn;
-
-/// One row of the table of points.
-#[derive(Serialize)]
-struct Row {
-    #[serde(rename = "C")]
-    c: f64,
-    sigma: f64,
-    #[serde(rename = "G")]
-    g: f64,
-    #[serde(rename = "u_C")]
-    u_c: f64,
-    u_sigma: f64,
-    #[serde(rename = "u_G")]
-    u_g: f64,
-    periods: f64,
-    settled: bool,
-    sigma_less_exact: Option<f64>,
-    #[serde(rename = "G_less_exact")]
-    g_less_exact: Option<f64>,
-}
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
     let mut section = Section::new("The backbone, tracked with the loop closed");
@@ -75,18 +53,6 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
             "Largest difference from the exact curve at the same C, over all settled points.",
         );
     }
-    let rows = tracked.points.iter().map(|one| Row {
-        c: one.point.c,
-        sigma: one.point.sigma,
-        g: one.point.g,
-        periods: one.point.periods,
-        settled: one.point.settled,
-        u_c: one.point.u_c,
-        u_sigma: one.point.u_sigma,
-        u_g: one.point.u_g,
-        sigma_less_exact: one.exact.and_then(|exact| exact.sigma),
-        g_less_exact: one.exact.and_then(|exact| exact.g),
-    });
-    section.attach("tracked.csv", csv(rows)?);
+    section.attach("tracked.csv", tracked_csv(&tracked)?);
     Ok(section)
 }

@@ -8,20 +8,8 @@ use vines_model::{
     theory::{B_SYMMETRY_BREAKING, BranchSide, Manifold, SlowFlow, half_period_map},
 };
 
-mod reference;
-use reference::rows;
-
-const LAMBDA: f64 = 1.43;
-const R: f64 = 0.65;
-
-fn flow() -> SlowFlow {
-    SlowFlow::new(LAMBDA, R)
-}
-
-fn close(one: f64, other: f64, tolerance: f64) {
-    let size = 1f64.max(one.abs());
-    assert!((one - other).abs() <= tolerance * size, "{one} and {other}");
-}
+use crate::reference::rows;
+use crate::{LAMBDA, R, close, flow};
 
 #[test]
 fn both_branches_lie_on_the_manifold() {

@@ -1,0 +1,83 @@
+//! Motions in physical time.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use vines_model::{
+    Dimensionless,
+    orbit::phase_resonant,
+    theory::{Waveform, triangle_wave},
+};
+
+use crate::{LAMBDA, R, close, flow};
+
+#[test]
+fn a_waveform_meets_its_walls_and_bounces_as_restitution_says() {
+    let scene = Dimensionless {
+        omega0: 55.4,
+        b: 0.01,
+        ..Dimensionless::new(0.0084, LAMBDA, R, 1.1)
+    };
+    let flow = flow();
+    for one in flow.equilibria(1.1, -1.0) {
+        let wave = Waveform::new(&scene, -1.0, one.b, one.gamma);
+        let t = wave.impact_time();
+        close(wave.w(t) / scene.b, 1.0, 1e-12);
+        close(wave.w(t + PI / wave.omega) / scene.b, -1.0, 1e-12);
+        let h = 1e-6 / wave.omega;
+        let before = (wave.w(t) - wave.w(t - h)) / h;
+        let after = (wave.w(t + h) - wave.w(t)) / h;
+        close(after / before, -R, 1e-4);
+        close(wave.q1(0.3) - wave.q2(0.3), wave.w(0.3), 1e-15);
+        close(wave.q1(0.3) + scene.epsilon * wave.q2(0.3), wave.v(0.3), 1e-15);
+    }
+    close(triangle_wave(FRAC_PI_2), FRAC_PI_2, 1e-15);
+    close(triangle_wave(PI + 0.2), -0.2, 1e-12);
+}
+
+#[test]
+fn the_waveform_approaches_the_exact_motion_as_epsilon() {
+    let distance = |epsilon: f64| {
+        let scene = Dimensionless::new(epsilon, LAMBDA, R, 1.1);
+        let orbit = phase_resonant(&scene).into_iter().find(|one| one.stable).unwrap();
+        let point = flow().phase_resonant(1.1).into_iter().find(|one| one.stable()).unwrap();
+        let wave = Waveform::new(&scene, point.sigma, point.b, -FRAC_PI_2);
+        // The exact particle's flight from the impact on w = +1, and the waveform's, both from their own impact on.
+        let t = wave.impact_time();
+        (1..8)
+            .map(|n| {
+                let part = f64::from(n) / 8.0;
+                let exact = orbit.start.q2 + orbit.start.dq2 * part * PI / orbit.omega;
+                (wave.q2(t + part * PI / wave.omega) - exact).abs()
+            })
+            .fold(0.0, f64::max)
+    };
+    let (coarse, fine) = (distance(1e-2), distance(1e-3));
+    let slope = (coarse / fine).log10();
+    println!("q2 of the waveform less the exact one: {coarse:.1e}, {fine:.1e}, as epsilon^{slope:.2}");
+    close(slope, 1.0, 0.1);
+}
+
+#[test]
+fn the_phase_of_a_decay_is_the_integral_of_its_detuning() {
+    let decay = flow().decay(0.9).unwrap();
+    let (tau1, h) = (0.3, 1e-5);
+    let turned = |tau1: f64| decay.turned(decay.at(tau1).unwrap().b);
+    let rate = (turned(tau1 + h) - turned(tau1 - h)) / (2.0 * h);
+    close(rate, decay.at(tau1).unwrap().sigma, 1e-6);
+}
+
+#[test]
+fn a_decaying_motion_stays_between_its_walls() {
+    let decay = flow().decay(0.9).unwrap();
+    let epsilon = 0.001;
+    let end = decay.duration() / epsilon;
+    let mut touched = 0f64;
+    for n in 0..4000 {
+        let tau = end * f64::from(n) / 4000.0;
+        let [v, w] = decay.motion(epsilon, 0.4, tau).unwrap();
+        assert!(w.abs() <= 1.0 + 1e-9 && v.abs() < 1.0, "tau = {tau}: v = {v}, w = {w}");
+        touched = touched.max(w.abs());
+    }
+    assert!(touched > 0.999);
+    assert_eq!(decay.motion(epsilon, 0.4, 1.001 * end), None);
+}
