@@ -19,6 +19,7 @@ mod rig;
 mod rigs;
 mod scene_arguments;
 mod serving;
+mod sweep;
 mod theory;
 
 use std::{
@@ -43,6 +44,7 @@ Examples:
   vines orbit --response                       the exact frequency response, stable and unstable
   vines theory --scene scenes/dimensionless.toml --set plant.epsilon=0.0042
   vines map                                    the regimes over sigma and G
+  vines sweep --axis plant.r=0.3:1:71 --axis start.dq2=-1:1:81 --out r.zarr
   vines report --out report                    everything on one page, with figures
   vines pack --out fmus                        write LoViNes.fmu and PhaseLock.fmu
   vines rig --listen 127.0.0.1:5510            serve the plant in real time, for identify --rig udp://127.0.0.1:5510
@@ -69,6 +71,7 @@ enum Command {
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Map(map::Arguments),
+    Sweep(sweep::Arguments),
     Report(report::Arguments),
     Pack(pack::Arguments),
     Rig(rig::Arguments),
@@ -93,6 +96,7 @@ pub fn run() -> ExitCode {
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),
+        Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Pack(arguments) => pack::run(&arguments),
         Command::Rig(arguments) => rig::run(&arguments),

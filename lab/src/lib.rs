@@ -9,6 +9,7 @@ pub mod report;
 pub use vines_fmu as fmu;
 pub use vines_model::{map, numerics, orbit, regime, theory};
 pub use vines_net as net;
+pub use vines_sweep as sweep;
 pub use vines_testbench::{
     advice, backbone, calibration, chain_effects, comparison, estimators, experiment, faults, identification,
     loop_check, random_rigs, rig, scene,

@@ -5,6 +5,7 @@ mod chain;
 mod configuration;
 mod controller;
 mod error;
+mod family;
 mod overrides;
 mod plant;
 mod record;
@@ -15,12 +16,13 @@ use std::path::Path;
 
 pub use lovines::Parameters;
 use lovines::State;
-use serde::Serialize;
+use serde::{Deserialize, Serialize};
 
 pub use backbone::{Backbone, Predictor};
 pub use chain::{Chain, RatioOf};
 pub use controller::Controller;
 pub use error::SceneError;
+pub use family::Family;
 pub use overrides::{Override, SyntaxError};
 pub use record::{Estimator, Record};
 pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
@@ -76,8 +78,11 @@ impl Scene {
         };
         // The file is checked on its own first, so that an error can name the line.
         let sections: Sections = toml::from_str(text).map_err(syntax)?;
-        let table = toml::from_str(text).map_err(syntax)?;
-        overrides::merged(table, overrides)?.unwrap_or(sections).resolve(origin)
+        if overrides.is_empty() {
+            return sections.resolve(origin);
+        }
+        let table = overrides::merge(toml::from_str(text).map_err(syntax)?, overrides)?;
+        Sections::deserialize(table).map_err(syntax)?.resolve(origin)
     }
 
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.

@@ -8,9 +8,11 @@ mod axis;
 mod decide;
 mod grid;
 mod island;
+mod response;
 mod run;
 
 pub use axis::{Axis, Range};
 pub use grid::{Cell, LIMIT, Map, MapError, Plan};
 pub use island::outline;
-pub use run::{Point, observe};
+pub use response::Response;
+pub use run::{Point, observe, observe_response};

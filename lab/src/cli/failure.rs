@@ -38,6 +38,11 @@ impl Failure {
         Self { code: 3, message: message.to_string() }
     }
 
+    /// Ended by a signal: exit code 130.
+    pub(super) fn interrupted(message: impl Display) -> Self {
+        Self { code: INTERRUPTED, message: message.to_string() }
+    }
+
     /// The same exit code with another message.
     pub(super) fn with_message(self, message: String) -> Self {
         Self { message, ..self }

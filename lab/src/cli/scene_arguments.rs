@@ -3,7 +3,7 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::scene::{Override, Scene, SceneError};
+use vines::scene::{Family, Override, Scene, SceneError};
 
 #[derive(Debug, Args)]
 pub(super) struct SceneArguments {
@@ -19,6 +19,15 @@ pub(super) struct SceneArguments {
 impl SceneArguments {
     pub(super) fn load(&self) -> Result<Scene, SceneError> {
         self.load_with(&[])
+    }
+
+    /// The scene, of which numbers may vary.
+    pub(super) fn family(&self) -> Result<Family, SceneError> {
+        let Some(path) = &self.scene else {
+            return Family::parse("", None, &self.set);
+        };
+        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.clone(), source })?;
+        Family::parse(&path.display().to_string(), Some(&text), &self.set)
     }
 
     /// The scene with further values replaced.

@@ -2,9 +2,10 @@
 
 use lovines::{InvalidValue, Parameters, Plant, State};
 
+use crate::scene::Scene;
 use vines_model::{Definition, Sensor};
 
-use super::{Drive, GroundTruth, Measured, Rig, RigError, Sensors};
+use super::{Chain, Drive, GroundTruth, Measured, Rig, RigError, Sensors};
 
 /// The plant, stepped directly.
 #[derive(Clone)]
@@ -21,6 +22,21 @@ impl Simulated {
     pub fn new(parameters: Parameters, start: State) -> Result<Self, InvalidValue> {
         let plant = Plant::new(parameters, start)?;
         Ok(Self { plant, sensor: Sensor::V })
+    }
+
+    /// The rig of a scene, with its measurement chain.
+    ///
+    /// # Errors
+    /// An invalid parameter or start.
+    pub fn of(scene: &Scene) -> Result<Box<dyn Rig>, InvalidValue> {
+        let plant = Self::new(scene.plant, scene.start)?.with_sensors(scene.resonance);
+        let samples = scene.controller.samples_per_period;
+        Ok(Chain::around(
+            Box::new(plant),
+            &scene.chain,
+            &scene.dimensionless(),
+            samples,
+        ))
     }
 
     /// The same with the sensors of a definition.

@@ -95,18 +95,16 @@ impl Override {
     }
 }
 
-/// The sections of `table` with the overrides applied one by one, so that an error names the
+/// `table` with the overrides applied one by one, so that an error names the
 /// argument that caused it.
-pub(super) fn merged(mut table: Table, overrides: &[Override]) -> Result<Option<Sections>, SceneError> {
+pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, SceneError> {
     let sets = |key| overrides.iter().find(|one| one.is("excitation", key));
     if let (Some(_), Some(second)) = (sets("G"), sets("E")) {
         return Err(second.error("excitation.G is set as well: set one of them"));
     }
-    let mut sections = None;
     for one in overrides {
         one.merge_into(&mut table)?;
-        let read = Sections::deserialize(table.clone());
-        sections = Some(read.map_err(|error| one.error(error.message().trim()))?);
+        Sections::deserialize(table.clone()).map_err(|error| one.error(error.message().trim()))?;
     }
-    Ok(sections)
+    Ok(table)
 }

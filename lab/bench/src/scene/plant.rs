@@ -11,7 +11,7 @@ pub(super) const SI_KEYS: [&str; 5] = ["M", "k", "c", "m", "b"];
 pub(super) const DIMENSIONLESS_KEYS: [&str; 2] = ["epsilon", "lambda"];
 
 /// The section as written.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub(super) struct PlantSection {
     #[serde(rename = "M")]
@@ -65,7 +65,7 @@ impl PlantSection {
 }
 
 /// The `[start]` section; what is left out is zero.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct StartSection {
     q1: f64,

@@ -10,7 +10,7 @@ use super::{
 };
 
 /// The file; sections left out count as empty.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub(super) struct Sections {
     plant: PlantSection,
@@ -24,7 +24,7 @@ pub(super) struct Sections {
 }
 
 /// The base amplitude; exactly one of the two keys is given.
-#[derive(Debug, Default, Deserialize)]
+#[derive(Debug, Clone, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Excitation {
     #[serde(rename = "G")]
@@ -57,6 +57,21 @@ impl Excitation {
 }
 
 impl Sections {
+    /// Replaces a section.
+    pub(super) fn replace(&mut self, name: &str, table: toml::Table) -> Result<(), toml::de::Error> {
+        match name {
+            "plant" => self.plant = PlantSection::deserialize(table)?,
+            "start" => self.start = StartSection::deserialize(table)?,
+            "excitation" => self.excitation = Excitation::deserialize(table)?,
+            "controller" => self.controller = Controller::deserialize(table)?,
+            "record" => self.record = Record::deserialize(table)?,
+            "backbone" => self.backbone = Backbone::deserialize(table)?,
+            "chain" => self.chain = Chain::deserialize(table)?,
+            _ => self.resonance = Definition::deserialize(table)?,
+        }
+        Ok(())
+    }
+
     pub(super) fn resolve(self, origin: &str) -> Result<Scene, SceneError> {
         let plant = self.plant.resolve(origin)?;
         let scene = Scene {

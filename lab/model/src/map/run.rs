@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
 
+use super::response::Response;
 use crate::Dimensionless;
 use crate::orbit::{Driven, Tangent};
 use crate::regime::{Impact, Regime};
@@ -55,43 +56,30 @@ const CONTINUED: usize = 4;
 /// # Errors
 /// Invalid parameters or an invalid start.
 pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize) -> Result<Point, InvalidValue> {
+    Run::new(scene, sigma, start)?.decided(limit)
+}
+
+/// As [`observe`], with the response of the motion found.
+///
+/// # Errors
+/// As [`observe`].
+pub fn observe_response(
+    scene: &Dimensionless,
+    sigma: f64,
+    start: [f64; 4],
+    limit: usize,
+) -> Result<(Point, Response), InvalidValue> {
     let mut run = Run::new(scene, sigma, start)?;
-    let mut next = FIRST.min(limit);
-    loop {
-        run.follow(next)?;
-        if let Some(point) = run.without_impacts().or_else(|| run.settling()) {
-            return Ok(point);
-        }
-        if run.repeating().is_some() {
-            // Near an unstable motion, recurrence lasts a while: it must last longer, and disturbances must shrink.
-            let settled = run.halves();
-            run.follow(settled / 2 + EXPONENT)?;
-            let (exponent, error) = run.exponent(settled);
-            if let Some(point) = run.repeating().filter(|_| exponent < 0.0) {
-                return Ok(Point {
-                    exponent: Some(exponent),
-                    exponent_error: Some(error),
-                    ..point
-                });
-            }
-        }
-        if next >= limit {
-            let point = run.irregular();
-            if point.regime != Regime::Undecided || next >= CONTINUED * limit {
-                return Ok(point);
-            }
-        }
-        let last = if next < limit { limit } else { CONTINUED * limit };
-        next = ((next as f64 * LATER) as usize).min(last);
-    }
+    let point = run.decided(limit)?;
+    Ok((point, run.response(&point)?))
 }
 
 /// A simulated motion, half period by half period.
 pub(super) struct Run {
     pub(super) scene: Dimensionless,
     pub(super) sigma: f64,
-    plant: Plant,
-    drive: Drive,
+    pub(super) plant: Plant,
+    pub(super) drive: Drive,
     pub(super) driven: Driven,
     tangent: Tangent,
     /// States at the beginning of every half period and now.
@@ -120,12 +108,44 @@ impl Run {
         })
     }
 
+    /// Follows the motion until its regime is decided.
+    fn decided(&mut self, limit: usize) -> Result<Point, InvalidValue> {
+        let mut next = FIRST.min(limit);
+        loop {
+            self.follow(next)?;
+            if let Some(point) = self.without_impacts().or_else(|| self.settling()) {
+                return Ok(point);
+            }
+            if self.repeating().is_some() {
+                // Near an unstable motion, recurrence lasts a while: it must last longer, and disturbances must shrink.
+                let settled = self.halves();
+                self.follow(settled / 2 + EXPONENT)?;
+                let (exponent, error) = self.exponent(settled);
+                if let Some(point) = self.repeating().filter(|_| exponent < 0.0) {
+                    return Ok(Point {
+                        exponent: Some(exponent),
+                        exponent_error: Some(error),
+                        ..point
+                    });
+                }
+            }
+            if next >= limit {
+                let point = self.irregular();
+                if point.regime != Regime::Undecided || next >= CONTINUED * limit {
+                    return Ok(point);
+                }
+            }
+            let last = if next < limit { limit } else { CONTINUED * limit };
+            next = ((next as f64 * LATER) as usize).min(last);
+        }
+    }
+
     /// Half periods so far.
     pub(super) fn halves(&self) -> usize {
         self.growth.len()
     }
 
-    fn follow(&mut self, periods: usize) -> Result<(), InvalidValue> {
+    pub(super) fn follow(&mut self, periods: usize) -> Result<(), InvalidValue> {
         let step = PI / self.drive.omega;
         while self.halves() < 2 * periods {
             let n = self.halves();

@@ -1,0 +1,52 @@
+"""A phase-locked loop tuned against noise: error of the locked detuning, and periods to the lock.
+
+python examples/tuning.py [FOLDER]    writes tuning.svg
+"""
+
+import sys
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import vines
+
+folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
+folder.mkdir(parents=True, exist_ok=True)
+bandwidths = np.geomspace(0.03, 0.3, 6)
+seeds = range(1, 7)
+exact = next(orbit.sigma for orbit in vines.orbits() if orbit.stable)
+
+
+def locked(bandwidth: float, seed: int) -> tuple[float, float]:
+    """Return the error of sigma and the periods to the lock; NaN without a lock."""
+    scene = vines.Scene(
+        controller={
+            "bandwidth": bandwidth,
+            "frequency_tolerance": 3e-2,
+            "amplitude_tolerance": 8e-3,
+            "phase_tolerance": 5.0,
+        },
+        chain={"snr": 30.0, "seed": seed},
+        record={"decay_periods": 5.0},
+    )
+    try:
+        lock = vines.identify(scene).lock
+    except RuntimeError:
+        return np.nan, np.nan
+    return lock["sigma"] - exact, lock["periods_to_lock"]
+
+
+# The interpreter lock is released: threads use all cores.
+with ThreadPoolExecutor() as pool:
+    found = pool.map(lambda case: locked(*case), [(bandwidth, seed) for bandwidth in bandwidths for seed in seeds])
+    errors, periods = np.array(list(found)).reshape(len(bandwidths), len(seeds), 2).transpose(2, 0, 1)
+figure, (upper, lower) = plt.subplots(2, sharex=True, figsize=(6, 5), layout="constrained")
+upper.loglog(bandwidths, np.abs(errors), "k.")
+upper.loglog(bandwidths, np.sqrt(np.nanmean(errors**2, axis=1)), label="RMS")
+upper.set(ylabel="|error of $\\sigma$|", title="Noise 30 dB below the response")
+upper.legend()
+lower.semilogx(bandwidths, periods, "k.")
+lower.set(xlabel="bandwidth / ω₀", ylabel="periods to the lock")
+figure.savefig(folder / "tuning.svg")

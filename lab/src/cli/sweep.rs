@@ -1,0 +1,188 @@
+//! `vines sweep`: any numbers of a scene over grids, lists and random or Sobol designs, to a Zarr store.
+
+use std::{
+    path::PathBuf,
+    sync::atomic::{AtomicBool, Ordering::Relaxed},
+    thread,
+    time::Duration,
+};
+
+use clap::Args;
+use indicatif::{ProgressBar, ProgressStyle};
+use vines::sweep::{self, Axis, Estimate, Monitor, Plan, Results, Settings, Shard};
+
+use super::{failure::Failure, interrupt::stop_flag, scene_arguments::SceneArguments};
+
+const HELP: &str = "\
+Axes; a key is sigma (the detuning) or section.key of a scene:
+  --axis plant.r=0.3:1:71          first : last : how many
+  --axis plant.r=0.3,0.5,0.8       a list
+  --axis start.dq2=random:-1:1     one random number per sample; with --samples and --seed
+  --axis start.dq2=sobol:-1:1      one number of a Sobol sequence per sample; with --samples
+Grids and lists have one dimension each; all random and Sobol axes share the dimension `sample`.
+
+Results; the regime is always computed, as by `vines map`:
+  regime     regime, periods to settle, impacts per period, pattern, Lyapunov exponent, synchrony, sticking
+  response   amplitude C, and the powers that impacts and damper dissipate
+  orbits     the exact symmetric 1:1 orbits at the drive of the cell, and their stability
+  lock       the locked point: the experiment of `vines identify`, without its decay
+
+The store is a Zarr group (version 3) that xarray.open_zarr reads; docs/scale.md describes it. It is written chunk by chunk. The same
+command goes on with a sweep that was interrupted. A cell that fails has its reason in the variable `failure`.
+
+Examples:
+  vines sweep --axis sigma=-5:5:101 --axis excitation.G=0.1:3:59 --out map.zarr
+  vines sweep --axis start.q1=random:-0.01:0.01 --axis start.dq1=random:-1:1 --samples 10000 --sigma=-1.14 --out basin.zarr
+  vines sweep --axis sigma=-5:5:1000 --axis excitation.G=0.1:3:1000 --shard 3/8 --out map.zarr
+  vines sweep --axis plant.r=0.3:1:71 --axis plant.b=0.005:0.02:61 --results response,orbits --out gap.zarr";
+
+/// Sweep over any numbers of a scene and of its start, to a Zarr store
+#[derive(Debug, Args)]
+#[command(after_help = HELP)]
+pub(super) struct Arguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    /// An axis; may be repeated
+    #[arg(long, value_name = "KEY=VALUES", required = true)]
+    axis: Vec<Axis>,
+
+    /// Detuning, if it is not an axis [default: that of the scene's stable phase-resonant orbit, or 0]
+    #[arg(long, value_name = "SIGMA", allow_negative_numbers = true)]
+    sigma: Option<f64>,
+
+    /// Number of samples of the random and Sobol axes
+    #[arg(long, value_name = "N")]
+    samples: Option<u64>,
+
+    /// Seed of the random axes
+    #[arg(long, value_name = "SEED", default_value_t = 0)]
+    seed: u64,
+
+    /// Largest number of periods that a cell is followed; at least 100
+    #[arg(long, value_name = "PERIODS", default_value_t = Settings::default().periods)]
+    periods: usize,
+
+    /// What to compute: regime, response, orbits, lock
+    #[arg(long, value_name = "GROUPS", default_value = "regime", value_delimiter = ',')]
+    results: Vec<String>,
+
+    /// Largest number of cells in a chunk of the store
+    #[arg(long, value_name = "CELLS", default_value_t = Settings::default().chunk)]
+    chunk: u64,
+
+    /// Folder of the store; made if it is not there
+    #[arg(long, value_name = "DIR", default_value = "sweep.zarr")]
+    out: PathBuf,
+
+    /// Compute only the I-th of N parts, I from 1; parts may share a store on a common file system
+    #[arg(long, value_name = "I/N", value_parser = shard)]
+    shard: Option<Shard>,
+
+    /// Collect the chunks of these stores of the same sweep instead of computing
+    #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
+    merge: Vec<PathBuf>,
+
+    /// Confirms a sweep of more than 2 hours or 20 GB
+    #[arg(long)]
+    yes: bool,
+}
+
+pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+    let settings = Settings {
+        axes: arguments.axis.clone(),
+        sigma: arguments.sigma,
+        samples: arguments.samples,
+        seed: arguments.seed,
+        periods: arguments.periods,
+        results: Results::parse(arguments.results.iter().map(String::as_str)).map_err(Failure::input)?,
+        chunk: arguments.chunk,
+    };
+    let plan = Plan::new(arguments.scene.family()?, settings).map_err(Failure::input)?;
+    if !arguments.merge.is_empty() {
+        return merge(&plan, arguments);
+    }
+    let estimate = sweep::estimate(&plan, &AtomicBool::new(false)).map_err(Failure::input)?;
+    if estimate.is_large() && !arguments.yes {
+        let Estimate { cells, hours, bytes } = estimate;
+        return Err(Failure::input(format!(
+            "{cells} cells would take about {hours:.1} h on this machine and {:.1} GB before compression; confirm with --yes",
+            bytes / 1e9
+        )));
+    }
+    let monitor = Monitor::default();
+    let complete = watched(&plan, arguments, &monitor)?;
+    let (found, computed, failed) = (
+        monitor.found.load(Relaxed),
+        monitor.computed.load(Relaxed),
+        monitor.failed.load(Relaxed),
+    );
+    let mut text = format!(
+        "{} cells in {} chunks: {found} were there, {computed} computed, {failed} of these failed\n",
+        plan.cells(),
+        plan.chunks()
+    );
+    if let Some(reason) = monitor.reason.lock().ok().and_then(|mut reason| reason.take()) {
+        text += &format!("First failure: {reason}\n");
+    }
+    if complete {
+        return Ok(format!("{text}Written: {}\n", arguments.out.display()));
+    }
+    Err(Failure::interrupted(format!(
+        "interrupted; {} has the complete chunks, and the same command goes on",
+        arguments.out.display()
+    )))
+}
+
+/// The part `I/N` of a sweep.
+fn shard(text: &str) -> Result<Shard, String> {
+    let parts = text
+        .split_once('/')
+        .and_then(|(one, of)| Some((one.parse::<u64>().ok()?, of.parse().ok()?)));
+    match parts {
+        Some((one, of)) if (1..=of).contains(&one) => Ok(Shard { number: one - 1, of }),
+        _ => Err("expected I/N with I from 1 to N, for instance 3/8".into()),
+    }
+}
+
+fn merge(plan: &Plan, arguments: &Arguments) -> Result<String, Failure> {
+    let out = arguments.out.display();
+    match sweep::merge(plan, &arguments.out, &arguments.merge).map_err(Failure::input)? {
+        0 => Ok(format!("{} cells, complete\nWritten: {out}\n", plan.cells())),
+        missing => Err(Failure::run(format!(
+            "{missing} of {} cells are in none of these stores; {out} has the others. Without --merge, the same command computes them",
+            plan.cells()
+        ))),
+    }
+}
+
+/// Runs the sweep with a bar that shows the progress, until it is complete or a signal stops it.
+fn watched(plan: &Plan, arguments: &Arguments, monitor: &Monitor) -> Result<bool, Failure> {
+    let signal = stop_flag()?;
+    let style = ProgressStyle::with_template("sweeping [{wide_bar}] {pos}/{len} cells, {per_sec}, {eta} left")
+        .unwrap_or_else(|_| ProgressStyle::default_bar());
+    let bar = ProgressBar::new(plan.cells()).with_style(style);
+    thread::scope(|scope| {
+        let work = scope.spawn(|| sweep::run(plan, &arguments.out, arguments.shard.unwrap_or(Shard::ALL), monitor));
+        let mut started = false;
+        while !work.is_finished() {
+            thread::sleep(Duration::from_millis(20));
+            if signal.load(Relaxed) {
+                monitor.stop.store(true, Relaxed);
+            }
+            let computed = monitor.computed.load(Relaxed);
+            if computed > 0 && !started {
+                // The rate is that of the cells computed now.
+                started = true;
+                bar.set_position(monitor.found.load(Relaxed));
+                bar.reset_eta();
+            }
+            bar.set_position(monitor.found.load(Relaxed) + computed);
+        }
+        bar.finish_and_clear();
+        match work.join() {
+            Ok(result) => result.map_err(Failure::run),
+            Err(panic) => std::panic::resume_unwind(panic),
+        }
+    })
+}

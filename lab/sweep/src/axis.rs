@@ -1,0 +1,197 @@
+//! The axes of a sweep.
+
+use std::fmt::{self, Display, Formatter};
+use std::str::FromStr;
+
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{Rng, SeedableRng},
+};
+
+use crate::sobol;
+
+/// The detuning, which belongs to the drive and not to the scene.
+pub const SIGMA: &str = "sigma";
+
+/// Values of an axis.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Values {
+    /// At equal distances from the first to the last.
+    Grid {
+        /// First value.
+        from: f64,
+        /// Last value.
+        to: f64,
+        /// Number of values.
+        points: u64,
+    },
+    /// As listed.
+    List(Vec<f64>),
+    /// Independent random numbers from an interval, one per sample.
+    Random([f64; 2]),
+    /// A low-discrepancy sequence in an interval, one number per sample.
+    Sobol([f64; 2]),
+}
+
+/// A number of the scene, or [`SIGMA`], with the values it takes. Parse it from `plant.r=0.3:1:71` (first : last : how many),
+/// `plant.r=0.3,0.5,0.8`, `start.dq2=random:-1:1` or `start.dq2=sobol:-1:1`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Axis {
+    /// `section.key` of a scene, or `sigma`.
+    pub name: String,
+    /// Its values.
+    pub values: Values,
+}
+
+impl Axis {
+    /// An axis, checked.
+    ///
+    /// # Errors
+    /// A value that is not finite, fewer than two values, a value twice, or an empty interval.
+    pub fn new(name: &str, values: Values) -> Result<Self, String> {
+        let finite = |value: f64| match value.is_finite() {
+            true => Ok(()),
+            false => Err(format!("{name} = {value} is not a finite number")),
+        };
+        match &values {
+            Values::Grid { from, to, points } => {
+                [*from, *to].into_iter().try_for_each(finite)?;
+                few(name, *points, *from)?;
+                if from >= to {
+                    return Err(format!("{name} from {from} to {to}: the first must be below the last"));
+                }
+            }
+            Values::List(list) => {
+                list.iter().copied().try_for_each(finite)?;
+                few(name, list.len() as u64, list.first().copied().unwrap_or(f64::NAN))?;
+                let mut sorted = list.clone();
+                sorted.sort_by(f64::total_cmp);
+                if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
+                    return Err(format!("{name} has the value {} twice", pair[0]));
+                }
+            }
+            Values::Random([from, to]) | Values::Sobol([from, to]) => {
+                [*from, *to].into_iter().try_for_each(finite)?;
+                if from >= to {
+                    return Err(format!("{name} from {from} to {to}: the first must be below the last"));
+                }
+            }
+        }
+        Ok(Self { name: name.into(), values })
+    }
+
+    /// Number of values along its own dimension; None if it has one value per sample.
+    #[must_use]
+    pub fn points(&self) -> Option<u64> {
+        match &self.values {
+            Values::Grid { points, .. } => Some(*points),
+            Values::List(list) => Some(list.len() as u64),
+            Values::Random(_) | Values::Sobol(_) => None,
+        }
+    }
+
+    /// Unit, as far as the axis alone determines it: `1` for a dimensionless number.
+    #[must_use]
+    pub fn unit(&self) -> Option<&'static str> {
+        Some(match self.name.as_str() {
+            SIGMA | "plant.r" | "plant.epsilon" | "plant.lambda" | "excitation.G" => "1",
+            "plant.M" | "plant.m" => "kg",
+            "plant.k" => "N/m",
+            "plant.c" => "N s/m",
+            "plant.b" | "excitation.E" | "start.q1" | "start.q2" => "m",
+            "start.dq1" | "start.dq2" => "m/s",
+            _ => return None,
+        })
+    }
+}
+
+fn few(name: &str, points: u64, value: f64) -> Result<(), String> {
+    match points {
+        0 => Err(format!("{name} has no values; at least 2 are needed")),
+        1 => Err(format!(
+            "{name} has one value; at least 2 are needed. Set a constant in the scene instead: --set {name}={value}"
+        )),
+        _ => Ok(()),
+    }
+}
+
+/// The values of an axis as a function of the position.
+#[derive(Debug, Clone)]
+pub(crate) struct Sequence {
+    values: Values,
+    seed: u64,
+    /// Position among the axes of the sequence, and its direction numbers.
+    stream: u64,
+    directions: [u32; 32],
+}
+
+impl Sequence {
+    /// `sampled`: how many axes before this one have one value per sample.
+    pub(crate) fn new(axis: &Axis, seed: u64, sampled: usize) -> Self {
+        Self {
+            values: axis.values.clone(),
+            seed,
+            stream: sampled as u64,
+            directions: sobol::directions(sampled.min(sobol::MOST - 1)),
+        }
+    }
+
+    pub(crate) fn at(&self, n: u64) -> f64 {
+        let within = |[from, to]: [f64; 2], part: f64| from + (to - from) * part;
+        match &self.values {
+            Values::Grid { from, to, points } => from + (to - from) / (points - 1) as f64 * n as f64,
+            Values::List(list) => list[n as usize],
+            Values::Random(interval) => {
+                // One block of the generator per sample: any sample is found without those before it.
+                let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+                random.set_stream(self.stream);
+                random.set_word_pos(16 * u128::from(n));
+                within(*interval, (random.next_u64() >> 11) as f64 / 2_f64.powi(53))
+            }
+            Values::Sobol(interval) => within(*interval, sobol::point(&self.directions, n)),
+        }
+    }
+}
+
+impl Display for Axis {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "{}=", self.name)?;
+        match &self.values {
+            Values::Grid { from, to, points } => write!(f, "{from}:{to}:{points}"),
+            Values::List(list) => f.write_str(&list.iter().map(f64::to_string).collect::<Vec<_>>().join(",")),
+            Values::Random([from, to]) => write!(f, "random:{from}:{to}"),
+            Values::Sobol([from, to]) => write!(f, "sobol:{from}:{to}"),
+        }
+    }
+}
+
+impl FromStr for Axis {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let form = "expected KEY=FIRST:LAST:POINTS, KEY=VALUE,VALUE,..., KEY=random:FIRST:LAST or KEY=sobol:FIRST:LAST, \
+                    for instance plant.r=0.3:1:71";
+        let (name, values) = text.split_once('=').ok_or(form)?;
+        let number = |text: &str| {
+            let text = text.trim();
+            text.parse::<f64>()
+                .map_err(|_| format!("`{text}` is not a number; {form}"))
+        };
+        let parts: Vec<&str> = values.split(':').collect();
+        let values = match parts[..] {
+            ["random", from, to] => Values::Random([number(from)?, number(to)?]),
+            ["sobol", from, to] => Values::Sobol([number(from)?, number(to)?]),
+            [from, to, points] => Values::Grid {
+                from: number(from)?,
+                to: number(to)?,
+                points: points
+                    .trim()
+                    .parse()
+                    .map_err(|_| format!("`{points}` is not a number of points; {form}"))?,
+            },
+            [list] => Values::List(list.split(',').map(number).collect::<Result<_, _>>()?),
+            _ => return Err(form.into()),
+        };
+        Self::new(name.trim(), values)
+    }
+}

@@ -1,0 +1,161 @@
+//! One cell of a sweep: its result, and the variables that are stored of it.
+
+use vines_model::{
+    map::{Point, Response, observe, observe_response},
+    orbit::{Orbit, symmetric_orbits},
+    regime::Regime,
+};
+use vines_testbench::{
+    experiment,
+    identification::{self, Lock},
+    rig::{BuiltIn, Simulated},
+    scene::{Dimensionless, Scene},
+};
+
+/// What is computed of every cell besides its regime.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Results {
+    /// Amplitude, and the powers that impacts and damper dissipate. The motion is followed further for them.
+    pub response: bool,
+    /// The exact symmetric 1:1 orbits at the drive of the cell, and their stability.
+    pub orbits: bool,
+    /// The locked point: the experiment of `vines identify` without its decay.
+    pub lock: bool,
+}
+
+impl Results {
+    /// The names of the groups, in the order of the store.
+    #[must_use]
+    pub fn names(&self) -> Vec<&'static str> {
+        let all = [
+            (true, "regime"),
+            (self.response, "response"),
+            (self.orbits, "orbits"),
+            (self.lock, "lock"),
+        ];
+        all.into_iter().filter_map(|(is, name)| is.then_some(name)).collect()
+    }
+
+    /// From the names of groups; `regime` is always there.
+    ///
+    /// # Errors
+    /// An unknown name.
+    pub fn parse<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Self, String> {
+        let mut results = Self::default();
+        for name in names {
+            match name.trim() {
+                "regime" => {}
+                "response" => results.response = true,
+                "orbits" => results.orbits = true,
+                "lock" => results.lock = true,
+                other => {
+                    return Err(format!(
+                        "unknown results `{other}`; known are regime, response, orbits and lock"
+                    ));
+                }
+            }
+        }
+        Ok(results)
+    }
+}
+
+/// Result of a cell; all is absent in a cell that failed.
+#[derive(Debug, Clone, Default)]
+pub struct Cell {
+    pub(crate) point: Option<Point>,
+    response: Option<Response>,
+    orbits: Option<Vec<Orbit>>,
+    lock: Option<Lock>,
+    /// `k b^2 omega0`, W.
+    pub(crate) power: f64,
+    /// Why the cell failed; empty if it did not.
+    pub failure: String,
+}
+
+/// Computes a cell at the detuning `sigma`; `g` replaces the scene's G without rounding.
+pub(crate) fn compute(scene: &Scene, sigma: f64, g: Option<f64>, periods: usize, results: Results) -> Cell {
+    let mut numbers = scene.dimensionless();
+    numbers.g = g.unwrap_or(numbers.g);
+    let omega = 1.0 + numbers.epsilon * sigma;
+    if omega <= 0.0 {
+        return Cell::failed(format!(
+            "sigma = {sigma} (dimensionless) gives the frequency {omega} omega0, which must be above 0"
+        ));
+    }
+    match simulated(&numbers, sigma, scene.dimensionless_start(), periods, results.response) {
+        Ok((point, response)) => {
+            let lock = results.lock.then(|| locked(scene)).transpose();
+            Cell {
+                point: Some(point),
+                response,
+                orbits: results.orbits.then(|| symmetric_orbits(&numbers, sigma)),
+                power: scene.plant.stiffness * numbers.b * numbers.b * numbers.omega0,
+                failure: lock.as_ref().err().cloned().unwrap_or_default(),
+                lock: lock.ok().flatten(),
+            }
+        }
+        Err(error) => Cell::failed(error.to_string()),
+    }
+}
+
+/// The locked point of the scene.
+fn locked(scene: &Scene) -> Result<Lock, String> {
+    let message = |error: &dyn std::fmt::Display| format!("no locked point: {error}");
+    let plan = experiment::Plan { decay: 0, ..experiment::Plan::of(scene) };
+    let mut rig = Simulated::of(scene).map_err(|error| message(&error))?;
+    let mut controller = BuiltIn::new(&scene.controller_config()).map_err(|error| message(&error))?;
+    let record =
+        experiment::run(rig.as_mut(), &mut controller, &plan, |_, _, _| {}).map_err(|error| message(&error))?;
+    let found = identification::identify(&record, scene).map_err(|error| message(&error))?;
+    Ok(found.lock)
+}
+
+fn simulated(
+    numbers: &Dimensionless,
+    sigma: f64,
+    start: [f64; 4],
+    periods: usize,
+    response: bool,
+) -> Result<(Point, Option<Response>), lovines::InvalidValue> {
+    if response {
+        observe_response(numbers, sigma, start, periods).map(|(point, response)| (point, Some(response)))
+    } else {
+        observe(numbers, sigma, start, periods).map(|point| (point, None))
+    }
+}
+
+impl Cell {
+    pub(crate) fn failed(failure: String) -> Self {
+        Self { failure, ..Self::default() }
+    }
+
+    /// The regime, unless the cell failed.
+    #[must_use]
+    pub fn regime(&self) -> Option<Regime> {
+        self.point.map(|point| point.regime)
+    }
+
+    pub(crate) fn number(&self, of: impl Fn(&Point) -> f64) -> f64 {
+        self.point.as_ref().map_or(f64::NAN, of)
+    }
+
+    pub(crate) fn response(&self, of: impl Fn(&Response) -> f64) -> f64 {
+        self.response.as_ref().map_or(f64::NAN, of)
+    }
+
+    pub(crate) fn lock(&self, of: impl Fn(&Lock) -> f64) -> f64 {
+        self.lock.as_ref().map_or(f64::NAN, of)
+    }
+
+    /// The orbit with the larger B, which is the stable one where one is.
+    pub(crate) fn orbit(&self, of: impl Fn(&Orbit) -> f64) -> f64 {
+        let orbits = self.orbits.iter().flatten();
+        orbits
+            .max_by(|one, other| one.b.total_cmp(&other.b))
+            .map_or(f64::NAN, of)
+    }
+
+    pub(crate) fn orbits(&self, counted: impl Fn(&&Orbit) -> bool) -> u32 {
+        self.orbits.iter().flatten().filter(counted).count() as u32
+    }
+}

@@ -1,0 +1,79 @@
+//! A folder as the storage of a Zarr store, whose files are either complete or absent.
+
+use std::{
+    fs, io,
+    path::{Path, PathBuf},
+    process,
+    sync::atomic::{AtomicU64, Ordering},
+};
+
+use zarrs::storage::{Bytes, OffsetBytesIterator, StorageError, StoreKey, StorePrefix, WritableStorageTraits};
+
+/// Where files are written before they get their name.
+const PARTIAL: &str = ".partial";
+
+/// A folder. (The storage of the crate `zarrs_filesystem` writes in place, and remembers every key.)
+#[derive(Debug)]
+pub(crate) struct Folder {
+    root: PathBuf,
+    written: AtomicU64,
+}
+
+impl Folder {
+    pub(crate) fn new(root: &Path) -> Self {
+        Self { root: root.into(), written: AtomicU64::new(0) }
+    }
+
+    pub(crate) fn path(&self, key: &str) -> PathBuf {
+        self.root.join(key)
+    }
+
+    /// Writes a file completely or not at all: under another name first.
+    pub(crate) fn write(&self, key: &str, content: &[u8]) -> io::Result<()> {
+        let target = self.path(key);
+        let partial = self.path(PARTIAL);
+        fs::create_dir_all(&partial)?;
+        // Several programs may write to one store.
+        let number = self.written.fetch_add(1, Ordering::Relaxed);
+        let path = partial.join(format!("{}-{number}", process::id()));
+        let complete = || {
+            // Not flushed to the disk: on a busy one, that took twenty times as long as the cells. Only a power failure needs it.
+            fs::write(&path, content)?;
+            if let Some(parent) = target.parent() {
+                fs::create_dir_all(parent)?;
+            }
+            fs::rename(&path, &target)
+        };
+        complete().inspect_err(|_| drop(fs::remove_file(&path)))
+    }
+
+    /// Removes what kills have left.
+    pub(crate) fn tidy(&self) -> io::Result<()> {
+        match fs::remove_dir_all(self.path(PARTIAL)) {
+            Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
+            _ => Ok(()),
+        }
+    }
+}
+
+impl WritableStorageTraits for Folder {
+    fn set(&self, key: &StoreKey, value: Bytes) -> Result<(), StorageError> {
+        Ok(self.write(key.as_str(), &value)?)
+    }
+
+    fn set_partial_many(&self, _: &StoreKey, _: OffsetBytesIterator) -> Result<(), StorageError> {
+        Err(StorageError::Unsupported("files are written as a whole".into()))
+    }
+
+    fn erase(&self, key: &StoreKey) -> Result<(), StorageError> {
+        Ok(fs::remove_file(self.path(key.as_str()))?)
+    }
+
+    fn erase_prefix(&self, prefix: &StorePrefix) -> Result<(), StorageError> {
+        Ok(fs::remove_dir_all(self.path(prefix.as_str()))?)
+    }
+
+    fn supports_set_partial(&self) -> bool {
+        false
+    }
+}

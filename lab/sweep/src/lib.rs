@@ -1,0 +1,24 @@
+//! Sweeps over any numbers of a scene and of its start, written to a Zarr store as they are computed.
+//!
+//! A [`Plan`] has the cells in their order, [`run`] computes the chunks that the store does not have. A chunk is complete or
+//! absent, and every cell depends only on its position: a sweep that was killed gives the same bytes as one that was not.
+
+#![forbid(unsafe_code)]
+
+mod axis;
+mod cell;
+mod folder;
+mod plan;
+mod run;
+mod settings;
+mod sobol;
+mod store;
+mod variables;
+
+pub use axis::{Axis, SIGMA, Values};
+pub use cell::Results;
+pub use plan::Plan;
+pub use run::{Estimate, Monitor, Shard, estimate, merge, run};
+pub use settings::{PlanError, Settings};
+pub use store::StoreError;
+pub use variables::ABSENT;

@@ -1,0 +1,201 @@
+//! Runs a sweep on all cores, chunk by chunk.
+
+use std::{
+    path::{Path, PathBuf},
+    sync::{
+        Mutex,
+        atomic::{AtomicBool, AtomicU64, Ordering::Relaxed},
+    },
+    time::{Duration, Instant},
+};
+
+use rayon::prelude::*;
+
+use crate::{
+    cell::Cell,
+    plan::Plan,
+    store::{Store, StoreError},
+};
+
+/// The progress of a sweep, and the flag that stops it.
+#[derive(Debug, Default)]
+pub struct Monitor {
+    /// Cells that were in the store at the start.
+    pub found: AtomicU64,
+    /// Cells computed since then.
+    pub computed: AtomicU64,
+    /// Those of them that failed.
+    pub failed: AtomicU64,
+    /// Ends the sweep within the duration of a cell; unfinished chunks are dropped.
+    pub stop: AtomicBool,
+    /// Reason of the first failure.
+    pub reason: Mutex<Option<String>>,
+}
+
+/// The part of a sweep that one process computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// Number of this part, from 0.
+    pub number: u64,
+    /// Number of parts.
+    pub of: u64,
+}
+
+impl Shard {
+    /// The whole sweep.
+    pub const ALL: Self = Self { number: 0, of: 1 };
+}
+
+/// Chunks that are computed at the same time for every eight threads: the last cells of one and the first of the next.
+const AT_ONCE: usize = 2;
+
+/// Computes the chunks of a part of `plan` that its store in `folder` does not have. True if all are there at the end; false if the
+/// monitor stopped it.
+///
+/// # Errors
+/// A folder that cannot be used.
+pub fn run(plan: &Plan, folder: &Path, shard: Shard, monitor: &Monitor) -> Result<bool, StoreError> {
+    let store = Store::open(plan, folder)?;
+    let chunks = || (shard.number..plan.chunks()).step_by(shard.of as usize);
+    for n in chunks() {
+        let index = plan.chunk_index(n);
+        if store.has(&index) {
+            monitor.found.fetch_add(plan.chunk_cells(&index), Relaxed);
+        }
+    }
+    let next = Mutex::new(chunks());
+    let error = Mutex::new(None);
+    let work = || {
+        loop {
+            let n = next.lock().ok().and_then(|mut chunks| chunks.next());
+            let Some(index) = n.filter(|_| !monitor.stop.load(Relaxed)).map(|n| plan.chunk_index(n)) else {
+                return;
+            };
+            if store.has(&index) {
+                continue;
+            }
+            let Some(cells) = chunk(plan, &index, monitor) else {
+                return;
+            };
+            if let Err(failure) = store.write(&index, &cells) {
+                monitor.stop.store(true, Relaxed);
+                if let Ok(mut error) = error.lock() {
+                    error.get_or_insert(failure);
+                }
+            }
+        }
+    };
+    let at_once = AT_ONCE * rayon::current_num_threads().div_ceil(8);
+    std::thread::scope(|scope| {
+        for _ in 0..at_once {
+            scope.spawn(work);
+        }
+    });
+    match error.into_inner().unwrap_or_default() {
+        Some(error) => Err(error),
+        None if monitor.stop.load(Relaxed) => Ok(false),
+        None => {
+            if shard == Shard::ALL {
+                store.tidy()?;
+            }
+            Ok(true)
+        }
+    }
+}
+
+/// Collects the chunks of other stores of the same sweep. Returns the number of cells that are still missing.
+///
+/// # Errors
+/// A folder that cannot be used, or a store of another sweep.
+pub fn merge(plan: &Plan, folder: &Path, from: &[PathBuf]) -> Result<u64, StoreError> {
+    let sources = from
+        .iter()
+        .map(|one| Store::existing(plan, one))
+        .collect::<Result<Vec<_>, _>>()?;
+    let store = Store::open(plan, folder)?;
+    let mut missing = 0;
+    for index in (0..plan.chunks()).map(|n| plan.chunk_index(n)) {
+        if store.has(&index) {
+            continue;
+        }
+        match sources.iter().find(|source| source.has(&index)) {
+            Some(source) => store.copy(&index, source)?,
+            None => missing += plan.chunk_cells(&index),
+        }
+    }
+    if missing == 0 {
+        store.tidy()?;
+    }
+    Ok(missing)
+}
+
+/// All cells of a chunk; None if it was stopped.
+fn chunk(plan: &Plan, index: &[u64], monitor: &Monitor) -> Option<Vec<Cell>> {
+    (0..plan.chunk_size() as u64)
+        .into_par_iter()
+        .map(|n| {
+            if monitor.stop.load(Relaxed) {
+                return None;
+            }
+            let cell = plan.cell(index, n);
+            if !cell.failure.is_empty() {
+                monitor.failed.fetch_add(1, Relaxed);
+                if let Ok(mut reason) = monitor.reason.lock() {
+                    reason.get_or_insert_with(|| cell.failure.clone());
+                }
+            }
+            if cell.regime().is_some() || !cell.failure.is_empty() {
+                monitor.computed.fetch_add(1, Relaxed);
+            }
+            Some(cell)
+        })
+        .collect()
+}
+
+/// What a sweep will cost.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Estimate {
+    /// Number of cells.
+    pub cells: u64,
+    /// Duration on this machine, h.
+    pub hours: f64,
+    /// Size before compression, bytes.
+    pub bytes: f64,
+}
+
+impl Estimate {
+    /// Above this, a sweep may be a mistake: it must be confirmed.
+    #[must_use]
+    pub fn is_large(&self) -> bool {
+        self.hours > 2.0 || self.bytes > 2e10
+    }
+}
+
+/// Largest number of cells, and duration, of the trial behind an estimate.
+const TRIED: usize = 64;
+const TRIAL: Duration = Duration::from_secs(1);
+
+/// Estimates the cost of a sweep from a few of its cells; the flag ends it early.
+///
+/// # Errors
+/// If all of them fail: the reason of the first.
+pub fn estimate(plan: &Plan, stop: &AtomicBool) -> Result<Estimate, String> {
+    let start = Instant::now();
+    // Positions that do not follow a regular grid: the golden ratio.
+    let tried: Vec<Cell> = (0..TRIED)
+        .map(|n| (0.5 + 0.618_033_988_749_895 * n as f64).fract())
+        .take_while(|n| *n == 0.5 || start.elapsed() < TRIAL && !stop.load(Relaxed))
+        .map(|position| plan.cell_near(position))
+        .collect();
+    if tried.iter().all(|cell| !cell.failure.is_empty()) {
+        let reason = tried.first().map_or("", |cell| &cell.failure);
+        return Err(format!("all of {} cells that were tried fail: {reason}", tried.len()));
+    }
+    let cell = start.elapsed().as_secs_f64() / tried.len() as f64;
+    let threads = rayon::current_num_threads() as f64;
+    Ok(Estimate {
+        cells: plan.cells(),
+        hours: plan.cells() as f64 * cell / threads / 3600.0,
+        bytes: plan.bytes(),
+    })
+}

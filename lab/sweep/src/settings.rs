@@ -1,0 +1,133 @@
+//! Settings of a sweep, checked.
+
+use vines_testbench::scene::SceneError;
+
+use crate::{
+    axis::{Axis, SIGMA},
+    cell::Results,
+    sobol,
+};
+
+/// Settings of a sweep besides its scene.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Settings {
+    /// The axes; those with one value per sample share one dimension, the last.
+    pub axes: Vec<Axis>,
+    /// Detuning, if it is not an axis. Without it: that of the scene's stable phase-resonant orbit, or 0.
+    pub sigma: Option<f64>,
+    /// Number of samples of random and Sobol axes.
+    pub samples: Option<u64>,
+    /// Seed of random axes.
+    pub seed: u64,
+    /// Largest number of periods that a cell is followed.
+    pub periods: usize,
+    /// What is computed.
+    pub results: Results,
+    /// Largest number of cells in a chunk of the store.
+    pub chunk: u64,
+}
+
+impl Default for Settings {
+    fn default() -> Self {
+        Self {
+            axes: Vec::new(),
+            sigma: None,
+            samples: None,
+            seed: 0,
+            periods: vines_model::map::LIMIT,
+            results: Results::default(),
+            chunk: 4096,
+        }
+    }
+}
+
+impl Settings {
+    pub(crate) fn check(&self) -> Result<(), PlanError> {
+        let refused = |message: String| Err(PlanError::Setting(message));
+        let axes = &self.axes;
+        if axes.is_empty() {
+            return refused("a sweep needs at least one axis, for instance plant.r=0.3:1:71".into());
+        }
+        if let Some((n, axis)) = axes
+            .iter()
+            .enumerate()
+            .find(|(n, axis)| axes[..*n].iter().any(|one| one.name == axis.name))
+        {
+            return refused(format!("axis {} is {} again", n + 1, axis.name));
+        }
+        if self.sigma.is_some() && axes.iter().any(|axis| axis.name == SIGMA) {
+            return refused("sigma is an axis and a constant: give one of them".into());
+        }
+        if let Some(sigma) = self.sigma.filter(|sigma| !sigma.is_finite()) {
+            return refused(format!("sigma = {sigma} (dimensionless) is not a finite number"));
+        }
+        if !(100..=u32::MAX as usize / 8).contains(&self.periods) {
+            return refused(format!(
+                "{} periods: from 100 to {} are allowed",
+                self.periods,
+                u32::MAX / 8
+            ));
+        }
+        if self.chunk == 0 {
+            return refused("a chunk of 0 cells: at least 1 is needed".into());
+        }
+        Ok(())
+    }
+}
+
+/// Why a sweep cannot be made.
+#[derive(Debug, thiserror::Error)]
+pub enum PlanError {
+    /// The scene refuses its values or an axis.
+    #[error(transparent)]
+    Scene(#[from] SceneError),
+    /// A setting that is not allowed.
+    #[error("{0}")]
+    Setting(String),
+}
+
+/// Most cells: their number must be countable in the metadata of the store.
+const MOST: u64 = 1 << 53;
+/// Number of points of a Sobol sequence.
+const SOBOL: u64 = 1 << 32;
+
+/// The dimension that random and Sobol axes share.
+pub(crate) const SAMPLE: &str = "sample";
+
+/// Names and lengths of the dimensions.
+pub(crate) fn dimensions(settings: &Settings) -> Result<(Vec<String>, Vec<u64>), PlanError> {
+    let refused = |message: String| Err(PlanError::Setting(message));
+    let own = || {
+        settings
+            .axes
+            .iter()
+            .filter_map(|axis| axis.points().map(|points| (axis.name.clone(), points)))
+    };
+    let (mut names, mut shape): (Vec<String>, Vec<u64>) = own().unzip();
+    let sampled = settings.axes.len() - names.len();
+    match settings.samples {
+        None if sampled > 0 => return refused("random and Sobol axes need a number of samples: --samples N".into()),
+        Some(_) if sampled == 0 => return refused("--samples needs a random or Sobol axis".into()),
+        Some(samples) if !(2..=SOBOL).contains(&samples) => {
+            return refused(format!("{samples} samples: from 2 to {SOBOL} are allowed"));
+        }
+        Some(samples) => {
+            names.push(SAMPLE.into());
+            shape.push(samples);
+        }
+        None => {}
+    }
+    if sampled > sobol::MOST {
+        return refused(format!(
+            "{sampled} random and Sobol axes: at most {} are allowed",
+            sobol::MOST
+        ));
+    }
+    let cells = shape
+        .iter()
+        .try_fold(1_u64, |product, length| product.checked_mul(*length));
+    if cells.is_none_or(|cells| cells > MOST) {
+        return refused("more than 2^53 cells: take fewer values".into());
+    }
+    Ok((names, shape))
+}

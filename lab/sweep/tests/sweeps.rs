@@ -1,0 +1,289 @@
+//! Sweeps against single cells and the regime map, and what is refused.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::Path,
+    sync::atomic::{AtomicBool, Ordering::Relaxed},
+};
+
+use vines_model::map::{LIMIT, Plan as MapPlan};
+use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, estimate, merge, run};
+use vines_testbench::scene::Family;
+
+fn settings(axes: &[&str]) -> Settings {
+    Settings {
+        axes: axes.iter().map(|axis| axis.parse().unwrap()).collect(),
+        periods: 200,
+        chunk: 7,
+        ..Settings::default()
+    }
+}
+
+fn plan(settings: Settings) -> Result<Plan, String> {
+    Plan::new(Family::parse("", None, &[]).unwrap(), settings).map_err(|error| error.to_string())
+}
+
+fn refused(settings: Settings) -> String {
+    plan(settings).unwrap_err()
+}
+
+/// All files of a store.
+fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    let mut folders = vec![folder.to_path_buf()];
+    while let Some(one) = folders.pop() {
+        for entry in fs::read_dir(&one).unwrap().flatten() {
+            let path = entry.path();
+            if path.is_dir() {
+                folders.push(path);
+            } else {
+                let name = path.strip_prefix(folder).unwrap().display().to_string();
+                all.insert(name, fs::read(&path).unwrap());
+            }
+        }
+    }
+    all
+}
+
+/// The numbers of a variable with one chunk.
+fn numbers(folder: &Path, name: &str) -> Vec<f64> {
+    use std::sync::Arc;
+    use zarrs::{array::Array, storage::store::MemoryStore};
+    let memory = MemoryStore::new();
+    for (key, value) in files(&folder.join(name)) {
+        use zarrs::storage::WritableStorageTraits;
+        let key = format!("a/{key}").as_str().try_into().unwrap();
+        memory.set(&key, value.into()).unwrap();
+    }
+    let array = Array::open(Arc::new(memory), "/a").unwrap();
+    array.retrieve_array_subset(&array.subset_all()).unwrap()
+}
+
+#[test]
+fn a_sweep_over_sigma_and_g_has_the_bits_of_the_map() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = plan(Settings {
+        chunk: 1000,
+        periods: 400,
+        ..settings(&["sigma=-3:3:7", "excitation.G=0.4:2.4:6"])
+    })
+    .unwrap();
+    assert!(run(&plan, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
+    let scene = vines_testbench::scene::Scene::load(None, &[]).unwrap();
+    let map = MapPlan {
+        scene: scene.dimensionless(),
+        sigma: 0.0,
+        start: scene.dimensionless_start(),
+        x: "G=0.4:2.4:6".parse().unwrap(),
+        y: "sigma=-3:3:7".parse().unwrap(),
+        limit: 400,
+        starts: 1,
+    }
+    .run(|| {})
+    .unwrap();
+    let settling: Vec<f64> = map.cells.iter().map(|cell| cell.point.transient).collect();
+    assert_eq!(numbers(folder.path(), "settling"), settling);
+    let bits = |values: Vec<f64>| values.into_iter().map(f64::to_bits).collect::<Vec<_>>();
+    let exponents = map
+        .cells
+        .iter()
+        .map(|cell| cell.point.exponent.unwrap_or(f64::NAN))
+        .collect();
+    assert_eq!(bits(numbers(folder.path(), "exponent")), bits(exponents));
+}
+
+#[test]
+fn on_a_symmetric_motion_the_response_is_that_of_the_exact_orbit() {
+    let folder = tempfile::tempdir().unwrap();
+    let results = Results::parse(["response", "orbits"]).unwrap();
+    let plan = plan(Settings {
+        results,
+        chunk: 100,
+        ..settings(&["sigma=-1.2:-1.05:2", "excitation.G=1.05:1.25:3"])
+    })
+    .unwrap();
+    assert!(run(&plan, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
+    let [found, exact] = ["C", "orbit_C"].map(|name| numbers(folder.path(), name));
+    // At an impact on the orbit, m M/(M + m) (1 - r^2) w'^2/2; two per period. Base amplitude and C give the damper's part to first order.
+    let [impact, damper] = ["impact_power", "damper_power"].map(|name| numbers(folder.path(), name));
+    for n in 0..found.len() {
+        assert!((found[n] / exact[n] - 1.0).abs() < 1e-5, "{found:?} {exact:?}");
+        assert!(impact[n] > 0.0 && damper[n] > 0.0);
+    }
+    let scene = vines_testbench::scene::Scene::load(None, &[]).unwrap();
+    let (d, p) = (scene.dimensionless(), scene.plant);
+    let omega = d.omega(-1.2);
+    let velocity = d.b * omega * exact[0];
+    // The relative velocity of damper and base is that of v within epsilon, and of the base.
+    assert!(
+        (damper[0] / (0.5 * p.damping * velocity * velocity) - 1.0).abs() < 0.05,
+        "{}",
+        damper[0]
+    );
+}
+
+#[test]
+fn shards_stops_and_resumptions_give_the_same_bytes() {
+    let whole = tempfile::tempdir().unwrap();
+    let parts = tempfile::tempdir().unwrap();
+    let settings = Settings {
+        samples: Some(20),
+        ..settings(&[
+            "start.dq2=random:-1:1",
+            "plant.r=0.4,0.65,0.8",
+            "excitation.G=sobol:0.5:1.5",
+        ])
+    };
+    let plan = plan(settings).unwrap();
+    assert!(run(&plan, whole.path(), Shard::ALL, &Monitor::default()).unwrap());
+    let stopped = Monitor::default();
+    stopped.stop.store(true, Relaxed);
+    assert!(!run(&plan, parts.path(), Shard::ALL, &stopped).unwrap());
+    for number in [1, 0] {
+        assert!(run(&plan, parts.path(), Shard { number, of: 2 }, &Monitor::default()).unwrap());
+    }
+    let monitor = Monitor::default();
+    assert!(run(&plan, parts.path(), Shard::ALL, &monitor).unwrap());
+    assert_eq!((monitor.found.load(Relaxed), monitor.computed.load(Relaxed)), (60, 0));
+    assert!(files(whole.path()) == files(parts.path()));
+}
+
+#[test]
+fn shards_in_stores_of_their_own_merge_to_the_same_bytes() {
+    let [whole, first, second, merged] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
+    let plan = plan(settings(&["start.dq2=0.1:0.6:9", "plant.r=0.5,0.65"])).unwrap();
+    assert!(run(&plan, whole.path(), Shard::ALL, &Monitor::default()).unwrap());
+    for (number, folder) in [&first, &second].into_iter().enumerate() {
+        assert!(
+            run(
+                &plan,
+                folder.path(),
+                Shard { number: number as u64, of: 2 },
+                &Monitor::default()
+            )
+            .unwrap()
+        );
+    }
+    assert_eq!(merge(&plan, merged.path(), &[first.path().into()]).unwrap(), 6);
+    assert_eq!(
+        merge(&plan, merged.path(), &[first.path().into(), second.path().into()]).unwrap(),
+        0
+    );
+    assert!(files(whole.path()) == files(merged.path()));
+    let error = merge(&plan, merged.path(), &["missing".into()])
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("missing is not the store"), "{error}");
+}
+
+#[test]
+fn the_locked_point_of_a_cell_is_that_of_the_experiment() {
+    let folder = tempfile::tempdir().unwrap();
+    let results = Results::parse(["lock"]).unwrap();
+    let plan = plan(Settings { results, chunk: 100, ..settings(&["excitation.G=0.1,1.1"]) }).unwrap();
+    assert!(run(&plan, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
+    // As the README shows for the default scene; at G = 0.1, nothing is hit.
+    let sigma = numbers(folder.path(), "lock_sigma");
+    assert!(sigma[0].is_nan() && (sigma[1] + 1.139_376).abs() < 4e-6, "{sigma:?}");
+    assert!((numbers(folder.path(), "lock_C")[1] - 0.448_018).abs() < 4e-6);
+}
+
+#[test]
+fn a_failed_cell_has_its_reason_and_stops_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = plan(Settings {
+        chunk: 4,
+        ..settings(&["start.q1=0,0.006", "start.q2=-0.006,0"])
+    })
+    .unwrap();
+    let monitor = Monitor::default();
+    assert!(run(&plan, folder.path(), Shard::ALL, &monitor).unwrap());
+    assert_eq!((monitor.computed.load(Relaxed), monitor.failed.load(Relaxed)), (4, 1));
+    let reason = monitor.reason.lock().unwrap().clone().unwrap();
+    assert!(
+        reason.contains("0.012") && reason.contains('m') && reason.contains("from -b to b"),
+        "{reason}"
+    );
+    let settling = numbers(folder.path(), "settling");
+    assert_eq!(
+        settling.iter().map(|one| one.is_nan()).collect::<Vec<_>>(),
+        [false, false, true, false]
+    );
+}
+
+#[test]
+fn axes_that_make_no_sense_are_refused_with_their_name_and_value() {
+    let axis = |text: &str| text.parse::<Axis>().unwrap_err();
+    assert!(axis("plant.r=0.7").contains("plant.r has one value") && axis("plant.r=0.7").contains("--set plant.r=0.7"));
+    assert!(axis("plant.r=0.3:NaN:5").contains("NaN is not a finite number"));
+    assert!(axis("plant.r=0.5,0.5").contains("0.5 twice"));
+    assert!(axis("plant.r=0.9:0.3:5").contains("from 0.9 to 0.3"));
+    assert!(axis("plant.r=random:1:1").contains("below"));
+    assert!(axis("plant.r").contains("expected KEY="));
+    let unknown = refused(settings(&["plant.rr=0.3:0.5:3"]));
+    assert!(
+        unknown.contains("plant.rr") && unknown.contains("unknown field"),
+        "{unknown}"
+    );
+    let mixed = refused(settings(&["plant.epsilon=0.001:0.01:3"]));
+    assert!(mixed.contains("SI units"), "{mixed}");
+    assert!(refused(settings(&["resonance.sensor=1:2:2"])).contains("resonance.sensor"));
+    assert!(refused(settings(&["plant.r=0.3:0.5:3", "plant.r=0.3:0.5:3"])).contains("plant.r again"));
+    assert!(refused(settings(&["plant.r=random:0.3:0.5"])).contains("--samples"));
+    assert!(refused(Settings { periods: 99, ..settings(&["plant.r=0.3:0.5:3"]) }).contains("99 periods"));
+    assert!(refused(Settings { sigma: Some(f64::NAN), ..settings(&["plant.r=0.3:0.5:3"]) }).contains("NaN"));
+    assert!(refused(settings(&["plant.r=0.3:0.5:9999999999", "plant.b=1:2:9999999999"])).contains("2^53"));
+    let none = estimate(
+        &plan(settings(&["plant.r=1.2:1.4:3"])).unwrap(),
+        &AtomicBool::new(false),
+    )
+    .unwrap_err();
+    assert!(
+        none.contains("all of") && none.contains("above 0 and at most 1"),
+        "{none}"
+    );
+}
+
+#[test]
+fn a_sweep_of_10_12_cells_is_estimated_and_found_large() {
+    let plan = plan(Settings {
+        periods: LIMIT,
+        ..settings(&["plant.r=0.3:1:1000000", "sigma=-5:5:1000000"])
+    })
+    .unwrap();
+    let estimate = estimate(&plan, &AtomicBool::new(false)).unwrap();
+    println!("{estimate:?}");
+    assert_eq!(estimate.cells, 1_000_000_000_000);
+    assert!(estimate.is_large() && estimate.bytes > 1e13 && estimate.hours > 100.0);
+}
+
+#[test]
+fn a_store_of_another_sweep_or_other_files_stay_as_they_are() {
+    let folder = tempfile::tempdir().unwrap();
+    let go = |settings| run(&plan(settings).unwrap(), folder.path(), Shard::ALL, &Monitor::default());
+    assert!(go(settings(&["plant.r=0.3,0.5"])).unwrap());
+    let before = files(folder.path());
+    let axes = go(settings(&["plant.r=0.3,0.6"])).unwrap_err().to_string();
+    assert!(axes.contains("another `axes`"), "{axes}");
+    let family = Family::parse("", None, &["plant.b=0.02".parse().unwrap()]).unwrap();
+    let other = Plan::new(family, settings(&["plant.r=0.3,0.5"])).unwrap();
+    let scene = run(&other, folder.path(), Shard::ALL, &Monitor::default())
+        .unwrap_err()
+        .to_string();
+    assert!(scene.contains("another `scene`"), "{scene}");
+    assert!(before == files(folder.path()));
+    // A newer version of the program does not continue a store of an older one.
+    let group = folder.path().join("zarr.json");
+    let text = fs::read_to_string(&group).unwrap();
+    fs::write(&group, text.replace(env!("CARGO_PKG_VERSION"), "0.0.9")).unwrap();
+    let version = go(settings(&["plant.r=0.3,0.5"])).unwrap_err().to_string();
+    assert!(version.contains("another `version`"), "{version}");
+    let notes = tempfile::tempdir().unwrap();
+    fs::write(notes.path().join("notes.txt"), "mine").unwrap();
+    let error = run(&other, notes.path(), Shard::ALL, &Monitor::default())
+        .unwrap_err()
+        .to_string();
+    assert!(error.contains("not the store of a sweep"), "{error}");
+    assert_eq!(files(notes.path()).len(), 1);
+}

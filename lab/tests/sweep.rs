@@ -1,0 +1,160 @@
+//! `vines sweep` as a program: kills, signals, a full disk and folders that cannot be written.
+
+use std::{
+    collections::BTreeMap,
+    fs,
+    path::Path,
+    process::{Child, Command, Output, Stdio},
+    thread,
+    time::Duration,
+};
+
+const ARGUMENTS: [&str; 9] = [
+    "sweep",
+    "--axis",
+    "sigma=-3:3:61",
+    "--axis",
+    "start.dq2=-0.7:0.7:50",
+    "--periods",
+    "200",
+    "--chunk",
+    "25",
+];
+
+fn vines(arguments: &[&str], out: &Path) -> Command {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_vines"));
+    command.args(arguments).arg("--out").arg(out);
+    command.stdout(Stdio::piped()).stderr(Stdio::piped());
+    command
+}
+
+fn text(output: &Output) -> String {
+    String::from_utf8_lossy(&output.stdout).into_owned() + &String::from_utf8_lossy(&output.stderr)
+}
+
+fn files(folder: &Path, below: &str, all: &mut BTreeMap<String, Vec<u8>>) {
+    for entry in fs::read_dir(folder.join(below)).unwrap().flatten() {
+        let name = format!("{below}/{}", entry.file_name().display());
+        if entry.path().is_dir() {
+            files(folder, name.trim_start_matches('/'), all);
+        } else {
+            all.insert(name, fs::read(entry.path()).unwrap());
+        }
+    }
+}
+
+fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
+    let mut all = BTreeMap::new();
+    files(folder, "", &mut all);
+    all
+}
+
+/// A program that a test starts, and that is still running.
+fn signalled(mut child: Child, after: Duration, signal: &str) -> Option<Output> {
+    thread::sleep(after);
+    if child.try_wait().unwrap().is_none() {
+        let id = child.id().to_string();
+        Command::new("kill").args(["-s", signal, &id]).status().unwrap();
+    }
+    child.wait_with_output().ok()
+}
+
+#[test]
+fn after_20_kills_the_store_is_that_of_an_undisturbed_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let [whole, killed] = ["whole", "killed"].map(|name| folder.path().join(name));
+    let output = vines(&ARGUMENTS, &whole).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output));
+    let mut kills = 0;
+    for n in 0..20 {
+        // From before the metadata is there to the middle of the chunks.
+        let after = Duration::from_millis(3 + 7 * n % 60);
+        let output = signalled(vines(&ARGUMENTS, &killed).spawn().unwrap(), after, "KILL").unwrap();
+        kills += usize::from(!output.status.success());
+    }
+    let output = vines(&ARGUMENTS, &killed).output().unwrap();
+    assert!(output.status.success(), "{}", text(&output));
+    println!("{kills} kills; {}", text(&output));
+    assert!(kills == 20 && content(&whole) == content(&killed));
+}
+
+#[test]
+fn ctrl_c_keeps_complete_chunks_and_the_same_command_goes_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("store");
+    let mut arguments = ARGUMENTS.map(String::from);
+    arguments[2] = "sigma=-3:3:3001".into();
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    let output = signalled(
+        vines(&arguments, &out).spawn().unwrap(),
+        Duration::from_millis(1500),
+        "INT",
+    )
+    .unwrap();
+    assert_eq!(output.status.code(), Some(130), "{}", text(&output));
+    assert!(text(&output).contains("the same command goes on"), "{}", text(&output));
+    let chunks = content(&out)
+        .keys()
+        .filter(|key| key.starts_with("/failure/c/"))
+        .count();
+    println!("{chunks} chunks");
+    assert!(chunks > 0 || content(&out).contains_key("/zarr.json"));
+}
+
+#[test]
+fn a_full_disk_and_a_folder_that_cannot_be_written_are_explained() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("store");
+    // No file may grow beyond one block: as on a full disk, metadata that fits is written and a larger chunk is not.
+    let arguments = [
+        "sweep",
+        "--axis",
+        "plant.r=0.3:0.9:400",
+        "--periods",
+        "100",
+        "--sigma=-4",
+    ]
+    .join(" ");
+    let script = format!(
+        "trap '' XFSZ; ulimit -f 4; exec {} {arguments} --out {}",
+        env!("CARGO_BIN_EXE_vines"),
+        out.display()
+    );
+    let output = Command::new("sh").args(["-c", &script]).output().unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output));
+    assert!(
+        text(&output).contains("cannot write to") && text(&output).contains("goes on"),
+        "{}",
+        text(&output)
+    );
+    let output = vines(&["sweep", "--axis", "plant.r=0.3,0.4"], Path::new("/proc/store"))
+        .output()
+        .unwrap();
+    assert_eq!(output.status.code(), Some(1), "{}", text(&output));
+    assert!(
+        text(&output).contains("cannot write to /proc/store"),
+        "{}",
+        text(&output)
+    );
+}
+
+#[test]
+fn a_large_sweep_needs_a_confirmation() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("store");
+    let arguments = [
+        "sweep",
+        "--axis",
+        "plant.r=0.3:0.9:1000000",
+        "--axis",
+        "sigma=-5:5:1000000",
+    ];
+    let output = vines(&arguments, &out).output().unwrap();
+    assert_eq!(output.status.code(), Some(2), "{}", text(&output));
+    let text = text(&output);
+    assert!(
+        text.contains("1000000000000 cells") && text.contains(" h ") && text.contains("GB") && text.contains("--yes"),
+        "{text}"
+    );
+    assert!(!out.exists());
+}

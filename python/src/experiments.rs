@@ -1,0 +1,218 @@
+//! Experiments, orbits, theory and regimes. Results are JSON: its numbers keep all bits, and Python names them.
+
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering::Relaxed},
+};
+
+use phase_lock::{Input, State};
+use pyo3::{
+    exceptions::{PyRuntimeError, PyValueError},
+    prelude::*,
+};
+use serde_json::json;
+use vines_model::{
+    map::observe,
+    orbit,
+    theory::{SlowFlow, resonant},
+};
+use vines_testbench::{
+    backbone::track,
+    comparison::{Comparison, TrackedComparison},
+    experiment::{self, Plan},
+    identification,
+    rig::{BuiltIn, Drive, GroundTruth, Rig, RigError, Sensors, Simulated},
+};
+
+use crate::{
+    scene::{Scene, invalid, json},
+    wait::wait,
+};
+
+/// A rig that fails once the flag is set.
+struct Stoppable {
+    rig: Box<dyn Rig>,
+    stop: Arc<AtomicBool>,
+}
+
+impl Rig for Stoppable {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        if self.stop.load(Relaxed) {
+            return Err(RigError::Failed("interrupted".into()));
+        }
+        self.rig.sense()
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.rig.advance(drive, step)
+    }
+
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        self.rig.hold(displacement, step)
+    }
+
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        self.rig.ground_truth()
+    }
+}
+
+/// Runs an experiment on the scene's rig; its failure is a `RuntimeError`.
+fn experiment(
+    py: Python<'_>,
+    scene: &vines_testbench::scene::Scene,
+    work: impl FnOnce(&mut Stoppable) -> Result<String, String> + Send,
+) -> PyResult<String> {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    let run = || {
+        let rig = Simulated::of(scene).map_err(|error| error.to_string())?;
+        work(&mut Stoppable { rig, stop: flag })
+    };
+    wait(py, &stop, |_| Ok(()), run)?.map_err(PyRuntimeError::new_err)
+}
+
+fn text(result: &impl serde::Serialize) -> Result<String, String> {
+    serde_json::to_string(result).map_err(|error| error.to_string())
+}
+
+#[pyfunction]
+pub fn identify(py: Python<'_>, scene: &Scene) -> PyResult<String> {
+    let scene = &scene.scene;
+    let mut controller = BuiltIn::new(&scene.controller_config()).map_err(invalid)?;
+    experiment(py, scene, |rig| {
+        let record =
+            experiment::run(rig, &mut controller, &Plan::of(scene), |_, _, _| {}).map_err(|error| error.to_string())?;
+        let found = identification::identify(&record, scene).map_err(|error| error.to_string())?;
+        text(&Comparison::of(&found, scene))
+    })
+}
+
+#[pyfunction]
+pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
+    let scene = &scene.scene;
+    let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(invalid)?;
+    experiment(py, scene, |rig| {
+        let tracked = track(rig, &mut controller, scene, |_, _| {}).map_err(|error| error.to_string())?;
+        text(&TrackedComparison::of(&tracked, scene))
+    })
+}
+
+#[pyfunction]
+pub fn orbits(py: Python<'_>, scene: &Scene, sigma: Option<f64>) -> PyResult<String> {
+    let numbers = scene.scene.dimensionless();
+    finite(sigma)?;
+    json(&py.detach(|| match sigma {
+        Some(sigma) => orbit::symmetric_orbits(&numbers, sigma),
+        None => orbit::phase_resonant(&numbers),
+    }))
+}
+
+#[pyfunction]
+pub fn theory(py: Python<'_>, scene: &Scene, points: usize) -> PyResult<String> {
+    if !(2..=100_000).contains(&points) {
+        return Err(PyValueError::new_err(format!(
+            "points = {points}: a number from 2 to 100000 is allowed"
+        )));
+    }
+    let numbers = scene.scene.dimensionless();
+    let flow = SlowFlow::new(numbers.lambda, numbers.r);
+    let manifold = vines_model::theory::Manifold::new(numbers.r);
+    let to = vines_model::theory::B_SYMMETRY_BREAKING;
+    json(&py.detach(|| {
+        json!({
+            "solutions": resonant(&numbers),
+            "backbone": flow.backbone(manifold.b_min(), to, points),
+            "B_min": manifold.b_min(),
+            "C_min": manifold.c_min(),
+        })
+    }))
+}
+
+#[pyfunction]
+pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<f64>, periods: usize) -> PyResult<String> {
+    finite(sigma)?;
+    if !(100..=100_000).contains(&periods) {
+        return Err(PyValueError::new_err(format!(
+            "periods = {periods}: a number from 100 to 100000 is allowed"
+        )));
+    }
+    let (numbers, start) = (scene.scene.dimensionless(), scene.scene.dimensionless_start());
+    let stop = AtomicBool::new(false);
+    let point = wait(
+        py,
+        &stop,
+        |_| Ok(()),
+        || {
+            let sigma = sigma.unwrap_or_else(|| {
+                let orbits = orbit::phase_resonant(&numbers);
+                orbits
+                    .iter()
+                    .find(|orbit| orbit.stable)
+                    .map_or(0.0, |orbit| orbit.sigma)
+            });
+            observe(&numbers, sigma, start, periods).map(|point| (sigma, point))
+        },
+    )?;
+    let (sigma, point) = point.map_err(invalid)?;
+    json(&json!({ "sigma": sigma, "point": point }))
+}
+
+fn finite(sigma: Option<f64>) -> PyResult<()> {
+    match sigma.filter(|sigma| !sigma.is_finite()) {
+        Some(sigma) => Err(invalid(format!(
+            "sigma = {sigma} (dimensionless): a finite number is allowed"
+        ))),
+        None => Ok(()),
+    }
+}
+
+/// The controller, sample by sample.
+#[pyclass]
+#[derive(Clone)]
+pub struct PhaseLock {
+    lock: phase_lock::PhaseLock,
+    state: State,
+}
+
+#[pymethods]
+impl PhaseLock {
+    #[new]
+    fn new(scene: &Scene) -> PyResult<Self> {
+        let lock = scene.scene.controller_config().build().map_err(invalid)?;
+        Ok(Self { state: lock.start(), lock })
+    }
+
+    #[getter]
+    fn sample_time(&self) -> f64 {
+        self.lock.config().sample_time
+    }
+
+    fn copy(&self) -> Self {
+        self.clone()
+    }
+
+    /// omega, amplitude, drive, phase error, response amplitude, coherence, locked, settled, state, fault.
+    #[allow(clippy::type_complexity)]
+    fn sample(
+        &mut self,
+        response: f64,
+        reference: Option<f64>,
+        active: bool,
+    ) -> (f64, f64, f64, f64, f64, f64, bool, bool, u8, u8) {
+        let output = self
+            .lock
+            .process(&mut self.state, Input { response, reference, active });
+        (
+            output.omega,
+            output.amplitude,
+            output.drive,
+            output.phase_error,
+            output.response_amplitude,
+            output.coherence,
+            output.locked,
+            output.settled,
+            output.state as u8,
+            output.fault.map_or(0, |fault| fault as u8),
+        )
+    }
+}

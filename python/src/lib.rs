@@ -1,0 +1,28 @@
+//! The compiled part of the Python package: thin functions; `vines/*.py` has the interface with its documentation.
+
+mod experiments;
+mod plants;
+mod scene;
+mod sweeps;
+mod wait;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<plants::Plants>()?;
+    module.add_class::<scene::Scene>()?;
+    module.add_class::<experiments::PhaseLock>()?;
+    for function in [
+        wrap_pyfunction!(experiments::identify, module)?,
+        wrap_pyfunction!(experiments::backbone, module)?,
+        wrap_pyfunction!(experiments::orbits, module)?,
+        wrap_pyfunction!(experiments::theory, module)?,
+        wrap_pyfunction!(experiments::regime, module)?,
+        wrap_pyfunction!(sweeps::sweep, module)?,
+        wrap_pyfunction!(sweeps::chunks, module)?,
+    ] {
+        module.add_function(function)?;
+    }
+    module.add("version", env!("CARGO_PKG_VERSION"))
+}

@@ -1,0 +1,182 @@
+//! Plants: one, or many at once.
+
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+
+use lovines::{Drive, Event, Parameters, Plant, State, Wall};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ndarray::Array2};
+use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*};
+use rayon::prelude::*;
+
+use crate::{scene::invalid, wait::wait};
+
+/// Plants that advance independently of each other.
+#[pyclass]
+#[derive(Clone)]
+pub struct Plants {
+    plants: Vec<Plant>,
+}
+
+/// Number of the plant, time, kind (0 impact, 1 stuck, 2 released), wall, relative velocity.
+#[derive(Default)]
+struct Events {
+    plant: Vec<u64>,
+    time: Vec<f64>,
+    kind: Vec<u8>,
+    wall: Vec<i8>,
+    velocity: Vec<f64>,
+}
+
+impl Events {
+    fn push(&mut self, plant: usize, time: f64, event: Event) {
+        let (kind, t, wall, velocity) = match event {
+            Event::Impact { t, wall, velocity } => (0, t, wall, velocity),
+            Event::Stuck { t, wall } => (1, t, wall, f64::NAN),
+            Event::Released { t, wall } => (2, t, wall, f64::NAN),
+        };
+        self.plant.push(plant as u64);
+        self.time.push(time + t);
+        self.kind.push(kind);
+        self.wall.push(if wall == Wall::Plus { 1 } else { -1 });
+        self.velocity.push(velocity);
+    }
+
+    fn append(&mut self, mut other: Self) {
+        self.plant.append(&mut other.plant);
+        self.time.append(&mut other.time);
+        self.kind.append(&mut other.kind);
+        self.wall.append(&mut other.wall);
+        self.velocity.append(&mut other.velocity);
+    }
+}
+
+type EventArrays<'py> = (
+    Bound<'py, PyArray1<u64>>,
+    Bound<'py, PyArray1<f64>>,
+    Bound<'py, PyArray1<u8>>,
+    Bound<'py, PyArray1<i8>>,
+    Bound<'py, PyArray1<f64>>,
+);
+
+#[pymethods]
+impl Plants {
+    /// Rows of M, k, c, m, b, r and of q1, dq1, q2, dq2.
+    #[new]
+    fn new(parameters: PyReadonlyArray2<'_, f64>, starts: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
+        let (parameters, starts) = (parameters.as_array(), starts.as_array());
+        let rows = parameters.rows().into_iter().zip(starts.rows());
+        let plants = rows
+            .enumerate()
+            .map(|(n, (p, s))| {
+                let parameters = Parameters {
+                    primary_mass: p[0],
+                    stiffness: p[1],
+                    damping: p[2],
+                    particle_mass: p[3],
+                    half_width: p[4],
+                    restitution: p[5],
+                };
+                let start = State { q1: s[0], dq1: s[1], q2: s[2], dq2: s[3] };
+                Plant::new(parameters, start).map_err(|error| invalid(format!("plant {n}: {error}")))
+            })
+            .collect::<PyResult<_>>()?;
+        Ok(Self { plants })
+    }
+
+    fn __len__(&self) -> usize {
+        self.plants.len()
+    }
+
+    fn copy(&self) -> Self {
+        self.clone()
+    }
+
+    /// Advances all plants, or none if a value is refused or a signal arrives. Returns the events, if they are wanted.
+    fn advance<'py>(
+        &mut self,
+        py: Python<'py>,
+        durations: PyReadonlyArray1<'py, f64>,
+        amplitudes: PyReadonlyArray1<'py, f64>,
+        omegas: PyReadonlyArray1<'py, f64>,
+        events: bool,
+    ) -> PyResult<Option<EventArrays<'py>>> {
+        let (durations, amplitudes, omegas) = (durations.as_array(), amplitudes.as_array(), omegas.as_array());
+        let mut plants = self.plants.clone();
+        let stop = AtomicBool::new(false);
+        let one = |(n, plant): (usize, &mut Plant)| -> Result<Events, String> {
+            if stop.load(Relaxed) {
+                return Err(String::new());
+            }
+            let mut found = Events::default();
+            let (drive, start) = (Drive::harmonic(amplitudes[n], omegas[n]), plant.time());
+            let advanced = if events {
+                plant.advance_with(drive, durations[n], |event| found.push(n, start, event))
+            } else {
+                plant.advance(drive, durations[n])
+            };
+            advanced.map(|_| found).map_err(|error| format!("plant {n}: {error}"))
+        };
+        let mut all = if plants.len() == 1 {
+            // A thread would take longer than most steps.
+            vec![py.detach(|| one((0, &mut plants[0])))]
+        } else {
+            wait(
+                py,
+                &stop,
+                |_| Ok(()),
+                || plants.par_iter_mut().enumerate().map(one).collect(),
+            )?
+        };
+        let mut merged = Events::default();
+        for found in all.drain(..) {
+            merged.append(found.map_err(|error| match error.as_str() {
+                "" => PyKeyboardInterrupt::new_err(()),
+                _ => invalid(error),
+            })?);
+        }
+        self.plants = plants;
+        let Events { plant, time, kind, wall, velocity } = merged;
+        Ok(events.then(|| {
+            (
+                plant.into_pyarray(py),
+                time.into_pyarray(py),
+                kind.into_pyarray(py),
+                wall.into_pyarray(py),
+                velocity.into_pyarray(py),
+            )
+        }))
+    }
+
+    /// Rows of q1, dq1, q2, dq2.
+    fn states<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let mut states = Array2::zeros((self.plants.len(), 4));
+        for (mut row, plant) in states.rows_mut().into_iter().zip(&self.plants) {
+            let State { q1, dq1, q2, dq2 } = plant.state();
+            row.assign(&numpy::ndarray::arr1(&[q1, dq1, q2, dq2]));
+        }
+        states.into_pyarray(py)
+    }
+
+    /// Time, s.
+    fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
+        self.plants.iter().map(Plant::time).collect::<Vec<_>>().into_pyarray(py)
+    }
+
+    /// Wall that the particle is stuck to: 1, -1, or 0.
+    fn walls<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i8>> {
+        let wall = |plant: &Plant| {
+            plant
+                .contact()
+                .map_or(0, |wall| if wall == Wall::Plus { 1 } else { -1 })
+        };
+        self.plants.iter().map(wall).collect::<Vec<i8>>().into_pyarray(py)
+    }
+
+    /// Impacts, and the energy that they dissipated, J.
+    fn totals<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<f64>>) {
+        let totals = || self.plants.iter().map(Plant::totals);
+        (
+            totals().map(|one| one.impacts).collect::<Vec<_>>().into_pyarray(py),
+            totals().map(|one| one.dissipated).collect::<Vec<_>>().into_pyarray(py),
+        )
+    }
+}

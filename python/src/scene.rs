@@ -1,0 +1,51 @@
+//! Scenes.
+
+use std::fmt::Display;
+
+use pyo3::{exceptions::PyValueError, prelude::*};
+use vines_testbench::scene::{Family, Override};
+
+/// A `ValueError`, whose message has the value, its unit and what is allowed.
+pub fn invalid(error: impl Display) -> PyErr {
+    PyValueError::new_err(error.to_string())
+}
+
+pub fn json(value: &impl serde::Serialize) -> PyResult<String> {
+    serde_json::to_string(value).map_err(invalid)
+}
+
+/// A checked scene.
+#[pyclass(frozen)]
+#[derive(Clone)]
+pub struct Scene {
+    pub family: Family,
+    pub scene: vines_testbench::scene::Scene,
+}
+
+#[pymethods]
+impl Scene {
+    #[new]
+    #[pyo3(signature = (text, origin, overrides))]
+    fn new(text: Option<&str>, origin: &str, overrides: Vec<String>) -> PyResult<Self> {
+        let overrides = overrides
+            .iter()
+            .map(|one| {
+                one.parse::<Override>()
+                    .map_err(|error| invalid(format!("{one}: {error}")))
+            })
+            .collect::<PyResult<Vec<_>>>()?;
+        let family = Family::parse(origin, text, &overrides).map_err(invalid)?;
+        let scene = family.scene(&[]).map_err(invalid)?;
+        Ok(Self { family, scene })
+    }
+
+    /// All settings, as JSON.
+    fn settings(&self) -> PyResult<String> {
+        json(&self.scene)
+    }
+
+    /// epsilon, lambda, r, G, omega0 and b, as JSON.
+    fn dimensionless(&self) -> PyResult<String> {
+        json(&self.scene.dimensionless())
+    }
+}

@@ -1,0 +1,116 @@
+//! Sweeps.
+
+use std::{
+    path::PathBuf,
+    sync::atomic::{AtomicBool, Ordering::Relaxed},
+};
+
+use pyo3::{
+    exceptions::{PyOSError, PyValueError},
+    prelude::*,
+    types::PyDict,
+};
+use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, StoreError, Values, estimate, run};
+
+use crate::{
+    scene::{Scene, invalid},
+    wait::wait,
+};
+
+/// The values of an axis: first, last and number; a list; or an interval with the name of a design.
+#[derive(FromPyObject)]
+enum Given {
+    Grid(f64, f64, u64),
+    Design(String, f64, f64),
+    List(Vec<f64>),
+}
+
+fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -> PyResult<Plan> {
+    let axes = axes
+        .iter()
+        .map(|(name, values)| {
+            let name: String = name.extract()?;
+            let values = match values.extract()? {
+                Given::Grid(from, to, points) => Values::Grid { from, to, points },
+                Given::List(list) => Values::List(list),
+                Given::Design(design, from, to) => match design.as_str() {
+                    "random" => Values::Random([from, to]),
+                    "sobol" => Values::Sobol([from, to]),
+                    other => {
+                        return Err(invalid(format!(
+                            "{name}: unknown design `{other}`; known are random and sobol"
+                        )));
+                    }
+                },
+            };
+            Axis::new(&name, values).map_err(invalid)
+        })
+        .collect::<PyResult<Vec<_>>>()?;
+    let get = |key: &str| {
+        settings
+            .get_item(key)?
+            .ok_or_else(|| PyValueError::new_err(key.to_string()))
+    };
+    let results: Vec<String> = get("results")?.extract()?;
+    let settings = Settings {
+        axes,
+        sigma: get("sigma")?.extract()?,
+        samples: get("samples")?.extract()?,
+        seed: get("seed")?.extract()?,
+        periods: get("periods")?.extract()?,
+        results: Results::parse(results.iter().map(String::as_str)).map_err(invalid)?,
+        chunk: get("chunk")?.extract()?,
+    };
+    Plan::new(scene.family.clone(), settings).map_err(invalid)
+}
+
+/// Number of cells and of chunks, estimated hours and bytes, and whether these must be confirmed.
+#[pyfunction]
+pub fn chunks(
+    py: Python<'_>,
+    scene: &Scene,
+    axes: &Bound<'_, PyDict>,
+    settings: &Bound<'_, PyDict>,
+) -> PyResult<(u64, u64, f64, f64, bool)> {
+    let plan = plan(scene, axes, settings)?;
+    let stop = AtomicBool::new(false);
+    let cost = wait(py, &stop, |_| Ok(()), || estimate(&plan, &stop))?.map_err(invalid)?;
+    Ok((cost.cells, plan.chunks(), cost.hours, cost.bytes, cost.is_large()))
+}
+
+/// Computes a part of a sweep; `look` receives the number of cells that are complete. Returns the numbers of cells computed and failed.
+#[pyfunction]
+pub fn sweep(
+    py: Python<'_>,
+    scene: &Scene,
+    axes: &Bound<'_, PyDict>,
+    settings: &Bound<'_, PyDict>,
+    out: PathBuf,
+    shard: (u64, u64),
+    look: Option<Py<PyAny>>,
+) -> PyResult<(u64, u64)> {
+    let plan = plan(scene, axes, settings)?;
+    let (number, of) = shard;
+    if number >= of {
+        return Err(invalid(format!(
+            "shard ({number}, {of}): the number counts from 0 to {of} - 1"
+        )));
+    }
+    let monitor = Monitor::default();
+    let looked = |py: Python<'_>| match &look {
+        Some(look) => {
+            let complete = monitor.found.load(Relaxed) + monitor.computed.load(Relaxed);
+            look.call1(py, (complete,)).map(drop)
+        }
+        None => Ok(()),
+    };
+    let result = wait(py, &monitor.stop, looked, || {
+        run(&plan, &out, Shard { number, of }, &monitor)
+    })?;
+    result.map_err(|error| match error {
+        StoreError::Write { .. } => PyOSError::new_err(error.to_string()),
+        _ => invalid(error),
+    })?;
+    looked(py)?;
+    Ok((monitor.computed.load(Relaxed), monitor.failed.load(Relaxed)))
+}

@@ -1,0 +1,166 @@
+"""Plants, batches, scenes and experiments: bits, errors, threads and signals."""
+
+import os
+import signal
+import threading
+import time
+
+import numpy as np
+import pytest
+from fmpy import extract, instantiate_fmu, read_model_description
+
+import vines
+
+DRIVE = {"amplitude": 9.2e-5, "omega": 54.9}
+
+
+def fmu_states(start, steps, duration):
+    """States of the plant's FMU after each of the steps."""
+    path = vines.fmu("LoViNes")
+    folder, description = extract(path), read_model_description(path)
+    numbers = {one.name: one.valueReference for one in description.modelVariables}
+    fmu = instantiate_fmu(folder, description, "CoSimulation")
+    fmu.setupExperiment(startTime=0.0)
+    values = start | {"E": DRIVE["amplitude"], "omega": DRIVE["omega"]}
+    fmu.setReal([numbers[name] for name in values], list(values.values()))
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    outputs = [numbers[name] for name in ("q1", "der(q1)", "q2", "der(q2)")]
+    states = []
+    for n in range(steps):
+        fmu.doStep(n * duration, duration)
+        states.append(fmu.getReal(outputs))
+    fmu.terminate()
+    fmu.freeInstance()
+    return np.array(states)
+
+
+def test_a_plant_has_the_bits_of_the_fmu():
+    plant = vines.Plant(vines.Scene(), dq2=0.5)
+    states = []
+    for _ in range(4096):
+        plant.advance(1.0 / 1024, **DRIVE)
+        states.append(list(plant.state.values()))
+    assert plant.impacts > 40
+    order = [list(plant.state).index(name) for name in ("q1", "dq1", "q2", "dq2")]
+    scene = vines.Scene().settings["plant"]
+    expected = fmu_states(scene | {"der(q2)": 0.5}, 4096, 1.0 / 1024)
+    assert np.array_equal(np.array(states)[:, order], expected)
+
+
+def test_a_batch_has_the_bits_of_its_plants_and_all_their_events():
+    scene, random = vines.Scene(), np.random.default_rng(4)
+    starts, restitution = random.uniform(-0.6, 0.6, 40), random.uniform(0.3, 0.9, 40)
+    batch = vines.Batch(scene.settings["plant"] | {"r": restitution}, {"dq2": starts})
+    durations = random.uniform(0.5, 3.0, 40)
+    events = batch.advance(durations, **DRIVE)
+    for n in range(40):
+        plant = vines.Plant(scene.settings["plant"] | {"r": restitution[n]}, dq2=starts[n])
+        own = plant.advance(durations[n], **DRIVE)
+        mine = events.plant == n
+        assert np.array_equal(batch.states[n], plant.states[0])
+        assert np.array_equal(events.time[mine], own.time)
+        assert np.array_equal(events.velocity[mine], own.velocity, equal_nan=True)
+    assert (events.kind == 0).sum() == batch.impacts.sum() > 500
+    data = batch.to_xarray()
+    assert data.q1.attrs["units"] == "m"
+    assert events.to_xarray().velocity.attrs["units"] == "m/s"
+
+
+def test_a_copy_continues_with_the_same_bits():
+    one = vines.Plant()
+    one.advance(1.0, **DRIVE)
+    other = one.copy()
+    one.advance(1.0, **DRIVE)
+    other.advance(1.0, **DRIVE)
+    assert one.state == other.state
+    assert isinstance(other, vines.Plant)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "parts"),
+    [
+        (
+            lambda: vines.Plant({**vines.Scene().settings["plant"], "k": -1.0}),
+            ["k (stiffness)", "-1", "N/m", "1e-100 to 1e100"],
+        ),
+        (lambda: vines.Plant(q2=0.02), ["0.02", "m", "-b to b"]),
+        (lambda: vines.Plant(q3=0.0), ["q3", "q1, dq1, q2, dq2"]),
+        (lambda: vines.Batch(vines.Scene(), {"dq2": [0.1, np.nan]}), ["plant 1", "NaN", "m/s"]),
+        (lambda: vines.Plant().advance(1.0, amplitude=np.inf), ["E (amplitude", "inf", "m"]),
+        (lambda: vines.Plant().advance(-1.0), ["-1"]),
+        (lambda: vines.Batch({"M": 1.0}), ["k (N/m) is missing"]),
+        (lambda: vines.Scene(plant={"rr": 1}), ["plant.rr", "unknown field"]),
+        (lambda: vines.Scene(controller={"bandwidth": -3.0}), ["controller.bandwidth", "-3"]),
+        (lambda: vines.Scene(path="a", text="b"), ["give one"]),
+        (lambda: vines.fmu("Other"), ["Other", "LoViNes", "PhaseLock"]),
+        (lambda: vines.orbits(sigma=np.nan), ["sigma", "NaN"]),
+        (lambda: vines.regime(periods=3), ["periods = 3", "100"]),
+        (lambda: vines.theory(points=1), ["points = 1", "2 to 100000"]),
+    ],
+)
+def test_a_value_that_is_not_allowed_is_a_value_error_with_value_and_range(wrong, parts):
+    with pytest.raises(ValueError) as error:  # noqa: PT011
+        wrong()
+    for part in parts:
+        assert part in str(error.value)
+
+
+def test_after_an_error_no_plant_has_advanced():
+    batch = vines.Batch(vines.Scene(), {"dq2": [0.1, 0.2]})
+    with pytest.raises(ValueError, match="plant 1"):
+        batch.advance([1.0, np.nan], **DRIVE)
+    assert batch.times.tolist() == [0.0, 0.0]
+
+
+def test_an_experiment_without_a_lock_is_a_runtime_error():
+    with pytest.raises(RuntimeError, match="lock"):
+        vines.identify(vines.Scene(excitation={"G": 0.1}))
+
+
+def test_results_become_datasets_with_units():
+    assert vines.theory(points=5).to_xarray().sigma.attrs["units"] == "1"
+    assert vines.regime(sigma=-1.1).to_xarray().exponent < 0
+    decay = vines.identify().to_xarray()
+    assert decay.sizes["point"] == 96
+    assert decay.attrs["lock_regime"] == "symmetric 1:1"
+    tracked = vines.backbone(vines.Scene(backbone={"C_from": 0.6, "C_to": 0.5, "points": 2})).to_xarray()
+    assert tracked.u_sigma.attrs["units"] == "1"
+    assert tracked.phase_error_deg.attrs["units"] == "degree"
+
+
+def large_batch():
+    return vines.Batch(vines.Scene(), {"dq2": np.linspace(0.3, 0.6, 2000)})
+
+
+def test_ctrl_c_ends_a_batch_within_02_s_and_no_plant_has_advanced():
+    batch = large_batch()
+    sent = []
+
+    def interrupt():
+        sent.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    timer = threading.Timer(0.3, interrupt)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        batch.advance(3000.0, **DRIVE, events=False)
+    assert time.monotonic() - sent[0] < 0.2
+    assert batch.times.max() == 0.0
+
+
+def test_other_threads_run_while_plants_advance():
+    counted, stop = [0], threading.Event()
+
+    def count():
+        while not stop.wait(0.005):
+            counted[0] += 1
+
+    thread = threading.Thread(target=count)
+    thread.start()
+    before = counted[0]
+    large_batch().advance(30.0, **DRIVE, events=False)
+    during = counted[0] - before
+    stop.set()
+    thread.join()
+    assert during > 5

@@ -1,0 +1,139 @@
+"""Sweeps from Python: the bytes of `vines sweep`, interruptions, and a local cluster of Dask."""
+
+import os
+import signal
+import subprocess
+import threading
+import time
+from pathlib import Path
+
+import pytest
+from dask.distributed import Client, LocalCluster
+
+import vines
+
+AXES = {"sigma": (-3.0, 3.0, 31), "start.dq2": (-0.6, 0.7, 40)}
+SETTINGS = {"periods": 200, "chunk": 40}
+
+
+def content(folder):
+    return {str(one.relative_to(folder)): one.read_bytes() for one in Path(folder).rglob("*") if one.is_file()}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory):
+    out = tmp_path_factory.mktemp("whole") / "store"
+    vines.sweep(None, AXES, out=out, **SETTINGS)
+    return content(out)
+
+
+def test_the_store_has_the_bytes_of_the_program(whole, tmp_path):
+    program = os.environ["VINES"]
+    axes = [f"--axis={name}={first}:{last}:{number}" for name, (first, last, number) in AXES.items()]
+    out = tmp_path / "store"
+    subprocess.run([program, "sweep", *axes, "--periods=200", "--chunk=40", f"--out={out}"], check=True)
+    assert content(out) == whole
+
+
+def test_designs_lists_and_results_become_a_dataset_with_units(tmp_path):
+    axes = {"plant.r": [0.5, 0.65], "start.dq2": ("sobol", -0.6, 0.6), "start.q2": ("random", -0.005, 0.005)}
+    cells = vines.sweep(None, axes, out=tmp_path / "s", samples=8, periods=200, results=["response", "orbits"])
+    assert dict(cells.sizes) == {"plant.r": 2, "sample": 8}
+    assert cells["start.dq2"].dims == ("sample",)
+    assert "start.dq2" in cells.coords
+    assert cells["start.dq2"].attrs["units"] == "m/s"
+    assert cells.impact_power.attrs["units"] == "W"
+    assert (cells.failure == "").all()
+    assert cells.attrs["vines"]["scene"]["plant"]["M"] == 3.807
+
+
+@pytest.mark.parametrize(
+    ("axes", "parts"),
+    [
+        ({"plant.rr": (0.3, 0.5, 3)}, ["plant.rr", "unknown field"]),
+        ({"plant.r": (0.3, float("nan"), 3)}, ["plant.r", "NaN"]),
+        ({"plant.r": [0.5]}, ["plant.r has one value"]),
+        ({"plant.r": ("normal", 0.3, 0.5)}, ["plant.r", "normal", "random and sobol"]),
+        (
+            {"plant.r": (0.3, 1.0, 10**6), "sigma": (-5.0, 5.0, 10**6)},
+            ["1000000000000 cells", " h ", "GB", "confirm=True"],
+        ),
+        ({}, ["at least one axis"]),
+    ],
+)
+def test_bad_axes_are_value_errors_and_write_nothing(axes, parts, tmp_path):
+    with pytest.raises(ValueError) as error:  # noqa: PT011
+        vines.sweep(None, axes, out=tmp_path / "store")
+    for part in parts:
+        assert part in str(error.value)
+    assert not (tmp_path / "store").exists()
+
+
+def test_a_store_of_another_sweep_stays_and_a_folder_that_cannot_be_written_is_an_os_error(tmp_path):
+    out = tmp_path / "store"
+    vines.sweep(None, {"plant.r": [0.5, 0.6]}, out=out, periods=200)
+    before = content(out)
+    with pytest.raises(ValueError, match="another `axes`"):
+        vines.sweep(None, {"plant.r": [0.5, 0.7]}, out=out, periods=200)
+    assert content(out) == before
+    with pytest.raises(OSError, match="/proc/store"):
+        vines.sweep(None, {"plant.r": [0.5, 0.6]}, out="/proc/store", periods=200)
+
+
+def test_ctrl_c_ends_within_02_s_and_the_same_call_goes_on(whole, tmp_path):
+    sent = []
+
+    def interrupt():
+        sent.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    out = tmp_path / "store"
+    timer = threading.Timer(0.15, interrupt)
+    timer.start()
+    with pytest.raises(KeyboardInterrupt):
+        vines.sweep(None, AXES, out=out, **SETTINGS)
+    assert time.monotonic() - sent[0] < 0.2
+    vines.sweep(None, AXES, out=out, **SETTINGS)
+    assert content(out) == whole
+
+
+def test_nothing_is_printed_and_a_bar_on_request(tmp_path, capfd):
+    vines.sweep(None, {"plant.r": [0.5, 0.6]}, out=tmp_path / "quiet", periods=200)
+    assert capfd.readouterr() == ("", "")
+    vines.sweep(None, {"plant.r": [0.5, 0.6]}, out=tmp_path / "bar", periods=200, progress=True)
+    assert "2/2" in capfd.readouterr().err
+
+
+def cluster(workers):
+    return LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
+
+
+def test_with_dask_a_worker_is_killed_and_one_added_and_the_bytes_are_the_same(whole, tmp_path):
+    out = tmp_path / "store"
+    with cluster(2) as local, Client(local) as client:
+        identity = client.run(os.getpid)
+
+        def disturb():
+            os.kill(next(iter(identity.values())), signal.SIGKILL)
+            local.scale(3)
+
+        timer = threading.Timer(0.2, disturb)
+        timer.start()
+        vines.sweep(None, AXES, out=out, client=client, **SETTINGS)
+        timer.join()
+    assert content(out) == whole
+
+
+def test_after_the_scheduler_ends_another_one_goes_on(whole, tmp_path):
+    out = tmp_path / "store"
+    with cluster(1) as local, Client(local) as client:
+        timer = threading.Timer(0.3, local.close)
+        timer.start()
+        # Whatever the client notices first.
+        with pytest.raises(Exception):  # noqa: B017, PT011
+            vines.sweep(None, AXES, out=out, client=client, **SETTINGS)
+        timer.join()
+    assert content(out) != whole
+    with cluster(1) as local, Client(local) as client:
+        vines.sweep(None, AXES, out=out, client=client, **SETTINGS)
+    assert content(out) == whole

@@ -1,0 +1,272 @@
+"""Experiments on the simulated rig, exact orbits and first-order theory."""
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _native
+from .datasets import dataset
+from .scenes import Scene
+
+if TYPE_CHECKING:
+    import xarray
+
+#: A table: one array per column; a missing number is NaN.
+Table = dict[str, NDArray[Any]]
+
+
+def _table(rows: list[dict[str, Any]]) -> Table:
+    names = dict.fromkeys(name for row in rows for name in row)
+    return {name: _column([row.get(name) for row in rows]) for name in names}
+
+
+def _column(values: list[Any]) -> NDArray[Any]:
+    kinds = {type(value) for value in values} - {type(None)}
+    if kinds <= {float, int}:
+        return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
+    return np.array(["" if value is None else value for value in values] if str in kinds else values)
+
+
+def _dataset(table: Table, dimension: str, units: dict[str, str], **attributes: Any) -> "xarray.Dataset":
+    columns = {
+        name: (dimension, values) for name, values in table.items() if values.ndim == 1 and values.dtype != object
+    }
+    return dataset(columns, {name: units.get(name, "1") for name in columns}, **attributes)
+
+
+@dataclass(frozen=True)
+class Identification:
+    """What an experiment found; dimensionless throughout.
+
+    Attributes
+    ----------
+    lock : dict
+        The locked point: G, sigma, C, B, phase_error_deg, their standard uncertainties u_*, regime and others.
+    exact : Orbit or None
+        The exact phase-resonant orbit nearest to the lock.
+    decay : dict of ndarray
+        Points along the free decay: tau, C, B, sigma, sigma_steady, their standard uncertainties, sigma_theory and
+        sigma_exact.
+    decay_end : str
+        What ended the points.
+    rms_sigma_error, rms_sigma_exact, rms_steady_exact : float or None
+        RMS of the decay's sigma, and of sigma_steady, minus theory and minus the exact backbone, over C > 0.2.
+    """
+
+    lock: dict[str, Any]
+    exact: "Orbit | None"
+    decay: Table
+    decay_end: str
+    rms_sigma_error: float | None
+    rms_sigma_exact: float | None
+    rms_steady_exact: float | None
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the decay as a dataset over the dimension `point`; the locked point is in its attributes."""
+        lock = {f"lock_{name}": value for name, value in self.lock.items() if value is not None}
+        return _dataset(self.decay, "point", {}, **lock)
+
+
+def identify(scene: Scene | None = None) -> Identification:
+    """Lock the plant at phase resonance, let it decay, and identify its backbone, as `vines identify` does.
+
+    Parameters
+    ----------
+    scene : Scene, optional
+        Default: the default scene.
+
+    Returns
+    -------
+    Identification
+
+    Raises
+    ------
+    ValueError
+        A setting that the controller cannot work with.
+    RuntimeError
+        No lock in the time allowed, or another regime than the symmetric 1:1 one.
+
+    Examples
+    --------
+    >>> found = identify()
+    >>> round(found.lock["sigma"], 5), found.lock["regime"]
+    (-1.13938, 'symmetric 1:1')
+    """
+    found = json.loads(_native.identify((scene or Scene())._native))
+    return Identification(
+        lock=found["lock"],
+        exact=Orbit._of(found["exact"]) if found["exact"] else None,
+        decay=_table(found["decay"]),
+        **{key: found[key] for key in ("decay_end", "rms_sigma_error", "rms_sigma_exact", "rms_steady_exact")},
+    )
+
+
+@dataclass(frozen=True)
+class Backbone:
+    """A tracked backbone; dimensionless throughout.
+
+    Attributes
+    ----------
+    points : dict of ndarray
+        C, sigma, G, their standard uncertainties u_C, u_sigma and u_G, level, periods, settled, reached, regime
+        and others.
+    periods : float
+        All periods, from the start to the last point.
+    """
+
+    points: Table
+    periods: float
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the points as a dataset over the dimension `point`."""
+        return _dataset(
+            self.points, "point", {"phase_error_deg": "degree", "u_phase_deg": "degree"}, periods=self.periods
+        )
+
+
+def backbone(scene: Scene | None = None) -> Backbone:
+    """Track the backbone level by level with the response controlled, as `vines backbone` does.
+
+    Parameters
+    ----------
+    scene : Scene, optional
+        Its section backbone has the levels. Default: the default scene.
+
+    Returns
+    -------
+    Backbone
+
+    Raises
+    ------
+    ValueError
+        A setting that the controller cannot work with.
+    RuntimeError
+        No lock in the time allowed, or a controller that switches the drive off.
+
+    Examples
+    --------
+    >>> found = backbone(Scene(backbone={"C_from": 0.6, "C_to": 0.4, "points": 3}))
+    >>> found.points["C"].round(2)
+    array([0.6, 0.5, 0.4])
+    """
+    found = json.loads(_native.backbone((scene or Scene())._native))
+    points = [
+        {**point, **{f"{k}_difference": v for k, v in (point.pop("exact") or {}).items()}} for point in found["points"]
+    ]
+    return Backbone(points=_table(points), periods=found["periods"])
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """An exact symmetric 1:1 orbit; dimensionless.
+
+    Attributes
+    ----------
+    G, sigma, C, B : float
+        Base amplitude over b epsilon, detuning, amplitude of the first harmonic of the response over b,
+        speed of the particle over b omega0.
+    gamma : float
+        Phase of the response relative to the reference, rad.
+    multipliers : tuple of float
+        Moduli of the multipliers over half a period, ascending.
+    stable : bool
+        All multipliers are inside the unit circle.
+    """
+
+    G: float
+    sigma: float
+    C: float
+    B: float
+    gamma: float
+    multipliers: tuple[float, float, float, float]
+    stable: bool
+
+    @classmethod
+    def _of(cls, found: dict[str, Any]) -> "Orbit":
+        names = ("G", "sigma", "C", "B", "gamma", "stable")
+        return cls(**{name: found[name] for name in names}, multipliers=tuple(found["multipliers"]))
+
+
+def orbits(scene: Scene | None = None, sigma: float | None = None) -> list[Orbit]:
+    """Return the exact symmetric 1:1 orbits of a scene.
+
+    Parameters
+    ----------
+    scene : Scene, optional
+        Default: the default scene.
+    sigma : float, optional
+        Detuning. Without it: the orbits at phase resonance.
+
+    Returns
+    -------
+    list of Orbit
+        By rising C; none where no such orbit exists.
+
+    Raises
+    ------
+    ValueError
+        A sigma that is not finite.
+
+    Examples
+    --------
+    >>> [(round(orbit.sigma, 6), orbit.stable) for orbit in orbits()][0]
+    (-1.139376, True)
+    """
+    found = json.loads(_native.orbits((scene or Scene())._native, sigma))
+    return [Orbit._of(one) for one in found]
+
+
+@dataclass(frozen=True)
+class Theory:
+    """First-order theory; dimensionless.
+
+    Attributes
+    ----------
+    backbone : dict of ndarray
+        C, B, sigma, G, branch, impacts_stable and slow_flow_stable along the backbone, from the fold to
+        symmetry breaking.
+    solutions : dict of ndarray
+        The same at phase resonance and the scene's G.
+    B_min, C_min : float
+        The fold of the slow invariant manifold.
+    """
+
+    backbone: Table
+    solutions: Table
+    B_min: float
+    C_min: float
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the backbone as a dataset over the dimension `point`."""
+        return _dataset(self.backbone, "point", {}, B_min=self.B_min, C_min=self.C_min)
+
+
+def theory(scene: Scene | None = None, points: int = 200) -> Theory:
+    """Return the backbone of first-order theory, and its solutions at the scene's G.
+
+    Parameters
+    ----------
+    scene : Scene, optional
+        Default: the default scene.
+    points : int
+        Number of points along the backbone, 2 to 100000.
+
+    Returns
+    -------
+    Theory
+
+    Raises
+    ------
+    ValueError
+        A number of points that is not allowed.
+
+    Examples
+    --------
+    >>> theory().solutions["sigma"].round(4)[-1]
+    np.float64(-1.1817)
+    """
+    found = json.loads(_native.theory((scene or Scene())._native, points))
+    return Theory(_table(found["backbone"]), _table(found["solutions"]), found["B_min"], found["C_min"])

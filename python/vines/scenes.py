@@ -1,0 +1,98 @@
+"""Scenes: plant, excitation, controller, measurement chain and durations."""
+
+import json
+from collections.abc import Mapping
+from os import PathLike
+from pathlib import Path
+from typing import Any
+
+from . import _native
+
+
+class Scene:
+    """A checked scene.
+
+    Parameters
+    ----------
+    path : path-like, optional
+        A scene file (TOML). Without it and without `text`: the default scene.
+    text : str, optional
+        A scene as TOML text instead.
+    **sections : mapping
+        Values that replace those of the scene, by section: `plant={"r": 0.7}`. scenes/paper.toml has all
+        sections and keys with their units.
+
+    Raises
+    ------
+    ValueError
+        A value that is not allowed, with its unit and range; an unknown section or key.
+    OSError
+        A file that cannot be read.
+
+    Examples
+    --------
+    >>> Scene(plant={"r": 0.7}).settings["plant"]["r"]
+    0.7
+    >>> Scene(plant={"r": 1.7})
+    Traceback (most recent call last):
+        ...
+    ValueError: [plant] or [start]: r (coefficient of restitution) = 1.7 is refused; allowed is a number above 0 and ...
+    """
+
+    def __init__(
+        self, path: str | PathLike[str] | None = None, *, text: str | None = None, **sections: Mapping[str, Any]
+    ) -> None:
+        if path is not None and text is not None:
+            raise ValueError("path and text are both given: give one of them")
+        origin = "text"
+        if path is not None:
+            origin, text = str(path), Path(path).read_text(encoding="utf-8")
+        self._arguments = (text, origin, [*_overrides(sections)])
+        self._native = _native.Scene(*self._arguments)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _restored, self._arguments
+
+    def __repr__(self) -> str:
+        numbers = ", ".join(f"{key} = {value:.6g}" for key, value in self.dimensionless.items())
+        return f"<Scene {numbers}>"
+
+    @property
+    def settings(self) -> dict[str, Any]:
+        """All settings, by section: plant, start and amplitude in SI units, the others in those of the scene file."""
+        return dict(json.loads(self._native.settings()))
+
+    @property
+    def dimensionless(self) -> dict[str, float]:
+        """epsilon, lambda, r and G, with the units of frequency omega0 (rad/s) and of length b (m).
+
+        Examples
+        --------
+        >>> round(Scene().dimensionless["epsilon"], 6)
+        0.008406
+        """
+        numbers = json.loads(self._native.dimensionless())
+        return {key: value for key, value in numbers.items() if isinstance(value, float)}
+
+
+def _overrides(sections: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    texts = []
+    for section, keys in sections.items():
+        if not isinstance(keys, Mapping):
+            raise TypeError(f"{section} = {keys!r}: a section is a mapping, for instance plant={{'r': 0.7}}")
+        texts += [f"{section}.{key} = {_toml(value)}" for key, value in keys.items()]
+    return texts
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool) or not hasattr(value, "__float__"):
+        return json.dumps(value)
+    # NumPy's numbers too.
+    return repr(int(value)) if hasattr(value, "__index__") else repr(float(value))
+
+
+def _restored(text: str | None, origin: str, overrides: list[str]) -> Scene:
+    scene = Scene.__new__(Scene)
+    scene._arguments = (text, origin, overrides)
+    scene._native = _native.Scene(text, origin, overrides)
+    return scene

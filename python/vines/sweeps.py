@@ -1,0 +1,154 @@
+"""Sweeps over any numbers of a scene and of its start."""
+
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import nullcontext
+from os import PathLike, fspath
+from typing import TYPE_CHECKING, Any
+
+from . import _native
+from .scenes import Scene
+
+if TYPE_CHECKING:
+    import xarray
+
+#: Values of an axis: first, last and number of values; a list; or ("random" or "sobol", first, last).
+Values = tuple[float, float, int] | Sequence[float] | tuple[str, float, float]
+
+
+def sweep(
+    scene: Scene | None,
+    axes: Mapping[str, Values],
+    *,
+    out: str | PathLike[str],
+    sigma: float | None = None,
+    samples: int | None = None,
+    seed: int = 0,
+    periods: int = 20_000,
+    results: Iterable[str] = (),
+    chunk: int = 4096,
+    confirm: bool = False,
+    progress: bool = False,
+    client: Any = None,
+) -> "xarray.Dataset":
+    """Compute one plant per cell, write the results to a Zarr store as they are computed, and open it.
+
+    The store goes on where it ended, and has the same bytes as that of `vines sweep`; docs/scale.md describes it.
+
+    Parameters
+    ----------
+    scene : Scene or None
+        None: the default scene.
+    axes : mapping of str to values
+        By name, `"sigma"` or `"section.key"` of a scene: a tuple (first, last, number), a list, or a tuple
+        ("random" or "sobol", first, last).
+    out : path-like
+        Folder of the store.
+    sigma : float, optional
+        Detuning, if it is not an axis. Without it: that of the scene's stable phase-resonant orbit, or 0.
+    samples : int, optional
+        Number of samples of random and Sobol axes, which share the dimension `sample`.
+    seed : int
+        Seed of random axes.
+    periods : int
+        Largest number of periods that a cell is followed.
+    results : iterable of str
+        Further results: `"response"`, `"orbits"`, `"lock"`.
+    chunk : int
+        Largest number of cells in a chunk.
+    confirm : bool
+        Confirms a sweep of more than 2 hours or 20 GB.
+    progress : bool
+        Whether tqdm shows a bar.
+    client : dask.distributed.Client, optional
+        Its workers compute the chunks and write them to the store, whose folder they must all see.
+
+    Returns
+    -------
+    xarray.Dataset
+        The store, opened lazily, with units as attributes.
+
+    Raises
+    ------
+    ValueError
+        An unknown axis, a value that is not allowed, a large sweep that is not confirmed, or a store of
+        another sweep, which stays as it is.
+    OSError
+        The store cannot be written. Complete chunks stay.
+    KeyboardInterrupt
+        Ctrl-C. Complete chunks stay, and the same call goes on.
+
+    Examples
+    --------
+    >>> cells = sweep(None, {"sigma": (-2, 0, 5), "plant.r": [0.5, 0.65]}, out=folder / "r.zarr", periods=400)
+    >>> dict(cells.sizes), cells.settling.attrs["units"]
+    ({'sigma': 5, 'plant.r': 2}, '1')
+    """
+    import xarray
+
+    scene = scene or Scene()
+    settings = {
+        "sigma": sigma,
+        "samples": samples,
+        "seed": seed,
+        "periods": periods,
+        "results": list(results),
+        "chunk": chunk,
+    }
+    axes = {name: _values(values) for name, values in axes.items()}
+    cells, chunks, hours, size, large = _native.chunks(scene._native, axes, settings)
+    if large and not confirm:
+        raise ValueError(
+            f"{cells} cells would take about {hours:.1f} h on this machine and {size / 1e9:.1f} GB before compression; "
+            "confirm with confirm=True"
+        )
+    with _bar(cells, progress) as bar:
+        if client is None:
+            look = None if bar is None else lambda complete: bar.update(complete - bar.n)
+            _native.sweep(scene._native, axes, settings, fspath(out), (0, 1), look)
+        else:
+            _distributed(client, (scene, axes, settings, fspath(out)), chunks, cells, bar)
+            # Nothing is left to compute; this removes what a killed worker has left.
+            _native.sweep(scene._native, axes, settings, fspath(out), (0, 1), None)
+    opened: xarray.Dataset = xarray.open_zarr(out)
+    return opened
+
+
+def _values(values: Values) -> Values:
+    if isinstance(values, tuple) and len(values) == 3:
+        return values
+    return [float(value) for value in values]
+
+
+def _bar(cells: int, progress: bool) -> Any:
+    if not progress:
+        return nullcontext()
+    from tqdm.auto import tqdm  # type: ignore[import-untyped]
+
+    return tqdm(total=cells, unit="cell")
+
+
+def _chunk(part: int, chunks: int, scene: Scene, axes: Any, settings: Any, out: str) -> int:
+    """Compute one chunk in a worker; only the number of its cells returns."""
+    return _native.sweep(scene._native, axes, settings, out, (part, chunks), None)[0]
+
+
+def _distributed(client: Any, arguments: Any, chunks: int, cells: int, bar: Any) -> None:
+    from dask.distributed import as_completed
+
+    # The scheduler holds a few tasks per thread at a time, however many chunks there are.
+    waiting = iter(range(chunks))
+
+    def submit() -> Any:
+        part = next(waiting, None)
+        return None if part is None else client.submit(_chunk, part, chunks, *arguments, pure=False)
+
+    at_once = 4 * max(1, sum(client.nthreads().values()))
+    started = [one for one in (submit() for _ in range(at_once)) if one is not None]
+    running: Any = as_completed(started)  # type: ignore[no-untyped-call]
+    for finished in running:
+        finished.result()
+        if bar is not None:
+            bar.update(cells / chunks)
+        further = submit()
+        if further is not None:
+            running.add(further)
