@@ -25,13 +25,13 @@ mod plant {
 
 /// Value references of the controller.
 mod controller {
-    pub const INPUTS: [u32; 2] = [31, 32];
-    pub const ACTIVE: u32 = 33;
+    pub const INPUTS: [u32; 2] = [33, 34];
+    pub const ACTIVE: u32 = 35;
     /// `omega` and `E`.
-    pub const DRIVE: [u32; 2] = [34, 35];
-    pub const REALS: [u32; 9] = [34, 35, 36, 37, 38, 39, 40, 41, 42];
-    pub const BOOLEANS: [u32; 2] = [43, 44];
-    pub const INTEGERS: [u32; 2] = [45, 46];
+    pub const DRIVE: [u32; 2] = [36, 37];
+    pub const REALS: [u32; 9] = [36, 37, 38, 39, 40, 41, 42, 43, 44];
+    pub const BOOLEANS: [u32; 2] = [45, 46];
+    pub const INTEGERS: [u32; 2] = [47, 48];
 }
 
 /// The two, exchanging values at communication points. The controller's commands reach the plant one step later.
