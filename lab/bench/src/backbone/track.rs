@@ -6,7 +6,7 @@ use super::point::{Point, Tracked};
 use super::predictor::{self, FIRST, Known, LAST, PHASE};
 use super::settle::{Criterion, Found};
 use crate::experiment::{self, ExperimentError, Sample, Stage};
-use crate::identification::{Cycle, classify, regime_by_response};
+use crate::identification::{Cycle, Regime, classify, regime_by_response};
 use crate::rig::{Controller, LoopState, Move, Rig};
 use crate::scene::{Resonance, Scene};
 use vines_model::numerics::Estimate;
@@ -206,6 +206,7 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         .sum();
     let averaged = &bench.samples[bench.samples.len() - samples..];
     let [base, omega] = said.at;
+    let regime = regime_by_response(averaged, scene, base.value, omega.value);
     Ok(Point {
         level,
         c: said.response.value / d.b,
@@ -217,12 +218,13 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         u_g: d.excitation(base.uncertainty),
         u_phase_deg: said.phase_error.uncertainty.to_degrees(),
         periods: bench.periods - start,
-        regime: regime_by_response(averaged, scene, base.value, omega.value),
+        regime,
         regime_by_impacts: bench.samples[0]
             .ground_truth
             .map(|_| classify(averaged, bench.sample_time, omega.value).1),
         averaged: said.periods,
-        settled: said.steady || criterion.is_met(&said),
+        // An irregular motion can seem steady for a while.
+        settled: regime != Regime::Other && (said.steady || criterion.is_met(&said)),
         reached: is_reached(&said),
     })
 }
