@@ -49,9 +49,8 @@ fn content(folder: &Path) -> BTreeMap<String, Vec<u8>> {
     all
 }
 
-/// A program that a test starts, and that is still running.
-fn signalled(mut child: Child, after: Duration, signal: &str) -> Option<Output> {
-    thread::sleep(after);
+/// Sends a signal to a program that a test started, if it is still running.
+fn signalled(mut child: Child, signal: &str) -> Option<Output> {
     if child.try_wait().unwrap().is_none() {
         let id = child.id().to_string();
         Command::new("kill").args(["-s", signal, &id]).status().unwrap();
@@ -66,16 +65,28 @@ fn after_20_kills_the_store_is_that_of_an_undisturbed_run() {
     let output = vines(&ARGUMENTS, &whole).output().unwrap();
     assert!(output.status.success(), "{}", text(&output));
     let mut kills = 0;
-    for n in 0..20 {
+    for n in 0.. {
         // From before the metadata is there to the middle of the chunks.
         let after = Duration::from_millis(3 + 7 * n % 60);
-        let output = signalled(vines(&ARGUMENTS, &killed).spawn().unwrap(), after, "KILL").unwrap();
-        kills += usize::from(!output.status.success());
+        let child = vines(&ARGUMENTS, &killed).spawn().unwrap();
+        thread::sleep(after);
+        let output = signalled(child, "KILL").unwrap();
+        if output.status.success() {
+            // A fast machine is done before the last kill.
+            assert!(content(&whole) == content(&killed));
+            fs::remove_dir_all(&killed).unwrap();
+        } else {
+            assert!(output.status.code().is_none(), "{}", text(&output));
+            kills += 1;
+        }
+        if kills == 20 {
+            break;
+        }
     }
     let output = vines(&ARGUMENTS, &killed).output().unwrap();
     assert!(output.status.success(), "{}", text(&output));
     println!("{kills} kills; {}", text(&output));
-    assert!(kills == 20 && content(&whole) == content(&killed));
+    assert!(content(&whole) == content(&killed));
 }
 
 #[test]
@@ -85,20 +96,21 @@ fn ctrl_c_keeps_complete_chunks_and_the_same_command_goes_on() {
     let mut arguments = ARGUMENTS.map(String::from);
     arguments[2] = "sigma=-3:3:3001".into();
     let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
-    let output = signalled(
-        vines(&arguments, &out).spawn().unwrap(),
-        Duration::from_millis(1500),
-        "INT",
-    )
-    .unwrap();
+    let child = vines(&arguments, &out).spawn().unwrap();
+    let begun = (0..6000).any(|_| {
+        thread::sleep(Duration::from_millis(10));
+        out.join("failure/c").exists()
+    });
+    assert!(begun);
+    let output = signalled(child, "INT").unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", text(&output));
     assert!(text(&output).contains("the same command goes on"), "{}", text(&output));
     let chunks = content(&out)
         .keys()
-        .filter(|key| key.starts_with("/failure/c/"))
+        .filter(|key| key.starts_with("failure/c/"))
         .count();
     println!("{chunks} chunks");
-    assert!(chunks > 0 || content(&out).contains_key("/zarr.json"));
+    assert!(chunks > 0);
 }
 
 #[test]

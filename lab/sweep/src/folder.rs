@@ -10,7 +10,7 @@ use std::{
 use zarrs::storage::{Bytes, OffsetBytesIterator, StorageError, StoreKey, StorePrefix, WritableStorageTraits};
 
 /// Where files are written before they get their name.
-const PARTIAL: &str = ".partial";
+pub(crate) const PARTIAL: &str = ".partial";
 
 /// A folder. (The storage of the crate `zarrs_filesystem` writes in place, and remembers every key.)
 #[derive(Debug)]
@@ -37,7 +37,7 @@ impl Folder {
         let number = self.written.fetch_add(1, Ordering::Relaxed);
         let path = partial.join(format!("{}-{number}", process::id()));
         let complete = || {
-            // Not flushed to the disk: on a busy one, that took twenty times as long as the cells. Only a power failure needs it.
+            // Not flushed to the disk for each chunk: only a power failure needs it, and loses no more than the last chunks.
             fs::write(&path, content)?;
             if let Some(parent) = target.parent() {
                 fs::create_dir_all(parent)?;

@@ -15,7 +15,7 @@ use zarrs::array::{
 
 use crate::{
     cell::Cell,
-    folder::Folder,
+    folder::{Folder, PARTIAL},
     plan::Plan,
     variables::{ABSENT, Read, Variable, variables},
 };
@@ -255,9 +255,12 @@ fn may_become_a_store(root: &Path) -> bool {
     let Ok(entries) = fs::read_dir(root) else {
         return true;
     };
-    entries
-        .flatten()
-        .all(|entry| entry.file_name() == ".partial" || entry.path().join(GROUP).exists())
+    // A folder is made before the file that goes into it.
+    let empty = |path: &Path| fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+    entries.flatten().all(|entry| {
+        let path = entry.path();
+        entry.file_name() == PARTIAL || path.join(GROUP).exists() || empty(&path)
+    })
 }
 
 fn object(value: Value) -> Map<String, Value> {

@@ -287,3 +287,11 @@ fn a_store_of_another_sweep_or_other_files_stay_as_they_are() {
     assert!(error.contains("not the store of a sweep"), "{error}");
     assert_eq!(files(notes.path()).len(), 1);
 }
+
+#[test]
+fn folders_that_a_kill_left_empty_are_no_other_files() {
+    let folder = tempfile::tempdir().unwrap();
+    fs::create_dir(folder.path().join("regime")).unwrap();
+    let plan = plan(settings(&["plant.r=0.3,0.5"])).unwrap();
+    assert!(run(&plan, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
+}
