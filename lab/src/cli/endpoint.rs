@@ -10,14 +10,11 @@ use clap::Args;
 use vines::{
     fmu::{FmuController, FmuRig},
     net::{Address, BindScope, NetController, NetRig, Timing},
-    rig::{BuiltIn, Chain, Controller, Rig, Simulated},
+    rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable},
     scene::{Resonance, Scene},
 };
 
-use super::{
-    failure::Failure,
-    interrupt::{Interruptible, stop_flag},
-};
+use super::{failure::Failure, interrupt::stop_flag};
 
 /// An implementation, as written on the command line.
 #[derive(Debug, Clone, PartialEq)]
@@ -54,7 +51,7 @@ impl FromStr for Endpoint {
 
 /// A rig.
 pub(super) struct OpenRig {
-    pub rig: Interruptible,
+    pub rig: Stoppable,
     /// In real time, the longest silence that it tolerates, s.
     pub pace: Option<f64>,
     /// In real time, what it reports when the session has ended.
@@ -92,7 +89,7 @@ impl Endpoint {
         };
         let (d, samples) = (scene.dimensionless(), scene.controller.samples_per_period);
         let rig = Chain::around(rig, &scene.chain, &d, samples);
-        let rig = Interruptible::around(rig, scene.sample_time(), &stop_flag()?);
+        let rig = Stoppable::around(rig, scene.sample_time(), &stop_flag()?);
         Ok(OpenRig { rig, pace, timing })
     }
 

@@ -2,9 +2,15 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use vines::{experiment::ExperimentError, net::LinkError, pack::PackError, rig::RigError, scene::SceneError};
+use vines::{
+    experiment::ExperimentError,
+    net::LinkError,
+    pack::PackError,
+    rig::{Interrupted, RigError},
+    scene::SceneError,
+};
 
-use super::interrupt::{INTERRUPTED, Interrupted};
+use super::interrupt::INTERRUPTED;
 
 /// A message and an exit code.
 #[derive(Debug)]
