@@ -15,6 +15,7 @@ mod controller_client;
 mod error;
 pub mod frame;
 mod handshake;
+pub mod helic;
 mod link;
 mod payload;
 mod ramp;

@@ -9,7 +9,11 @@ use std::{
 use clap::Args;
 use vines::{
     fmu::{FmuController, FmuRig},
-    net::{Address, BindScope, NetController, NetRig, Timing},
+    net::{
+        Address, BindScope, NetController, NetRig, Timing,
+        helic::{Channels, DEFAULT_PORT, HelicRig, Network},
+        resolve,
+    },
     rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable},
     scene::{Resonance, Scene},
 };
@@ -43,7 +47,7 @@ impl FromStr for Endpoint {
         } else {
             Err(format!(
                 "{text} does not exist; give `built-in`, the path of an FMU, tcp://HOST:PORT, or for a rig in real time \
-                 udp://HOST:PORT"
+                 udp://HOST:PORT or helic://HOST[:PORT]"
             ))
         }
     }
@@ -79,6 +83,7 @@ impl Endpoint {
                 let rig = FmuRig::load(file, &scene.start_values(), scene.resonance, &scene.plant);
                 Box::new(rig.map_err(Failure::run)?)
             }
+            Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
             Self::Network(address) => {
                 let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time())?;
                 let rig = rig.with_sensors(scene.resonance)?;
@@ -114,6 +119,26 @@ impl Endpoint {
         })
     }
 }
+
+/// The helic device at `helic://HOST[:PORT]`.
+fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Network>, Failure> {
+    let place = address.trim_start_matches("helic://");
+    let has_port = place
+        .rsplit_once(':')
+        .is_some_and(|(_, port)| port.parse::<u16>().is_ok());
+    let place = if has_port {
+        place.into()
+    } else {
+        format!("{place}:{DEFAULT_PORT}")
+    };
+    let network = Network::connect(resolve(&place, scope)?);
+    let network =
+        network.map_err(|error| Failure::run(format!("no answer from {address}: {error}; {HELIC_ADVICE}")))?;
+    let samples = scene.controller.samples_per_period;
+    HelicRig::new(network, Channels::default(), scene.sample_time(), samples).map_err(Failure::run)
+}
+
+const HELIC_ADVICE: &str = "is `vines rig --protocol helic` or a device running there?";
 
 /// Refuses settings with which no experiment can begin, before anything is written or driven.
 pub(super) fn check(scene: &Scene) -> Result<(), Failure> {

@@ -1,7 +1,7 @@
 //! `vines rig`: the plant at a network address.
 
-use clap::Args;
-use vines::net::{Address, Role, Served, Service};
+use clap::{Args, ValueEnum};
+use vines::net::{Address, Role, Served, Service, helic::Device};
 use vines::rig::Simulated;
 
 use super::{
@@ -15,6 +15,8 @@ Examples:
   vines rig --listen 127.0.0.1:5510                 in real time; then: vines identify --rig udp://127.0.0.1:5510
   vines rig --listen 127.0.0.1:5510 --lock-step     as fast as the drives arrive, with the bits of the built-in plant;
                                                     then: vines identify --rig tcp://127.0.0.1:5510
+  vines rig --protocol helic --listen 127.0.0.1:2350
+                                                    as a device of helic-daq; then: vines identify --rig helic://127.0.0.1
 
 Every session starts with the plant in the start state of the scene; the rig's clock starts with the first drive frame. Client and
 server take the sample time from their scene: use the same scene for both. In real time, lost and late drives are counted, and the
@@ -39,6 +41,14 @@ pub(super) struct Arguments {
     #[command(flatten)]
     serving: ServingArguments,
 
+    /// The protocol: `vines` (docs/network-protocol.md), or `helic`, as a device of helic-daq (docs/helic.md)
+    #[arg(long, value_enum, default_value_t = Protocol::Vines)]
+    protocol: Protocol,
+
+    /// With `--protocol helic`: samples of the device per sample of the scene
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=100))]
+    oversampling: u16,
+
     /// Advance when a drive arrives instead of in real time
     #[arg(long)]
     lock_step: bool,
@@ -52,8 +62,18 @@ pub(super) struct Arguments {
     max_amplitude: Option<f64>,
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Protocol {
+    Vines,
+    Helic,
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?;
+    let mut scene = arguments.scene.load()?;
+    if arguments.protocol == Protocol::Helic {
+        // A device runs on between its hosts.
+        scene.start = Default::default();
+    }
     let first = Simulated::new(scene.plant, scene.start)
         .map_err(Failure::input)?
         .with_sensors(scene.resonance);
@@ -68,6 +88,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         ("in real time", Address::Udp)
     };
     let max_amplitude = arguments.max_amplitude.unwrap_or(scene.plant.half_width);
+    if arguments.protocol == Protocol::Helic {
+        if arguments.lock_step {
+            let message = "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic";
+            return Err(Failure::input(message));
+        }
+        let step = scene.sample_time() / f64::from(arguments.oversampling);
+        let device = Device::new(Box::new(first), step, max_amplitude).map_err(Failure::run)?;
+        return arguments.serving.serve_helic(device, step);
+    }
     let service = Service {
         role: Role::Rig { max_amplitude, sensors: scene.resonance },
         sample_time: scene.sample_time(),
