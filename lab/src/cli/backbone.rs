@@ -69,7 +69,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     log_warnings();
     let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(Failure::input)?;
     writable(&arguments.out)?;
-    let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
+    let mut open = arguments.rig.rig(&scene, arguments.reach.reach()?)?;
     arguments.loop_check.before(&mut open.rig, &scene)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let tracked = track(&mut open.rig, &mut controller, &scene, |done, _| {

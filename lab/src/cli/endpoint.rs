@@ -10,7 +10,7 @@ use clap::Args;
 use vines::{
     fmu::{FmuController, FmuRig},
     net::{
-        Address, BindScope, NetController, NetRig, Timing,
+        Address, BindScope, Key, NetController, NetRig, Timing,
         helic::{Channels, DEFAULT_PORT, HelicRig, Network},
         resolve,
     },
@@ -85,7 +85,7 @@ impl Endpoint {
             }
             Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
             Self::Network(address) => {
-                let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time())?;
+                let rig = NetRig::connect_with(Address::parse(address, scope)?, scene.sample_time(), scope.key())?;
                 let rig = rig.with_sensors(scene.resonance)?;
                 pace = rig.pace();
                 timing = rig.timing();
@@ -109,7 +109,12 @@ impl Endpoint {
             Self::BuiltIn => Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?),
             Self::Fmu(file) => Box::new(FmuController::load(file, &scene.controller_config()).map_err(Failure::run)?),
             Self::Network(address) => match Address::parse(address, scope)? {
-                Address::Tcp(peer) => Box::new(NetController::connect(peer, scene.sample_time(), pace)?),
+                Address::Tcp(peer) => Box::new(NetController::connect_with(
+                    peer,
+                    scene.sample_time(),
+                    pace,
+                    scope.key(),
+                )?),
                 Address::Udp(_) => {
                     return Err(Failure::input(format!(
                         "{address}: a controller has an address tcp://HOST:PORT"
@@ -122,6 +127,7 @@ impl Endpoint {
 
 /// The helic device at `helic://HOST[:PORT]`.
 fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Network>, Failure> {
+    no_key(scope)?;
     let place = address.trim_start_matches("helic://");
     let has_port = place
         .rsplit_once(':')
@@ -136,6 +142,13 @@ fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Netw
         network.map_err(|error| Failure::run(format!("no answer from {address}: {error}; {HELIC_ADVICE}")))?;
     let samples = scene.controller.samples_per_period;
     HelicRig::new(network, Channels::default(), scene.sample_time(), samples).map_err(Failure::run)
+}
+
+/// Refuses a key where the protocol has none.
+pub(super) fn no_key(scope: BindScope) -> Result<(), Failure> {
+    let message = "--key: the helic protocol has no authentication; drop --key, and use --allow-remote only on a network where everyone may \
+                   drive the rig";
+    scope.key().map_or(Ok(()), |_| Err(Failure::input(message)))
 }
 
 const HELIC_ADVICE: &str = "is `vines rig --protocol helic` or a device running there?";
@@ -155,17 +168,27 @@ pub(super) fn check(scene: &Scene) -> Result<(), Failure> {
 /// `--allow-remote`, which several commands share.
 #[derive(Debug, Args)]
 pub(super) struct ReachArguments {
-    /// Allow network addresses beyond this machine. There is no authentication: anyone who can reach the address can drive the rig
+    /// Allow network addresses beyond this machine without a key: anyone who can reach the address can drive the rig
     #[arg(long)]
     allow_remote: bool,
+
+    /// File with a shared key of 16 bytes or more, the same on both sides; allows network addresses beyond this machine
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
 }
 
 impl ReachArguments {
-    pub(super) fn reach(&self) -> BindScope {
-        if self.allow_remote {
-            BindScope::Remote
-        } else {
-            BindScope::Loopback
-        }
+    pub(super) fn reach(&self) -> Result<BindScope, Failure> {
+        let Some(file) = &self.key else {
+            return Ok(if self.allow_remote {
+                BindScope::Remote
+            } else {
+                BindScope::Loopback
+            });
+        };
+        let refused = |reason: String| Failure::input(format!("--key {}: {reason}", file.display()));
+        let secret = std::fs::read(file).map_err(|error| refused(error.to_string()))?;
+        let short = || refused("16 bytes or more are needed; `openssl rand -hex 32` writes a good key".into());
+        Key::of(&secret).map(BindScope::Keyed).ok_or_else(short)
     }
 }

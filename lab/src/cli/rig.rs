@@ -23,8 +23,8 @@ server take the sample time from their scene: use the same scene for both. In re
 last valid one is held. When the newest drive is older than --silence, the drive ramps to zero and stays there until another session
 starts. In lock-step, a drive that is not allowed ends the session. See docs/network-protocol.md.
 
-The server listens on this machine only, unless --allow-remote is given: there is no authentication and no encryption, and everyone
-who can reach the address can drive the rig.";
+The server listens on this machine only, unless --key or --allow-remote is given. With --key, every frame is authenticated; nothing is
+encrypted. Without it, everyone who can reach the address can drive the rig.";
 
 /// Longest silence in real time, s: about one period of the default scene.
 const SILENCE_PACED: f64 = 0.1;

@@ -12,7 +12,12 @@ use vines::net::{
     resolve,
 };
 
-use super::{endpoint::ReachArguments, failure::Failure, interrupt::stop_flag, print};
+use super::{
+    endpoint::{ReachArguments, no_key},
+    failure::Failure,
+    interrupt::stop_flag,
+    print,
+};
 
 #[derive(Debug, Args)]
 pub(super) struct ServingArguments {
@@ -45,7 +50,8 @@ impl ServingArguments {
         service: Service,
         mut make: impl FnMut() -> Served,
     ) -> Result<String, Failure> {
-        let mut server = Server::listen(transport(resolve(&self.listen, self.reach.reach())?), service)?;
+        let scope = self.reach.reach()?;
+        let mut server = Server::listen_with(transport(resolve(&self.listen, scope)?), service, scope.key())?;
         let address = server.address().map_err(Failure::run)?;
         self.run(&format!("{what} on {address}"), |stop, tell| {
             server.serve(|| Ok(make()), stop, tell)
@@ -54,7 +60,9 @@ impl ServingArguments {
 
     /// Serves `device` as a device of helic-daq, sampled every `sample_time`, s.
     pub(super) fn serve_helic(&self, device: Device, sample_time: f64) -> Result<String, Failure> {
-        let address = resolve(&self.listen, self.reach.reach())?;
+        let scope = self.reach.reach()?;
+        no_key(scope)?;
+        let address = resolve(&self.listen, scope)?;
         let listen = |source| LinkError::Listen { address: Address::Tcp(address), source };
         let mut server = HelicServer::listen(address, device, sample_time).map_err(listen)?;
         let what = format!("helic device, {:.1} samples per second, on", 1.0 / sample_time);

@@ -4,9 +4,13 @@ use std::io;
 
 use thiserror::Error;
 
-use super::codec::{ErrorCode, Frame, Malformed, Status, VERSION, message, text};
+use super::codec::{ErrorCode, Frame, Malformed, Packet, Status, VERSION, message, text};
+use super::registry::{COEFFICIENTS, HARMONICS};
 use super::transport::Transport;
 use vines_testbench::rig::RigError;
+
+/// Forcing with which the phase of the oscillator is read while the output is off, V.
+const PROBE: f64 = 0.01;
 
 /// Why a device cannot be used.
 #[derive(Debug, Error)]
@@ -196,6 +200,57 @@ impl<T: Transport> Host<T> {
     pub fn get(&mut self, name: &str) -> Result<Vec<u8>, HostError> {
         let (index, _) = self.index(name)?;
         self.request(message::GET_PAR, index.to_le_bytes().into(), name)
+    }
+}
+
+impl<T: Transport> Host<T> {
+    /// Sets the stream up, and starts it.
+    ///
+    /// # Errors
+    /// A device that refuses.
+    pub fn stream(&mut self, sources: &[u8], decimation: u16, count: u32) -> Result<(), HostError> {
+        self.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
+        let setup = [
+            &decimation.to_le_bytes()[..],
+            &count.to_le_bytes(),
+            &[sources.len() as u8],
+            sources,
+        ]
+        .concat();
+        self.request(message::STREAM_SETUP, setup, "StreamSetup")?;
+        let port = self.transport.port()?.to_le_bytes();
+        self.request(message::STREAM_START, port.into(), "StreamStart")?;
+        Ok(())
+    }
+
+    /// The present value of a source.
+    fn value(&mut self, source: u8) -> Result<f64, HostError> {
+        self.stream(&[source], 1, 1)?;
+        loop {
+            match Packet::decode(&self.transport.datagram()?) {
+                Ok(Packet { width: 1, values, .. }) if values.len() == 1 => return Ok(values[0].into()),
+                _ => {}
+            }
+        }
+    }
+
+    /// Stops the master oscillator, and returns its cosine and sine: its phase is a state of the device that no parameter sets. The output
+    /// must be off.
+    ///
+    /// # Errors
+    /// A device that does not answer, or refuses.
+    pub fn stop_oscillator(&mut self) -> Result<[f64; 2], HostError> {
+        let forcing = self.source("forcing")?;
+        self.set("freq", &[0.0])?;
+        let mut parts = [0.0; 2];
+        for (part, place) in parts.iter_mut().zip([1, 1 + HARMONICS]) {
+            let mut coefficients = [0.0; COEFFICIENTS];
+            coefficients[place] = PROBE;
+            self.set("forcing_coeffs", &coefficients)?;
+            *part = self.value(forcing)? / PROBE;
+        }
+        self.set("forcing_coeffs", &[0.0; COEFFICIENTS])?;
+        Ok(parts)
     }
 }
 

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 
 use super::codec::{Packet, message};
 use super::host::{Host, HostError};
-use super::registry::HARMONICS;
+use super::registry::{COEFFICIENTS, HARMONICS};
 use super::transport::Transport;
 use crate::report::Counters;
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
@@ -46,6 +46,8 @@ impl Default for Channels {
 pub struct HelicRig<T: Transport> {
     host: Host<T>,
     channels: Channels,
+    /// Cosine and sine of the device's oscillator at the start.
+    origin: [f64; 2],
     sample_time: f64,
     /// Readings that have arrived, and the sensors before them.
     readings: VecDeque<Sensors>,
@@ -82,21 +84,15 @@ impl<T: Transport> HelicRig<T> {
             sources.push(host.source(name)?);
         }
         host.set("arm", &[0.0])?;
-        host.set("forcing_coeffs", &[0.0; 2 * HARMONICS + 1])?;
-        host.set("target_coeffs", &[0.0; 2 * HARMONICS + 1])?;
+        host.set("target_coeffs", &[0.0; COEFFICIENTS])?;
         host.set("table_mode", &[0.0])?;
-        host.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
-        let mut setup = (ratio.round() as u16).to_le_bytes().to_vec();
-        setup.extend([0; 4]);
-        setup.push(sources.len() as u8);
-        setup.extend(sources);
-        host.request(message::STREAM_SETUP, setup, "StreamSetup")?;
-        let port = host.transport.port()?.to_le_bytes();
-        host.request(message::STREAM_START, port.into(), "StreamStart")?;
+        let origin = host.stop_oscillator()?;
+        host.stream(&sources, ratio.round() as u16, 0)?;
         host.set("arm", &[1.0])?;
         Ok(Self {
             host,
             channels,
+            origin,
             sample_time,
             readings: VecDeque::new(),
             now: None,
@@ -190,8 +186,9 @@ impl<T: Transport> HelicRig<T> {
             self.host.set("freq", &[self.wanted.omega / TAU])?;
         }
         if self.wanted.amplitude != self.given.amplitude {
-            let mut forcing = [0.0; 2 * HARMONICS + 1];
-            forcing[1 + HARMONICS] = self.wanted.amplitude / self.channels.gain;
+            let ([cosine, sine], volts) = (self.origin, self.wanted.amplitude / self.channels.gain);
+            let mut forcing = [0.0; COEFFICIENTS];
+            (forcing[1], forcing[1 + HARMONICS]) = (-volts * sine, volts * cosine);
             self.host.set("forcing_coeffs", &forcing)?;
         }
         self.given = self.wanted;

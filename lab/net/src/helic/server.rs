@@ -7,6 +7,7 @@ use std::time::{Duration, Instant};
 
 use super::codec::{BEACON_REQUEST, Frame, beacon};
 use super::device::{Device, EXPERIMENT};
+use crate::address::is_loopback;
 use crate::error::ServerError;
 use crate::real_time_clock::RealTimeClock;
 use crate::report::{Ended, Session};
@@ -47,7 +48,13 @@ impl HelicServer {
             port => SocketAddr::new(address.ip(), port.saturating_add(offset)),
         };
         let control = TcpListener::bind(address)?;
-        let (stream, beacon) = (UdpSocket::bind(beside(1))?, UdpSocket::bind(beside(2)).ok());
+        // On this machine, the host itself binds that port.
+        let source = if is_loopback(address.ip()) {
+            SocketAddr::new(address.ip(), 0)
+        } else {
+            beside(1)
+        };
+        let (stream, beacon) = (UdpSocket::bind(source)?, UdpSocket::bind(beside(2)).ok());
         control.set_nonblocking(true)?;
         stream.set_nonblocking(true)?;
         if let Some(beacon) = &beacon {

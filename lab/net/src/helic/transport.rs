@@ -54,9 +54,9 @@ impl Network {
         let stream = UdpSocket::bind(own)?;
         stream.set_read_timeout(Some(PATIENCE))?;
         let port = peer.port().saturating_add(1);
-        // Needed by firewalls only.
-        let primed = stream.send_to(b"vines", SocketAddr::new(peer.ip(), port));
-        log::debug!("primer to {}: {primed:?}, loopback: {}", peer, is_loopback(peer.ip()));
+        if !is_loopback(peer.ip()) {
+            stream.send_to(b"vines", SocketAddr::new(peer.ip(), port))?;
+        }
         Ok(Self { control, stream, bytes: Vec::new() })
     }
 }

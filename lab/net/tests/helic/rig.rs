@@ -162,3 +162,25 @@ fn a_slower_scene_uses_every_second_sample_of_the_device() {
     }
     assert!(!rig.counters.is_troubled());
 }
+
+#[test]
+fn the_drive_begins_with_phase_zero_wherever_the_oscillator_of_the_device_is() {
+    let scene = scene();
+    let mut direct = Direct::new(|_| 1);
+    let mut host = Host::new(direct.device);
+    host.set("freq", &[37.0]).unwrap();
+    (0..777).for_each(|_| drop(host.device.tick().unwrap()));
+    direct.device = host.device;
+    let mut rig = HelicRig::new(direct, Channels::default(), scene.sample_time(), 100.0).unwrap();
+    let drive = Drive { omega: 55.0, amplitude: 9e-5, displacement: 0.0 };
+    let mut base = Vec::new();
+    for _ in 0..200 {
+        base.push(rig.sense().unwrap().reference.unwrap());
+        rig.advance(drive, scene.sample_time()).unwrap();
+    }
+    let start = base.iter().position(|e| e.abs() > 1e-9).unwrap();
+    for (n, e) in base[start..].iter().enumerate() {
+        let expected = 9e-5 * (55.0 * (n + 1) as f64 * scene.sample_time()).sin();
+        assert!((e - expected).abs() < 1e-9, "{n}: {e} {expected}");
+    }
+}
