@@ -127,10 +127,15 @@ impl Server {
             (Err(FrameError::Closed), Some(run)) if run.peer == from => run.end(Ended::Farewell),
             (Err(FrameError::Closed), _) => {}
             (Err(error), run) => {
+                let version = matches!(error, FrameError::Version(_));
                 if let Some(run) = run {
                     run.counters.malformed += 1;
+                    // Over TCP, the refusal closes the connection.
+                    if version && run.peer == from && !self.listener.is_real_time() {
+                        run.end(Ended::Refused);
+                    }
                 }
-                if let FrameError::Version(_) = error {
+                if version {
                     self.refuse(Refusal::Version(VERSION), &Frame::new(Kind::Hello, 0), from)?;
                 }
             }
