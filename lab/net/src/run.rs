@@ -202,12 +202,13 @@ impl Run {
     }
 
     fn timing(&self) -> Timing {
-        let punctuality = self.clock.map(|clock| clock.punctuality).unwrap_or_default();
+        let punctuality = self.clock.as_ref().map(|clock| &clock.punctuality);
         Timing {
             samples: self.at,
-            missed: punctuality.missed,
-            worst: punctuality.worst,
+            missed: punctuality.map_or(0, |all| all.missed),
+            worst: punctuality.map_or(0.0, |all| all.worst),
             held: self.counters.held,
+            quantiles: punctuality.map_or([0.0; 2], |all| [0.99, 0.9999].map(|share| all.quantile(share))),
         }
     }
 
@@ -220,7 +221,7 @@ impl Run {
                 let _ = rig.advance(self.drive.next(), self.service.sample_time);
             }
         }
-        let began = self.clock.map_or(self.opened, |clock| clock.due(0));
+        let began = self.clock.as_ref().map_or(self.opened, |clock| clock.due(0));
         Session {
             peer: self.peer,
             ended: self.ended.unwrap_or(Ended::Stopped),

@@ -43,5 +43,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         silence: arguments.silence,
     };
     let make = || Served::Controller(Box::new(first.clone()));
-    arguments.serving.serve("controller", Address::Tcp, service, make)
+    arguments
+        .serving
+        .serve("controller", Address::Tcp, service, make, |_| {})
 }

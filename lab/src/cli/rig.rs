@@ -1,11 +1,12 @@
 //! `vines rig`: the plant at a network address.
 
 use clap::{Args, ValueEnum};
-use vines::net::{Address, Role, Served, Service, helic::Device};
+use vines::net::{Address, Role, Served, Service, Session, helic::Device};
 use vines::rig::Simulated;
 
 use super::{
     failure::Failure,
+    real_time::RealTimeArguments,
     scene_arguments::SceneArguments,
     serving::{ServingArguments, positive},
 };
@@ -40,6 +41,9 @@ pub(super) struct Arguments {
 
     #[command(flatten)]
     serving: ServingArguments,
+
+    #[command(flatten)]
+    real_time: RealTimeArguments,
 
     /// The protocol: `vines` (docs/network-protocol.md), or `helic`, as a device of helic-daq (docs/helic.md)
     #[arg(long, value_enum, default_value_t = Protocol::Vines)]
@@ -88,6 +92,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         ("in real time", Address::Udp)
     };
     let max_amplitude = arguments.max_amplitude.unwrap_or(scene.plant.half_width);
+    arguments.real_time.apply()?;
+    let keep = |session: &Session| arguments.real_time.keep(session);
     if arguments.protocol == Protocol::Helic {
         if arguments.lock_step {
             let message = "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic";
@@ -95,7 +101,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         }
         let step = scene.sample_time() / f64::from(arguments.oversampling);
         let device = Device::new(Box::new(first), step, max_amplitude).map_err(Failure::run)?;
-        return arguments.serving.serve_helic(device, step);
+        return arguments.serving.serve_helic(device, step, keep);
     }
     let service = Service {
         role: Role::Rig { max_amplitude, sensors: scene.resonance },
@@ -104,5 +110,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     };
     let what = format!("rig, {mode}, {:.1} samples per second,", 1.0 / service.sample_time);
     let make = || Served::Rig(Box::new(first.clone()));
-    arguments.serving.serve(&what, transport, service, make)
+    arguments.serving.serve(&what, transport, service, make, keep)
 }
