@@ -156,7 +156,7 @@ fn the_sensors_of_the_scene_are_those_of_every_rig() {
 #[test]
 fn a_rig_in_real_time_gives_the_same_sigma_within_5e_3() {
     let direct = identified(&["--rig", "built-in"]);
-    let rig = Server::start(&["rig", "--json"]);
+    let rig = Server::start(&["rig", "--json", "--silence", "5"]);
     let folder = tempfile::tempdir().unwrap();
     let arguments = [
         "identify",

@@ -97,7 +97,7 @@ fn a_server_ends_in_order_on_a_signal() {
 #[test]
 fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() {
     for (signal, mode) in [
-        ("-INT", &["rig", "--json"][..]),
+        ("-INT", &["rig", "--json", "--silence", "5"][..]),
         ("-TERM", &["rig", "--json", "--lock-step"]),
     ] {
         let rig = Server::start(mode);
@@ -111,7 +111,7 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        std::thread::sleep(std::time::Duration::from_millis(1500));
+        std::thread::sleep(std::time::Duration::from_secs(3));
         let pid = client.id().to_string();
         assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
         let output = client.wait_with_output().unwrap();
