@@ -65,12 +65,12 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?;
+    let mut scene = arguments.scene.load()?;
     log_warnings();
     let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(Failure::input)?;
     writable(&arguments.out)?;
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
-    arguments.loop_check.before(&mut open.rig, &scene)?;
+    arguments.loop_check.before(&mut open.rig, &mut scene)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let tracked = track(&mut open.rig, &mut controller, &scene, |done, _| {
         bar.set_position(done as u64);

@@ -136,3 +136,19 @@ fn backbone_finds_that_it_cannot_write_before_it_drives_the_rig() {
         "cannot write to",
     );
 }
+
+#[test]
+fn a_sensor_that_is_unplugged_ends_identify_and_backbone_with_its_reason() {
+    let name = "response sensor dead@";
+    for (command, seconds, part) in [
+        ("identify", 0.01, "does not answer"),
+        ("backbone", 6.0, "a sensor, the drive"),
+    ] {
+        let fault = format!("{name}{seconds}");
+        let rig = Server::start(&["rig", "--lock-step", "--sensors-only", "--fault", &fault]);
+        let out = tempfile::tempdir().unwrap();
+        let arguments = [command, "--out", out.path().to_str().unwrap(), "--rig", &rig.1];
+        fails(&with_settings(&arguments), 1, part);
+        assert!(rig.report().contains("ended by the client"));
+    }
+}
