@@ -78,32 +78,47 @@ fn short(scene: &Scene) -> Scene {
 }
 
 /// What a real rig shows of itself: its sensors.
-struct SensorsOnly(Box<dyn Rig>);
+struct SensorsOnly<F: FnMut(Option<f64>)> {
+    rig: Box<dyn Rig>,
+    log: Log,
+    ended: F,
+}
 
-impl Rig for SensorsOnly {
+impl<F: FnMut(Option<f64>)> Drop for SensorsOnly<F> {
+    fn drop(&mut self) {
+        if self.log.has_begun() {
+            (self.ended)(self.log.times().map(|(detection, shutdown)| detection + shutdown));
+        }
+    }
+}
+
+impl<F: FnMut(Option<f64>)> Rig for SensorsOnly<F> {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.0.sense()
+        self.rig.sense()
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.0.advance(drive, step)
+        self.rig.advance(drive, step)
     }
 
     fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.0.hold(displacement, step)
+        self.rig.hold(displacement, step)
     }
 }
 
 /// The rig of a checked scene as a rehearsal needs it: read by the scene's measurement chain, without ground truth, and with a fault that
-/// begins after `seconds` of rig time.
+/// begins after `seconds` of rig time. When it is dropped after that, `ended` gets the time from the fault to a drive of zero, s, or
+/// `None` if the last drive was not zero.
 #[must_use]
-pub fn rehearsal_rig(scene: &Scene, kind: Kind, seconds: f64) -> Box<dyn Rig> {
+pub fn rehearsal_rig(
+    scene: &Scene,
+    kind: Kind,
+    seconds: f64,
+    ended: impl FnMut(Option<f64>) + 'static,
+) -> Box<dyn Rig> {
     let step = scene.sample_time();
-    Box::new(SensorsOnly(failing(
-        scene,
-        kind,
-        &Log::new((seconds / step) as usize, step),
-    )))
+    let log = Log::new((seconds / step).min(usize::MAX as f64) as usize, step);
+    Box::new(SensorsOnly { rig: failing(scene, kind, &log), log, ended })
 }
 
 fn failing(scene: &Scene, kind: Kind, log: &Log) -> Box<dyn Rig> {

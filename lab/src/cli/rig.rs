@@ -9,6 +9,7 @@ use vines::rig::Simulated;
 
 use super::{
     failure::Failure,
+    print,
     scene_arguments::SceneArguments,
     serving::{ServingArguments, positive},
 };
@@ -65,6 +66,17 @@ pub(super) struct Arguments {
     max_amplitude: Option<f64>,
 }
 
+/// Prints the time from the fault to a drive of zero, s.
+fn tell(zero: Option<f64>, json: bool) {
+    let text = match zero {
+        _ if json => format!("{}\n", serde_json::json!({ "drive_zero_after_fault": zero })),
+        Some(seconds) => format!("the drive was zero {:.1} ms after the fault\n", 1e3 * seconds),
+        None => "the drive was NOT ZERO at the end\n".into(),
+    };
+    // A closed output does not stop the server.
+    let _ = print(&text);
+}
+
 /// A fault of the rig, and when it begins, s of rig time.
 #[derive(Debug, Clone, Copy)]
 struct Fault {
@@ -113,10 +125,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         silence: arguments.silence.unwrap_or(default),
     };
     let what = format!("rig, {mode}, {:.1} samples per second,", 1.0 / service.sample_time);
-    let fault = arguments.fault.unwrap_or(Fault { kind: Kind::None, seconds: 0.0 });
+    let fault = arguments
+        .fault
+        .unwrap_or(Fault { kind: Kind::None, seconds: f64::INFINITY });
+    let json = arguments.serving.json;
     let make = || {
         Served::Rig(match arguments.sensors_only {
-            true => rehearsal_rig(&scene, fault.kind, fault.seconds),
+            true => rehearsal_rig(&scene, fault.kind, fault.seconds, move |zero| tell(zero, json)),
             false => Box::new(first.clone()),
         })
     };
