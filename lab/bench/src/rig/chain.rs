@@ -96,6 +96,21 @@ impl Chain {
     }
 }
 
+impl Chain {
+    /// Time from this sampling instant to the next one, for a nominal step, s.
+    fn step(&mut self, step: f64) -> f64 {
+        let late = if self.jitter > 0.0 {
+            self.jitter * self.normal.next().clamp(-JITTER_MAX, JITTER_MAX)
+        } else {
+            0.0
+        };
+        let taken = step * (1.0 + late - self.late);
+        self.late = late;
+        self.elapsed += taken;
+        taken
+    }
+}
+
 impl Rig for Chain {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let seen = self.rig.sense()?;
@@ -116,18 +131,20 @@ impl Rig for Chain {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let late = if self.jitter > 0.0 {
-            self.jitter * self.normal.next().clamp(-JITTER_MAX, JITTER_MAX)
-        } else {
-            0.0
-        };
-        let taken = step * (1.0 + late - self.late);
-        self.late = late;
-        self.elapsed += taken;
+        let taken = self.step(step);
         match &self.output {
             Some(output) => self.rig.hold(output.convert(drive.displacement), taken),
             None => self.rig.advance(drive, taken),
         }
+    }
+
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        let taken = self.step(step);
+        let given = self
+            .output
+            .as_ref()
+            .map_or(displacement, |output| output.convert(displacement));
+        self.rig.hold(given, taken)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
