@@ -6,6 +6,7 @@ mod configuration;
 mod controller;
 mod error;
 mod family;
+mod names;
 mod overrides;
 mod plant;
 mod record;
@@ -23,6 +24,7 @@ pub use chain::{Chain, RatioOf};
 pub use controller::Controller;
 pub use error::SceneError;
 pub use family::Family;
+pub use names::{Name, Names};
 pub use overrides::{Override, SyntaxError};
 pub use record::{Estimator, Record};
 pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
@@ -52,6 +54,12 @@ pub struct Scene {
     pub chain: Chain,
     /// What counts as resonance, and what is measured.
     pub resonance: Definition,
+    /// What a rig other than the simulated one calls its variables.
+    #[serde(skip_serializing_if = "Names::is_empty")]
+    pub rig_names: Names,
+    /// What a controller other than the built-in one calls its variables.
+    #[serde(skip_serializing_if = "Names::is_empty")]
+    pub controller_names: Names,
 }
 
 impl Scene {

@@ -5,12 +5,38 @@ use std::path::Path;
 use fmi::fmi2::instance::Common;
 use phase_lock::{Config, PARAMETERS, Value};
 use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Sensors};
+use vines_testbench::scene::Names;
 
-use crate::instance::{Fmu, FmuError, Kind, Reference};
+use crate::instance::{Fmu, FmuError, Kind, Named, Reference};
+use crate::judge::Judge;
+
+/// The names of this bench that a scene may map, beside those of the parameters.
+const NAMES: [&str; 11] = [
+    "response",
+    "reference",
+    "active",
+    "omega",
+    "E",
+    "drive",
+    "phase_error",
+    "settled",
+    "locked",
+    "state",
+    "fault",
+];
+
+/// How it is known that the lock has settled.
+enum Settled {
+    /// The controller says so: `settled`.
+    Told(Reference),
+    /// The lab judges, while `locked` is true where the controller has it.
+    Judged(Option<Reference>, Judge),
+}
 
 /// A controller FMU, stepped sample by sample.
 ///
-/// It needs the inputs `response` and `active` and the outputs `omega`, `E` and `settled`; `reference`, `drive`, `phase_error`,
+/// It needs the inputs `response` and `active` and the outputs `omega` and `E`. Without the output `settled`, the lab judges whether the
+/// lock has settled, by `locked`, the phase error and the frequency. A scene maps all names; `reference`, `drive`, `phase_error`,
 /// `state` and `fault` are used where it has them. Of the configuration it gets what it has a parameter for, by the names of
 /// `PhaseLock.fmu`. At each sample its inputs are set, it is stepped by one sample time, and what it then puts out is
 /// the drive of that very sample period.
@@ -18,13 +44,13 @@ pub struct FmuController {
     fmu: Fmu,
     sample_time: f64,
     /// `response`, and `reference` where there is one.
-    sensors: Vec<Reference>,
+    sensors: Vec<Named>,
     active: Reference,
     /// `omega` and `E`.
-    drive: [Reference; 2],
-    displacement: Option<Reference>,
-    phase_error: Option<Reference>,
-    settled: Reference,
+    drive: [Named; 2],
+    displacement: Option<Named>,
+    phase_error: Option<Named>,
+    settled: Settled,
     /// `state` and `fault`.
     states: [Option<Reference>; 2],
 }
@@ -34,29 +60,64 @@ impl FmuController {
     ///
     /// # Errors
     /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
-    pub fn load(path: &Path, config: &Config) -> Result<Self, FmuError> {
+    pub fn load(path: &Path, config: &Config, names: &Names) -> Result<Self, FmuError> {
+        let known = PARAMETERS.iter().map(|parameter| parameter.name);
+        let known: Vec<&str> = NAMES.into_iter().chain(known).collect();
+        if let Some(name) = names.unknown(&known) {
+            return Err(FmuError::Name { name: name.into(), known: known.join(", ") });
+        }
         let mut fmu = Fmu::load(path, "controller")?;
-        let mut sensors = vec![fmu.need(Kind::Real, "response")?];
-        sensors.extend(fmu.find(Kind::Real, "reference"));
-        let active = fmu.need(Kind::Boolean, "active")?;
-        let drive = [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?];
-        let settled = fmu.need(Kind::Boolean, "settled")?;
-        fmu.start(&parameters(config))?;
+        let mut sensors = vec![fmu.need_named(Kind::Real, names, "response")?];
+        sensors.extend(fmu.named(Kind::Real, names, "reference")?);
+        let (active, _) = fmu.need_named(Kind::Boolean, names, "active")?;
+        let drive = [
+            fmu.need_named(Kind::Real, names, "omega")?,
+            fmu.need_named(Kind::Real, names, "E")?,
+        ];
+        let phase_error = fmu.named(Kind::Real, names, "phase_error")?;
+        let settled = match ["settled", "locked"].map(|ours| fmu.named(Kind::Boolean, names, ours)) {
+            [Ok(Some((settled, _))), _] => Settled::Told(settled),
+            [Err(error), _] | [_, Err(error)] => return Err(error),
+            [Ok(None), Ok(locked)] => {
+                let locked = locked.map(|(locked, _)| locked);
+                if locked.is_none() && phase_error.is_none() {
+                    log::warn!(
+                        "{} has none of `settled`, `locked` and `phase_error`: its lock is judged by its frequency alone",
+                        path.display()
+                    );
+                }
+                Settled::Judged(locked, Judge::new(config))
+            }
+        };
+        let integer = |ours| {
+            fmu.named(Kind::Integer, names, ours)
+                .map(|found| found.map(|(reference, _)| reference))
+        };
+        let states = [integer("state")?, integer("fault")?];
+        let displacement = fmu.named(Kind::Real, names, "drive")?;
+        fmu.start(names, &parameters(config))?;
         Ok(Self {
             sample_time: config.sample_time,
             sensors,
             active,
             drive,
-            displacement: fmu.find(Kind::Real, "drive"),
-            phase_error: fmu.find(Kind::Real, "phase_error"),
+            displacement,
+            phase_error,
             settled,
-            states: ["state", "fault"].map(|name| fmu.find(Kind::Integer, name)),
+            states,
             fmu,
         })
     }
 
-    fn optional(&mut self, reference: Option<Reference>) -> Result<f64, FmuError> {
-        reference.map_or(Ok(0.0), |one| self.fmu.reals("give its outputs", [one]).map(|[x]| x))
+    fn optional(&mut self, variable: Option<Named>) -> Result<f64, FmuError> {
+        variable.map_or(Ok(0.0), |one| self.fmu.read("give its outputs", [one]).map(|[x]| x))
+    }
+
+    fn boolean(&mut self, reference: Reference) -> Result<bool, FmuError> {
+        let (reference, mut value) = ([reference], [0]);
+        self.fmu
+            .ask("give its outputs", |i| i.get_boolean(&reference, &mut value))?;
+        Ok(value != [0])
     }
 
     fn integer(&mut self, reference: Option<Reference>) -> Result<Option<i32>, FmuError> {
@@ -71,24 +132,39 @@ impl FmuController {
 
     fn exchange(&mut self, sensors: Sensors, active: bool) -> Result<Command, FmuError> {
         let readings = [sensors.response, sensors.reference.unwrap_or(0.0)];
-        let (references, active_reference) = (&self.sensors, [self.active]);
+        let given: Vec<f64> = self
+            .sensors
+            .iter()
+            .zip(readings)
+            .map(|((_, factor), x)| x / factor)
+            .collect();
+        let references: Vec<Reference> = self.sensors.iter().map(|(reference, _)| *reference).collect();
+        let active_reference = [self.active];
         self.fmu.ask("take its inputs", |i| {
-            i.set_real(references, &readings[..references.len()])?;
+            i.set_real(&references, &given)?;
             i.set_boolean(&active_reference, &[active.into()])
         })?;
         self.fmu.step(self.sample_time)?;
-        let [omega, amplitude] = self.fmu.reals("give its outputs", self.drive)?;
-        let (reference, mut settled) = ([self.settled], [0]);
-        self.fmu
-            .ask("give its outputs", |i| i.get_boolean(&reference, &mut settled))?;
+        let [omega, amplitude] = self.fmu.read("give its outputs", self.drive)?;
+        let told = match self.settled {
+            Settled::Told(told) => Some(told),
+            Settled::Judged(locked, _) => locked,
+        };
+        let told = told.map(|told| self.boolean(told)).transpose()?;
+        let phase_error = self.optional(self.phase_error)?;
+        let settled = match &mut self.settled {
+            Settled::Told(_) => told == Some(true),
+            Settled::Judged(..) if !active => false,
+            Settled::Judged(_, judge) => judge.sample(omega, phase_error, told.unwrap_or(true)),
+        };
         Ok(Command {
             drive: Drive {
                 omega,
                 amplitude,
                 displacement: self.optional(self.displacement)?,
             },
-            phase_error: self.optional(self.phase_error)?,
-            settled: settled != [0],
+            phase_error,
+            settled,
             state: self.integer(self.states[0])?.and_then(LoopState::of_number),
             fault: self.integer(self.states[1])?.and_then(Fault::of_number),
         })

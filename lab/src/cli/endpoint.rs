@@ -80,7 +80,13 @@ impl Endpoint {
                 Box::new(plant.with_sensors(scene.resonance))
             }
             Self::Fmu(file) => {
-                let rig = FmuRig::load(file, &scene.start_values(), scene.resonance, &scene.plant);
+                let rig = FmuRig::load(
+                    file,
+                    &scene.start_values(),
+                    scene.resonance,
+                    &scene.plant,
+                    &scene.rig_names,
+                );
                 Box::new(rig.map_err(Failure::run)?)
             }
             Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
@@ -107,7 +113,9 @@ impl Endpoint {
     ) -> Result<Box<dyn Controller>, Failure> {
         Ok(match self {
             Self::BuiltIn => Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?),
-            Self::Fmu(file) => Box::new(FmuController::load(file, &scene.controller_config()).map_err(Failure::run)?),
+            Self::Fmu(file) => Box::new(
+                FmuController::load(file, &scene.controller_config(), &scene.controller_names).map_err(Failure::run)?,
+            ),
             Self::Network(address) => match Address::parse(address, scope)? {
                 Address::Tcp(peer) => Box::new(NetController::connect_with(
                     peer,
