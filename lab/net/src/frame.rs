@@ -53,6 +53,8 @@ pub mod flag {
     pub const GROUND_TRUTH: u8 = 8;
     /// Sensors, from a rig in real time: the drive has been shut down for this session.
     pub const SHUT_DOWN: u8 = 16;
+    /// Drive: the rig holds the displacement, instead of its oscillator with frequency and amplitude.
+    pub const HOLD: u8 = 128;
     /// Hello and Welcome: the server is, or should be, a controller; otherwise a rig.
     pub const CONTROLLER: u8 = 64;
 }

@@ -128,7 +128,7 @@ impl Run {
             (Served::Rig(_), Kind::Drive) => match self.service.drive(frame) {
                 Err(refusal) => Ok(Err(refusal)),
                 Ok(drive) => {
-                    self.drive.set(drive);
+                    self.drive.set(drive, frame.has(flag::HOLD));
                     self.advance()?;
                     self.tell_reading(listener)?;
                     Ok(Ok(()))
@@ -145,7 +145,7 @@ impl Run {
         self.counters.late += u64::from(known || frame.sequence < self.at);
         self.counters.malformed += u64::from(drive.is_none());
         if let Some(drive) = drive.filter(|_| !known) {
-            self.drive.set(drive);
+            self.drive.set(drive, frame.has(flag::HOLD));
             self.newest = frame.sequence;
             self.clock
                 .get_or_insert_with(|| RealTimeClock::start(self.service.sample_time));
@@ -180,7 +180,7 @@ impl Run {
 
     fn advance(&mut self) -> Result<(), ServerError> {
         if let Served::Rig(rig) = &mut self.served {
-            rig.advance(self.drive.next(), self.service.sample_time)?;
+            self.drive.apply(rig.as_mut(), self.service.sample_time)?;
             self.at += 1;
         }
         Ok(())
@@ -218,7 +218,7 @@ impl Run {
         if let Served::Rig(rig) = &mut self.served {
             while !self.drive.is_down() {
                 // An error of the rig changes nothing now: the session ends.
-                let _ = rig.advance(self.drive.next(), self.service.sample_time);
+                let _ = self.drive.apply(rig.as_mut(), self.service.sample_time);
             }
         }
         let began = self.clock.as_ref().map_or(self.opened, |clock| clock.due(0));

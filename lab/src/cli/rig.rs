@@ -5,9 +5,10 @@ use std::str::FromStr;
 use clap::{Args, ValueEnum};
 use vines::faults::{FAULTS, Kind, rehearsal_rig};
 use vines::net::{Address, Role, Served, Service, Session, helic::Device};
-use vines::rig::{Rig, Simulated};
+use vines::rig::{Rig, RigError, Simulated};
 
 use super::{
+    endpoint::{Endpoint, fmu},
     failure::Failure,
     print,
     real_time::RealTimeArguments,
@@ -20,6 +21,7 @@ Examples:
   vines rig --listen 127.0.0.1:5510                 in real time; then: vines identify --rig udp://127.0.0.1:5510
   vines rig --listen 127.0.0.1:5510 --lock-step     as fast as the drives arrive, with the bits of the built-in plant;
                                                     then: vines identify --rig tcp://127.0.0.1:5510
+  vines rig --listen 127.0.0.1:5510 --rig LoViNes.fmu     an FMU
   vines rig --protocol helic --listen 127.0.0.1:2350
                                                     as a device of helic-daq; then: vines identify --rig helic://127.0.0.1
   vines rig --listen 127.0.0.1:5510 --sensors-only --set chain.snr=40 --set chain.adc_bits=12 --fault \"response sensor dead@60\"
@@ -58,6 +60,15 @@ pub(super) struct Arguments {
     /// With `--protocol helic`: samples of the device per sample of the scene
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=100))]
     oversampling: u16,
+
+    /// The rig that is served: `built-in` or an FMU
+    #[arg(
+        long,
+        value_name = "ENDPOINT",
+        default_value = "built-in",
+        conflicts_with = "sensors_only"
+    )]
+    rig: Endpoint,
 
     /// Advance when a drive arrives instead of in real time
     #[arg(long)]
@@ -146,12 +157,25 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .fault
         .unwrap_or(Fault { kind: Kind::None, seconds: f64::INFINITY });
     let json = arguments.serving.json;
-    let make = || -> Box<dyn Rig> {
-        match arguments.sensors_only {
-            true => rehearsal_rig(&scene, fault.kind, fault.seconds, move |zero| tell(zero, json)),
-            false => Box::new(first.clone()),
-        }
+    let make = || -> Result<Box<dyn Rig>, RigError> {
+        Ok(match &arguments.rig {
+            Endpoint::Fmu(file) => Box::new(fmu(file, &scene)?),
+            _ if arguments.sensors_only => {
+                rehearsal_rig(&scene, fault.kind, fault.seconds, move |zero| tell(zero, json))
+            }
+            _ => Box::new(first.clone()),
+        })
     };
+    match &arguments.rig {
+        Endpoint::Network(address) => {
+            return Err(Failure::input(format!(
+                "--rig {address}: only `built-in` or an FMU can be served"
+            )));
+        }
+        // An FMU that cannot be loaded is reported before a client comes.
+        Endpoint::Fmu(file) => drop(fmu(file, &scene).map_err(Failure::run)?),
+        Endpoint::BuiltIn => {}
+    }
     arguments.real_time.apply()?;
     let keep = |session: &Session| arguments.real_time.keep(session);
     if arguments.protocol == Protocol::Helic {
@@ -159,7 +183,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             let message = "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic";
             return Err(Failure::input(message));
         }
-        let device = Device::new(make(), scene.sample_time(), max_amplitude).map_err(Failure::run)?;
+        let device =
+            Device::new(make().map_err(Failure::run)?, scene.sample_time(), max_amplitude).map_err(Failure::run)?;
         return arguments.serving.serve_helic(device, scene.sample_time(), keep);
     }
     let service = Service {
@@ -170,5 +195,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let what = format!("rig, {mode}, {:.1} samples per second,", 1.0 / service.sample_time);
     arguments
         .serving
-        .serve(&what, transport, service, || Served::Rig(make()), keep)
+        .serve(&what, transport, service, || Ok(Served::Rig(make()?)), keep)
 }

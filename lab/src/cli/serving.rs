@@ -48,14 +48,14 @@ impl ServingArguments {
         what: &str,
         transport: fn(std::net::SocketAddr) -> Address,
         service: Service,
-        mut make: impl FnMut() -> Served,
+        make: impl FnMut() -> Result<Served, ServerError>,
         keep: impl Fn(&Session),
     ) -> Result<String, Failure> {
         let scope = self.reach.reach()?;
         let mut server = Server::listen_with(transport(resolve(&self.listen, scope)?), service, scope.key())?;
         let address = server.address().map_err(Failure::run)?;
         self.run(&format!("{what} on {address}"), keep, |stop, tell| {
-            server.serve(|| Ok(make()), stop, tell)
+            server.serve(make, stop, tell)
         })
     }
 
