@@ -54,9 +54,9 @@ impl Punctuality {
     /// Lateness, s, that this share of the samples does not exceed.
     #[must_use]
     pub fn quantile(&self, share: f64) -> f64 {
-        self.histogram
-            .as_ref()
-            .map_or(0.0, |all| all.value_at_quantile(share) as f64 * NANO)
+        let nanoseconds = self.histogram.as_ref().map_or(0, |all| all.value_at_quantile(share));
+        // The upper limit of a class may be above the largest value in it.
+        (nanoseconds as f64 * NANO).min(self.worst)
     }
 
     /// The classes that samples are in: upper limit of the lateness, s, and number of samples.
@@ -149,6 +149,9 @@ mod tests {
         }
         assert_eq!((all.samples(), all.missed, all.worst), (10_000, 1, 1e-2));
         assert_eq!(all.classes().iter().map(|(_, count)| count).sum::<u64>(), 10_000);
-        assert!(all.to_string().contains("p99.99 99"), "{all}");
+        assert!(
+            all.to_string().contains("p99.99 10000.0 us, maximum 10000.0 us"),
+            "{all}"
+        );
     }
 }
