@@ -16,7 +16,6 @@ use core::f64::consts::TAU;
 
 use crate::config::Config;
 use crate::drive::Drive;
-use crate::gains::Gains;
 
 /// Lowest drive, as a share of its integral part.
 const MIN_SHARE: f64 = 0.2;
@@ -138,7 +137,7 @@ fn smooth(x: f64) -> f64 {
 impl AmplitudeLoop {
     /// The loop of a configuration and its drive.
     pub fn new(config: &Config, drive: &Drive) -> Self {
-        let gains = Gains::from_bandwidth(config.bandwidth, config.damping_rate);
+        let gains = config.gains();
         let (gain, sample_time) = (config.response_gain, config.sample_time);
         Self {
             proportional: gains.proportional / gain,

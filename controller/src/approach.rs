@@ -65,11 +65,12 @@ pub struct ApproachState {
 impl Approach {
     /// The approach of a configuration.
     pub fn new(config: &Config) -> Self {
-        let rate = (OBSERVER_RATE * (1.0 + config.approach_gain) * config.damping_rate).min(config.bandwidth);
+        let damping_rate = config.damping_rate.unwrap_or(0.0);
+        let rate = (OBSERVER_RATE * (1.0 + config.approach_gain) * damping_rate).min(config.bandwidth);
         let rate = if rate > 0.0 { rate } else { config.bandwidth };
         Self {
             gain: config.approach_gain,
-            damping_rate: config.damping_rate,
+            damping_rate,
             step: -libm::expm1(-rate * config.sample_time),
             detector_step: -libm::expm1(-config.bandwidth * config.sample_time),
             slope: rate / config.response_gain,

@@ -110,7 +110,7 @@ impl Capture {
             largest,
             amplitude: config.amplitude,
             amplitude_max: config.amplitude_limit(),
-            damping: config.damping_rate / config.response_gain,
+            damping: config.damping_rate.unwrap_or(0.0) / config.response_gain,
             fall: config.omega_start / (TAU * DESCENT * config.response_gain),
             sample_time: config.sample_time,
         }

@@ -49,8 +49,12 @@ impl Config {
             self.amplitude <= self.amplitude_limit(),
             "a finite number, 0 or above and at most amplitude_max",
         )?;
-        Quantity::new("base_bandwidth", self.base_bandwidth, "rad/s")
-            .check(self.base_bandwidth <= self.bandwidth, "between 0 and bandwidth")
+        match self.base_bandwidth {
+            Some(wide) if wide > self.bandwidth => {
+                Err(Quantity::new("base_bandwidth", wide, "rad/s").refuse("above 0 and at most bandwidth, or none"))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn check_detector(&self) -> Result<(), ConfigError> {

@@ -2,6 +2,8 @@
 
 use core::f64::consts::{FRAC_PI_2, TAU};
 
+use crate::gains::Gains;
+
 /// Method by which amplitude and phase of the fundamental are estimated. The numbers are those of the FMU's `detector`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -77,8 +79,8 @@ pub struct Config {
     pub ramp_rate: Option<f64>,
     /// Rate of the drive ramp to 0 after `active` becomes false, m/s. `None`: switched off at once, as a free decay requires.
     pub release_rate: Option<f64>,
-    /// Bandwidth of the control of the *measured* base amplitude, rad/s; 0: no control, for a shaker whose gain is known.
-    pub base_bandwidth: f64,
+    /// Bandwidth of the control of the *measured* base amplitude, rad/s. `None`: no control, for a shaker whose gain is known.
+    pub base_bandwidth: Option<f64>,
     /// Setpoint of the phase of the response relative to the reference, rad; tunable.
     pub phase_target: f64,
     /// Method of the phase detector.
@@ -90,8 +92,9 @@ pub struct Config {
     pub odd_only: bool,
     /// Bandwidth of the detector, rad/s: the tuning parameter, from which the gains follow.
     pub bandwidth: f64,
-    /// Damping rate of the structure, rad/s (damping ratio times natural frequency); 0: unknown.
-    pub damping_rate: f64,
+    /// Damping rate of the structure, rad/s (damping ratio times natural frequency). `None`: unknown; the gains are those of an
+    /// undamped structure.
+    pub damping_rate: Option<f64>,
     /// Delay from the drive to the sample of the sensor, s. Used if no reference is connected. A rig with an oscillator
     /// of its own that receives `omega` from the first sample on has no delay; a rig that holds the samples of `drive`
     /// has a delay of half a sample.
@@ -101,7 +104,7 @@ pub struct Config {
     /// [`PhaseLock::hold_response`](crate::PhaseLock::hold_response).
     pub response_gain: f64,
     /// How much faster the response approaches its steady state than under a constant drive: `1 + approach_gain` times. The
-    /// drive is shaped until the lock criterion is met, and constant from then on; 0: always constant.
+    /// drive is shaped by this gain until the lock criterion is met, and constant from then on.
     pub approach_gain: f64,
     /// Response amplitude, m, at which impacts certainly occur. The response rises to it before the drive goes to its setpoint, so
     /// that a particle at rest joins the motion. `None`: the drive goes to its setpoint at once.
@@ -143,13 +146,13 @@ impl Config {
             amplitude_max: Some(4.0 * amplitude),
             ramp_rate: Some(4.0 * amplitude * omega),
             release_rate: None,
-            base_bandwidth: 0.0,
+            base_bandwidth: None,
             phase_target: -FRAC_PI_2,
             detector: Detector::Adaptive,
             harmonics: 3,
             odd_only: true,
             bandwidth: 0.1 * omega,
-            damping_rate: 0.0,
+            damping_rate: None,
             delay: 0.0,
             response_gain: 0.5 * omega,
             approach_gain: 0.0,
@@ -167,5 +170,10 @@ impl Config {
     /// Largest drive amplitude, m; infinite without a limit.
     pub(crate) fn amplitude_limit(&self) -> f64 {
         self.amplitude_max.unwrap_or(f64::INFINITY)
+    }
+
+    /// The gains of both loops.
+    pub(crate) fn gains(&self) -> Gains {
+        Gains::from_bandwidth(self.bandwidth, self.damping_rate.unwrap_or(0.0))
     }
 }

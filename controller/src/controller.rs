@@ -10,7 +10,6 @@ use crate::drive::Drive;
 use crate::error::{ConfigError, Quantity};
 use crate::gains::Gains;
 use crate::loop_filter::LoopFilter;
-use crate::range::NONE;
 use crate::sensing::{Measurement, PresentDrive, Sensing};
 use crate::signals::{Input, Output};
 use crate::state::State;
@@ -100,10 +99,14 @@ impl PhaseLock {
         Quantity::new("duration", to.duration, "s").not_negative()?;
         Quantity::new("amplitude", to.amplitude, "m").check(true, "a finite number")?;
         Quantity::new("omega", to.omega, "rad/s").check(true, "a finite number")?;
-        Quantity::new("amplitude_max", self.config.amplitude_max.unwrap_or(NONE), "m").check(
-            self.config.amplitude_max.is_some(),
-            "above 0 to control the response amplitude: the drive needs a limit",
-        )?;
+        if self.config.amplitude_max.is_none() {
+            return Err(ConfigError {
+                name: "amplitude_max",
+                value: None,
+                unit: "m",
+                allowed: "above 0 to control the response amplitude: the drive needs a limit",
+            });
+        }
         Quantity::new("state", f64::from(state.loop_state as u8), "").check(
             matches!(state.loop_state, LoopState::Acquiring | LoopState::Locked),
             "2 (acquiring) or 3 (locked): the response amplitude can be controlled only in a closed loop",
@@ -115,6 +118,13 @@ impl PhaseLock {
             .start(to, self.amplitude_loop.sample_time());
         state.dwell = Dwell::default();
         Ok(())
+    }
+
+    /// Controls the drive amplitude again: the drive ramps to its setpoint.
+    pub fn hold_drive(&self, state: &mut State) {
+        if state.loop_state != LoopState::Capturing {
+            state.amplitude_loop = None;
+        }
     }
 
     /// One sample: takes the sensor readings, returns the drive until the next sample.

@@ -34,7 +34,7 @@ impl Drive {
             amplitude_max: config.amplitude_limit(),
             ramp_step: per_sample(config.ramp_rate),
             release_step: per_sample(config.release_rate),
-            control_step: -libm::expm1(-config.base_bandwidth * config.sample_time),
+            control_step: -libm::expm1(-config.base_bandwidth.unwrap_or(0.0) * config.sample_time),
         }
     }
 

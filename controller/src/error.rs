@@ -7,8 +7,8 @@ use core::fmt;
 pub struct ConfigError {
     /// Name of the field.
     pub name: &'static str,
-    /// The invalid value.
-    pub value: f64,
+    /// The invalid value; `None`: an option that is needed is absent.
+    pub value: Option<f64>,
     /// Unit; empty for a pure number.
     pub unit: &'static str,
     /// The allowed values.
@@ -17,8 +17,14 @@ pub struct ConfigError {
 
 impl fmt::Display for ConfigError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "{} = {}", self.name, self.value)?;
-        if !self.unit.is_empty() {
+        write!(f, "{} = ", self.name)?;
+        match self.value {
+            None => f.write_str("none")?,
+            // In full, 1e300 would fill a line.
+            Some(value) if value != 0.0 && !(1e-4..1e7).contains(&value.abs()) => write!(f, "{value:e}")?,
+            Some(value) => write!(f, "{value}")?,
+        }
+        if self.value.is_some() && !self.unit.is_empty() {
             write!(f, " {}", self.unit)?;
         }
         write!(f, " is refused; allowed is {}", self.allowed)
@@ -49,7 +55,7 @@ impl Quantity {
 
     /// The error for this value.
     pub fn refuse(&self, allowed: &'static str) -> ConfigError {
-        ConfigError { name: self.name, value: self.value, unit: self.unit, allowed }
+        ConfigError { name: self.name, value: Some(self.value), unit: self.unit, allowed }
     }
 
     pub fn positive(&self) -> Result<(), ConfigError> {

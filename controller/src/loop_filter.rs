@@ -39,7 +39,7 @@ impl LoopFilter {
     /// The filter of a configuration.
     pub fn new(config: &Config) -> Self {
         Self {
-            gains: Gains::from_bandwidth(config.bandwidth, config.damping_rate),
+            gains: config.gains(),
             omega_min: config.omega_min,
             omega_max: config.omega_max,
             max_change: config

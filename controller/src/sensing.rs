@@ -78,8 +78,10 @@ pub struct PresentDrive {
 pub struct Measurement {
     /// Fault of the readings.
     pub fault: Option<Fault>,
-    /// Phase error, rad.
+    /// Phase error, rad; 0 if it cannot be measured.
     pub error: f64,
+    /// Whether both amplitudes are above 0.
+    pub measurable: bool,
     /// m
     pub reference_amplitude: f64,
     /// Whether the error is valid.
@@ -141,6 +143,7 @@ impl Sensing {
         Measurement {
             fault,
             error: if measurable { wrap(error) } else { 0.0 },
+            measurable,
             reference_amplitude: reference.amplitude,
             valid: measurable && reference.valid && amplitude >= self.response_min && self.is_coherent(response),
             has_sensor: channel.is_some(),

@@ -24,13 +24,13 @@ pub struct Output {
     pub amplitude: f64,
     /// Setpoint of the base displacement at this sample, `E sin(phase)`, m, for a rig that takes samples.
     pub drive: f64,
-    /// Phase of the response relative to the reference, minus the target, rad, in [-pi, pi]; 0 while one of the two
+    /// Phase of the response relative to the reference, minus the target, rad, in [-pi, pi]. `None` while one of the two
     /// amplitudes is 0.
-    pub phase_error: f64,
+    pub phase_error: Option<f64>,
     /// Amplitude of the response's fundamental, m.
     pub response_amplitude: f64,
-    /// Present setpoint of the response amplitude, m; 0 while the drive amplitude is controlled instead.
-    pub response_target: f64,
+    /// Present setpoint of the response amplitude, m. `None` while the drive amplitude is controlled instead.
+    pub response_target: Option<f64>,
     /// Amplitude of the reference's fundamental, m: measured, or that of the drive.
     pub reference_amplitude: f64,
     /// Power of the response's fundamental over the sum of itself and the detector's residual power, 0 to 1.
@@ -52,14 +52,15 @@ pub struct Output {
 
 impl Output {
     /// The output before the first sample: no drive, no measurements.
-    pub(crate) fn idle(omega: f64) -> Self {
+    #[must_use]
+    pub fn idle(omega: f64) -> Self {
         Self {
             omega,
             amplitude: 0.0,
             drive: 0.0,
-            phase_error: 0.0,
+            phase_error: None,
             response_amplitude: 0.0,
-            response_target: 0.0,
+            response_target: None,
             reference_amplitude: 0.0,
             coherence: 0.0,
             frequency: omega,

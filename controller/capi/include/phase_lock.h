@@ -11,6 +11,14 @@
 #include <stdint.h>
 #include <stdlib.h>
 
+// Method of the phase detector.
+typedef enum PhaseLockDetector {
+  // Adaptive harmonic filter.
+  PHASE_LOCK_DETECTOR_ADAPTIVE = 1,
+  // Synchronous demodulation.
+  PHASE_LOCK_DETECTOR_DEMODULATOR = 2,
+} PhaseLockDetector;
+
 // State of the loop.
 typedef enum PhaseLockStage {
   // Not armed.
@@ -77,14 +85,16 @@ typedef struct PhaseLockConfig {
   struct PhaseLockOptional ramp_rate;
   // Rate of the drive ramp to 0 after active becomes false, m/s; not present: switched off at once.
   struct PhaseLockOptional release_rate;
-  // Bandwidth of the control of the measured base amplitude, rad/s; 0: no control.
-  double base_bandwidth;
+  // Bandwidth of the control of the measured base amplitude, rad/s; not present: no control.
+  struct PhaseLockOptional base_bandwidth;
   // Setpoint of the phase of the response relative to the reference, rad.
   double phase_target;
+  // Method of the phase detector.
+  enum PhaseLockDetector detector;
   // Bandwidth of the detector, rad/s: the tuning parameter.
   double bandwidth;
-  // Damping rate of the structure, rad/s; 0: unknown.
-  double damping_rate;
+  // Damping rate of the structure, rad/s; not present: unknown.
+  struct PhaseLockOptional damping_rate;
   // Delay from the drive to the sample of the sensor, s; used if no reference is connected.
   double delay;
   // Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
@@ -111,7 +121,7 @@ typedef struct PhaseLockConfig {
   struct PhaseLockOptional residual_max;
   // Whether a sensor measures the base.
   bool reference_connected;
-  // The response approaches its steady state 1 + approach_gain times as fast as under a constant drive; 0: constant drive.
+  // The response approaches its steady state 1 + approach_gain times as fast as under a constant drive.
   double approach_gain;
   // Response amplitude, m, at which impacts certainly occur; it is visited first, so that a particle at rest joins the motion.
   struct PhaseLockOptional capture_response;
@@ -119,7 +129,7 @@ typedef struct PhaseLockConfig {
   struct PhaseLockOptional captured_max;
   // Time for which the lock criterion must hold, periods.
   uint32_t dwell;
-  // Number of harmonics of the adaptive filter, 1 to 8; 0: synchronous demodulator.
+  // Number of harmonics of the adaptive filter, 1 to 8.
   uint8_t harmonics;
   // Harmonics 1, 3, 5, ... instead of 1, 2, 3, ...
   bool odd_only;
@@ -135,10 +145,8 @@ typedef struct PhaseLockController {
 typedef struct PhaseLockInput {
   // Response of the structure, m.
   double response;
-  // Displacement of the base, m.
-  double reference;
-  // Whether a sensor measures the base.
-  bool has_reference;
+  // Displacement of the base, m; not present: no sensor measures it.
+  struct PhaseLockOptional reference;
   // Whether the drive is requested. A change from false to true arms the controller, also after a fault.
   bool active;
 } PhaseLockInput;
@@ -151,12 +159,12 @@ typedef struct PhaseLockOutput {
   double amplitude;
   // Setpoint of the base displacement at this sample, m.
   double drive;
-  // Phase of the response relative to the reference, minus the target, rad.
-  double phase_error;
+  // Phase of the response relative to the reference, minus the target, rad; not present while an amplitude is 0.
+  struct PhaseLockOptional phase_error;
   // Amplitude of the response's fundamental, m.
   double response_amplitude;
-  // Setpoint of the response amplitude, m; 0 while the drive amplitude is controlled instead.
-  double response_target;
+  // Setpoint of the response amplitude, m; not present while the drive amplitude is controlled instead.
+  struct PhaseLockOptional response_target;
   // Amplitude of the reference's fundamental, m.
   double reference_amplitude;
   // Share of the fundamental in the power of the response, 0 to 1.
@@ -166,7 +174,7 @@ typedef struct PhaseLockOutput {
   // Mean response amplitude over the running dwell, m.
   double response_mean;
   // State of the loop.
-  enum PhaseLockStage stage;
+  enum PhaseLockStage state;
   // Reason why the drive was switched off.
   enum PhaseLockFault fault;
   // Whether the loop is locked.
@@ -181,9 +189,9 @@ typedef struct PhaseLockMove {
   double response;
   // Duration, s.
   double duration;
-  // Expected change of the drive amplitude, m; 0 if unknown.
+  // Expected change of the drive amplitude, m; 0: none.
   double amplitude;
-  // Expected change of the frequency, rad/s; 0 if unknown.
+  // Expected change of the frequency, rad/s; 0: none.
   double omega;
 } PhaseLockMove;
 

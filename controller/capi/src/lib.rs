@@ -15,8 +15,8 @@ pub use controller::{
     phase_lock_sample,
 };
 pub use types::{
-    PhaseLockConfig, PhaseLockController, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOutput,
-    PhaseLockStage,
+    PhaseLockConfig, PhaseLockController, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove,
+    PhaseLockOptional, PhaseLockOutput, PhaseLockStage,
 };
 
 #[cfg(not(feature = "std"))]

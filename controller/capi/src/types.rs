@@ -30,6 +30,17 @@ pub struct PhaseLockOptional {
     pub value: f64,
 }
 
+/// Method of the phase detector.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PhaseLockDetector {
+    /// Adaptive harmonic filter.
+    #[default]
+    Adaptive = 1,
+    /// Synchronous demodulation.
+    Demodulator = 2,
+}
+
 /// All parameters; phase_lock_config_for_resonance gives initial values.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -52,14 +63,16 @@ pub struct PhaseLockConfig {
     pub ramp_rate: PhaseLockOptional,
     /// Rate of the drive ramp to 0 after active becomes false, m/s; not present: switched off at once.
     pub release_rate: PhaseLockOptional,
-    /// Bandwidth of the control of the measured base amplitude, rad/s; 0: no control.
-    pub base_bandwidth: f64,
+    /// Bandwidth of the control of the measured base amplitude, rad/s; not present: no control.
+    pub base_bandwidth: PhaseLockOptional,
     /// Setpoint of the phase of the response relative to the reference, rad.
     pub phase_target: f64,
+    /// Method of the phase detector.
+    pub detector: PhaseLockDetector,
     /// Bandwidth of the detector, rad/s: the tuning parameter.
     pub bandwidth: f64,
-    /// Damping rate of the structure, rad/s; 0: unknown.
-    pub damping_rate: f64,
+    /// Damping rate of the structure, rad/s; not present: unknown.
+    pub damping_rate: PhaseLockOptional,
     /// Delay from the drive to the sample of the sensor, s; used if no reference is connected.
     pub delay: f64,
     /// Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
@@ -86,7 +99,7 @@ pub struct PhaseLockConfig {
     pub residual_max: PhaseLockOptional,
     /// Whether a sensor measures the base.
     pub reference_connected: bool,
-    /// The response approaches its steady state 1 + approach_gain times as fast as under a constant drive; 0: constant drive.
+    /// The response approaches its steady state 1 + approach_gain times as fast as under a constant drive.
     pub approach_gain: f64,
     /// Response amplitude, m, at which impacts certainly occur; it is visited first, so that a particle at rest joins the motion.
     pub capture_response: PhaseLockOptional,
@@ -94,7 +107,7 @@ pub struct PhaseLockConfig {
     pub captured_max: PhaseLockOptional,
     /// Time for which the lock criterion must hold, periods.
     pub dwell: u32,
-    /// Number of harmonics of the adaptive filter, 1 to 8; 0: synchronous demodulator.
+    /// Number of harmonics of the adaptive filter, 1 to 8.
     pub harmonics: u8,
     /// Harmonics 1, 3, 5, ... instead of 1, 2, 3, ...
     pub odd_only: bool,
@@ -106,10 +119,8 @@ pub struct PhaseLockConfig {
 pub struct PhaseLockInput {
     /// Response of the structure, m.
     pub response: f64,
-    /// Displacement of the base, m.
-    pub reference: f64,
-    /// Whether a sensor measures the base.
-    pub has_reference: bool,
+    /// Displacement of the base, m; not present: no sensor measures it.
+    pub reference: PhaseLockOptional,
     /// Whether the drive is requested. A change from false to true arms the controller, also after a fault.
     pub active: bool,
 }
@@ -166,12 +177,12 @@ pub struct PhaseLockOutput {
     pub amplitude: f64,
     /// Setpoint of the base displacement at this sample, m.
     pub drive: f64,
-    /// Phase of the response relative to the reference, minus the target, rad.
-    pub phase_error: f64,
+    /// Phase of the response relative to the reference, minus the target, rad; not present while an amplitude is 0.
+    pub phase_error: PhaseLockOptional,
     /// Amplitude of the response's fundamental, m.
     pub response_amplitude: f64,
-    /// Setpoint of the response amplitude, m; 0 while the drive amplitude is controlled instead.
-    pub response_target: f64,
+    /// Setpoint of the response amplitude, m; not present while the drive amplitude is controlled instead.
+    pub response_target: PhaseLockOptional,
     /// Amplitude of the reference's fundamental, m.
     pub reference_amplitude: f64,
     /// Share of the fundamental in the power of the response, 0 to 1.
@@ -181,7 +192,7 @@ pub struct PhaseLockOutput {
     /// Mean response amplitude over the running dwell, m.
     pub response_mean: f64,
     /// State of the loop.
-    pub stage: PhaseLockStage,
+    pub state: PhaseLockStage,
     /// Reason why the drive was switched off.
     pub fault: PhaseLockFault,
     /// Whether the loop is locked.
@@ -198,8 +209,8 @@ pub struct PhaseLockMove {
     pub response: f64,
     /// Duration, s.
     pub duration: f64,
-    /// Expected change of the drive amplitude, m; 0 if unknown.
+    /// Expected change of the drive amplitude, m; 0: none.
     pub amplitude: f64,
-    /// Expected change of the frequency, rad/s; 0 if unknown.
+    /// Expected change of the frequency, rad/s; 0: none.
     pub omega: f64,
 }

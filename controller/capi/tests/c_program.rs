@@ -72,7 +72,7 @@ fn by_the_core() -> String {
                 "{n} {:016x} {:016x} {:016x} {}",
                 output.omega.to_bits(),
                 output.amplitude.to_bits(),
-                output.phase_error.to_bits(),
+                output.phase_error.unwrap_or(0.0).to_bits(),
                 output.state as u8
             )
             .unwrap();

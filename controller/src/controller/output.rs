@@ -16,9 +16,9 @@ impl PhaseLock {
             omega,
             amplitude: state.drive.amplitude,
             drive,
-            phase_error: measured.error,
+            phase_error: measured.measurable.then_some(measured.error),
             response_amplitude,
-            response_target: state.amplitude_loop.map_or(0.0, |l| l.setpoint()),
+            response_target: state.amplitude_loop.map(|l| l.setpoint()),
             reference_amplitude: measured.reference_amplitude,
             coherence: state.channels.response.coherence(),
             // Rounding can move the mean of values at a limit beyond the limit.
