@@ -79,7 +79,7 @@ struct Broken;
 
 impl Controller for Broken {
     fn sample(&mut self, _: Sensors, _: bool) -> Result<Command, ControllerError> {
-        Ok(Command { phase_error: f64::NAN, ..Command::default() })
+        Ok(Command { phase_error: Some(f64::NAN), ..Command::default() })
     }
 }
 
