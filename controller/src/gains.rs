@@ -37,6 +37,27 @@ impl Gains {
             integral: -bandwidth * bandwidth * p * p * p,
         }
     }
+
+    /// Phase margin, rad, of the loop with this detector and structure and a delay, s.
+    ///
+    /// The open loop is `wLP (kp s + ki) exp(-s delay)/(s (s + delta) (s + wLP))`. Its gain falls with the frequency, so that it is 1
+    /// at one frequency only.
+    #[must_use]
+    pub fn phase_margin(&self, bandwidth: f64, damping_rate: f64, delay: f64) -> f64 {
+        let gain = |w: f64| {
+            let open = bandwidth * libm::hypot(self.proportional * w, self.integral);
+            open / (w * libm::hypot(w, damping_rate) * libm::hypot(w, bandwidth))
+        };
+        let (mut low, mut high) = (0.0, bandwidth);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            *(if gain(middle) > 1.0 { &mut low } else { &mut high }) = middle;
+        }
+        libm::atan2(self.proportional * low, self.integral) + core::f64::consts::FRAC_PI_2
+            - libm::atan2(low, damping_rate)
+            - libm::atan2(low, bandwidth)
+            - delay * low
+    }
 }
 
 #[cfg(test)]
@@ -59,6 +80,20 @@ mod tests {
             6.0 * s + 2.0 * c2,
         ] {
             assert!(residual.abs() < 1e-12, "{residual}");
+        }
+    }
+
+    #[test]
+    fn the_phase_margin_is_above_50_degrees_and_zero_with_the_delay_that_uses_it_up() {
+        for damping in [0.0, 0.01, 0.06, 0.3] {
+            let gains = Gains::from_bandwidth(1.0, damping);
+            let margin = gains.phase_margin(1.0, damping, 0.0);
+            assert!((50.0..75.0).contains(&margin.to_degrees()), "{damping}: {margin}");
+            // The open loop at the frequency of gain 1, whose phase a delay of 1 s shifts by that frequency.
+            let w = margin - gains.phase_margin(1.0, damping, 1.0);
+            let open = (gains.proportional * w).hypot(gains.integral) / (w * w.hypot(damping) * w.hypot(1.0));
+            assert!((open - 1.0).abs() < 1e-9, "{open}");
+            assert!(gains.phase_margin(1.0, damping, margin / w).abs() < 1e-9);
         }
     }
 
