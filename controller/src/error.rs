@@ -1,5 +1,7 @@
 //! Error of a configuration.
 
+use crate::real::Real;
+
 use core::fmt;
 
 /// An invalid value of a [`Config`](crate::Config) or of a call: its name, value and unit, and the allowed values.
@@ -8,7 +10,7 @@ pub struct ConfigError {
     /// Name of the field.
     pub name: &'static str,
     /// The invalid value; `None`: an option that is needed is absent.
-    pub value: Option<f64>,
+    pub value: Option<Real>,
     /// Unit; empty for a pure number.
     pub unit: &'static str,
     /// The allowed values.
@@ -36,12 +38,12 @@ impl core::error::Error for ConfigError {}
 /// A value to check.
 pub(crate) struct Quantity {
     pub name: &'static str,
-    pub value: f64,
+    pub value: Real,
     pub unit: &'static str,
 }
 
 impl Quantity {
-    pub const fn new(name: &'static str, value: f64, unit: &'static str) -> Self {
+    pub const fn new(name: &'static str, value: Real, unit: &'static str) -> Self {
         Self { name, value, unit }
     }
 
@@ -55,7 +57,12 @@ impl Quantity {
 
     /// The error for this value.
     pub fn refuse(&self, allowed: &'static str) -> ConfigError {
-        ConfigError { name: self.name, value: Some(self.value), unit: self.unit, allowed }
+        ConfigError {
+            name: self.name,
+            value: Some(self.value),
+            unit: self.unit,
+            allowed,
+        }
     }
 
     pub fn positive(&self) -> Result<(), ConfigError> {

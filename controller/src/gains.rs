@@ -1,5 +1,7 @@
 //! The gains of the loop from the detector's bandwidth.
 
+use crate::real::{self, Real};
+
 /// Gains of the PI loop filter.
 ///
 /// Near phase resonance the phase of a lightly damped structure follows `phi' = -delta phi + omega_0 - omega` (`delta`: its
@@ -20,16 +22,16 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gains {
     /// Proportional gain, rad/s per rad.
-    pub proportional: f64,
+    pub proportional: Real,
     /// Integral gain, rad/s² per rad.
-    pub integral: f64,
+    pub integral: Real,
 }
 
 impl Gains {
     /// Gains for a detector of the given bandwidth (rad/s, above 0) and a structure of the given damping rate (rad/s,
     /// damping ratio times natural frequency; 0 or above).
     #[must_use]
-    pub fn from_bandwidth(bandwidth: f64, damping_rate: f64) -> Self {
+    pub fn from_bandwidth(bandwidth: Real, damping_rate: Real) -> Self {
         let d = damping_rate / bandwidth;
         let p = -(d + 1.0) / 3.0;
         Self {
@@ -43,19 +45,19 @@ impl Gains {
     /// The open loop is `wLP (kp s + ki) exp(-s delay)/(s (s + delta) (s + wLP))`. Its gain falls with the frequency, so that it is 1
     /// at one frequency only.
     #[must_use]
-    pub fn phase_margin(&self, bandwidth: f64, damping_rate: f64, delay: f64) -> f64 {
-        let gain = |w: f64| {
-            let open = bandwidth * libm::hypot(self.proportional * w, self.integral);
-            open / (w * libm::hypot(w, damping_rate) * libm::hypot(w, bandwidth))
+    pub fn phase_margin(&self, bandwidth: Real, damping_rate: Real, delay: Real) -> Real {
+        let gain = |w: Real| {
+            let open = bandwidth * real::hypot(self.proportional * w, self.integral);
+            open / (w * real::hypot(w, damping_rate) * real::hypot(w, bandwidth))
         };
         let (mut low, mut high) = (0.0, bandwidth);
         for _ in 0..60 {
             let middle = 0.5 * (low + high);
             *(if gain(middle) > 1.0 { &mut low } else { &mut high }) = middle;
         }
-        libm::atan2(self.proportional * low, self.integral) + core::f64::consts::FRAC_PI_2
-            - libm::atan2(low, damping_rate)
-            - libm::atan2(low, bandwidth)
+        real::atan2(self.proportional * low, self.integral) + crate::real::consts::FRAC_PI_2
+            - real::atan2(low, damping_rate)
+            - real::atan2(low, bandwidth)
             - delay * low
     }
 }

@@ -7,6 +7,7 @@
 use crate::config::{Config, Detector};
 use crate::error::{ConfigError, Quantity};
 use crate::range::{NONE, Range, Value};
+use crate::real::Real;
 
 /// Invokes the macro `$with` with one row per parameter:
 /// `group field: type, unit, range;`. The group is `config` for a field of [`Config`] and `lock` for one of
@@ -108,7 +109,7 @@ impl Parameter {
         }
     }
 
-    fn refuse(&self, value: f64) -> ConfigError {
+    fn refuse(&self, value: Real) -> ConfigError {
         Quantity::new(self.name, value, self.unit).refuse(self.range.allowed())
     }
 }

@@ -8,7 +8,9 @@ const HEADER: &str = include_str!("../capi/include/phase_lock.h");
 /// Names of the variables of a causality.
 fn names(causality: &str) -> Vec<&'static str> {
     let of_it = variables().filter(|text| attribute(text, "causality") == Some(causality));
-    of_it.filter_map(|text| text["name=\"".len()..].split('"').next()).collect()
+    of_it
+        .filter_map(|text| text["name=\"".len()..].split('"').next())
+        .collect()
 }
 
 /// Types and names of the fields of a structure of the header, sorted by name.
@@ -17,7 +19,9 @@ fn fields(structure: &str) -> Vec<(&'static str, &'static str)> {
     let (_, body) = HEADER.split_once(&from).expect("the structure");
     let (body, _) = body.split_once('}').expect("its end");
     let lines = body.lines().map(str::trim).filter(|line| line.ends_with(';'));
-    let mut fields: Vec<_> = lines.filter_map(|line| line.trim_end_matches(';').rsplit_once(' ')).collect();
+    let mut fields: Vec<_> = lines
+        .filter_map(|line| line.trim_end_matches(';').rsplit_once(' '))
+        .collect();
     fields.sort_by_key(|field| field.1);
     fields
 }
@@ -70,14 +74,26 @@ fn the_structures_of_the_c_interface_are_the_tables_of_the_core() {
 fn what_is_optional_in_the_core_is_optional_in_c_and_not_a_number_with_a_meaning() {
     let is_optional = |structure, name: &str| {
         let name = name.trim_start_matches("lock.");
-        fields(structure).iter().any(|field| field.1 == name && field.0.ends_with("PhaseLockOptional"))
+        fields(structure)
+            .iter()
+            .any(|field| field.1 == name && field.0.ends_with("PhaseLockOptional"))
     };
     for parameter in &PARAMETERS {
         let expected = parameter.range == Range::Optional;
-        assert_eq!(is_optional("PhaseLockConfig", parameter.name), expected, "{}", parameter.name);
+        assert_eq!(
+            is_optional("PhaseLockConfig", parameter.name),
+            expected,
+            "{}",
+            parameter.name
+        );
     }
     for signal in &OUTPUTS {
-        assert_eq!(is_optional("PhaseLockOutput", signal.name), signal.present.is_some(), "{}", signal.name);
+        assert_eq!(
+            is_optional("PhaseLockOutput", signal.name),
+            signal.present.is_some(),
+            "{}",
+            signal.name
+        );
     }
     assert!(is_optional("PhaseLockInput", "reference"));
 }

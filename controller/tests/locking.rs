@@ -82,7 +82,10 @@ fn follows_a_resonance_that_moves() {
     for _ in 0..500 * 100 {
         bench.resonator.omega_0 -= 1e-5 * OMEGA_0 / 100.0;
         let output = bench.sample();
-        assert!(output.locked && output.phase_error.is_some_and(|error| error.abs() < 0.02), "{output:?}");
+        assert!(
+            output.locked && output.phase_error.is_some_and(|error| error.abs() < 0.02),
+            "{output:?}"
+        );
     }
     assert!(relative(bench.run(400).frequency, 0.995 * OMEGA_0) < 1e-5);
 }
@@ -147,7 +150,10 @@ fn periods_to_lock_over_bandwidth() {
         let mut locked = None;
         for n in 0..100 * most {
             let output = bench.sample();
-            if output.phase_error.is_none_or(|error| error.abs() > 0.5_f64.to_radians()) {
+            if output
+                .phase_error
+                .is_none_or(|error| error.abs() > 0.5_f64.to_radians())
+            {
                 last_outside = n;
             }
             if output.locked {
@@ -192,7 +198,10 @@ fn a_new_phase_target_is_acquired_with_the_drive_on() {
         let output = bench.sample();
         assert!(!output.locked && output.amplitude == amplitude);
         let (_, output) = bench.run_to_lock(3000).expect("a lock");
-        assert!(output.phase_error.is_some_and(|error| error.abs() < 0.01), "{change}: {output:?}");
+        assert!(
+            output.phase_error.is_some_and(|error| error.abs() < 0.01),
+            "{change}: {output:?}"
+        );
         assert_eq!(output.amplitude, amplitude);
     }
 }
@@ -264,7 +273,11 @@ fn the_response_cannot_be_controlled_without_a_limit_of_the_drive_or_in_an_open_
 #[test]
 fn a_shaped_drive_reaches_the_same_lock_several_times_as_fast_and_is_constant_from_then_on() {
     let periods = |approach_gain: f64| {
-        let config = Config { approach_gain, damping_rate: Some(ZETA * OMEGA_0), ..config() };
+        let config = Config {
+            approach_gain,
+            damping_rate: Some(ZETA * OMEGA_0),
+            ..config()
+        };
         let mut bench = Bench::new(config);
         let (periods, _) = bench.run_to_lock(2000).expect("a lock");
         let output = bench.run(20);

@@ -11,9 +11,9 @@ use fmi::fmi2::import::Fmi2Import;
 use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
 use fmi::traits::FmiImport;
 use vines::experiment::{self, Plan};
+use vines::fmu::FmuController;
 use vines::identification::identify;
 use vines::pack::pack_bench;
-use vines::fmu::FmuController;
 use vines::rig::{BuiltIn, Controller, Move, Rig, Simulated};
 use vines::scene::Scene;
 

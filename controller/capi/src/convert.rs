@@ -3,7 +3,8 @@
 use phase_lock::{Config, Detector, Fault, Input, LoopState, Move, Output};
 
 use crate::types::{
-    PhaseLockConfig, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOptional, PhaseLockOutput, PhaseLockStage,
+    PhaseLockConfig, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOptional,
+    PhaseLockOutput, PhaseLockReal, PhaseLockStage,
 };
 
 // Every parameter is a field of the same name.
@@ -43,14 +44,14 @@ macro_rules! write {
     };
 }
 
-impl From<PhaseLockOptional> for Option<f64> {
+impl From<PhaseLockOptional> for Option<PhaseLockReal> {
     fn from(c: PhaseLockOptional) -> Self {
         c.present.then_some(c.value)
     }
 }
 
-impl From<Option<f64>> for PhaseLockOptional {
-    fn from(value: Option<f64>) -> Self {
+impl From<Option<PhaseLockReal>> for PhaseLockOptional {
+    fn from(value: Option<PhaseLockReal>) -> Self {
         Self { present: value.is_some(), value: value.unwrap_or_default() }
     }
 }
@@ -150,7 +151,7 @@ mod tests {
             config.detector = detector;
             for (n, parameter) in PARAMETERS.iter().enumerate() {
                 let value = match parameter.get(&config) {
-                    Value::Real(_) => Value::Real(1.0 + n as f64),
+                    Value::Real(_) => Value::Real(1.0 + n as PhaseLockReal),
                     Value::Integer(_) if parameter.name != "detector" => Value::Integer(5),
                     same => same,
                 };

@@ -5,6 +5,10 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![warn(missing_docs)]
 
+// Single precision under the same name.
+#[cfg(feature = "f32")]
+extern crate phase_lock_f32 as phase_lock;
+
 mod controller;
 mod convert;
 mod message;
@@ -16,7 +20,7 @@ pub use controller::{
 };
 pub use types::{
     PhaseLockConfig, PhaseLockController, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove,
-    PhaseLockOptional, PhaseLockOutput, PhaseLockStage,
+    PhaseLockOptional, PhaseLockOutput, PhaseLockReal, PhaseLockStage,
 };
 
 #[cfg(not(feature = "std"))]

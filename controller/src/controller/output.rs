@@ -1,13 +1,14 @@
 //! The output of one sample.
 
 use super::PhaseLock;
+use crate::real::Real;
 use crate::sensing::Measurement;
 use crate::signals::Output;
 use crate::state::State;
 use crate::supervisor::LoopState;
 
 impl PhaseLock {
-    pub(super) fn output(&self, state: &State, measured: &Measurement, drive: f64) -> Output {
+    pub(super) fn output(&self, state: &State, measured: &Measurement, drive: Real) -> Output {
         let omega = state.frequency.omega;
         let response_amplitude = state.channels.response.amplitude();
         let means = state.dwell.means();

@@ -169,7 +169,11 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
     });
     let amplitudes = expected.map(|one| one.norm());
     let verdict = verdict(&channels, &amplitudes, has_base);
-    let base = if has_base { channels[1].gain * amplitudes[1] } else { amplitude };
+    let base = if has_base {
+        channels[1].gain * amplitudes[1]
+    } else {
+        amplitude
+    };
     let period = samples(1);
     let phasors: Vec<_> = readings[quiet..]
         .chunks_exact(period)

@@ -22,7 +22,10 @@ fn changed(setting: &str) -> Vec<&'static str> {
 fn every_parameter_of_the_controller_has_exactly_one_key_of_the_scene() {
     for parameter in &PARAMETERS {
         let name = parameter.name;
-        let key = KEYS.iter().find(|(parameter, _)| *parameter == name).map(|(_, key)| *key);
+        let key = KEYS
+            .iter()
+            .find(|(parameter, _)| *parameter == name)
+            .map(|(_, key)| *key);
         let value = match (name, parameter.get(&config(&[]).unwrap())) {
             ("reference_connected", _) => "false".into(),
             ("capture_response", _) => "true".into(),
@@ -77,11 +80,19 @@ fn a_stage_of_the_chain_is_switched_off_by_none_or_false_and_not_by_zero() {
         let overrides = ["chain.hold=true", setting].map(|one| one.parse().unwrap());
         Scene::load(None, &overrides).map(|scene| scene.chain)
     };
-    for (key, on) in [("adc_bits", "12"), ("dac_bits", "12"), ("filter", "10.0"), ("snr", "40")] {
+    for (key, on) in [
+        ("adc_bits", "12"),
+        ("dac_bits", "12"),
+        ("filter", "10.0"),
+        ("snr", "40"),
+    ] {
         let with = chain(&format!("chain.{key}={on}")).unwrap();
         for off in ["'none'", "false"] {
             assert_ne!(chain(&format!("chain.{key}={off}")).unwrap(), with);
-            assert_eq!(chain(&format!("chain.{key}={off}")).unwrap(), chain("chain.delay=0").unwrap());
+            assert_eq!(
+                chain(&format!("chain.{key}={off}")).unwrap(),
+                chain("chain.delay=0").unwrap()
+            );
         }
         // 0 dB is a ratio, 0 bits or a cut-off of 0 are none.
         let zero = chain(&format!("chain.{key}=0"));
@@ -91,7 +102,10 @@ fn a_stage_of_the_chain_is_switched_off_by_none_or_false_and_not_by_zero() {
 
 #[test]
 fn two_parameters_of_one_group_are_set_one_after_the_other() {
-    let settings = ["phase_lock.lock.coherence_min=0.25", "phase_lock.lock.response_min=0.125"];
+    let settings = [
+        "phase_lock.lock.coherence_min=0.25",
+        "phase_lock.lock.response_min=0.125",
+    ];
     let config = config(&settings.map(String::from)).unwrap();
     assert_eq!((config.lock.coherence_min, config.lock.response_min), (0.25, 0.125));
 }
@@ -102,8 +116,14 @@ fn a_mistake_in_the_section_of_the_controller_names_the_parameter_and_what_is_al
         ("phase_lock.harmonics=9", ["harmonics = 9", "1 to 8"]),
         ("phase_lock.harmonics=2.5", ["harmonics is a float", "1 to 8"]),
         ("phase_lock.nothing=1", ["no parameter `nothing`", "base_bandwidth"]),
-        ("phase_lock.omega_min=1.0", ["phase_lock.omega_min", "controller.omega_min"]),
-        ("phase_lock.base_bandwidth=99.0", ["base_bandwidth = 99 rad/s", "at most bandwidth"]),
+        (
+            "phase_lock.omega_min=1.0",
+            ["phase_lock.omega_min", "controller.omega_min"],
+        ),
+        (
+            "phase_lock.base_bandwidth=99.0",
+            ["base_bandwidth = 99 rad/s", "at most bandwidth"],
+        ),
     ] {
         let refused = config(&[setting.into()]).unwrap_err();
         assert!(words.iter().all(|word| refused.contains(word)), "{setting}: {refused}");

@@ -43,8 +43,18 @@ fn the_check_drives_at_a_hundredth_and_ends_at_the_phase_where_it_began() {
 
 #[test]
 fn the_check_measures_the_linear_response_and_states_gains_with_a_phase_margin() {
-    for (settings, tolerance) in [(&[][..], 0.02), (&["chain.snr=40", "chain.adc_bits=16", "chain.response_range=0.02"], 0.15)] {
-        let overrides: Vec<_> = settings.iter().chain(&["start.dq2=0"]).map(|one| one.parse().unwrap()).collect();
+    for (settings, tolerance) in [
+        (&[][..], 0.02),
+        (
+            &["chain.snr=40", "chain.adc_bits=16", "chain.response_range=0.02"],
+            0.15,
+        ),
+    ] {
+        let overrides: Vec<_> = settings
+            .iter()
+            .chain(&["start.dq2=0"])
+            .map(|one| one.parse().unwrap())
+            .collect();
         let scene = Scene::parse("paper.toml", PAPER, &overrides).unwrap();
         let d = scene.dimensionless();
         let plant = Simulated::new(scene.plant, scene.start).unwrap();

@@ -75,7 +75,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     }
     if arguments.lock_times {
         let times = lock_times(&scene).map_err(Failure::run)?;
-        return if arguments.json { json(&times) } else { Ok(listed(&times)) };
+        return if arguments.json {
+            json(&times)
+        } else {
+            Ok(listed(&times))
+        };
     }
     scene.start = Default::default();
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
@@ -136,7 +140,12 @@ fn described(found: &LoopCheck) -> String {
     let rows = [("response", Some(&found.response)), ("base", found.base.as_ref())];
     let rows = rows.into_iter().filter_map(|(name, channel)| Some(row(name, channel?)));
     let table = Table::new(["channel", "gain", "phase", "delay", "noise", "floor"]).rows(rows);
-    let mut text = format!("{}\nAt E = {:.2e} m: {}\n", table.markdown(), found.amplitude, found.verdict);
+    let mut text = format!(
+        "{}\nAt E = {:.2e} m: {}\n",
+        table.markdown(),
+        found.amplitude,
+        found.verdict
+    );
     if let Some(linear) = &found.linear {
         let (damping, gain) = (linear.damping_rate, linear.response_gain);
         text += &format!(

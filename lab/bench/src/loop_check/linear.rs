@@ -37,7 +37,10 @@ impl Linear {
         let (mean_before, mean_after) = (mean(before), mean(after));
         let power: f64 = before.iter().map(|z| (z - mean_before).norm_sqr()).sum();
         let products = before.iter().zip(after);
-        let q = products.map(|(z, next)| (z - mean_before).conj() * next).sum::<Complex64>() / power;
+        let q = products
+            .map(|(z, next)| (z - mean_before).conj() * next)
+            .sum::<Complex64>()
+            / power;
         let c = mean_after - q * mean_before;
         let errors = before.iter().zip(after).map(|(z, next)| (next - q * z - c).norm_sqr());
         let u_q = (errors.sum::<f64>() / (2.0 * steps - 4.0) / power).sqrt();

@@ -92,7 +92,9 @@ impl Chain {
             rig,
             response: channel(settings.response_range * d.b),
             base: settings.reference.then(|| channel(base_range)),
-            output: settings.hold.then(|| settings.dac_bits.map(|bits| Converter::new(bits, base_range))),
+            output: settings
+                .hold
+                .then(|| settings.dac_bits.map(|bits| Converter::new(bits, base_range))),
             normal: NormalDistribution::new(settings.seed),
             jitter: settings.jitter,
             late: 0.0,

@@ -110,7 +110,8 @@ impl Chain {
     pub(super) fn check(&self, controller: &Controller) -> Result<(), SceneError> {
         for (key, bits) in [("chain.adc_bits", self.adc_bits), ("chain.dac_bits", self.dac_bits)] {
             let bits = bits.unwrap_or(1);
-            Quantity::new(key, bits.into(), "bits").check((1..=32).contains(&bits), "must be from 1 to 32, or \"none\"")?;
+            Quantity::new(key, bits.into(), "bits")
+                .check((1..=32).contains(&bits), "must be from 1 to 32, or \"none\"")?;
         }
         Quantity::new("chain.dac_bits", self.dac_bits.unwrap_or(0).into(), "bits").check(
             self.dac_bits.is_none() || self.hold,

@@ -73,7 +73,10 @@ fn set(config: &mut Config, name: &str, value: &Value) -> Result<(), String> {
     let parameter = Parameter::find(name).ok_or_else(|| {
         let free = PARAMETERS.iter().map(|one| one.name);
         let free: Vec<&str> = free.filter(|one| KEYS.iter().all(|(name, _)| name != one)).collect();
-        format!("the controller has no parameter `{name}`; expected one of {}", free.join(", "))
+        format!(
+            "the controller has no parameter `{name}`; expected one of {}",
+            free.join(", ")
+        )
     })?;
     let setting = match (parameter.get(config), value) {
         (Setting::Real(_), Value::Float(number)) => Setting::Real(*number),
@@ -84,8 +87,12 @@ fn set(config: &mut Config, name: &str, value: &Value) -> Result<(), String> {
         (Setting::Boolean(_), Value::Boolean(one)) => Setting::Boolean(*one),
         _ => {
             let (allowed, given) = (parameter.range.allowed(), value.type_str());
-            return Err(format!("phase_lock.{name} is a {given}, which is refused; allowed is {allowed}"));
+            return Err(format!(
+                "phase_lock.{name} is a {given}, which is refused; allowed is {allowed}"
+            ));
         }
     };
-    parameter.set(config, setting).map_err(|error| format!("phase_lock.{error}"))
+    parameter
+        .set(config, setting)
+        .map_err(|error| format!("phase_lock.{error}"))
 }

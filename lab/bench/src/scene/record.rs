@@ -63,7 +63,8 @@ impl Record {
             (0.5..=longest).contains(&self.window_periods),
             format!("must be from 0.5 to {longest} (decay_periods, or 1000)"),
         )?;
-        let samples = controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods.unwrap_or(0.0));
+        let samples =
+            controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods.unwrap_or(0.0));
         Quantity::new("samples_per_period times all periods of [record]", samples, "samples")
             .check(samples <= MOST_SAMPLES, "must be at most 20 million")
     }
