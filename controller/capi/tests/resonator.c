@@ -1,4 +1,4 @@
-/* Locks a small resonator and prints what the controller puts out, bit by bit. */
+/* Locks a small resonator and prints what the controller puts out, bit by bit; the argument is the number of samples. */
 #include "phase_lock.h"
 
 #include <inttypes.h>
@@ -12,7 +12,8 @@ static uint64_t bits(double x) {
     return word;
 }
 
-int main(void) {
+int main(int argc, char **argv) {
+    const int samples = argc > 1 ? atoi(argv[1]) : 60000;
     const double omega_0 = 55.39, zeta = 0.005, amplitude = 1e-4;
     PhaseLockConfig config;
     phase_lock_config_for_resonance(&config, omega_0, amplitude);
@@ -29,7 +30,7 @@ int main(void) {
 
     PhaseLockOutput output = {0};
     double q = 0.0, v = 0.0;
-    for (int n = 0; n < 60000; n++) {
+    for (int n = 0; n < samples; n++) {
         PhaseLockInput input = {q, {true, output.drive}, true};
         if (n == 50000) {
             PhaseLockMove to = {0.5 * output.response_amplitude, 1.0, -0.5 * amplitude, 0.0};
