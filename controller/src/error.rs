@@ -17,14 +17,26 @@ pub struct ConfigError {
     pub allowed: &'static str,
 }
 
+/// A number in a message. In full, 1e300 would fill a line.
+#[derive(Clone, Copy, Debug)]
+pub struct Number(pub Real);
+
+impl fmt::Display for Number {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        if self.0 == 0.0 || (1e-4..1e7).contains(&self.0.abs()) {
+            write!(f, "{}", self.0)
+        } else {
+            write!(f, "{:e}", self.0)
+        }
+    }
+}
+
 impl fmt::Display for ConfigError {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} = ", self.name)?;
         match self.value {
             None => f.write_str("none")?,
-            // In full, 1e300 would fill a line.
-            Some(value) if value != 0.0 && !(1e-4..1e7).contains(&value.abs()) => write!(f, "{value:e}")?,
-            Some(value) => write!(f, "{value}")?,
+            Some(value) => write!(f, "{}", Number(value))?,
         }
         if self.value.is_some() && !self.unit.is_empty() {
             write!(f, " {}", self.unit)?;

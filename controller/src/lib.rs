@@ -76,7 +76,7 @@ mod supervisor;
 pub use amplitude_loop::Move;
 pub use config::{Config, Detector, LockCriterion};
 pub use controller::PhaseLock;
-pub use error::ConfigError;
+pub use error::{ConfigError, Number};
 pub use gains::Gains;
 pub use harmonics::MAX_HARMONICS;
 pub use interface::{INPUTS, MOVE, OUTPUTS, Signal};

@@ -26,7 +26,7 @@ pub use controller::Controller;
 pub use error::SceneError;
 pub use family::Family;
 pub use overrides::{Override, SyntaxError};
-pub use phase_lock::{KEYS, PhaseLock};
+pub use phase_lock::{KEYS, PhaseLock, refusal};
 pub use record::{Estimator, Record};
 pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
 

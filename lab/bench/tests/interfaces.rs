@@ -1,13 +1,13 @@
 //! The scene offers every parameter of the controller's table, and its options are absent, `false` or "none", never 0.
 
 use phase_lock::{Config, NONE, PARAMETERS, Parameter, Range, Value};
-use vines_testbench::scene::{KEYS, Scene};
+use vines_testbench::scene::{KEYS, Scene, refusal};
 
 fn config(settings: &[String]) -> Result<Config, String> {
     let overrides = settings.iter().map(|one| one.parse().unwrap()).collect::<Vec<_>>();
     let scene = Scene::load(None, &overrides).map_err(|error| error.to_string())?;
     let config = scene.controller_config();
-    config.build().map_err(|error| error.to_string())?;
+    config.build().map_err(|error| refusal(&error))?;
     Ok(config)
 }
 
@@ -113,6 +113,14 @@ fn two_parameters_of_one_group_are_set_one_after_the_other() {
 #[test]
 fn a_mistake_in_the_section_of_the_controller_names_the_parameter_and_what_is_allowed() {
     for (setting, words) in [
+        (
+            "controller.G_max=1.0",
+            ["excitation.G: amplitude = 9.", "amplitude_max is controller.G_max"],
+        ),
+        (
+            "controller.bandwidth=1e300",
+            ["controller.bandwidth = 1e300 (omega0)", "at most 2.274"],
+        ),
         ("phase_lock.harmonics=9", ["harmonics = 9", "1 to 8"]),
         ("phase_lock.harmonics=2.5", ["harmonics is a float", "1 to 8"]),
         ("phase_lock.nothing=1", ["no parameter `nothing`", "base_bandwidth"]),
@@ -122,7 +130,10 @@ fn a_mistake_in_the_section_of_the_controller_names_the_parameter_and_what_is_al
         ),
         (
             "phase_lock.base_bandwidth=99.0",
-            ["base_bandwidth = 99 rad/s", "at most bandwidth"],
+            [
+                "phase_lock.base_bandwidth: base_bandwidth = 99 rad/s",
+                "bandwidth is controller.bandwidth",
+            ],
         ),
     ] {
         let refused = config(&[setting.into()]).unwrap_err();

@@ -72,7 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     log_warnings();
     let (config, reach) = (scene.backbone_config(), arguments.reach.reach());
-    BuiltIn::new(&config).map_err(Failure::input)?;
+    BuiltIn::new(&config)?;
     writable(&arguments.out)?;
     let mut open = arguments.rig.rig(&scene, reach)?;
     arguments.loop_check.before(&mut open.rig, &scene)?;

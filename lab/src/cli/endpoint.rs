@@ -105,7 +105,7 @@ impl Endpoint {
         pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
         Ok(match self {
-            Self::BuiltIn => Box::new(BuiltIn::new(config).map_err(Failure::input)?),
+            Self::BuiltIn => Box::new(BuiltIn::new(config)?),
             Self::Fmu(file) => Box::new(FmuController::load(file, config).map_err(Failure::run)?),
             Self::Network(address) => match Address::parse(address, scope)? {
                 Address::Tcp(peer) => Box::new(NetController::connect(peer, config.sample_time, pace)?),
@@ -127,7 +127,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Failure> {
              phase at the peak, which `vines orbit` computes and `vines backbone` measures",
         ));
     }
-    BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
+    BuiltIn::new(&scene.controller_config())?;
     Ok(())
 }
 

@@ -1,6 +1,6 @@
 //! The `[phase_lock]` section: parameters of the controller that no other key sets, in SI units and by their names in `PhaseLock.fmu`.
 
-use phase_lock::{Config, NONE, PARAMETERS, Parameter, Value as Setting};
+use phase_lock::{Config, ConfigError, NONE, PARAMETERS, Parameter, Value as Setting};
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
@@ -30,6 +30,21 @@ pub const KEYS: [(&str, &str); 23] = [
     ("approach_gain", "controller.approach_gain"),
     ("capture_response", "controller.capture"),
 ];
+
+/// The message for a refused configuration, with the keys of the scene.
+#[must_use]
+pub fn refusal(error: &ConfigError) -> String {
+    let key = |name: &str| {
+        let key = KEYS.iter().find(|(parameter, _)| *parameter == name);
+        key.map_or_else(|| format!("phase_lock.{name}"), |(_, key)| (*key).to_string())
+    };
+    let mut text = format!("{}: {error}", key(error.name));
+    let words = error.allowed.split([' ', ',', '(', ')']);
+    for name in words.filter(|word| Parameter::find(word).is_some()) {
+        text += &format!("; {name} is {}", key(name));
+    }
+    text
+}
 
 /// Values by the names of the controller's parameters.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
