@@ -5,6 +5,10 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![warn(missing_docs)]
 
+// Single precision under the same name.
+#[cfg(feature = "f32")]
+extern crate phase_lock_f32 as phase_lock;
+
 mod controller;
 mod convert;
 mod message;
@@ -15,8 +19,8 @@ pub use controller::{
     phase_lock_sample,
 };
 pub use types::{
-    PhaseLockConfig, PhaseLockController, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOutput,
-    PhaseLockStage,
+    PhaseLockConfig, PhaseLockController, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove,
+    PhaseLockOptional, PhaseLockOutput, PhaseLockReal, PhaseLockStage,
 };
 
 #[cfg(not(feature = "std"))]

@@ -3,6 +3,8 @@
 //! A linear resonator at rest that is driven at its natural frequency with the amplitude E responds with `-i g E (1 - exp(-d t))/d`
 //! (`g`: half the frequency, `d`: damping rate). Response and base are compared with this and with E, by amplitude and phase.
 
+mod linear;
+mod lock_times;
 mod trials;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -14,6 +16,8 @@ use serde::Serialize;
 use crate::rig::{Drive, Rig, RigError};
 use crate::scene::Scene;
 
+pub use linear::Linear;
+pub use lock_times::{LockTime, LockTimeError, lock_times};
 pub use trials::{Trials, trials};
 
 /// Drive, as a share of that of the scene.
@@ -118,6 +122,8 @@ pub struct LoopCheck {
     pub response: Channel,
     /// The base, if a sensor measures it.
     pub base: Option<Channel>,
+    /// The linear response and the gains for it, if the loop is healthy.
+    pub linear: Option<Linear>,
 }
 
 /// Checks a rig at rest at a hundredth of the drive. The phase of the rig's oscillator is a multiple of 2 pi before and after.
@@ -167,8 +173,21 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
         }
     });
     let amplitudes = expected.map(|one| one.norm());
+    let verdict = verdict(&channels, &amplitudes, has_base);
+    let base = if has_base {
+        channels[1].gain * amplitudes[1]
+    } else {
+        amplitude
+    };
+    let period = samples(1);
+    let phasors: Vec<_> = readings[quiet..]
+        .chunks_exact(period)
+        .map(|readings| Seen::of(readings, 1).phasor)
+        .collect();
+    let linear = Linear::of(&phasors, base, omega, period as f64 * step, scene);
     Ok(LoopCheck {
-        verdict: verdict(&channels, &amplitudes, has_base),
+        verdict,
+        linear: linear.filter(|_| verdict == Verdict::Healthy),
         amplitude,
         response: channels[0],
         base: has_base.then_some(channels[1]),
