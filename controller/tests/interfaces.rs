@@ -47,7 +47,8 @@ fn inputs_and_outputs_of_the_fmu_are_those_of_the_core() {
     let flags = OUTPUTS.iter().filter_map(|signal| signal.present);
     let mut outputs: Vec<_> = OUTPUTS.iter().map(|signal| signal.name).chain(flags).collect();
     let mut described = names("output");
-    (outputs.sort_unstable(), described.sort_unstable());
+    outputs.sort_unstable();
+    described.sort_unstable();
     assert_eq!(described, outputs);
     let unit = |name: &str| attribute(variable(name), "unit").unwrap_or("");
     for signal in &OUTPUTS {
