@@ -72,6 +72,21 @@ fn the_structures_of_the_c_interface_are_the_tables_of_the_core() {
 }
 
 #[test]
+fn the_c_interface_has_every_operation_of_the_core() {
+    let core = include_str!("../src/controller.rs");
+    let public = core.split("pub fn ").skip(1).filter_map(|rest| rest.split('(').next());
+    // The configuration and what follows from it are in the hands of the caller; the output before the first sample is all zeros.
+    for name in public.filter(|name| !["build", "config", "gains", "idle"].contains(name)) {
+        let in_c = match name {
+            "start" => "reset",
+            "process" => "sample",
+            name => name,
+        };
+        assert!(HEADER.contains(&format!("int phase_lock_{in_c}(")), "{name}");
+    }
+}
+
+#[test]
 fn what_is_optional_in_the_core_is_optional_in_c_and_not_a_number_with_a_meaning() {
     let is_optional = |structure, name: &str| {
         let name = name.trim_start_matches("lock.");
