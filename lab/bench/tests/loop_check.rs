@@ -1,5 +1,6 @@
 //! The loop check on random rigs; `vines check --trials 1000` takes more.
 
+use lovines::State;
 use vines_testbench::loop_check::{Verdict, check, trials};
 use vines_testbench::rig::{Chain, Drive, Rig, RigError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
@@ -66,5 +67,15 @@ fn the_check_measures_the_linear_response_and_states_gains_with_a_phase_margin()
         assert!((found.response_gain / (0.5 * d.omega0) - 1.0).abs() < tolerance);
         assert!((found.omega_0 / d.omega0 - 1.0).abs() < 1e-3);
         assert!((50.0..60.0).contains(&found.phase_margin));
+    }
+}
+
+#[test]
+fn a_rig_that_moves_before_the_drive_is_named() {
+    let scene = scene();
+    for speed in [1e-3, 0.05] {
+        let start = State { dq1: speed, ..State::default() };
+        let found = check(&mut Simulated::new(scene.plant, start).unwrap(), &scene).unwrap();
+        assert_eq!(found.verdict, Verdict::NotAtRest, "{found:?}");
     }
 }

@@ -69,13 +69,14 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?;
+    let mut scene = arguments.scene.load()?;
     log_warnings();
-    let (config, reach) = (scene.backbone_config(), arguments.reach.reach());
-    BuiltIn::new(&config)?;
+    let reach = arguments.reach.reach();
+    BuiltIn::new(&scene.backbone_config())?;
     writable(&arguments.out)?;
     let mut open = arguments.rig.rig(&scene, reach)?;
-    arguments.loop_check.before(&mut open.rig, &scene)?;
+    arguments.loop_check.before(&mut open.rig, &mut scene)?;
+    let config = scene.backbone_config();
     let mut controller = arguments.controller.controller(&config, reach, open.pace)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let tracked = track(&mut open.rig, controller.as_mut(), &scene, |done, _| {
