@@ -179,5 +179,5 @@ impl AmplitudeLoop {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests;

@@ -42,7 +42,7 @@ impl Complex {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
 

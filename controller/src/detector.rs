@@ -112,7 +112,7 @@ impl PhaseDetector {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
     use crate::oscillator::Oscillator;

@@ -73,7 +73,7 @@ fn approach(from: Real, to: Real, step: Real) -> Real {
     to.clamp(from - step, from + step)
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
 

@@ -62,7 +62,7 @@ impl Gains {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
 

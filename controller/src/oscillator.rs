@@ -35,7 +35,7 @@ impl Oscillator {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
 

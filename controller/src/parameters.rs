@@ -191,7 +191,7 @@ macro_rules! table {
 
 parameters!(table);
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
 

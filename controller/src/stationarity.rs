@@ -225,5 +225,5 @@ fn range(blocks: &[Block], group: usize, value: impl Fn(&Block) -> Real) -> Real
     (high - low) / last
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests;

@@ -249,6 +249,15 @@ fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
         assert!(relative(output.amplitude, share * AMPLITUDE) < 1e-5);
         assert!(output.settled);
     }
+    // The drive returns to its own setpoint.
+    bench.controller.hold_drive(&mut bench.state);
+    let output = bench.run(30);
+    assert_eq!((output.response_target, output.amplitude), (None, AMPLITUDE));
+    bench
+        .controller
+        .hold_response(&mut bench.state, Move { response: before, ..Move::default() })
+        .unwrap();
+    assert!(bench.sample().response_target.is_some());
     // Switching the drive off ends the control of the response.
     bench.active = false;
     assert_eq!(bench.sample().response_target, None);

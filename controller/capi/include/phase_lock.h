@@ -254,6 +254,12 @@ int phase_lock_hold_response(struct PhaseLockController *controller,
                              char *message,
                              size_t length);
 
+// Controls the drive amplitude again; the drive ramps to its setpoint.
+//
+// # Safety
+// controller is NULL or was initialised.
+int phase_lock_hold_drive(struct PhaseLockController *controller);
+
 // Returns to the state before the first sample, with the same configuration.
 //
 // # Safety

@@ -146,6 +146,20 @@ pub unsafe extern "C" fn phase_lock_hold_response(
     unsafe { status(outcome, message, length) }
 }
 
+/// Controls the drive amplitude again; the drive ramps to its setpoint.
+///
+/// # Safety
+/// controller is NULL or was initialised.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn phase_lock_hold_drive(controller: *mut PhaseLockController) -> c_int {
+    // SAFETY: the caller's contract.
+    let Some(stored) = (unsafe { stored(controller) }) else {
+        return NULL_POINTER;
+    };
+    stored.lock.hold_drive(&mut stored.state);
+    SUCCESS
+}
+
 /// Returns to the state before the first sample, with the same configuration.
 ///
 /// # Safety

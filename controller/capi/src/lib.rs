@@ -15,8 +15,8 @@ mod message;
 mod types;
 
 pub use controller::{
-    phase_lock_config_for_resonance, phase_lock_hold_response, phase_lock_init, phase_lock_reset, phase_lock_retune,
-    phase_lock_sample,
+    phase_lock_config_for_resonance, phase_lock_hold_drive, phase_lock_hold_response, phase_lock_init,
+    phase_lock_reset, phase_lock_retune, phase_lock_sample,
 };
 pub use types::{
     PhaseLockConfig, PhaseLockController, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove,
