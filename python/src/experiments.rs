@@ -168,7 +168,7 @@ impl PhaseLock {
         response: f64,
         reference: Option<f64>,
         active: bool,
-    ) -> (f64, f64, f64, f64, f64, f64, bool, bool, u8, u8) {
+    ) -> (f64, f64, f64, Option<f64>, f64, f64, bool, bool, u8, u8) {
         let output = self
             .lock
             .process(&mut self.state, Input { response, reference, active });

@@ -86,8 +86,8 @@ pub trait Rig {
 pub struct Command {
     /// The drive for the coming sample period.
     pub drive: Drive,
-    /// Phase of the response relative to the base, less the target, rad.
-    pub phase_error: f64,
+    /// Phase of the response relative to the base, less the target, rad; absent if it cannot be measured.
+    pub phase_error: Option<f64>,
     /// Phase, frequency and amplitude have been stationary for the controller's dwell time.
     pub settled: bool,
     /// State of the loop; absent if the controller does not report it.

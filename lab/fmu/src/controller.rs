@@ -3,15 +3,15 @@
 use std::path::Path;
 
 use fmi::fmi2::instance::Common;
-use phase_lock::{Config, PARAMETERS, Value};
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Sensors};
+use phase_lock::{Config, MOVE, PARAMETERS, Value};
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Sensors};
 use vines_testbench::scene::Names;
 
 use crate::instance::{Fmu, FmuError, Kind, Named, Reference};
 use crate::judge::Judge;
 
 /// The names of this bench that a scene may map, beside those of the parameters.
-const NAMES: [&str; 11] = [
+const NAMES: [&str; 13] = [
     "response",
     "reference",
     "active",
@@ -19,6 +19,8 @@ const NAMES: [&str; 11] = [
     "E",
     "drive",
     "phase_error",
+    "phase_measured",
+    "hold_response",
     "settled",
     "locked",
     "state",
@@ -36,8 +38,9 @@ enum Settled {
 /// A controller FMU, stepped sample by sample.
 ///
 /// It needs the inputs `response` and `active` and the outputs `omega` and `E`. Without the output `settled`, the lab judges whether the
-/// lock has settled, by `locked`, the phase error and the frequency. A scene maps all names; `reference`, `drive`, `phase_error`,
-/// `state` and `fault` are used where it has them. Of the configuration it gets what it has a parameter for, by the names of
+/// lock has settled, by `locked`, the phase error and the frequency. `reference`, `drive`, `phase_error`,
+/// `phase_measured`, `state` and `fault` are used where it has them, and for the control of the response the parameter `phase_target`
+/// and the inputs `hold_response` and `move.*`. A scene maps all names. Of the configuration it gets what it has a parameter for, by the names of
 /// `PhaseLock.fmu`. At each sample its inputs are set, it is stepped by one sample time, and what it then puts out is
 /// the drive of that very sample period.
 pub struct FmuController {
@@ -50,9 +53,28 @@ pub struct FmuController {
     drive: [Named; 2],
     displacement: Option<Named>,
     phase_error: Option<Named>,
+    phase_measured: Option<Reference>,
     settled: Settled,
     /// `state` and `fault`.
     states: [Option<Reference>; 2],
+    response_loop: Option<ResponseLoop>,
+}
+
+/// Variables of a controller that can control the response.
+struct ResponseLoop {
+    /// `phase_target` and the fields of the move, in the order of the core's table.
+    reals: Vec<Named>,
+    hold: Reference,
+}
+
+impl ResponseLoop {
+    fn of(fmu: &Fmu, names: &Names) -> Result<Option<Self>, FmuError> {
+        let reals = std::iter::once("phase_target".to_owned()).chain(moves());
+        let reals = reals.map(|ours| fmu.named(Kind::Real, names, &ours));
+        let reals: Option<Vec<Named>> = reals.collect::<Result<_, _>>()?;
+        let hold = fmu.named(Kind::Boolean, names, "hold_response")?;
+        Ok(reals.zip(hold).map(|(reals, (hold, _))| Self { reals, hold }))
+    }
 }
 
 impl FmuController {
@@ -62,7 +84,12 @@ impl FmuController {
     /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
     pub fn load(path: &Path, config: &Config, names: &Names) -> Result<Self, FmuError> {
         let known = PARAMETERS.iter().map(|parameter| parameter.name);
-        let known: Vec<&str> = NAMES.into_iter().chain(known).collect();
+        let moves: Vec<String> = moves().collect();
+        let known: Vec<&str> = NAMES
+            .into_iter()
+            .chain(known)
+            .chain(moves.iter().map(String::as_str))
+            .collect();
         if let Some(name) = names.unknown(&known) {
             return Err(FmuError::Name { name: name.into(), known: known.join(", ") });
         }
@@ -95,6 +122,9 @@ impl FmuController {
         };
         let states = [integer("state")?, integer("fault")?];
         let displacement = fmu.named(Kind::Real, names, "drive")?;
+        let phase_measured = fmu.named(Kind::Boolean, names, "phase_measured")?;
+        let phase_measured = phase_measured.map(|(reference, _)| reference);
+        let response_loop = ResponseLoop::of(&fmu, names)?;
         fmu.start(names, &parameters(config))?;
         Ok(Self {
             sample_time: config.sample_time,
@@ -103,14 +133,17 @@ impl FmuController {
             drive,
             displacement,
             phase_error,
+            phase_measured,
+            response_loop,
             settled,
             states,
             fmu,
         })
     }
 
-    fn optional(&mut self, variable: Option<Named>) -> Result<f64, FmuError> {
-        variable.map_or(Ok(0.0), |one| self.fmu.read("give its outputs", [one]).map(|[x]| x))
+    fn optional(&mut self, variable: Option<Named>) -> Result<Option<f64>, FmuError> {
+        let value = variable.map(|one| self.fmu.read("give its outputs", [one]).map(|[x]| x));
+        value.transpose()
     }
 
     fn boolean(&mut self, reference: Reference) -> Result<bool, FmuError> {
@@ -151,17 +184,22 @@ impl FmuController {
             Settled::Judged(locked, _) => locked,
         };
         let told = told.map(|told| self.boolean(told)).transpose()?;
-        let phase_error = self.optional(self.phase_error)?;
+        let measured = self.phase_measured.map_or(Ok(true), |one| self.boolean(one))?;
+        let phase_error = self.optional(self.phase_error.filter(|_| measured))?;
         let settled = match &mut self.settled {
             Settled::Told(_) => told == Some(true),
             Settled::Judged(..) if !active => false,
-            Settled::Judged(_, judge) => judge.sample(omega, phase_error, told.unwrap_or(true)),
+            Settled::Judged(_, judge) => {
+                // A phase that cannot be measured now is none to judge by.
+                let locked = told.unwrap_or(true) && measured;
+                judge.sample(omega, phase_error.unwrap_or(0.0), locked)
+            }
         };
         Ok(Command {
             drive: Drive {
                 omega,
                 amplitude,
-                displacement: self.optional(self.displacement)?,
+                displacement: self.optional(self.displacement)?.unwrap_or(0.0),
             },
             phase_error,
             settled,
@@ -175,6 +213,29 @@ impl Controller for FmuController {
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
         Ok(self.exchange(sensors, active)?)
     }
+
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
+        let inputs = self.response_loop.as_ref().ok_or(ControllerError::NoResponseLoop)?;
+        let Move { response, duration, amplitude, omega } = to;
+        let values = [phase_target, response, duration, amplitude, omega];
+        let values: Vec<f64> = inputs
+            .reals
+            .iter()
+            .zip(values)
+            .map(|((_, factor), x)| x / factor)
+            .collect();
+        let references: Vec<Reference> = inputs.reals.iter().map(|(reference, _)| *reference).collect();
+        self.fmu.ask("take its inputs", |i| {
+            i.set_real(&references, &values)?;
+            i.set_boolean(&[inputs.hold], &[true.into()])
+        })?;
+        Ok(())
+    }
+}
+
+/// The inputs of a move.
+fn moves() -> impl Iterator<Item = String> {
+    MOVE.iter().map(|(name, _)| format!("move.{name}"))
 }
 
 /// The configuration under the names of the FMU's parameters.

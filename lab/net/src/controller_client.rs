@@ -7,10 +7,10 @@ use super::address::Address;
 use super::client::Client;
 use super::error::LinkError;
 use super::frame::{Frame, Kind, flag};
-use super::payload::{Reading, read_command, write_reading};
+use super::payload::{Reading, read_command, write_move, write_reading};
 use super::report::Counters;
 use super::seal::Key;
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Sensors};
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Move, Sensors};
 
 /// A controller at a network address.
 #[derive(Debug)]
@@ -122,5 +122,10 @@ impl Controller for NetController {
         // Latched: after one failure the peer is not asked again.
         self.failed = answer.is_err();
         Ok(answer?)
+    }
+
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
+        let frame = write_move(self.client.frame(Kind::Move), to, phase_target);
+        Ok(self.client.send(frame)?)
     }
 }

@@ -36,7 +36,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let first = BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
+    let first = BuiltIn::new(&scene.controller_config())?;
     let service = Service {
         role: Role::Controller,
         sample_time: scene.sample_time(),

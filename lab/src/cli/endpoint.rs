@@ -7,6 +7,7 @@ use std::{
 };
 
 use clap::Args;
+use phase_lock::Config;
 use vines::{
     fmu::{FmuController, FmuError, FmuRig},
     net::{
@@ -95,22 +96,21 @@ impl Endpoint {
         Ok(OpenRig { rig, pace, timing })
     }
 
-    /// The controller of this endpoint, for a rig of that `pace`.
+    /// The controller of this endpoint with its configuration, for a rig of that `pace`. One at a network address has its own.
     pub(super) fn controller(
         &self,
-        scene: &Scene,
+        config: &Config,
+        names: &Names,
         scope: BindScope,
         pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
         Ok(match self {
-            Self::BuiltIn => Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?),
-            Self::Fmu(file) => Box::new(
-                FmuController::load(file, &scene.controller_config(), &scene.controller_names).map_err(Failure::run)?,
-            ),
+            Self::BuiltIn => Box::new(BuiltIn::new(config)?),
+            Self::Fmu(file) => Box::new(FmuController::load(file, config, names).map_err(Failure::run)?),
             Self::Network(address) => match Address::parse(address, scope)? {
                 Address::Tcp(peer) => Box::new(NetController::connect_with(
                     peer,
-                    scene.sample_time(),
+                    config.sample_time,
                     pace,
                     scope.key(),
                 )?),
@@ -192,7 +192,7 @@ pub(super) fn check(scene: &Scene) -> Result<(), Failure> {
              phase at the peak, which `vines orbit` computes and `vines backbone` measures",
         ));
     }
-    BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
+    BuiltIn::new(&scene.controller_config())?;
     Ok(())
 }
 

@@ -2,12 +2,13 @@
 
 use std::fmt::{self, Display, Formatter};
 
+use phase_lock::ConfigError;
 use vines::{
     experiment::ExperimentError,
     net::LinkError,
     pack::PackError,
     rig::{Interrupted, RigError},
-    scene::SceneError,
+    scene::{SceneError, refusal},
 };
 
 use super::interrupt::INTERRUPTED;
@@ -68,6 +69,12 @@ impl Display for Failure {
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
         Self::input(error)
+    }
+}
+
+impl From<ConfigError> for Failure {
+    fn from(error: ConfigError) -> Self {
+        Self::input(refusal(&error))
     }
 }
 

@@ -91,12 +91,6 @@ pub(super) struct Arguments {
     max_amplitude: Option<f64>,
 }
 
-#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
-enum Protocol {
-    Vines,
-    Helic,
-}
-
 /// Prints the time from the fault to a drive of zero, s.
 fn tell(zero: Option<f64>, json: bool) {
     let text = match zero {
@@ -131,13 +125,21 @@ impl FromStr for Fault {
     }
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Protocol {
+    Vines,
+    Helic,
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
-    if arguments.protocol == Protocol::Helic {
-        scene.controller.samples_per_period *= f64::from(arguments.oversampling);
-    }
-    if arguments.sensors_only || arguments.protocol == Protocol::Helic {
+    let helic = arguments.protocol == Protocol::Helic;
+    if arguments.sensors_only || helic {
+        // A device runs on between its hosts.
         scene.start = Default::default();
+    }
+    if helic {
+        scene.controller.samples_per_period *= f64::from(arguments.oversampling);
     }
     let first = Simulated::new(scene.plant, scene.start)
         .map_err(Failure::input)?
@@ -178,14 +180,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     }
     arguments.real_time.apply()?;
     let keep = |session: &Session| arguments.real_time.keep(session);
-    if arguments.protocol == Protocol::Helic {
+    if helic {
         if arguments.lock_step {
             let message = "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic";
             return Err(Failure::input(message));
         }
-        let device =
-            Device::new(make().map_err(Failure::run)?, scene.sample_time(), max_amplitude).map_err(Failure::run)?;
-        return arguments.serving.serve_helic(device, scene.sample_time(), keep);
+        let step = scene.sample_time();
+        let device = Device::new(make().map_err(Failure::run)?, step, max_amplitude).map_err(Failure::run)?;
+        return arguments.serving.serve_helic(device, step, keep);
     }
     let service = Service {
         role: Role::Rig { max_amplitude, sensors: scene.resonance },

@@ -1,5 +1,6 @@
 //! The endpoints of `vines identify`, as its users meet them: whatever stands behind them, the identified numbers agree.
 
+mod loop_check;
 mod refusals;
 
 use std::env::consts::DLL_SUFFIX;

@@ -58,7 +58,7 @@ fn connect<F: FnMut(usize) -> usize>(fate: F) -> HelicRig<Direct<F>> {
 #[test]
 fn the_experiment_on_a_device_gives_the_backbone_of_the_plant() {
     let mut scene = scene();
-    scene.record.decay_periods = 150.0;
+    scene.record.decay_periods = Some(150.0);
     let plant = || Simulated::new(scene.plant, scene.start).unwrap();
     let step = scene.sample_time();
     let run = |rig: &mut dyn Rig| {
