@@ -6,6 +6,7 @@ mod error;
 mod measured;
 mod phase_lock;
 mod simulated;
+mod stoppable;
 
 pub use ::phase_lock::{Fault, LoopState, Move};
 pub use chain::Chain;
@@ -14,6 +15,7 @@ pub use error::{ControllerError, RigError};
 pub use measured::Measured;
 pub use phase_lock::BuiltIn;
 pub use simulated::Simulated;
+pub use stoppable::{Interrupted, Stoppable};
 
 /// What the controller asks of the rig for the coming sample period.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]

@@ -9,6 +9,7 @@ use super::error::LinkError;
 use super::frame::{Frame, Kind, flag};
 use super::payload::{Reading, read_command, write_move, write_reading};
 use super::report::Counters;
+use super::seal::Key;
 use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Move, Sensors};
 
 /// A controller at a network address.
@@ -34,7 +35,20 @@ impl NetController {
     /// # Errors
     /// A server that does not answer, refuses, or has another version.
     pub fn connect(peer: SocketAddr, sample_time: f64, pace: Option<f64>) -> Result<Self, LinkError> {
-        let mut client = Client::connect(Address::Tcp(peer), true, sample_time)?;
+        Self::connect_with(peer, sample_time, pace, None)
+    }
+
+    /// As [`NetController::connect`], with a shared key.
+    ///
+    /// # Errors
+    /// As there; a server with another key does not answer.
+    pub fn connect_with(
+        peer: SocketAddr,
+        sample_time: f64,
+        pace: Option<f64>,
+        key: Option<Key>,
+    ) -> Result<Self, LinkError> {
+        let mut client = Client::connect(Address::Tcp(peer), true, sample_time, key)?;
         let limit = pace.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
         client.silence = limit.map_or(client.silence, |limit| limit.min(client.silence));
         Ok(Self {

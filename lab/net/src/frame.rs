@@ -93,6 +93,9 @@ pub enum FrameError {
     /// The checksum does not match the content.
     #[error("wrong checksum")]
     Checksum,
+    /// It has no valid authentication code.
+    #[error("not authenticated with the key")]
+    Tag,
     /// There will be no more frames.
     #[error("the connection is closed")]
     Closed,

@@ -71,7 +71,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
     log_warnings();
-    let reach = arguments.reach.reach();
+    let reach = arguments.reach.reach()?;
     BuiltIn::new(&scene.backbone_config())?;
     writable(&arguments.out)?;
     let mut open = arguments.rig.rig(&scene, reach)?;

@@ -82,7 +82,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         };
     }
     scene.start = Default::default();
-    let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
+    let mut open = arguments.rig.rig(&scene, arguments.reach.reach()?)?;
     let found = check(&mut open.rig, &scene).map_err(ExperimentError::from)?;
     open.close();
     let text = if arguments.json {

@@ -7,11 +7,11 @@ use vines::{
     experiment::ExperimentError,
     net::LinkError,
     pack::PackError,
-    rig::RigError,
+    rig::{Interrupted, RigError},
     scene::{SceneError, refusal},
 };
 
-use super::interrupt::{INTERRUPTED, Interrupted};
+use super::interrupt::INTERRUPTED;
 
 /// A message and an exit code.
 #[derive(Debug)]

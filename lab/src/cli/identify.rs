@@ -69,7 +69,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
     log_warnings();
-    let reach = arguments.reach.reach();
+    let reach = arguments.reach.reach()?;
     check(&scene)?;
     let (mut open, fmus) = match &arguments.rig {
         Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&arguments.out)?),

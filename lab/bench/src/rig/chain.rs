@@ -104,6 +104,21 @@ impl Chain {
     }
 }
 
+impl Chain {
+    /// Duration of a sample period of `step` seconds, whose end is not where it should be.
+    fn taken(&mut self, step: f64) -> f64 {
+        let late = if self.jitter > 0.0 {
+            self.jitter * self.normal.next().clamp(-JITTER_MAX, JITTER_MAX)
+        } else {
+            0.0
+        };
+        let taken = step * (1.0 + late - self.late);
+        self.late = late;
+        self.elapsed += taken;
+        taken
+    }
+}
+
 impl Rig for Chain {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let seen = self.rig.sense()?;
@@ -124,18 +139,17 @@ impl Rig for Chain {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let late = if self.jitter > 0.0 {
-            self.jitter * self.normal.next().clamp(-JITTER_MAX, JITTER_MAX)
-        } else {
-            0.0
-        };
-        let taken = step * (1.0 + late - self.late);
-        self.late = late;
-        self.elapsed += taken;
-        match &self.output {
-            Some(output) => self.rig.hold(converted(output.as_ref(), drive.displacement), taken),
-            None => self.rig.advance(drive, taken),
+        if self.output.is_some() {
+            return self.hold(drive.displacement, step);
         }
+        let taken = self.taken(step);
+        self.rig.advance(drive, taken)
+    }
+
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        let taken = self.taken(step);
+        let output = self.output.as_ref().and_then(Option::as_ref);
+        self.rig.hold(converted(output, displacement), taken)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
