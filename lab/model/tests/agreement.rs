@@ -213,7 +213,7 @@ fn regimes_agree_with_those_after_20_000_periods() {
 const SHORT: usize = 400;
 
 #[test]
-fn a_decision_before_the_limit_is_that_of_the_full_length() {
+fn an_early_decision_is_that_of_the_full_length() {
     let (cells, first) = (setting("CELLS", 40), setting("SEED", 1));
     let mut wrong = 0;
     for (n, case) in CASES.iter().enumerate() {

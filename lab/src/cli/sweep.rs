@@ -73,7 +73,7 @@ pub(super) struct Arguments {
     chunk: u64,
 
     /// Only the regime: compute every N-th cell of two grids, then where neighbours differ; infer the rest and mark it in `inferred`
-    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "8", conflicts_with_all = ["shard", "merge"])]
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "4", conflicts_with_all = ["shard", "merge"])]
     adaptive: Option<u64>,
 
     /// Folder of the store; made if it is not there

@@ -16,9 +16,13 @@ fn main() -> Result<(), Box<dyn std::error::Error>> {
     let mut least = f64::INFINITY;
     for _ in 0..7 {
         let start = |n: usize| [0.0, 0.0, 0.0, 0.3 + 0.6 * n as f64 / (PLANTS - 1) as f64];
-        let mut plants = (0..PLANTS).map(|n| scene.plant(start(n))).collect::<Result<Vec<Plant>, _>>()?;
+        let mut plants = (0..PLANTS)
+            .map(|n| scene.plant(start(n)))
+            .collect::<Result<Vec<Plant>, _>>()?;
         let begin = Instant::now();
-        plants.par_iter_mut().try_for_each(|plant| plant.advance(drive, duration).map(drop))?;
+        plants
+            .par_iter_mut()
+            .try_for_each(|plant| plant.advance(drive, duration).map(drop))?;
         least = least.min(begin.elapsed().as_secs_f64());
     }
     println!("{least}");

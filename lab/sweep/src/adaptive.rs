@@ -81,16 +81,18 @@ impl Map {
         .collect()
     }
 
-    /// The neighbours of a cell at this distance.
+    /// The eight neighbours of a cell at this distance.
     fn beside(&self, n: usize, stride: usize) -> impl Iterator<Item = usize> + use<> {
-        let (row, column, columns) = (n / self.columns, n % self.columns, self.columns);
-        let inside = [
-            (row >= stride).then(|| n - stride * columns),
-            (row + stride < self.rows).then(|| n + stride * columns),
-            (column >= stride).then(|| n - stride),
-            (column + stride < columns).then(|| n + stride),
-        ];
-        inside.into_iter().flatten()
+        let (rows, columns) = (self.rows, self.columns);
+        let around = |at: usize, size: usize| {
+            [at.checked_sub(stride), Some(at), Some(at + stride)]
+                .into_iter()
+                .flatten()
+                .filter(move |one| *one < size)
+        };
+        around(n / columns, rows)
+            .flat_map(move |row| around(n % columns, columns).map(move |column| row * columns + column))
+            .filter(move |other| *other != n)
     }
 
     /// Those of the cells that are not computed and differ from a neighbour, in order.

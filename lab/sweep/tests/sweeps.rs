@@ -1,68 +1,17 @@
 //! Sweeps against single cells and the regime map, and what is refused.
 
+mod common;
+
 use std::{
-    collections::BTreeMap,
     fs,
-    path::Path,
     sync::atomic::{AtomicBool, Ordering::Relaxed},
 };
+
+use common::{files, numbers, plan, refused, settings};
 
 use vines_model::map::{LIMIT, Plan as MapPlan};
 use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, estimate, merge, run};
 use vines_testbench::scene::Family;
-
-fn settings(axes: &[&str]) -> Settings {
-    Settings {
-        axes: axes.iter().map(|axis| axis.parse().unwrap()).collect(),
-        periods: 200,
-        chunk: 7,
-        ..Settings::default()
-    }
-}
-
-fn plan(settings: Settings) -> Result<Plan, String> {
-    Plan::new(Family::parse("", None, &[]).unwrap(), settings).map_err(|error| error.to_string())
-}
-
-fn refused(settings: Settings) -> String {
-    plan(settings).unwrap_err()
-}
-
-/// All files of a store.
-fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut all = BTreeMap::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(one) = folders.pop() {
-        for entry in fs::read_dir(&one).unwrap().flatten() {
-            let path = entry.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let name = path.strip_prefix(folder).unwrap().display().to_string();
-                all.insert(name, fs::read(&path).unwrap());
-            }
-        }
-    }
-    all
-}
-
-/// The numbers of a variable.
-fn numbers(folder: &Path, name: &str) -> Vec<f64> {
-    let array = array(folder, name);
-    array.retrieve_array_subset(&array.subset_all()).unwrap()
-}
-
-fn array(folder: &Path, name: &str) -> zarrs::array::Array<zarrs::storage::store::MemoryStore> {
-    use std::sync::Arc;
-    use zarrs::{array::Array, storage::store::MemoryStore};
-    let memory = MemoryStore::new();
-    for (key, value) in files(&folder.join(name)) {
-        use zarrs::storage::WritableStorageTraits;
-        let key = format!("a/{key}").as_str().try_into().unwrap();
-        memory.set(&key, value.into()).unwrap();
-    }
-    Array::open(Arc::new(memory), "/a").unwrap()
-}
 
 #[test]
 fn a_sweep_over_sigma_and_g_has_the_bits_of_the_map() {
@@ -298,79 +247,4 @@ fn folders_that_a_kill_left_empty_are_no_other_files() {
     fs::create_dir(folder.path().join("regime")).unwrap();
     let plan = plan(settings(&["plant.r=0.3,0.5"])).unwrap();
     assert!(run(&plan, folder.path(), Shard::ALL, &Monitor::default()).unwrap());
-}
-
-#[test]
-fn an_adaptive_map_computes_borders_infers_the_rest_and_resumes_to_the_same_bytes() {
-    let [full, whole, stopped] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
-    let settings = Settings {
-        chunk: 400,
-        ..settings(&["sigma=-1.6:-0.9:40", "excitation.G=0.8:1.3:40"])
-    };
-    assert!(
-        run(
-            &plan(settings.clone()).unwrap(),
-            full.path(),
-            Shard::ALL,
-            &Monitor::default()
-        )
-        .unwrap()
-    );
-    let plan = plan(Settings { adaptive: Some(8), ..settings }).unwrap();
-    let monitor = Monitor::default();
-    assert!(run(&plan, whole.path(), Shard::ALL, &monitor).unwrap());
-    let (computed, inferred) = (monitor.computed.load(Relaxed), monitor.inferred.load(Relaxed));
-    assert_eq!(computed + inferred, 1600);
-    let same = differences(full.path(), whole.path());
-    println!("{computed} computed, {inferred} inferred, {same} differ");
-    assert!(inferred > 600 && same < 80, "{inferred} inferred, {same} differ");
-    // The first rounds are read again, whatever has been removed.
-    let monitor = Monitor::default();
-    monitor.stop.store(true, Relaxed);
-    assert!(!run(&plan, stopped.path(), Shard::ALL, &monitor).unwrap());
-    let monitor = Monitor::default();
-    std::thread::scope(|scope| {
-        scope.spawn(|| {
-            while monitor.computed.load(Relaxed) < computed / 2 {
-                std::thread::yield_now();
-            }
-            monitor.stop.store(true, Relaxed);
-        });
-        // It may end before the flag is set.
-        run(&plan, stopped.path(), Shard::ALL, &monitor).unwrap();
-    });
-    let monitor = Monitor::default();
-    assert!(run(&plan, stopped.path(), Shard::ALL, &monitor).unwrap());
-    assert!(monitor.found.load(Relaxed) > 0);
-    assert!(files(whole.path()) == files(stopped.path()));
-    let part = run(&plan, stopped.path(), Shard { number: 0, of: 2 }, &Monitor::default());
-    assert!(part.unwrap_err().to_string().contains("in parts"));
-}
-
-/// Number of cells whose regimes differ.
-fn differences(one: &Path, other: &Path) -> usize {
-    let codes = |folder: &Path| -> Vec<u8> {
-        let array = array(folder, "regime");
-        array.retrieve_array_subset(&array.subset_all()).unwrap()
-    };
-    codes(one)
-        .iter()
-        .zip(codes(other))
-        .filter(|(one, other)| *one != other)
-        .count()
-}
-
-#[test]
-fn adaptive_sweeps_that_make_no_sense_are_refused() {
-    let adaptive = |axes: &[&str], stride| refused(Settings { adaptive: Some(stride), ..settings(axes) });
-    assert!(adaptive(&["sigma=-1:1:9", "plant.r=0.5,0.6"], 3).contains("every 3-th"));
-    assert!(adaptive(&["sigma=-1:1:9"], 8).contains("two axes"));
-    assert!(adaptive(&["sigma=-1:1:99999", "plant.r=0.5:0.6:99999"], 8).contains("in memory"));
-    let results = Results::parse(["response"]).unwrap();
-    let more = Settings {
-        adaptive: Some(8),
-        results,
-        ..settings(&["sigma=-1:1:9", "plant.r=0.5,0.6"])
-    };
-    assert!(refused(more).contains("the regime only"));
 }
