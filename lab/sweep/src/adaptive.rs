@@ -84,7 +84,7 @@ impl Map {
     /// The eight neighbours of a cell at this distance.
     fn beside(&self, n: usize, stride: usize) -> impl Iterator<Item = usize> + use<> {
         let (rows, columns) = (self.rows, self.columns);
-        let around = |at: usize, size: usize| {
+        let around = move |at: usize, size: usize| {
             [at.checked_sub(stride), Some(at), Some(at + stride)]
                 .into_iter()
                 .flatten()
