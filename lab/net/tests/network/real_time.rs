@@ -47,9 +47,11 @@ fn shaken_with_report(
 #[test]
 fn the_rig_keeps_its_rate_and_reports_the_lateness_of_its_samples() {
     let (_, session, drives, timing) = shaken_with_report(|_, _| Fate::Pass);
-    let nominal = 1.0 / session.sample_time;
-    assert!((session.rate() / nominal - 1.0).abs() < 0.2, "{}", session.rate());
     let punctuality = session.punctuality.unwrap();
+    // However busy the machine is, the samples are as late as the report says.
+    let late = session.seconds - session.samples as f64 * session.sample_time;
+    let allowed = -2.0 * session.sample_time..punctuality.worst + 0.1;
+    assert!(allowed.contains(&late), "{late} s, {allowed:?}");
     assert_eq!(punctuality.samples(), session.samples);
     assert!(punctuality.missed <= session.samples && punctuality.worst >= 0.0);
     // The client gets the figures of the time before its farewell.
