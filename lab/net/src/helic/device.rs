@@ -156,23 +156,7 @@ impl Device {
             self.tripped |= self.pll.state == PllState::LockLost;
         }
         let out = self.gate(wanted);
-        let lock = &self.pll;
-        let values = [
-            readings[1],
-            readings[0],
-            f64::from(self.settings.mode as u8),
-            lock.phase[0],
-            lock.phase[1],
-            lock.amplitudes[0],
-            lock.amplitudes[1],
-            actual,
-            f64::from(lock.state as u8),
-            target,
-            forcing,
-            table,
-            out,
-            f64::from(self.epoch),
-        ];
+        let values = self.values(readings, actual, [target, forcing, table, out]);
         let from = usize::from(!self.has_reference);
         let shown: Vec<f64> = values[..1].iter().chain(&values[1 + from..]).copied().collect();
         let packet = self.stream.record(self.ticks, &shown);
@@ -189,6 +173,27 @@ impl Device {
             self.registry.put_number("impacts", inside.impacts as u32);
         }
         Ok(packet)
+    }
+
+    /// The values of all sources: `readings` of reference and response, mm, the frequency, Hz, and target, forcing, table and output, V.
+    fn values(&self, readings: [f64; 2], actual: f64, [target, forcing, table, out]: [f64; 4]) -> [f64; 14] {
+        let lock = &self.pll;
+        [
+            readings[1],
+            readings[0],
+            f64::from(self.settings.mode as u8),
+            lock.phase[0],
+            lock.phase[1],
+            lock.amplitudes[0],
+            lock.amplitudes[1],
+            actual,
+            f64::from(lock.state as u8),
+            target,
+            forcing,
+            table,
+            out,
+            f64::from(self.epoch),
+        ]
     }
 
     /// The output, V: nothing unless armed, and never more than the limit.
