@@ -33,6 +33,12 @@ impl Wall {
         }
     }
 
+    /// The wall that `w` approaches with this velocity, or lies beyond.
+    #[inline(always)]
+    pub fn ahead(w: f64) -> Self {
+        if w > 0.0 { Wall::Plus } else { Wall::Minus }
+    }
+
     /// The wall on the other side.
     pub fn other(self) -> Self {
         match self {

@@ -6,8 +6,6 @@
 mod advance;
 mod at_wall;
 mod events;
-#[cfg(feature = "serde")]
-mod snapshot;
 
 use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive};
@@ -20,8 +18,13 @@ pub use events::{Event, Outcome, State, Totals};
 /// Largest number of impacts per step. Bounds the work of any input.
 pub const MOST_IMPACTS: u64 = 10_000_000;
 
-/// The parameters and what follows from them.
+/// The parameters and what follows from them. The parameters alone are saved.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "Parameters", into = "Parameters")
+)]
 pub(crate) struct Rig {
     pub parameters: Parameters,
     pub mass_ratio: f64,
@@ -31,13 +34,19 @@ pub(crate) struct Rig {
     pub joint: Oscillator,
 }
 
-impl Rig {
-    fn new(p: &Parameters) -> Self {
+impl From<Rig> for Parameters {
+    fn from(rig: Rig) -> Self {
+        rig.parameters
+    }
+}
+
+impl From<Parameters> for Rig {
+    fn from(p: Parameters) -> Self {
         let joint = p.primary_mass + p.particle_mass;
         Self {
-            parameters: *p,
+            parameters: p,
             mass_ratio: p.mass_ratio(),
-            law: ImpactLaw::new(p),
+            law: ImpactLaw::new(&p),
             alone: Oscillator::new(p.primary_mass, p.stiffness, p.damping),
             joint: Oscillator::new(joint, p.stiffness, p.damping),
         }
@@ -64,7 +73,6 @@ pub(crate) struct Masses {
 /// The plant: parameters, what follows from them, and the state.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(into = "snapshot::Snapshot", from = "snapshot::Snapshot"))]
 pub struct Plant {
     rig: Rig,
     contact: Contact,
@@ -74,7 +82,6 @@ pub struct Plant {
     begun: bool,
     time: f64,
     totals: Totals,
-    evaluations: u64,
     fast: FastPath,
 }
 
@@ -105,7 +112,7 @@ impl Plant {
             "a number from -b to b",
         )?;
         Ok(Self {
-            rig: Rig::new(&parameters),
+            rig: Rig::from(parameters),
             contact: Contact::Free,
             masses: Masses {
                 x: Sum::from(start.q1),
@@ -118,7 +125,6 @@ impl Plant {
             begun: false,
             time: 0.0,
             totals: Totals::default(),
-            evaluations: 0,
             fast: FastPath::default(),
         })
     }
@@ -148,7 +154,7 @@ impl Plant {
     /// Invalid parameters; the old ones stay.
     pub fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         parameters.validate()?;
-        self.rig = Rig::new(&parameters);
+        self.rig = Rig::from(parameters);
         self.fast.parameters_changed(&self.base);
         Ok(())
     }
@@ -209,7 +215,7 @@ impl Plant {
     /// Displacement of the base now, m.
     #[inline]
     pub fn base_displacement(&self) -> f64 {
-        self.base.drive.signal[0] + self.base.drive.amplitude * self.fast.phasor().1
+        self.base.drive.signal[0] + self.base.drive.amplitude * self.fast.phasor.1
     }
 
     /// The wall the particle is stuck to, if it is.
@@ -234,3 +240,7 @@ impl Plant {
         0.5 * (p.primary_mass * dq1 * dq1 + p.particle_mass * dq2 * dq2 + p.stiffness * stretch * stretch)
     }
 }
+
+#[cfg(all(test, feature = "serde"))]
+#[path = "../tests/unit/plant.rs"]
+mod tests;

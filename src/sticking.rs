@@ -26,11 +26,7 @@ pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> P
     let s = wall.sign();
     let series = motion.series();
     let look = |t: f64| {
-        let d = if t == 0.0 {
-            motion.derivatives_at_start()
-        } else {
-            motion.at(&series, t).derivatives
-        };
+        let d = motion.at(&series, t).derivatives;
         let push = Gap {
             gap: (s * d[2] + noise).max(0.0),
             closing: -s * d[3],

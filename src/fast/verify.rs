@@ -16,13 +16,6 @@ use crate::oscillator::Oscillator;
 /// Rounding error of a gap, in half-widths, and of a bound, relative.
 pub(super) const ROUNDING: f64 = 1e-14;
 
-/// Bounds of the motion over a time.
-#[derive(Clone, Copy, Debug)]
-pub(super) struct Envelope {
-    /// `|w'''|` is at most this, m/s³, if the signal is a straight line.
-    pub jerk: f64,
-}
-
 /// Relative motion at an instant.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Sample {
@@ -52,38 +45,6 @@ pub(super) fn forcing(oscillator: &Oscillator, drive: &Drive, t: f64) -> f64 {
 #[inline(always)]
 pub(super) fn speed_squared(oscillator: &Oscillator, at: &Point) -> f64 {
     at.dy * at.dy + oscillator.omega0_squared * (at.y * at.y)
-}
-
-/// Whether `w'` certainly keeps its sign for `t` seconds: the particle drifts faster than the primary mass can move. Then the wall
-/// ahead is met once, and the other one is left behind.
-#[inline(always)]
-pub(super) fn is_monotone(oscillator: &Oscillator, drive: &Drive, start: &Point, (drift, t): (f64, f64)) -> bool {
-    let spare = drift.abs() - forcing(oscillator, drive, t) * t;
-    spare > 0.0 && spare * spare * (1.0 - 1e-9) > speed_squared(oscillator, start)
-}
-
-impl Envelope {
-    /// Bounds over the next `t` seconds for a motion that is at `start`.
-    #[inline(always)]
-    pub fn new(oscillator: &Oscillator, drive: &Drive, start: &Point, t: f64) -> Self {
-        let Oscillator { delta, omega0_squared, omega0, .. } = *oscillator;
-        let damping = 2.0 * delta;
-        let omega = drive.omega.abs();
-        let forcing = forcing(oscillator, drive, t);
-        let speed = speed_squared(oscillator, start).sqrt() + forcing * t;
-        let acceleration = (omega0 + damping) * speed + forcing;
-        Self {
-            jerk: damping * acceleration + omega0_squared * speed + omega * forcing,
-        }
-    }
-
-    /// Whether both walls are certainly not met between two samples `t` apart, but for a contact at the second one.
-    #[inline(always)]
-    pub fn open_between(&self, b: f64, from: &Sample, to: &Sample, t: f64) -> bool {
-        let half = 0.5 * t;
-        let backwards = Sample { dw: -to.dw, ..*to };
-        from.is_open(b, self.jerk, half) && backwards.is_open(b, self.jerk, half)
-    }
 }
 
 impl Sample {

@@ -73,7 +73,7 @@ impl Plant {
         };
         if self.contact == Contact::Free && self.fast.step(&mut moving, duration) {
             self.time += duration;
-            self.evaluations += 1;
+            self.fast.evaluations += 1;
             return Ok(Outcome { elapsed: duration, evaluations: 1, ..Outcome::default() });
         }
         self.check_duration(duration)?;
@@ -102,7 +102,7 @@ impl Plant {
             self.fast.state_changed(&self.base);
             return;
         }
-        let sin = self.fast.phasor().1;
+        let sin = self.fast.phasor.1;
         let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
         let kick = 2.0 * self.rig.alone.delta * jump;
         if jump != 0.0 {
@@ -116,7 +116,7 @@ impl Plant {
 
     /// Follows the motion from event to event to the end of the step.
     fn follow(&mut self, duration: f64, on_event: impl FnMut(Event)) -> Outcome {
-        let evaluations = self.evaluations;
+        let evaluations = self.fast.evaluations;
         let mut step = Step {
             duration,
             left: Sum::from(duration),
@@ -152,12 +152,11 @@ impl Plant {
                 }
                 Next::Search(limit) => self.search(limit, &mut step),
             }
-            self.evaluations += self.fast.evaluations();
         }
         let left = step.left.value();
         step.outcome.cut_short = left > 0.0;
         step.outcome.elapsed = if left > 0.0 { step.now() } else { duration };
-        step.outcome.evaluations = self.evaluations - evaluations;
+        step.outcome.evaluations = self.fast.evaluations - evaluations;
         step.outcome
     }
 
@@ -174,7 +173,7 @@ impl Plant {
         let half_width = self.rig.parameters.half_width;
         let flight = Flight::new(motion, (masses.w.value(), masses.dw), half_width);
         let landing = flight.first_contact(limit, released);
-        self.evaluations += landing.evaluations;
+        self.fast.evaluations += landing.evaluations;
         self.masses.x = masses.x.plus(landing.moved);
         self.masses.v = masses.v.plus(landing.gained);
         self.masses.dw += landing.gained;
@@ -199,7 +198,7 @@ impl Plant {
         let start = (self.masses.x.value(), self.masses.v.value());
         let motion = Segment::new(&self.rig.joint, self.base, start);
         let stay = until_released(&motion, wall, left, noise);
-        self.evaluations += stay.evaluations;
+        self.fast.evaluations += stay.evaluations;
         self.masses.x = Sum::from(stay.joint.0);
         self.masses.v = Sum::from(stay.joint.1);
         self.masses.particle = stay.joint.1;
