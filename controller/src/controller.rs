@@ -10,7 +10,7 @@ use crate::drive::Drive;
 use crate::error::{ConfigError, Quantity};
 use crate::gains::Gains;
 use crate::loop_filter::LoopFilter;
-use crate::range::NONE;
+use crate::real::Real;
 use crate::sensing::{Measurement, PresentDrive, Sensing};
 use crate::signals::{Input, Output};
 use crate::state::State;
@@ -18,7 +18,7 @@ use crate::stationarity::{Dwell, Reading, Stationarity};
 use crate::supervisor::{Conditions, Fault, LoopState};
 
 /// Phase error, rad, up to which a larger drive certainly gives a larger response.
-const PHASE_RANGE: f64 = core::f64::consts::FRAC_PI_3;
+const PHASE_RANGE: Real = crate::real::consts::FRAC_PI_3;
 
 /// A checked configuration and its coefficients; only [`PhaseLock::retune`] changes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,7 +85,7 @@ impl PhaseLock {
     ///
     /// # Errors
     /// A value out of range; then nothing changes.
-    pub fn retune(&mut self, amplitude: f64, phase_target: f64) -> Result<(), ConfigError> {
+    pub fn retune(&mut self, amplitude: Real, phase_target: Real) -> Result<(), ConfigError> {
         *self = Config { amplitude, phase_target, ..self.config }.build()?;
         Ok(())
     }
@@ -100,11 +100,15 @@ impl PhaseLock {
         Quantity::new("duration", to.duration, "s").not_negative()?;
         Quantity::new("amplitude", to.amplitude, "m").check(true, "a finite number")?;
         Quantity::new("omega", to.omega, "rad/s").check(true, "a finite number")?;
-        Quantity::new("amplitude_max", self.config.amplitude_max.unwrap_or(NONE), "m").check(
-            self.config.amplitude_max.is_some(),
-            "above 0 to control the response amplitude: the drive needs a limit",
-        )?;
-        Quantity::new("state", f64::from(state.loop_state as u8), "").check(
+        if self.config.amplitude_max.is_none() {
+            return Err(ConfigError {
+                name: "amplitude_max",
+                value: None,
+                unit: "m",
+                allowed: "above 0 to control the response amplitude: the drive needs a limit",
+            });
+        }
+        Quantity::new("state", (state.loop_state as u8) as Real, "").check(
             matches!(state.loop_state, LoopState::Acquiring | LoopState::Locked),
             "2 (acquiring) or 3 (locked): the response amplitude can be controlled only in a closed loop",
         )?;
@@ -115,6 +119,13 @@ impl PhaseLock {
             .start(to, self.amplitude_loop.sample_time());
         state.dwell = Dwell::default();
         Ok(())
+    }
+
+    /// Controls the drive amplitude again: the drive ramps to its setpoint.
+    pub fn hold_drive(&self, state: &mut State) {
+        if state.loop_state != LoopState::Capturing {
+            state.amplitude_loop = None;
+        }
     }
 
     /// One sample: takes the sensor readings, returns the drive until the next sample.
@@ -140,14 +151,14 @@ impl PhaseLock {
         output
     }
 
-    fn tuning(&self) -> (f64, f64) {
+    fn tuning(&self) -> (Real, Real) {
         (self.config.amplitude, self.config.phase_target)
     }
 
     /// Advances the state machine.
     fn change_state(&self, state: &mut State, active: bool, fault: Option<Fault>) {
         let timeout = self.config.acquire_timeout;
-        let elapsed = state.acquiring as f64 * self.config.sample_time;
+        let elapsed = state.acquiring as Real * self.config.sample_time;
         let before = state.loop_state;
         let (next, fault) = before.next(&Conditions {
             active,
@@ -246,7 +257,7 @@ impl PhaseLock {
         let reading = state.channels.response.amplitude();
         let near = measured.valid && measured.error.abs() < PHASE_RANGE;
         let before = state.drive.amplitude;
-        let elapsed = state.acquiring as f64 * self.config.sample_time;
+        let elapsed = state.acquiring as Real * self.config.sample_time;
         let holding = self
             .approach
             .observe(&mut state.approach, before, reading, measured.error);
@@ -286,7 +297,7 @@ impl PhaseLock {
         if state.loop_state.is_closed() {
             let reading = Reading {
                 error: measured.error,
-                integral: state.frequency.integral,
+                integral: state.frequency.integral.get(),
                 omega: state.frequency.omega,
                 amplitude: state.channels.response.amplitude(),
                 valid: measured.valid,

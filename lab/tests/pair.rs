@@ -11,9 +11,10 @@ use fmi::fmi2::import::Fmi2Import;
 use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
 use fmi::traits::FmiImport;
 use vines::experiment::{self, Plan};
+use vines::fmu::FmuController;
 use vines::identification::identify;
 use vines::pack::pack_bench;
-use vines::rig::{BuiltIn, Simulated};
+use vines::rig::{BuiltIn, Controller, Move, Rig, Simulated};
 use vines::scene::Scene;
 
 /// The periods that are driven: the default scene locks after about 110.
@@ -150,6 +151,37 @@ fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
     assert!(off.abs() < 1e-4);
     let hits = after[0] - before[0];
     assert!((39..=41).contains(&hits), "{hits} impacts in 20 periods");
+}
+
+#[test]
+fn the_fmu_moves_the_response_with_the_bits_of_the_built_in_controller() {
+    let overrides = ["phase_lock.harmonics=4", "phase_lock.base_bandwidth=0.5"].map(|one| one.parse().unwrap());
+    let scene = Scene::load(None, &overrides).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    pack_bench(&scene, &libraries().as_path().into(), folder.path()).unwrap();
+    let config = scene.backbone_config();
+    let mut fmu = FmuController::load(&folder.path().join("PhaseLock.fmu"), &config).unwrap();
+    let mut own = BuiltIn::new(&config).unwrap();
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut moved = 0.0;
+    for n in 0..6000 {
+        if n == 2000 || n == 4000 {
+            let to = Move {
+                response: (0.8 - 1e-4 * n as f64) * scene.plant.half_width,
+                duration: 2.0,
+                amplitude: -1e-6,
+                omega: 0.01,
+            };
+            fmu.hold_response(to, -1.5).unwrap();
+            own.hold_response(to, -1.5).unwrap();
+        }
+        let sensors = rig.sense().unwrap();
+        let command = own.sample(sensors, true).unwrap();
+        assert_eq!(fmu.sample(sensors, true).unwrap(), command, "sample {n}");
+        rig.advance(command.drive, scene.sample_time()).unwrap();
+        moved = command.drive.amplitude;
+    }
+    assert!(moved != config.amplitude);
 }
 
 /// Where the lab's own loop locks.

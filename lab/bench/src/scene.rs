@@ -6,7 +6,9 @@ mod configuration;
 mod controller;
 mod error;
 mod family;
+mod option;
 mod overrides;
+mod phase_lock;
 mod plant;
 mod record;
 mod sections;
@@ -24,6 +26,7 @@ pub use controller::Controller;
 pub use error::SceneError;
 pub use family::Family;
 pub use overrides::{Override, SyntaxError};
+pub use phase_lock::{KEYS, PhaseLock, refusal};
 pub use record::{Estimator, Record};
 pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
 
@@ -44,6 +47,8 @@ pub struct Scene {
     pub amplitude: f64,
     /// The phase-locked loop, in units of omega0 and of the natural period.
     pub controller: Controller,
+    /// Further parameters of the loop.
+    pub phase_lock: PhaseLock,
     /// How long to drive and to record, in periods.
     pub record: Record,
     /// How the backbone is tracked, in units of b and in periods.

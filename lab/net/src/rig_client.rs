@@ -9,6 +9,7 @@ use super::error::LinkError;
 use super::frame::{Frame, Kind};
 use super::payload::{Reading, read_reading, write_command};
 use super::report::{Counters, Timing};
+use super::seal::Key;
 use vines_testbench::rig::{Command, Drive, GroundTruth, Rig, RigError, Sensors};
 use vines_testbench::scene::Definition;
 
@@ -36,8 +37,16 @@ impl NetRig {
     /// # Errors
     /// A server that does not answer, refuses, or has another version.
     pub fn connect(peer: Address, sample_time: f64) -> Result<Self, LinkError> {
+        Self::connect_with(peer, sample_time, None)
+    }
+
+    /// As [`NetRig::connect`], with a shared key.
+    ///
+    /// # Errors
+    /// As there; a server with another key does not answer.
+    pub fn connect_with(peer: Address, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
         Ok(Self {
-            client: Client::connect(peer, false, sample_time)?,
+            client: Client::connect(peer, false, sample_time, key)?,
             now: None,
             good: Reading::default(),
             newest: None,

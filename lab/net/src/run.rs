@@ -7,7 +7,7 @@ use super::error::ServerError;
 use super::frame::{Frame, Kind, flag};
 use super::handshake::{Refusal, Service};
 use super::link::Listener;
-use super::payload::{Reading, read_reading, write_command, write_reading};
+use super::payload::{Reading, read_move, read_reading, write_command, write_reading};
 use super::ramp::Ramp;
 use super::real_time_clock::RealTimeClock;
 use super::report::{Counters, Ended, Session, Timing};
@@ -124,6 +124,11 @@ impl Run {
                 self.at += 1;
                 listener.send(&answer, self.peer)?;
                 Ok(Ok(()))
+            }
+            (Served::Controller(controller), Kind::Move) => {
+                let (to, phase_target) = read_move(frame);
+                // No answer: the next drive follows from it. A refusal ends the session.
+                Ok(controller.hold_response(to, phase_target).map_err(|_| Refusal::Move))
             }
             (Served::Rig(_), Kind::Drive) => match self.service.drive(frame) {
                 Err(refusal) => Ok(Err(refusal)),

@@ -67,9 +67,9 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?;
+    let mut scene = arguments.scene.load()?;
     log_warnings();
-    let reach = arguments.reach.reach();
+    let reach = arguments.reach.reach()?;
     check(&scene)?;
     let (mut open, fmus) = match &arguments.rig {
         Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&arguments.out)?),
@@ -78,8 +78,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             (Endpoint::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
         }
     };
-    arguments.loop_check.before(&mut open.rig, &scene)?;
-    let mut controller = arguments.controller.controller(&scene, reach, open.pace)?;
+    arguments.loop_check.before(&mut open.rig, &mut scene)?;
+    let mut controller = arguments
+        .controller
+        .controller(&scene.controller_config(), reach, open.pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(&plan);
     let mut samples = Vec::new();

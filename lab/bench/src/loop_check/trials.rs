@@ -75,8 +75,8 @@ fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Scene, Box<dyn
     scene.chain.snr = Some(random.between(30.0, 80.0));
     scene.chain.seed = random.between(0.0, 1e6) as u64;
     scene.chain.delay = random.between(0.0, 4.0) as u32;
-    scene.chain.filter = random.between(8.0, 40.0);
-    scene.chain.adc_bits = random.between(16.0, 25.0) as u32;
+    scene.chain.filter = Some(random.between(8.0, 40.0));
+    scene.chain.adc_bits = Some(random.between(16.0, 25.0) as u32);
     let mut plant = scene.plant;
     plant.stiffness *= random.between(0.99, 1.01);
     plant.damping *= random.between(0.8, 1.2);

@@ -32,7 +32,9 @@ pub enum ControllerError {
     #[error("the controller: {0}")]
     Failed(#[source] Cause),
     /// The controller cannot control the response.
-    #[error("the controller cannot hold the amplitude of the response; use the built-in controller")]
+    #[error(
+        "the controller cannot hold the amplitude of the response; use the built-in controller, PhaseLock.fmu or `vines controller`"
+    )]
     NoResponseLoop,
     /// The controller refused a value.
     #[error("the controller: {0}")]

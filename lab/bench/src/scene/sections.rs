@@ -4,7 +4,7 @@ use lovines::Parameters;
 use serde::Deserialize;
 
 use super::{
-    Backbone, Chain, Controller, Definition, Dimensionless, Record, Reference, Scene, SceneError,
+    Backbone, Chain, Controller, Definition, Dimensionless, PhaseLock, Record, Reference, Scene, SceneError,
     plant::{PlantSection, StartSection},
     validate::Quantity,
 };
@@ -17,6 +17,7 @@ pub(super) struct Sections {
     start: StartSection,
     excitation: Excitation,
     controller: Controller,
+    phase_lock: PhaseLock,
     record: Record,
     backbone: Backbone,
     chain: Chain,
@@ -64,6 +65,7 @@ impl Sections {
             "start" => self.start = StartSection::deserialize(table)?,
             "excitation" => self.excitation = Excitation::deserialize(table)?,
             "controller" => self.controller = Controller::deserialize(table)?,
+            "phase_lock" => self.phase_lock = PhaseLock::deserialize(table)?,
             "record" => self.record = Record::deserialize(table)?,
             "backbone" => self.backbone = Backbone::deserialize(table)?,
             "chain" => self.chain = Chain::deserialize(table)?,
@@ -79,6 +81,7 @@ impl Sections {
             amplitude: self.excitation.resolve(origin, &plant)?,
             plant,
             controller: self.controller,
+            phase_lock: self.phase_lock,
             record: self.record,
             backbone: self.backbone,
             chain: self.chain,
