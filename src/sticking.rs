@@ -1,8 +1,8 @@
 //! Persistent contact: both masses move as one while the wall must push, and part at the instant it need not.
 
-use crate::clearance::{Bounds, Gap, first_closure};
+use crate::clearance::{Bounds, Closure, Gap, first_closure};
 use crate::contact::Wall;
-use crate::segment::{Derivatives, Segment, nearby};
+use crate::segment::{Derivatives, Segment, position_change, velocity_change};
 
 /// How a stretch of sticking ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,10 +38,10 @@ pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> P
     let scale = (motion.fastest(), noise);
     let (closure, evaluations) = first_closure((0.0, limit), scale, look, motion);
     match closure {
-        Some(closure) => Parting {
-            t: closure.t + closure.h,
+        Some(Closure { t, h, derivatives: d, .. }) => Parting {
+            t: t + h,
             released: true,
-            joint: nearby(&closure.derivatives, closure.h),
+            joint: (d[0] + position_change(&d, h), d[1] + velocity_change(&d, h)),
             evaluations,
         },
         None => {

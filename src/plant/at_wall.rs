@@ -19,13 +19,7 @@ impl Plant {
     #[inline]
     pub(super) fn wall_touched(&self) -> Option<Wall> {
         let (w, b) = (self.masses.w.value(), self.rig.parameters.half_width);
-        if w >= b {
-            Some(Wall::Plus)
-        } else if w <= -b {
-            Some(Wall::Minus)
-        } else {
-            None
-        }
+        (w.abs() >= b).then(|| Wall::ahead(w))
     }
 
     /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
