@@ -41,10 +41,7 @@ impl Wall {
 
     /// The wall on the other side.
     pub fn other(self) -> Self {
-        match self {
-            Wall::Plus => Wall::Minus,
-            Wall::Minus => Wall::Plus,
-        }
+        Wall::ahead(-self.sign())
     }
 }
 

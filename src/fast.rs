@@ -51,10 +51,12 @@ pub(crate) enum Next {
 }
 
 /// The parts of a plant that move, and the rig.
-pub(crate) struct Moving<'a> {
-    pub rig: &'a Rig,
-    pub masses: &'a mut Masses,
-    pub base: &'a mut BaseMotion,
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Moving {
+    pub rig: Rig,
+    pub masses: Masses,
+    pub base: BaseMotion,
 }
 
 /// Predictions, and what they are made from.
@@ -196,7 +198,7 @@ impl FastPath {
         let increment = if !drive.is_straight() || drive.omega < 0.0 || t * fastest > LONGEST_COAST {
             self.rotations = ROTATIONS;
             let (x, v) = (moving.masses.x.value(), moving.masses.v.value());
-            let (dx, dv) = Segment::new(oscillator, *moving.base, (x, v)).departure(t);
+            let (dx, dv) = Segment::new(oscillator, moving.base, (x, v)).departure(t);
             Increment {
                 y: dx + (v - drive.signal[1]) * t,
                 dy: dv,

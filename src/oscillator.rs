@@ -111,11 +111,6 @@ impl Oscillator {
         (omega - omega_d) - self.omega_d_error
     }
 
-    /// Sine and cosine of `omega_d t`, for the `omega_d` of this oscillator.
-    pub(crate) fn sincos(&self, omega_d: f64, t: f64) -> (f64, f64) {
-        sincos_of_product((omega_d, self.omega_d_error), t)
-    }
-
     /// A bound on `|y|` from now on, for a free motion that has `y` and `y'` now (each derivative of the motion obeys
     /// the same equation): its energy never grows.
     pub fn ceiling(&self, y: f64, dy: f64) -> f64 {
@@ -135,10 +130,17 @@ impl Oscillator {
     pub(crate) fn flow(&self, t: f64) -> (Transition, Complex64) {
         match self.regime {
             Regime::Oscillating { omega_d } => {
-                let (sin, cos) = self.sincos(omega_d, t);
+                let (sin, cos) = sincos_of_product((omega_d, self.omega_d_error), t);
                 let decay = libm::exp(-self.delta * t);
                 let turned = Complex64::new(decay * cos, decay * sin);
-                (self.oscillating(omega_d, turned.im, turned.re), turned)
+                let s = turned.im / omega_d;
+                let free = Transition {
+                    xx: turned.re + self.delta * s,
+                    xv: s,
+                    vx: -self.omega0_squared * s,
+                    vv: turned.re - self.delta * s,
+                };
+                (free, turned)
             }
             Regime::Overdamped { slow, fast, half_gap } => (self.overdamped(t, slow, fast, half_gap), Complex64::ZERO),
         }
@@ -187,17 +189,6 @@ impl Oscillator {
     /// `2 delta` and `omega0²` with their rounding errors.
     fn rates(&self) -> ((f64, f64), (f64, f64)) {
         ((2.0 * self.delta, self.errors.0), (self.omega0_squared, self.errors.1))
-    }
-
-    /// The transition from `exp(-delta t) sin(omega_d t)` and `exp(-delta t) cos(omega_d t)`.
-    pub(crate) fn oscillating(&self, omega_d: f64, sin: f64, cos: f64) -> Transition {
-        let s = sin / omega_d;
-        Transition {
-            xx: cos + self.delta * s,
-            xv: s,
-            vx: -self.omega0_squared * s,
-            vv: cos - self.delta * s,
-        }
     }
 
     fn overdamped(&self, t: f64, slow: f64, fast: f64, half_gap: f64) -> Transition {

@@ -36,7 +36,7 @@ impl FastPath {
             return Next::Search(to_search.min(left));
         }
         let point = self.point(moving);
-        let (rig, base) = (moving.rig, &*moving.base);
+        let (rig, base) = (&moving.rig, &moving.base);
         let soon = left * rig.alone.fastest.max(base.drive.omega.abs()) <= 1.0;
         if left < self.contact_free.t || (soon && self.is_contact_free(moving, &point, left)) {
             return self.coast(moving, &point, left, duration);

@@ -44,11 +44,8 @@ pub(super) type Angle = ((f64, f64), f64);
 
 /// The closed form at time `t`; what follows from that is computed when it is needed.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(from = "f64", into = "f64")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "f64", into = "f64"))]
 pub(super) struct Propagator {
     /// The key: time, s; NaN where the propagator is empty.
     pub t: f64,

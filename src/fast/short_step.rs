@@ -20,11 +20,8 @@ const MOMENTS: usize = 5;
 
 /// The propagator of one step length; what follows from that is computed when it is needed.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(from = "f64", into = "f64")
-)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "f64", into = "f64"))]
 pub(super) struct ShortStep {
     /// The key: length of the step, s; NaN where there is none.
     pub t: f64,

@@ -23,10 +23,10 @@ pub(super) struct Start<'a> {
 impl<'a> Start<'a> {
     #[inline(always)]
     pub fn new(moving: &'a Moving, point: Point) -> Self {
-        let (masses, base) = (&*moving.masses, &*moving.base);
+        let Moving { rig, masses, base } = moving;
         let sample = Sample { w: masses.w.value(), dw: masses.dw, ddw: 0.0 };
         Self {
-            rig: moving.rig,
+            rig,
             base,
             masses,
             here: Mark { t: 0.0, point, sample },
