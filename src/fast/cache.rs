@@ -72,7 +72,7 @@ impl Cache {
             self.regular = 0;
             (0..FLIGHTS as u8).find(|&n| is_near(n)).unwrap_or_else(|| {
                 self.oldest = (self.oldest + 1) % FLIGHTS as u8;
-                self.flights[usize::from(self.oldest)] = Propagator::from(t);
+                self.flights[usize::from(self.oldest)].reset(t);
                 self.oldest
             })
         };

@@ -127,6 +127,12 @@ impl Propagator {
         Self { t, free, complete: true, ..Self::default() }
     }
 
+    /// Makes it the propagator over `t` seconds.
+    #[inline(always)]
+    pub fn reset(&mut self, t: f64) {
+        (self.t, self.omega, self.complete) = (t, f64::NAN, false);
+    }
+
     /// Makes the response that of these coefficients' frequency.
     #[inline(always)]
     pub fn prepare(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) {
