@@ -1,10 +1,9 @@
 //! The fast path: predict with whatever is cheap, then verify with a bound.
 //!
 //! The next contact is *predicted* from cached propagators: the flight time that followed the last one, or a march over the
-//! flight in equal stretches. A prediction may be wrong. It is *verified* with a bound ([`verify`]): between two instants at which the
-//! motion is known exactly, the gaps to both walls are certainly open if a Taylor bound from the left and one from the right say
-//! so, each over half of the time. What cannot be verified is left to the plain solver's search. Results therefore never
-//! depend on a guess, only the cost does.
+//! flight in equal stretches. It is *verified* with a bound ([`verify`]): the particle drifts towards one wall all the time, or
+//! Taylor bounds from both ends of a stretch keep the gaps to both walls open. What cannot be verified is left to the plain
+//! solver's search. Results therefore never depend on a guess, only the cost does.
 //!
 //! Everything kept between steps lives in [`Cache`], and each entry carries its key: the time it belongs to and
 //! the frequency of the base. An entry whose key differs is not used; nothing else invalidates it.
@@ -19,7 +18,6 @@ mod horizon;
 mod march;
 mod propagator;
 mod short_step;
-mod start;
 mod verify;
 
 use crate::arithmetic::Sum;
@@ -32,7 +30,7 @@ use cache::Cache;
 use coefficients::Coefficients;
 use horizon::Horizon;
 use propagator::{Angle, Increment, Point};
-use start::Start;
+use verify::Start;
 
 /// How often a phasor is rotated before it is computed from the phase again.
 const ROTATIONS: u32 = 16;

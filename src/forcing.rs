@@ -73,7 +73,7 @@ impl Forcing {
         let form = match light {
             Some(omega_d) if strength.norm_sqr() > limit => Form::DividedDifferences {
                 gain: strength / Complex64::new(0.0, 2.0 * omega_d),
-                near: Complex64::new(delta, oscillator.detuning(omega, omega_d)),
+                near: Complex64::new(delta, (omega - omega_d) - oscillator.omega_d_error),
                 far: Complex64::new(delta, omega + omega_d).inv(),
             },
             _ => Form::Steady(strength / detuned),

@@ -20,7 +20,7 @@ pub struct Oscillator {
     pub regime: Regime,
     /// Rounding error of the damped natural frequency, rad/s. After a thousand periods the error of the phase is six thousand
     /// times as large.
-    omega_d_error: f64,
+    pub(crate) omega_d_error: f64,
     /// Rounding errors of `2 delta` (1/s) and `omega0²` (1/s²).
     errors: (f64, f64),
     /// Longest a unit velocity can carry the free motion, s: `|x(t)| <= |x(0)| + reach |x'(0)|`.
@@ -106,11 +106,6 @@ impl Oscillator {
         }
     }
 
-    /// `omega` less the damped natural frequency `omega_d`, with all its digits.
-    pub(crate) fn detuning(&self, omega: f64, omega_d: f64) -> f64 {
-        (omega - omega_d) - self.omega_d_error
-    }
-
     /// A bound on `|y|` from now on, for a free motion that has `y` and `y'` now (each derivative of the motion obeys
     /// the same equation): its energy never grows.
     pub fn ceiling(&self, y: f64, dy: f64) -> f64 {
@@ -119,11 +114,6 @@ impl Oscillator {
             Regime::Oscillating { .. } => libm::sqrt(y * y + carried * carried),
             Regime::Overdamped { .. } => libm::fabs(y) + libm::fabs(carried),
         }
-    }
-
-    /// The free motion over `t` seconds.
-    pub fn transition(&self, t: f64) -> Transition {
-        self.flow(t).0
     }
 
     /// The free motion over `t` seconds and, where it oscillates, `exp((-delta + i omega_d) t)`.

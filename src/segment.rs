@@ -87,12 +87,6 @@ impl Segment {
         (x, v, z * response.base)
     }
 
-    /// Position and velocity after `t` seconds, by the closed form at any `t`.
-    pub fn position_and_velocity(&self, t: f64) -> (f64, f64) {
-        let (x, v, _) = self.closed_form(t);
-        (x, v)
-    }
-
     /// Position and its derivatives after `t` seconds; from the second on they follow from the equation of motion.
     pub fn derivatives(&self, t: f64) -> Derivatives {
         let (x, v, phasor) = self.closed_form(t);

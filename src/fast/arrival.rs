@@ -4,8 +4,7 @@ use super::FastPath;
 use super::coefficients::{Coefficients, NEAR};
 use super::grid::Mark;
 use super::propagator::{Angle, Increment, Nearby, Point, Propagator, angle};
-use super::start::Start;
-use super::verify::Sample;
+use super::verify::{Sample, Start};
 use crate::arithmetic::Sum;
 use crate::contact::Wall;
 
@@ -37,7 +36,7 @@ impl Arrival {
     pub fn is_first(&self, start: &Start, coefficients: &Coefficients, from: &Mark) -> bool {
         let there = self.added.to(&start.here.point);
         let sample = Sample {
-            w: self.wall.sign() * start.half_width(),
+            w: self.wall.sign() * start.rig.parameters.half_width,
             dw: start.here.sample.dw + self.added.dy,
             ddw: start.acceleration(coefficients, &there),
         };
@@ -53,7 +52,7 @@ pub(super) fn arrive(coefficients: &Coefficients, propagator: &Propagator, start
     let increment = propagator.increment(amplitude, &here.point);
     let w = here.sample.w + (increment.y + start.drift * propagator.t);
     let slowness = 1.0 / (here.point.dy + increment.dy + start.drift);
-    let first = (wall.sign() * start.half_width() - w) * slowness;
+    let first = (wall.sign() * start.rig.parameters.half_width - w) * slowness;
     // Not a number where the approach has no speed.
     let close = first.abs() < coefficients.near;
     if !close {
@@ -89,7 +88,7 @@ impl FastPath {
     /// one point of the grid to a nearer one.
     #[inline(always)]
     pub(super) fn arrive_after(&mut self, start: &Start, from: &Mark, mut t: f64, wall: Wall) -> Option<Arrival> {
-        let ahead = wall.sign() * start.half_width() - from.sample.w;
+        let ahead = wall.sign() * start.rig.parameters.half_width - from.sample.w;
         for _ in 0..MOST_POINTS {
             let (at, nearby) = self.near_point(start, from, t);
             let gap = ahead - (nearby.there.y + start.drift * (at - from.t));

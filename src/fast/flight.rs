@@ -4,7 +4,7 @@ use super::arrival::{Arrival, arrive};
 use super::coefficients::Coefficients;
 use super::horizon::Horizon;
 use super::propagator::{Nearby, Point};
-use super::start::Start;
+use super::verify::Start;
 use super::{FastPath, Moving, Next};
 use crate::base_motion::BaseMotion;
 use crate::plant::Rig;
@@ -105,7 +105,7 @@ impl FastPath {
             let increment = propagator.increment(drive.amplitude, point);
             let increment = Nearby::<4>::new(&self.coefficients, drive.amplitude, point, &increment).at(h);
             let w = start.here.sample.w + (increment.y + start.drift * left);
-            if w.abs() >= start.half_width() || !start.is_monotone(&start.here, left) {
+            if w.abs() >= start.rig.parameters.half_width || !start.is_monotone(&start.here, left) {
                 return None;
             }
             let angle = (propagator.angle, self.coefficients.omega * h);
@@ -145,7 +145,10 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
 fn out_of_reach(coefficients: &Coefficients, start: &Start) -> Option<f64> {
     let amplitude = start.base.drive.amplitude;
     let steady = coefficients.forcing.steady()? * amplitude;
-    let (b, particle) = (start.half_width(), start.here.point.y - start.here.sample.w);
+    let (b, particle) = (
+        start.rig.parameters.half_width,
+        start.here.point.y - start.here.sample.w,
+    );
     let room = b * (1.0 - 1e-9) - particle.abs() - steady.l1_norm();
     if room <= 0.0 || start.base.drive.signal[1] != 0.0 {
         return None;

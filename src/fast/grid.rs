@@ -6,8 +6,7 @@
 use super::FastPath;
 use super::coefficients::{Coefficients, TERMS};
 use super::propagator::{Increment, Nearby, Point, Propagator};
-use super::start::Start;
-use super::verify::Sample;
+use super::verify::{Sample, Start};
 use crate::oscillator::Oscillator;
 
 /// Points of the grid: its span is a little more than half a period of the fastest rate.

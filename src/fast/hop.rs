@@ -6,7 +6,7 @@
 
 use super::FastPath;
 use super::arrival::Arrival;
-use super::start::Start;
+use super::verify::Start;
 use crate::contact::Wall;
 
 /// Longest hop, in units of the fastest rate's time: it ends within reach of the start's Taylor polynomial.
@@ -16,7 +16,7 @@ impl FastPath {
     /// The return to the wall that the particle has just left, if it is a short hop that ends within `left` seconds.
     #[inline(always)]
     pub(super) fn hop(&mut self, start: &Start, left: f64) -> Option<Arrival> {
-        let (here, b) = (&start.here.sample, start.half_width());
+        let (here, b) = (&start.here.sample, start.rig.parameters.half_width);
         if here.w.abs() != b {
             return None;
         }

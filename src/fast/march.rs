@@ -4,8 +4,7 @@ use super::FastPath;
 use super::arrival::Arrival;
 use super::flight::Found;
 use super::grid::{Mark, STRETCH};
-use super::start::Start;
-use super::verify::Sample;
+use super::verify::{Sample, Start};
 use crate::contact::Wall;
 
 /// Longest flight that is marched over, in stretches.
@@ -82,7 +81,7 @@ impl FastPath {
     fn rest(&mut self, start: &Start, from: &Mark) -> Option<Arrival> {
         let wall = Wall::ahead(start.drift);
         // If the primary mass stood still.
-        let t = (wall.sign() * start.half_width() - from.sample.w) / start.drift;
+        let t = (wall.sign() * start.rig.parameters.half_width - from.sample.w) / start.drift;
         if t > self.coefficients.span || !start.is_monotone(from, from.t + t) {
             return None;
         }
@@ -94,7 +93,7 @@ impl FastPath {
 /// What happens between two marks.
 #[inline(always)]
 fn stretch(start: &Start, from: &Mark, to: &Mark) -> Stretch {
-    let (b, t) = (start.half_width(), to.t - from.t);
+    let (b, t) = (start.rig.parameters.half_width, to.t - from.t);
     if to.sample.w.abs() < b {
         return if start.is_open(from, &to.sample, to.t) {
             Stretch::Open
