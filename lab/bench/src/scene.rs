@@ -6,6 +6,7 @@ mod configuration;
 mod controller;
 mod error;
 mod family;
+mod names;
 mod option;
 mod overrides;
 mod phase_lock;
@@ -25,6 +26,7 @@ pub use chain::{Chain, RatioOf};
 pub use controller::Controller;
 pub use error::SceneError;
 pub use family::Family;
+pub use names::{Name, Names};
 pub use overrides::{Override, SyntaxError};
 pub use phase_lock::{KEYS, PhaseLock, refusal};
 pub use record::{Estimator, Record};
@@ -57,6 +59,12 @@ pub struct Scene {
     pub chain: Chain,
     /// What counts as resonance, and what is measured.
     pub resonance: Definition,
+    /// What a rig other than the simulated one calls its variables.
+    #[serde(skip_serializing_if = "Names::is_empty")]
+    pub rig_names: Names,
+    /// What a controller other than the built-in one calls its variables.
+    #[serde(skip_serializing_if = "Names::is_empty")]
+    pub controller_names: Names,
 }
 
 impl Scene {

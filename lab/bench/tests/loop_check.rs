@@ -13,6 +13,9 @@ fn scene() -> Scene {
 fn healthy_rigs_pass_and_faults_are_named() {
     let found = trials(&scene(), 60, 5).unwrap();
     assert_eq!((found.healthy, found.faulty), ([60, 60], [60, 60]), "{:?}", found.wrong);
+    // The integral gain, the response gain, and the damping rate in its uncertainty.
+    let [integral, gain, damping] = found.linear.map(|[_, largest]| largest);
+    assert!(integral < 0.05 && gain < 0.15 && damping < 3.0, "{:?}", found.linear);
 }
 
 /// A rig that records its largest drive and the phase of its oscillator.

@@ -32,7 +32,7 @@ pub use controller_client::NetController;
 pub use error::{LinkError, ServerError};
 pub use handshake::{Refusal, Role, Service};
 pub use ramp::RAMP_SAMPLES;
-pub use real_time_clock::{CLASSES, Punctuality};
+pub use real_time_clock::Punctuality;
 pub use report::{Counters, Ended, Session, Timing};
 pub use rig_client::NetRig;
 pub use run::Served;

@@ -1,5 +1,6 @@
 //! Frames over TCP and UDP, with a deadline for receiving.
 
+use std::hint;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::thread;
@@ -13,6 +14,8 @@ use super::seal::{Key, Seal, Side};
 const FINE: Duration = Duration::from_millis(20);
 /// Polling interval.
 const POLL: Duration = Duration::from_micros(50);
+/// Shorter waits do not sleep: the system wakes a program up later than it asks for, by about this.
+const SPIN: Duration = Duration::from_micros(100);
 /// Interval at which a server without connections looks for one.
 const ACCEPT: Duration = Duration::from_millis(5);
 /// Longest time for sending a frame over TCP to a peer that does not read.
@@ -249,7 +252,8 @@ fn wait<T>(
             Ok(received) => return Ok(Some(received)),
             Err(error) if !is_passing(&error) => return Err(error),
             Err(_) if left.is_zero() => return Ok(None),
-            Err(_) if coarse.is_none() => thread::sleep(left.min(POLL)),
+            Err(_) if left < SPIN => hint::spin_loop(),
+            Err(_) if coarse.is_none() => thread::sleep(POLL),
             Err(_) => {}
         }
     }

@@ -77,7 +77,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut open = arguments.rig.rig(&scene, reach)?;
     arguments.loop_check.before(&mut open.rig, &mut scene)?;
     let config = scene.backbone_config();
-    let mut controller = arguments.controller.controller(&config, reach, open.pace)?;
+    let mut controller = arguments
+        .controller
+        .controller(&config, &scene.controller_names, reach, open.pace)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let tracked = track(&mut open.rig, controller.as_mut(), &scene, |done, _| {
         bar.set_position(done as u64);

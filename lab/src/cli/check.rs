@@ -187,6 +187,17 @@ fn counted(found: &Trials) -> String {
         "{} of {} healthy rigs passed, {} of {} faults were named correctly.\n",
         found.healthy[1], found.healthy[0], found.faulty[1], found.faulty[0]
     );
+    let [integral, gain, damping] = found.linear;
+    text += &format!(
+        "Linear response of the healthy rigs, median and largest errors: integral gain {:.2} and {:.2} %, response gain {:.2} and {:.2} %, \
+         damping rate {:.1} and {:.1} standard uncertainties.\n",
+        100.0 * integral[0],
+        100.0 * integral[1],
+        100.0 * gain[0],
+        100.0 * gain[1],
+        damping[0],
+        damping[1],
+    );
     for (expected, given) in &found.wrong {
         text += &format!("expected: {expected:?}\n{}", described(given));
     }

@@ -42,6 +42,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         sample_time: scene.sample_time(),
         silence: arguments.silence,
     };
-    let make = || Served::Controller(Box::new(first.clone()));
-    arguments.serving.serve("controller", Address::Tcp, service, make)
+    let make = || Ok(Served::Controller(Box::new(first.clone())));
+    arguments
+        .serving
+        .serve("controller", Address::Tcp, service, make, |_| {})
 }

@@ -1,7 +1,7 @@
 //! `--rig` and `--controller`: the implementations of the two sides of the bench.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     str::FromStr,
     sync::{Arc, OnceLock},
 };
@@ -9,14 +9,14 @@ use std::{
 use clap::Args;
 use phase_lock::Config;
 use vines::{
-    fmu::{FmuController, FmuRig},
+    fmu::{FmuController, FmuError, FmuRig},
     net::{
         Address, BindScope, Key, NetController, NetRig, Timing,
         helic::{Channels, DEFAULT_PORT, HelicRig, Network},
         resolve,
     },
-    rig::{BuiltIn, Chain, Controller, Rig, Simulated, Stoppable},
-    scene::{Resonance, Scene},
+    rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable},
+    scene::{Name, Names, Resonance, Scene},
 };
 
 use super::{failure::Failure, interrupt::stop_flag};
@@ -80,10 +80,7 @@ impl Endpoint {
                 let plant = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
                 Box::new(plant.with_sensors(scene.resonance))
             }
-            Self::Fmu(file) => {
-                let rig = FmuRig::load(file, &scene.start_values(), scene.resonance, &scene.plant);
-                Box::new(rig.map_err(Failure::run)?)
-            }
+            Self::Fmu(file) => Box::new(fmu(file, scene).map_err(Failure::run)?),
             Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
             Self::Network(address) => {
                 let rig = NetRig::connect_with(Address::parse(address, scope)?, scene.sample_time(), scope.key())?;
@@ -103,12 +100,13 @@ impl Endpoint {
     pub(super) fn controller(
         &self,
         config: &Config,
+        names: &Names,
         scope: BindScope,
         pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
         Ok(match self {
             Self::BuiltIn => Box::new(BuiltIn::new(config)?),
-            Self::Fmu(file) => Box::new(FmuController::load(file, config).map_err(Failure::run)?),
+            Self::Fmu(file) => Box::new(FmuController::load(file, config, names).map_err(Failure::run)?),
             Self::Network(address) => match Address::parse(address, scope)? {
                 Address::Tcp(peer) => Box::new(NetController::connect_with(
                     peer,
@@ -124,6 +122,17 @@ impl Endpoint {
             },
         })
     }
+}
+
+/// The rig in an FMU.
+pub(super) fn fmu(file: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuError> {
+    FmuRig::load(
+        file,
+        &scene.start_values(),
+        scene.resonance,
+        &scene.plant,
+        &scene.rig_names,
+    )
 }
 
 /// The helic device at `helic://HOST[:PORT]`.
@@ -142,7 +151,28 @@ fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Netw
     let network =
         network.map_err(|error| Failure::run(format!("no answer from {address}: {error}; {HELIC_ADVICE}")))?;
     let samples = scene.controller.samples_per_period;
-    HelicRig::new(network, Channels::default(), scene.sample_time(), samples).map_err(Failure::run)
+    HelicRig::new(network, channels(&scene.rig_names)?, scene.sample_time(), samples).map_err(Failure::run)
+}
+
+/// The sources of a device and the gain of its output, by the scene's names `response`, `base` and `E`.
+fn channels(names: &Names) -> Result<Channels, Failure> {
+    if let Some(name) = names.unknown(&["response", "base", "E"]) {
+        return Err(Failure::input(format!(
+            "[rig.names] maps `{name}`; for a helic device there are response, base and E"
+        )));
+    }
+    let Channels { mut response, mut reference, mut gain } = Channels::default();
+    if let Some(Name { name, factor }) = names.mapped("response") {
+        response = (name.clone(), *factor);
+    }
+    if let Some(Name { name, factor }) = names.mapped("base") {
+        // A device without a base sensor: "".
+        reference = Some((name.clone(), *factor)).filter(|(name, _)| !name.is_empty());
+    }
+    if let Some(Name { factor, .. }) = names.mapped("E") {
+        gain = *factor;
+    }
+    Ok(Channels { response, reference, gain })
 }
 
 /// Refuses a key where the protocol has none.

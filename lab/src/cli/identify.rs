@@ -79,9 +79,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         }
     };
     arguments.loop_check.before(&mut open.rig, &mut scene)?;
-    let mut controller = arguments
-        .controller
-        .controller(&scene.controller_config(), reach, open.pace)?;
+    let mut controller =
+        arguments
+            .controller
+            .controller(&scene.controller_config(), &scene.controller_names, reach, open.pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(&plan);
     let mut samples = Vec::new();

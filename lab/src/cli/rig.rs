@@ -4,12 +4,14 @@ use std::str::FromStr;
 
 use clap::{Args, ValueEnum};
 use vines::faults::{FAULTS, Kind, rehearsal_rig};
-use vines::net::{Address, Role, Served, Service, helic::Device};
-use vines::rig::{Rig, Simulated};
+use vines::net::{Address, Role, Served, Service, Session, helic::Device};
+use vines::rig::{Rig, RigError, Simulated};
 
 use super::{
+    endpoint::{Endpoint, fmu},
     failure::Failure,
     print,
+    real_time::RealTimeArguments,
     scene_arguments::SceneArguments,
     serving::{ServingArguments, positive},
 };
@@ -19,10 +21,11 @@ Examples:
   vines rig --listen 127.0.0.1:5510                 in real time; then: vines identify --rig udp://127.0.0.1:5510
   vines rig --listen 127.0.0.1:5510 --lock-step     as fast as the drives arrive, with the bits of the built-in plant;
                                                     then: vines identify --rig tcp://127.0.0.1:5510
-  vines rig --listen 127.0.0.1:5510 --sensors-only --set chain.snr=40 --set chain.adc_bits=12 --fault \"response sensor dead@60\"
-                                                    a rehearsal: noise, converters, and a sensor that is unplugged after 60 s
+  vines rig --listen 127.0.0.1:5510 --rig LoViNes.fmu     an FMU
   vines rig --protocol helic --listen 127.0.0.1:2350
                                                     as a device of helic-daq; then: vines identify --rig helic://127.0.0.1
+  vines rig --listen 127.0.0.1:5510 --sensors-only --set chain.snr=40 --set chain.adc_bits=12 --fault \"response sensor dead@60\"
+                                                    a rehearsal: noise, converters, and a sensor that is unplugged after 60 s
 
 Every session starts with the plant in the start state of the scene; the rig's clock starts with the first drive frame. Client and
 server take the sample time from their scene: use the same scene for both. In real time, lost and late drives are counted, and the
@@ -47,6 +50,9 @@ pub(super) struct Arguments {
     #[command(flatten)]
     serving: ServingArguments,
 
+    #[command(flatten)]
+    real_time: RealTimeArguments,
+
     /// The protocol: `vines` (docs/network-protocol.md), or `helic`, as a device of helic-daq (docs/helic.md)
     #[arg(long, value_enum, default_value_t = Protocol::Vines)]
     protocol: Protocol,
@@ -54,6 +60,15 @@ pub(super) struct Arguments {
     /// With `--protocol helic`: samples of the device per sample of the scene
     #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=100))]
     oversampling: u16,
+
+    /// The rig that is served: `built-in` or an FMU
+    #[arg(
+        long,
+        value_name = "ENDPOINT",
+        default_value = "built-in",
+        conflicts_with = "sensors_only"
+    )]
+    rig: Endpoint,
 
     /// Advance when a drive arrives instead of in real time
     #[arg(long)]
@@ -144,20 +159,35 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .fault
         .unwrap_or(Fault { kind: Kind::None, seconds: f64::INFINITY });
     let json = arguments.serving.json;
-    let make = || -> Box<dyn Rig> {
-        match arguments.sensors_only {
-            true => rehearsal_rig(&scene, fault.kind, fault.seconds, move |zero| tell(zero, json)),
-            false => Box::new(first.clone()),
-        }
+    let make = || -> Result<Box<dyn Rig>, RigError> {
+        Ok(match &arguments.rig {
+            Endpoint::Fmu(file) => Box::new(fmu(file, &scene)?),
+            _ if arguments.sensors_only => {
+                rehearsal_rig(&scene, fault.kind, fault.seconds, move |zero| tell(zero, json))
+            }
+            _ => Box::new(first.clone()),
+        })
     };
+    match &arguments.rig {
+        Endpoint::Network(address) => {
+            return Err(Failure::input(format!(
+                "--rig {address}: only `built-in` or an FMU can be served"
+            )));
+        }
+        // An FMU that cannot be loaded is reported before a client comes.
+        Endpoint::Fmu(file) => drop(fmu(file, &scene).map_err(Failure::run)?),
+        Endpoint::BuiltIn => {}
+    }
+    arguments.real_time.apply()?;
+    let keep = |session: &Session| arguments.real_time.keep(session);
     if helic {
         if arguments.lock_step {
             let message = "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic";
             return Err(Failure::input(message));
         }
         let step = scene.sample_time();
-        let device = Device::new(make(), step, max_amplitude).map_err(Failure::run)?;
-        return arguments.serving.serve_helic(device, step);
+        let device = Device::new(make().map_err(Failure::run)?, step, max_amplitude).map_err(Failure::run)?;
+        return arguments.serving.serve_helic(device, step, keep);
     }
     let service = Service {
         role: Role::Rig { max_amplitude, sensors: scene.resonance },
@@ -167,5 +197,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let what = format!("rig, {mode}, {:.1} samples per second,", 1.0 / service.sample_time);
     arguments
         .serving
-        .serve(&what, transport, service, || Served::Rig(make()))
+        .serve(&what, transport, service, || Ok(Served::Rig(make()?)), keep)
 }

@@ -42,24 +42,30 @@ pub(super) struct ServingArguments {
 }
 
 impl ServingArguments {
-    /// Serves `what` at a TCP or UDP address: prints the address, then a report per session.
+    /// Serves `what` at a TCP or UDP address: prints the address, then a report per session, which `keep` gets, too.
     pub(super) fn serve(
         &self,
         what: &str,
         transport: fn(std::net::SocketAddr) -> Address,
         service: Service,
-        mut make: impl FnMut() -> Served,
+        make: impl FnMut() -> Result<Served, ServerError>,
+        keep: impl Fn(&Session),
     ) -> Result<String, Failure> {
         let scope = self.reach.reach()?;
         let mut server = Server::listen_with(transport(resolve(&self.listen, scope)?), service, scope.key())?;
         let address = server.address().map_err(Failure::run)?;
-        self.run(&format!("{what} on {address}"), |stop, tell| {
-            server.serve(|| Ok(make()), stop, tell)
+        self.run(&format!("{what} on {address}"), keep, |stop, tell| {
+            server.serve(make, stop, tell)
         })
     }
 
     /// Serves `device` as a device of helic-daq, sampled every `sample_time`, s.
-    pub(super) fn serve_helic(&self, device: Device, sample_time: f64) -> Result<String, Failure> {
+    pub(super) fn serve_helic(
+        &self,
+        device: Device,
+        sample_time: f64,
+        keep: impl Fn(&Session),
+    ) -> Result<String, Failure> {
         let scope = self.reach.reach()?;
         no_key(scope)?;
         let address = resolve(&self.listen, scope)?;
@@ -67,7 +73,7 @@ impl ServingArguments {
         let mut server = HelicServer::listen(address, device, sample_time).map_err(listen)?;
         let what = format!("helic device, {:.1} samples per second, on", 1.0 / sample_time);
         let address = server.address().map_err(Failure::run)?;
-        self.run(&format!("{what} helic://{address}"), |stop, tell| {
+        self.run(&format!("{what} helic://{address}"), keep, |stop, tell| {
             server.serve(stop, tell)
         })
     }
@@ -76,6 +82,7 @@ impl ServingArguments {
     fn run(
         &self,
         what: &str,
+        keep: impl Fn(&Session),
         serve: impl FnOnce(&mut dyn FnMut() -> bool, &mut dyn FnMut(&Session)) -> Result<(), ServerError>,
     ) -> Result<String, Failure> {
         let stop = stop_flag()?;
@@ -92,6 +99,7 @@ impl ServingArguments {
             } else {
                 session.to_string()
             };
+            keep(session);
             // A closed output does not stop the server.
             let _ = print(&text);
             served += 1;

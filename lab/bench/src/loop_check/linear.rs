@@ -49,12 +49,15 @@ impl Linear {
         if !(response_gain.is_finite() && u_q.is_finite() && q.norm() > 0.0) {
             return None;
         }
+        // Scatter, and what the growth within a period adds to its phasor as a component of twice the frequency.
+        let noise = u_q / (q.norm() * period);
+        let leakage = rate.norm_sqr() * period / std::f64::consts::TAU;
         let bandwidth = scene.controller.bandwidth * scene.dimensionless().omega0;
         let gains = Gains::from_bandwidth(bandwidth, rate.re.max(0.0));
         Some(Self {
             omega_0: omega - rate.im,
             damping_rate: rate.re,
-            u_damping_rate: u_q / (q.norm() * period),
+            u_damping_rate: noise.hypot(leakage),
             response_gain,
             bandwidth,
             gains: [gains.proportional, gains.integral],

@@ -20,7 +20,8 @@ pub enum RigError {
     Refused(#[from] InvalidValue),
     /// The rig cannot be driven by held samples.
     #[error(
-        "the rig accepts frequency and amplitude only, not the samples of the base displacement that chain.hold = true sends"
+        "the rig accepts frequency and amplitude only, not samples of the base displacement: chain.hold = true needs a rig that does, and so \
+         does `vines rig --protocol helic`"
     )]
     NoHold,
 }

@@ -4,7 +4,7 @@ use lovines::Parameters;
 use serde::Deserialize;
 
 use super::{
-    Backbone, Chain, Controller, Definition, Dimensionless, PhaseLock, Record, Reference, Scene, SceneError,
+    Backbone, Chain, Controller, Definition, Dimensionless, Names, PhaseLock, Record, Reference, Scene, SceneError,
     plant::{PlantSection, StartSection},
     validate::Quantity,
 };
@@ -22,6 +22,15 @@ pub(super) struct Sections {
     backbone: Backbone,
     chain: Chain,
     resonance: Definition,
+    rig: RigSection,
+    controller_names: Names,
+}
+
+/// A rig other than the simulated one.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RigSection {
+    names: Names,
 }
 
 /// The base amplitude; exactly one of the two keys is given.
@@ -86,6 +95,8 @@ impl Sections {
             backbone: self.backbone,
             chain: self.chain,
             resonance: self.resonance,
+            rig_names: self.rig.names,
+            controller_names: self.controller_names,
         };
         scene.controller.check()?;
         let needed = scene.impact_drive();

@@ -107,7 +107,7 @@ impl HelicServer {
                     samples: tick - host.first,
                     sample_time: self.sample_time,
                     seconds: host.opened.elapsed().as_secs_f64(),
-                    punctuality: Some(clock.punctuality),
+                    punctuality: Some(clock.punctuality.clone()),
                     counters: None,
                 });
             }
