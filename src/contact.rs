@@ -33,12 +33,15 @@ impl Wall {
         }
     }
 
+    /// The wall that `w` approaches with this velocity, or lies beyond.
+    #[inline(always)]
+    pub fn ahead(w: f64) -> Self {
+        if w > 0.0 { Wall::Plus } else { Wall::Minus }
+    }
+
     /// The wall on the other side.
     pub fn other(self) -> Self {
-        match self {
-            Wall::Plus => Wall::Minus,
-            Wall::Minus => Wall::Plus,
-        }
+        Wall::ahead(-self.sign())
     }
 }
 

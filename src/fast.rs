@@ -1,10 +1,9 @@
 //! The fast path: predict with whatever is cheap, then verify with a bound.
 //!
 //! The next contact is *predicted* from cached propagators: the flight time that followed the last one, or a march over the
-//! flight in equal stretches. A prediction may be wrong. It is *verified* with a bound ([`verify`]): between two instants at which the
-//! motion is known exactly, the gaps to both walls are certainly open if a Taylor bound from the left and one from the right say
-//! so, each over half of the time. What cannot be verified is left to the plain solver's search. Results therefore never
-//! depend on a guess, only the cost does.
+//! flight in equal stretches. It is *verified* with a bound ([`verify`]): the particle drifts towards one wall all the time, or
+//! Taylor bounds from both ends of a stretch keep the gaps to both walls open. What cannot be verified is left to the plain
+//! solver's search. Results therefore never depend on a guess, only the cost does.
 //!
 //! Everything kept between steps lives in [`Cache`], and each entry carries its key: the time it belongs to and
 //! the frequency of the base. An entry whose key differs is not used; nothing else invalidates it.
@@ -19,7 +18,6 @@ mod horizon;
 mod march;
 mod propagator;
 mod short_step;
-mod start;
 mod verify;
 
 use crate::arithmetic::Sum;
@@ -29,12 +27,10 @@ use crate::oscillator::Oscillator;
 use crate::plant::{Masses, Rig};
 use crate::segment::Segment;
 use cache::Cache;
-#[cfg(feature = "serde")]
-pub(crate) use cache::Keys;
 use coefficients::Coefficients;
 use horizon::Horizon;
-use propagator::{Increment, Point};
-use start::Start;
+use propagator::{Angle, Increment, Point};
+use verify::Start;
 
 /// How often a phasor is rotated before it is computed from the phase again.
 const ROTATIONS: u32 = 16;
@@ -53,41 +49,35 @@ pub(crate) enum Next {
 }
 
 /// The parts of a plant that move, and the rig.
-pub(crate) struct Moving<'a> {
-    pub rig: &'a Rig,
-    pub masses: &'a mut Masses,
-    pub base: &'a mut BaseMotion,
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct Moving {
+    pub rig: Rig,
+    pub masses: Masses,
+    pub base: BaseMotion,
 }
 
 /// Predictions, and what they are made from.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct FastPath {
     pub disabled: bool,
     /// How long there is no contact from now on.
     contact_free: Horizon,
     /// `e^{i phase}` of the base: cosine and sine.
-    phasor: (f64, f64),
+    pub phasor: (f64, f64),
     /// Rotations since it was computed from the phase.
     rotations: u32,
+    #[cfg_attr(feature = "serde", serde(skip))]
     coefficients: Coefficients,
     cache: Cache,
-    /// What comes next could not be verified: it need not be tried again.
-    unverified: bool,
-    evaluations: u64,
+    /// What comes next could not be verified: the plain solver is to search for so long, s.
+    to_search: f64,
+    /// Evaluations of the motion, by the plain solver too.
+    pub evaluations: u64,
 }
 
 impl FastPath {
-    /// `e^{i phase}` of the base: cosine and sine.
-    #[inline(always)]
-    pub fn phasor(&self) -> (f64, f64) {
-        self.phasor
-    }
-
-    /// Evaluations of the motion since the last call.
-    pub fn evaluations(&mut self) -> u64 {
-        core::mem::take(&mut self.evaluations)
-    }
-
     /// The state was changed from outside.
     pub fn state_changed(&mut self, base: &BaseMotion) {
         self.contact_free = Horizon::default();
@@ -105,17 +95,6 @@ impl FastPath {
     pub fn drive_changed(&mut self, oscillator: &Oscillator, before: &Drive, drive: &Drive, kick: f64) {
         self.contact_free.drive_changed(oscillator, before, drive, kick);
         self.cache.step.drive_changed(drive);
-    }
-
-    /// The phasor and the phase of the base have moved on.
-    #[inline(always)]
-    fn turned(&mut self, base: &mut BaseMotion, phase: Phase, phasor: (f64, f64)) {
-        base.phase = phase;
-        self.phasor = phasor;
-        self.rotations += 1;
-        if self.rotations >= ROTATIONS {
-            self.resynchronise(phase);
-        }
     }
 
     #[inline(never)]
@@ -156,20 +135,20 @@ impl FastPath {
     fn take_step(&mut self, moving: &mut Moving, start: &Point, late: f64) {
         let step = &mut self.cache.step;
         let drive = &moving.base.drive;
-        let (mut increment, angle) = step.increment(drive, start);
+        let (mut increment, angle) = step.increment(&moving.rig.alone, drive, start);
         if late != 0.0 {
             increment = increment.later(&moving.rig.alone, drive, start, late);
         }
         let t = step.t + late;
-        let phase = moving.base.phase.rotated(angle, drive.omega * late);
-        self.apply(moving, &increment, phase, t);
-        self.contact_free.t -= t;
+        let more = drive.omega * late;
+        self.drift(moving, &increment, t);
+        self.apply(moving, &increment, (angle, more), t);
     }
 
     /// Adds an increment to displacements, velocities and base.
     #[inline(always)]
-    fn apply(&mut self, moving: &mut Moving, increment: &Increment, phase: Phase, t: f64) {
-        let Moving { rig, masses, base } = moving;
+    fn apply(&mut self, moving: &mut Moving, increment: &Increment, (angle, more): Angle, t: f64) {
+        let Moving { masses, base, .. } = moving;
         let dx = increment.y + base.drive.signal[1] * t;
         if base.drive.signal[1] != 0.0 || !base.drive.is_straight() {
             base.drive.signal = shift(base.drive.signal, t);
@@ -177,12 +156,25 @@ impl FastPath {
         masses.x = masses.x.plus(dx);
         masses.v = masses.v.plus(increment.dy);
         masses.dw += increment.dy;
+        base.phase = base.phase.rotated(angle, more);
+        self.phasor = increment.phasor;
+        self.rotations += 1;
+        if self.rotations >= ROTATIONS {
+            self.resynchronise(base.phase);
+        }
+    }
+
+    /// Adds an increment to the relative displacement: no wall is met.
+    #[inline(always)]
+    fn drift(&mut self, moving: &mut Moving, increment: &Increment, t: f64) {
+        let Moving { rig, masses, base } = moving;
+        let dx = increment.y + base.drive.signal[1] * t;
         masses.w = masses.w.plus(dx - masses.particle * t);
         let (w, b) = (masses.w.value(), rig.parameters.half_width);
         if w.abs() > b {
             masses.w = Sum::from(b.copysign(w));
         }
-        self.turned(base, phase, increment.phasor);
+        self.contact_free.t -= t;
     }
 
     /// Whether a bound from the start alone shows that no wall is met within `t`; it may reach further.
@@ -196,33 +188,29 @@ impl FastPath {
     fn coast(&mut self, moving: &mut Moving, start: &Point, t: f64, duration: f64) -> Next {
         let (oscillator, drive) = (&moving.rig.alone, moving.base.drive);
         let fastest = oscillator.fastest.max(drive.omega.abs());
+        self.evaluations += 1;
         if t == duration && self.cache.repeats(oscillator, &drive, duration) {
-            self.evaluations += 1;
             self.take_step(moving, start, duration - self.cache.step.t);
-        } else if !drive.is_straight() || drive.omega < 0.0 || t * fastest > LONGEST_COAST {
-            self.evaluations += 1;
+            return Next::ContactFree(t);
+        }
+        let increment = if !drive.is_straight() || drive.omega < 0.0 || t * fastest > LONGEST_COAST {
+            self.rotations = ROTATIONS;
             let (x, v) = (moving.masses.x.value(), moving.masses.v.value());
-            let segment = Segment::new(oscillator, *moving.base, (x, v));
-            let (dx, dv) = segment.departure(t);
-            let phase = moving.base.phase.advanced(drive.omega, t);
-            let increment = Increment {
+            let (dx, dv) = Segment::new(oscillator, moving.base, (x, v)).departure(t);
+            Increment {
                 y: dx + (v - drive.signal[1]) * t,
                 dy: dv,
                 phasor: self.phasor,
-            };
-            self.apply(moving, &increment, phase, t);
-            self.resynchronise(phase);
-            self.contact_free.t -= t;
+            }
         } else {
             self.coefficients.prepare(oscillator, drive.omega);
-            let increment = self.after(&Start::new(moving, *start), t);
             if t * fastest > short_step::LONGEST {
                 self.cache.learn(&self.coefficients, t);
             }
-            let phase = moving.base.phase.rotated(propagator::angle(drive.omega, t), 0.0);
-            self.apply(moving, &increment, phase, t);
-            self.contact_free.t -= t;
-        }
+            self.after(&Start::new(moving, *start), t)
+        };
+        self.drift(moving, &increment, t);
+        self.apply(moving, &increment, (propagator::angle(drive.omega, t), 0.0), t);
         Next::ContactFree(t)
     }
 }

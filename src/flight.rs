@@ -46,7 +46,7 @@ impl Flight {
     pub fn first_contact(&self, limit: f64, released: Option<Wall>) -> Landing {
         let from = released.map_or(0.0, |wall| self.clear_of(wall).min(limit));
         let look = |t: f64| {
-            let Instant { departure: (dx, dv), derivatives: d, .. } = self.instant(t);
+            let Instant { departure: (dx, dv), derivatives: d, .. } = self.motion.at(&self.series, t);
             (
                 Wall::BOTH.map(|wall| self.gap(wall, (self.start.1 * t + dx, dv), &d)),
                 d,
@@ -62,7 +62,7 @@ impl Flight {
 
     /// The state `h` seconds after the instant `t`.
     fn landing(&self, (t, h): (f64, f64), wall: Option<Wall>, evaluations: u64) -> Landing {
-        let Instant { moved, departure: (dx, dv), derivatives: d } = self.instant(t);
+        let Instant { moved, departure: (dx, dv), derivatives: d } = self.motion.at(&self.series, t);
         Landing {
             t: t + h,
             wall,
@@ -71,15 +71,6 @@ impl Flight {
             drifted: self.start.1 * t + dx,
             evaluations,
         }
-    }
-
-    /// The motion of the primary mass after `t` seconds.
-    fn instant(&self, t: f64) -> Instant {
-        if t == 0.0 {
-            let derivatives = self.motion.derivatives_at_start();
-            return Instant { moved: 0.0, departure: (0.0, 0.0), derivatives };
-        }
-        self.motion.at(&self.series, t)
     }
 
     /// The particle flies straight on, so that beyond the first derivative `w` moves as the primary mass does.

@@ -73,7 +73,7 @@ impl Forcing {
         let form = match light {
             Some(omega_d) if strength.norm_sqr() > limit => Form::DividedDifferences {
                 gain: strength / Complex64::new(0.0, 2.0 * omega_d),
-                near: Complex64::new(delta, oscillator.detuning(omega, omega_d)),
+                near: Complex64::new(delta, (omega - omega_d) - oscillator.omega_d_error),
                 far: Complex64::new(delta, omega + omega_d).inv(),
             },
             _ => Form::Steady(strength / detuned),
@@ -101,16 +101,9 @@ impl Forcing {
                 gain * (first - second)
             }
         };
-        Response { base, position, velocity: self.velocity(position, free.xv) }
-    }
-
-    /// `K' = i omega K + F xv`: the response to the slope of the base motion, and to its jump from rest.
-    #[inline(always)]
-    pub(crate) fn velocity(&self, position: Complex64, per_velocity: f64) -> Complex64 {
-        Complex64::new(
-            self.strength.re * per_velocity - self.omega * position.im,
-            self.strength.im * per_velocity + self.omega * position.re,
-        )
+        // `K' = i omega K + F xv`: the response to the slope of the base motion, and to its jump from rest.
+        let turned = Complex64::new(-self.omega * position.im, self.omega * position.re);
+        Response { base, position, velocity: self.strength * free.xv + turned }
     }
 }
 

@@ -20,7 +20,7 @@ pub struct Oscillator {
     pub regime: Regime,
     /// Rounding error of the damped natural frequency, rad/s. After a thousand periods the error of the phase is six thousand
     /// times as large.
-    omega_d_error: f64,
+    pub(crate) omega_d_error: f64,
     /// Rounding errors of `2 delta` (1/s) and `omega0²` (1/s²).
     errors: (f64, f64),
     /// Longest a unit velocity can carry the free motion, s: `|x(t)| <= |x(0)| + reach |x'(0)|`.
@@ -106,16 +106,6 @@ impl Oscillator {
         }
     }
 
-    /// `omega` less the damped natural frequency `omega_d`, with all its digits.
-    pub(crate) fn detuning(&self, omega: f64, omega_d: f64) -> f64 {
-        (omega - omega_d) - self.omega_d_error
-    }
-
-    /// Sine and cosine of `omega_d t`, for the `omega_d` of this oscillator.
-    pub(crate) fn sincos(&self, omega_d: f64, t: f64) -> (f64, f64) {
-        sincos_of_product((omega_d, self.omega_d_error), t)
-    }
-
     /// A bound on `|y|` from now on, for a free motion that has `y` and `y'` now (each derivative of the motion obeys
     /// the same equation): its energy never grows.
     pub fn ceiling(&self, y: f64, dy: f64) -> f64 {
@@ -126,82 +116,69 @@ impl Oscillator {
         }
     }
 
-    /// The free motion over `t` seconds.
-    pub fn transition(&self, t: f64) -> Transition {
-        self.flow(t).0
-    }
-
     /// The free motion over `t` seconds and, where it oscillates, `exp((-delta + i omega_d) t)`.
     pub(crate) fn flow(&self, t: f64) -> (Transition, Complex64) {
         match self.regime {
             Regime::Oscillating { omega_d } => {
-                let (sin, cos) = self.sincos(omega_d, t);
+                let (sin, cos) = sincos_of_product((omega_d, self.omega_d_error), t);
                 let decay = libm::exp(-self.delta * t);
                 let turned = Complex64::new(decay * cos, decay * sin);
-                (self.oscillating(omega_d, turned.im, turned.re), turned)
+                let s = turned.im / omega_d;
+                let free = Transition {
+                    xx: turned.re + self.delta * s,
+                    xv: s,
+                    vx: -self.omega0_squared * s,
+                    vv: turned.re - self.delta * s,
+                };
+                (free, turned)
             }
             Regime::Overdamped { slow, fast, half_gap } => (self.overdamped(t, slow, fast, half_gap), Complex64::ZERO),
         }
     }
 
-    /// What the free motion over `t` seconds adds to position and velocity, as the sum of two maps: for a transition that is
-    /// used many times. A rounded one would be a steady source or sink of energy, and shift the phase.
-    pub(crate) fn exact_increment(&self, t: f64) -> (Transition, Transition) {
-        split(self.increment(t))
-    }
-
-    /// The same over `t`, `2 t`, `3 t` and so on, seconds.
-    pub(crate) fn exact_increments<const N: usize>(&self, t: f64) -> [(Transition, Transition); N] {
-        let once = self.increment(t);
-        let mut increment = [(0.0, 0.0); 4];
-        core::array::from_fn(|_| {
-            increment = both(&increment, &once);
-            split(increment)
-        })
-    }
-
-    /// In double-double arithmetic: a Taylor series over a time that is short against every rate, doubled as often as needed.
-    fn increment(&self, t: f64) -> Increment {
-        let doublings = libm::ceil(libm::log2(2.0 * self.fastest * t)).max(0.0);
-        let mut increment = self.short_increment(t * libm::exp2(-doublings));
-        for _ in 0..doublings as u32 {
-            increment = both(&increment, &increment);
-        }
-        increment
-    }
-
-    /// The same over a short time, each entry with its rounding error.
-    fn short_increment(&self, t: f64) -> Increment {
-        const DEGREE: usize = 26;
-        let damping = times((2.0 * self.delta, self.errors.0), (t, 0.0));
-        let spring = times((self.omega0_squared, self.errors.1), product(t, t));
-        // Coefficients for the start (0, t); the velocity is that of `t x'`.
-        let (mut c, mut x, mut v) = ([(0.0, 0.0), (1.0, 0.0)], (0.0, 0.0), (0.0, 0.0));
-        for n in 2..DEGREE {
+    /// What the free motion over `t` seconds adds: a Taylor series over a time that is short against every rate, doubled as often as
+    /// needed.
+    pub(crate) fn increment(&self, t: f64) -> Increment {
+        const TERMS: usize = 16;
+        let doublings = libm::ceil(libm::log2(32.0 * self.fastest * t)).max(0.0);
+        let t = t * libm::exp2(-doublings);
+        let (damping, spring) = self.rates();
+        let (damping, spring) = (times(damping, (t, 0.0)), times(spring, product(t, t)));
+        // Coefficients of the motion that starts with a displacement of 0 and a velocity of 1/t.
+        let (mut c, mut s, mut p) = ([(0.0, 0.0), (1.0, 0.0)], (1.0, 0.0), (0.0, 0.0));
+        for n in 2..TERMS {
             let sum = plus(times(damping, times(c[1], ((n - 1) as f64, 0.0))), times(spring, c[0]));
             let (next, error) = divided(sum, ((n - 1) * n) as f64);
             c = [c[1], (-next, -error)];
-            x = plus(x, c[1]);
-            v = plus(v, times(c[1], (n as f64, 0.0)));
-            if c[0].0.abs().max(c[1].0.abs()) <= 1e-35 * x.0.abs() {
-                break;
-            }
+            s = plus(s, c[1]);
+            p = plus(p, times(c[1], (n as f64, 0.0)));
         }
-        // `xx = vv + 2 delta xv` and `vx = -omega0² xv`.
-        let per_t = plus((1.0, 0.0), x);
-        let (vx, error) = times((self.omega0_squared, self.errors.1), times(per_t, (t, 0.0)));
-        [plus(v, times(damping, per_t)), times(per_t, (t, 0.0)), (-vx, -error), v]
+        let short = Increment { p, s: times(s, (t, 0.0)) };
+        (0..doublings as u32).fold(short, |one, _| self.both(&one, &one))
     }
 
-    /// The transition from `exp(-delta t) sin(omega_d t)` and `exp(-delta t) cos(omega_d t)`.
-    pub(crate) fn oscillating(&self, omega_d: f64, sin: f64, cos: f64) -> Transition {
-        let s = sin / omega_d;
-        Transition {
-            xx: cos + self.delta * s,
-            xv: s,
-            vx: -self.omega0_squared * s,
-            vv: cos - self.delta * s,
-        }
+    /// What two times, one after the other, add.
+    pub(crate) fn both(&self, a: &Increment, b: &Increment) -> Increment {
+        let (damping, spring) = self.rates();
+        let square = times(a.s, b.s);
+        let p = plus(times(a.p, b.p), times((-spring.0, -spring.1), square));
+        let s = plus(plus(times(a.p, b.s), times(b.p, a.s)), times(damping, square));
+        Increment { p: plus(plus(a.p, b.p), p), s: plus(plus(a.s, b.s), s) }
+    }
+
+    /// What an increment adds to position and velocity, as the sum of two maps: for one that is used many times. A rounded one would be a
+    /// steady source or sink of energy, and shift the phase.
+    pub(crate) fn split(&self, Increment { p, s }: &Increment) -> (Transition, Transition) {
+        let (damping, spring) = self.rates();
+        let entries = [plus(*p, times(damping, *s)), *s, times((-spring.0, -spring.1), *s), *p];
+        let [xx, xv, vx, vv] = entries.map(split_coefficient);
+        let part = |xx, xv, vx, vv| Transition { xx, xv, vx, vv };
+        (part(xx.0, xv.0, vx.0, vv.0), part(xx.1, xv.1, vx.1, vv.1))
+    }
+
+    /// `2 delta` and `omega0²` with their rounding errors.
+    fn rates(&self) -> ((f64, f64), (f64, f64)) {
+        ((2.0 * self.delta, self.errors.0), (self.omega0_squared, self.errors.1))
     }
 
     fn overdamped(&self, t: f64, slow: f64, fast: f64, half_gap: f64) -> Transition {
@@ -227,22 +204,12 @@ impl Oscillator {
     }
 }
 
-/// What a transition adds: `xx - 1`, `xv`, `vx`, `vv - 1`, each with its rounding error.
-type Increment = [(f64, f64); 4];
-
-/// What two transitions, one after the other, add: `(1 + A) (1 + B) = 1 + A + B + A B`, which keeps the relative accuracy of
-/// small ones.
-fn both(a: &Increment, b: &Increment) -> Increment {
-    let entry = |row: usize, column: usize| plus(times(a[row], b[column]), times(a[row + 1], b[column + 2]));
-    let product = [entry(0, 0), entry(0, 1), entry(2, 0), entry(2, 1)];
-    core::array::from_fn(|n| plus(product[n], plus(a[n], b[n])))
-}
-
-/// Each entry as the sum of two numbers.
-fn split(increment: Increment) -> (Transition, Transition) {
-    let [xx, xv, vx, vv] = increment.map(split_coefficient);
-    let part = |xx, xv, vx, vv| Transition { xx, xv, vx, vv };
-    (part(xx.0, xv.0, vx.0, vv.0), part(xx.1, xv.1, vx.1, vv.1))
+/// What a transition adds, in double-double arithmetic: `p = vv - 1` and `s = xv`. With them `xx = 1 + p + 2 delta s` and
+/// `vx = -omega0² s`.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Increment {
+    p: (f64, f64),
+    s: (f64, f64),
 }
 
 #[cfg(test)]

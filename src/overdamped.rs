@@ -9,30 +9,19 @@ use crate::oscillator::{Oscillator, Regime};
 /// Below this part of the decay rate the two rates are too near each other to be told apart by subtraction.
 pub(crate) const APART: f64 = 0.1;
 
-/// Rates of a overdamped oscillator whose two rates are far apart.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct OverdampedRates {
-    slow: f64,
-    fast: f64,
+/// Whether the rates of `oscillator` are far apart.
+pub(crate) fn is_apart(oscillator: &Oscillator) -> bool {
+    matches!(oscillator.regime, Regime::Overdamped { half_gap, .. } if half_gap > APART * oscillator.delta)
 }
 
-impl OverdampedRates {
-    /// The rates of `oscillator`, if it is overdamped and they are far apart.
-    pub fn of(oscillator: &Oscillator) -> Option<Self> {
-        match oscillator.regime {
-            Regime::Overdamped { slow, fast, half_gap } if half_gap > APART * oscillator.delta => {
-                Some(Self { slow, fast })
-            }
-            _ => None,
-        }
-    }
-
-    /// Positions after `t` seconds under a push of 1 and under one that grows as the time: s² and s³.
-    pub fn pushed(&self, t: f64) -> (f64, f64) {
-        let (slow, fast) = (integrals(self.slow, t), integrals(self.fast, t));
-        let gap = self.slow - self.fast;
-        ((slow.0 - fast.0) / gap, (slow.1 - fast.1) / gap)
-    }
+/// Positions after `t` seconds under a push of 1 and under one that grows as the time, s² and s³, where the rates are apart.
+pub(crate) fn pushed(oscillator: &Oscillator, t: f64) -> (f64, f64) {
+    let Regime::Overdamped { slow, fast, .. } = oscillator.regime else {
+        return (0.0, 0.0);
+    };
+    let (of_slow, of_fast) = (integrals(slow, t), integrals(fast, t));
+    let gap = slow - fast;
+    ((of_slow.0 - of_fast.0) / gap, (of_slow.1 - of_fast.1) / gap)
 }
 
 /// The integral of `e^{rate t}` from 0 to `t`, and the integral of that, for a rate of 0 or below.

@@ -6,13 +6,11 @@
 mod advance;
 mod at_wall;
 mod events;
-#[cfg(feature = "serde")]
-mod snapshot;
 
 use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive};
 use crate::contact::{Contact, ImpactLaw, Wall};
-use crate::fast::FastPath;
+use crate::fast::{FastPath, Moving};
 use crate::oscillator::Oscillator;
 use crate::parameters::{InvalidValue, Parameters};
 pub use events::{Event, Outcome, State, Totals};
@@ -20,8 +18,10 @@ pub use events::{Event, Outcome, State, Totals};
 /// Largest number of impacts per step. Bounds the work of any input.
 pub const MOST_IMPACTS: u64 = 10_000_000;
 
-/// The parameters and what follows from them.
+/// The parameters and what follows from them. The parameters alone are saved.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "Parameters", into = "Parameters"))]
 pub(crate) struct Rig {
     pub parameters: Parameters,
     pub mass_ratio: f64,
@@ -31,13 +31,19 @@ pub(crate) struct Rig {
     pub joint: Oscillator,
 }
 
-impl Rig {
-    fn new(p: &Parameters) -> Self {
+impl From<Rig> for Parameters {
+    fn from(rig: Rig) -> Self {
+        rig.parameters
+    }
+}
+
+impl From<Parameters> for Rig {
+    fn from(p: Parameters) -> Self {
         let joint = p.primary_mass + p.particle_mass;
         Self {
-            parameters: *p,
+            parameters: p,
             mass_ratio: p.mass_ratio(),
-            law: ImpactLaw::new(p),
+            law: ImpactLaw::new(&p),
             alone: Oscillator::new(p.primary_mass, p.stiffness, p.damping),
             joint: Oscillator::new(joint, p.stiffness, p.damping),
         }
@@ -64,17 +70,13 @@ pub(crate) struct Masses {
 /// The plant: parameters, what follows from them, and the state.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(into = "snapshot::Snapshot", from = "snapshot::Snapshot"))]
 pub struct Plant {
-    rig: Rig,
+    moving: Moving,
     contact: Contact,
-    masses: Masses,
-    base: BaseMotion,
     /// Whether the base has a position: the first drive sets it, later ones may make it jump.
     begun: bool,
     time: f64,
     totals: Totals,
-    evaluations: u64,
     fast: FastPath,
 }
 
@@ -105,20 +107,21 @@ impl Plant {
             "a number from -b to b",
         )?;
         Ok(Self {
-            rig: Rig::new(&parameters),
-            contact: Contact::Free,
-            masses: Masses {
-                x: Sum::from(start.q1),
-                v: Sum::from(start.dq1),
-                w: Sum::from(w.clamp(-b, b)),
-                dw: start.dq1 - start.dq2,
-                particle: start.dq2,
+            moving: Moving {
+                rig: Rig::from(parameters),
+                masses: Masses {
+                    x: Sum::from(start.q1),
+                    v: Sum::from(start.dq1),
+                    w: Sum::from(w.clamp(-b, b)),
+                    dw: start.dq1 - start.dq2,
+                    particle: start.dq2,
+                },
+                base: BaseMotion::default(),
             },
-            base: BaseMotion::default(),
+            contact: Contact::Free,
             begun: false,
             time: 0.0,
             totals: Totals::default(),
-            evaluations: 0,
             fast: FastPath::default(),
         })
     }
@@ -129,9 +132,9 @@ impl Plant {
     /// An invalid drive.
     pub fn begin(&mut self, drive: Drive) -> Result<(), InvalidValue> {
         drive.validate()?;
-        self.base.drive = drive;
+        self.moving.base.drive = drive;
         self.begun = true;
-        self.fast.state_changed(&self.base);
+        self.fast.state_changed(&self.moving.base);
         Ok(())
     }
 
@@ -148,14 +151,14 @@ impl Plant {
     /// Invalid parameters; the old ones stay.
     pub fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         parameters.validate()?;
-        self.rig = Rig::new(&parameters);
-        self.fast.parameters_changed(&self.base);
+        self.moving.rig = Rig::from(parameters);
+        self.fast.parameters_changed(&self.moving.base);
         Ok(())
     }
 
     /// The parameters.
     pub fn parameters(&self) -> &Parameters {
-        &self.rig.parameters
+        &self.moving.rig.parameters
     }
 
     /// Time since the start, s, or as [`Self::set_time`] set it. Only impact times depend on it.
@@ -171,7 +174,7 @@ impl Plant {
     /// Positions and velocities now.
     #[inline]
     pub fn state(&self) -> State {
-        let masses = &self.masses;
+        let masses = &self.moving.masses;
         let q1 = masses.x.value();
         State {
             q1,
@@ -184,32 +187,32 @@ impl Plant {
     /// Relative displacement `w = q1 - q2`, m.
     #[inline]
     pub fn relative_displacement(&self) -> f64 {
-        self.masses.w.value()
+        self.moving.masses.w.value()
     }
 
     /// Relative velocity `w'`, m/s.
     #[inline]
     pub fn relative_velocity(&self) -> f64 {
-        self.masses.dw
+        self.moving.masses.dw
     }
 
     /// `v = q1 + epsilon q2`, m: the displacement of the centre of mass times `1 + epsilon`.
     #[inline]
     pub fn centre(&self) -> f64 {
-        let q1 = self.masses.x.value();
-        q1 + self.rig.mass_ratio * (q1 - self.masses.w.value())
+        let q1 = self.moving.masses.x.value();
+        q1 + self.moving.rig.mass_ratio * (q1 - self.moving.masses.w.value())
     }
 
     /// The base motion now: drive, and the phase of its oscillator.
     #[inline]
     pub fn base(&self) -> BaseMotion {
-        self.base
+        self.moving.base
     }
 
     /// Displacement of the base now, m.
     #[inline]
     pub fn base_displacement(&self) -> f64 {
-        self.base.drive.signal[0] + self.base.drive.amplitude * self.fast.phasor().1
+        self.moving.base.drive.signal[0] + self.moving.base.drive.amplitude * self.fast.phasor.1
     }
 
     /// The wall the particle is stuck to, if it is.
@@ -228,9 +231,13 @@ impl Plant {
     /// Mechanical energy, J: of both masses' motion, and of the spring between the primary mass and a base at
     /// `displacement`, m.
     pub fn energy(&self, displacement: f64) -> f64 {
-        let p = &self.rig.parameters;
+        let p = &self.moving.rig.parameters;
         let State { q1, dq1, dq2, .. } = self.state();
         let stretch = q1 - displacement;
         0.5 * (p.primary_mass * dq1 * dq1 + p.particle_mass * dq2 * dq2 + p.stiffness * stretch * stretch)
     }
 }
+
+#[cfg(all(test, feature = "serde"))]
+#[path = "../tests/unit/plant.rs"]
+mod tests;

@@ -8,7 +8,7 @@
 use crate::base_motion::BaseMotion;
 use crate::forcing::Forcing;
 use crate::oscillator::Oscillator;
-use crate::overdamped::OverdampedRates;
+use crate::overdamped::{is_apart, pushed};
 use num_complex::Complex64;
 
 /// The series is used while `fastest rate * t` is at most this; degree 15 then leaves out less than 1e-18.
@@ -28,7 +28,7 @@ pub struct Segment {
     /// The polynomial that follows the signal.
     follower: [f64; 4],
     /// Where the follower is the signal itself: the forcing by its curvature and jerk, m/s² and m/s³.
-    pushed: Option<(OverdampedRates, [f64; 2])>,
+    pushed: Option<[f64; 2]>,
     x0: f64,
     v0: f64,
 }
@@ -36,7 +36,9 @@ pub struct Segment {
 impl Segment {
     /// The motion that starts at `x0` (m) with `v0` (m/s) under `base`.
     pub fn new(oscillator: &Oscillator, base: BaseMotion, (x0, v0): (f64, f64)) -> Self {
-        let pushed = push(oscillator, base.drive.signal);
+        let [_, _, u2, u3] = base.drive.signal;
+        // The departure from the signal `u` obeys `z'' + 2 delta z' + omega0² z = -u''`.
+        let pushed = (!base.drive.is_straight() && is_apart(oscillator)).then_some([-2.0 * u2, -6.0 * u3]);
         let follower = if pushed.is_some() {
             base.drive.signal
         } else {
@@ -71,8 +73,8 @@ impl Segment {
         let (y, dy) = free.of(self.x0 - p[0], self.v0 - p[1]);
         let mut x = p[0] + t * (p[1] + t * (p[2] + t * p[3])) + y;
         let mut v = p[1] + t * (2.0 * p[2] + t * 3.0 * p[3]) + dy;
-        if let Some((rates, [steady, growing])) = self.pushed {
-            let (once, twice) = rates.pushed(t);
+        if let Some([steady, growing]) = self.pushed {
+            let (once, twice) = pushed(&self.oscillator, t);
             x += steady * once + growing * twice;
             v += steady * free.xv + growing * once;
         }
@@ -83,12 +85,6 @@ impl Segment {
         x += (z * response.position).im;
         v += (z * response.velocity).im;
         (x, v, z * response.base)
-    }
-
-    /// Position and velocity after `t` seconds, by the closed form at any `t`.
-    pub fn position_and_velocity(&self, t: f64) -> (f64, f64) {
-        let (x, v, _) = self.closed_form(t);
-        (x, v)
     }
 
     /// Position and its derivatives after `t` seconds; from the second on they follow from the equation of motion.
@@ -206,12 +202,7 @@ pub struct Instant {
     pub derivatives: Derivatives,
 }
 
-/// Position and velocity `h` seconds on by the local Taylor polynomial, for `h` far below every period.
-pub fn nearby(d: &Derivatives, h: f64) -> (f64, f64) {
-    (d[0] + position_change(d, h), d[1] + velocity_change(d, h))
-}
-
-/// Change of position over the next `h` seconds by the local Taylor polynomial.
+/// Change of position over the next `h` seconds by the local Taylor polynomial, for `h` far below every period.
 pub fn position_change(d: &Derivatives, h: f64) -> f64 {
     h * (d[1] + h * (d[2] / 2.0 + h * (d[3] / 6.0 + h * d[4] / 24.0)))
 }
@@ -259,15 +250,6 @@ fn phasor(base: &BaseMotion) -> Option<Complex64> {
     } else {
         Complex64::new(amplitude * cos, amplitude * sin)
     })
-}
-
-/// `-u''` of a curved signal `u` and its rate of change, for an overdamped oscillator: the departure from the signal obeys
-/// `z'' + 2 delta z' + omega0² z = -u''`.
-fn push(oscillator: &Oscillator, [_, _, u2, u3]: [f64; 4]) -> Option<(OverdampedRates, [f64; 2])> {
-    if u2 == 0.0 && u3 == 0.0 {
-        return None;
-    }
-    Some((OverdampedRates::of(oscillator)?, [-2.0 * u2, -6.0 * u3]))
 }
 
 /// The polynomial motion that follows a polynomial base signal `u`: `u + s` with `s'' + 2 delta s' + omega0² s = -u''`.

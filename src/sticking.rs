@@ -1,8 +1,8 @@
 //! Persistent contact: both masses move as one while the wall must push, and part at the instant it need not.
 
-use crate::clearance::{Bounds, Gap, first_closure};
+use crate::clearance::{Bounds, Closure, Gap, first_closure};
 use crate::contact::Wall;
-use crate::segment::{Derivatives, Segment, nearby};
+use crate::segment::{Derivatives, Segment, position_change, velocity_change};
 
 /// How a stretch of sticking ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,11 +26,7 @@ pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> P
     let s = wall.sign();
     let series = motion.series();
     let look = |t: f64| {
-        let d = if t == 0.0 {
-            motion.derivatives_at_start()
-        } else {
-            motion.at(&series, t).derivatives
-        };
+        let d = motion.at(&series, t).derivatives;
         let push = Gap {
             gap: (s * d[2] + noise).max(0.0),
             closing: -s * d[3],
@@ -42,10 +38,10 @@ pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> P
     let scale = (motion.fastest(), noise);
     let (closure, evaluations) = first_closure((0.0, limit), scale, look, motion);
     match closure {
-        Some(closure) => Parting {
-            t: closure.t + closure.h,
+        Some(Closure { t, h, derivatives: d, .. }) => Parting {
+            t: t + h,
             released: true,
-            joint: nearby(&closure.derivatives, closure.h),
+            joint: (d[0] + position_change(&d, h), d[1] + velocity_change(&d, h)),
             evaluations,
         },
         None => {

@@ -5,18 +5,17 @@ Started by scripts/bench, which builds and installs what is needed.
 
 import argparse
 import json
-import os
 import random
 import statistics
 import subprocess
 import sys
 import time
-from dataclasses import dataclass, field
 from pathlib import Path
 
 import report
 import run_time_map
 from judge import judge
+from measured import Load, Row, middle_point
 from scenes import LOOP_PERIODS, fingerprint, load
 from worker import Missing, Worker
 
@@ -54,74 +53,6 @@ GROWTH = {
     "impacts": (1e7, 1e5),
     "samples per period": (1e4, 1e3),
 }
-
-
-class Load:
-    """Processor time that other programs take while this one measures."""
-
-    def __init__(self, workers):
-        self.workers = workers
-        self.began, self.all_began, self.own_began = time.monotonic(), self.all(), self.own()
-
-    @staticmethod
-    def all():
-        """Busy seconds of all cores since the machine started; none where the system does not say."""
-        try:
-            user, nice, system, _, _, irq, softirq, steal = map(int, Path("/proc/stat").read_text().split()[1:9])
-        except (OSError, ValueError):
-            return None
-        return (user + nice + system + irq + softirq + steal) / os.sysconf("SC_CLK_TCK")
-
-    def own(self):
-        """Processor seconds of this program and its workers, the ended ones included."""
-        parts = os.times()
-        total = parts.user + parts.system + parts.children_user + parts.children_system
-        for worker in self.workers:
-            total += worker.processor_seconds()
-        return total
-
-    def others(self):
-        """Cores that other programs kept busy on average; none where the system does not say."""
-        if self.all_began is None:
-            return None
-        busy = self.all() - self.all_began - (self.own() - self.own_began)
-        return max(0.0, busy / (time.monotonic() - self.began))
-
-
-def middle_point(points):
-    """Of points (size, ns, work) of the same size, that with the median of the times."""
-    return [points[0][0], statistics.median(point[1] for point in points), points[0][2]]
-
-
-@dataclass
-class Row:
-    """One method at one setting on one scene."""
-
-    scene: str
-    method: str
-    side: str
-    name: str
-    setting: float
-    times: list = field(default_factory=list)  # A median per round.
-    error: float | None = None
-    impacts: int = 0
-    failure: str | None = None
-
-    @property
-    def median(self):
-        return statistics.median(self.times)
-
-    @property
-    def spread(self):
-        """Half the distance of the quartiles, as a part of the median."""
-        if len(self.times) < 2:
-            return None
-        low, _, high = statistics.quantiles(self.times, n=4, method="inclusive")
-        return 0.5 * (high - low) / self.median
-
-    def given_up(self):
-        """Whether it failed in the first round: it is not tried again."""
-        return self.failure is not None and not self.times
 
 
 class Bench:

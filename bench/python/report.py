@@ -7,26 +7,11 @@ import platform
 import re
 import statistics
 from datetime import date
-from math import log
 from pathlib import Path
 
+from growth import growths, samples
 from judge import short, time_at_the_limit
-
-# Where there is nothing to be said.
-NONE = "\N{EN DASH}"
-
-
-def number(x, digits=3):
-    return NONE if x is None else f"{x:.{digits}g}"
-
-
-def ratio(x):
-    """A ratio to two digits."""
-    if x is None:
-        return NONE
-    if x < 100:
-        return f"{x:.2g}"
-    return f"{float(f'{x:.2g}'):.0f}" if x < 10000 else f"{x:.0e}".replace("e+0", "e")
+from tables import NONE, markdown_table, number, ratio, replace, text_table
 
 
 def machine():
@@ -70,24 +55,6 @@ def cells(row, bench):
 HEAD = ["method", "setting", "ns/impact", "spread", "rounds", "error", "time/plant", "verdict"]
 
 
-def text_table(head, rows):
-    widths = [max(len(row[n]) for row in [head, *rows]) for n in range(len(head))]
-    lines = []
-    for row in [head, *rows]:
-        lines.append(
-            "  ".join(
-                cell.ljust(w) if n in (0, len(row) - 1) else cell.rjust(w)
-                for n, (cell, w) in enumerate(zip(row, widths, strict=True))
-            ).rstrip()
-        )
-    return "\n".join(lines)
-
-
-def markdown_table(head, rows):
-    align = ["---"] + ["---:"] * (len(head) - 2) + ["---"]
-    return "\n".join("| " + " | ".join(row) + " |" for row in [head, align, *rows])
-
-
 def savings(bench, profiles):
     """Per scene: what the plant skipped, counted and timed."""
     rows = []
@@ -125,45 +92,6 @@ def skipped(profile, general):
     return "; ".join(words)
 
 
-def exponent(points):
-    """Slope of the least-squares line through the upper half of the points, log against log."""
-    upper = points[len(points) // 2 :]
-    xs, ys = [log(point[0]) for point in upper], [log(point[1]) for point in upper]
-    return statistics.linear_regression(xs, ys).slope
-
-
-UNITS = {"periods": "period", "impacts": "impact", "samples per period": "sample"}
-
-
-def seconds(x):
-    """A time that somebody waits for."""
-    for unit, name in ((86400, "days"), (3600, "h"), (60, "min")):
-        if x >= 2 * unit:
-            return f"{x / unit:.2g} {name}"
-    return f"{x:.2g} s"
-
-
-def growths(curves):
-    rows = []
-    for what, points in curves.items():
-        if len(points) < 4:
-            rows.append([what, "not measured: no answer in time", NONE, NONE, NONE])
-            continue
-        slope = exponent(points)
-        size, ns, work = points[-1]
-        unit = UNITS.get(what, "plant and period")
-        rows.append(
-            [
-                what,
-                f"{points[0][0]:.0f} to {size:.0f}",
-                f"{slope:.3f}",
-                f"{ns / work:.3g} ns per {unit}",
-                f"{1000 * size:.0e}: {seconds(1e-9 * ns * 1000**slope)}".replace("e+0", "e").replace("e+", "e"),
-            ]
-        )
-    return ["what grows", "range", "exponent", "at the end of it", "extrapolated"], rows
-
-
 GROWTH_NOTE = (
     "Steady 1:1 motion. Periods: a step each; impacts: all in one step; samples: over 100 periods. The exponent is "
     "that of the upper half of the range, in logarithms; the last column goes a thousand times further by it. Times "
@@ -179,23 +107,6 @@ SAMPLE_NOTE = (
     "Wall time over the number of samples in the loop scene, where the drive changes at every sample. Each method is "
     "at its most accurate setting that came to an end. The C interface sets two values and reads four at each sample."
 )
-
-
-def samples(bench):
-    """Cost of a sample in the loop scene, method by method."""
-    best = {}
-    for row in bench.rows:
-        if row.scene == "loop" and row.times and not row.failure:
-            known = best.get(row.method)
-            if known is None or row.error < known.error:
-                best[row.method] = row
-    plant = best.get("plant, Rust")
-    count = bench.scenes["loop"]["steps"]
-    table = []
-    for method, row in best.items():
-        compared = number(row.median / plant.median) if plant else NONE
-        table.append([method, number(row.median / count), compared, f"{row.error:.0e}"])
-    return ["method", "ns per sample", "time/plant", "error"], table
 
 
 def idle(busy):
@@ -288,13 +199,6 @@ def renew(readme, bench):
     after = rest.split(END)[1]
     table = markdown_table(*matrix(bench))
     replace(readme, f"{before}{BEGIN}\n{MATRIX_NOTE}\n\n{table}\n{END}{after}")
-
-
-def replace(file, text):
-    """Writes a file as a whole or not at all."""
-    part = file.with_suffix(".part")
-    part.write_text(text)
-    part.replace(file)
 
 
 def write(bench, growth, loop, profiles, run_times, folder):

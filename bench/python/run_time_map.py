@@ -4,7 +4,7 @@ import csv
 import io
 from statistics import median
 
-from report import markdown_table, number, replace, text_table
+from tables import markdown_table, number, replace, text_table
 
 # First and last values are those of docs/regimes.svg (`vines map`).
 SIGMA, G = (-5.0, 5.0), (0.1, 3.0)

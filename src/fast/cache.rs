@@ -2,8 +2,6 @@
 
 use super::coefficients::Coefficients;
 use super::grid::Grid;
-#[cfg(feature = "serde")]
-use super::horizon::Horizon;
 use super::propagator::Propagator;
 use super::short_step::{SAME, ShortStep};
 use crate::base_motion::Drive;
@@ -14,8 +12,9 @@ const FLIGHTS: usize = 6;
 /// So many flights in a row must be the followers of those before until the next one is predicted.
 const ENOUGH: u8 = 3;
 
-/// Propagators.
+/// Propagators. What is saved of one is its key.
 #[derive(Clone, Copy, Debug, Default)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(super) struct Cache {
     /// Of a step that repeats.
     pub step: ShortStep,
@@ -28,7 +27,8 @@ pub(super) struct Cache {
     regular: u8,
     /// The one to be replaced next.
     oldest: u8,
-    /// Of stretches of a march, and parts of them.
+    /// Of points of a march.
+    #[cfg_attr(feature = "serde", serde(skip))]
     pub grid: Grid,
     /// Length of the last whole step without contact, s.
     last_duration: f64,
@@ -44,7 +44,7 @@ impl Cache {
         let again = (duration - self.last_duration).abs() <= SAME * duration;
         self.last_duration = duration;
         if again && ShortStep::is_short(oscillator, drive.omega, duration) {
-            self.step = ShortStep::new(oscillator, duration);
+            self.step = ShortStep::from(duration);
         }
         duration == self.step.t
     }
@@ -72,74 +72,11 @@ impl Cache {
             self.regular = 0;
             (0..FLIGHTS as u8).find(|&n| is_near(n)).unwrap_or_else(|| {
                 self.oldest = (self.oldest + 1) % FLIGHTS as u8;
-                self.flights[usize::from(self.oldest)] = Propagator::at(t);
+                self.flights[usize::from(self.oldest)].reset(t);
                 self.oldest
             })
         };
         self.followers[usize::from(self.last)] = n;
         self.last = n;
-    }
-}
-
-/// The keys of a fast path: everything else is computed from them.
-#[cfg(feature = "serde")]
-#[derive(serde::Serialize, serde::Deserialize)]
-pub(crate) struct Keys {
-    disabled: bool,
-    contact_free: Horizon,
-    phasor: (f64, f64),
-    rotations: u32,
-    step: f64,
-    flights: [f64; FLIGHTS],
-    followers: [u8; FLIGHTS],
-    last: u8,
-    regular: u8,
-    oldest: u8,
-    last_duration: f64,
-}
-
-#[cfg(feature = "serde")]
-impl Keys {
-    /// The keys of `fast`.
-    pub fn of(fast: &super::FastPath) -> Self {
-        let cache = &fast.cache;
-        Self {
-            disabled: fast.disabled,
-            contact_free: fast.contact_free,
-            phasor: fast.phasor,
-            rotations: fast.rotations,
-            step: cache.step.t,
-            flights: cache.flights.map(|propagator| propagator.t),
-            followers: cache.followers,
-            last: cache.last,
-            regular: cache.regular,
-            oldest: cache.oldest,
-            last_duration: cache.last_duration,
-        }
-    }
-
-    /// The fast path of these keys.
-    pub fn restore(&self, oscillator: &Oscillator) -> super::FastPath {
-        let kept = |t: f64| !t.is_nan();
-        let mut fast = super::FastPath {
-            disabled: self.disabled,
-            contact_free: self.contact_free,
-            phasor: self.phasor,
-            rotations: self.rotations,
-            ..Default::default()
-        };
-        fast.cache = Cache {
-            flights: self.flights.map(Propagator::at),
-            followers: self.followers,
-            last: self.last,
-            regular: self.regular,
-            oldest: self.oldest,
-            last_duration: self.last_duration,
-            ..Cache::default()
-        };
-        if kept(self.step) {
-            fast.cache.step = ShortStep::new(oscillator, self.step);
-        }
-        fast
     }
 }

@@ -1,14 +1,17 @@
 //! Coefficients of the motion at one frequency of the base.
 
-use super::grid::POINTS;
+use super::grid::{POINTS, STRETCH};
 use crate::forcing::Forcing;
 use crate::oscillator::Oscillator;
 
 /// Farthest distance of an instant from that of a propagator, in units of the fastest rate's time: Taylor polynomials of degree
 /// 5 then leave out less than 1e-17.
 pub(super) const NEAR: f64 = 1.0 / 2048.0;
-/// Length of a stretch of a march, in units of the fastest rate's time.
-const STRETCH: f64 = 2.3;
+/// Distance of the points of a grid, in units of the fastest rate's time: Taylor polynomials of degree 9 then leave out less than
+/// 1e-18 halfway between two of them.
+const SPACING: f64 = 0.0958;
+/// Farthest distance of an instant from its point, in distances between points.
+const REACH: f64 = 0.7;
 /// Number of Taylor coefficients: of degrees 2 to 9.
 pub(super) const TERMS: usize = 8;
 
@@ -21,10 +24,12 @@ pub(super) struct Coefficients {
     pub forcing: Forcing,
     /// Farthest distance from a propagator's time, s.
     pub near: f64,
-    /// Distance of the points of a grid, s.
+    /// Distance of the points of a grid, and farthest distance of an instant from its point, s.
     pub spacing: f64,
-    /// Length of a stretch of a march, s.
+    pub reach: f64,
+    /// Length of a stretch of a march, and of the whole grid, s.
     pub stretch: f64,
+    pub span: f64,
     /// `y^(n)/n!` for n from 2 on, per `y`, `y'`, forcing `f` and `f'`, where `y'' + 2 delta y' + omega0² y = f`.
     pub taylor: [[f64; TERMS]; 4],
 }
@@ -64,14 +69,16 @@ impl Coefficients {
             1.25 * leading_bits(omega, 2)
         };
         // Multiples of so few bits are exact.
-        let spacing = leading_bits(STRETCH / POINTS as f64 / rate, 30);
+        let spacing = leading_bits(SPACING / rate, 30);
         Self {
             key: Some(omega),
             omega,
             forcing: Forcing::new(oscillator, omega),
             near: NEAR / fastest.max(omega),
             spacing,
-            stretch: spacing * POINTS as f64,
+            reach: REACH * spacing,
+            stretch: spacing * STRETCH as f64,
+            span: spacing * POINTS as f64,
             taylor,
         }
     }

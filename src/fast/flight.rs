@@ -3,11 +3,10 @@
 use super::arrival::{Arrival, arrive};
 use super::coefficients::Coefficients;
 use super::horizon::Horizon;
-use super::propagator::{Increment, Point};
-use super::start::Start;
-use super::verify::is_monotone;
+use super::propagator::{Nearby, Point};
+use super::verify::Start;
 use super::{FastPath, Moving, Next};
-use crate::base_motion::{BaseMotion, Phase, shift};
+use crate::base_motion::BaseMotion;
 use crate::plant::Rig;
 
 /// Largest displacements, in half-widths: the digits of `w` are those of `q1`.
@@ -21,8 +20,6 @@ pub(super) enum Found {
     Contact(Arrival),
     /// No contact for this time, s.
     Free(f64),
-    /// No contact to the end of the step: what that adds, and the phase of the base then.
-    FreeAsBefore(Increment, Phase),
     /// Nothing could be verified.
     Nothing,
 }
@@ -34,11 +31,12 @@ impl FastPath {
         if self.disabled {
             return Next::Search(left);
         }
-        if core::mem::take(&mut self.unverified) {
-            return Next::Search(self.coefficients.stretch.min(left));
+        let to_search = core::mem::take(&mut self.to_search);
+        if to_search > 0.0 {
+            return Next::Search(to_search.min(left));
         }
         let point = self.point(moving);
-        let (rig, base) = (moving.rig, &*moving.base);
+        let (rig, base) = (&moving.rig, &moving.base);
         let soon = left * rig.alone.fastest.max(base.drive.omega.abs()) <= 1.0;
         if left < self.contact_free.t || (soon && self.is_contact_free(moving, &point, left)) {
             return self.coast(moving, &point, left, duration);
@@ -47,31 +45,25 @@ impl FastPath {
             return Next::Search(left);
         }
         self.coefficients.prepare(&rig.alone, base.drive.omega);
+        if let Some(next) = self.as_before(moving, &point, left, duration) {
+            return next;
+        }
         let mut start = Start::new(moving, point);
-        let found = match self.as_before(&mut start, left) {
-            Some(found) => found,
-            None => match out_of_reach(&self.coefficients, &start) {
-                Some(t) if t > self.coefficients.stretch => Found::Free(t),
-                _ => self.look(&mut start, left),
-            },
+        let found = match out_of_reach(&self.coefficients, &start) {
+            Some(t) if t > self.coefficients.stretch => Found::Free(t),
+            _ => self.look(&mut start, left),
         };
+        self.take(moving, &point, &found, left, duration)
+    }
+
+    /// Does what was found.
+    #[inline(always)]
+    fn take(&mut self, moving: &mut Moving, point: &Point, found: &Found, left: f64, duration: f64) -> Next {
         match found {
-            Found::Contact(arrival) if arrival.t.value() <= left => {
-                self.cache.learn(&self.coefficients, arrival.t.value());
-                self.land(moving, &arrival)
-            }
-            Found::Contact(arrival) => {
-                self.contact_free = Horizon::unchanged(arrival.t.value());
-                self.coast(moving, &point, left, duration)
-            }
+            Found::Contact(arrival) => self.meet(moving, point, arrival, left, duration),
             Found::Free(t) => {
-                self.contact_free = Horizon::unchanged(t);
-                self.coast(moving, &point, t.min(left), duration)
-            }
-            Found::FreeAsBefore(increment, phase) => {
-                self.cache.learn(&self.coefficients, left);
-                self.apply(moving, &increment, phase, left);
-                Next::ContactFree(left)
+                self.contact_free = Horizon::unchanged(*t);
+                self.coast(moving, point, t.min(left), duration)
             }
             Found::Nothing => Next::Search(left),
         }
@@ -80,54 +72,55 @@ impl FastPath {
     /// A short hop, or a march.
     #[inline(always)]
     fn look(&mut self, start: &mut Start, left: f64) -> Found {
-        start.sample.ddw = start.acceleration(&self.coefficients, &start.point);
+        start.here.sample.ddw = start.acceleration(&self.coefficients, &start.here.point);
         match self.hop(start, left) {
             Some(hop) => Found::Contact(hop),
             None => self.march(start, left, None),
         }
     }
 
-    /// Moves on to a verified contact.
+    /// Moves on to a verified contact, or to the end of the step before it.
     #[inline(always)]
-    fn land(&mut self, moving: &mut Moving, arrival: &Arrival) -> Next {
-        let Moving { masses, base, .. } = moving;
-        let signal = &mut base.drive.signal;
-        if signal[1] != 0.0 {
-            *signal = shift(*signal, arrival.t.value());
+    fn meet(&mut self, moving: &mut Moving, point: &Point, arrival: &Arrival, left: f64, duration: f64) -> Next {
+        let t = arrival.t.value();
+        if t > left {
+            self.contact_free = Horizon::unchanged(t);
+            return self.coast(moving, point, left, duration);
         }
-        masses.x = arrival.x;
-        masses.v = arrival.v;
-        masses.dw = arrival.dw;
-        self.turned(base, arrival.phase, arrival.phasor);
+        self.cache.learn(&self.coefficients, t);
+        self.apply(moving, &arrival.added, arrival.angle, t);
         self.contact_free = Horizon::default();
         Next::Contact(arrival.t, arrival.wall)
     }
 
     /// The flight that followed the last one before, or the end of a step that did, if it lies ahead again.
     #[inline(always)]
-    fn as_before(&mut self, start: &mut Start, left: f64) -> Option<Found> {
-        let propagator = (self.cache).expected(&start.rig.alone, &self.coefficients)?;
+    fn as_before(&mut self, moving: &mut Moving, point: &Point, left: f64, duration: f64) -> Option<Next> {
+        let propagator = (self.cache).expected(&moving.rig.alone, &self.coefficients)?;
         self.evaluations += 1;
-        let (oscillator, drive) = (&start.rig.alone, &start.base.drive);
-        let (point, drift) = (start.point, start.drift);
-        let monotone = |t: f64| is_monotone(oscillator, drive, &point, (drift, t));
+        let mut start = Start::new(moving, *point);
+        let drive = &start.base.drive;
         if (propagator.t - left).abs() < self.coefficients.near {
-            let coefficients = &self.coefficients;
             let h = left - propagator.t;
-            let increment = propagator.shortly(coefficients, drive.amplitude, &start.point, h);
-            let w = start.sample.w + (increment.y + start.drift * left);
-            if w.abs() >= start.half_width() || !monotone(left) {
+            let increment = propagator.increment(drive.amplitude, point);
+            let increment = Nearby::<4>::new(&self.coefficients, drive.amplitude, point, &increment).at(h);
+            let w = start.here.sample.w + (increment.y + start.drift * left);
+            if w.abs() >= start.rig.parameters.half_width || !start.is_monotone(&start.here, left) {
                 return None;
             }
-            let phase = (start.base.phase).rotated(propagator.angle, coefficients.omega * h);
-            return Some(Found::FreeAsBefore(increment, phase));
+            let angle = (propagator.angle, self.coefficients.omega * h);
+            self.cache.learn(&self.coefficients, left);
+            self.drift(moving, &increment, left);
+            self.apply(moving, &increment, angle, left);
+            return Some(Next::ContactFree(left));
         }
-        let predicted = arrive(&self.coefficients, propagator, start, start.wall_ahead())?;
-        if !monotone(predicted.arrival.t.value()) {
-            start.sample.ddw = start.acceleration(&self.coefficients, &point);
-            return Some(self.march(start, left, Some(&predicted)));
+        let arrival = arrive(&self.coefficients, propagator, &start)?;
+        if start.is_monotone(&start.here, arrival.t.value()) {
+            return Some(self.meet(moving, point, &arrival, left, duration));
         }
-        Some(Found::Contact(predicted.arrival))
+        start.here.sample.ddw = start.acceleration(&self.coefficients, point);
+        let found = self.march(&start, left, Some(&arrival));
+        Some(self.take(moving, point, &found, left, duration))
     }
 }
 
@@ -152,14 +145,17 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
 fn out_of_reach(coefficients: &Coefficients, start: &Start) -> Option<f64> {
     let amplitude = start.base.drive.amplitude;
     let steady = coefficients.forcing.steady()? * amplitude;
-    let (b, particle) = (start.half_width(), start.point.y - start.sample.w);
+    let (b, particle) = (
+        start.rig.parameters.half_width,
+        start.here.point.y - start.here.sample.w,
+    );
     let room = b * (1.0 - 1e-9) - particle.abs() - steady.l1_norm();
     if room <= 0.0 || start.base.drive.signal[1] != 0.0 {
         return None;
     }
-    let (cos, sin) = start.point.phasor;
-    let y = start.point.y - (steady.re * sin + steady.im * cos);
-    let dy = start.point.dy - coefficients.omega * (steady.re * cos - steady.im * sin);
+    let Point { y, dy, phasor: (cos, sin) } = start.here.point;
+    let y = y - (steady.re * sin + steady.im * cos);
+    let dy = dy - coefficients.omega * (steady.re * cos - steady.im * sin);
     let omega0 = start.rig.alone.omega0;
     let room = room - (y * y + (dy / omega0) * (dy / omega0)).sqrt();
     (room > 0.0).then(|| room / start.masses.particle.abs())

@@ -1,36 +1,47 @@
-//! Propagators over equal distances of time, up to one stretch of a march.
+//! Propagators over equal distances of time.
 //!
-//! Any instant of a stretch is so near a point of the grid that a Taylor polynomial about that point gives the motion to rounding.
+//! Any instant within the grid is so near a point of it that a Taylor polynomial about that point gives the motion to rounding.
 //! No sine and no exponential is left to compute, however irregular the contacts.
 
 use super::FastPath;
 use super::coefficients::{Coefficients, TERMS};
 use super::propagator::{Increment, Nearby, Point, Propagator};
-use super::start::Start;
-use super::verify::Sample;
+use super::verify::{Sample, Start};
 use crate::oscillator::Oscillator;
 
-/// Points of the grid. Half their distance is 0.047 of the fastest rate's time; terms of degree 10 are then below 1e-19.
-pub(super) const POINTS: usize = 24;
-/// Farthest distance of an instant from its point, in distances between points.
-const REACH: f64 = 0.75;
-/// Up to here after a mark it serves as its own point.
-const ITSELF: f64 = 0.7;
+/// Points of the grid: its span is a little more than half a period of the fastest rate.
+pub(super) const POINTS: usize = 36;
+/// Points in a stretch of a march.
+pub(super) const STRETCH: usize = 24;
+/// Up to here after a mark, in distances between points, it serves as its own point.
+const ITSELF: f64 = 0.65;
 
 /// The propagators over 1 to [`POINTS`] times the spacing.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub(super) struct Grid {
     /// The key, s; 0 before the first use.
     spacing: f64,
     propagators: [Propagator; POINTS],
 }
 
+impl Default for Grid {
+    fn default() -> Self {
+        Self { spacing: 0.0, propagators: [Propagator::default(); POINTS] }
+    }
+}
+
 impl Grid {
     #[inline(never)]
     fn build(&mut self, oscillator: &Oscillator, spacing: f64) {
         self.spacing = spacing;
-        let free = oscillator.exact_increments::<POINTS>(spacing);
-        self.propagators = core::array::from_fn(|n| Propagator::new((n + 1) as f64 * spacing, free[n]));
+        let once = oscillator.increment(spacing);
+        let mut increment = once;
+        for (n, propagator) in self.propagators.iter_mut().enumerate() {
+            if n > 0 {
+                increment = oscillator.both(&increment, &once);
+            }
+            *propagator = Propagator::new((n + 1) as f64 * spacing, oscillator.split(&increment));
+        }
     }
 
     /// The propagator over `n` times the spacing, n from 1 on.
@@ -54,26 +65,13 @@ pub(super) struct Mark {
     pub sample: Sample,
 }
 
-/// The motion near a point of the grid.
-pub(super) struct NearPoint {
-    /// Time of that point since the start of the flight, s.
-    pub t: f64,
-    /// The same since the mark.
-    pub since: f64,
-    /// What has been added to the mark until then.
-    pub increment: Increment,
-    pub nearby: Nearby<TERMS>,
-    /// Farthest distance, s.
-    pub reach: f64,
-}
-
 impl FastPath {
-    /// The motion near the time `t`, at most a stretch after a mark.
+    /// The time of a point of the grid after a mark, and the motion near it: the point is the nearest one to the time `t`.
     #[inline(always)]
-    pub(super) fn near_point(&mut self, start: &Start, from: &Mark, t: f64) -> NearPoint {
+    pub(super) fn near_point(&mut self, start: &Start, from: &Mark, t: f64) -> (f64, Nearby<TERMS>) {
         self.evaluations += 1;
         let (coefficients, amplitude) = (&self.coefficients, start.base.drive.amplitude);
-        // The nearest point, but near the mark the mark itself: it needs no propagator.
+        // Near the mark the mark itself: it needs no propagator.
         let n = match (t - from.t) / coefficients.spacing {
             part if part < ITSELF => 0,
             part => ((part + 0.5) as usize).min(POINTS),
@@ -84,27 +82,24 @@ impl FastPath {
                 .over(&start.rig.alone, coefficients, n)
                 .increment(amplitude, &from.point),
         };
-        let since = n as f64 * coefficients.spacing;
-        NearPoint {
-            t: from.t + since,
-            since,
-            increment,
-            nearby: Nearby::new(coefficients, amplitude, &from.point, &increment),
-            reach: REACH * coefficients.spacing,
-        }
+        (
+            from.t + n as f64 * coefficients.spacing,
+            Nearby::new(coefficients, amplitude, &from.point, &increment),
+        )
     }
 
     /// What the motion adds in `t` seconds after the start.
     pub(super) fn after(&mut self, start: &Start, t: f64) -> Increment {
-        let mut mark = Mark { t: 0.0, point: start.point, sample: start.sample };
-        while t - mark.t > self.coefficients.stretch {
+        let here = start.here.point;
+        let mut mark = start.here;
+        while t - mark.t > self.coefficients.span {
             mark = self.mark(start, &mark, POINTS);
         }
-        let near = self.near_point(start, &mark, t);
-        let Increment { y, dy, phasor } = near.nearby.at(t - near.t);
+        let (at, nearby) = self.near_point(start, &mark, t);
+        let Increment { y, dy, phasor } = nearby.at(t - at);
         Increment {
-            y: (mark.point.y - start.point.y) + y,
-            dy: (mark.point.dy - start.point.dy) + dy,
+            y: (mark.point.y - here.y) + y,
+            dy: (mark.point.dy - here.dy) + dy,
             phasor,
         }
     }
@@ -115,12 +110,8 @@ impl FastPath {
         self.evaluations += 1;
         self.rotations += 1;
         let propagator = (self.cache.grid).over(&start.rig.alone, &self.coefficients, n);
-        let point = propagator.point(start.base.drive.amplitude, &from.point);
+        let increment = propagator.increment(start.base.drive.amplitude, &from.point);
         let t = from.t + propagator.t;
-        Mark {
-            t,
-            point,
-            sample: start.sample(&self.coefficients, &point, t),
-        }
+        start.mark(&self.coefficients, increment.to(&from.point), t)
     }
 }

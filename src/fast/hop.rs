@@ -5,24 +5,23 @@
 //! the first contact; the other wall is out of reach if the height `u²/(2a)` is below the half-width.
 
 use super::FastPath;
-use super::arrival::{Arrival, Predicted};
-use super::grid::Mark;
-use super::start::Start;
-use crate::arithmetic::Sum;
+use super::arrival::Arrival;
+use super::verify::Start;
+use crate::contact::Wall;
 
-/// Longest hop, in units of the fastest rate's time: Taylor polynomials then leave out less than 1e-17.
-const LONGEST: f64 = 1.0 / 512.0;
+/// Longest hop, in units of the fastest rate's time: it ends within reach of the start's Taylor polynomial.
+const LONGEST: f64 = 1.0 / 20.0;
 
 impl FastPath {
     /// The return to the wall that the particle has just left, if it is a short hop that ends within `left` seconds.
     #[inline(always)]
     pub(super) fn hop(&mut self, start: &Start, left: f64) -> Option<Arrival> {
-        let (w, b) = (start.masses.w.value(), start.rig.parameters.half_width);
-        if w.abs() != b {
+        let (here, b) = (&start.here.sample, start.rig.parameters.half_width);
+        if here.w.abs() != b {
             return None;
         }
-        let s = 1f64.copysign(w);
-        let (speed, pressing) = (-s * start.masses.dw, s * start.sample.ddw);
+        let s = 1f64.copysign(here.w);
+        let (speed, pressing) = (-s * here.dw, s * here.ddw);
         let about = 2.0 * speed / pressing;
         let fastest = (start.rig.alone.fastest).max(start.base.drive.omega.abs());
         let short = speed > 0.0
@@ -35,21 +34,11 @@ impl FastPath {
 
     #[inline(never)]
     fn short_hop(&mut self, start: &Start, about: f64) -> Option<Arrival> {
-        let wall = start.wall_ahead().other();
-        let s = wall.sign();
-        let (speed, pressing) = (-s * start.sample.dw, s * start.sample.ddw);
-        if start.envelope(&start.point, 1.25 * about).jerk * about > 0.125 * pressing {
+        let here = &start.here;
+        if start.jerk(here, 1.25 * about) * about > 0.125 * here.sample.ddw.abs() {
             return None;
         }
-        let here = Mark { t: 0.0, point: start.point, sample: start.sample };
-        let near = self.near_point(start, &here, 0.0).nearby;
-        // Newton's method.
-        let mut h = about;
-        for _ in 0..4 {
-            let (bent, quickened) = near.change(h);
-            h -= (s * bent - speed * h) / (s * quickened - speed);
-        }
-        let when = (Sum::from(h), ((0.0, 0.0), self.coefficients.omega * h));
-        Some(Predicted::new(start, wall, when, near.at(h), 0.0).arrival)
+        let (at, nearby) = self.near_point(start, here, 0.0);
+        self.polish(start, here, Wall::ahead(here.sample.w), (at, &nearby), (0.0, about))
     }
 }

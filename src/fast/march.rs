@@ -1,11 +1,10 @@
-//! A march over a flight in equal stretches, each verified by a bound.
+//! A march over a flight in equal stretches, each verified by a bound, until the rest of the flight is verified at once.
 
 use super::FastPath;
-use super::arrival::{Arrival, Predicted};
+use super::arrival::Arrival;
 use super::flight::Found;
-use super::grid::{Mark, POINTS};
-use super::start::Start;
-use super::verify::Sample;
+use super::grid::{Mark, STRETCH};
+use super::verify::{Sample, Start};
 use crate::contact::Wall;
 
 /// Longest flight that is marched over, in stretches.
@@ -16,9 +15,8 @@ const SHORTEST: usize = 3;
 const MOST_DIVIDED: u32 = 16;
 /// Longest stretch before a predicted contact that one bound can verify, in stretches.
 const LONGEST_STRETCH: f64 = 2.0;
-
 /// Steps of Newton's method for a rough crossing.
-const ROUGHLY: u32 = 3;
+const ROUGHLY: u32 = 2;
 
 /// How a stretch of a march ends.
 enum Stretch {
@@ -32,17 +30,20 @@ impl FastPath {
     /// Marches over the flight until a contact is found or `left` seconds are over. Where a stretch cannot be verified, it is
     /// halved, down to [`SHORTEST`].
     #[inline(never)]
-    pub(super) fn march(&mut self, start: &Start, left: f64, predicted: Option<&Predicted>) -> Found {
-        let mut from = Mark { t: 0.0, point: start.point, sample: start.sample };
+    pub(super) fn march(&mut self, start: &Start, left: f64, predicted: Option<&Arrival>) -> Found {
+        let mut from = start.here;
         // Points of the grid in the next stretch.
-        let mut n = POINTS;
+        let mut n = STRETCH;
         let mut divided = 0;
         for _ in 0..MOST_STRETCHES {
-            if let Some(predicted) = predicted
-                && predicted.arrival.t.value() - from.t <= LONGEST_STRETCH * self.coefficients.stretch
-                && verified(start, &from, predicted)
+            if let Some(arrival) = predicted
+                && arrival.t.value() - from.t <= LONGEST_STRETCH * self.coefficients.stretch
+                && arrival.is_first(start, &self.coefficients, &from)
             {
-                return Found::Contact(predicted.arrival);
+                return Found::Contact(*arrival);
+            }
+            if let Some(arrival) = self.rest(start, &from) {
+                return Found::Contact(arrival);
             }
             let to = self.mark(start, &from, n);
             let found = match stretch(start, &from, &to) {
@@ -51,10 +52,11 @@ impl FastPath {
                     if from.t >= left {
                         break;
                     }
-                    n = POINTS.min(2 * n);
+                    n = STRETCH.min(2 * n);
                     continue;
                 }
-                Stretch::Contact(t, wall) => self.approach(start, &from, t, wall),
+                Stretch::Contact(t, wall) => (self.arrive_after(start, &from, t, wall))
+                    .filter(|arrival| arrival.is_first(start, &self.coefficients, &from)),
                 Stretch::Unknown => None,
             };
             match found {
@@ -65,7 +67,7 @@ impl FastPath {
                 }
                 // What is verified is kept: the plain solver searches as little as possible.
                 None if from.t > 0.0 => {
-                    self.unverified = true;
+                    self.to_search = self.coefficients.stretch;
                     break;
                 }
                 None => return Found::Nothing,
@@ -74,35 +76,32 @@ impl FastPath {
         Found::Free(from.t)
     }
 
-    /// The contact at `wall` about `t` seconds after the start, verified from the last mark on.
+    /// The contact after a mark, if it is near and the particle certainly drifts towards it all the time.
     #[inline(always)]
-    fn approach(&mut self, start: &Start, from: &Mark, t: f64, wall: Wall) -> Option<Arrival> {
-        let predicted = self.arrive_after(start, from, t, wall)?;
-        verified(start, from, &predicted).then_some(predicted.arrival)
+    fn rest(&mut self, start: &Start, from: &Mark) -> Option<Arrival> {
+        let wall = Wall::ahead(start.drift);
+        // If the primary mass stood still.
+        let t = (wall.sign() * start.rig.parameters.half_width - from.sample.w) / start.drift;
+        if t > self.coefficients.span || !start.is_monotone(from, from.t + t) {
+            return None;
+        }
+        let arrival = self.arrive_after(start, from, from.t + t, wall)?;
+        start.is_monotone(from, arrival.t.value()).then_some(arrival)
     }
-}
-
-/// Whether no wall is met between a mark and a predicted contact.
-#[inline(always)]
-fn verified(start: &Start, from: &Mark, predicted: &Predicted) -> bool {
-    let t = predicted.arrival.t.value() - from.t;
-    let envelope = start.envelope(&from.point, t);
-    t > 0.0 && envelope.open_between(start.half_width(), &from.sample, &predicted.sample, t)
 }
 
 /// What happens between two marks.
 #[inline(always)]
 fn stretch(start: &Start, from: &Mark, to: &Mark) -> Stretch {
-    let (b, t) = (start.half_width(), to.t - from.t);
+    let (b, t) = (start.rig.parameters.half_width, to.t - from.t);
     if to.sample.w.abs() < b {
-        let envelope = start.envelope(&from.point, t);
-        return if envelope.open_between(b, &from.sample, &to.sample, t) {
+        return if start.is_open(from, &to.sample, to.t) {
             Stretch::Open
         } else {
             Stretch::Unknown
         };
     }
-    let wall = if to.sample.w > 0.0 { Wall::Plus } else { Wall::Minus };
+    let wall = Wall::ahead(to.sample.w);
     let shape = |Sample { w, dw, ddw }: Sample| [w, dw * t, ddw * (t * t / 2.0)];
     match crossing(wall.sign() * b, shape(from.sample), shape(to.sample)) {
         Some(part) => Stretch::Contact(from.t + part * t, wall),
@@ -123,8 +122,9 @@ fn crossing(target: f64, from: [f64; 3], to: [f64; 3]) -> Option<f64> {
     // From behind, so that a start on this very wall is not found again.
     let mut s = if gap == 0.0 { 1.0 } else { gap / (w1 - w0) };
     for _ in 0..ROUGHLY {
-        let value = s * (d0 + s * (a0 + s * (c3 + s * (c4 + s * c5)))) - gap;
-        let slope = d0 + s * (2.0 * a0 + s * (3.0 * c3 + s * (4.0 * c4 + s * (5.0 * c5))));
+        let square = s * s;
+        let value = s * ((d0 + s * a0) + square * ((c3 + s * c4) + square * c5)) - gap;
+        let slope = (d0 + s * (2.0 * a0)) + square * ((3.0 * c3 + s * (4.0 * c4)) + square * (5.0 * c5));
         s -= value / slope;
     }
     (s > 0.0 && s <= 1.0).then_some(s)

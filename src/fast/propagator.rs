@@ -27,8 +27,25 @@ pub(super) struct Increment {
     pub phasor: (f64, f64),
 }
 
-/// The closed form at time `t`.
+impl Increment {
+    /// Where it leads.
+    #[inline(always)]
+    pub fn to(&self, start: &Point) -> Point {
+        Point {
+            y: start.y + self.y,
+            dy: start.dy + self.dy,
+            phasor: self.phasor,
+        }
+    }
+}
+
+/// An angle from -2π to 2π with its rounding error, and a small angle to be added.
+pub(super) type Angle = ((f64, f64), f64);
+
+/// The closed form at time `t`; what follows from that is computed when it is needed.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "f64", into = "f64"))]
 pub(super) struct Propagator {
     /// The key: time, s; NaN where the propagator is empty.
     pub t: f64,
@@ -43,16 +60,28 @@ pub(super) struct Propagator {
     pub angle: (f64, f64),
 }
 
-impl Default for Propagator {
-    fn default() -> Self {
+impl From<Propagator> for f64 {
+    fn from(propagator: Propagator) -> Self {
+        propagator.t
+    }
+}
+
+impl From<f64> for Propagator {
+    fn from(t: f64) -> Self {
         Self {
-            t: f64::NAN,
+            t,
             omega: f64::NAN,
             free: Default::default(),
             complete: false,
             response: Response::default(),
             angle: (0.0, 0.0),
         }
+    }
+}
+
+impl Default for Propagator {
+    fn default() -> Self {
+        Self::from(f64::NAN)
     }
 }
 
@@ -81,11 +110,11 @@ pub(super) fn forced(amplitude: f64, (cos, sin): (f64, f64), k: Complex64) -> f6
     amplitude * (k.re * sin + k.im * cos)
 }
 
-/// `omega t` in [0, 2π), and its rounding error.
+/// `omega t` from -2π to 2π, and its rounding error.
 #[inline(always)]
 pub(super) fn angle(omega: f64, t: f64) -> (f64, f64) {
     let (angle, error) = product(omega, t);
-    if angle < TAU {
+    if angle.abs() < TAU {
         (angle, error)
     } else {
         Phase::default().advanced(omega, t).parts()
@@ -93,14 +122,15 @@ pub(super) fn angle(omega: f64, t: f64) -> (f64, f64) {
 }
 
 impl Propagator {
-    /// The propagator over `t` seconds, to be completed when it is needed.
-    pub fn at(t: f64) -> Self {
-        Self { t, ..Self::default() }
-    }
-
     /// The propagator over `t` seconds; `free` is what the free motion adds in that time.
     pub fn new(t: f64, free: (Transition, Transition)) -> Self {
         Self { t, free, complete: true, ..Self::default() }
+    }
+
+    /// Makes it the propagator over `t` seconds.
+    #[inline(always)]
+    pub fn reset(&mut self, t: f64) {
+        (self.t, self.omega, self.complete) = (t, f64::NAN, false);
     }
 
     /// Makes the response that of these coefficients' frequency.
@@ -114,7 +144,7 @@ impl Propagator {
     #[inline(never)]
     fn respond(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) {
         if !self.complete {
-            *self = Self::new(self.t, oscillator.exact_increment(self.t));
+            *self = Self::new(self.t, oscillator.split(&oscillator.increment(self.t)));
         }
         let (head, tail) = &self.free;
         let free = Transition {
@@ -146,29 +176,12 @@ impl Propagator {
             phasor: rotate(start.phasor, (base.re, base.im)),
         }
     }
-
-    /// Where `start` has moved to.
-    #[inline(always)]
-    pub fn point(&self, amplitude: f64, start: &Point) -> Point {
-        let Increment { y, dy, phasor } = self.increment(amplitude, start);
-        Point { y: start.y + y, dy: start.dy + dy, phasor }
-    }
-
-    /// What is added to `start` at a time near that of the propagator, `h` seconds later.
-    #[inline(always)]
-    pub fn shortly(&self, coefficients: &Coefficients, amplitude: f64, start: &Point, h: f64) -> Increment {
-        let increment = self.increment(amplitude, start);
-        if h == 0.0 {
-            return increment;
-        }
-        Nearby::<4>::new(coefficients, amplitude, start, &increment).at(h)
-    }
 }
 
 /// The motion near an instant, as a Taylor polynomial of degree `N + 1`.
 pub(super) struct Nearby<const N: usize> {
     /// What has been added to the start until then.
-    there: Increment,
+    pub there: Increment,
     /// Velocity then, m/s.
     pub dy: f64,
     /// `y^(n)/n!` for n from 2 on.
@@ -193,13 +206,22 @@ impl<const N: usize> Nearby<N> {
     /// What `h` seconds add to the displacement beyond uniform motion, m, and to the velocity, m/s.
     #[inline(always)]
     pub fn change(&self, h: f64) -> (f64, f64) {
-        let last = self.c[N - 1];
-        let (mut bent, mut quickened) = (last, (N + 1) as f64 * last);
-        for n in (0..N - 1).rev() {
-            bent = self.c[n] + h * bent;
-            quickened = (n + 2) as f64 * self.c[n] + h * quickened;
+        let c = &self.c;
+        let (mut bent, mut quickened) = (0.0, 0.0);
+        let square = h * h;
+        for n in (0..N).step_by(2).rev() {
+            let (c0, c1) = (c[n], c[n + 1]);
+            let k = (n + 2) as f64;
+            bent = (c0 + h * c1) + square * bent;
+            quickened = (k * c0 + h * ((k + 1.0) * c1)) + square * quickened;
         }
-        (h * h * bent, h * quickened)
+        (square * bent, h * quickened)
+    }
+
+    /// The phasor of the base then.
+    #[inline(always)]
+    pub fn phasor(&self, h: f64) -> (f64, f64) {
+        rotate(self.there.phasor, rotation::<N>(self.omega * h))
     }
 
     /// What is added to the start, `h` seconds after that instant.
@@ -209,7 +231,7 @@ impl<const N: usize> Nearby<N> {
         Increment {
             y: self.there.y + (h * self.dy + bent),
             dy: self.there.dy + quickened,
-            phasor: rotate(self.there.phasor, rotation::<N>(self.omega * h)),
+            phasor: self.phasor(h),
         }
     }
 }

@@ -18,8 +18,10 @@ pub(super) const SAME: f64 = 1e-9;
 /// Half the number of the `G_n`.
 const MOMENTS: usize = 5;
 
-/// The propagator of one step length.
+/// The propagator of one step length; what follows from that is computed when it is needed.
 #[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(feature = "serde", serde(from = "f64", into = "f64"))]
 pub(super) struct ShortStep {
     /// The key: length of the step, s; NaN where there is none.
     pub t: f64,
@@ -45,11 +47,17 @@ struct Response {
     velocity: Complex64,
 }
 
-impl Default for ShortStep {
-    fn default() -> Self {
+impl From<ShortStep> for f64 {
+    fn from(step: ShortStep) -> Self {
+        step.t
+    }
+}
+
+impl From<f64> for ShortStep {
+    fn from(t: f64) -> Self {
         Self {
-            t: f64::NAN,
-            halves: (0.0, 0.0),
+            t,
+            halves: halves(t),
             free: Default::default(),
             pushed: (0.0, 0.0),
             moments: [[0.0; 2]; MOMENTS],
@@ -64,22 +72,22 @@ impl Default for ShortStep {
     }
 }
 
+impl Default for ShortStep {
+    fn default() -> Self {
+        Self::from(f64::NAN)
+    }
+}
+
 impl ShortStep {
-    /// The propagator of a step of `t` seconds.
-    pub fn new(oscillator: &Oscillator, t: f64) -> Self {
-        let free = oscillator.exact_increment(t);
-        let per_velocity = free.0.xv + free.1.xv;
-        Self {
-            t,
-            halves: halves(t),
-            free,
-            pushed: (
-                oscillator.omega0_squared * per_velocity,
-                2.0 * oscillator.delta * per_velocity,
-            ),
-            moments: core::array::from_fn(|n| [2 * n, 2 * n + 1].map(|n| moment(oscillator, n, t))),
-            ..Self::default()
-        }
+    #[inline(never)]
+    fn complete(&mut self, oscillator: &Oscillator) {
+        self.free = oscillator.split(&oscillator.increment(self.t));
+        let per_velocity = self.free.0.xv + self.free.1.xv;
+        self.pushed = (
+            oscillator.omega0_squared * per_velocity,
+            2.0 * oscillator.delta * per_velocity,
+        );
+        self.moments = core::array::from_fn(|n| [2 * n, 2 * n + 1].map(|n| moment(oscillator, n, self.t)));
     }
 
     /// Whether a step of `t` seconds can have such a propagator.
@@ -125,10 +133,13 @@ impl ShortStep {
 
     /// What one step adds to `start` under `drive`, and the angle by which its oscillator turns.
     #[inline(always)]
-    pub fn increment(&mut self, drive: &Drive, start: &Point) -> (Increment, (f64, f64)) {
+    pub fn increment(&mut self, oscillator: &Oscillator, drive: &Drive, start: &Point) -> (Increment, (f64, f64)) {
         // A copy: what was just stored is slow to load.
         let mut response = self.response;
         if response.omega != drive.omega {
+            if response.omega.is_nan() {
+                self.complete(oscillator);
+            }
             response = self.respond(drive.omega);
             self.response = response;
         }

@@ -4,7 +4,7 @@ use super::{Event, MOST_IMPACTS, Outcome, Plant};
 use crate::arithmetic::Sum;
 use crate::base_motion::Drive;
 use crate::contact::{Contact, Wall};
-use crate::fast::{Moving, Next};
+use crate::fast::Next;
 use crate::flight::Flight;
 use crate::parameters::InvalidValue;
 use crate::segment::Segment;
@@ -61,19 +61,14 @@ impl Plant {
         duration: f64,
         on_event: impl FnMut(Event),
     ) -> Result<Outcome, InvalidValue> {
-        if drive != self.base.drive || !self.begun {
+        if drive != self.moving.base.drive || !self.begun {
             drive.validate()?;
             self.check_duration(duration)?;
             self.set_drive(drive);
         }
-        let mut moving = Moving {
-            rig: &self.rig,
-            masses: &mut self.masses,
-            base: &mut self.base,
-        };
-        if self.contact == Contact::Free && self.fast.step(&mut moving, duration) {
+        if self.contact == Contact::Free && self.fast.step(&mut self.moving, duration) {
             self.time += duration;
-            self.evaluations += 1;
+            self.fast.evaluations += 1;
             return Ok(Outcome { elapsed: duration, evaluations: 1, ..Outcome::default() });
         }
         self.check_duration(duration)?;
@@ -95,28 +90,28 @@ impl Plant {
     /// Makes `drive` the current one; the base may jump.
     #[inline(always)]
     fn set_drive(&mut self, drive: Drive) {
-        let before = self.base.drive;
-        self.base.drive = drive;
+        let before = self.moving.base.drive;
+        self.moving.base.drive = drive;
         if !self.begun {
             self.begun = true;
-            self.fast.state_changed(&self.base);
+            self.fast.state_changed(&self.moving.base);
             return;
         }
-        let sin = self.fast.phasor().1;
+        let sin = self.fast.phasor.1;
         let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
-        let kick = 2.0 * self.rig.alone.delta * jump;
+        let kick = 2.0 * self.moving.rig.alone.delta * jump;
         if jump != 0.0 {
-            self.masses.v = self.masses.v.plus(kick);
-            self.masses.dw += kick;
+            self.moving.masses.v = self.moving.masses.v.plus(kick);
+            self.moving.masses.dw += kick;
             // The impulse acts on the primary mass alone; contact is decided anew.
             self.contact = Contact::Free;
         }
-        self.fast.drive_changed(&self.rig.alone, &before, &drive, kick);
+        self.fast.drive_changed(&self.moving.rig.alone, &before, &drive, kick);
     }
 
     /// Follows the motion from event to event to the end of the step.
     fn follow(&mut self, duration: f64, on_event: impl FnMut(Event)) -> Outcome {
-        let evaluations = self.evaluations;
+        let evaluations = self.fast.evaluations;
         let mut step = Step {
             duration,
             left: Sum::from(duration),
@@ -134,13 +129,8 @@ impl Plant {
                 self.stay(wall, left, &mut step);
                 continue;
             }
-            let mut moving = Moving {
-                rig: &self.rig,
-                masses: &mut self.masses,
-                base: &mut self.base,
-            };
             let next = match self.contact {
-                Contact::Free => self.fast.next(&mut moving, left, duration),
+                Contact::Free => self.fast.next(&mut self.moving, left, duration),
                 _ => Next::Search(left),
             };
             match next {
@@ -152,12 +142,11 @@ impl Plant {
                 }
                 Next::Search(limit) => self.search(limit, &mut step),
             }
-            self.evaluations += self.fast.evaluations();
         }
         let left = step.left.value();
         step.outcome.cut_short = left > 0.0;
         step.outcome.elapsed = if left > 0.0 { step.now() } else { duration };
-        step.outcome.evaluations = self.evaluations - evaluations;
+        step.outcome.evaluations = self.fast.evaluations - evaluations;
         step.outcome
     }
 
@@ -168,19 +157,19 @@ impl Plant {
             Contact::Released(wall) => Some(wall),
             _ => None,
         };
-        let masses = self.masses;
+        let masses = self.moving.masses;
         let start = (masses.x.value(), masses.v.value());
-        let motion = Segment::new(&self.rig.alone, self.base, start);
-        let half_width = self.rig.parameters.half_width;
+        let motion = Segment::new(&self.moving.rig.alone, self.moving.base, start);
+        let half_width = self.moving.rig.parameters.half_width;
         let flight = Flight::new(motion, (masses.w.value(), masses.dw), half_width);
         let landing = flight.first_contact(limit, released);
-        self.evaluations += landing.evaluations;
-        self.masses.x = masses.x.plus(landing.moved);
-        self.masses.v = masses.v.plus(landing.gained);
-        self.masses.dw += landing.gained;
+        self.fast.evaluations += landing.evaluations;
+        self.moving.masses.x = masses.x.plus(landing.moved);
+        self.moving.masses.v = masses.v.plus(landing.gained);
+        self.moving.masses.dw += landing.gained;
         let w = masses.w.plus(landing.drifted);
         let outside = w.value().abs() > half_width;
-        self.masses.w = if outside {
+        self.moving.masses.w = if outside {
             Sum::from(half_width.copysign(w.value()))
         } else {
             w
@@ -195,15 +184,15 @@ impl Plant {
 
     /// Both masses move as one for at most `left` seconds, until the wall ceases to push.
     fn stay(&mut self, wall: Wall, left: f64, step: &mut Step<impl FnMut(Event)>) {
-        let noise = self.acceleration_error(self.masses.v.value());
-        let start = (self.masses.x.value(), self.masses.v.value());
-        let motion = Segment::new(&self.rig.joint, self.base, start);
+        let noise = self.acceleration_error(self.moving.masses.v.value());
+        let start = (self.moving.masses.x.value(), self.moving.masses.v.value());
+        let motion = Segment::new(&self.moving.rig.joint, self.moving.base, start);
         let stay = until_released(&motion, wall, left, noise);
-        self.evaluations += stay.evaluations;
-        self.masses.x = Sum::from(stay.joint.0);
-        self.masses.v = Sum::from(stay.joint.1);
-        self.masses.particle = stay.joint.1;
-        self.masses.dw = 0.0;
+        self.fast.evaluations += stay.evaluations;
+        self.moving.masses.x = Sum::from(stay.joint.0);
+        self.moving.masses.v = Sum::from(stay.joint.1);
+        self.moving.masses.particle = stay.joint.1;
+        self.moving.masses.dw = 0.0;
         self.base_moves(stay.t);
         step.left = step.left.plus(-stay.t);
         if stay.released {
@@ -216,7 +205,7 @@ impl Plant {
 
     /// The base has moved on by `t` seconds.
     fn base_moves(&mut self, t: f64) {
-        self.base = self.base.after(t);
-        self.fast.state_changed(&self.base);
+        self.moving.base = self.moving.base.after(t);
+        self.fast.state_changed(&self.moving.base);
     }
 }

@@ -18,36 +18,34 @@ impl Plant {
     /// The wall that the particle touches.
     #[inline]
     pub(super) fn wall_touched(&self) -> Option<Wall> {
-        let (w, b) = (self.masses.w.value(), self.rig.parameters.half_width);
-        if w >= b {
-            Some(Wall::Plus)
-        } else if w <= -b {
-            Some(Wall::Minus)
-        } else {
-            None
-        }
+        let (w, b) = (self.moving.masses.w.value(), self.moving.rig.parameters.half_width);
+        (w.abs() >= b).then(|| Wall::ahead(w))
     }
 
     /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
     #[inline]
     pub(super) fn touch(&mut self, wall: Wall, step: &mut Step<impl FnMut(Event)>) {
-        let half_width = self.rig.parameters.half_width;
-        self.masses.w = Sum::from(wall.sign() * half_width);
+        let half_width = self.moving.rig.parameters.half_width;
+        self.moving.masses.w = Sum::from(wall.sign() * half_width);
         let resolution = Resolution {
             lowest_hop: LOWEST_HOP * half_width,
             longest_chatter: step.left.value(),
-            fastest: self.rig.alone.fastest,
+            fastest: self.moving.rig.alone.fastest,
             elastic: true,
         };
-        let velocities = (self.masses.v.value(), self.masses.particle, self.masses.dw);
-        let touch = self.rig.law.touch(wall, velocities, |primary, speed| {
+        let velocities = (
+            self.moving.masses.v.value(),
+            self.moving.masses.particle,
+            self.moving.masses.dw,
+        );
+        let touch = self.moving.rig.law.touch(wall, velocities, |primary, speed| {
             let largest = self.acceleration_bound(primary);
-            !(self.rig.law).certainly_leaves(speed, largest, &resolution)
-                && (self.rig.law).rests(speed, self.pressing(wall, primary), &resolution)
+            !(self.moving.rig.law).certainly_leaves(speed, largest, &resolution)
+                && (self.moving.rig.law).rests(speed, self.pressing(wall, primary), &resolution)
         });
-        self.masses.v = self.masses.v.plus(touch.kick);
-        self.masses.particle = touch.particle;
-        self.masses.dw = touch.relative;
+        self.moving.masses.v = self.moving.masses.v.plus(touch.kick);
+        self.moving.masses.particle = touch.particle;
+        self.moving.masses.dw = touch.relative;
         let t = step.now();
         self.totals.add(&touch, self.time + t);
         if let Some(velocity) = touch.impact {
@@ -63,8 +61,8 @@ impl Plant {
 
     /// Acceleration of `wall` towards the particle while the primary mass moves alone, and its rounding error, m/s².
     fn pressing(&self, wall: Wall, velocity: f64) -> (f64, f64) {
-        let start = (self.masses.x.value(), velocity);
-        let motion = Segment::new(&self.rig.alone, self.base, start);
+        let start = (self.moving.masses.x.value(), velocity);
+        let motion = Segment::new(&self.moving.rig.alone, self.moving.base, start);
         let acceleration = motion.derivatives_at_start()[2];
         (wall.sign() * acceleration, self.acceleration_error(velocity))
     }
@@ -72,16 +70,16 @@ impl Plant {
     /// An upper bound of the acceleration's magnitude, m/s²: the sum of its terms.
     #[inline(always)]
     fn acceleration_bound(&self, velocity: f64) -> f64 {
-        let Oscillator { delta, omega0_squared, .. } = self.rig.alone;
-        let drive = &self.base.drive;
-        let position = self.masses.x.value().abs() + drive.signal[0].abs() + drive.amplitude.abs();
+        let Oscillator { delta, omega0_squared, .. } = self.moving.rig.alone;
+        let drive = &self.moving.base.drive;
+        let position = self.moving.masses.x.value().abs() + drive.signal[0].abs() + drive.amplitude.abs();
         let velocity = velocity.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
         (omega0_squared * position + 2.0 * delta * velocity) * (1.0 + 1e-9)
     }
 
     /// Rounding error of the acceleration, m/s².
     pub(super) fn acceleration_error(&self, velocity: f64) -> f64 {
-        let nothing = NOTHING * self.rig.parameters.half_width * self.rig.alone.omega0_squared;
+        let nothing = NOTHING * self.moving.rig.parameters.half_width * self.moving.rig.alone.omega0_squared;
         ROUNDING * self.acceleration_bound(velocity) + nothing
     }
 }

@@ -22,7 +22,7 @@ fn farthest(s: &Scene) -> Option<f64> {
     let base = BaseMotion { drive: s.drive, ..BaseMotion::default() };
     let motion = Segment::new(&oscillator, base, (0.0, s.start.dq1));
     let step = DURATION / f64::from(LOOKS);
-    let at = |t: f64| motion.position_and_velocity(t).0.abs();
+    let at = |t: f64| motion.derivatives(t)[0].abs();
     let looks: Vec<f64> = (0..=LOOKS).map(|n| at(f64::from(n) * step)).collect();
     let end = looks[looks.len() - 1];
     let mut farthest = 0.0f64;

@@ -9,6 +9,7 @@ mod elastic;
 mod follow;
 mod graze;
 mod random;
+mod simple;
 mod spacing;
 mod steps;
 mod table;
@@ -33,7 +34,7 @@ fn hard_scenes_are_survived() {
         steps::chatter(&mut table);
     }
     steps::short(&mut table);
-    work::steps(&mut table);
+    simple::steps(&mut table);
     work::sweep(n > 10_000, &mut table);
     table.end();
 }

@@ -1,6 +1,7 @@
 //! Plant and controller coupled as a master couples them: the default scene, a digest of every output bit, and the lock.
 
 use fmi2_component::Status;
+use fmi2_description::{Description, Kind};
 use sha2::{Digest, Sha256};
 
 use crate::fuzz::RandomSource;
@@ -14,24 +15,55 @@ const OMEGA0: f64 = 55.389_823_718_609_82;
 /// The mass ratio m/M.
 const EPSILON: f64 = 0.032 / 3.807;
 
-/// Value references of the plant.
-mod plant {
-    pub const INPUTS: [u32; 2] = [8, 7];
-    pub const SENSORS: [u32; 2] = [13, 16];
-    pub const START_VELOCITY: u32 = 12;
-    pub const REALS: [u32; 18] = [9, 10, 11, 12, 13, 14, 15, 16, 17, 19, 20, 22, 23, 24, 25, 26, 27, 28];
-    pub const INTEGERS: [u32; 2] = [18, 21];
+/// Value references of one of the two, from its description.
+#[derive(Debug)]
+struct References {
+    /// What it is given in every step, and what the other one is given of it.
+    inputs: [u32; 2],
+    sensors: [u32; 2],
+    /// What is set before the start.
+    start: u32,
+    /// Everything that it puts out, by the type of the C interface.
+    reals: Vec<u32>,
+    integers: Vec<u32>,
+    booleans: Vec<u32>,
 }
 
-/// Value references of the controller.
-mod controller {
-    pub const INPUTS: [u32; 2] = [33, 34];
-    pub const ACTIVE: u32 = 35;
-    /// `omega` and `E`.
-    pub const DRIVE: [u32; 2] = [36, 37];
-    pub const REALS: [u32; 9] = [36, 37, 38, 39, 40, 41, 42, 43, 44];
-    pub const BOOLEANS: [u32; 2] = [45, 46];
-    pub const INTEGERS: [u32; 2] = [47, 48];
+impl References {
+    fn of(fmu: &Fmu, inputs: [&str; 2], sensors: [&str; 2], start: &str) -> Self {
+        let description = description(fmu);
+        let one = |name: &str| reference(fmu, name);
+        let all = |kinds: &[Kind]| {
+            let put_out = description
+                .variables
+                .iter()
+                .filter(|variable| matches!(variable.causality.as_deref(), Some("output" | "local")));
+            put_out
+                .filter(|variable| kinds.contains(&variable.content[0].kind))
+                .map(|variable| variable.value_reference)
+                .collect()
+        };
+        Self {
+            inputs: inputs.map(one),
+            sensors: sensors.map(one),
+            start: one(start),
+            reals: all(&[Kind::Real]),
+            integers: all(&[Kind::Integer, Kind::Enumeration]),
+            booleans: all(&[Kind::Boolean]),
+        }
+    }
+}
+
+fn description(fmu: &Fmu) -> Description {
+    Description::parse(fmu.description).expect("the library was built from it")
+}
+
+fn reference(fmu: &Fmu, name: &str) -> u32 {
+    let description = description(fmu);
+    let variable = description.variable(name);
+    variable
+        .unwrap_or_else(|| panic!("{} has no {name}", fmu.name))
+        .value_reference
 }
 
 /// The two, exchanging values at communication points. The controller's commands reach the plant one step later.
@@ -41,6 +73,8 @@ pub struct Pair {
     pub plant: Master,
     /// The phase-locked loop.
     pub controller: Master,
+    references: [References; 2],
+    locked: u32,
     time: f64,
     digest: Sha256,
 }
@@ -52,23 +86,32 @@ impl Pair {
     /// If a call is refused; so below.
     #[must_use]
     pub fn new(plant: &Fmu, controller: &Fmu) -> Self {
+        let references = [
+            References::of(plant, ["omega", "E"], ["v", "base"], "der(q2)"),
+            References::of(controller, ["response", "reference"], ["omega", "E"], "active"),
+        ];
+        let locked = reference(controller, "locked");
         let plant = Master::new(plant, Interface::CoSimulation);
-        plant.well(plant.set_real(plant::START_VELOCITY, 0.5));
+        plant.well(plant.set_real(references[0].start, 0.5));
         plant.start();
         let controller = Master::new(controller, Interface::CoSimulation);
         // SAFETY: one reference, one value.
-        let armed = unsafe { (controller.f.fmi2SetBoolean)(controller.c, &controller::ACTIVE, 1, &1) };
+        let armed = unsafe { (controller.f.fmi2SetBoolean)(controller.c, &references[1].start, 1, &1) };
         controller.well(armed);
         controller.start();
-        Self { plant, controller, time: 0.0, digest: Sha256::new() }
+        let digest = Sha256::new();
+        Self { plant, controller, references, locked, time: 0.0, digest }
     }
 
     /// Hands values on, and takes a step of `step` s; answers the frequency of the drive, rad/s.
     pub fn step(&mut self, step: f64) -> f64 {
-        let Self { plant, controller, .. } = self;
-        let (sensed, drive) = (reals(plant, plant::SENSORS), reals(controller, controller::DRIVE));
-        set(controller, controller::INPUTS, sensed);
-        set(plant, plant::INPUTS, drive);
+        let Self { plant, controller, references: [of_plant, of_controller], .. } = self;
+        let (sensed, drive) = (
+            reals(plant, &of_plant.sensors),
+            reals(controller, &of_controller.sensors),
+        );
+        set(controller, &of_controller.inputs, &sensed);
+        set(plant, &of_plant.inputs, &drive);
         plant.well(plant.step(self.time, step));
         controller.well(controller.step(self.time, step));
         self.time += step;
@@ -77,21 +120,13 @@ impl Pair {
 
     /// Takes every output bit of both into the digest.
     pub fn digest(&mut self) {
-        let Self { plant, controller, digest, .. } = self;
-        for value in reals(plant, plant::REALS) {
-            digest.update(value.to_bits().to_le_bytes());
-        }
-        for value in reals(controller, controller::REALS) {
-            digest.update(value.to_bits().to_le_bytes());
-        }
-        for value in [
-            integers(plant, plant::INTEGERS),
-            integers(controller, controller::INTEGERS),
-            booleans(controller, controller::BOOLEANS),
-        ]
-        .as_flattened()
-        {
-            digest.update(value.to_le_bytes());
+        for (master, of) in [&self.plant, &self.controller].into_iter().zip(&self.references) {
+            for value in reals(master, &of.reals) {
+                self.digest.update(value.to_bits().to_le_bytes());
+            }
+            for value in [integers(master, &of.integers), booleans(master, &of.booleans)].concat() {
+                self.digest.update(value.to_le_bytes());
+            }
         }
     }
 
@@ -105,7 +140,7 @@ impl Pair {
     /// Whether the controller says that it is locked.
     #[must_use]
     pub fn is_locked(&self) -> bool {
-        booleans(&self.controller, controller::BOOLEANS)[0] != 0
+        booleans(&self.controller, &[self.locked])[0] != 0
     }
 }
 
@@ -143,30 +178,31 @@ pub fn irregular(from: f64, to: f64, seed: u64) -> impl FnMut() -> f64 {
     move || random.between(from, to) * SAMPLE_TIME
 }
 
-fn reals<const N: usize>(m: &Master, references: [u32; N]) -> [f64; N] {
-    let mut values = [f64::NAN; N];
+fn reals(m: &Master, references: &[u32]) -> Vec<f64> {
+    let mut values = vec![f64::NAN; references.len()];
     // SAFETY: arrays of the same length; so below.
-    m.well(unsafe { (m.f.fmi2GetReal)(m.c, references.as_ptr(), N, values.as_mut_ptr()) });
+    m.well(unsafe { (m.f.fmi2GetReal)(m.c, references.as_ptr(), references.len(), values.as_mut_ptr()) });
     values
 }
 
-fn integers<const N: usize>(m: &Master, references: [u32; N]) -> [i32; N] {
-    let mut values = [-1; N];
+fn integers(m: &Master, references: &[u32]) -> Vec<i32> {
+    let mut values = vec![-1; references.len()];
     // SAFETY: as above.
-    m.well(unsafe { (m.f.fmi2GetInteger)(m.c, references.as_ptr(), N, values.as_mut_ptr()) });
+    m.well(unsafe { (m.f.fmi2GetInteger)(m.c, references.as_ptr(), references.len(), values.as_mut_ptr()) });
     values
 }
 
-fn booleans<const N: usize>(m: &Master, references: [u32; N]) -> [i32; N] {
-    let mut values = [-1; N];
+fn booleans(m: &Master, references: &[u32]) -> Vec<i32> {
+    let mut values = vec![-1; references.len()];
     // SAFETY: as above.
-    m.well(unsafe { (m.f.fmi2GetBoolean)(m.c, references.as_ptr(), N, values.as_mut_ptr()) });
+    m.well(unsafe { (m.f.fmi2GetBoolean)(m.c, references.as_ptr(), references.len(), values.as_mut_ptr()) });
     values
 }
 
 #[track_caller]
-fn set<const N: usize>(m: &Master, references: [u32; N], values: [f64; N]) {
+fn set(m: &Master, references: &[u32], values: &[f64]) {
+    assert_eq!(references.len(), values.len());
     // SAFETY: as above.
-    let status: Status = unsafe { (m.f.fmi2SetReal)(m.c, references.as_ptr(), N, values.as_ptr()) };
+    let status: Status = unsafe { (m.f.fmi2SetReal)(m.c, references.as_ptr(), references.len(), values.as_ptr()) };
     m.well(status);
 }
