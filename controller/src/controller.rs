@@ -100,6 +100,7 @@ impl PhaseLock {
         Quantity::new("duration", to.duration, "s").not_negative()?;
         Quantity::new("amplitude", to.amplitude, "m").check(true, "a finite number")?;
         Quantity::new("omega", to.omega, "rad/s").check(true, "a finite number")?;
+        Quantity::new("growth", to.growth, "m/s").check(true, "a finite number")?;
         Quantity::new("amplitude_max", self.config.amplitude_max.unwrap_or(NONE), "m").check(
             self.config.amplitude_max.is_some(),
             "above 0 to control the response amplitude: the drive needs a limit",

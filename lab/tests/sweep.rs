@@ -105,10 +105,7 @@ fn ctrl_c_keeps_complete_chunks_and_the_same_command_goes_on() {
     let output = signalled(child, "INT").unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", text(&output));
     assert!(text(&output).contains("the same command goes on"), "{}", text(&output));
-    let chunks = content(&out)
-        .keys()
-        .filter(|key| key.starts_with("failure/c/"))
-        .count();
+    let chunks = content(&out).keys().filter(|key| key.starts_with("failure/c/")).count();
     println!("{chunks} chunks");
     assert!(chunks > 0);
 }

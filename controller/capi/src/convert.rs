@@ -90,6 +90,7 @@ impl From<&PhaseLockMove> for Move {
             duration: to.duration,
             amplitude: to.amplitude,
             omega: to.omega,
+            ..Move::default()
         }
     }
 }

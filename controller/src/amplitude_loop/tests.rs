@@ -64,7 +64,7 @@ fn an_expected_change_of_the_drive_reduces_the_control_error() {
         response: 0.8,
         duration: 60.0,
         amplitude: -0.2 * DELTA / GAIN,
-        omega: 0.0,
+        ..Move::default()
     };
     let expected = worst(to, 0);
     let unexpected = worst(Move { amplitude: 0.0, ..to }, 0);
@@ -103,7 +103,10 @@ fn the_drive_stays_within_its_limits_without_windup() {
 fn the_shifts_of_the_frequency_add_up_to_the_expected_change() {
     let control = amplitude_loop(1.0);
     let (_, mut state) = settled();
-    state.start(Move { response: 1.1, duration: 3.0, amplitude: 0.0, omega: -0.7 }, DT);
+    state.start(
+        Move { response: 1.1, duration: 3.0, omega: -0.7, ..Move::default() },
+        DT,
+    );
     let shifted: f64 = (0..400).map(|_| control.follow(&mut state, 0.0, Some(1.0)).1).sum();
     assert!((shifted + 0.7).abs() < 1e-12);
 }

@@ -73,6 +73,8 @@ const PHASE_RANGE: f64 = 0.3;
 const FEWEST: usize = 8;
 /// Difference, in standard uncertainties, that still counts as noise.
 const RANDOM: f64 = 2.0;
+/// Relative uncertainty of the effect of a drift of the amplitude.
+pub const LATE: f64 = 0.15;
 /// Relative standard uncertainty of the slopes by first-order theory.
 const SLOPE: f64 = 0.3;
 
@@ -209,6 +211,8 @@ fn slopes(scene: &Scene, c: f64) -> Slopes {
     Slopes {
         base: pair(g).map(|g| d.amplitude(g) / d.b),
         omega: pair(sigma).map(|sigma| d.omega_change(sigma) / d.b),
+        late: LATE,
+        phase: [0.0, d.epsilon * d.lambda],
         drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
         curvature: [d.amplitude(bend[0]), d.omega_change(bend[1])].map(|bend| bend / (d.b * d.b)),
     }
