@@ -11,7 +11,7 @@ use vines::{
     fmu::{FmuController, FmuRig},
     net::{Address, BindScope, NetController, NetRig, Timing},
     rig::{BuiltIn, Chain, Controller, Rig, Simulated},
-    scene::{Resonance, Scene},
+    scene::Scene,
 };
 
 use super::{
@@ -120,12 +120,6 @@ impl Endpoint {
 
 /// Refuses settings with which no experiment can begin, before anything is written or driven.
 pub(super) fn check(scene: &Scene) -> Result<(), Failure> {
-    if scene.resonance.resonance == Resonance::Peak && scene.controller.phase_target == -90.0 {
-        return Err(Failure::input(
-            "resonance.definition = \"peak\" with controller.phase_target = -90 degrees: the loop holds a phase, so set phase_target to the \
-             phase at the peak, which `vines orbit` computes and `vines backbone` measures",
-        ));
-    }
     BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
     Ok(())
 }

@@ -81,9 +81,9 @@ const SLOPE: f64 = 0.3;
 pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let d = scene.dimensionless();
     let (dt, hold) = (record.sample_time, record.hold());
-    let target = scene.controller.phase_target_radians();
+    let target = scene.phase_target().radians();
     let held = Cycle::all(hold, dt, target);
-    let approach = approached(record, scene, &held);
+    let approach = approached(record, scene, target, &held);
     let slopes = slopes(scene, mean(held.iter().map(Cycle::amplitude)) / d.b);
     // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
@@ -156,10 +156,10 @@ fn limits(approach: &[Cycle], omega0: f64, command: f64, slopes: &Slopes) -> Opt
 }
 
 /// The periods before the release in which the motion was as near as in the hold.
-fn approached(record: &Record, scene: &Scene, held: &[Cycle]) -> Vec<Cycle> {
+fn approached(record: &Record, scene: &Scene, target: f64, held: &[Cycle]) -> Vec<Cycle> {
     let most = (MOST * scene.controller.samples_per_period) as usize;
     let samples = &record.samples[record.released.saturating_sub(most.max(record.hold().len()))..record.released];
-    let mut cycles = Cycle::all(samples, record.sample_time, scene.controller.phase_target_radians());
+    let mut cycles = Cycle::all(samples, record.sample_time, target);
     let level = mean(held.iter().map(Cycle::amplitude));
     let noise = 4.0 * mean(held.iter().map(|cycle| cycle.noise[0])).sqrt();
     let is_near = |cycle: &&Cycle| {
