@@ -175,11 +175,16 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
 /// The criterion for a settled point.
 pub(super) fn criterion(scene: &Scene, order: &Order) -> Criterion {
     let (settings, d) = (&scene.backbone, scene.dimensionless());
+    let share = match scene.resonance.resonance {
+        Resonance::Phase => 1.0,
+        Resonance::Peak => peak::share_of_drive(order.level),
+    };
     let pair = |size: f64| [d.amplitude(size), d.omega_change(size)];
+    let [base, omega] = pair(settings.tolerance);
     Criterion {
         omega0: d.omega0,
         precision: pair(settings.precision),
-        tolerance: pair(settings.tolerance),
+        tolerance: [share * base, omega],
         spread: SPREAD,
         fewest: settings.dwell_min as usize,
         slopes: predictor::slopes(scene, &order.known, [order.level, order.phase]),
