@@ -100,6 +100,33 @@ fn the_drive_stays_within_its_limits_without_windup() {
 }
 
 #[test]
+fn a_move_with_a_growth_goes_on_at_that_rate_until_the_next_one() {
+    let control = amplitude_loop(1.0);
+    let (_, mut state) = settled();
+    let mut go = |to: Move, samples: usize| -> Vec<f64> {
+        state.start(to, DT);
+        let mut at = vec![state.setpoint()];
+        for _ in 0..samples {
+            control.follow(&mut state, 0.0, Some(1.0));
+            at.push(state.setpoint());
+        }
+        at.windows(2).map(|pair| (pair[1] - pair[0]) / DT).collect()
+    };
+    let crossing = Move {
+        response: 0.9,
+        duration: 1.0,
+        growth: -0.1,
+        ..Move::default()
+    };
+    let begun = go(crossing, 120);
+    assert!(begun[0].abs() < 1e-3 && begun[100..].iter().all(|rate| (rate + 0.1).abs() < 1e-9));
+    let crossed = go(Move { response: 0.798, ..crossing }, 100);
+    assert!(crossed.iter().all(|rate| (rate + 0.1).abs() < 1e-9), "{crossed:?}");
+    let ended = go(Move { response: 0.75, duration: 1.0, ..Move::default() }, 110);
+    assert!((ended[0] + 0.1).abs() < 1e-2 && ended[101..].iter().all(|rate| *rate == 0.0));
+}
+
+#[test]
 fn the_shifts_of_the_frequency_add_up_to_the_expected_change() {
     let control = amplitude_loop(1.0);
     let (_, mut state) = settled();

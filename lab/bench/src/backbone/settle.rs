@@ -68,7 +68,7 @@ const RANDOM: f64 = 2.0;
 /// Largest scatter of the residuals over the noise of the sensors for a steady motion whose uncertainty is not yet small.
 const STEADY: f64 = 2.0;
 /// Relative uncertainty of the effect of the curvature.
-pub const BENT: f64 = 0.07;
+pub const BENT: f64 = 0.05;
 /// Shares of the periods that are considered, from the last one backwards.
 const SHARES: [f64; 6] = [1.0, 0.85, 0.7, 0.55, 0.45, 0.35];
 

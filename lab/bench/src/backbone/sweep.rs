@@ -20,15 +20,15 @@ const FEWEST: f64 = 11.0;
 /// Most periods: where more are needed, a hold is better.
 const MOST: f64 = 24.0;
 /// Periods in which the rate is reached, over those of the crossing.
-const LEAD: f64 = 0.6;
+const LEAD: f64 = 0.65;
 /// Largest distance of two levels, relative to the level.
 const WIDEST: f64 = 0.15;
 /// Share of the drive that may change the amplitude.
 const SHARE: f64 = 0.62;
 /// Relative uncertainty of the effect of a steady drift.
-const LATE: f64 = 0.05;
+const LATE: f64 = 0.036;
 /// Largest parts of the uncertainty of sigma, over `backbone.precision`, by the drift and by noise.
-const PARTS: [f64; 2] = [0.85, 0.5];
+const PARTS: [f64; 2] = [0.645, 0.5];
 
 /// Periods in which the level after `last` can be crossed; `None` where a hold is better: at noise, towards the fold, and for distant levels.
 pub fn periods<R: Rig + ?Sized, C: Controller + ?Sized>(
