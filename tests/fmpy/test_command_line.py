@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 import subprocess
 from math import isfinite
 from pathlib import Path
@@ -157,3 +158,22 @@ def check_refusal(done, part, folder):
     assert "panicked" not in done.stderr
     assert done.stdout == ""
     assert list(folder.iterdir()) == []
+
+
+def test_a_rehearsal_ends_well_and_its_notebook_has_its_figures(tmp_path):
+    done = subprocess.run(
+        [ROOT / "scripts/rehearse", "--lock-step", "--out", tmp_path], capture_output=True, text=True, timeout=600
+    )
+    assert done.returncode == 0, done.stderr
+    notebook = (tmp_path / "notebook.md").read_text()
+    for words in (
+        "signs, gains, delays and noise are as expected",
+        "29 points in",
+        "switched the drive off",
+        "the drive was zero",
+    ):
+        assert words in notebook
+    figures = re.findall(r"!\[.*\]\((.*)\)", notebook)
+    assert figures
+    for name in figures:
+        ElementTree.parse(tmp_path / name)

@@ -7,11 +7,12 @@ mod table;
 
 use std::panic::{AssertUnwindSafe, catch_unwind};
 
+use lovines::Parameters;
 use serde::Serialize;
 
 use crate::backbone::track;
 use crate::experiment::{self, ExperimentError, Plan};
-use crate::rig::{BuiltIn, Chain, Rig, Simulated};
+use crate::rig::{BuiltIn, Chain, Drive, Rig, RigError, Sensors, Simulated};
 use crate::scene::Scene;
 
 use inject::FaultyController;
@@ -76,11 +77,65 @@ fn short(scene: &Scene) -> Scene {
     scene
 }
 
+/// What a real rig shows of itself: its sensors.
+struct SensorsOnly<F: FnMut(Option<f64>)> {
+    rig: Box<dyn Rig>,
+    log: Log,
+    ended: F,
+}
+
+impl<F: FnMut(Option<f64>)> Drop for SensorsOnly<F> {
+    fn drop(&mut self) {
+        if self.log.has_begun() {
+            (self.ended)(self.log.times().map(|(detection, shutdown)| detection + shutdown));
+        }
+    }
+}
+
+impl<F: FnMut(Option<f64>)> Rig for SensorsOnly<F> {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.rig.sense()
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.rig.advance(drive, step)
+    }
+
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        self.rig.hold(displacement, step)
+    }
+}
+
+/// The rig of a checked scene as a rehearsal needs it: read by the scene's measurement chain, without ground truth, and with a fault that
+/// begins after `seconds` of rig time. When it is dropped after that, `ended` gets the time from the fault to a drive of zero, s, or
+/// `None` if the last drive was not zero.
+#[must_use]
+pub fn rehearsal_rig(
+    scene: &Scene,
+    kind: Kind,
+    seconds: f64,
+    ended: impl FnMut(Option<f64>) + 'static,
+) -> Box<dyn Rig> {
+    let step = scene.sample_time();
+    let log = Log::new((seconds / step).min(usize::MAX as f64) as usize, step);
+    Box::new(SensorsOnly { rig: failing(scene, kind, &log), log, ended })
+}
+
+fn failing(scene: &Scene, kind: Kind, log: &Log) -> Box<dyn Rig> {
+    let rig = |stiffness: f64| -> Box<dyn Rig> {
+        let plant = Parameters { stiffness, ..scene.plant };
+        // A stiffer plant is as valid.
+        let rig = Simulated::new(plant, scene.start).expect("a checked scene");
+        Box::new(rig.with_sensors(scene.resonance))
+    };
+    let (d, stiffness) = (scene.dimensionless(), scene.plant.stiffness);
+    let rig = FaultyRig::new(rig(stiffness), rig(1.21 * stiffness), kind, log, d.b);
+    Chain::around(Box::new(rig), &scene.chain, &d, scene.controller.samples_per_period)
+}
+
 /// The bench of the faults.
 pub struct Faults<'a> {
     scene: Scene,
-    /// A rig of another natural frequency.
-    changed: Scene,
     /// What the lab puts around its rig.
     around: &'a dyn Fn(Box<dyn Rig>) -> Box<dyn Rig>,
     /// First sample of each stage, and its length.
@@ -94,9 +149,7 @@ impl<'a> Faults<'a> {
     /// A scene that does not lock without a fault.
     pub fn new(scene: &Scene, around: &'a dyn Fn(Box<dyn Rig>) -> Box<dyn Rig>) -> Result<Self, ExperimentError> {
         let scene = short(scene);
-        let mut changed = scene.clone();
-        changed.plant.stiffness *= 1.21;
-        let mut faults = Self { scene, changed, around, stages: [[0, 1]; 4] };
+        let mut faults = Self { scene, around, stages: [[0, 1]; 4] };
         let plan = Plan::of(&faults.scene);
         let log = Log::new(usize::MAX, plan.sample_time);
         let record = experiment::run(
@@ -120,20 +173,7 @@ impl<'a> Faults<'a> {
     }
 
     fn rig(&self, kind: Kind, log: &Log) -> Box<dyn Rig> {
-        let plant = |scene: &Scene| -> Box<dyn Rig> {
-            // The scene is checked; a stiffer plant is as valid.
-            let rig = Simulated::new(scene.plant, scene.start).expect("a checked scene");
-            Box::new(rig.with_sensors(scene.resonance))
-        };
-        let rig = Box::new(FaultyRig::new(
-            plant(&self.scene),
-            plant(&self.changed),
-            kind,
-            log,
-            self.scene.dimensionless().b,
-        ));
-        let (d, samples) = (self.scene.dimensionless(), self.scene.controller.samples_per_period);
-        (self.around)(Chain::around(rig, &self.scene.chain, &d, samples))
+        (self.around)(failing(&self.scene, kind, log))
     }
 
     fn controller(&self, kind: Kind, log: &Log, during: During) -> FaultyController {

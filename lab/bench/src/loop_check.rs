@@ -26,6 +26,8 @@ const DEAD: f64 = 0.02;
 const GAIN: f64 = 2.0;
 /// Largest RMS of what is not the drive's frequency, as a share of the amplitude.
 const NOISE: f64 = 0.15;
+/// RMS of the response without a drive over that of its noise with it, from which the rig moves.
+const AT_REST: f64 = 3.0;
 /// Deviation of the phase, rad, up to which a channel is in time, and from which it is reversed.
 const IN_TIME: f64 = 0.7;
 
@@ -37,6 +39,8 @@ pub enum Verdict {
     Healthy,
     /// A sensor reads no number.
     NotANumber,
+    /// The response moves before there is a drive.
+    NotAtRest,
     /// Neither channel answers the drive: the shaker is off.
     ShakerOff,
     /// A channel does not answer the drive.
@@ -70,6 +74,7 @@ impl fmt::Display for Verdict {
         f.write_str(match self {
             Self::Healthy => "signs, gains, delays and noise are as expected",
             Self::NotANumber => "a sensor reads no number: check its converter",
+            Self::NotAtRest => "the response moves without a drive: wait until the rig is at rest",
             Self::ShakerOff => "no sensor answers the drive: check the amplifier of the shaker and the cables",
             Self::ResponseDead => "the response does not answer the drive: check its sensor and cable",
             Self::BaseDead => "the base sensor does not answer the drive: check it and its cable",
@@ -214,6 +219,7 @@ fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bool) -> Verd
     // The response's converter may be too coarse for the motion of the base.
     let as_base = dead[0] || near(crossed[0]) && in_time(crossed_phases[0]);
     match () {
+        () if response.floor > (AT_REST * response.noise).max(NOISE * expected[0]) => Verdict::NotAtRest,
         () if dead[0] && (dead[1] || !has_base) => Verdict::ShakerOff,
         () if has_base && as_base && near(crossed[1]) && in_time(crossed_phases[1]) => Verdict::Swapped,
         () if dead[0] => Verdict::ResponseDead,

@@ -1,5 +1,6 @@
 //! The loop check on random rigs; `vines check --trials 1000` takes more.
 
+use lovines::State;
 use vines_testbench::loop_check::{Verdict, check, trials};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
@@ -39,4 +40,14 @@ fn the_check_drives_at_a_hundredth_and_ends_at_the_phase_where_it_began() {
     let turns = rig.2 / std::f64::consts::TAU;
     assert!((turns - turns.round()).abs() < 1e-9, "{turns}");
     assert!((found.response.gain - 1.0).abs() < 0.01 && found.response.phase.abs() < 3.0);
+}
+
+#[test]
+fn a_rig_that_moves_before_the_drive_is_named() {
+    let scene = scene();
+    for speed in [1e-3, 0.05] {
+        let start = State { dq1: speed, ..State::default() };
+        let found = check(&mut Simulated::new(scene.plant, start).unwrap(), &scene).unwrap();
+        assert_eq!(found.verdict, Verdict::NotAtRest, "{found:?}");
+    }
 }

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
+use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn, scene::Scene};
 
 use super::{
     check::LoopCheckArguments,
@@ -65,12 +65,14 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?;
+    let mut scene = arguments.scene.load()?;
     log_warnings();
-    let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(Failure::input)?;
+    let controller = |scene: &Scene| BuiltIn::new(&scene.backbone_config()).map_err(Failure::input);
+    controller(&scene)?;
     writable(&arguments.out)?;
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
-    arguments.loop_check.before(&mut open.rig, &scene)?;
+    arguments.loop_check.before(&mut open.rig, &mut scene)?;
+    let mut controller = controller(&scene)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let tracked = track(&mut open.rig, &mut controller, &scene, |done, _| {
         bar.set_position(done as u64);

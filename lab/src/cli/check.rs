@@ -92,13 +92,14 @@ pub(super) struct LoopCheckArguments {
 }
 
 impl LoopCheckArguments {
-    /// Checks a rig that is not a simulation; refuses one that is not as expected.
-    pub(super) fn before(&self, rig: &mut impl Rig, scene: &Scene) -> Result<(), Failure> {
-        if self.no_check {
-            return Ok(());
-        }
+    /// Checks a rig that is not a simulation, and refuses one that is not as expected. Such a rig starts at rest.
+    pub(super) fn before(&self, rig: &mut impl Rig, scene: &mut Scene) -> Result<(), Failure> {
         rig.sense().map_err(ExperimentError::from)?;
         if rig.ground_truth().map_err(ExperimentError::from)?.is_some() {
+            return Ok(());
+        }
+        scene.start = Default::default();
+        if self.no_check {
             return Ok(());
         }
         let found = check(rig, scene).map_err(ExperimentError::from)?;

@@ -67,7 +67,7 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?;
+    let mut scene = arguments.scene.load()?;
     log_warnings();
     let reach = arguments.reach.reach();
     check(&scene)?;
@@ -78,7 +78,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             (Endpoint::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
         }
     };
-    arguments.loop_check.before(&mut open.rig, &scene)?;
+    arguments.loop_check.before(&mut open.rig, &mut scene)?;
     let mut controller = arguments.controller.controller(&scene, reach, open.pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(&plan);

@@ -1,11 +1,15 @@
 //! `vines rig`: the plant at a network address.
 
+use std::str::FromStr;
+
 use clap::Args;
+use vines::faults::{FAULTS, Kind, rehearsal_rig};
 use vines::net::{Address, Role, Served, Service};
 use vines::rig::Simulated;
 
 use super::{
     failure::Failure,
+    print,
     scene_arguments::SceneArguments,
     serving::{ServingArguments, positive},
 };
@@ -15,6 +19,8 @@ Examples:
   vines rig --listen 127.0.0.1:5510                 in real time; then: vines identify --rig udp://127.0.0.1:5510
   vines rig --listen 127.0.0.1:5510 --lock-step     as fast as the drives arrive, with the bits of the built-in plant;
                                                     then: vines identify --rig tcp://127.0.0.1:5510
+  vines rig --listen 127.0.0.1:5510 --sensors-only --set chain.snr=40 --set chain.adc_bits=12 --fault \"response sensor dead@60\"
+                                                    a rehearsal: noise, converters, and a sensor that is unplugged after 60 s
 
 Every session starts with the plant in the start state of the scene; the rig's clock starts with the first drive frame. Client and
 server take the sample time from their scene: use the same scene for both. In real time, lost and late drives are counted, and the
@@ -43,6 +49,14 @@ pub(super) struct Arguments {
     #[arg(long)]
     lock_step: bool,
 
+    /// Serve what the scene's measurement chain reads, and no impacts, from a plant at rest, as a real rig does
+    #[arg(long)]
+    sensors_only: bool,
+
+    /// Begin a fault of `vines faults` after this many seconds of rig time in each session, such as "response sensor dead@60"
+    #[arg(long, value_name = "NAME@SECONDS", requires = "sensors_only")]
+    fault: Option<Fault>,
+
     /// Longest silence before the drive is shut down, s [default: 0.1, with --lock-step 5]
     #[arg(long, value_name = "SECONDS", value_parser = positive)]
     silence: Option<f64>,
@@ -52,8 +66,45 @@ pub(super) struct Arguments {
     max_amplitude: Option<f64>,
 }
 
+/// Prints the time from the fault to a drive of zero, s.
+fn tell(zero: Option<f64>, json: bool) {
+    let text = match zero {
+        _ if json => format!("{}\n", serde_json::json!({ "drive_zero_after_fault": zero })),
+        Some(seconds) => format!("the drive was zero {:.1} ms after the fault\n", 1e3 * seconds),
+        None => "the drive was NOT ZERO at the end\n".into(),
+    };
+    // A closed output does not stop the server.
+    let _ = print(&text);
+}
+
+/// A fault of the rig, and when it begins, s of rig time.
+#[derive(Debug, Clone, Copy)]
+struct Fault {
+    kind: Kind,
+    seconds: f64,
+}
+
+impl FromStr for Fault {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let (name, seconds) = text.rsplit_once('@').ok_or("expected is NAME@SECONDS")?;
+        let of_a_rig = |kind| !matches!(kind, Kind::ControllerLost | Kind::ControllerNan | Kind::PeerLost);
+        let faults = FAULTS.into_iter().filter(|(_, kind)| of_a_rig(*kind));
+        let known = || faults.clone().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
+        let seconds = positive(seconds)?;
+        match faults.clone().find(|(one, _)| *one == name) {
+            Some((_, kind)) => Ok(Self { kind, seconds }),
+            None => Err(format!("no fault has this name; there are: {}", known())),
+        }
+    }
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?;
+    let mut scene = arguments.scene.load()?;
+    if arguments.sensors_only {
+        scene.start = Default::default();
+    }
     let first = Simulated::new(scene.plant, scene.start)
         .map_err(Failure::input)?
         .with_sensors(scene.resonance);
@@ -74,6 +125,15 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         silence: arguments.silence.unwrap_or(default),
     };
     let what = format!("rig, {mode}, {:.1} samples per second,", 1.0 / service.sample_time);
-    let make = || Served::Rig(Box::new(first.clone()));
+    let fault = arguments
+        .fault
+        .unwrap_or(Fault { kind: Kind::None, seconds: f64::INFINITY });
+    let json = arguments.serving.json;
+    let make = || {
+        Served::Rig(match arguments.sensors_only {
+            true => rehearsal_rig(&scene, fault.kind, fault.seconds, move |zero| tell(zero, json)),
+            false => Box::new(first.clone()),
+        })
+    };
     arguments.serving.serve(&what, transport, service, make)
 }

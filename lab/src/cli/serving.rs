@@ -29,7 +29,7 @@ pub(super) struct ServingArguments {
 
     /// Print a line of JSON per session instead of text
     #[arg(long)]
-    json: bool,
+    pub(super) json: bool,
 }
 
 impl ServingArguments {

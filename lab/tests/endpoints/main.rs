@@ -156,7 +156,7 @@ fn the_sensors_of_the_scene_are_those_of_every_rig() {
 #[test]
 fn a_rig_in_real_time_gives_the_same_sigma_within_5e_3() {
     let direct = identified(&["--rig", "built-in"]);
-    let rig = Server::start(&["rig", "--json"]);
+    let rig = Server::start(&["rig", "--json", "--silence", "5"]);
     let folder = tempfile::tempdir().unwrap();
     let arguments = [
         "identify",
@@ -188,4 +188,23 @@ fn a_rig_in_real_time_gives_the_same_sigma_within_5e_3() {
         "{late} of {counted}, {code:?}: {message}"
     );
     assert_eq!(code == Some(3), message.contains("did not keep its time"), "{message}");
+}
+
+#[test]
+fn from_a_rig_that_shows_its_sensors_only_and_is_at_rest_lock_and_backbone_are_the_exact_ones() {
+    let direct = identified(&["--rig", "built-in"]);
+    let rig = || Server::start(&["rig", "--lock-step", "--sensors-only"]);
+    let first = rig();
+    assert!((sigma(&identified(&["--rig", &first.1])) - sigma(&direct)).abs() < 2e-3);
+    let (second, folder) = (rig(), tempfile::tempdir().unwrap());
+    let few = ["--set", "backbone.points=3", "--set", "backbone.C_to=0.6"];
+    let arguments = ["backbone", "--json", "--out", folder.path().to_str().unwrap()];
+    let done = vines(&with_settings(&[&arguments[..], &few, &["--rig", &second.1]].concat()));
+    let found: Value = serde_json::from_slice(&done.stdout).unwrap();
+    let error = |point: &Value| point["exact"]["sigma"].as_f64().unwrap().abs();
+    let errors: Vec<f64> = found["points"].as_array().unwrap().iter().map(error).collect();
+    assert!(
+        errors.len() == 3 && errors.iter().all(|error| *error < 2e-3),
+        "{errors:?}"
+    );
 }

@@ -97,7 +97,7 @@ fn a_server_ends_in_order_on_a_signal() {
 #[test]
 fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() {
     for (signal, mode) in [
-        ("-INT", &["rig", "--json"][..]),
+        ("-INT", &["rig", "--json", "--silence", "5"][..]),
         ("-TERM", &["rig", "--json", "--lock-step"]),
     ] {
         let rig = Server::start(mode);
@@ -111,7 +111,7 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
             .stderr(Stdio::piped())
             .spawn()
             .unwrap();
-        std::thread::sleep(std::time::Duration::from_millis(1500));
+        std::thread::sleep(std::time::Duration::from_secs(3));
         let pid = client.id().to_string();
         assert!(Command::new("kill").args([signal, &pid]).status().unwrap().success());
         let output = client.wait_with_output().unwrap();
@@ -135,4 +135,20 @@ fn backbone_finds_that_it_cannot_write_before_it_drives_the_rig() {
         2,
         "cannot write to",
     );
+}
+
+#[test]
+fn a_sensor_that_is_unplugged_ends_identify_and_backbone_with_its_reason() {
+    let name = "response sensor dead@";
+    for (command, seconds, part) in [
+        ("identify", 0.01, "does not answer"),
+        ("backbone", 6.0, "a sensor, the drive"),
+    ] {
+        let fault = format!("{name}{seconds}");
+        let rig = Server::start(&["rig", "--lock-step", "--sensors-only", "--fault", &fault]);
+        let out = tempfile::tempdir().unwrap();
+        let arguments = [command, "--out", out.path().to_str().unwrap(), "--rig", &rig.1];
+        fails(&with_settings(&arguments), 1, part);
+        assert!(rig.report().contains("ended by the client"));
+    }
 }

@@ -94,7 +94,7 @@ impl Log {
         self.0.taken.get()
     }
 
-    fn has_begun(&self) -> bool {
+    pub fn has_begun(&self) -> bool {
         self.taken() >= self.0.at
     }
 
