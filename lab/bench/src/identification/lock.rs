@@ -66,9 +66,9 @@ impl Lock {
 /// Most periods before the release that are evaluated.
 const MOST: f64 = 240.0;
 /// Largest relative deviation of the amplitude from that of the hold, unless it is noise.
-const SPREAD: f64 = 0.03;
+const SPREAD: f64 = 0.008;
 /// Largest phase error of a period, rad, for the same.
-const PHASE_RANGE: f64 = 0.3;
+const PHASE_RANGE: f64 = 0.1;
 /// Fewest periods of an estimate.
 const FEWEST: usize = 8;
 /// Difference, in standard uncertainties, that still counts as noise.
