@@ -6,6 +6,7 @@ mod cycle;
 mod decay;
 mod fit;
 mod lock;
+mod motion;
 mod regime;
 mod response;
 

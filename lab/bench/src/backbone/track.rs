@@ -46,8 +46,7 @@ pub fn track(
     };
     let mut scans: Vec<Vec<Point>> = vec![Vec::new(); phases.len()];
     // The last point, and the phase at which it was held.
-    let mut last: Option<(Point, f64)> = None;
-    let mut ended = None;
+    let (mut last, mut ended) = (None::<(Point, f64)>, None);
     'levels: for (n, &level) in levels.iter().enumerate() {
         progress(n, levels.len());
         for k in 0..phases.len() {
@@ -55,9 +54,8 @@ pub fn track(
             let scan = if n % 2 == 0 { k } else { phases.len() - 1 - k };
             let order = &Order { level, phase: phases[scan], known: known(&scans[scan], last) };
             // The last level is held: a crossing would go beyond it.
-            let may_cross = phases.len() == 1 && n + 1 < levels.len();
-            let crossed = last.filter(|_| may_cross).map(|(last, _)| last);
-            let crossing = crossed.and_then(|last| Some((last, sweep::periods(&bench, scene, order, &last)?)));
+            let crossed = last.filter(|_| phases.len() == 1 && n + 1 < levels.len());
+            let crossing = crossed.and_then(|(last, _)| Some((last, sweep::periods(&bench, scene, order, &last)?)));
             let next = match crossing {
                 Some((last, periods)) => sweep::cross(&mut bench, scene, order, (&last, periods)),
                 None => go(&mut bench, scene, order, last),

@@ -20,6 +20,7 @@ use nalgebra::Complex;
 use vines_model::numerics::{Estimate, Line, Prior, Regression, mean};
 
 use super::Cycle;
+use super::motion::{Motion, motion};
 
 /// What is known of the backbone about a point in advance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -36,6 +37,14 @@ pub struct Slopes {
     pub phase: [f64; 2],
     /// Second derivatives of `E_R`, 1/m, and `omega_R`, rad/(s m²), over the amplitude; 0 where they are not known.
     pub curvature: [f64; 2],
+}
+
+impl Slopes {
+    /// The part of a drive, or of its integral, that a phase beyond the one that is held adds to the balance of the amplitude.
+    fn beyond(&self, drive: Complex<f64>) -> f64 {
+        let [held, by_phase] = self.phase;
+        by_phase * (drive * Complex::from_polar(1.0, -held)).im
+    }
 }
 
 /// The two lines, fitted to some periods.
@@ -103,18 +112,11 @@ impl Balance {
         // The integral of A' is A. Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
         let [late, turned] = [1.0 + gain * slopes.drift[0], slopes.drift[1]];
-        let [held, by_phase] = slopes.phase;
-        let beyond = |work: Complex<f64>| by_phase * (work * Complex::from_polar(1.0, -held)).im;
-        let balanced = motion
-            .into_iter()
-            .zip(&drives)
-            .map(|(Motion { amplitude, phase, .. }, drive)| {
-                let phase = phase + (gain * drive.work.im - inertia * drive.force.re) / response - turned * amplitude;
-                (
-                    amplitude * late - inertia * drive.force.im - gain * (drive.work.re + beyond(drive.work)),
-                    phase,
-                )
-            });
+        let balanced = motion.into_iter().zip(&drives).map(|(one, Drive { force, work })| {
+            let worked = gain * (work.re + slopes.beyond(*work));
+            let phase = one.phase + (gain * work.im - inertia * force.re) / response - turned * one.amplitude;
+            (one.amplitude * late - inertia * force.im - worked, phase)
+        });
         let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
         let prior = |[value, uncertainty]: [f64; 2]| [Prior { coefficient: 2, value, uncertainty }];
         let [slope, width] = slopes.base;
@@ -123,7 +125,7 @@ impl Balance {
         let remainders = remainders(cycles, &drives, [inertia, gain, response], slopes);
         let phase_noise = (noise / response).hypot(base_noise / base);
         let excess = drive.excess.max(turning.excess);
-        let of = |value: f64, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
+        let of = |value, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
         Some(Self {
             periods: cycles.len(),
             response: of(response, noise),
@@ -203,16 +205,9 @@ fn remainders(cycles: &[Cycle], drives: &[Drive], [inertia, gain, response]: [f6
     let slope = |values: Vec<f64>| Line::fit(&values).slope * cycles.len() as f64 / duration;
     let inertial = REMAINDER * inertia * slope(drives.iter().map(|drive| drive.force.re).collect());
     let drift = slopes.late * slope(cycles.iter().map(Cycle::amplitude).collect());
-    let [held, by_phase] = slopes.phase;
-    let aside = mean(
-        drives
-            .iter()
-            .map(|drive| (drive.force * Complex::from_polar(1.0, -held)).im),
-    );
+    let aside = mean(drives.iter().map(|drive| slopes.beyond(drive.force)));
     [
-        (inertial / gain)
-            .hypot(drift * slopes.drift[0])
-            .hypot(ASIDE * by_phase * aside),
+        (inertial / gain).hypot(drift * slopes.drift[0]).hypot(ASIDE * aside),
         (inertial / response).hypot(drift * slopes.drift[1]),
     ]
 }
@@ -268,52 +263,6 @@ fn drives(cycles: &[Cycle], motion: &[Motion], calibration: f64) -> Vec<Drive> {
             Drive {
                 force: share * middle.norm(),
                 work: before + share * cycle.duration * (0.5 * middle.norm() - growth / 6.0),
-            }
-        })
-        .collect()
-}
-
-/// The response of a period.
-struct Motion {
-    /// m
-    amplitude: f64,
-    /// rad
-    phase: f64,
-    /// Phase less that of the fit, rad.
-    correction: f64,
-}
-
-/// Amplitudes and phases of the response, continuous from period to period, without the influence of their own drift.
-///
-/// Over one period from the phase 0 on, a drift z' of the complex amplitude per radian changes the fitted amplitude by
-/// -i conj(z')/2.
-fn motion(cycles: &[Cycle]) -> Vec<Motion> {
-    let mut before = cycles[0].response[0];
-    let mut turned = before.arg();
-    let phases: Vec<f64> = cycles
-        .iter()
-        .map(|cycle| {
-            turned += (cycle.response[0] * before.conj()).arg();
-            before = cycle.response[0];
-            cycle.drive_phase + turned
-        })
-        .collect();
-    let last = cycles.len() - 1;
-    (0..=last)
-        .map(|n| {
-            let (from, to) = (n.saturating_sub(1), (n + 1).min(last));
-            let time = (cycles[to].time - cycles[from].time) * cycles[n].omega;
-            let growth = (cycles[to].amplitude() - cycles[from].amplitude()) / time;
-            let amplitude = cycles[n].amplitude();
-            // The frequency of the drive may jump from period to period; that of the response does not.
-            let turning = amplitude * ((phases[to] - phases[from]) / time - 1.0);
-            let z = cycles[n].response[0];
-            let drift = Complex::new(growth, turning) * z / amplitude;
-            let correction = Complex::new(0.0, 0.5) * drift.conj() / z;
-            Motion {
-                amplitude: amplitude * (1.0 + correction.re),
-                phase: phases[n] + correction.im,
-                correction: correction.im,
             }
         })
         .collect()
