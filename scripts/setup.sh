@@ -33,10 +33,11 @@ progress() {
     fi
 }
 
-# environment FOLDER REQUIREMENTS [options of pip]: a Python environment with the packages of a requirements file. It is
-# created again when the file changes. If the packages cannot be installed, it returns 1 and leaves pip's output in FOLDER.log.
+# environment FOLDER REQUIREMENTS [options of pip]: a Python environment with the packages of a requirements file. Those of the
+# scripts have the hash of every package. It is created again when the file changes. If the packages cannot be installed, it returns 1 and leaves pip's output in FOLDER.log.
 environment() {
-    local folder=$1 requirements=$2
+    local folder=$1 requirements=$2 hashes=()
+    [ "${requirements%/*}" != scripts ] || hashes=(--require-hashes)
     cmp -s "$requirements" "$folder/requirements.txt" && return
     command -v python3 >/dev/null || fail "python3 was not found; Python 3.11 or newer is needed"
     python3 -c 'import sys; sys.exit(sys.version_info < (3, 11))' ||
@@ -46,7 +47,7 @@ environment() {
     mkdir -p "$(dirname "$folder")"
     python3 -m venv "$folder" >/dev/null 2>&1 || { rm -rf "$folder"; python3 -m virtualenv -q "$folder" >/dev/null 2>&1; } ||
         fail "python3 cannot create a virtual environment; install python3-venv (name of the Debian package) or virtualenv"
-    if ! "$folder/bin/python" -m pip install --quiet --disable-pip-version-check "${@:3}" -r "$requirements" >"$folder.log" 2>&1
+    if ! "$folder/bin/python" -m pip install --quiet --disable-pip-version-check "${hashes[@]}" "${@:3}" -r "$requirements" >"$folder.log" 2>&1
     then
         rm -rf "$folder"
         return 1

@@ -20,7 +20,7 @@ fn run(periods: usize, mut see: impl FnMut(f64, f64)) -> Plant {
         sample_time: TAU / SAMPLES as f64,
         omega_min: 0.9,
         omega_max: 1.1,
-        damping_rate: 0.5 * EPSILON * LAMBDA,
+        damping_rate: Some(0.5 * EPSILON * LAMBDA),
         ..Config::for_resonance(1.0, EPSILON * 1.1)
     }
     .build()

@@ -12,33 +12,33 @@
 //! drive stays within its limit and its ramp rate. It never falls below a fifth of its integral part: without a drive
 //! the phase is undefined.
 
-use core::f64::consts::TAU;
+use crate::real::consts::TAU;
 
 use crate::config::Config;
 use crate::drive::Drive;
-use crate::gains::Gains;
+use crate::real::{self, Real};
 
 /// Lowest drive, as a share of its integral part.
-const MIN_SHARE: f64 = 0.2;
+const MIN_SHARE: Real = 0.2;
 
 /// Coefficients of the loop.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct AmplitudeLoop {
     /// Proportional gain, m of drive per m of response.
-    proportional: f64,
+    proportional: Real,
     /// Integral gain, m of drive per m of response and sample.
-    integral: f64,
+    integral: Real,
     /// Feedforward, m of drive for a growth of the response by 1 m per sample.
-    feedforward: f64,
+    feedforward: Real,
     /// Share of its error that the detector corrects per sample.
-    detector_step: f64,
+    detector_step: Real,
     /// Largest drive amplitude, m.
-    amplitude_max: f64,
+    amplitude_max: Real,
     /// Largest change of the drive amplitude per sample, m.
-    max_change: f64,
+    max_change: Real,
     /// s
-    sample_time: f64,
+    sample_time: Real,
 }
 
 /// A change of the response amplitude's setpoint.
@@ -46,15 +46,15 @@ pub struct AmplitudeLoop {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Move {
     /// New setpoint of the response amplitude, m; above 0.
-    pub response: f64,
+    pub response: Real,
     /// Duration, s; 0: step change.
-    pub duration: f64,
+    pub duration: Real,
     /// Expected change of the drive amplitude, m; 0 if unknown.
-    pub amplitude: f64,
+    pub amplitude: Real,
     /// Expected change of the frequency, rad/s; 0 if unknown.
-    pub omega: f64,
+    pub omega: Real,
     /// Growth of the setpoint at the end, m/s, at which it goes on from there; 0 to hold it.
-    pub growth: f64,
+    pub growth: Real,
 }
 
 /// State of the loop while it controls the response.
@@ -64,26 +64,26 @@ pub struct AmplitudeState {
     /// The present trajectory.
     trajectory: Move,
     /// Setpoint at the start of the trajectory, m.
-    from: f64,
+    from: Real,
     /// Length of the trajectory, samples.
     samples: u64,
     /// Samples since the start of the trajectory.
     taken: u64,
     /// Growth at the start and at the end, as multiples of the mean growth of the trajectory.
-    growths: [f64; 2],
+    growths: [Real; 2],
     /// Growth in the last sample, m.
-    growth: f64,
+    growth: Real,
     /// Present setpoint of the response amplitude, m.
-    setpoint: f64,
+    setpoint: Real,
     /// Reading of the detector that the setpoint leads to, m.
-    expected: f64,
+    expected: Real,
     /// Integral part of the drive, m.
-    integral: f64,
+    integral: Real,
 }
 
 impl AmplitudeState {
     /// A constant setpoint: the present reading `response`, m, at the drive `amplitude`, m.
-    pub fn constant(response: f64, amplitude: f64) -> Self {
+    pub fn constant(response: Real, amplitude: Real) -> Self {
         Self {
             trajectory: Move { response, ..Move::default() },
             from: response,
@@ -98,13 +98,13 @@ impl AmplitudeState {
     }
 
     /// Starts a trajectory at the present setpoint, with its present growth.
-    pub fn start(&mut self, trajectory: Move, sample_time: f64) {
+    pub fn start(&mut self, trajectory: Move, sample_time: Real) {
         self.from = self.setpoint;
         self.trajectory = trajectory;
-        self.samples = libm::ceil(trajectory.duration / sample_time) as u64;
+        self.samples = real::ceil(trajectory.duration / sample_time) as u64;
         self.taken = 0;
-        let mean = (trajectory.response - self.from) / self.samples as f64;
-        let relative = |growth: f64| Some(growth / mean).filter(|growth| growth.is_finite());
+        let mean = (trajectory.response - self.from) / self.samples as Real;
+        let relative = |growth: Real| Some(growth / mean).filter(|growth| growth.is_finite());
         self.growths = [self.growth, trajectory.growth * sample_time].map(|growth| relative(growth).unwrap_or(0.0));
         if self.samples == 0 {
             self.setpoint = trajectory.response;
@@ -113,7 +113,7 @@ impl AmplitudeState {
     }
 
     /// Present setpoint of the response amplitude, m.
-    pub fn setpoint(&self) -> f64 {
+    pub fn setpoint(&self) -> Real {
         self.setpoint
     }
 
@@ -124,14 +124,14 @@ impl AmplitudeState {
 
     /// Advances the trajectory by one sample. Returns the share of the trajectory in this sample, and the growth of the
     /// setpoint, m.
-    fn advance(&mut self, sample_time: f64) -> (f64, f64) {
+    fn advance(&mut self, sample_time: Real) -> (Real, Real) {
         if self.has_arrived() {
             self.growth = self.trajectory.growth * sample_time;
             self.setpoint += self.growth;
             return (0.0, self.growth);
         }
         let before = self.setpoint;
-        let share = |taken: u64| smooth(taken as f64 / self.samples as f64, self.growths);
+        let share = |taken: u64| smooth(taken as Real / self.samples as Real, self.growths);
         let progress = share(self.taken + 1) - share(self.taken);
         self.taken += 1;
         self.setpoint = if self.has_arrived() {
@@ -145,21 +145,21 @@ impl AmplitudeState {
 }
 
 /// Rises from 0 to 1, with the slopes `begin` and `end` at the ends; velocity and, between equal slopes, acceleration are continuous there.
-fn smooth(x: f64, [begin, end]: [f64; 2]) -> f64 {
+fn smooth(x: Real, [begin, end]: [Real; 2]) -> Real {
     let ramp = begin * x + 0.5 * (end - begin) * x * x;
-    ramp + (1.0 - 0.5 * (begin + end)) * (x - libm::sin(TAU * x) / TAU)
+    ramp + (1.0 - 0.5 * (begin + end)) * (x - real::sin(TAU * x) / TAU)
 }
 
 impl AmplitudeLoop {
     /// The loop of a configuration and its drive.
     pub fn new(config: &Config, drive: &Drive) -> Self {
-        let gains = Gains::from_bandwidth(config.bandwidth, config.damping_rate);
+        let gains = config.gains();
         let (gain, sample_time) = (config.response_gain, config.sample_time);
         Self {
             proportional: gains.proportional / gain,
             integral: gains.integral * sample_time / gain,
             feedforward: 1.0 / (gain * sample_time),
-            detector_step: -libm::expm1(-config.bandwidth * sample_time),
+            detector_step: -real::expm1(-config.bandwidth * sample_time),
             amplitude_max: drive.amplitude_max,
             max_change: drive.ramp_step,
             sample_time,
@@ -167,14 +167,14 @@ impl AmplitudeLoop {
     }
 
     /// Sample time, s.
-    pub fn sample_time(&self) -> f64 {
+    pub fn sample_time(&self) -> Real {
         self.sample_time
     }
 
     /// One sample. `reading` is the measured response amplitude, m, or `None` if it is not valid: then only the feedforward
     /// acts. Returns the drive amplitude, m, which differs from `before` at most by the ramp's rate, and the shift of the
     /// frequency, rad/s.
-    pub fn follow(&self, state: &mut AmplitudeState, before: f64, reading: Option<f64>) -> (f64, f64) {
+    pub fn follow(&self, state: &mut AmplitudeState, before: Real, reading: Option<Real>) -> (Real, Real) {
         let (progress, growth) = state.advance(self.sample_time);
         state.expected += self.detector_step * (state.setpoint - state.expected);
         let planned = state.integral + progress * state.trajectory.amplitude;
@@ -194,5 +194,5 @@ impl AmplitudeLoop {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests;

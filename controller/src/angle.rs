@@ -1,10 +1,11 @@
 //! Angles and small complex numbers.
 
-use core::f64::consts::{PI, TAU};
+use crate::real::consts::{PI, TAU};
+use crate::real::{self, Real};
 
 /// The angle `x` modulo 2 pi, rad, in [-pi, pi].
-pub fn wrap(x: f64) -> f64 {
-    (x - TAU * libm::rint(x / TAU)).clamp(-PI, PI)
+pub fn wrap(x: Real) -> Real {
+    (x - TAU * real::rint(x / TAU)).clamp(-PI, PI)
 }
 
 /// A complex number. A rotor is `exp(i phase)`.
@@ -14,14 +15,14 @@ pub fn wrap(x: f64) -> f64 {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Complex {
-    pub re: f64,
-    pub im: f64,
+    pub re: Real,
+    pub im: Real,
 }
 
 impl Complex {
     /// `exp(i angle)`, angle in rad.
-    pub fn unit(angle: f64) -> Self {
-        let (im, re) = libm::sincos(angle);
+    pub fn unit(angle: Real) -> Self {
+        let (im, re) = real::sincos(angle);
         Self { re, im }
     }
 
@@ -32,16 +33,16 @@ impl Complex {
         }
     }
 
-    pub fn magnitude(self) -> f64 {
-        libm::hypot(self.re, self.im)
+    pub fn magnitude(self) -> Real {
+        real::hypot(self.re, self.im)
     }
 
-    pub fn argument(self) -> f64 {
-        libm::atan2(self.im, self.re)
+    pub fn argument(self) -> Real {
+        real::atan2(self.im, self.re)
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
 

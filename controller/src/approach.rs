@@ -14,35 +14,36 @@
 //! `1 + gain` times as fast.
 
 use crate::config::Config;
+use crate::real::{self, Real};
 
 /// Rate of the observer, relative to the rate of the approach in the linear regime.
-const OBSERVER_RATE: f64 = 4.0;
+const OBSERVER_RATE: Real = 4.0;
 /// Range of the shaped drive, relative to its setpoint: wide enough to move the response, narrow enough to stay in the regime.
-const DRIVE_RANGE: [f64; 2] = [0.25, 3.0];
+const DRIVE_RANGE: [Real; 2] = [0.25, 3.0];
 
 /// A difference between setpoint and holding drive, relative to the setpoint, that changes its sign is a swing if it exceeds this.
-const LARGE_SWING: f64 = 0.1;
+const LARGE_SWING: Real = 0.1;
 /// Factor of the gain for each swing. Swings that persist mean that the response changes faster than the observer follows.
-const SWING_FACTOR: f64 = 0.7;
+const SWING_FACTOR: Real = 0.7;
 
 /// An approach that takes this long swings, in time constants of the structure; from then on the gain falls.
-const LATE: f64 = 20.0;
+const LATE: Real = 20.0;
 /// Time constant with which it falls, in those of the structure.
-const PATIENCE: f64 = 8.0;
+const PATIENCE: Real = 8.0;
 
 /// Coefficients of the approach.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Approach {
-    gain: f64,
+    gain: Real,
     /// rad/s
-    damping_rate: f64,
+    damping_rate: Real,
     /// Share of its error that the observer corrects per sample.
-    step: f64,
+    step: Real,
     /// Share of its error that the detector corrects per sample.
-    detector_step: f64,
+    detector_step: Real,
     /// `w/g`, m of drive per m of response.
-    slope: f64,
+    slope: Real,
 }
 
 /// State of the observer.
@@ -50,14 +51,14 @@ pub struct Approach {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct ApproachState {
     /// The drive in phase with the response's velocity, m, with the lag of the detector, and with that of the observer.
-    detected: f64,
-    drive: f64,
+    detected: Real,
+    drive: Real,
     /// Response amplitude with the lag of the observer, m.
-    pub response: f64,
+    pub response: Real,
     /// The drive that would hold the response, m.
-    pub holding: f64,
+    pub holding: Real,
     /// Largest relative difference between the setpoint and the holding drive since it last changed its sign.
-    swing: f64,
+    swing: Real,
     /// Number of large swings.
     swings: i32,
 }
@@ -65,21 +66,22 @@ pub struct ApproachState {
 impl Approach {
     /// The approach of a configuration.
     pub fn new(config: &Config) -> Self {
-        let rate = (OBSERVER_RATE * (1.0 + config.approach_gain) * config.damping_rate).min(config.bandwidth);
+        let damping_rate = config.damping_rate.unwrap_or(0.0);
+        let rate = (OBSERVER_RATE * (1.0 + config.approach_gain) * damping_rate).min(config.bandwidth);
         let rate = if rate > 0.0 { rate } else { config.bandwidth };
         Self {
             gain: config.approach_gain,
-            damping_rate: config.damping_rate,
-            step: -libm::expm1(-rate * config.sample_time),
-            detector_step: -libm::expm1(-config.bandwidth * config.sample_time),
+            damping_rate,
+            step: -real::expm1(-rate * config.sample_time),
+            detector_step: -real::expm1(-config.bandwidth * config.sample_time),
             slope: rate / config.response_gain,
         }
     }
 
     /// Updates the observer with the drive amplitude and the response amplitude, m, and the phase error, rad. Returns the
     /// drive that would hold the response, m.
-    pub fn observe(&self, state: &mut ApproachState, drive: f64, response: f64, error: f64) -> f64 {
-        state.detected += self.detector_step * (drive * libm::cos(error) - state.detected);
+    pub fn observe(&self, state: &mut ApproachState, drive: Real, response: Real, error: Real) -> Real {
+        state.detected += self.detector_step * (drive * real::cos(error) - state.detected);
         state.drive += self.step * (state.detected - state.drive);
         state.response += self.step * (response - state.response);
         state.holding = state.drive - self.slope * (response - state.response);
@@ -87,12 +89,12 @@ impl Approach {
     }
 
     /// The drive, m, on the way to `setpoint`, m, where `holding`, m, would hold the response.
-    pub fn shape(&self, state: &mut ApproachState, setpoint: f64, holding: f64, elapsed: f64) -> f64 {
+    pub fn shape(&self, state: &mut ApproachState, setpoint: Real, holding: Real, elapsed: Real) -> Real {
         let [low, high] = DRIVE_RANGE.map(|share| share * setpoint);
         let missing = setpoint - holding;
         let late = (self.damping_rate * elapsed - LATE).max(0.0);
-        let patience = libm::exp(-late / PATIENCE);
-        let gain = patience * self.gain * libm::pow(SWING_FACTOR, f64::from(state.swings));
+        let patience = real::exp(-late / PATIENCE);
+        let gain = patience * self.gain * real::pow(SWING_FACTOR, state.swings as Real);
         if missing * state.swing < 0.0 {
             state.swings += i32::from(state.swing.abs() > LARGE_SWING * setpoint);
             state.swing = 0.0;

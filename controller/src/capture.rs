@@ -10,36 +10,37 @@
 //! a constant drive. The first repetition ends the descent below `captured_max`; the others go on until the response needs more
 //! than the setpoint of the drive: from there, the setpoint leads it down to the orbit above the fold.
 
-use core::f64::consts::TAU;
+use crate::real::consts::TAU;
 
 use crate::amplitude_loop::{AmplitudeState, Move};
 use crate::config::Config;
+use crate::real::{self, Real};
 
 /// Phase error, rad, up to which the loop is near phase resonance.
-const NEAR: f64 = 0.35;
+const NEAR: Real = 0.35;
 /// Periods near phase resonance before the response is raised, and above the level before the capture is complete: the particle
 /// needs a few impacts to join the motion.
-const PERIODS: f64 = 5.0;
+const PERIODS: Real = 5.0;
 /// Share of the level at which it counts as reached: the impacts make the response fluctuate.
-const REACHED: f64 = 0.97;
+const REACHED: Real = 0.97;
 /// Duration of the rise, periods; a limited drive extends it.
-const RISE: f64 = 20.0;
+const RISE: Real = 20.0;
 
 /// Response at which the first descents end, as a share of the largest wanted one.
-const BELOW: f64 = 0.97;
+const BELOW: Real = 0.97;
 /// Response above which the motion is another one, as a share of the largest wanted one.
-const ABOVE: f64 = 1.0005;
+const ABOVE: Real = 1.0005;
 /// Periods in which the response falls by a factor of e on the descent, if the frequency follows.
-const DESCENT: f64 = 60.0;
+const DESCENT: Real = 60.0;
 /// Phase error, rad, at which the descent waits for the frequency: near the fold the resonance frequency changes fast.
-const FOLLOWED: f64 = 0.1;
+const FOLLOWED: Real = 0.1;
 /// Smallest drive of the descent, as a share of that which holds the response: without a drive the phase is undefined.
-const LEAST: f64 = 0.4;
+const LEAST: Real = 0.4;
 /// Growth of the response on the descent by which the motion is lost.
-const LOST: f64 = 1.15;
+const LOST: Real = 1.15;
 /// Smallest power that the impacts take, as a share of the largest before, of a motion that is not lost: at the lower end of the
 /// symmetric motion it is a third.
-const KEPT: f64 = 0.2;
+const KEPT: Real = 0.2;
 /// Largest number of repetitions. The last one accepts any motion.
 const REPETITIONS: u32 = 5;
 
@@ -48,19 +49,19 @@ const REPETITIONS: u32 = 5;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Capture {
     /// Response amplitude at which impacts occur, m; `None` without a capture.
-    level: Option<f64>,
+    level: Option<Real>,
     /// Largest response amplitude of the wanted motion, m.
-    largest: f64,
+    largest: Real,
     /// Setpoint of the drive, m.
-    amplitude: f64,
+    amplitude: Real,
     /// Largest drive, m.
-    amplitude_max: f64,
+    amplitude_max: Real,
     /// Drive, m, that the damping of the structure needs for a response of 1 m.
-    damping: f64,
+    damping: Real,
     /// Drive, m, that is missing for a response of 1 m to fall at the rate of the descent.
-    fall: f64,
+    fall: Real,
     /// s
-    sample_time: f64,
+    sample_time: Real,
 }
 
 /// Progress of the capture.
@@ -68,11 +69,11 @@ pub struct Capture {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct CaptureState {
     /// Periods for which the present condition has held.
-    periods: f64,
+    periods: Real,
     /// Smallest response amplitude on the descent, m.
-    lowest: Option<f64>,
+    lowest: Option<Real>,
     /// Largest product of the response and the drive that the impacts need, m².
-    taken: f64,
+    taken: Real,
     /// Number of repetitions.
     repetitions: u32,
 }
@@ -88,29 +89,29 @@ impl CaptureState {
 #[derive(Clone, Copy, Debug)]
 pub struct Observation {
     /// Frequency, rad/s.
-    pub omega: f64,
+    pub omega: Real,
     /// Drive amplitude, m.
-    pub drive: f64,
+    pub drive: Real,
     /// Response amplitude, m.
-    pub response: f64,
+    pub response: Real,
     /// Its mean over the lag of the observer, m.
-    pub mean: f64,
+    pub mean: Real,
     /// Drive that would hold the response, m.
-    pub holding: f64,
+    pub holding: Real,
     /// Phase error, rad, if it is valid.
-    pub error: Option<f64>,
+    pub error: Option<Real>,
 }
 
 impl Capture {
     /// The capture of a configuration.
     pub fn new(config: &Config) -> Self {
-        let largest = config.captured_max.unwrap_or(f64::INFINITY);
+        let largest = config.captured_max.unwrap_or(Real::INFINITY);
         Self {
             level: config.capture_response,
             largest,
             amplitude: config.amplitude,
             amplitude_max: config.amplitude_limit(),
-            damping: config.damping_rate / config.response_gain,
+            damping: config.damping_rate.unwrap_or(0.0) / config.response_gain,
             fall: config.omega_start / (TAU * DESCENT * config.response_gain),
             sample_time: config.sample_time,
         }
@@ -122,22 +123,22 @@ impl Capture {
     }
 
     /// Whether the motion of this mean response amplitude, m, is another one, which calls for a repetition.
-    pub fn has_escaped(&self, state: &CaptureState, mean: f64) -> bool {
+    pub fn has_escaped(&self, state: &CaptureState, mean: Real) -> bool {
         self.is_on() && mean > ABOVE * self.largest && state.repetitions < REPETITIONS
     }
 
     /// The drive, m, of a descent and of the approach after a repetition; `None` before. `holding`, m, would hold the response, m,
     /// at the phase error, rad.
-    pub fn drive(&self, state: &CaptureState, holding: f64, response: f64, error: f64) -> Option<f64> {
+    pub fn drive(&self, state: &CaptureState, holding: Real, response: Real, error: Real) -> Option<Real> {
         let follows = (1.0 - error.abs() / FOLLOWED).max(0.0);
-        let fall = follows * self.fall * response / f64::from(state.repetitions.max(2) - 1);
+        let fall = follows * self.fall * response / (state.repetitions.max(2) - 1) as Real;
         let least = (holding - fall).max(LEAST * holding);
         let in_phase = match state.lowest {
             Some(_) => least,
             None if state.repetitions > 0 => least.max(self.amplitude),
             None => return None,
         };
-        Some((in_phase / libm::cos(error)).min(self.amplitude_max))
+        Some((in_phase / real::cos(error)).min(self.amplitude_max))
     }
 
     /// One sample: starts the amplitude loop near phase resonance, then the descent. Returns whether the capture is complete.
@@ -158,7 +159,7 @@ impl Capture {
         &self,
         state: &mut CaptureState,
         amplitude_loop: &mut Option<AmplitudeState>,
-        level: f64,
+        level: Real,
         seen: &Observation,
     ) -> bool {
         let is_rising = amplitude_loop.is_some();
@@ -189,7 +190,7 @@ impl Capture {
         false
     }
 
-    fn descend(&self, state: &mut CaptureState, lowest: f64, seen: &Observation) -> bool {
+    fn descend(&self, state: &mut CaptureState, lowest: Real, seen: &Observation) -> bool {
         state.lowest = Some(lowest);
         let is_below = seen.mean < BELOW * self.largest;
         let taken = (seen.holding - self.damping * seen.mean) * seen.mean;
@@ -214,7 +215,7 @@ impl Capture {
     }
 
     /// Periods per sample.
-    fn periods(&self, seen: &Observation) -> f64 {
+    fn periods(&self, seen: &Observation) -> Real {
         seen.omega * self.sample_time / TAU
     }
 }

@@ -1,11 +1,12 @@
 //! Checks of a configuration: the range of each parameter, and the relations between them.
 
-use core::f64::consts::PI;
+use crate::real::consts::PI;
 
 use crate::config::Config;
 use crate::detector::PhaseDetector;
 use crate::error::{ConfigError, Quantity};
 use crate::parameters::PARAMETERS;
+use crate::real::Real;
 
 impl Config {
     /// Refuses the first parameter that is out of its range or contradicts another.
@@ -25,8 +26,8 @@ impl Config {
 
     /// Largest bandwidth of the detector, rad/s, for this sample time and number of harmonics.
     #[must_use]
-    pub fn bandwidth_max(&self) -> f64 {
-        1.0 / (PhaseDetector::new(self).coefficients() as f64 * self.sample_time)
+    pub fn bandwidth_max(&self) -> Real {
+        1.0 / (PhaseDetector::new(self).coefficients() as Real * self.sample_time)
     }
 
     /// Order of the highest harmonic of the detector. The sampling must resolve it up to `omega_max`.
@@ -49,8 +50,12 @@ impl Config {
             self.amplitude <= self.amplitude_limit(),
             "a finite number, 0 or above and at most amplitude_max",
         )?;
-        Quantity::new("base_bandwidth", self.base_bandwidth, "rad/s")
-            .check(self.base_bandwidth <= self.bandwidth, "between 0 and bandwidth")
+        match self.base_bandwidth {
+            Some(wide) if wide > self.bandwidth => {
+                Err(Quantity::new("base_bandwidth", wide, "rad/s").refuse("above 0 and at most bandwidth, or none"))
+            }
+            _ => Ok(()),
+        }
     }
 
     fn check_detector(&self) -> Result<(), ConfigError> {
@@ -59,7 +64,7 @@ impl Config {
             detector.total_step() <= 1.0,
             "lower: (2 harmonics + 1) bandwidth sample_time must stay below 1",
         )?;
-        let highest = self.highest_harmonic() as f64;
+        let highest = self.highest_harmonic() as Real;
         Quantity::new("sample_time", self.sample_time, "s").check(
             self.omega_max * self.sample_time * highest < PI,
             "more than two samples per period of the highest harmonic at omega_max",

@@ -1,6 +1,9 @@
 //! The configuration, in SI units.
 
-use core::f64::consts::{FRAC_PI_2, TAU};
+use crate::real::consts::{FRAC_PI_2, TAU};
+
+use crate::gains::Gains;
+use crate::real::Real;
 
 /// Method by which amplitude and phase of the fundamental are estimated. The numbers are those of the FMU's `detector`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -24,19 +27,19 @@ pub enum Detector {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LockCriterion {
     /// Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
-    pub phase_tolerance: f64,
+    pub phase_tolerance: Real,
     /// Phase error, mean over a period, above which the lock is lost, rad; at least `phase_tolerance`.
-    pub unlock_tolerance: f64,
+    pub unlock_tolerance: Real,
     /// Largest relative drift of the frequency per period; where noise is larger than such a drift, the noise is accepted.
-    pub frequency_drift: f64,
+    pub frequency_drift: Real,
     /// Largest relative drift of the response amplitude per period.
-    pub amplitude_drift: f64,
+    pub amplitude_drift: Real,
     /// Time for which all conditions must hold, periods; rounded up to a multiple of 4.
     pub dwell: u32,
     /// Smallest share of the fundamental in the power of a valid signal, between 0 and 1. Noise has a small share.
-    pub coherence_min: f64,
+    pub coherence_min: Real,
     /// Smallest valid response amplitude, as a multiple of the drive amplitude setpoint. A zero response is never valid.
-    pub response_min: f64,
+    pub response_min: Real,
 }
 
 impl Default for LockCriterion {
@@ -59,28 +62,28 @@ impl Default for LockCriterion {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Config {
     /// Sample time, s.
-    pub sample_time: f64,
+    pub sample_time: Real,
     /// Frequency while the loop is open, rad/s.
-    pub omega_start: f64,
+    pub omega_start: Real,
     /// Lowest frequency, rad/s.
-    pub omega_min: f64,
+    pub omega_min: Real,
     /// Highest frequency, rad/s.
-    pub omega_max: f64,
+    pub omega_max: Real,
     /// Largest rate of change of the frequency, rad/s².
-    pub omega_rate: Option<f64>,
+    pub omega_rate: Option<Real>,
     /// Setpoint of the drive amplitude, m; tunable.
-    pub amplitude: f64,
+    pub amplitude: Real,
     /// Largest drive amplitude, m.
-    pub amplitude_max: Option<f64>,
+    pub amplitude_max: Option<Real>,
     /// Largest rate of change of the drive amplitude, m/s, in every ramp but the release: at the start, after a fault, to a new
     /// setpoint, and while the response amplitude is controlled. `None`: step changes.
-    pub ramp_rate: Option<f64>,
+    pub ramp_rate: Option<Real>,
     /// Rate of the drive ramp to 0 after `active` becomes false, m/s. `None`: switched off at once, as a free decay requires.
-    pub release_rate: Option<f64>,
-    /// Bandwidth of the control of the *measured* base amplitude, rad/s; 0: no control, for a shaker whose gain is known.
-    pub base_bandwidth: f64,
+    pub release_rate: Option<Real>,
+    /// Bandwidth of the control of the *measured* base amplitude, rad/s. `None`: no control, for a shaker whose gain is known.
+    pub base_bandwidth: Option<Real>,
     /// Setpoint of the phase of the response relative to the reference, rad; tunable.
-    pub phase_target: f64,
+    pub phase_target: Real,
     /// Method of the phase detector.
     pub detector: Detector,
     /// Number of harmonics of the adaptive filter, including the fundamental; 1 to [`MAX_HARMONICS`](crate::MAX_HARMONICS).
@@ -89,38 +92,39 @@ pub struct Config {
     /// has only odd ones.
     pub odd_only: bool,
     /// Bandwidth of the detector, rad/s: the tuning parameter, from which the gains follow.
-    pub bandwidth: f64,
-    /// Damping rate of the structure, rad/s (damping ratio times natural frequency); 0: unknown.
-    pub damping_rate: f64,
+    pub bandwidth: Real,
+    /// Damping rate of the structure, rad/s (damping ratio times natural frequency). `None`: unknown; the gains are those of an
+    /// undamped structure.
+    pub damping_rate: Option<Real>,
     /// Delay from the drive to the sample of the sensor, s. Used if no reference is connected. A rig with an oscillator
     /// of its own that receives `omega` from the first sample on has no delay; a rig that holds the samples of `drive`
     /// has a delay of half a sample.
-    pub delay: f64,
+    pub delay: Real,
     /// Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s. For an oscillator excited
     /// through its base: half the natural frequency in rad/s. Used only by
     /// [`PhaseLock::hold_response`](crate::PhaseLock::hold_response).
-    pub response_gain: f64,
+    pub response_gain: Real,
     /// How much faster the response approaches its steady state than under a constant drive: `1 + approach_gain` times. The
-    /// drive is shaped until the lock criterion is met, and constant from then on; 0: always constant.
-    pub approach_gain: f64,
+    /// drive is shaped by this gain until the lock criterion is met, and constant from then on.
+    pub approach_gain: Real,
     /// Response amplitude, m, at which impacts certainly occur. The response rises to it before the drive goes to its setpoint, so
     /// that a particle at rest joins the motion. `None`: the drive goes to its setpoint at once.
-    pub capture_response: Option<f64>,
+    pub capture_response: Option<Real>,
     /// Largest response amplitude, m, of the motion that is wanted. A captured motion is led below it, and captured again if it rises
     /// above it. `None`: any motion is wanted.
-    pub captured_max: Option<f64>,
+    pub captured_max: Option<Real>,
     /// Lock criterion.
     pub lock: LockCriterion,
     /// Reading of the response sensor above which the drive is switched off, m.
-    pub response_max: Option<f64>,
+    pub response_max: Option<Real>,
     /// Longest time from the end of the ramp to the lock, s. The time in which [`PhaseLock::hold_response`](crate::PhaseLock::hold_response)
     /// controls the response does not count.
-    pub acquire_timeout: Option<f64>,
+    pub acquire_timeout: Option<Real>,
     /// Longest time in the closed loop without a valid measurement, s: with too small an amplitude or too much noise.
-    pub signal_timeout: Option<f64>,
+    pub signal_timeout: Option<Real>,
     /// Largest difference between a reading and its prediction by the detector, as a share of the amplitude of the channel, beyond twice
     /// the differences of the last periods. `None`: any.
-    pub residual_max: Option<f64>,
+    pub residual_max: Option<Real>,
     /// Whether a sensor measures the base. Without it the internal oscillator with the configured `delay` is the reference.
     pub reference_connected: bool,
 }
@@ -132,7 +136,7 @@ impl Config {
     /// 2000 periods for the lock. Only the limit of the
     /// response must be set. The release is a step.
     #[must_use]
-    pub fn for_resonance(omega: f64, amplitude: f64) -> Self {
+    pub fn for_resonance(omega: Real, amplitude: Real) -> Self {
         Self {
             sample_time: TAU / omega / 100.0,
             omega_start: omega,
@@ -143,13 +147,13 @@ impl Config {
             amplitude_max: Some(4.0 * amplitude),
             ramp_rate: Some(4.0 * amplitude * omega),
             release_rate: None,
-            base_bandwidth: 0.0,
+            base_bandwidth: None,
             phase_target: -FRAC_PI_2,
             detector: Detector::Adaptive,
             harmonics: 3,
             odd_only: true,
             bandwidth: 0.1 * omega,
-            damping_rate: 0.0,
+            damping_rate: None,
             delay: 0.0,
             response_gain: 0.5 * omega,
             approach_gain: 0.0,
@@ -165,7 +169,12 @@ impl Config {
     }
 
     /// Largest drive amplitude, m; infinite without a limit.
-    pub(crate) fn amplitude_limit(&self) -> f64 {
-        self.amplitude_max.unwrap_or(f64::INFINITY)
+    pub(crate) fn amplitude_limit(&self) -> Real {
+        self.amplitude_max.unwrap_or(Real::INFINITY)
+    }
+
+    /// The gains of both loops.
+    pub(crate) fn gains(&self) -> Gains {
+        Gains::from_bandwidth(self.bandwidth, self.damping_rate.unwrap_or(0.0))
     }
 }

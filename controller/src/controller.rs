@@ -1,24 +1,22 @@
 //! The controller: one function per sample.
 
+mod closed_loop;
 mod output;
 
 use crate::amplitude_loop::{AmplitudeLoop, AmplitudeState, Move};
 use crate::approach::{Approach, ApproachState};
-use crate::capture::{Capture, CaptureState, Observation};
+use crate::capture::{Capture, CaptureState};
 use crate::config::Config;
 use crate::drive::Drive;
 use crate::error::{ConfigError, Quantity};
 use crate::gains::Gains;
 use crate::loop_filter::LoopFilter;
-use crate::range::NONE;
+use crate::real::Real;
 use crate::sensing::{Measurement, PresentDrive, Sensing};
 use crate::signals::{Input, Output};
 use crate::state::State;
 use crate::stationarity::{Dwell, Reading, Stationarity};
 use crate::supervisor::{Conditions, Fault, LoopState};
-
-/// Phase error, rad, up to which a larger drive certainly gives a larger response.
-const PHASE_RANGE: f64 = core::f64::consts::FRAC_PI_3;
 
 /// A checked configuration and its coefficients; only [`PhaseLock::retune`] changes it.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -85,7 +83,7 @@ impl PhaseLock {
     ///
     /// # Errors
     /// A value out of range; then nothing changes.
-    pub fn retune(&mut self, amplitude: f64, phase_target: f64) -> Result<(), ConfigError> {
+    pub fn retune(&mut self, amplitude: Real, phase_target: Real) -> Result<(), ConfigError> {
         *self = Config { amplitude, phase_target, ..self.config }.build()?;
         Ok(())
     }
@@ -101,11 +99,15 @@ impl PhaseLock {
         Quantity::new("amplitude", to.amplitude, "m").check(true, "a finite number")?;
         Quantity::new("omega", to.omega, "rad/s").check(true, "a finite number")?;
         Quantity::new("growth", to.growth, "m/s").check(true, "a finite number")?;
-        Quantity::new("amplitude_max", self.config.amplitude_max.unwrap_or(NONE), "m").check(
-            self.config.amplitude_max.is_some(),
-            "above 0 to control the response amplitude: the drive needs a limit",
-        )?;
-        Quantity::new("state", f64::from(state.loop_state as u8), "").check(
+        if self.config.amplitude_max.is_none() {
+            return Err(ConfigError {
+                name: "amplitude_max",
+                value: None,
+                unit: "m",
+                allowed: "above 0 to control the response amplitude: the drive needs a limit",
+            });
+        }
+        Quantity::new("state", (state.loop_state as u8) as Real, "").check(
             matches!(state.loop_state, LoopState::Acquiring | LoopState::Locked),
             "2 (acquiring) or 3 (locked): the response amplitude can be controlled only in a closed loop",
         )?;
@@ -116,6 +118,13 @@ impl PhaseLock {
             .start(to, self.amplitude_loop.sample_time());
         state.dwell = Dwell::default();
         Ok(())
+    }
+
+    /// Controls the drive amplitude again: the drive ramps to its setpoint.
+    pub fn hold_drive(&self, state: &mut State) {
+        if state.loop_state != LoopState::Capturing {
+            state.amplitude_loop = None;
+        }
     }
 
     /// One sample: takes the sensor readings, returns the drive until the next sample.
@@ -141,14 +150,14 @@ impl PhaseLock {
         output
     }
 
-    fn tuning(&self) -> (f64, f64) {
+    fn tuning(&self) -> (Real, Real) {
         (self.config.amplitude, self.config.phase_target)
     }
 
     /// Advances the state machine.
     fn change_state(&self, state: &mut State, active: bool, fault: Option<Fault>) {
         let timeout = self.config.acquire_timeout;
-        let elapsed = state.acquiring as f64 * self.config.sample_time;
+        let elapsed = state.acquiring as Real * self.config.sample_time;
         let before = state.loop_state;
         let (next, fault) = before.next(&Conditions {
             active,
@@ -215,67 +224,6 @@ impl PhaseLock {
         }
     }
 
-    /// One sample of the capture.
-    fn capture(&self, state: &mut State, measured: &Measurement) {
-        let complete = self.capture.advance(
-            &mut state.capture,
-            &mut state.amplitude_loop,
-            &Observation {
-                omega: state.frequency.omega,
-                drive: state.drive.amplitude,
-                response: state.channels.response.amplitude(),
-                mean: state.approach.response,
-                holding: state.approach.holding,
-                error: measured.valid.then_some(measured.error),
-            },
-        );
-        self.close_loop(state, measured);
-        state.ready = complete;
-        if complete {
-            state.amplitude_loop = None;
-        }
-    }
-
-    /// One sample of the closed loop.
-    fn close_loop(&self, state: &mut State, measured: &Measurement) {
-        let Self { filter, drive, .. } = self;
-        if measured.valid {
-            filter.follow(&mut state.frequency, measured.error);
-        } else {
-            filter.hold(&mut state.frequency);
-        }
-        let reading = state.channels.response.amplitude();
-        let near = measured.valid && measured.error.abs() < PHASE_RANGE;
-        let before = state.drive.amplitude;
-        let elapsed = state.acquiring as f64 * self.config.sample_time;
-        let holding = self
-            .approach
-            .observe(&mut state.approach, before, reading, measured.error);
-        let holding = near.then_some(holding);
-        if let Some(amplitude_loop) = &mut state.amplitude_loop {
-            let (amplitude, shift) = self
-                .amplitude_loop
-                .follow(amplitude_loop, before, near.then_some(reading));
-            state.drive.amplitude = amplitude;
-            filter.shift(&mut state.frequency, shift);
-            state.ready = amplitude_loop.has_arrived();
-        } else {
-            let amplitude = self.config.amplitude;
-            let setpoint = match holding {
-                Some(holding) if state.loop_state != LoopState::Locked => {
-                    let captured = self.capture.drive(&state.capture, holding, reading, measured.error);
-                    captured.unwrap_or_else(|| self.approach.shape(&mut state.approach, amplitude, holding, elapsed))
-                }
-                _ => amplitude,
-            };
-            if measured.valid && measured.has_sensor {
-                drive.control(&mut state.drive, setpoint, measured.reference_amplitude);
-            }
-            let arrived = drive.ramp(&mut state.drive, setpoint);
-            state.ready = arrived || setpoint != amplitude;
-        }
-    }
-
     /// Updates the lock criterion. It restarts while the loop is open and when the tuning has changed.
     fn judge(&self, state: &mut State, measured: &Measurement, period_ends: bool) {
         let tuning = self.tuning();
@@ -287,7 +235,7 @@ impl PhaseLock {
         if state.loop_state.is_closed() {
             let reading = Reading {
                 error: measured.error,
-                integral: state.frequency.integral,
+                integral: state.frequency.integral.get(),
                 omega: state.frequency.omega,
                 amplitude: state.channels.response.amplitude(),
                 valid: measured.valid,

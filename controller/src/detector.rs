@@ -3,13 +3,14 @@
 use crate::angle::Complex;
 use crate::config::{Config, Detector};
 use crate::harmonics::{Coefficients, Harmonics};
+use crate::real::{self, Real};
 
 /// Coefficients of a phase detector. Both methods are of first order and have the same bandwidth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub enum PhaseDetector {
     Adaptive(Harmonics),
-    Demodulator { step: f64 },
+    Demodulator { step: Real },
 }
 
 /// Estimate of the signal of one channel.
@@ -19,7 +20,7 @@ pub struct Estimate {
     /// m, relative to the oscillator's phase. The demodulator estimates only the fundamental.
     coefficients: Coefficients,
     /// Mean square of the residual, m².
-    residual_power: f64,
+    residual_power: Real,
 }
 
 impl Estimate {
@@ -28,24 +29,24 @@ impl Estimate {
     }
 
     /// Sum of the amplitudes of the harmonics above the fundamental, m.
-    pub fn harmonics(&self) -> f64 {
+    pub fn harmonics(&self) -> Real {
         self.coefficients.harmonic[1..].iter().map(|one| one.magnitude()).sum()
     }
 
     /// Amplitude of the fundamental, m.
-    pub fn amplitude(&self) -> f64 {
+    pub fn amplitude(&self) -> Real {
         self.fundamental().magnitude()
     }
 
     /// Phase of `sin` relative to the oscillator's sine, rad.
-    pub fn argument(&self) -> f64 {
+    pub fn argument(&self) -> Real {
         // Re(c exp(i phase)) is a cosine; a sine lags a cosine by pi/2.
         let Complex { re, im } = self.fundamental();
         Complex { re: -im, im: re }.argument()
     }
 
     /// Power of the fundamental over the sum of itself and the residual power; 0 for a zero signal.
-    pub fn coherence(&self) -> f64 {
+    pub fn coherence(&self) -> Real {
         let power = 0.5 * self.amplitude() * self.amplitude();
         let total = power + self.residual_power;
         if total > 0.0 { power / total } else { 0.0 }
@@ -55,7 +56,7 @@ impl Estimate {
 impl PhaseDetector {
     /// The detector of a configuration.
     pub fn new(config: &Config) -> Self {
-        let step = -libm::expm1(-config.bandwidth * config.sample_time);
+        let step = -real::expm1(-config.bandwidth * config.sample_time);
         match config.detector {
             Detector::Adaptive => Self::Adaptive(Harmonics {
                 count: config.harmonics.into(),
@@ -75,7 +76,7 @@ impl PhaseDetector {
     }
 
     /// Sum of the steps of all coefficients: the share of the residual that one update removes, at most 1.
-    pub fn total_step(&self) -> f64 {
+    pub fn total_step(&self) -> Real {
         match self {
             Self::Adaptive(harmonics) => harmonics.total_step(),
             Self::Demodulator { step } => *step,
@@ -92,7 +93,7 @@ impl PhaseDetector {
 
     /// Updates the estimate with a sample, m. `rotor` is `exp(i phase)` of the oscillator. Returns the difference between the sample and
     /// its prediction, m.
-    pub fn update(&self, estimate: &mut Estimate, sample: f64, rotor: Complex) -> f64 {
+    pub fn update(&self, estimate: &mut Estimate, sample: Real, rotor: Complex) -> Real {
         let (residual, step) = match self {
             Self::Adaptive(harmonics) => {
                 let residual = harmonics.update(&mut estimate.coefficients, sample, rotor);
@@ -111,7 +112,7 @@ impl PhaseDetector {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
     use crate::oscillator::Oscillator;

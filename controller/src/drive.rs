@@ -1,19 +1,20 @@
 //! Amplitude of the drive.
 
 use crate::config::Config;
+use crate::real::{self, Real};
 
 /// Ramps of the drive amplitude, and the control of the measured base amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Drive {
     /// m
-    pub amplitude_max: f64,
+    pub amplitude_max: Real,
     /// Largest change per sample during a ramp, m; infinite for a step change.
-    pub ramp_step: f64,
+    pub ramp_step: Real,
     /// Largest change per sample after `active` became false, m; infinite to switch off at once.
-    pub release_step: f64,
+    pub release_step: Real,
     /// Share of the base amplitude's error that the control corrects per sample; 0 without control.
-    pub control_step: f64,
+    pub control_step: Real,
 }
 
 /// State of the drive.
@@ -21,32 +22,32 @@ pub struct Drive {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct DriveState {
     /// Amplitude of the output, m.
-    pub amplitude: f64,
+    pub amplitude: Real,
     /// Correction by the control of the base amplitude, m.
-    trim: f64,
+    trim: Real,
 }
 
 impl Drive {
     /// The drive of a configuration.
     pub fn new(config: &Config) -> Self {
-        let per_sample = |rate: Option<f64>| rate.map_or(f64::INFINITY, |rate| rate * config.sample_time);
+        let per_sample = |rate: Option<Real>| rate.map_or(Real::INFINITY, |rate| rate * config.sample_time);
         Self {
             amplitude_max: config.amplitude_limit(),
             ramp_step: per_sample(config.ramp_rate),
             release_step: per_sample(config.release_rate),
-            control_step: -libm::expm1(-config.base_bandwidth * config.sample_time),
+            control_step: -real::expm1(-config.base_bandwidth.unwrap_or(0.0) * config.sample_time),
         }
     }
 
     /// Corrects the error between setpoint and measured amplitude of the base, m.
-    pub fn control(&self, state: &mut DriveState, setpoint: f64, measured: f64) {
+    pub fn control(&self, state: &mut DriveState, setpoint: Real, measured: Real) {
         let trim = state.trim + self.control_step * (setpoint - measured);
         // Anti-windup: the trim stays within the range of the drive.
         state.trim = trim.clamp(-setpoint, self.amplitude_max - setpoint);
     }
 
     /// Ramps towards `setpoint`, m, for one sample. Returns whether the setpoint is reached.
-    pub fn ramp(&self, state: &mut DriveState, setpoint: f64) -> bool {
+    pub fn ramp(&self, state: &mut DriveState, setpoint: Real) -> bool {
         let target = (setpoint + state.trim).clamp(0.0, self.amplitude_max);
         state.amplitude = approach(state.amplitude, target, self.ramp_step);
         state.amplitude == target
@@ -62,17 +63,17 @@ impl Drive {
         self.down(state, self.release_step);
     }
 
-    fn down(&self, state: &mut DriveState, step: f64) {
+    fn down(&self, state: &mut DriveState, step: Real) {
         state.trim = 0.0;
         state.amplitude = approach(state.amplitude, 0.0, step);
     }
 }
 
-fn approach(from: f64, to: f64, step: f64) -> f64 {
+fn approach(from: Real, to: Real, step: Real) -> Real {
     to.clamp(from - step, from + step)
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
 

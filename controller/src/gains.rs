@@ -1,5 +1,7 @@
 //! The gains of the loop from the detector's bandwidth.
 
+use crate::real::{self, Real};
+
 /// Gains of the PI loop filter.
 ///
 /// Near phase resonance the phase of a lightly damped structure follows `phi' = -delta phi + omega_0 - omega` (`delta`: its
@@ -20,16 +22,16 @@
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Gains {
     /// Proportional gain, rad/s per rad.
-    pub proportional: f64,
+    pub proportional: Real,
     /// Integral gain, rad/s² per rad.
-    pub integral: f64,
+    pub integral: Real,
 }
 
 impl Gains {
     /// Gains for a detector of the given bandwidth (rad/s, above 0) and a structure of the given damping rate (rad/s,
     /// damping ratio times natural frequency; 0 or above).
     #[must_use]
-    pub fn from_bandwidth(bandwidth: f64, damping_rate: f64) -> Self {
+    pub fn from_bandwidth(bandwidth: Real, damping_rate: Real) -> Self {
         let d = damping_rate / bandwidth;
         let p = -(d + 1.0) / 3.0;
         Self {
@@ -37,9 +39,30 @@ impl Gains {
             integral: -bandwidth * bandwidth * p * p * p,
         }
     }
+
+    /// Phase margin, rad, of the loop with this detector and structure and a delay, s.
+    ///
+    /// The open loop is `wLP (kp s + ki) exp(-s delay)/(s (s + delta) (s + wLP))`. Its gain falls with the frequency, so that it is 1
+    /// at one frequency only.
+    #[must_use]
+    pub fn phase_margin(&self, bandwidth: Real, damping_rate: Real, delay: Real) -> Real {
+        let gain = |w: Real| {
+            let open = bandwidth * real::hypot(self.proportional * w, self.integral);
+            open / (w * real::hypot(w, damping_rate) * real::hypot(w, bandwidth))
+        };
+        let (mut low, mut high) = (0.0, bandwidth);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            *(if gain(middle) > 1.0 { &mut low } else { &mut high }) = middle;
+        }
+        real::atan2(self.proportional * low, self.integral) + crate::real::consts::FRAC_PI_2
+            - real::atan2(low, damping_rate)
+            - real::atan2(low, bandwidth)
+            - delay * low
+    }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
 
@@ -59,6 +82,20 @@ mod tests {
             6.0 * s + 2.0 * c2,
         ] {
             assert!(residual.abs() < 1e-12, "{residual}");
+        }
+    }
+
+    #[test]
+    fn the_phase_margin_is_above_50_degrees_and_zero_with_the_delay_that_uses_it_up() {
+        for damping in [0.0, 0.01, 0.06, 0.3] {
+            let gains = Gains::from_bandwidth(1.0, damping);
+            let margin = gains.phase_margin(1.0, damping, 0.0);
+            assert!((50.0..75.0).contains(&margin.to_degrees()), "{damping}: {margin}");
+            // The open loop at the frequency of gain 1, whose phase a delay of 1 s shifts by that frequency.
+            let w = margin - gains.phase_margin(1.0, damping, 1.0);
+            let open = (gains.proportional * w).hypot(gains.integral) / (w * w.hypot(damping) * w.hypot(1.0));
+            assert!((open - 1.0).abs() < 1e-9, "{open}");
+            assert!(gains.phase_margin(1.0, damping, margin / w).abs() < 1e-9);
         }
     }
 

@@ -1,6 +1,7 @@
 //! The adaptive harmonic filter.
 
 use crate::angle::Complex;
+use crate::real::Real;
 
 /// Largest number of harmonics of the adaptive filter.
 pub const MAX_HARMONICS: usize = 8;
@@ -14,7 +15,7 @@ pub struct Harmonics {
     /// Whether the harmonics are 1, 3, 5, … instead of 1, 2, 3, ….
     pub odd_only: bool,
     /// Adaptation step: fraction by which the error of a coefficient decreases per sample.
-    pub step: f64,
+    pub step: Real,
 }
 
 /// A constant and Fourier coefficients relative to the oscillator's phase: the signal is
@@ -22,7 +23,7 @@ pub struct Harmonics {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Coefficients {
-    offset: f64,
+    offset: Real,
     /// The first entry belongs to the fundamental.
     pub harmonic: [Complex; MAX_HARMONICS],
 }
@@ -39,15 +40,15 @@ impl Harmonics {
     }
 
     /// Sum of the steps of all coefficients. The filter is stable below 2; below 1 it converges without oscillation.
-    pub fn total_step(&self) -> f64 {
-        self.step * self.coefficients() as f64
+    pub fn total_step(&self) -> Real {
+        self.step * self.coefficients() as Real
     }
 
     /// Updates the coefficients with a sample; `rotor` is `exp(i phase)` of the oscillator. Returns the residual.
     ///
     /// Least mean squares (LMS): every coefficient moves down the gradient of the squared residual. All harmonics and the
     /// offset share one residual, so that no component causes ripple in another.
-    pub fn update(&self, c: &mut Coefficients, sample: f64, rotor: Complex) -> f64 {
+    pub fn update(&self, c: &mut Coefficients, sample: Real, rotor: Complex) -> Real {
         let stride = if self.odd_only { rotor.times(rotor) } else { rotor };
         let mut rotors = [Complex::default(); MAX_HARMONICS];
         let mut next = rotor;

@@ -2,6 +2,7 @@
 
 use crate::config::Config;
 use crate::gains::Gains;
+use crate::real::{Real, Sum};
 
 /// A PI filter with limits, a limited rate of change, and conditional anti-windup.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -9,13 +10,13 @@ use crate::gains::Gains;
 pub struct LoopFilter {
     pub gains: Gains,
     /// rad/s
-    pub omega_min: f64,
+    pub omega_min: Real,
     /// rad/s
-    pub omega_max: f64,
+    pub omega_max: Real,
     /// Largest change per sample, rad/s; infinite without a limit.
-    pub max_change: f64,
+    pub max_change: Real,
     /// s
-    pub sample_time: f64,
+    pub sample_time: Real,
 }
 
 /// State of the loop filter.
@@ -23,15 +24,15 @@ pub struct LoopFilter {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frequency {
     /// Centre frequency and integral part, rad/s.
-    pub integral: f64,
+    pub integral: Sum,
     /// Output frequency, rad/s.
-    pub omega: f64,
+    pub omega: Real,
 }
 
 impl Frequency {
     /// The state at a constant frequency, rad/s.
-    pub fn at(omega: f64) -> Self {
-        Self { integral: omega, omega }
+    pub fn at(omega: Real) -> Self {
+        Self { integral: Sum::new(omega), omega }
     }
 }
 
@@ -39,52 +40,54 @@ impl LoopFilter {
     /// The filter of a configuration.
     pub fn new(config: &Config) -> Self {
         Self {
-            gains: Gains::from_bandwidth(config.bandwidth, config.damping_rate),
+            gains: config.gains(),
             omega_min: config.omega_min,
             omega_max: config.omega_max,
             max_change: config
                 .omega_rate
-                .map_or(f64::INFINITY, |rate| rate * config.sample_time),
+                .map_or(Real::INFINITY, |rate| rate * config.sample_time),
             sample_time: config.sample_time,
         }
     }
 
     /// One sample with the loop closed; `error` in rad.
-    pub fn follow(&self, frequency: &mut Frequency, error: f64) {
-        let unlimited = frequency.integral + self.gains.proportional * error;
+    pub fn follow(&self, frequency: &mut Frequency, error: Real) {
+        let unlimited = frequency.integral.get() + self.gains.proportional * error;
         frequency.omega = self.limit(frequency.omega, unlimited);
         // Anti-windup: no integration in the direction in which the output is already limited.
         let excess = unlimited - frequency.omega;
         if excess * error <= 0.0 {
-            let integral = frequency.integral + self.gains.integral * self.sample_time * error;
-            frequency.integral = integral.clamp(self.omega_min, self.omega_max);
+            self.shift(frequency, self.gains.integral * self.sample_time * error);
         }
     }
 
     /// Shifts the centre frequency by `shift`, rad/s.
-    pub fn shift(&self, frequency: &mut Frequency, shift: f64) {
-        let integral = frequency.integral + shift;
-        frequency.integral = integral.clamp(self.omega_min, self.omega_max);
+    pub fn shift(&self, frequency: &mut Frequency, shift: Real) {
+        frequency.integral.add(shift);
+        let (now, limits) = (frequency.integral.get(), self.omega_min..=self.omega_max);
+        if !limits.contains(&now) {
+            frequency.integral = Sum::new(now.clamp(self.omega_min, self.omega_max));
+        }
     }
 
     /// One sample with the loop open; the frequency moves towards `omega`, rad/s.
-    pub fn go_to(&self, frequency: &mut Frequency, omega: f64) {
+    pub fn go_to(&self, frequency: &mut Frequency, omega: Real) {
         *frequency = Frequency::at(self.limit(frequency.omega, omega));
     }
 
     /// One sample with the loop open; the integral part does not change.
     pub fn hold(&self, frequency: &mut Frequency) {
-        frequency.omega = self.limit(frequency.omega, frequency.integral);
+        frequency.omega = self.limit(frequency.omega, frequency.integral.get());
     }
 
-    fn limit(&self, before: f64, unlimited: f64) -> f64 {
+    fn limit(&self, before: Real, unlimited: Real) -> Real {
         unlimited
             .clamp(before - self.max_change, before + self.max_change)
             .clamp(self.omega_min, self.omega_max)
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
 
@@ -101,7 +104,7 @@ mod tests {
         let mut frequency = Frequency::at(10.0);
         for _ in 0..100_000 {
             FILTER.follow(&mut frequency, 2.0);
-            assert!(frequency.omega <= 11.0 && frequency.integral <= 11.0);
+            assert!(frequency.omega <= 11.0 && frequency.integral.get() <= 11.0);
         }
         assert_eq!(frequency.omega, 11.0);
         FILTER.follow(&mut frequency, -0.5);
@@ -117,13 +120,13 @@ mod tests {
             filter.follow(&mut frequency, 0.8);
             assert!((frequency.omega - before).abs() <= 1e-3 + 1e-15);
         }
-        assert_eq!(frequency.integral, 10.0);
+        assert_eq!(frequency.integral.get(), 10.0);
     }
 
     #[test]
     fn a_negative_error_lowers_the_frequency() {
         let mut frequency = Frequency::at(10.0);
         FILTER.follow(&mut frequency, -0.1);
-        assert!(frequency.omega < 10.0 && frequency.integral < 10.0);
+        assert!(frequency.omega < 10.0 && frequency.integral.get() < 10.0);
     }
 }

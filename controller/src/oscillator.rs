@@ -1,21 +1,22 @@
 //! The numerically controlled oscillator.
 
-use core::f64::consts::TAU;
+use crate::real::consts::TAU;
 
 use crate::angle::Complex;
+use crate::real::{Real, Sum};
 
 /// Phase of the internal oscillator, in turns. Subtracting a whole turn is exact in binary arithmetic, so wrapping
 /// causes no rounding error however long the run is.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Oscillator {
-    turns: f64,
+    turns: Sum,
 }
 
 impl Oscillator {
     /// Phase, rad, in [0, 2 pi).
-    pub fn phase(self) -> f64 {
-        TAU * self.turns
+    pub fn phase(self) -> Real {
+        TAU * self.turns.get()
     }
 
     /// `exp(i phase)`.
@@ -24,17 +25,17 @@ impl Oscillator {
     }
 
     /// Advances by `omega` (rad/s) times `duration` (s), less than one turn. Returns whether a new period begins.
-    pub fn advance(&mut self, omega: f64, duration: f64) -> bool {
-        self.turns += omega * duration / TAU;
-        let wrapped = self.turns >= 1.0;
+    pub fn advance(&mut self, omega: Real, duration: Real) -> bool {
+        self.turns.add(omega * duration / TAU);
+        let wrapped = self.turns.get() >= 1.0;
         if wrapped {
-            self.turns -= 1.0;
+            self.turns.add(-1.0);
         }
         wrapped
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
 

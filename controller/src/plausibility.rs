@@ -1,51 +1,52 @@
 //! Plausibility of readings: one that differs from the detector's prediction by far more than those of the last periods shows that a
 //! sensor, the drive or the clock has failed, often within a few samples.
 
-use core::f64::consts::TAU;
+use crate::real::consts::TAU;
 
 use crate::config::Config;
 use crate::detector::Estimate;
+use crate::real::Real;
 
 /// Time in the closed loop before the check begins, in time constants of the detector, and in turns.
-const WARM_UP: [f64; 2] = [6.0, 10.0];
+const WARM_UP: [Real; 2] = [6.0, 10.0];
 /// Ratio of the drive to the drive with the lag of the detector, or its inverse, from which the drive changes fast, and turns for which
 /// its sensor may differ more after that, by this share of the larger amplitude.
-const FAST: f64 = 1.2;
-const SETTLES: f64 = 4.0;
-const SLACK: f64 = 0.8;
+const FAST: Real = 1.2;
+const SETTLES: Real = 4.0;
+const SLACK: Real = 0.8;
 /// Phase, rad, after which a reading that does not change at all needs a smaller difference: this share of the limit. Shorter pauses are
 /// those of a connection that loses a few samples.
-const PAUSE: f64 = TAU / 12.0;
-const PAUSE_SHARE: f64 = 0.15;
+const PAUSE: Real = TAU / 12.0;
+const PAUSE_SHARE: Real = 0.15;
 /// Differences that count as normal, in units of the largest one of a period.
-const NORMAL: f64 = 2.0;
+const NORMAL: Real = 2.0;
 
 /// Sum of the amplitudes of all harmonics above the fundamental, as a share of the limit, above which a sensor saturates, and turns for
 /// which it must last: a change of the drive disturbs the harmonics for one or two.
-const DISTORTION: f64 = 0.5;
-const LASTS: f64 = 5.0;
+const DISTORTION: Real = 0.5;
+const LASTS: Real = 5.0;
 
 /// Coefficients of the check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plausibility {
     /// Largest difference beyond the normal one, as a share of the amplitude.
-    limit: Option<f64>,
+    limit: Option<Real>,
     /// s
-    warm_up: f64,
+    warm_up: Real,
 }
 
 /// Largest differences in this period and in the two before it, m, for each channel.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Differences {
-    largest: [[f64; 3]; 2],
+    largest: [[Real; 3]; 2],
     /// Phase since the start of the period, rad.
-    phase: f64,
+    phase: Real,
     /// Phase for which each channel has been distorted, rad.
-    distorted: [f64; 2],
+    distorted: [Real; 2],
     /// Phase since the amplitude of each channel changed fast, rad.
-    steady: [f64; 2],
+    steady: [Real; 2],
     /// Whether the last readings were plausible.
     implausible: bool,
 }
@@ -65,10 +66,10 @@ impl Plausibility {
     pub fn take(
         &self,
         state: &mut Differences,
-        differences: [(f64, &Estimate, f64); 2],
-        unchanged: [f64; 2],
-        omega: f64,
-        sample_time: f64,
+        differences: [(Real, &Estimate, Real); 2],
+        unchanged: [Real; 2],
+        omega: Real,
+        sample_time: Real,
     ) {
         let turn = omega * sample_time;
         state.phase += turn;
@@ -102,7 +103,7 @@ impl Plausibility {
     }
 
     /// Whether the last readings show a fault, `closed` seconds after the loop was closed.
-    pub fn refuses(&self, state: &Differences, closed: f64) -> bool {
+    pub fn refuses(&self, state: &Differences, closed: Real) -> bool {
         state.implausible && closed > self.warm_up
     }
 }

@@ -1,14 +1,15 @@
 //! Values and ranges of parameters.
 
-use core::f64::consts::PI;
+use crate::real::consts::PI;
 
 use crate::harmonics::MAX_HARMONICS;
+use crate::real::Real;
 
 /// A value of a parameter. The types are those of FMI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
     /// A real number.
-    Real(f64),
+    Real(Real),
     /// A whole number.
     Integer(i32),
     /// True or false.
@@ -17,17 +18,17 @@ pub enum Value {
 
 impl Value {
     /// The value as a real number, with 1 for true and 0 for false.
-    pub(crate) fn number(self) -> f64 {
+    pub(crate) fn number(self) -> Real {
         match self {
             Self::Real(value) => value,
-            Self::Integer(value) => value.into(),
+            Self::Integer(value) => value as Real,
             Self::Boolean(value) => u8::from(value).into(),
         }
     }
 }
 
 /// The number that means "none" for an optional parameter, where the interface knows only numbers.
-pub const NONE: f64 = -1.0;
+pub const NONE: Real = -1.0;
 
 /// The values that a parameter may have, whatever the values of the others are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -55,7 +56,7 @@ pub enum Range {
 impl Range {
     /// Whether the range contains the number.
     #[must_use]
-    pub fn contains(self, number: f64) -> bool {
+    pub fn contains(self, number: Real) -> bool {
         number.is_finite()
             && match self {
                 Self::Positive => number > 0.0,
@@ -64,7 +65,7 @@ impl Range {
                 Self::Angle => number.abs() <= PI,
                 Self::Share => number > 0.0 && number < 1.0,
                 Self::Detector => number == 1.0 || number == 2.0,
-                Self::Harmonics => (1.0..=MAX_HARMONICS as f64).contains(&number),
+                Self::Harmonics => (1.0..=MAX_HARMONICS as Real).contains(&number),
                 Self::Dwell => (1.0..=1e6).contains(&number),
                 Self::Boolean => true,
             }

@@ -47,7 +47,7 @@ impl SampleClock {
     }
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests {
     extern crate std;
 

@@ -1,20 +1,19 @@
 //! The measurements of a sample: phase error, amplitudes, and whether they are valid.
 
-use core::f64::consts::FRAC_PI_3;
+use crate::real::consts::FRAC_PI_3;
 
 use crate::angle::{Complex, wrap};
 use crate::config::Config;
 use crate::detector::{Estimate, PhaseDetector};
 use crate::plausibility::{Differences, Plausibility};
+use crate::real::{self, Real};
 use crate::signals::Input;
 use crate::supervisor::Fault;
 
-/// Largest valid reading, m. Smaller readings cause no overflow.
-const READING_MAX: f64 = 1e100;
 /// Phase, rad, for which no signal of more than eight steps of its converter stays the same.
-const UNCHANGED: f64 = FRAC_PI_3;
+const UNCHANGED: Real = FRAC_PI_3;
 /// Smallest valid amplitude of the reference, as a share of the drive amplitude.
-const REFERENCE_SHARE: f64 = 0.1;
+const REFERENCE_SHARE: Real = 0.1;
 
 /// Coefficients of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -22,23 +21,23 @@ const REFERENCE_SHARE: f64 = 0.1;
 pub struct Sensing {
     detector: PhaseDetector,
     /// rad
-    phase_target: f64,
+    phase_target: Real,
     /// s
-    delay: f64,
+    delay: Real,
     /// m
-    response_max: Option<f64>,
+    response_max: Option<Real>,
     /// Smallest valid response amplitude, m.
-    response_min: f64,
-    coherence_min: f64,
+    response_min: Real,
+    coherence_min: Real,
     /// Whether a sensor measures the base.
     has_reference: bool,
     /// s
-    sample_time: f64,
+    sample_time: Real,
     /// Longest time without a valid response, s.
-    signal_timeout: Option<f64>,
+    signal_timeout: Option<Real>,
     plausibility: Plausibility,
     /// Share of its error that the detector corrects per sample.
-    detector_step: f64,
+    detector_step: Real,
 }
 
 /// State of both channels.
@@ -49,15 +48,15 @@ pub struct Channels {
     pub response: Estimate,
     reference: Estimate,
     /// The drive with the lag of the detector, m.
-    drive: f64,
+    drive: Real,
     differences: Differences,
     /// The last reading of each channel, m, and the time for which it has not changed, s.
-    last: [f64; 2],
-    unchanged: [f64; 2],
+    last: [Real; 2],
+    unchanged: [Real; 2],
     /// Time in the closed loop, s.
-    closed: f64,
+    closed: Real,
     /// Time since the loop was closed or the measurement was last valid, s.
-    invalid: f64,
+    invalid: Real,
     /// Whether the measurement has been valid since the loop was closed.
     seen: bool,
 }
@@ -68,9 +67,9 @@ pub struct PresentDrive {
     /// `exp(i phase)` of the oscillator.
     pub rotor: Complex,
     /// Frequency, rad/s.
-    pub omega: f64,
+    pub omega: Real,
     /// Amplitude, m.
-    pub amplitude: f64,
+    pub amplitude: Real,
 }
 
 /// Measurements of a sample.
@@ -78,10 +77,12 @@ pub struct PresentDrive {
 pub struct Measurement {
     /// Fault of the readings.
     pub fault: Option<Fault>,
-    /// Phase error, rad.
-    pub error: f64,
+    /// Phase error, rad; 0 if it cannot be measured.
+    pub error: Real,
+    /// Whether both amplitudes are above 0.
+    pub measurable: bool,
     /// m
-    pub reference_amplitude: f64,
+    pub reference_amplitude: Real,
     /// Whether the error is valid.
     pub valid: bool,
     /// Whether the reference is a sensor.
@@ -91,9 +92,9 @@ pub struct Measurement {
 /// The reference of the phase.
 struct Reference {
     /// rad
-    phase: f64,
+    phase: Real,
     /// m
-    amplitude: f64,
+    amplitude: Real,
     valid: bool,
 }
 
@@ -111,7 +112,7 @@ impl Sensing {
             sample_time: config.sample_time,
             signal_timeout: config.signal_timeout,
             plausibility: Plausibility::new(config),
-            detector_step: -libm::expm1(-config.bandwidth * config.sample_time),
+            detector_step: -real::expm1(-config.bandwidth * config.sample_time),
         }
     }
 
@@ -120,7 +121,7 @@ impl Sensing {
         let channel = input.reference.filter(|_| self.has_reference);
         let fault = self.fault(input.response, channel);
         // Without a sensor on the base nothing is expected to change.
-        let readings = [input.response, channel.unwrap_or(f64::NAN)];
+        let readings = [input.response, channel.unwrap_or(Real::NAN)];
         for (n, reading) in readings.into_iter().enumerate() {
             state.unchanged[n] = self.longer(state.unchanged[n], reading == state.last[n]);
         }
@@ -141,6 +142,7 @@ impl Sensing {
         Measurement {
             fault,
             error: if measurable { wrap(error) } else { 0.0 },
+            measurable,
             reference_amplitude: reference.amplitude,
             valid: measurable && reference.valid && amplitude >= self.response_min && self.is_coherent(response),
             has_sensor: channel.is_some(),
@@ -148,7 +150,7 @@ impl Sensing {
     }
 
     /// Watches the signals while the loop is closed: a sensor that has stopped, or a response that cannot be measured.
-    pub fn watch(&self, state: &mut Channels, measured: &Measurement, omega: f64) -> Option<Fault> {
+    pub fn watch(&self, state: &mut Channels, measured: &Measurement, omega: Real) -> Option<Fault> {
         state.seen |= measured.valid;
         state.closed += self.sample_time;
         state.invalid = self.longer(state.invalid, !measured.valid);
@@ -169,7 +171,7 @@ impl Sensing {
     }
 
     /// Updates the detectors, and compares the readings with what they predicted.
-    fn predict(&self, state: &mut Channels, response: f64, reference: Option<f64>, drive: PresentDrive) {
+    fn predict(&self, state: &mut Channels, response: Real, reference: Option<Real>, drive: PresentDrive) {
         let difference = self.detector.update(&mut state.response, response, drive.rotor);
         let (mut differences, mut change) = ([difference, 0.0], 1.0);
         if let Some(reading) = reference {
@@ -197,12 +199,12 @@ impl Sensing {
     }
 
     /// A time, s, after one more sample of a condition.
-    fn longer(&self, time: f64, condition: bool) -> f64 {
+    fn longer(&self, time: Real, condition: bool) -> Real {
         if condition { time + self.sample_time } else { 0.0 }
     }
 
-    fn fault(&self, response: f64, reference: Option<f64>) -> Option<Fault> {
-        let is_valid = |reading: f64| reading.abs() <= READING_MAX;
+    fn fault(&self, response: Real, reference: Option<Real>) -> Option<Fault> {
+        let is_valid = |reading: Real| reading.abs() <= real::READING_MAX;
         if !is_valid(response) || !reference.is_none_or(is_valid) {
             Some(Fault::Sensor)
         } else if self.response_max.is_some_and(|limit| response.abs() > limit) {

@@ -1,5 +1,6 @@
 //! Input and output of a sample.
 
+use crate::real::Real;
 use crate::supervisor::{Fault, LoopState};
 
 /// Sensor readings of a sample, and the operator's request.
@@ -7,9 +8,9 @@ use crate::supervisor::{Fault, LoopState};
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Input {
     /// Response of the structure, m.
-    pub response: f64,
+    pub response: Real,
     /// Displacement of the base, m. If it is `None`, the internal oscillator is the reference.
-    pub reference: Option<f64>,
+    pub reference: Option<Real>,
     /// Whether the drive is requested. A change from false to true arms the controller, also after a fault.
     pub active: bool,
 }
@@ -19,26 +20,26 @@ pub struct Input {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Output {
     /// Drive frequency, rad/s; always between `omega_min` and `omega_max`.
-    pub omega: f64,
+    pub omega: Real,
     /// Drive amplitude `E`, m; always between 0 and `amplitude_max` (where that is set).
-    pub amplitude: f64,
+    pub amplitude: Real,
     /// Setpoint of the base displacement at this sample, `E sin(phase)`, m, for a rig that takes samples.
-    pub drive: f64,
-    /// Phase of the response relative to the reference, minus the target, rad, in [-pi, pi]; 0 while one of the two
+    pub drive: Real,
+    /// Phase of the response relative to the reference, minus the target, rad, in [-pi, pi]. `None` while one of the two
     /// amplitudes is 0.
-    pub phase_error: f64,
+    pub phase_error: Option<Real>,
     /// Amplitude of the response's fundamental, m.
-    pub response_amplitude: f64,
-    /// Present setpoint of the response amplitude, m; 0 while the drive amplitude is controlled instead.
-    pub response_target: f64,
+    pub response_amplitude: Real,
+    /// Present setpoint of the response amplitude, m. `None` while the drive amplitude is controlled instead.
+    pub response_target: Option<Real>,
     /// Amplitude of the reference's fundamental, m: measured, or that of the drive.
-    pub reference_amplitude: f64,
+    pub reference_amplitude: Real,
     /// Power of the response's fundamental over the sum of itself and the detector's residual power, 0 to 1.
-    pub coherence: f64,
+    pub coherence: Real,
     /// Mean frequency, rad/s, over the complete blocks of the running dwell; `omega` before the first one.
-    pub frequency: f64,
+    pub frequency: Real,
     /// Mean of `response_amplitude`, m, over the same blocks; `response_amplitude` before the first one.
-    pub response_mean: f64,
+    pub response_mean: Real,
     /// Whether the loop is locked: the lock criterion has been met, and the lock has not been lost since.
     pub locked: bool,
     /// Whether the lock criterion is met now: phase, frequency and amplitude have been stationary for the whole dwell.
@@ -52,14 +53,15 @@ pub struct Output {
 
 impl Output {
     /// The output before the first sample: no drive, no measurements.
-    pub(crate) fn idle(omega: f64) -> Self {
+    #[must_use]
+    pub fn idle(omega: Real) -> Self {
         Self {
             omega,
             amplitude: 0.0,
             drive: 0.0,
-            phase_error: 0.0,
+            phase_error: None,
             response_amplitude: 0.0,
-            response_target: 0.0,
+            response_target: None,
             reference_amplitude: 0.0,
             coherence: 0.0,
             frequency: omega,

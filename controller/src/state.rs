@@ -6,6 +6,7 @@ use crate::capture::CaptureState;
 use crate::drive::DriveState;
 use crate::loop_filter::Frequency;
 use crate::oscillator::Oscillator;
+use crate::real::Real;
 use crate::sensing::Channels;
 use crate::stationarity::Dwell;
 use crate::supervisor::{Fault, LoopState};
@@ -32,12 +33,12 @@ pub struct State {
     pub(crate) acquiring: u64,
     pub(crate) capture: CaptureState,
     /// Drive amplitude and phase target to which the dwell applies.
-    pub(crate) tuning: (f64, f64),
+    pub(crate) tuning: (Real, Real),
 }
 
 impl State {
     /// The state before the first sample.
-    pub(crate) fn new(omega_start: f64, tuning: (f64, f64)) -> Self {
+    pub(crate) fn new(omega_start: Real, tuning: (Real, Real)) -> Self {
         Self {
             oscillator: Oscillator::default(),
             channels: Channels::default(),

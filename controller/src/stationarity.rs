@@ -5,31 +5,32 @@
 //! a drift makes the range of four consecutive means ten times as large as the scatter, noise about twice.
 
 use crate::config::LockCriterion;
+use crate::real::{self, Real, Sum};
 
 /// Number of blocks of a dwell.
 const DWELL: usize = 4;
 /// Number of blocks that the criterion for noise needs: two dwells.
 const BLOCKS: usize = 2 * DWELL;
 /// Largest range of four means over two blocks that counts as noise, in units of the scatter.
-const NOISE_RANGE: f64 = 5.0;
+const NOISE_RANGE: Real = 5.0;
 /// Smallest sum of the squared differences from period to period over that of the squared deviations from the mean that counts as
 /// noise. A drift over five periods has 0.4, noise about 1.
-const RANDOM: f64 = 0.5;
+const RANDOM: Real = 0.5;
 /// Largest scatter of the periods, relative, that counts as noise.
-const NOISE_MAX: f64 = 0.03;
+const NOISE_MAX: Real = 0.03;
 
 /// The criterion. Impacts cause ripple within a period, so it compares means over whole periods only.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stationarity {
     /// rad
-    pub phase_tolerance: f64,
+    pub phase_tolerance: Real,
     /// rad
-    pub unlock_tolerance: f64,
+    pub unlock_tolerance: Real,
     /// Relative, per period.
-    pub frequency_drift: f64,
+    pub frequency_drift: Real,
     /// Relative, per period.
-    pub amplitude_drift: f64,
+    pub amplitude_drift: Real,
     /// Periods in a block.
     pub block: u32,
 }
@@ -38,13 +39,13 @@ pub struct Stationarity {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Reading {
     /// Phase error, rad.
-    pub error: f64,
+    pub error: Real,
     /// Integral part of the frequency, rad/s. It is smoother than the frequency, and equal to it at zero phase error.
-    pub integral: f64,
+    pub integral: Real,
     /// Frequency, rad/s.
-    pub omega: f64,
+    pub omega: Real,
     /// Response amplitude, m.
-    pub amplitude: f64,
+    pub amplitude: Real,
     /// Whether these values are valid.
     pub valid: bool,
 }
@@ -53,10 +54,10 @@ pub struct Reading {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Sums {
-    error: f64,
-    integral: f64,
-    omega: f64,
-    amplitude: f64,
+    error: Sum,
+    integral: Sum,
+    omega: Sum,
+    amplitude: Sum,
     samples: u64,
     invalid: u64,
 }
@@ -66,15 +67,15 @@ struct Sums {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Scatter {
-    mean: f64,
-    squares: f64,
-    differences: f64,
-    last: f64,
+    mean: Real,
+    squares: Real,
+    differences: Real,
+    last: Real,
 }
 
 impl Scatter {
     /// Welford's update with the `n`-th value.
-    fn add(&mut self, value: f64, n: f64) {
+    fn add(&mut self, value: Real, n: Real) {
         let before = value - self.mean;
         self.mean += before / n;
         self.squares += before * (value - self.mean);
@@ -90,8 +91,8 @@ impl Scatter {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Block {
     periods: u32,
-    error: f64,
-    omega: f64,
+    error: Real,
+    omega: Real,
     integral: Scatter,
     amplitude: Scatter,
 }
@@ -99,11 +100,11 @@ struct Block {
 impl Block {
     fn add(&mut self, period: &Sums) {
         self.periods += 1;
-        let (n, samples) = (f64::from(self.periods), period.samples as f64);
-        self.error += (period.error / samples - self.error) / n;
-        self.omega += (period.omega / samples - self.omega) / n;
-        self.integral.add(period.integral / samples, n);
-        self.amplitude.add(period.amplitude / samples, n);
+        let (n, samples) = (self.periods as Real, period.samples as Real);
+        self.error += (period.error.get() / samples - self.error) / n;
+        self.omega += (period.omega.get() / samples - self.omega) / n;
+        self.integral.add(period.integral.get() / samples, n);
+        self.amplitude.add(period.amplitude.get() / samples, n);
     }
 }
 
@@ -125,9 +126,9 @@ impl Dwell {
     }
 
     /// Means over the complete blocks of the last dwell: frequency, rad/s, and response amplitude, m.
-    pub fn means(&self) -> Option<(f64, f64)> {
+    pub fn means(&self) -> Option<(Real, Real)> {
         let complete = self.last(self.complete.min(DWELL));
-        let mean = |value: fn(&Block) -> f64| mean(complete, value);
+        let mean = |value: fn(&Block) -> Real| mean(complete, value);
         (self.complete > 0).then(|| (mean(|block| block.omega), mean(|block| block.amplitude.mean)))
     }
 
@@ -151,17 +152,17 @@ impl Stationarity {
     /// Takes a sample; `period_ends` marks the last one of a period. Returns whether the lock is lost.
     pub fn update(&self, dwell: &mut Dwell, reading: &Reading, period_ends: bool) -> bool {
         let period = &mut dwell.period;
-        period.error += reading.error;
-        period.integral += reading.integral;
-        period.omega += reading.omega;
-        period.amplitude += reading.amplitude;
+        period.error.add(reading.error);
+        period.integral.add(reading.integral);
+        period.omega.add(reading.omega);
+        period.amplitude.add(reading.amplitude);
         period.samples += 1;
         period.invalid += u64::from(!reading.valid);
         if !period_ends {
             return false;
         }
         let period = core::mem::take(&mut dwell.period);
-        let error = (period.error / period.samples as f64).abs();
+        let error = (period.error.get() / period.samples as Real).abs();
         let lost = period.invalid > 0 || error > self.unlock_tolerance;
         if lost {
             *dwell = Dwell::default();
@@ -186,17 +187,17 @@ impl Stationarity {
     fn is_smooth(&self, blocks: &[Block]) -> bool {
         // Periods between the centres of the first and the last block. A slope would miss the crest of a slow modulation; the
         // range does not.
-        let distance = f64::from(self.block) * (DWELL - 1) as f64;
+        let distance = self.block as Real * (DWELL - 1) as Real;
         blocks.iter().all(|block| block.error.abs() <= self.phase_tolerance)
             && range(blocks, 1, |block| block.integral.mean) <= self.frequency_drift * distance
             && range(blocks, 1, |block| block.amplitude.mean) <= self.amplitude_drift * distance
     }
 
     fn is_noise(&self, blocks: &[Block; BLOCKS]) -> bool {
-        let distance = f64::from(2 * self.block) * (DWELL - 1) as f64;
-        let is_constant = |value: fn(&Block) -> Scatter, drift: f64| {
+        let distance = (2 * self.block) as Real * (DWELL - 1) as Real;
+        let is_constant = |value: fn(&Block) -> Scatter, drift: Real| {
             let squares = mean(blocks, |block| value(block).squares);
-            let scatter = libm::sqrt(squares / f64::from(self.block)) / value(&blocks[BLOCKS - 1]).mean;
+            let scatter = real::sqrt(squares / self.block as Real) / value(&blocks[BLOCKS - 1]).mean;
             let largest = (NOISE_RANGE * scatter).max(drift * distance);
             let differences = mean(blocks, |block| value(block).differences);
             let random =
@@ -209,13 +210,13 @@ impl Stationarity {
     }
 }
 
-fn mean(blocks: &[Block], value: impl Fn(&Block) -> f64) -> f64 {
-    blocks.iter().map(value).sum::<f64>() / blocks.len() as f64
+fn mean(blocks: &[Block], value: impl Fn(&Block) -> Real) -> Real {
+    blocks.iter().map(value).sum::<Real>() / blocks.len() as Real
 }
 
 /// Difference of the largest and the smallest mean over `group` blocks, relative to the last one.
-fn range(blocks: &[Block], group: usize, value: impl Fn(&Block) -> f64) -> f64 {
-    let (mut low, mut high, mut last) = (f64::INFINITY, f64::NEG_INFINITY, 0.0);
+fn range(blocks: &[Block], group: usize, value: impl Fn(&Block) -> Real) -> Real {
+    let (mut low, mut high, mut last) = (Real::INFINITY, Real::NEG_INFINITY, 0.0);
     for group in blocks.chunks(group) {
         last = mean(group, &value);
         low = low.min(last);
@@ -224,5 +225,5 @@ fn range(blocks: &[Block], group: usize, value: impl Fn(&Block) -> f64) -> f64 {
     (high - low) / last
 }
 
-#[cfg(test)]
+#[cfg(all(test, not(feature = "f32")))]
 mod tests;

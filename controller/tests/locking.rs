@@ -1,7 +1,7 @@
 //! The loop around a resonator: whether it locks, at which frequency, and how fast.
 
 mod rig;
-use phase_lock::{Config, Detector, LoopState, Move};
+use phase_lock::{Config, Detector, LoopState};
 use rig::{AMPLITUDE, Bench, Noise, OMEGA_0, ZETA, config};
 
 fn relative(a: f64, b: f64) -> f64 {
@@ -82,7 +82,10 @@ fn follows_a_resonance_that_moves() {
     for _ in 0..500 * 100 {
         bench.resonator.omega_0 -= 1e-5 * OMEGA_0 / 100.0;
         let output = bench.sample();
-        assert!(output.locked && output.phase_error.abs() < 0.02, "{output:?}");
+        assert!(
+            output.locked && output.phase_error.is_some_and(|error| error.abs() < 0.02),
+            "{output:?}"
+        );
     }
     assert!(relative(bench.run(400).frequency, 0.995 * OMEGA_0) < 1e-5);
 }
@@ -101,8 +104,8 @@ fn retuning_keeps_the_lock_and_settles_again() {
 }
 
 #[test]
-fn the_base_amplitude_is_controlled_if_base_bandwidth_is_positive() {
-    let mut bench = Bench::new(Config { base_bandwidth: 0.02 * OMEGA_0, ..config() });
+fn the_base_amplitude_is_controlled_if_base_bandwidth_is_set() {
+    let mut bench = Bench::new(Config { base_bandwidth: Some(0.02 * OMEGA_0), ..config() });
     let mut output = bench.sample();
     for _ in 0..60_000 {
         // A shaker with a gain of 0.8.
@@ -139,7 +142,7 @@ fn periods_to_lock_over_bandwidth() {
     for (ratio, most) in [(0.02, 400), (0.05, 350), (0.1, 320), (0.2, 320), (0.5, 320)] {
         let mut bench = Bench::new(Config {
             bandwidth: ratio * OMEGA_0,
-            damping_rate: ZETA * OMEGA_0,
+            damping_rate: Some(ZETA * OMEGA_0),
             omega_start: 0.98 * OMEGA_0,
             ..config()
         });
@@ -147,7 +150,10 @@ fn periods_to_lock_over_bandwidth() {
         let mut locked = None;
         for n in 0..100 * most {
             let output = bench.sample();
-            if output.phase_error.abs() > 0.5_f64.to_radians() {
+            if output
+                .phase_error
+                .is_none_or(|error| error.abs() > 0.5_f64.to_radians())
+            {
                 last_outside = n;
             }
             if output.locked {
@@ -175,7 +181,7 @@ fn two_runs_give_the_same_bits() {
     let (first, second) = (outputs(), outputs());
     for (a, b) in first.iter().zip(&second) {
         assert_eq!(a.omega.to_bits(), b.omega.to_bits());
-        assert_eq!(a.phase_error.to_bits(), b.phase_error.to_bits());
+        assert_eq!(a.phase_error.map(f64::to_bits), b.phase_error.map(f64::to_bits));
     }
     assert_eq!(first, second);
     assert_eq!(first[0].state, LoopState::Ramping);
@@ -192,7 +198,10 @@ fn a_new_phase_target_is_acquired_with_the_drive_on() {
         let output = bench.sample();
         assert!(!output.locked && output.amplitude == amplitude);
         let (_, output) = bench.run_to_lock(3000).expect("a lock");
-        assert!(output.phase_error.abs() < 0.01, "{change}: {output:?}");
+        assert!(
+            output.phase_error.is_some_and(|error| error.abs() < 0.01),
+            "{change}: {output:?}"
+        );
         assert_eq!(output.amplitude, amplitude);
     }
 }
@@ -211,60 +220,13 @@ fn a_ramp_down_to_zero_has_the_rate_of_the_ramp_up() {
 }
 
 #[test]
-fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
-    let mut bench = Bench::new(Config {
-        amplitude_max: Some(4.0 * AMPLITUDE),
-        damping_rate: ZETA * OMEGA_0,
-        ..config()
-    });
-    bench.run_to_lock(2000).expect("a lock");
-    let before = AMPLITUDE / (2.0 * ZETA);
-    for (share, drive) in [(0.8, -0.2 * AMPLITUDE), (1.3, 0.0)] {
-        let to = Move {
-            response: share * before,
-            duration: 0.5,
-            amplitude: drive,
-            ..Move::default()
-        };
-        bench
-            .controller
-            .hold_response(&mut bench.state, to)
-            .expect("a closed loop");
-        // A free transient would decay by a factor of 2.6 in 30 periods.
-        let output = bench.run(30);
-        println!("{share}: {:.5}", output.response_amplitude / before);
-        assert!(relative(output.response_amplitude, share * before) < 0.02);
-        assert!(output.locked && output.response_target == share * before);
-        let output = bench.run(200);
-        assert!(relative(output.response_amplitude, share * before) < 1e-5);
-        assert!(relative(output.amplitude, share * AMPLITUDE) < 1e-5);
-        assert!(output.settled);
-    }
-    // Switching the drive off ends the control of the response.
-    bench.active = false;
-    assert_eq!(bench.sample().response_target, 0.0);
-}
-
-#[test]
-fn the_response_cannot_be_controlled_without_a_limit_of_the_drive_or_in_an_open_loop() {
-    let to = Move { response: 0.01, ..Move::default() };
-    let mut bench = Bench::new(Config { amplitude_max: None, ..config() });
-    bench.run(10);
-    let refusal = |bench: &mut Bench, to| {
-        let refused = bench.controller.hold_response(&mut bench.state, to);
-        refused.expect_err("must be refused").to_string()
-    };
-    assert!(refusal(&mut bench, to).starts_with("amplitude_max = -1 m is refused"));
-    let mut bench = Bench::new(Config { amplitude_max: Some(1.0), ..config() });
-    assert!(refusal(&mut bench, to).starts_with("state = 0 is refused"));
-    bench.run(10);
-    assert!(refusal(&mut bench, Move::default()).starts_with("response = 0 m"));
-}
-
-#[test]
 fn a_shaped_drive_reaches_the_same_lock_several_times_as_fast_and_is_constant_from_then_on() {
     let periods = |approach_gain: f64| {
-        let config = Config { approach_gain, damping_rate: ZETA * OMEGA_0, ..config() };
+        let config = Config {
+            approach_gain,
+            damping_rate: Some(ZETA * OMEGA_0),
+            ..config()
+        };
         let mut bench = Bench::new(config);
         let (periods, _) = bench.run_to_lock(2000).expect("a lock");
         let output = bench.run(20);
@@ -287,7 +249,7 @@ fn a_capture_raises_the_response_before_the_drive_goes_to_its_setpoint() {
     let config = Config {
         capture_response: Some(level),
         amplitude_max: Some(6.0 * AMPLITUDE),
-        damping_rate: ZETA * OMEGA_0,
+        damping_rate: Some(ZETA * OMEGA_0),
         approach_gain: 2.0,
         ..config()
     };

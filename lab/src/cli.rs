@@ -14,6 +14,7 @@ mod interrupt;
 mod map;
 mod orbit;
 mod pack;
+mod real_time;
 mod report;
 mod rig;
 mod rigs;

@@ -205,6 +205,9 @@ fn absurd_curves_and_maps_are_refused() {
     fails(&["orbit", "--response", "--set", "excitation.G=0"], 1, "G = 0");
     fails(&["orbit", "--response", "--range=2:-2"], 2, "first below the last");
     fails(&["theory", "--sigma=nan"], 2, "finite");
+    fails(&["decay", "--set", "chain.snr=20"], 2, "[chain] has no effect");
+    let refused = ["identify", "--set", "controller.G_max=1.0"];
+    fails(&refused, 2, "amplitude_max is controller.G_max");
     fails(&["map", "--x", "G=1:2:3", "--y", "G=1:2:3"], 2, "both axes are G");
     fails(&["report", "--x", "r=0.5:1:3", "--y", "r=0.5:1:3"], 2, "both r");
 }

@@ -60,15 +60,24 @@ fn signalled(mut child: Child, signal: &str) -> Option<Output> {
 
 #[test]
 fn after_20_kills_the_store_is_that_of_an_undisturbed_run() {
+    kills(&ARGUMENTS);
+}
+
+#[test]
+fn after_20_kills_an_adaptive_store_is_that_of_an_undisturbed_run() {
+    kills(&[ARGUMENTS.as_slice(), &["--adaptive"]].concat());
+}
+
+fn kills(arguments: &[&str]) {
     let folder = tempfile::tempdir().unwrap();
     let [whole, killed] = ["whole", "killed"].map(|name| folder.path().join(name));
-    let output = vines(&ARGUMENTS, &whole).output().unwrap();
+    let output = vines(arguments, &whole).output().unwrap();
     assert!(output.status.success(), "{}", text(&output));
     let mut kills = 0;
     for n in 0.. {
         // From before the metadata is there to the middle of the chunks.
         let after = Duration::from_millis(3 + 7 * n % 60);
-        let child = vines(&ARGUMENTS, &killed).spawn().unwrap();
+        let child = vines(arguments, &killed).spawn().unwrap();
         thread::sleep(after);
         let output = signalled(child, "KILL").unwrap();
         if output.status.success() {
@@ -83,7 +92,7 @@ fn after_20_kills_the_store_is_that_of_an_undisturbed_run() {
             break;
         }
     }
-    let output = vines(&ARGUMENTS, &killed).output().unwrap();
+    let output = vines(arguments, &killed).output().unwrap();
     assert!(output.status.success(), "{}", text(&output));
     println!("{kills} kills; {}", text(&output));
     assert!(content(&whole) == content(&killed));

@@ -1,9 +1,6 @@
 //! Experiments, orbits, theory and regimes. Results are JSON: its numbers keep all bits, and Python names them.
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, Ordering::Relaxed},
-};
+use std::sync::{Arc, atomic::AtomicBool};
 
 use phase_lock::{Input, State};
 use pyo3::{
@@ -21,40 +18,13 @@ use vines_testbench::{
     comparison::{Comparison, TrackedComparison},
     experiment::{self, Plan},
     identification,
-    rig::{BuiltIn, Drive, GroundTruth, Rig, RigError, Sensors, Simulated},
+    rig::{BuiltIn, Simulated, Stoppable},
 };
 
 use crate::{
     scene::{Scene, invalid, json},
     wait::wait,
 };
-
-/// A rig that fails once the flag is set.
-struct Stoppable {
-    rig: Box<dyn Rig>,
-    stop: Arc<AtomicBool>,
-}
-
-impl Rig for Stoppable {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        if self.stop.load(Relaxed) {
-            return Err(RigError::Failed("interrupted".into()));
-        }
-        self.rig.sense()
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.rig.advance(drive, step)
-    }
-
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.rig.hold(displacement, step)
-    }
-
-    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
-        self.rig.ground_truth()
-    }
-}
 
 /// Runs an experiment on the scene's rig; its failure is a `RuntimeError`.
 fn experiment(
@@ -66,7 +36,7 @@ fn experiment(
     let flag = Arc::clone(&stop);
     let run = || {
         let rig = Simulated::of(scene).map_err(|error| error.to_string())?;
-        work(&mut Stoppable { rig, stop: flag })
+        work(&mut Stoppable::around(rig, scene.sample_time(), &flag))
     };
     wait(py, &stop, |_| Ok(()), run)?.map_err(PyRuntimeError::new_err)
 }
@@ -198,7 +168,7 @@ impl PhaseLock {
         response: f64,
         reference: Option<f64>,
         active: bool,
-    ) -> (f64, f64, f64, f64, f64, f64, bool, bool, u8, u8) {
+    ) -> (f64, f64, f64, Option<f64>, f64, f64, bool, bool, u8, u8) {
         let output = self
             .lock
             .process(&mut self.state, Input { response, reference, active });

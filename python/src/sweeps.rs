@@ -60,6 +60,7 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
         periods: get("periods")?.extract()?,
         results: Results::parse(results.iter().map(String::as_str)).map_err(invalid)?,
         chunk: get("chunk")?.extract()?,
+        adaptive: get("adaptive")?.extract()?,
     };
     Plan::new(scene.family.clone(), settings).map_err(invalid)
 }

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import threading
 import time
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -80,21 +81,35 @@ def test_a_store_of_another_sweep_stays_and_a_folder_that_cannot_be_written_is_a
         vines.sweep(None, {"plant.r": [0.5, 0.6]}, out="/proc/store", periods=200)
 
 
-def test_ctrl_c_ends_within_02_s_and_the_same_call_goes_on(whole, tmp_path):
+@contextmanager
+def after_the_first_chunk(out, action):
+    """Something that happens in another thread as soon as the store has a chunk."""
+
+    def wait():
+        while not (out / "failure" / "c").exists():
+            time.sleep(0.002)
+        action()
+
+    thread = threading.Thread(target=wait)
+    thread.start()
+    yield
+    thread.join()
+
+
+def test_ctrl_c_keeps_complete_chunks(tmp_path):
     sent = []
 
     def interrupt():
         sent.append(time.monotonic())
         os.kill(os.getpid(), signal.SIGINT)
 
+    # Minutes of work: it is certainly interrupted.
+    axes = AXES | {"sigma": (-3.0, 3.0, 30_001)}
     out = tmp_path / "store"
-    timer = threading.Timer(0.15, interrupt)
-    timer.start()
-    with pytest.raises(KeyboardInterrupt):
-        vines.sweep(None, AXES, out=out, **SETTINGS)
-    assert time.monotonic() - sent[0] < 0.2
-    vines.sweep(None, AXES, out=out, **SETTINGS)
-    assert content(out) == whole
+    with after_the_first_chunk(out, interrupt), pytest.raises(KeyboardInterrupt):
+        vines.sweep(None, axes, out=out, **SETTINGS)
+    print(f"{time.monotonic() - sent[0]:.3f} s")
+    assert 0 < sum(name.startswith("failure/c/") for name in content(out)) < 30_001
 
 
 def test_nothing_is_printed_and_a_bar_on_request(tmp_path, capfd):
@@ -117,23 +132,31 @@ def test_with_dask_a_worker_is_killed_and_one_added_and_the_bytes_are_the_same(w
             os.kill(next(iter(identity.values())), signal.SIGKILL)
             local.scale(3)
 
-        timer = threading.Timer(0.2, disturb)
-        timer.start()
-        vines.sweep(None, AXES, out=out, client=client, **SETTINGS)
-        timer.join()
-    assert content(out) == whole
-
-
-def test_after_the_scheduler_ends_another_one_goes_on(whole, tmp_path):
-    out = tmp_path / "store"
-    with cluster(1) as local, Client(local) as client:
-        timer = threading.Timer(0.3, local.close)
-        timer.start()
-        # Whatever the client notices first.
-        with pytest.raises(Exception):  # noqa: B017, PT011
+        with after_the_first_chunk(out, disturb):
             vines.sweep(None, AXES, out=out, client=client, **SETTINGS)
-        timer.join()
-    assert content(out) != whole
-    with cluster(1) as local, Client(local) as client:
-        vines.sweep(None, AXES, out=out, client=client, **SETTINGS)
     assert content(out) == whole
+
+
+def test_after_the_scheduler_ends_another_one_goes_on(tmp_path):
+    # More work than what fits into the time in which a scheduler ends.
+    settings = {"periods": 5000, "chunk": 40}
+    out, whole = tmp_path / "store", tmp_path / "whole"
+    with (
+        cluster(1) as local,
+        Client(local) as client,
+        after_the_first_chunk(out, local.close),
+        pytest.raises(Exception),  # noqa: B017, PT011  whatever the client notices first
+    ):
+        vines.sweep(None, AXES, out=out, client=client, **settings)
+    with cluster(1) as local, Client(local) as client:
+        vines.sweep(None, AXES, out=out, client=client, **settings)
+    vines.sweep(None, AXES, out=whole, **settings)
+    assert content(out) == content(whole)
+
+
+def test_an_adaptive_map_marks_what_it_infers(tmp_path):
+    axes = {"sigma": (-1.6, -0.9, 33), "excitation.G": (0.8, 1.3, 33)}
+    cells = vines.sweep(None, axes, out=tmp_path / "store", periods=200, adaptive=8)
+    assert 0 < int(cells.inferred.sum()) < cells.regime.size
+    with pytest.raises(ValueError, match="one process"):
+        vines.sweep(None, axes, out=tmp_path / "other", adaptive=8, client=object())

@@ -20,7 +20,7 @@ class Output:
         Drive amplitude E, m.
     drive : float
         Setpoint of the base displacement at this sample, m.
-    phase_error : float
+    phase_error : float or None
         Phase of the response relative to the reference, minus the target, rad.
     response_amplitude : float
         Amplitude of the first harmonic of the response, m.
@@ -37,7 +37,7 @@ class Output:
     omega: float
     amplitude: float
     drive: float
-    phase_error: float
+    phase_error: float | None
     response_amplitude: float
     coherence: float
     locked: bool

@@ -26,6 +26,7 @@ def sweep(
     periods: int = 20_000,
     results: Iterable[str] = (),
     chunk: int = 4096,
+    adaptive: int | None = None,
     confirm: bool = False,
     progress: bool = False,
     client: Any = None,
@@ -55,6 +56,9 @@ def sweep(
         Further results: `"response"`, `"orbits"`, `"lock"`.
     chunk : int
         Largest number of cells in a chunk.
+    adaptive : int, optional
+        Only the regime: compute every n-th cell of two grids (4 is usual), then where neighbours differ, and infer
+        the rest; `inferred` marks it. Not with `client`.
     confirm : bool
         Confirms a sweep of more than 2 hours or 20 GB.
     progress : bool
@@ -93,7 +97,10 @@ def sweep(
         "periods": periods,
         "results": list(results),
         "chunk": chunk,
+        "adaptive": adaptive,
     }
+    if adaptive is not None and client is not None:
+        raise ValueError("an adaptive sweep runs in one process: leave out adaptive or client")
     axes = {name: _values(values) for name, values in axes.items()}
     cells, chunks, hours, size, large = _native.chunks(scene._native, axes, settings)
     if large and not confirm:

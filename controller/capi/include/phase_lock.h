@@ -11,6 +11,14 @@
 #include <stdint.h>
 #include <stdlib.h>
 
+// Method of the phase detector.
+typedef enum PhaseLockDetector {
+  // Adaptive harmonic filter.
+  PHASE_LOCK_DETECTOR_ADAPTIVE = 1,
+  // Synchronous demodulation.
+  PHASE_LOCK_DETECTOR_DEMODULATOR = 2,
+} PhaseLockDetector;
+
 // State of the loop.
 typedef enum PhaseLockStage {
   // Not armed.
@@ -49,58 +57,70 @@ typedef enum PhaseLockFault {
   PHASE_LOCK_FAULT_IMPLAUSIBLE = 6,
 } PhaseLockFault;
 
+#if defined(PHASE_LOCK_F32)
+// The floating-point type: float if PHASE_LOCK_F32 is defined, for the library with the feature f32; otherwise double.
+typedef float PhaseLockReal;
+#endif
+
+#if !defined(PHASE_LOCK_F32)
+// The floating-point type: float if PHASE_LOCK_F32 is defined, for the library with the feature f32; otherwise double.
+typedef double PhaseLockReal;
+#endif
+
 // An optional value; all zeros: not present.
 typedef struct PhaseLockOptional {
   // Whether there is a value.
   bool present;
   // The value.
-  double value;
+  PhaseLockReal value;
 } PhaseLockOptional;
 
 // All parameters; phase_lock_config_for_resonance gives initial values.
 typedef struct PhaseLockConfig {
   // Sample time, s.
-  double sample_time;
+  PhaseLockReal sample_time;
   // Frequency while the loop is open, rad/s.
-  double omega_start;
+  PhaseLockReal omega_start;
   // Lowest frequency, rad/s.
-  double omega_min;
+  PhaseLockReal omega_min;
   // Highest frequency, rad/s.
-  double omega_max;
+  PhaseLockReal omega_max;
   // Largest rate of change of the frequency, rad/s^2.
   struct PhaseLockOptional omega_rate;
   // Setpoint of the drive amplitude, m.
-  double amplitude;
+  PhaseLockReal amplitude;
   // Largest drive amplitude, m.
   struct PhaseLockOptional amplitude_max;
   // Largest rate of change of the drive amplitude in a ramp, m/s; not present: step changes.
   struct PhaseLockOptional ramp_rate;
   // Rate of the drive ramp to 0 after active becomes false, m/s; not present: switched off at once.
   struct PhaseLockOptional release_rate;
-  // Bandwidth of the control of the measured base amplitude, rad/s; 0: no control.
-  double base_bandwidth;
+  // Bandwidth of the control of the measured base amplitude, rad/s; not present: no control.
+  struct PhaseLockOptional base_bandwidth;
   // Setpoint of the phase of the response relative to the reference, rad.
-  double phase_target;
+  PhaseLockReal phase_target;
+  // Method of the phase detector.
+  enum PhaseLockDetector detector;
   // Bandwidth of the detector, rad/s: the tuning parameter.
-  double bandwidth;
-  // Damping rate of the structure, rad/s; 0: unknown.
-  double damping_rate;
+  PhaseLockReal bandwidth;
+  // Damping rate of the structure, rad/s; not present: unknown.
+  struct PhaseLockOptional damping_rate;
   // Delay from the drive to the sample of the sensor, s; used if no reference is connected.
-  double delay;
+  PhaseLockReal delay;
   // Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
-  double response_gain;
+  PhaseLockReal response_gain;
   // Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
-  double phase_tolerance;
+  PhaseLockReal phase_tolerance;
   // Phase error above which the lock is lost, mean over a period, rad.
-  double unlock_tolerance;
+  PhaseLockReal unlock_tolerance;
   // Largest relative drift of the frequency per period in a lock.
-  double frequency_drift;
+  PhaseLockReal frequency_drift;
   // Largest relative drift of the response amplitude per period in a lock.
-  double amplitude_drift;
+  PhaseLockReal amplitude_drift;
   // Smallest share of the fundamental in the power of a valid signal, 0 to 1.
-  double coherence_min;
+  PhaseLockReal coherence_min;
   // Smallest valid response amplitude, as a multiple of amplitude.
-  double response_min;
+  PhaseLockReal response_min;
   // Reading of the response sensor above which the drive is switched off, m.
   struct PhaseLockOptional response_max;
   // Longest time from the end of the ramp to the lock, s.
@@ -111,15 +131,15 @@ typedef struct PhaseLockConfig {
   struct PhaseLockOptional residual_max;
   // Whether a sensor measures the base.
   bool reference_connected;
-  // The response approaches its steady state 1 + approach_gain times as fast as under a constant drive; 0: constant drive.
-  double approach_gain;
+  // The response approaches its steady state 1 + approach_gain times as fast as under a constant drive.
+  PhaseLockReal approach_gain;
   // Response amplitude, m, at which impacts certainly occur; it is visited first, so that a particle at rest joins the motion.
   struct PhaseLockOptional capture_response;
   // Largest response amplitude, m, of the motion that is wanted; a captured motion is led below it.
   struct PhaseLockOptional captured_max;
   // Time for which the lock criterion must hold, periods.
   uint32_t dwell;
-  // Number of harmonics of the adaptive filter, 1 to 8; 0: synchronous demodulator.
+  // Number of harmonics of the adaptive filter, 1 to 8.
   uint8_t harmonics;
   // Harmonics 1, 3, 5, ... instead of 1, 2, 3, ...
   bool odd_only;
@@ -134,11 +154,9 @@ typedef struct PhaseLockController {
 // Sensor readings of a sample, and the operator's request.
 typedef struct PhaseLockInput {
   // Response of the structure, m.
-  double response;
-  // Displacement of the base, m.
-  double reference;
-  // Whether a sensor measures the base.
-  bool has_reference;
+  PhaseLockReal response;
+  // Displacement of the base, m; not present: no sensor measures it.
+  struct PhaseLockOptional reference;
   // Whether the drive is requested. A change from false to true arms the controller, also after a fault.
   bool active;
 } PhaseLockInput;
@@ -146,27 +164,27 @@ typedef struct PhaseLockInput {
 // Drive until the next sample, and the controller's estimates.
 typedef struct PhaseLockOutput {
   // Drive frequency, rad/s.
-  double omega;
+  PhaseLockReal omega;
   // Drive amplitude, m.
-  double amplitude;
+  PhaseLockReal amplitude;
   // Setpoint of the base displacement at this sample, m.
-  double drive;
-  // Phase of the response relative to the reference, minus the target, rad.
-  double phase_error;
+  PhaseLockReal drive;
+  // Phase of the response relative to the reference, minus the target, rad; not present while an amplitude is 0.
+  struct PhaseLockOptional phase_error;
   // Amplitude of the response's fundamental, m.
-  double response_amplitude;
-  // Setpoint of the response amplitude, m; 0 while the drive amplitude is controlled instead.
-  double response_target;
+  PhaseLockReal response_amplitude;
+  // Setpoint of the response amplitude, m; not present while the drive amplitude is controlled instead.
+  struct PhaseLockOptional response_target;
   // Amplitude of the reference's fundamental, m.
-  double reference_amplitude;
+  PhaseLockReal reference_amplitude;
   // Share of the fundamental in the power of the response, 0 to 1.
-  double coherence;
+  PhaseLockReal coherence;
   // Mean frequency over the running dwell, rad/s.
-  double frequency;
+  PhaseLockReal frequency;
   // Mean response amplitude over the running dwell, m.
-  double response_mean;
+  PhaseLockReal response_mean;
   // State of the loop.
-  enum PhaseLockStage stage;
+  enum PhaseLockStage state;
   // Reason why the drive was switched off.
   enum PhaseLockFault fault;
   // Whether the loop is locked.
@@ -178,13 +196,17 @@ typedef struct PhaseLockOutput {
 // A change of the response amplitude's setpoint.
 typedef struct PhaseLockMove {
   // New setpoint of the response amplitude, m.
-  double response;
+  PhaseLockReal response;
   // Duration, s.
-  double duration;
-  // Expected change of the drive amplitude, m; 0 if unknown.
-  double amplitude;
-  // Expected change of the frequency, rad/s; 0 if unknown.
-  double omega;
+  PhaseLockReal duration;
+  // Expected change of the drive amplitude, m; 0: none.
+  PhaseLockReal amplitude;
+  // Expected change of the frequency, rad/s; 0: none.
+  PhaseLockReal omega;
+  /**
+   * Growth of the setpoint at the end, m/s, at which it goes on from there; 0 to hold it.
+   */
+  PhaseLockReal growth;
 } PhaseLockMove;
 
 #ifdef __cplusplus
@@ -196,8 +218,8 @@ extern "C" {
 // # Safety
 // config is NULL or may be written.
 int phase_lock_config_for_resonance(struct PhaseLockConfig *config,
-                                    double omega,
-                                    double amplitude);
+                                    PhaseLockReal omega,
+                                    PhaseLockReal amplitude);
 
 // Checks a configuration and initialises a controller before its first sample. For an invalid value, writes the reason to
 // message (of that length in bytes; may be NULL) and leaves the controller unchanged.
@@ -222,8 +244,8 @@ int phase_lock_sample(struct PhaseLockController *controller,
 // # Safety
 // As for phase_lock_init.
 int phase_lock_retune(struct PhaseLockController *controller,
-                      double amplitude,
-                      double phase_target,
+                      PhaseLockReal amplitude,
+                      PhaseLockReal phase_target,
                       char *message,
                       size_t length);
 
@@ -235,6 +257,12 @@ int phase_lock_hold_response(struct PhaseLockController *controller,
                              const struct PhaseLockMove *to,
                              char *message,
                              size_t length);
+
+// Controls the drive amplitude again; the drive ramps to its setpoint.
+//
+// # Safety
+// controller is NULL or was initialised.
+int phase_lock_hold_drive(struct PhaseLockController *controller);
 
 // Returns to the state before the first sample, with the same configuration.
 //

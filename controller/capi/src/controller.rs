@@ -5,7 +5,9 @@ use core::ffi::{c_char, c_int};
 use phase_lock::{Config, ConfigError};
 
 use crate::message;
-use crate::types::{PhaseLockConfig, PhaseLockController, PhaseLockInput, PhaseLockMove, PhaseLockOutput, Stored};
+use crate::types::{
+    PhaseLockConfig, PhaseLockController, PhaseLockInput, PhaseLockMove, PhaseLockOutput, PhaseLockReal, Stored,
+};
 
 const SUCCESS: c_int = 0;
 const INVALID_VALUE: c_int = 1;
@@ -40,8 +42,8 @@ unsafe fn status(outcome: Result<(), ConfigError>, message: *mut c_char, length:
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn phase_lock_config_for_resonance(
     config: *mut PhaseLockConfig,
-    omega: f64,
-    amplitude: f64,
+    omega: PhaseLockReal,
+    amplitude: PhaseLockReal,
 ) -> c_int {
     if config.is_null() {
         return NULL_POINTER;
@@ -110,8 +112,8 @@ pub unsafe extern "C" fn phase_lock_sample(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn phase_lock_retune(
     controller: *mut PhaseLockController,
-    amplitude: f64,
-    phase_target: f64,
+    amplitude: PhaseLockReal,
+    phase_target: PhaseLockReal,
     message: *mut c_char,
     length: usize,
 ) -> c_int {
@@ -142,6 +144,20 @@ pub unsafe extern "C" fn phase_lock_hold_response(
     let outcome = stored.lock.hold_response(&mut stored.state, to.into());
     // SAFETY: the caller's contract.
     unsafe { status(outcome, message, length) }
+}
+
+/// Controls the drive amplitude again; the drive ramps to its setpoint.
+///
+/// # Safety
+/// controller is NULL or was initialised.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn phase_lock_hold_drive(controller: *mut PhaseLockController) -> c_int {
+    // SAFETY: the caller's contract.
+    let Some(stored) = (unsafe { stored(controller) }) else {
+        return NULL_POINTER;
+    };
+    stored.lock.hold_drive(&mut stored.state);
+    SUCCESS
 }
 
 /// Returns to the state before the first sample, with the same configuration.

@@ -3,22 +3,20 @@
 use phase_lock::{Config, Detector, Fault, Input, LoopState, Move, Output};
 
 use crate::types::{
-    PhaseLockConfig, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOptional, PhaseLockOutput, PhaseLockStage,
+    PhaseLockConfig, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOptional,
+    PhaseLockOutput, PhaseLockReal, PhaseLockStage,
 };
 
-// In C, `harmonics = 0` selects the demodulator; every other parameter is a field of the same name.
+// Every parameter is a field of the same name.
 macro_rules! read {
     (detector, $c:ident, $config:ident, $group:ident, $field:ident) => {
-        $config.detector = match $c.harmonics {
-            0 => Detector::Demodulator,
-            _ => Detector::Adaptive,
+        $config.$field = match $c.$field {
+            PhaseLockDetector::Adaptive => Detector::Adaptive,
+            PhaseLockDetector::Demodulator => Detector::Demodulator,
         }
     };
     (optional, $c:ident, $config:ident, config, $field:ident) => {
-        $config.$field = $c.$field.present.then_some($c.$field.value)
-    };
-    ($type:ident, $c:ident, $config:ident, config, harmonics) => {
-        $config.harmonics = $c.harmonics.max(1)
+        $config.$field = $c.$field.into()
     };
     ($type:ident, $c:ident, $config:ident, config, $field:ident) => {
         $config.$field = $c.$field
@@ -29,18 +27,14 @@ macro_rules! read {
 }
 
 macro_rules! write {
-    (detector, $c:ident, $config:ident, $group:ident, $field:ident) => {};
-    (optional, $c:ident, $config:ident, config, $field:ident) => {
-        $c.$field = PhaseLockOptional {
-            present: $config.$field.is_some(),
-            value: $config.$field.unwrap_or_default(),
+    (detector, $c:ident, $config:ident, $group:ident, $field:ident) => {
+        $c.$field = match $config.$field {
+            Detector::Adaptive => PhaseLockDetector::Adaptive,
+            Detector::Demodulator => PhaseLockDetector::Demodulator,
         }
     };
-    ($type:ident, $c:ident, $config:ident, config, harmonics) => {
-        $c.harmonics = match $config.detector {
-            Detector::Demodulator => 0,
-            Detector::Adaptive => $config.harmonics,
-        }
+    (optional, $c:ident, $config:ident, config, $field:ident) => {
+        $c.$field = $config.$field.into()
     };
     ($type:ident, $c:ident, $config:ident, config, $field:ident) => {
         $c.$field = $config.$field
@@ -48,6 +42,18 @@ macro_rules! write {
     ($type:ident, $c:ident, $config:ident, lock, $field:ident) => {
         $c.$field = $config.lock.$field
     };
+}
+
+impl From<PhaseLockOptional> for Option<PhaseLockReal> {
+    fn from(c: PhaseLockOptional) -> Self {
+        c.present.then_some(c.value)
+    }
+}
+
+impl From<Option<PhaseLockReal>> for PhaseLockOptional {
+    fn from(value: Option<PhaseLockReal>) -> Self {
+        Self { present: value.is_some(), value: value.unwrap_or_default() }
+    }
 }
 
 /// Conversions in both directions, from the table of the parameters.
@@ -77,7 +83,7 @@ impl From<&PhaseLockInput> for Input {
     fn from(input: &PhaseLockInput) -> Self {
         Self {
             response: input.response,
-            reference: input.has_reference.then_some(input.reference),
+            reference: input.reference.into(),
             active: input.active,
         }
     }
@@ -90,7 +96,7 @@ impl From<&PhaseLockMove> for Move {
             duration: to.duration,
             amplitude: to.amplitude,
             omega: to.omega,
-            ..Move::default()
+            growth: to.growth,
         }
     }
 }
@@ -101,14 +107,14 @@ impl From<Output> for PhaseLockOutput {
             omega: o.omega,
             amplitude: o.amplitude,
             drive: o.drive,
-            phase_error: o.phase_error,
+            phase_error: o.phase_error.into(),
             response_amplitude: o.response_amplitude,
-            response_target: o.response_target,
+            response_target: o.response_target.into(),
             reference_amplitude: o.reference_amplitude,
             coherence: o.coherence,
             frequency: o.frequency,
             response_mean: o.response_mean,
-            stage: match o.state {
+            state: match o.state {
                 LoopState::Idle => PhaseLockStage::Idle,
                 LoopState::Ramping => PhaseLockStage::Ramping,
                 LoopState::Acquiring => PhaseLockStage::Acquiring,
@@ -146,15 +152,11 @@ mod tests {
             config.detector = detector;
             for (n, parameter) in PARAMETERS.iter().enumerate() {
                 let value = match parameter.get(&config) {
-                    Value::Real(_) => Value::Real(1.0 + n as f64),
+                    Value::Real(_) => Value::Real(1.0 + n as PhaseLockReal),
                     Value::Integer(_) if parameter.name != "detector" => Value::Integer(5),
                     same => same,
                 };
                 parameter.set(&mut config, value).expect(parameter.name);
-            }
-            if detector == Detector::Demodulator {
-                // The demodulator has no number of harmonics in C.
-                config.harmonics = 1;
             }
             let c = PhaseLockConfig::from(&config);
             assert_eq!(Config::from(&c), config);

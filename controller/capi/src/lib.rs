@@ -5,18 +5,22 @@
 #![cfg_attr(not(feature = "std"), no_std)]
 #![warn(missing_docs)]
 
+// Single precision under the same name.
+#[cfg(feature = "f32")]
+extern crate phase_lock_f32 as phase_lock;
+
 mod controller;
 mod convert;
 mod message;
 mod types;
 
 pub use controller::{
-    phase_lock_config_for_resonance, phase_lock_hold_response, phase_lock_init, phase_lock_reset, phase_lock_retune,
-    phase_lock_sample,
+    phase_lock_config_for_resonance, phase_lock_hold_drive, phase_lock_hold_response, phase_lock_init,
+    phase_lock_reset, phase_lock_retune, phase_lock_sample,
 };
 pub use types::{
-    PhaseLockConfig, PhaseLockController, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOutput,
-    PhaseLockStage,
+    PhaseLockConfig, PhaseLockController, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove,
+    PhaseLockOptional, PhaseLockOutput, PhaseLockReal, PhaseLockStage,
 };
 
 #[cfg(not(feature = "std"))]

@@ -50,4 +50,16 @@ mod tests {
         assert_eq!(&bytes[..4], b"gr\0\0");
         assert_eq!(bytes[4], 0x7f);
     }
+
+    #[test]
+    fn the_message_for_a_very_large_value_says_what_is_allowed() {
+        let mut config = phase_lock::Config::for_resonance(55.0, 1e-4);
+        config.sample_time = -1e300;
+        let mut bytes = [0_u8; 200];
+        // SAFETY: as many bytes as the array has.
+        unsafe { write(config.build().unwrap_err(), bytes.as_mut_ptr().cast(), bytes.len()) };
+        let text = core::ffi::CStr::from_bytes_until_nul(&bytes).unwrap().to_str().unwrap();
+        assert!(text.ends_with("allowed is a finite number above 0"), "{text}");
+        assert!(text.starts_with("sample_time = -1e300 s"), "{text}");
+    }
 }

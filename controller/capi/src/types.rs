@@ -2,6 +2,13 @@
 
 use phase_lock::{PhaseLock, State};
 
+/// The floating-point type: float if PHASE_LOCK_F32 is defined, for the library with the feature f32; otherwise double.
+#[cfg(feature = "f32")]
+pub type PhaseLockReal = f32;
+/// The floating-point type: float if PHASE_LOCK_F32 is defined, for the library with the feature f32; otherwise double.
+#[cfg(not(feature = "f32"))]
+pub type PhaseLockReal = f64;
+
 /// Storage of a controller and its state, initialised by phase_lock_init. May be copied; its content is private.
 #[repr(C)]
 #[derive(Clone, Copy)]
@@ -27,7 +34,18 @@ pub struct PhaseLockOptional {
     /// Whether there is a value.
     pub present: bool,
     /// The value.
-    pub value: f64,
+    pub value: PhaseLockReal,
+}
+
+/// Method of the phase detector.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum PhaseLockDetector {
+    /// Adaptive harmonic filter.
+    #[default]
+    Adaptive = 1,
+    /// Synchronous demodulation.
+    Demodulator = 2,
 }
 
 /// All parameters; phase_lock_config_for_resonance gives initial values.
@@ -35,47 +53,49 @@ pub struct PhaseLockOptional {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PhaseLockConfig {
     /// Sample time, s.
-    pub sample_time: f64,
+    pub sample_time: PhaseLockReal,
     /// Frequency while the loop is open, rad/s.
-    pub omega_start: f64,
+    pub omega_start: PhaseLockReal,
     /// Lowest frequency, rad/s.
-    pub omega_min: f64,
+    pub omega_min: PhaseLockReal,
     /// Highest frequency, rad/s.
-    pub omega_max: f64,
+    pub omega_max: PhaseLockReal,
     /// Largest rate of change of the frequency, rad/s^2.
     pub omega_rate: PhaseLockOptional,
     /// Setpoint of the drive amplitude, m.
-    pub amplitude: f64,
+    pub amplitude: PhaseLockReal,
     /// Largest drive amplitude, m.
     pub amplitude_max: PhaseLockOptional,
     /// Largest rate of change of the drive amplitude in a ramp, m/s; not present: step changes.
     pub ramp_rate: PhaseLockOptional,
     /// Rate of the drive ramp to 0 after active becomes false, m/s; not present: switched off at once.
     pub release_rate: PhaseLockOptional,
-    /// Bandwidth of the control of the measured base amplitude, rad/s; 0: no control.
-    pub base_bandwidth: f64,
+    /// Bandwidth of the control of the measured base amplitude, rad/s; not present: no control.
+    pub base_bandwidth: PhaseLockOptional,
     /// Setpoint of the phase of the response relative to the reference, rad.
-    pub phase_target: f64,
+    pub phase_target: PhaseLockReal,
+    /// Method of the phase detector.
+    pub detector: PhaseLockDetector,
     /// Bandwidth of the detector, rad/s: the tuning parameter.
-    pub bandwidth: f64,
-    /// Damping rate of the structure, rad/s; 0: unknown.
-    pub damping_rate: f64,
+    pub bandwidth: PhaseLockReal,
+    /// Damping rate of the structure, rad/s; not present: unknown.
+    pub damping_rate: PhaseLockOptional,
     /// Delay from the drive to the sample of the sensor, s; used if no reference is connected.
-    pub delay: f64,
+    pub delay: PhaseLockReal,
     /// Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
-    pub response_gain: f64,
+    pub response_gain: PhaseLockReal,
     /// Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
-    pub phase_tolerance: f64,
+    pub phase_tolerance: PhaseLockReal,
     /// Phase error above which the lock is lost, mean over a period, rad.
-    pub unlock_tolerance: f64,
+    pub unlock_tolerance: PhaseLockReal,
     /// Largest relative drift of the frequency per period in a lock.
-    pub frequency_drift: f64,
+    pub frequency_drift: PhaseLockReal,
     /// Largest relative drift of the response amplitude per period in a lock.
-    pub amplitude_drift: f64,
+    pub amplitude_drift: PhaseLockReal,
     /// Smallest share of the fundamental in the power of a valid signal, 0 to 1.
-    pub coherence_min: f64,
+    pub coherence_min: PhaseLockReal,
     /// Smallest valid response amplitude, as a multiple of amplitude.
-    pub response_min: f64,
+    pub response_min: PhaseLockReal,
     /// Reading of the response sensor above which the drive is switched off, m.
     pub response_max: PhaseLockOptional,
     /// Longest time from the end of the ramp to the lock, s.
@@ -86,15 +106,15 @@ pub struct PhaseLockConfig {
     pub residual_max: PhaseLockOptional,
     /// Whether a sensor measures the base.
     pub reference_connected: bool,
-    /// The response approaches its steady state 1 + approach_gain times as fast as under a constant drive; 0: constant drive.
-    pub approach_gain: f64,
+    /// The response approaches its steady state 1 + approach_gain times as fast as under a constant drive.
+    pub approach_gain: PhaseLockReal,
     /// Response amplitude, m, at which impacts certainly occur; it is visited first, so that a particle at rest joins the motion.
     pub capture_response: PhaseLockOptional,
     /// Largest response amplitude, m, of the motion that is wanted; a captured motion is led below it.
     pub captured_max: PhaseLockOptional,
     /// Time for which the lock criterion must hold, periods.
     pub dwell: u32,
-    /// Number of harmonics of the adaptive filter, 1 to 8; 0: synchronous demodulator.
+    /// Number of harmonics of the adaptive filter, 1 to 8.
     pub harmonics: u8,
     /// Harmonics 1, 3, 5, ... instead of 1, 2, 3, ...
     pub odd_only: bool,
@@ -105,11 +125,9 @@ pub struct PhaseLockConfig {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseLockInput {
     /// Response of the structure, m.
-    pub response: f64,
-    /// Displacement of the base, m.
-    pub reference: f64,
-    /// Whether a sensor measures the base.
-    pub has_reference: bool,
+    pub response: PhaseLockReal,
+    /// Displacement of the base, m; not present: no sensor measures it.
+    pub reference: PhaseLockOptional,
     /// Whether the drive is requested. A change from false to true arms the controller, also after a fault.
     pub active: bool,
 }
@@ -161,27 +179,27 @@ pub enum PhaseLockFault {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseLockOutput {
     /// Drive frequency, rad/s.
-    pub omega: f64,
+    pub omega: PhaseLockReal,
     /// Drive amplitude, m.
-    pub amplitude: f64,
+    pub amplitude: PhaseLockReal,
     /// Setpoint of the base displacement at this sample, m.
-    pub drive: f64,
-    /// Phase of the response relative to the reference, minus the target, rad.
-    pub phase_error: f64,
+    pub drive: PhaseLockReal,
+    /// Phase of the response relative to the reference, minus the target, rad; not present while an amplitude is 0.
+    pub phase_error: PhaseLockOptional,
     /// Amplitude of the response's fundamental, m.
-    pub response_amplitude: f64,
-    /// Setpoint of the response amplitude, m; 0 while the drive amplitude is controlled instead.
-    pub response_target: f64,
+    pub response_amplitude: PhaseLockReal,
+    /// Setpoint of the response amplitude, m; not present while the drive amplitude is controlled instead.
+    pub response_target: PhaseLockOptional,
     /// Amplitude of the reference's fundamental, m.
-    pub reference_amplitude: f64,
+    pub reference_amplitude: PhaseLockReal,
     /// Share of the fundamental in the power of the response, 0 to 1.
-    pub coherence: f64,
+    pub coherence: PhaseLockReal,
     /// Mean frequency over the running dwell, rad/s.
-    pub frequency: f64,
+    pub frequency: PhaseLockReal,
     /// Mean response amplitude over the running dwell, m.
-    pub response_mean: f64,
+    pub response_mean: PhaseLockReal,
     /// State of the loop.
-    pub stage: PhaseLockStage,
+    pub state: PhaseLockStage,
     /// Reason why the drive was switched off.
     pub fault: PhaseLockFault,
     /// Whether the loop is locked.
@@ -195,11 +213,13 @@ pub struct PhaseLockOutput {
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseLockMove {
     /// New setpoint of the response amplitude, m.
-    pub response: f64,
+    pub response: PhaseLockReal,
     /// Duration, s.
-    pub duration: f64,
-    /// Expected change of the drive amplitude, m; 0 if unknown.
-    pub amplitude: f64,
-    /// Expected change of the frequency, rad/s; 0 if unknown.
-    pub omega: f64,
+    pub duration: PhaseLockReal,
+    /// Expected change of the drive amplitude, m; 0: none.
+    pub amplitude: PhaseLockReal,
+    /// Expected change of the frequency, rad/s; 0: none.
+    pub omega: PhaseLockReal,
+    /// Growth of the setpoint at the end, m/s, at which it goes on from there; 0 to hold it.
+    pub growth: PhaseLockReal,
 }

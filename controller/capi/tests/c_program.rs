@@ -15,7 +15,7 @@ fn run(command: &mut Command) -> String {
 }
 
 /// Builds the static library as firmware takes it, without the standard library, in a folder of its own.
-fn static_library(folder: &Path) -> PathBuf {
+fn static_library(folder: &Path, features: &str) -> PathBuf {
     run(Command::new(env!("CARGO"))
         .args([
             "rustc",
@@ -24,6 +24,8 @@ fn static_library(folder: &Path) -> PathBuf {
             "--release",
             "--lib",
             "--no-default-features",
+            "--features",
+            features,
         ])
         .args(["--crate-type", "staticlib", "--target-dir"])
         .arg(folder)
@@ -73,7 +75,7 @@ fn by_the_core() -> String {
                 "{n} {:016x} {:016x} {:016x} {}",
                 output.omega.to_bits(),
                 output.amplitude.to_bits(),
-                output.phase_error.to_bits(),
+                output.phase_error.unwrap_or(0.0).to_bits(),
                 output.state as u8
             )
             .unwrap();
@@ -82,14 +84,22 @@ fn by_the_core() -> String {
     text + "5 1\n" + "1 omega_max = 66.468 rad/s is refused; allowed is a finite number above omega_min\n" + "-1\n"
 }
 
-#[test]
-fn a_c_program_locks_a_resonator_with_the_bits_of_the_core() {
+/// What tests/resonator.c prints with a library of these features.
+fn by_the_library(features: &str, define: &str) -> String {
     let folder = tempfile::tempdir().unwrap();
-    let library = static_library(&folder.path().join("target"));
+    let library = static_library(&folder.path().join("target"), features);
     let program = folder.path().join("resonator");
     let here = Path::new(env!("CARGO_MANIFEST_DIR"));
     run(Command::new("cc")
-        .args(["-std=c99", "-Wall", "-Wextra", "-Werror", "-O2", "-ffp-contract=off"])
+        .args([
+            "-std=c99",
+            "-Wall",
+            "-Wextra",
+            "-Werror",
+            "-O2",
+            "-ffp-contract=off",
+            define,
+        ])
         .arg("-I")
         .arg(here.join("include"))
         .arg(here.join("tests/resonator.c"))
@@ -97,7 +107,12 @@ fn a_c_program_locks_a_resonator_with_the_bits_of_the_core() {
         .args(["-lm", "-Wl,--gc-sections"])
         .arg("-o")
         .arg(&program));
-    let printed = run(&mut Command::new(program));
+    run(&mut Command::new(program))
+}
+
+#[test]
+fn a_c_program_locks_a_resonator_with_the_bits_of_the_core() {
+    let printed = by_the_library("", "-DDOUBLE");
     let expected = by_the_core();
     for (c, core) in printed.lines().zip(expected.lines()) {
         assert_eq!(c, core);
@@ -106,4 +121,21 @@ fn a_c_program_locks_a_resonator_with_the_bits_of_the_core() {
     // It did lock, and held its response at half.
     let locked = printed.lines().filter(|line| line.ends_with(" 3")).count();
     assert!(locked > 40, "{locked}");
+}
+
+#[test]
+fn a_c_program_in_single_precision_locks_the_resonator_at_the_same_frequency() {
+    let omegas = |printed: &str| -> Vec<f64> {
+        let lines = printed.lines().filter(|line| line.ends_with(" 3"));
+        let bits = lines.map(|line| u64::from_str_radix(line.split(' ').nth(1).unwrap(), 16).unwrap());
+        bits.map(f64::from_bits).collect()
+    };
+    let (single, double) = (
+        omegas(&by_the_library("f32", "-DPHASE_LOCK_F32")),
+        omegas(&by_the_core()),
+    );
+    assert_eq!(single.len(), double.len());
+    for (single, double) in single.iter().zip(&double) {
+        assert!((single / double - 1.0).abs() < 1e-6, "{single}, {double}");
+    }
 }

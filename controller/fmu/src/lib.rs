@@ -1,10 +1,12 @@
 //! The phase-lock controller as an FMI 2.0 component: maps the variables of the FMU to the core.
 //!
-//! The parameters come from the core's table; a test compares it with `modelDescription.xml`.
+//! Parameters and outputs come from the core's tables; a test compares them with `modelDescription.xml`.
 #![forbid(unsafe_code)]
 
 use fmi2_component::{Archive, Component, Key, Log, Refusal};
-use phase_lock::{Config, Input, LoopState, Output, Parameter, PhaseLock, SampleClock, State, Value};
+use phase_lock::{
+    Config, Input, LoopState, Move, OUTPUTS, Output, Parameter, PhaseLock, SampleClock, Signal as Out, State, Value,
+};
 use variables::{Boolean, Integer, Model, Real, category};
 
 mod signal;
@@ -24,6 +26,8 @@ struct Controller {
     response: Signal,
     reference: Signal,
     active: bool,
+    hold_response: bool,
+    to: Move,
     running: Option<Running>,
 }
 
@@ -35,6 +39,24 @@ struct Running {
     lock: PhaseLock,
     state: State,
     output: Output,
+    /// The last move of the response amplitude, while it is controlled.
+    moved: Option<Move>,
+}
+
+impl Running {
+    /// Controls the response amplitude as the master asks, as soon as the loop is closed; `None`: the drive amplitude.
+    fn hold_response(&mut self, to: Option<Move>) -> Result<(), Refusal> {
+        let is_closed = matches!(self.output.state, LoopState::Acquiring | LoopState::Locked);
+        let to = to.filter(|_| is_closed);
+        if to != self.moved {
+            match to {
+                Some(to) => self.lock.hold_response(&mut self.state, to)?,
+                None => self.lock.hold_drive(&mut self.state),
+            }
+            self.moved = to;
+        }
+        Ok(())
+    }
 }
 
 /// Tolerance of the sample grid, in sample times: a sample so little after a communication point counts as on it.
@@ -52,13 +74,21 @@ impl Controller {
         self.running.as_ref().is_some_and(|running| running.clock.taken() > 0)
     }
 
-    fn output(&self) -> Option<&Output> {
-        self.running.as_ref().map(|running| &running.output)
-    }
-
-    /// The value of a parameter; none for other variables.
-    fn parameter(&self, variable: impl Key) -> Option<Value> {
-        Parameter::find(variable.variable().name).map(|parameter| parameter.get(&self.config))
+    /// The value of a parameter or of an output; 0 for an output without a value.
+    fn value(&self, variable: impl Key) -> Value {
+        let name = variable.variable().name;
+        let idle = Output::idle(self.config.omega_start);
+        let output = self.running.as_ref().map_or(&idle, |running| &running.output);
+        if let Some(signal) = Out::find(name) {
+            return signal.get(output).unwrap_or(Value::Real(0.0));
+        }
+        if let Some(signal) = OUTPUTS.iter().find(|signal| signal.present == Some(name)) {
+            return Value::Boolean(signal.get(output).is_some());
+        }
+        match Parameter::find(name) {
+            Some(parameter) => parameter.get(&self.config),
+            None => unreachable!("{name} is a parameter or an output of the core"),
+        }
     }
 
     fn set_parameter(&mut self, variable: impl Key, value: Value) -> Result<(), Refusal> {
@@ -85,28 +115,24 @@ impl Component for Controller {
             response: Signal::default(),
             reference: Signal::default(),
             active: false,
+            hold_response: false,
+            to: Move::default(),
             running: None,
         }
     }
 
     fn get_real(&self, variable: Real) -> f64 {
-        let value = |get: fn(&Output) -> f64| self.output().map_or(0.0, get);
-        let frequency = |get: fn(&Output) -> f64| self.output().map_or(self.config.omega_start, get);
         match variable {
             Real::response => self.response.value,
             Real::reference => self.reference.value,
-            Real::omega => frequency(|o| o.omega),
-            Real::frequency => frequency(|o| o.frequency),
-            Real::E => value(|o| o.amplitude),
-            Real::drive => value(|o| o.drive),
-            Real::phase_error => value(|o| o.phase_error),
-            Real::response_amplitude => value(|o| o.response_amplitude),
-            Real::reference_amplitude => value(|o| o.reference_amplitude),
-            Real::coherence => value(|o| o.coherence),
-            Real::response_mean => value(|o| o.response_mean),
-            parameter => match self.parameter(parameter) {
-                Some(Value::Real(value)) => value,
-                _ => unreachable!("{parameter:?} is a real parameter of the core"),
+            Real::move_response => self.to.response,
+            Real::move_duration => self.to.duration,
+            Real::move_amplitude => self.to.amplitude,
+            Real::move_omega => self.to.omega,
+            Real::move_growth => self.to.growth,
+            computed => match self.value(computed) {
+                Value::Real(value) => value,
+                other => unreachable!("{computed:?} = {other:?} is a real number"),
             },
         }
     }
@@ -115,22 +141,20 @@ impl Component for Controller {
         match variable {
             Real::response => self.response.value = value,
             Real::reference => self.reference.value = value,
+            Real::move_response => self.to.response = value,
+            Real::move_duration => self.to.duration = value,
+            Real::move_amplitude => self.to.amplitude = value,
+            Real::move_omega => self.to.omega = value,
+            Real::move_growth => self.to.growth = value,
             parameter => return self.set_parameter(parameter, Value::Real(value)),
         }
         Ok(())
     }
 
     fn get_integer(&self, variable: Integer) -> i32 {
-        match variable {
-            Integer::state => self.output().map_or(LoopState::Idle, |o| o.state) as i32,
-            Integer::fault => {
-                let fault = self.output().and_then(|o| o.fault);
-                fault.map_or(0, |fault| fault as i32)
-            }
-            parameter => match self.parameter(parameter) {
-                Some(Value::Integer(value)) => value,
-                _ => unreachable!("{parameter:?} is an integer parameter of the core"),
-            },
+        match self.value(variable) {
+            Value::Integer(value) => value,
+            other => unreachable!("{variable:?} = {other:?} is a whole number"),
         }
     }
 
@@ -141,21 +165,18 @@ impl Component for Controller {
     fn get_boolean(&self, variable: Boolean) -> bool {
         match variable {
             Boolean::active => self.active,
-            Boolean::locked => self.output().is_some_and(|o| o.locked),
-            Boolean::settled => self.output().is_some_and(|o| o.settled),
-            parameter => match self.parameter(parameter) {
-                Some(Value::Boolean(value)) => value,
-                _ => unreachable!("{parameter:?} is a Boolean parameter of the core"),
-            },
+            Boolean::hold_response => self.hold_response,
+            computed => self.value(computed) == Value::Boolean(true),
         }
     }
 
     fn set_boolean(&mut self, variable: Boolean, value: bool) -> Result<(), Refusal> {
-        if variable == Boolean::active {
-            self.active = value;
-            return Ok(());
+        match variable {
+            Boolean::active => self.active = value,
+            Boolean::hold_response => self.hold_response = value,
+            parameter => return self.set_parameter(parameter, Value::Boolean(value)),
         }
-        self.set_parameter(variable, Value::Boolean(value))
+        Ok(())
     }
 
     fn initialise(&mut self, start_time: f64, _log: &Log) -> Result<(), Refusal> {
@@ -164,6 +185,7 @@ impl Component for Controller {
             start_time,
             clock: SampleClock::new(self.config.sample_time),
             output: lock.idle(),
+            moved: None,
             state: lock.start(),
             lock,
         });
@@ -190,6 +212,7 @@ impl Component for Controller {
         if (tuned.amplitude, tuned.phase_target) != (amplitude, phase_target) {
             running.lock.retune(amplitude, phase_target)?;
         }
+        running.hold_response(self.hold_response.then_some(self.to))?;
         let sample_time = self.config.sample_time;
         let begin = time - running.start_time;
         for (name, signal) in [("response", &mut self.response), ("reference", &mut self.reference)] {

@@ -15,7 +15,7 @@ const BANDWIDTH: f64 = 0.3;
 fn amplitude_loop(amplitude_max: f64) -> AmplitudeLoop {
     let config = Config {
         bandwidth: BANDWIDTH,
-        damping_rate: DELTA,
+        damping_rate: Some(DELTA),
         response_gain: GAIN,
         sample_time: DT,
         ..Config::for_resonance(1.0, 0.0)

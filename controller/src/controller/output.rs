@@ -1,13 +1,14 @@
 //! The output of one sample.
 
 use super::PhaseLock;
+use crate::real::Real;
 use crate::sensing::Measurement;
 use crate::signals::Output;
 use crate::state::State;
 use crate::supervisor::LoopState;
 
 impl PhaseLock {
-    pub(super) fn output(&self, state: &State, measured: &Measurement, drive: f64) -> Output {
+    pub(super) fn output(&self, state: &State, measured: &Measurement, drive: Real) -> Output {
         let omega = state.frequency.omega;
         let response_amplitude = state.channels.response.amplitude();
         let means = state.dwell.means();
@@ -16,9 +17,9 @@ impl PhaseLock {
             omega,
             amplitude: state.drive.amplitude,
             drive,
-            phase_error: measured.error,
+            phase_error: measured.measurable.then_some(measured.error),
             response_amplitude,
-            response_target: state.amplitude_loop.map_or(0.0, |l| l.setpoint()),
+            response_target: state.amplitude_loop.map(|l| l.setpoint()),
             reference_amplitude: measured.reference_amplitude,
             coherence: state.channels.response.coherence(),
             // Rounding can move the mean of values at a limit beyond the limit.

@@ -88,24 +88,41 @@ const SETTLE: f64 = 600.0;
 const LOOK: usize = 200;
 const TIMINGS: usize = 60;
 
-/// The effect of every stage of [`STAGES`] on the scene that `load` reads with further settings.
+/// The settings of a chain that is off, whatever the scene's is.
+const OFF: [&str; 9] = [
+    "adc_bits='none'",
+    "dac_bits='none'",
+    "hold=false",
+    "snr='none'",
+    "filter='none'",
+    "jitter=0",
+    "delay=0",
+    "reference=true",
+    "compensate=true",
+];
+
+/// The effect of every stage of [`STAGES`] alone on the scene that `load` reads with further settings, and that of the scene's own chain.
 ///
 /// # Errors
 /// A scene that is refused, or one that the plant or the controller refuses.
 pub fn effects(
     mut load: impl FnMut(&[Override]) -> Result<Scene, SceneError>,
 ) -> Result<Vec<Effect>, ChainEffectError> {
-    STAGES
-        .iter()
-        .map(|(name, settings)| {
-            let overrides = settings
-                .iter()
-                .map(|setting| format!("chain.{setting}").parse())
-                .collect::<Result<Vec<Override>, SyntaxError>>()
-                .map_err(SceneError::from)?;
-            effect(name, &load(&overrides)?)
-        })
-        .collect()
+    let mut scenes = Vec::new();
+    for (name, settings) in STAGES {
+        let overrides = OFF
+            .iter()
+            .chain(settings)
+            .map(|setting| format!("chain.{setting}").parse())
+            .collect::<Result<Vec<Override>, SyntaxError>>()
+            .map_err(SceneError::from)?;
+        scenes.push((name, load(&overrides)?));
+    }
+    let own = load(&[])?;
+    if own.chain.is_on() {
+        scenes.push(("the scene's chain", own));
+    }
+    scenes.iter().map(|(name, scene)| effect(name, scene)).collect()
 }
 
 /// The plant and the controller of a scene, with the chain between them where it is on.

@@ -71,8 +71,8 @@ const DECAY_EXTRA: f64 = 10.0;
 /// Length of the recorded decay, natural periods: that of the scene, or as long as first-order theory expects synchrony to last
 /// from symmetry breaking on, with a margin.
 fn decay_periods(scene: &Scene) -> f64 {
-    if scene.record.decay_periods > 0.0 {
-        return scene.record.decay_periods;
+    if let Some(periods) = scene.record.decay_periods {
+        return periods;
     }
     let d = scene.dimensionless();
     let flow = SlowFlow::new(d.lambda, d.r);
@@ -120,14 +120,15 @@ pub enum ExperimentError {
     Controller(#[from] ControllerError),
     /// The loop found no stationary phase resonance in the time allowed.
     #[error(
-        "no lock within {periods:.0} periods of the drive: the phase error is {phase_error:.3} degrees at omega = {omega:.6} rad/s; \
-         see record.lock_periods and the [controller] section"
+        "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s; \
+         see record.lock_periods and the [controller] section",
+        phase_error.map_or("the phase cannot be measured".into(), |error| format!("the phase error is {error:.3} degrees"))
     )]
     NoLock {
         /// Time limit, natural periods.
         periods: f64,
-        /// Last phase error, degrees.
-        phase_error: f64,
+        /// Last phase error, degrees; absent if it could not be measured.
+        phase_error: Option<f64>,
         /// Last frequency, rad/s.
         omega: f64,
     },

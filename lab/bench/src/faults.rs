@@ -73,7 +73,7 @@ fn short(scene: &Scene) -> Scene {
     scene.backbone.points = scene.backbone.points.min(4);
     scene.backbone.c_to = scene.backbone.c_from + f64::from(scene.backbone.points - 1) * step;
     scene.controller.release_periods = RELEASE;
-    scene.record.decay_periods = 3.0 * RELEASE;
+    scene.record.decay_periods = Some(3.0 * RELEASE);
     scene
 }
 

@@ -3,6 +3,8 @@
 //! A linear resonator at rest that is driven at its natural frequency with the amplitude E responds with `-i g E (1 - exp(-d t))/d`
 //! (`g`: half the frequency, `d`: damping rate). Response and base are compared with this and with E, by amplitude and phase.
 
+mod linear;
+mod lock_times;
 mod trials;
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
@@ -14,6 +16,8 @@ use serde::Serialize;
 use crate::rig::{Drive, Rig, RigError};
 use crate::scene::Scene;
 
+pub use linear::Linear;
+pub use lock_times::{LockTime, LockTimeError, lock_times};
 pub use trials::{Trials, trials};
 
 /// Drive, as a share of that of the scene.
@@ -26,6 +30,12 @@ const DEAD: f64 = 0.02;
 const GAIN: f64 = 2.0;
 /// Largest RMS of what is not the drive's frequency, as a share of the amplitude.
 const NOISE: f64 = 0.15;
+/// Periods between looks at a response that falls, how often, and the share of it that is left at most.
+const DECAY: usize = 10;
+/// As above.
+const PAUSES: usize = 40;
+/// As above.
+const FALLS: f64 = 0.98;
 /// RMS of the response without a drive over that of its noise with it, from which the rig moves.
 const AT_REST: f64 = 3.0;
 /// Deviation of the phase, rad, up to which a channel is in time, and from which it is reversed.
@@ -118,9 +128,11 @@ pub struct LoopCheck {
     pub response: Channel,
     /// The base, if a sensor measures it.
     pub base: Option<Channel>,
+    /// The linear response and the gains for it, if the loop is healthy.
+    pub linear: Option<Linear>,
 }
 
-/// Checks a rig at rest at a hundredth of the drive. The phase of the rig's oscillator is a multiple of 2 pi before and after.
+/// Checks a rig at a hundredth of the drive, after a response that is still falling has come to rest. The phase of the rig's oscillator is a multiple of 2 pi before and after.
 ///
 /// # Errors
 /// A failure of the rig.
@@ -130,23 +142,14 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
     let amplitude = SHARE * scene.amplitude;
     let samples = |periods: usize| (periods as f64 * TAU / (omega * step)).round() as usize;
     let [quiet, driven, window] = PERIODS.map(samples);
-    let mut readings: Vec<[f64; 3]> = Vec::with_capacity(quiet + driven);
-    let mut has_base = false;
-    let mut phase = 0.0_f64;
-    for n in 0..quiet + driven {
-        let sensors = rig.sense()?;
-        has_base |= sensors.reference.is_some();
-        readings.push([phase, sensors.response, sensors.reference.unwrap_or(0.0)]);
-        let amplitude = if n < quiet { 0.0 } else { amplitude };
-        rig.advance(Drive { omega, amplitude, displacement: amplitude * phase.sin() }, step)?;
-        phase += omega * step;
-    }
-    let turn = TAU - phase % TAU;
-    let rest = samples(1);
-    for _ in 0..rest {
-        rig.sense()?;
-        rig.advance(Drive { omega: turn / (rest as f64 * step), ..Drive::default() }, step)?;
-    }
+    let mut rig = OpenLoop {
+        rig,
+        omega,
+        step,
+        phase: 0.0,
+        readings: Vec::new(),
+        has_base: false,
+    };
     let time = (driven - window / 2) as f64 * step;
     let damping = 0.5 * d.epsilon * d.lambda * d.omega0;
     let rate = Complex64::new(damping, omega - d.omega0);
@@ -154,10 +157,15 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
     // A delay that the chain states is expected.
     let stated = Complex64::from_polar(1.0, -scene.controller_config().delay * omega);
     let expected = [growth * amplitude * stated, stated * amplitude];
+    rig.rest(quiet, samples(DECAY), NOISE * expected[0].norm())?;
+    let begins = rig.readings.len();
+    rig.drive(driven, amplitude)?;
+    rig.end(samples(1))?;
+    let OpenLoop { readings, has_base, .. } = rig;
     let channels = [0, 1].map(|n| {
-        let seen = Seen::of(&readings[quiet + driven - window..], n + 1);
+        let seen = Seen::of(&readings[begins + driven - window..], n + 1);
         let ratio = seen.phasor / expected[n];
-        let floor = rms(readings[..quiet].iter().map(|reading| reading[n + 1]));
+        let floor = rms(readings[begins - quiet..begins].iter().map(|reading| reading[n + 1]));
         Channel {
             gain: ratio.norm(),
             phase: ratio.arg().to_degrees(),
@@ -167,12 +175,77 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
         }
     });
     let amplitudes = expected.map(|one| one.norm());
+    let verdict = verdict(&channels, &amplitudes, has_base);
+    let base = if has_base {
+        channels[1].gain * amplitudes[1]
+    } else {
+        amplitude
+    };
+    let period = samples(1);
+    let phasors: Vec<_> = readings[begins..]
+        .chunks_exact(period)
+        .map(|readings| Seen::of(readings, 1).phasor)
+        .collect();
+    let linear = Linear::of(&phasors, base, omega, period as f64 * step, scene);
     Ok(LoopCheck {
-        verdict: verdict(&channels, &amplitudes, has_base),
+        verdict,
+        linear: linear.filter(|_| verdict == Verdict::Healthy),
         amplitude,
         response: channels[0],
         base: has_base.then_some(channels[1]),
     })
+}
+
+/// A rig whose loop is open, and what it has read: the phase of its oscillator, rad, response and base.
+struct OpenLoop<'a, R: ?Sized> {
+    rig: &'a mut R,
+    omega: f64,
+    step: f64,
+    phase: f64,
+    readings: Vec<[f64; 3]>,
+    has_base: bool,
+}
+
+impl<R: Rig + ?Sized> OpenLoop<'_, R> {
+    fn drive(&mut self, samples: usize, amplitude: f64) -> Result<(), RigError> {
+        for _ in 0..samples {
+            let (omega, phase) = (self.omega, self.phase);
+            let sensors = self.rig.sense()?;
+            self.has_base |= sensors.reference.is_some();
+            self.readings
+                .push([phase, sensors.response, sensors.reference.unwrap_or(0.0)]);
+            let drive = Drive { omega, amplitude, displacement: amplitude * phase.sin() };
+            self.rig.advance(drive, self.step)?;
+            self.phase += omega * self.step;
+        }
+        Ok(())
+    }
+
+    /// Listens for `quiet` samples, and as long as a response above `enough` (RMS, m) falls from one `pause` to the next.
+    fn rest(&mut self, quiet: usize, pause: usize, enough: f64) -> Result<(), RigError> {
+        let mut before = f64::INFINITY;
+        for n in 0..=PAUSES {
+            self.drive(if n == 0 { quiet } else { pause }, 0.0)?;
+            let last = &self.readings[self.readings.len() - quiet..];
+            let response = rms(last.iter().map(|reading| reading[1]));
+            // Noise does not fall.
+            if !(response > enough && response < FALLS * before) {
+                break;
+            }
+            before = response;
+        }
+        Ok(())
+    }
+
+    /// Brings the phase of the rig's oscillator to a multiple of 2 pi, with no drive.
+    fn end(&mut self, samples: usize) -> Result<(), RigError> {
+        let omega = (TAU - self.phase % TAU) / (samples as f64 * self.step);
+        for _ in 0..samples {
+            self.rig.sense()?;
+            self.rig.advance(Drive { omega, ..Drive::default() }, self.step)?;
+        }
+        Ok(())
+    }
 }
 
 fn rms(values: impl Iterator<Item = f64>) -> f64 {

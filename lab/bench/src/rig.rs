@@ -6,6 +6,7 @@ mod error;
 mod measured;
 mod phase_lock;
 mod simulated;
+mod stoppable;
 
 pub use ::phase_lock::{Fault, LoopState, Move};
 pub use chain::Chain;
@@ -14,6 +15,7 @@ pub use error::{ControllerError, RigError};
 pub use measured::Measured;
 pub use phase_lock::BuiltIn;
 pub use simulated::Simulated;
+pub use stoppable::{Interrupted, Stoppable};
 
 /// What the controller asks of the rig for the coming sample period.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -84,8 +86,8 @@ pub trait Rig {
 pub struct Command {
     /// The drive for the coming sample period.
     pub drive: Drive,
-    /// Phase of the response relative to the base, less the target, rad.
-    pub phase_error: f64,
+    /// Phase of the response relative to the base, less the target, rad; absent if it cannot be measured.
+    pub phase_error: Option<f64>,
     /// Phase, frequency and amplitude have been stationary for the controller's dwell time.
     pub settled: bool,
     /// State of the loop; absent if the controller does not report it.

@@ -6,7 +6,10 @@ mod configuration;
 mod controller;
 mod error;
 mod family;
+mod names;
+mod option;
 mod overrides;
+mod phase_lock;
 mod plant;
 mod record;
 mod sections;
@@ -24,7 +27,9 @@ pub use configuration::{PhaseOrigin, PhaseTarget};
 pub use controller::Controller;
 pub use error::SceneError;
 pub use family::Family;
+pub use names::{Name, Names};
 pub use overrides::{Override, SyntaxError};
+pub use phase_lock::{KEYS, PhaseLock, refusal};
 pub use record::{Estimator, Record};
 pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
 
@@ -45,6 +50,8 @@ pub struct Scene {
     pub amplitude: f64,
     /// The phase-locked loop, in units of omega0 and of the natural period.
     pub controller: Controller,
+    /// Further parameters of the loop.
+    pub phase_lock: PhaseLock,
     /// How long to drive and to record, in periods.
     pub record: Record,
     /// How the backbone is tracked, in units of b and in periods.
@@ -53,6 +60,12 @@ pub struct Scene {
     pub chain: Chain,
     /// What counts as resonance, and what is measured.
     pub resonance: Definition,
+    /// What a rig other than the simulated one calls its variables.
+    #[serde(skip_serializing_if = "Names::is_empty")]
+    pub rig_names: Names,
+    /// What a controller other than the built-in one calls its variables.
+    #[serde(skip_serializing_if = "Names::is_empty")]
+    pub controller_names: Names,
 }
 
 impl Scene {

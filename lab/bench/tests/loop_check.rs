@@ -2,7 +2,7 @@
 
 use lovines::State;
 use vines_testbench::loop_check::{Verdict, check, trials};
-use vines_testbench::rig::{Drive, Rig, RigError, Sensors, Simulated};
+use vines_testbench::rig::{Chain, Drive, Rig, RigError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
 
 fn scene() -> Scene {
@@ -13,6 +13,9 @@ fn scene() -> Scene {
 fn healthy_rigs_pass_and_faults_are_named() {
     let found = trials(&scene(), 60, 5).unwrap();
     assert_eq!((found.healthy, found.faulty), ([60, 60], [60, 60]), "{:?}", found.wrong);
+    // The integral gain, the response gain, and the damping rate in its uncertainty.
+    let [integral, gain, damping] = found.linear.map(|[_, largest]| largest);
+    assert!(integral < 0.05 && gain < 0.15 && damping < 3.0, "{:?}", found.linear);
 }
 
 /// A rig that records its largest drive and the phase of its oscillator.
@@ -43,11 +46,54 @@ fn the_check_drives_at_a_hundredth_and_ends_at_the_phase_where_it_began() {
 }
 
 #[test]
-fn a_rig_that_moves_before_the_drive_is_named() {
+fn a_rig_that_moves_before_the_drive_comes_to_rest_first_or_is_named() {
     let scene = scene();
-    for speed in [1e-3, 0.05] {
-        let start = State { dq1: speed, ..State::default() };
-        let found = check(&mut Simulated::new(scene.plant, start).unwrap(), &scene).unwrap();
-        assert_eq!(found.verdict, Verdict::NotAtRest, "{found:?}");
+    for (driven, expected) in [(false, Verdict::Healthy), (true, Verdict::NotAtRest)] {
+        let start = State { dq1: 0.05, ..State::default() };
+        let mut rig = Moving(Simulated::new(scene.plant, start).unwrap(), driven);
+        let found = check(&mut rig, &scene).unwrap();
+        assert_eq!(found.verdict, expected, "{found:?}");
+    }
+}
+
+/// A rig that moves at first, or that something else drives all the time.
+struct Moving(Simulated, bool);
+
+impl Rig for Moving {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.0.sense()
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let amplitude = drive.amplitude + if self.1 { 1e-5 } else { 0.0 };
+        self.0.advance(Drive { amplitude, ..drive }, step)
+    }
+}
+
+#[test]
+fn the_check_measures_the_linear_response_and_states_gains_with_a_phase_margin() {
+    for (settings, tolerance) in [
+        (&[][..], 0.02),
+        (
+            &["chain.snr=40", "chain.adc_bits=16", "chain.response_range=0.02"],
+            0.15,
+        ),
+    ] {
+        let overrides: Vec<_> = settings
+            .iter()
+            .chain(&["start.dq2=0"])
+            .map(|one| one.parse().unwrap())
+            .collect();
+        let scene = Scene::parse("paper.toml", PAPER, &overrides).unwrap();
+        let d = scene.dimensionless();
+        let plant = Simulated::new(scene.plant, scene.start).unwrap();
+        let mut rig = Chain::around(Box::new(plant), &scene.chain, &d, scene.controller.samples_per_period);
+        let found = check(&mut *rig, &scene).unwrap().linear.unwrap();
+        println!("{found:?}");
+        let damping = 0.5 * d.epsilon * d.lambda * d.omega0;
+        assert!((found.damping_rate / damping - 1.0).abs() < tolerance);
+        assert!((found.response_gain / (0.5 * d.omega0) - 1.0).abs() < tolerance);
+        assert!((found.omega_0 / d.omega0 - 1.0).abs() < 1e-3);
+        assert!((50.0..60.0).contains(&found.phase_margin));
     }
 }

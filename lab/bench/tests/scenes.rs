@@ -152,7 +152,7 @@ fn values_that_make_no_sense_are_named_with_unit_and_range() {
         ),
         (
             "record.decay_periods=-1",
-            ["record.decay_periods = -1 (natural periods)", "zero or positive"],
+            ["record.decay_periods = -1 (natural periods)", "must be positive"],
         ),
     ] {
         says(&complaint(paper(&[argument])), &parts);

@@ -3,30 +3,78 @@
 use std::path::Path;
 
 use fmi::fmi2::instance::Common;
-use phase_lock::{Config, PARAMETERS, Value};
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Sensors};
+use phase_lock::{Config, MOVE, PARAMETERS, Value};
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Sensors};
+use vines_testbench::scene::Names;
 
-use crate::instance::{Fmu, FmuError, Kind, Reference};
+use crate::instance::{Fmu, FmuError, Kind, Named, Reference};
+use crate::judge::Judge;
+
+/// The names of this bench that a scene may map, beside those of the parameters.
+const NAMES: [&str; 13] = [
+    "response",
+    "reference",
+    "active",
+    "omega",
+    "E",
+    "drive",
+    "phase_error",
+    "phase_measured",
+    "hold_response",
+    "settled",
+    "locked",
+    "state",
+    "fault",
+];
+
+/// How it is known that the lock has settled.
+enum Settled {
+    /// The controller says so: `settled`.
+    Told(Reference),
+    /// The lab judges, while `locked` is true where the controller has it.
+    Judged(Option<Reference>, Judge),
+}
 
 /// A controller FMU, stepped sample by sample.
 ///
-/// It needs the inputs `response` and `active` and the outputs `omega`, `E` and `settled`; `reference`, `drive`, `phase_error`,
-/// `state` and `fault` are used where it has them. Of the configuration it gets what it has a parameter for, by the names of
+/// It needs the inputs `response` and `active` and the outputs `omega` and `E`. Without the output `settled`, the lab judges whether the
+/// lock has settled, by `locked`, the phase error and the frequency. `reference`, `drive`, `phase_error`,
+/// `phase_measured`, `state` and `fault` are used where it has them, and for the control of the response the parameter `phase_target`
+/// and the inputs `hold_response` and `move.*`. A scene maps all names. Of the configuration it gets what it has a parameter for, by the names of
 /// `PhaseLock.fmu`. At each sample its inputs are set, it is stepped by one sample time, and what it then puts out is
 /// the drive of that very sample period.
 pub struct FmuController {
     fmu: Fmu,
     sample_time: f64,
     /// `response`, and `reference` where there is one.
-    sensors: Vec<Reference>,
+    sensors: Vec<Named>,
     active: Reference,
     /// `omega` and `E`.
-    drive: [Reference; 2],
-    displacement: Option<Reference>,
-    phase_error: Option<Reference>,
-    settled: Reference,
+    drive: [Named; 2],
+    displacement: Option<Named>,
+    phase_error: Option<Named>,
+    phase_measured: Option<Reference>,
+    settled: Settled,
     /// `state` and `fault`.
     states: [Option<Reference>; 2],
+    response_loop: Option<ResponseLoop>,
+}
+
+/// Variables of a controller that can control the response.
+struct ResponseLoop {
+    /// `phase_target` and the fields of the move, in the order of the core's table.
+    reals: Vec<Named>,
+    hold: Reference,
+}
+
+impl ResponseLoop {
+    fn of(fmu: &Fmu, names: &Names) -> Result<Option<Self>, FmuError> {
+        let reals = std::iter::once("phase_target".to_owned()).chain(moves());
+        let reals = reals.map(|ours| fmu.named(Kind::Real, names, &ours));
+        let reals: Option<Vec<Named>> = reals.collect::<Result<_, _>>()?;
+        let hold = fmu.named(Kind::Boolean, names, "hold_response")?;
+        Ok(reals.zip(hold).map(|(reals, (hold, _))| Self { reals, hold }))
+    }
 }
 
 impl FmuController {
@@ -34,29 +82,75 @@ impl FmuController {
     ///
     /// # Errors
     /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
-    pub fn load(path: &Path, config: &Config) -> Result<Self, FmuError> {
+    pub fn load(path: &Path, config: &Config, names: &Names) -> Result<Self, FmuError> {
+        let known = PARAMETERS.iter().map(|parameter| parameter.name);
+        let moves: Vec<String> = moves().collect();
+        let known: Vec<&str> = NAMES
+            .into_iter()
+            .chain(known)
+            .chain(moves.iter().map(String::as_str))
+            .collect();
+        if let Some(name) = names.unknown(&known) {
+            return Err(FmuError::Name { name: name.into(), known: known.join(", ") });
+        }
         let mut fmu = Fmu::load(path, "controller")?;
-        let mut sensors = vec![fmu.need(Kind::Real, "response")?];
-        sensors.extend(fmu.find(Kind::Real, "reference"));
-        let active = fmu.need(Kind::Boolean, "active")?;
-        let drive = [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?];
-        let settled = fmu.need(Kind::Boolean, "settled")?;
-        fmu.start(&parameters(config))?;
+        let mut sensors = vec![fmu.need_named(Kind::Real, names, "response")?];
+        sensors.extend(fmu.named(Kind::Real, names, "reference")?);
+        let (active, _) = fmu.need_named(Kind::Boolean, names, "active")?;
+        let drive = [
+            fmu.need_named(Kind::Real, names, "omega")?,
+            fmu.need_named(Kind::Real, names, "E")?,
+        ];
+        let phase_error = fmu.named(Kind::Real, names, "phase_error")?;
+        let settled = match ["settled", "locked"].map(|ours| fmu.named(Kind::Boolean, names, ours)) {
+            [Ok(Some((settled, _))), _] => Settled::Told(settled),
+            [Err(error), _] | [_, Err(error)] => return Err(error),
+            [Ok(None), Ok(locked)] => {
+                let locked = locked.map(|(locked, _)| locked);
+                if locked.is_none() && phase_error.is_none() {
+                    log::warn!(
+                        "{} has none of `settled`, `locked` and `phase_error`: its lock is judged by its frequency alone",
+                        path.display()
+                    );
+                }
+                Settled::Judged(locked, Judge::new(config))
+            }
+        };
+        let integer = |ours| {
+            fmu.named(Kind::Integer, names, ours)
+                .map(|found| found.map(|(reference, _)| reference))
+        };
+        let states = [integer("state")?, integer("fault")?];
+        let displacement = fmu.named(Kind::Real, names, "drive")?;
+        let phase_measured = fmu.named(Kind::Boolean, names, "phase_measured")?;
+        let phase_measured = phase_measured.map(|(reference, _)| reference);
+        let response_loop = ResponseLoop::of(&fmu, names)?;
+        fmu.start(names, &parameters(config))?;
         Ok(Self {
             sample_time: config.sample_time,
             sensors,
             active,
             drive,
-            displacement: fmu.find(Kind::Real, "drive"),
-            phase_error: fmu.find(Kind::Real, "phase_error"),
+            displacement,
+            phase_error,
+            phase_measured,
+            response_loop,
             settled,
-            states: ["state", "fault"].map(|name| fmu.find(Kind::Integer, name)),
+            states,
             fmu,
         })
     }
 
-    fn optional(&mut self, reference: Option<Reference>) -> Result<f64, FmuError> {
-        reference.map_or(Ok(0.0), |one| self.fmu.reals("give its outputs", [one]).map(|[x]| x))
+    fn optional(&mut self, variable: Option<Named>) -> Result<Option<f64>, FmuError> {
+        let value = variable.map(|one| self.fmu.read("give its outputs", [one]).map(|[x]| x));
+        value.transpose()
+    }
+
+    fn boolean(&mut self, reference: Reference) -> Result<bool, FmuError> {
+        let (reference, mut value) = ([reference], [0]);
+        self.fmu
+            .ask("give its outputs", |i| i.get_boolean(&reference, &mut value))?;
+        Ok(value != [0])
     }
 
     fn integer(&mut self, reference: Option<Reference>) -> Result<Option<i32>, FmuError> {
@@ -71,24 +165,44 @@ impl FmuController {
 
     fn exchange(&mut self, sensors: Sensors, active: bool) -> Result<Command, FmuError> {
         let readings = [sensors.response, sensors.reference.unwrap_or(0.0)];
-        let (references, active_reference) = (&self.sensors, [self.active]);
+        let given: Vec<f64> = self
+            .sensors
+            .iter()
+            .zip(readings)
+            .map(|((_, factor), x)| x / factor)
+            .collect();
+        let references: Vec<Reference> = self.sensors.iter().map(|(reference, _)| *reference).collect();
+        let active_reference = [self.active];
         self.fmu.ask("take its inputs", |i| {
-            i.set_real(references, &readings[..references.len()])?;
+            i.set_real(&references, &given)?;
             i.set_boolean(&active_reference, &[active.into()])
         })?;
         self.fmu.step(self.sample_time)?;
-        let [omega, amplitude] = self.fmu.reals("give its outputs", self.drive)?;
-        let (reference, mut settled) = ([self.settled], [0]);
-        self.fmu
-            .ask("give its outputs", |i| i.get_boolean(&reference, &mut settled))?;
+        let [omega, amplitude] = self.fmu.read("give its outputs", self.drive)?;
+        let told = match self.settled {
+            Settled::Told(told) => Some(told),
+            Settled::Judged(locked, _) => locked,
+        };
+        let told = told.map(|told| self.boolean(told)).transpose()?;
+        let measured = self.phase_measured.map_or(Ok(true), |one| self.boolean(one))?;
+        let phase_error = self.optional(self.phase_error.filter(|_| measured))?;
+        let settled = match &mut self.settled {
+            Settled::Told(_) => told == Some(true),
+            Settled::Judged(..) if !active => false,
+            Settled::Judged(_, judge) => {
+                // A phase that cannot be measured now is none to judge by.
+                let locked = told.unwrap_or(true) && measured;
+                judge.sample(omega, phase_error.unwrap_or(0.0), locked)
+            }
+        };
         Ok(Command {
             drive: Drive {
                 omega,
                 amplitude,
-                displacement: self.optional(self.displacement)?,
+                displacement: self.optional(self.displacement)?.unwrap_or(0.0),
             },
-            phase_error: self.optional(self.phase_error)?,
-            settled: settled != [0],
+            phase_error,
+            settled,
             state: self.integer(self.states[0])?.and_then(LoopState::of_number),
             fault: self.integer(self.states[1])?.and_then(Fault::of_number),
         })
@@ -99,6 +213,29 @@ impl Controller for FmuController {
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
         Ok(self.exchange(sensors, active)?)
     }
+
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
+        let inputs = self.response_loop.as_ref().ok_or(ControllerError::NoResponseLoop)?;
+        let Move { response, duration, amplitude, omega, growth } = to;
+        let values = [phase_target, response, duration, amplitude, omega, growth];
+        let values: Vec<f64> = inputs
+            .reals
+            .iter()
+            .zip(values)
+            .map(|((_, factor), x)| x / factor)
+            .collect();
+        let references: Vec<Reference> = inputs.reals.iter().map(|(reference, _)| *reference).collect();
+        self.fmu.ask("take its inputs", |i| {
+            i.set_real(&references, &values)?;
+            i.set_boolean(&[inputs.hold], &[true.into()])
+        })?;
+        Ok(())
+    }
+}
+
+/// The inputs of a move.
+fn moves() -> impl Iterator<Item = String> {
+    MOVE.iter().map(|(name, _)| format!("move.{name}"))
 }
 
 /// The configuration under the names of the FMU's parameters.

@@ -10,6 +10,7 @@ use fmi::traits::FmiImport;
 use phase_lock::Value;
 use thiserror::Error;
 use vines_testbench::rig::{ControllerError, RigError};
+use vines_testbench::scene::{Name, Names};
 
 use crate::error::{CallError, LoadError};
 
@@ -25,14 +26,24 @@ pub enum FmuError {
         source: LoadError,
     },
     /// The FMU lacks a variable that the bench needs.
-    #[error("{} has no {kind} variable `{name}`, which the bench needs", path.display())]
+    #[error("{} has no {kind} variable `{name}`, which the bench needs; [rig.names] and [controller_names] of the scene map names", path.display())]
     Variable {
         /// The FMU.
         path: PathBuf,
         /// Its type.
         kind: Kind,
         /// Its name.
-        name: &'static str,
+        name: String,
+    },
+    /// The scene maps a name that this bench does not have.
+    #[error(
+        "[rig.names] or [controller_names] of the scene maps `{name}`, which this bench does not have; it has: {known}"
+    )]
+    Name {
+        /// The name.
+        name: String,
+        /// What there is.
+        known: String,
     },
     /// The FMU refused a call; its own message has been logged.
     #[error("{} refused to {action} at t = {time} s: {source}", path.display())]
@@ -99,6 +110,9 @@ impl std::fmt::Display for Kind {
     }
 }
 
+/// A variable, and SI units per unit of it.
+pub(super) type Named = (Reference, f64);
+
 /// Value reference of a variable.
 pub(super) type Reference = <Fmi2Import as FmiImport>::ValueRef;
 
@@ -127,23 +141,38 @@ impl Fmu {
     }
 
     /// The variable of that name and kind.
-    pub fn need(&self, kind: Kind, name: &'static str) -> Result<Reference, FmuError> {
+    pub fn need(&self, kind: Kind, name: &str) -> Result<Reference, FmuError> {
         self.find(kind, name)
-            .ok_or_else(|| FmuError::Variable { path: self.path.clone(), kind, name })
+            .ok_or_else(|| FmuError::Variable { path: self.path.clone(), kind, name: name.into() })
+    }
+
+    /// The variable that `names` has for `ours`, and its factor. A name that the user gave must exist.
+    pub fn named(&self, kind: Kind, names: &Names, ours: &str) -> Result<Option<Named>, FmuError> {
+        let Name { name, factor } = names.of(ours);
+        match names.mapped(ours) {
+            Some(_) => self.need(kind, &name).map(|reference| Some((reference, factor))),
+            None => Ok(self.find(kind, &name).map(|reference| (reference, factor))),
+        }
+    }
+
+    /// The same for a variable that the bench needs.
+    pub fn need_named(&self, kind: Kind, names: &Names, ours: &str) -> Result<Named, FmuError> {
+        let missing = || FmuError::Variable { path: self.path.clone(), kind, name: ours.into() };
+        self.named(kind, names, ours)?.ok_or_else(missing)
     }
 
     /// Sets the values that the FMU has variables for, and initialises it at time 0. A warning in the log names the
     /// others; the FMU keeps its own values for these.
-    pub fn start(&mut self, values: &[(&str, Value)]) -> Result<(), FmuError> {
+    pub fn start(&mut self, names: &Names, values: &[(&str, Value)]) -> Result<(), FmuError> {
         let mut missing = Vec::new();
         for &(name, value) in values {
-            let Some(reference) = self.find(value.into(), name) else {
+            let Some((reference, factor)) = self.named(value.into(), names, name)? else {
                 missing.push(format!("`{name}`"));
                 continue;
             };
             let reference = [reference];
             self.ask("take its parameters", |i| match value {
-                Value::Real(x) => i.set_real(&reference, &[x]),
+                Value::Real(x) => i.set_real(&reference, &[x / factor]),
                 Value::Integer(n) => i.set_integer(&reference, &[n]),
                 Value::Boolean(b) => i.set_boolean(&reference, &[b.into()]),
             })?;
@@ -177,6 +206,12 @@ impl Fmu {
         let mut values = [0.0; N];
         self.ask(action, |i| i.get_real(&references, &mut values))?;
         Ok(values)
+    }
+
+    /// Values of real variables, SI units.
+    pub fn read<const N: usize>(&mut self, action: &'static str, variables: [Named; N]) -> Result<[f64; N], FmuError> {
+        let values = self.reals(action, variables.map(|(reference, _)| reference))?;
+        Ok(std::array::from_fn(|n| values[n] * variables[n].1))
     }
 
     /// Calls the FMU; `action` completes the message "refused to …".

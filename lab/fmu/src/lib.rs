@@ -8,6 +8,7 @@
 mod controller;
 mod error;
 mod instance;
+mod judge;
 mod rig;
 
 pub use controller::FmuController;

@@ -1,26 +1,53 @@
 //! A rig that is an FMU: ours, or anybody's with the same variable names.
 
+use std::f64::consts::TAU;
 use std::path::Path;
 
 use fmi::fmi2::instance::Common;
 use phase_lock::Value;
 use vines_testbench::rig::{Drive, GroundTruth, Measured, Rig, RigError, Sensors};
-use vines_testbench::scene::{Definition, Parameters, Reference as ReferenceSignal, Sensor};
+use vines_testbench::scene::{Definition, Names, Parameters, Reference as ReferenceSignal, Sensor};
 
-use crate::instance::{Fmu, FmuError, Kind, Reference};
+use crate::instance::{Fmu, FmuError, Kind, Named, Reference};
+
+/// The names of this bench that a scene may map.
+const NAMES: [&str; 18] = [
+    "omega",
+    "E",
+    "e",
+    "response",
+    "base",
+    "impacts",
+    "impact_time",
+    "impact_velocity",
+    "M",
+    "k",
+    "c",
+    "m",
+    "b",
+    "r",
+    "q1",
+    "der(q1)",
+    "q2",
+    "der(q2)",
+];
 
 /// A plant FMU, stepped sample by sample.
 ///
-/// It needs the inputs `omega` and `E` and the output that the sensor reads, `v` or `q1`, from which an acceleration follows; with the input `e` it can be driven by held samples, too. Where it has `base`, that is the reference sensor; where it has
-/// `impacts`, `impact_time`, `impact_velocity` and `der(q2)`, it reports its impacts. The parameters `M`, `k`, `c`, `m`, `b`, `r`
-/// and the start `q1`, `der(q1)`, `q2`, `der(q2)` are set as far as the FMU has them.
+/// It needs the output that the sensor reads, `v` or `q1` (or what the scene maps `response` to), from which an acceleration follows, and
+/// the inputs `omega` and `E`, or the input `e` for held samples of the base displacement, or both. Where it has `base`, that is the
+/// reference sensor; where it has `impacts`, `impact_time`, `impact_velocity` and `der(q2)`, it reports its impacts. The parameters `M`,
+/// `k`, `c`, `m`, `b`, `r` and the start `q1`, `der(q1)`, `q2`, `der(q2)` are set as far as the FMU has them. A scene maps all names.
 pub struct FmuRig {
     fmu: Fmu,
-    inputs: [Reference; 2],
+    /// `omega` and `E`.
+    inputs: Option<[Named; 2]>,
     /// `e`, for held samples of the base displacement.
-    held: Option<Reference>,
-    response: Reference,
-    reference: Option<Reference>,
+    held: Option<Named>,
+    /// Phase of the base for an FMU without an oscillator, rad.
+    phase: f64,
+    response: Named,
+    reference: Option<Named>,
     inside: Option<Inside>,
 }
 
@@ -29,12 +56,12 @@ pub struct FmuRig {
 struct Inside {
     impacts: Reference,
     /// `impact_time`, `impact_velocity` and `der(q2)`.
-    reals: [Reference; 3],
+    reals: [Named; 3],
 }
 
 impl FmuRig {
-    /// Loads the plant at `path` and initialises it with parameters and a start, under the names of `LoViNes.fmu`. It has the sensors of
-    /// `definition`, for a plant with the parameters `plant`.
+    /// Loads the plant at `path` and initialises it with parameters and a start, under the names of `LoViNes.fmu` or those that `names`
+    /// maps them to. It has the sensors of `definition`, for a plant with the parameters `plant`.
     ///
     /// # Errors
     /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
@@ -43,67 +70,85 @@ impl FmuRig {
         values: &[(&str, f64)],
         definition: Definition,
         plant: &Parameters,
+        names: &Names,
     ) -> Result<Measured<Self>, FmuError> {
+        if let Some(name) = names.unknown(&NAMES) {
+            return Err(FmuError::Name { name: name.into(), known: NAMES.join(", ") });
+        }
         let mut fmu = Fmu::load(path, "plant")?;
-        let inputs = [fmu.need(Kind::Real, "omega")?, fmu.need(Kind::Real, "E")?];
-        let response = match definition.sensor {
-            Sensor::V => fmu.need(Kind::Real, "v")?,
-            Sensor::Q1 | Sensor::Acceleration => fmu.need(Kind::Real, "q1")?,
+        let oscillator = ["omega", "E"].map(|ours| fmu.named(Kind::Real, names, ours));
+        let inputs = match oscillator {
+            [Ok(Some(omega)), Ok(Some(amplitude))] => Some([omega, amplitude]),
+            [Err(error), _] | [_, Err(error)] => return Err(error),
+            _ => None,
         };
+        let held = match inputs {
+            Some(_) => fmu.named(Kind::Real, names, "e")?,
+            None => Some(fmu.need_named(Kind::Real, names, "e")?),
+        };
+        let ours = match definition.sensor {
+            _ if names.mapped("response").is_some() => "response",
+            Sensor::V => "v",
+            Sensor::Q1 | Sensor::Acceleration => "q1",
+        };
+        let response = fmu.need_named(Kind::Real, names, ours)?;
         let reference = match definition.reference {
-            ReferenceSignal::Base => fmu.find(Kind::Real, "base"),
-            ReferenceSignal::Force => Some(fmu.need(Kind::Real, "base")?),
+            ReferenceSignal::Base => fmu.named(Kind::Real, names, "base")?,
+            ReferenceSignal::Force => Some(fmu.need_named(Kind::Real, names, "base")?),
         };
         let values = values.iter().map(|(name, value)| (*name, Value::Real(*value)));
-        fmu.start(&values.collect::<Vec<_>>())?;
-        let rig = Self {
-            inputs,
-            held: fmu.find(Kind::Real, "e"),
-            response,
-            reference,
-            inside: Inside::of(&fmu),
-            fmu,
-        };
+        fmu.start(names, &values.collect::<Vec<_>>())?;
+        let inside = Inside::of(&fmu, names)?;
+        let rig = Self { fmu, inputs, held, phase: 0.0, response, reference, inside };
         Ok(Measured::new(rig, definition, plant))
     }
 }
 
 impl Inside {
-    fn of(fmu: &Fmu) -> Option<Self> {
-        let real = |name| fmu.find(Kind::Real, name);
-        Some(Self {
-            impacts: fmu.find(Kind::Integer, "impacts")?,
-            reals: [real("impact_time")?, real("impact_velocity")?, real("der(q2)")?],
-        })
+    fn of(fmu: &Fmu, names: &Names) -> Result<Option<Self>, FmuError> {
+        let mut reals = [(Reference::default(), 1.0); 3];
+        for (real, ours) in reals.iter_mut().zip(["impact_time", "impact_velocity", "der(q2)"]) {
+            match fmu.named(Kind::Real, names, ours)? {
+                Some(found) => *real = found,
+                None => return Ok(None),
+            }
+        }
+        let impacts = fmu.named(Kind::Integer, names, "impacts")?;
+        Ok(impacts.map(|(impacts, _)| Self { impacts, reals }))
     }
 }
 
 impl Rig for FmuRig {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let read = "read its sensors";
-        let (response, reference) = match self.reference {
-            Some(reference) => {
-                let [v, base] = self.fmu.reals(read, [self.response, reference])?;
-                (v, Some(base))
-            }
-            None => (self.fmu.reals(read, [self.response])?[0], None),
+        let [response] = self.fmu.read(read, [self.response])?;
+        let reference = match self.reference {
+            Some(reference) => Some(self.fmu.read(read, [reference])?[0]),
+            None => None,
         };
         Ok(Sensors { response, reference })
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let references = self.inputs;
-        self.fmu.ask("take a drive", |i| {
-            i.set_real(&references, &[drive.omega, drive.amplitude])
-        })?;
+        let Some([(omega, of_omega), (amplitude, of_amplitude)]) = self.inputs else {
+            // The middle of the step: the mean of what is held is then in time.
+            let displacement = drive.amplitude * (self.phase + 0.5 * drive.omega * step).sin();
+            self.phase = (self.phase + drive.omega * step) % TAU;
+            return self.hold(displacement, step);
+        };
+        let values = [drive.omega / of_omega, drive.amplitude / of_amplitude];
+        self.fmu
+            .ask("take a drive", |i| i.set_real(&[omega, amplitude], &values))?;
         Ok(self.fmu.step(step)?)
     }
 
     fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        let held = self.held.ok_or(RigError::NoHold)?;
-        let [_, amplitude] = self.inputs;
+        let (held, factor) = self.held.ok_or(RigError::NoHold)?;
+        let zero = self.inputs.map(|[_, (amplitude, _)]| amplitude);
+        let (references, values) = ([Some(held), zero], [displacement / factor, 0.0]);
+        let references: Vec<Reference> = references.into_iter().flatten().collect();
         self.fmu.ask("take a sample of the base", |i| {
-            i.set_real(&[held, amplitude], &[displacement, 0.0])
+            i.set_real(&references, &values[..references.len()])
         })?;
         Ok(self.fmu.step(step)?)
     }
@@ -113,7 +158,7 @@ impl Rig for FmuRig {
             return Ok(None);
         };
         let action = "report its impacts";
-        let [impact_time, impact_velocity, particle_velocity] = self.fmu.reals(action, inside.reals)?;
+        let [impact_time, impact_velocity, particle_velocity] = self.fmu.read(action, inside.reals)?;
         let mut impacts = [0];
         self.fmu
             .ask(action, |i| i.get_integer(&[inside.impacts], &mut impacts))?;

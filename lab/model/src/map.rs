@@ -15,4 +15,4 @@ pub use axis::{Axis, Range};
 pub use grid::{Cell, LIMIT, Map, MapError, Plan};
 pub use island::outline;
 pub use response::Response;
-pub use run::{Point, observe, observe_response};
+pub use run::{Point, observe, observe_in_full, observe_response};

@@ -23,7 +23,6 @@ mod pattern;
 mod periodic;
 mod search;
 mod settle;
-mod tangent;
 
 use serde::Serialize;
 
@@ -35,13 +34,12 @@ pub use condition::Condition;
 pub use continuation::{branch_off, continue_both_ways, continue_from};
 pub use convergence::{Convergence, Difference, convergence};
 pub use curves::backbone;
-pub use driven::Driven;
+pub use driven::{Driven, Moment};
 pub use impact_map::ImpactMap;
 pub use pattern::{ImpactPattern, Unknowns};
 pub use periodic::Periodic;
 pub use search::{exact_backbone, phase_resonant, symmetric_orbits};
-pub use settle::{settle, stable_near};
-pub use tangent::Tangent;
+pub use settle::{periodic_near, settle};
 
 /// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

@@ -13,7 +13,7 @@ use rand_chacha::{
 use rayon::prelude::*;
 use vines_model::{
     Dimensionless,
-    map::{LIMIT, Point, observe},
+    map::{LIMIT, Point, observe, observe_in_full},
     regime::{Impact, Regime, synchrony},
 };
 
@@ -144,13 +144,19 @@ fn after_all(scene: &Dimensionless, sigma: f64, start: [f64; 4], periods: usize)
     (regime, growth)
 }
 
-/// A random cell, its regime by the map, and after that many periods.
-fn cell(case: &Case, seed: u64, periods: usize) -> (f64, f64, Point, Regime, f64) {
+/// The detuning and the scene of a random cell.
+fn place(case: &Case, seed: u64) -> (f64, Dimensionless) {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut within = |[low, high]: [f64; 2]| low + (high - low) * (random.next_u64() as f64 / u64::MAX as f64);
     let (sigma, g) = (within(case.sigma), within(case.g));
     let [epsilon, lambda, r] = case.scene;
-    let scene = Dimensionless::new(epsilon, lambda, r, g);
+    (sigma, Dimensionless::new(epsilon, lambda, r, g))
+}
+
+/// A random cell, its regime by the map, and after that many periods.
+fn cell(case: &Case, seed: u64, periods: usize) -> (f64, f64, Point, Regime, f64) {
+    let (sigma, scene) = place(case, seed);
+    let g = scene.g;
     let point = observe(&scene, sigma, case.start, LIMIT).unwrap();
     let (regime, growth) = after_all(&scene, sigma, case.start, periods);
     (sigma, g, point, regime, growth)
@@ -201,4 +207,51 @@ fn regimes_agree_with_those_after_20_000_periods() {
         let wrong = if periods == LIMIT { differ.len() } else { early };
         assert!(wrong as u64 <= 1.max(cells / 100), "{wrong} of {cells} cells differ");
     }
+}
+
+/// Periods per cell of the comparison of early decisions with the full length.
+const SHORT: usize = 400;
+
+#[test]
+fn an_early_decision_is_that_of_the_full_length() {
+    let (cells, first) = (setting("CELLS", 40), setting("SEED", 1));
+    let mut wrong = 0;
+    for (n, case) in CASES.iter().enumerate() {
+        let found: Vec<_> = (0..cells)
+            .into_par_iter()
+            .map(|seed| {
+                let (sigma, scene) = place(case, (first << 32) + seed);
+                let early = observe(&scene, sigma, case.start, SHORT).unwrap();
+                let full = observe_in_full(&scene, sigma, case.start, SHORT).unwrap();
+                (sigma, scene.g, early, full)
+            })
+            .collect();
+        let differ: Vec<_> = found.iter().filter(|one| one.2.regime != one.3.regime).collect();
+        for (sigma, g, early, full) in &differ {
+            println!(
+                "  sigma = {sigma:.4}, G = {g:.4}: {} after {}, {} after {}",
+                early.regime, early.followed, full.regime, full.followed
+            );
+        }
+        let stopped: Vec<_> = found.iter().filter(|one| one.2.followed < SHORT).collect();
+        // Irregular half way to the limit, and periodic at the limit: such a motion cannot be stopped half way.
+        let late = stopped
+            .iter()
+            .filter(|one| one.2.transient > SHORT as f64 / 2.0)
+            .count();
+        let mean = |cells: &[&(f64, f64, Point, Point)]| {
+            cells.iter().map(|one| one.2.followed as f64).sum::<f64>() / cells.len() as f64
+        };
+        println!(
+            "map {}, {SHORT} periods: {} of {cells} regimes differ from those of the full length; {} cells were stopped after {:.0} periods in the \
+             mean, all after {:.0}; {late} became periodic in the second half",
+            n + 1,
+            differ.len(),
+            stopped.len(),
+            mean(&stopped),
+            mean(&found.iter().collect::<Vec<_>>())
+        );
+        wrong += differ.len() as u64;
+    }
+    assert!(10_000 * wrong <= 3 * cells, "{wrong} of {} cells differ", 3 * cells);
 }

@@ -4,6 +4,7 @@ use std::fmt::{self, Display, Formatter};
 use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
 
 use super::error::LinkError;
+use super::seal::Key;
 
 /// Which addresses are allowed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -12,6 +13,19 @@ pub enum BindScope {
     Loopback,
     /// All addresses. Everyone who can send to the address can drive the rig.
     Remote,
+    /// All addresses, for peers with this key.
+    Keyed(Key),
+}
+
+impl BindScope {
+    /// The key, if there is one.
+    #[must_use]
+    pub fn key(self) -> Option<Key> {
+        match self {
+            Self::Keyed(key) => Some(key),
+            Self::Loopback | Self::Remote => None,
+        }
+    }
 }
 
 /// An address on the network. The transport decides who sets the pace.

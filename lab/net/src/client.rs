@@ -10,6 +10,7 @@ use super::frame::{Frame, FrameError, Kind, flag};
 use super::handshake::{Refusal, SAME_TIME};
 use super::link::Link;
 use super::report::Counters;
+use super::seal::Key;
 
 /// Longest time until the server opens the session.
 pub(super) const CONNECT: Duration = Duration::from_secs(2);
@@ -36,23 +37,23 @@ pub(super) struct Client {
 
 impl Client {
     /// Opens a session. If the server has another client, which may be about to leave, it is asked again for a while.
-    pub fn connect(peer: Address, controller: bool, sample_time: f64) -> Result<Self, LinkError> {
+    pub fn connect(peer: Address, controller: bool, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
         let end = Instant::now() + CONNECT;
         loop {
-            match Self::open(peer, controller, sample_time) {
+            match Self::open(peer, controller, sample_time, key) {
                 Err(LinkError::Refused { reason: Refusal::Busy, .. }) if Instant::now() < end => thread::sleep(RESEND),
                 outcome => return outcome,
             }
         }
     }
 
-    fn open(peer: Address, controller: bool, sample_time: f64) -> Result<Self, LinkError> {
+    fn open(peer: Address, controller: bool, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
         let unreachable = || LinkError::unreachable(peer, controller);
         let mut hello = Frame::new(Kind::Hello, RandomState::new().build_hasher().finish());
         hello.flags = if controller { flag::CONTROLLER } else { 0 };
         hello.values[0] = sample_time;
         let mut client = Self {
-            link: Link::connect(peer, CONNECT).map_err(|_| unreachable())?,
+            link: Link::connect(peer, CONNECT, key).map_err(|_| unreachable())?,
             peer,
             session: hello.session,
             sample_time,
@@ -69,6 +70,10 @@ impl Client {
                 // Client and server use the same limit.
                 client.silence = Duration::try_from_secs_f64(answer.values[1]).unwrap_or(CONNECT);
                 client.channels = answer.values[2] as u8;
+                client
+                    .link
+                    .seal
+                    .begin(answer.session, [answer.values[3], answer.values[4]]);
                 return Ok(client);
             }
         }

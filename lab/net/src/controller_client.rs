@@ -7,9 +7,10 @@ use super::address::Address;
 use super::client::Client;
 use super::error::LinkError;
 use super::frame::{Frame, Kind, flag};
-use super::payload::{Reading, read_command, write_reading};
+use super::payload::{Reading, read_command, write_move, write_reading};
 use super::report::Counters;
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Sensors};
+use super::seal::Key;
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Move, Sensors};
 
 /// A controller at a network address.
 #[derive(Debug)]
@@ -34,7 +35,20 @@ impl NetController {
     /// # Errors
     /// A server that does not answer, refuses, or has another version.
     pub fn connect(peer: SocketAddr, sample_time: f64, pace: Option<f64>) -> Result<Self, LinkError> {
-        let mut client = Client::connect(Address::Tcp(peer), true, sample_time)?;
+        Self::connect_with(peer, sample_time, pace, None)
+    }
+
+    /// As [`NetController::connect`], with a shared key.
+    ///
+    /// # Errors
+    /// As there; a server with another key does not answer.
+    pub fn connect_with(
+        peer: SocketAddr,
+        sample_time: f64,
+        pace: Option<f64>,
+        key: Option<Key>,
+    ) -> Result<Self, LinkError> {
+        let mut client = Client::connect(Address::Tcp(peer), true, sample_time, key)?;
         let limit = pace.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
         client.silence = limit.map_or(client.silence, |limit| limit.min(client.silence));
         Ok(Self {
@@ -108,5 +122,10 @@ impl Controller for NetController {
         // Latched: after one failure the peer is not asked again.
         self.failed = answer.is_err();
         Ok(answer?)
+    }
+
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
+        let frame = write_move(self.client.frame(Kind::Move), to, phase_target);
+        Ok(self.client.send(frame)?)
     }
 }

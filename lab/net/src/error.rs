@@ -20,15 +20,15 @@ pub enum LinkError {
     Address { address: String, message: String },
     /// An address beyond this machine, without permission.
     #[error(
-        "{address} is not an address of this machine. There is no authentication: everyone who can reach the address can drive \
-         the rig. Use --allow-remote only on a network where everyone may do so"
+        "{address} is not an address of this machine. Use --key on both sides; without it, everyone who can reach the address can drive the \
+         rig, so use --allow-remote only on a network where everyone may do so"
     )]
     Remote { address: SocketAddr },
     /// The server cannot listen on the address.
     #[error("cannot listen on {address}: {source}")]
     Listen { address: Address, source: io::Error },
     /// There is no answer.
-    #[error("no answer from {peer} within {seconds} s: is `{command}` running there?")]
+    #[error("no answer from {peer} within {seconds} s: is `{command}` running there, with the same --key or none?")]
     Unreachable {
         peer: Address,
         command: String,

@@ -30,12 +30,14 @@ pub enum Kind {
     Farewell = 6,
     /// The rig in real time confirms the farewell, and reports its timing.
     Report = 7,
+    /// A move of the response amplitude, to a controller server.
+    Move = 8,
 }
 
 impl Kind {
     fn from_code(code: u8) -> Option<Self> {
-        use Kind::{Drive, Farewell, Hello, Refusal, Report, Sensors, Welcome};
-        [Hello, Welcome, Refusal, Sensors, Drive, Farewell, Report]
+        use Kind::{Drive, Farewell, Hello, Move, Refusal, Report, Sensors, Welcome};
+        [Hello, Welcome, Refusal, Sensors, Drive, Farewell, Report, Move]
             .into_iter()
             .find(|kind| *kind as u8 == code)
     }
@@ -53,6 +55,10 @@ pub mod flag {
     pub const GROUND_TRUTH: u8 = 8;
     /// Sensors, from a rig in real time: the drive has been shut down for this session.
     pub const SHUT_DOWN: u8 = 16;
+    /// Drive: the rig holds the displacement, instead of its oscillator with frequency and amplitude.
+    pub const HOLD: u8 = 128;
+    /// Drive, from a controller: its phase error cannot be measured.
+    pub const NO_PHASE: u8 = 32;
     /// Hello and Welcome: the server is, or should be, a controller; otherwise a rig.
     pub const CONTROLLER: u8 = 64;
 }
@@ -89,6 +95,9 @@ pub enum FrameError {
     /// The checksum does not match the content.
     #[error("wrong checksum")]
     Checksum,
+    /// It has no valid authentication code.
+    #[error("not authenticated with the key")]
+    Tag,
     /// There will be no more frames.
     #[error("the connection is closed")]
     Closed,
@@ -177,7 +186,7 @@ mod tests {
 
     fn frames() -> impl Strategy<Value = Frame> {
         let numbers = prop::array::uniform6(any::<u64>());
-        (1u8..=7, any::<u8>(), any::<u64>(), any::<u64>(), any::<u64>(), numbers).prop_map(
+        (1u8..=8, any::<u8>(), any::<u64>(), any::<u64>(), any::<u64>(), numbers).prop_map(
             |(kind, flags, session, sequence, time, values)| Frame {
                 kind: Kind::from_code(kind).unwrap(),
                 flags,

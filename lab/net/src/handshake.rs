@@ -96,6 +96,8 @@ pub enum Refusal {
     },
     /// Code 6: a frame that does not belong here: of another kind, another sample, or damaged.
     Unexpected,
+    /// Code 7: the controller cannot make the move.
+    Move,
     /// An unknown code.
     Other(f64),
 }
@@ -110,6 +112,7 @@ impl Refusal {
             Self::Version(version) => [4.0, version.into(), 0.0, 0.0],
             Self::Drive { index, value, limit } => [5.0, index as f64, value, limit],
             Self::Unexpected => [6.0, 0.0, 0.0, 0.0],
+            Self::Move => [7.0, 0.0, 0.0, 0.0],
             Self::Other(code) => [code, 0.0, 0.0, 0.0],
         };
         let mut frame = Frame { flags: 0, kind: Kind::Refusal, ..*cause };
@@ -127,6 +130,7 @@ impl Refusal {
             4 => Self::Version(first as u16),
             5 => Self::Drive { index: first as usize, value, limit },
             6 => Self::Unexpected,
+            7 => Self::Move,
             _ => Self::Other(code),
         }
     }
@@ -157,6 +161,9 @@ impl Display for Refusal {
                 )
             }
             Self::Unexpected => f.write_str("a frame was damaged, or was not that of the present sample"),
+            Self::Move => f.write_str(
+                "its controller cannot control the response amplitude now, or not with these values: the loop must be closed, the drive needs a limit",
+            ),
             Self::Other(code) => write!(f, "reason {code}"),
         }
     }

@@ -5,7 +5,8 @@
 //! UDP: frames that are lost, late, foreign or malformed are counted, and the last valid value is held. The protocol is in
 //! `docs/network-protocol.md`.
 //!
-//! After a configured silence the drive is shut down for the rest of the session. There is no authentication: see [`BindScope`].
+//! After a configured silence the drive is shut down for the rest of the session. With a shared [`Key`], every frame is
+//! authenticated; without one, see [`BindScope`].
 
 #![forbid(unsafe_code)]
 
@@ -15,6 +16,7 @@ mod controller_client;
 mod error;
 pub mod frame;
 mod handshake;
+pub mod helic;
 mod link;
 mod payload;
 mod ramp;
@@ -22,6 +24,7 @@ mod real_time_clock;
 mod report;
 mod rig_client;
 mod run;
+mod seal;
 mod server;
 
 pub use address::{Address, BindScope, resolve};
@@ -29,8 +32,9 @@ pub use controller_client::NetController;
 pub use error::{LinkError, ServerError};
 pub use handshake::{Refusal, Role, Service};
 pub use ramp::RAMP_SAMPLES;
-pub use real_time_clock::{CLASSES, Punctuality};
+pub use real_time_clock::Punctuality;
 pub use report::{Counters, Ended, Session, Timing};
 pub use rig_client::NetRig;
 pub use run::Served;
+pub use seal::Key;
 pub use server::Server;

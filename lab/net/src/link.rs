@@ -1,17 +1,21 @@
 //! Frames over TCP and UDP, with a deadline for receiving.
 
+use std::hint;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::thread;
 use std::time::{Duration, Instant};
 
 use super::address::{Address, is_loopback};
-use super::frame::{Frame, FrameError, SIZE};
+use super::frame::{Frame, FrameError};
+use super::seal::{Key, Seal, Side};
 
 /// Shorter waits use polling: the time-outs of the system may be as coarse as 16 ms, which is several samples.
 const FINE: Duration = Duration::from_millis(20);
 /// Polling interval.
 const POLL: Duration = Duration::from_micros(50);
+/// Shorter waits do not sleep: the system wakes a program up later than it asks for, by about this.
+const SPIN: Duration = Duration::from_micros(100);
 /// Interval at which a server without connections looks for one.
 const ACCEPT: Duration = Duration::from_millis(5);
 /// Longest time for sending a frame over TCP to a peer that does not read.
@@ -24,15 +28,25 @@ pub(super) type Received = Result<Frame, FrameError>;
 
 /// The client's end of a connection.
 #[derive(Debug)]
-pub(super) enum Link {
+pub(super) struct Link {
+    socket: LinkSocket,
+    pub seal: Seal,
+}
+
+#[derive(Debug)]
+enum LinkSocket {
     Tcp(FrameStream),
     Udp(UdpSocket),
 }
 
 impl Link {
-    pub fn connect(peer: Address, patience: Duration) -> io::Result<Self> {
-        match peer {
-            Address::Tcp(to) => Ok(Self::Tcp(FrameStream::new(TcpStream::connect_timeout(&to, patience)?)?)),
+    pub fn connect(peer: Address, patience: Duration, key: Option<Key>) -> io::Result<Self> {
+        let seal = Seal::new(key, Side::Client);
+        let socket = match peer {
+            Address::Tcp(to) => LinkSocket::Tcp(FrameStream::new(
+                TcpStream::connect_timeout(&to, patience)?,
+                seal.size(),
+            )?),
             Address::Udp(to) => {
                 // Bound to loopback if the peer is on loopback.
                 let socket = UdpSocket::bind(SocketAddr::new(
@@ -46,62 +60,76 @@ impl Link {
                 ))?;
                 // Datagrams of other senders do not arrive from now on.
                 socket.connect(to)?;
-                Ok(Self::Udp(socket))
+                LinkSocket::Udp(socket)
             }
-        }
+        };
+        Ok(Self { socket, seal })
     }
 
     /// Sends a frame. One that cannot be sent shows when no answer arrives.
     pub fn send(&mut self, frame: &Frame) -> io::Result<()> {
-        match self {
-            Self::Tcp(stream) => stream.send(frame),
-            Self::Udp(socket) => delivered(socket.send(&frame.encode())),
+        let bytes = self.seal.encode(frame);
+        match &mut self.socket {
+            LinkSocket::Tcp(stream) => stream.send(&bytes),
+            LinkSocket::Udp(socket) => delivered(socket.send(&bytes)),
         }
     }
 
     /// Waits for a frame until `deadline`. A frame that has arrived is returned even after the deadline.
     pub fn receive(&mut self, deadline: Instant) -> io::Result<Option<Received>> {
-        match self {
-            Self::Tcp(stream) => stream.receive(deadline),
-            Self::Udp(socket) => Ok(receive_from(socket, deadline)?.map(|(frame, _)| frame)),
+        match &mut self.socket {
+            LinkSocket::Tcp(stream) => stream.receive(deadline, &self.seal),
+            LinkSocket::Udp(socket) => Ok(receive_from(socket, deadline, &self.seal)?.map(|(frame, _)| frame)),
         }
     }
 }
 
 /// The server's end of all connections.
 #[derive(Debug)]
-pub(super) enum Listener {
+pub(super) struct Listener {
+    socket: ListenerSocket,
+    pub seal: Seal,
+}
+
+#[derive(Debug)]
+enum ListenerSocket {
     Tcp(TcpListener, Vec<(SocketAddr, FrameStream)>),
     Udp(UdpSocket),
 }
 
 impl Listener {
-    pub fn bind(address: Address) -> io::Result<Self> {
-        Ok(match address {
-            Address::Udp(address) => Self::Udp(UdpSocket::bind(address)?),
+    pub fn bind(address: Address, key: Option<Key>) -> io::Result<Self> {
+        let socket = match address {
+            Address::Udp(address) => ListenerSocket::Udp(UdpSocket::bind(address)?),
             Address::Tcp(address) => {
                 let listener = TcpListener::bind(address)?;
                 listener.set_nonblocking(true)?;
-                Self::Tcp(listener, Vec::new())
+                ListenerSocket::Tcp(listener, Vec::new())
             }
-        })
+        };
+        Ok(Self { socket, seal: Seal::new(key, Side::Server) })
+    }
+
+    pub fn is_real_time(&self) -> bool {
+        matches!(self.socket, ListenerSocket::Udp(_))
     }
 
     pub fn address(&self) -> io::Result<Address> {
-        Ok(match self {
-            Self::Tcp(listener, _) => Address::Tcp(listener.local_addr()?),
-            Self::Udp(socket) => Address::Udp(socket.local_addr()?),
+        Ok(match &self.socket {
+            ListenerSocket::Tcp(listener, _) => Address::Tcp(listener.local_addr()?),
+            ListenerSocket::Udp(socket) => Address::Udp(socket.local_addr()?),
         })
     }
 
     /// Waits for a frame until `deadline`, or less.
     pub fn receive(&mut self, deadline: Instant) -> io::Result<Option<(Received, SocketAddr)>> {
-        let (listener, streams) = match self {
-            Self::Udp(socket) => return receive_from(socket, deadline),
-            Self::Tcp(listener, streams) => (listener, streams),
+        let seal = &self.seal;
+        let (listener, streams) = match &mut self.socket {
+            ListenerSocket::Udp(socket) => return receive_from(socket, deadline, seal),
+            ListenerSocket::Tcp(listener, streams) => (listener, streams),
         };
         if let Ok((stream, from)) = listener.accept() {
-            streams.push((from, FrameStream::new(stream)?));
+            streams.push((from, FrameStream::new(stream, seal.size())?));
         }
         if streams.is_empty() {
             thread::sleep(ACCEPT);
@@ -115,7 +143,7 @@ impl Listener {
             } else {
                 deadline.min(Instant::now() + HELLO)
             };
-            match stream.receive(until)? {
+            match stream.receive(until, seal)? {
                 Some(Err(FrameError::Closed)) => {
                     streams.remove(index);
                     return Ok(Some((Err(FrameError::Closed), from)));
@@ -130,18 +158,19 @@ impl Listener {
 
     /// Sends a frame. If a TCP client has left, the next call of `receive` says so.
     pub fn send(&mut self, frame: &Frame, to: SocketAddr) -> io::Result<()> {
-        match self {
-            Self::Udp(socket) => delivered(socket.send_to(&frame.encode(), to)),
-            Self::Tcp(_, streams) => {
+        let bytes = self.seal.encode(frame);
+        match &mut self.socket {
+            ListenerSocket::Udp(socket) => delivered(socket.send_to(&bytes, to)),
+            ListenerSocket::Tcp(_, streams) => {
                 let stream = streams.iter_mut().find(|(from, _)| *from == to);
-                stream.map_or(Ok(()), |(_, stream)| stream.send(frame))
+                stream.map_or(Ok(()), |(_, stream)| stream.send(&bytes))
             }
         }
     }
 
     /// The session is that of this client.
     pub fn prefer(&mut self, client: SocketAddr) {
-        if let Self::Tcp(_, streams) = self
+        if let ListenerSocket::Tcp(_, streams) = &mut self.socket
             && let Some(index) = streams.iter().position(|(from, _)| *from == client)
         {
             streams.swap(0, index);
@@ -150,7 +179,7 @@ impl Listener {
 
     /// Closes the connection of a client.
     pub fn close(&mut self, client: SocketAddr) {
-        if let Self::Tcp(_, streams) = self {
+        if let ListenerSocket::Tcp(_, streams) = &mut self.socket {
             streams.retain(|(from, _)| *from != client);
         }
     }
@@ -160,29 +189,29 @@ impl Listener {
 #[derive(Debug)]
 pub(super) struct FrameStream {
     stream: TcpStream,
-    bytes: [u8; SIZE],
+    bytes: Vec<u8>,
     /// Number of bytes of the next frame that have arrived.
     filled: usize,
 }
 
 impl FrameStream {
-    fn new(stream: TcpStream) -> io::Result<Self> {
+    fn new(stream: TcpStream, size: usize) -> io::Result<Self> {
         // Without this, the system collects small messages before it sends them.
         stream.set_nodelay(true)?;
         stream.set_write_timeout(Some(SEND))?;
-        Ok(Self { stream, bytes: [0; SIZE], filled: 0 })
+        Ok(Self { stream, bytes: vec![0; size], filled: 0 })
     }
 
-    fn send(&mut self, frame: &Frame) -> io::Result<()> {
+    fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
         self.stream.set_nonblocking(false)?;
         // If this fails, the connection has been closed, which the next read reports.
-        let _ = self.stream.write_all(&frame.encode());
+        let _ = self.stream.write_all(bytes);
         Ok(())
     }
 
-    fn receive(&mut self, deadline: Instant) -> io::Result<Option<Received>> {
+    fn receive(&mut self, deadline: Instant, seal: &Seal) -> io::Result<Option<Received>> {
         let Self { stream, bytes, filled } = self;
-        while *filled < SIZE {
+        while *filled < bytes.len() {
             let block = |time: Option<Duration>| {
                 stream.set_nonblocking(time.is_none())?;
                 time.map_or(Ok(()), |_| stream.set_read_timeout(time))
@@ -194,11 +223,11 @@ impl FrameStream {
             }
         }
         *filled = 0;
-        Ok(Some(Frame::decode(bytes)))
+        Ok(Some(seal.decode(bytes)))
     }
 }
 
-fn receive_from(socket: &UdpSocket, deadline: Instant) -> io::Result<Option<(Received, SocketAddr)>> {
+fn receive_from(socket: &UdpSocket, deadline: Instant, seal: &Seal) -> io::Result<Option<(Received, SocketAddr)>> {
     // Longer than a frame: a datagram that is too long must not be cut to the valid length.
     let mut bytes = [0; 256];
     let block = |time: Option<Duration>| {
@@ -206,7 +235,7 @@ fn receive_from(socket: &UdpSocket, deadline: Instant) -> io::Result<Option<(Rec
         time.map_or(Ok(()), |_| socket.set_read_timeout(time))
     };
     let received = wait(deadline, block, || socket.recv_from(&mut bytes).map_err(undelivered))?;
-    Ok(received.map(|(size, from)| (Frame::decode(&bytes[..size]), from)))
+    Ok(received.map(|(size, from)| (seal.decode(&bytes[..size]), from)))
 }
 
 /// Calls `receive` until it succeeds, or None at `deadline`. `block` sets the time-out of the socket; None: it does not wait.
@@ -223,7 +252,8 @@ fn wait<T>(
             Ok(received) => return Ok(Some(received)),
             Err(error) if !is_passing(&error) => return Err(error),
             Err(_) if left.is_zero() => return Ok(None),
-            Err(_) if coarse.is_none() => thread::sleep(left.min(POLL)),
+            Err(_) if left < SPIN => hint::spin_loop(),
+            Err(_) if coarse.is_none() => thread::sleep(POLL),
             Err(_) => {}
         }
     }

@@ -1,7 +1,7 @@
 //! The six values of a frame: readings or a drive.
 
 use super::frame::{Frame, Kind, flag};
-use vines_testbench::rig::{Command, Drive, Fault, GroundTruth, LoopState, Sensors};
+use vines_testbench::rig::{Command, Drive, Fault, GroundTruth, LoopState, Move, Sensors};
 
 /// Readings of a sample.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -62,11 +62,15 @@ pub(super) fn write_command(mut frame: Frame, command: &Command) -> Frame {
     if command.settled {
         frame.flags |= flag::SETTLED;
     }
+    if command.phase_error.is_none() {
+        frame.flags |= flag::NO_PHASE;
+    }
     let Drive { omega, amplitude, displacement } = command.drive;
     // The state is counted from 1, so that 0 means that it is not reported.
     let state = command.state.map_or(0.0, |state| f64::from(state as u8) + 1.0);
     let fault = command.fault.map_or(0.0, |fault| f64::from(fault as u8));
-    frame.values = [omega, amplitude, displacement, command.phase_error, state, fault];
+    let phase_error = command.phase_error.unwrap_or(0.0);
+    frame.values = [omega, amplitude, displacement, phase_error, state, fault];
     frame
 }
 
@@ -75,11 +79,32 @@ pub(super) fn read_command(frame: &Frame) -> Command {
     let [omega, amplitude, displacement, phase_error, state, fault] = frame.values;
     Command {
         drive: Drive { omega, amplitude, displacement },
-        phase_error,
+        phase_error: (!frame.has(flag::NO_PHASE)).then_some(phase_error),
         settled: frame.has(flag::SETTLED),
         state: LoopState::of_number(state as i32 - 1),
         fault: Fault::of_number(fault as i32),
     }
+}
+
+/// Writes a move of the response and its phase target, rad, into a frame.
+pub(super) fn write_move(mut frame: Frame, to: Move, phase_target: f64) -> Frame {
+    frame.kind = Kind::Move;
+    frame.values = [
+        to.response,
+        to.duration,
+        to.amplitude,
+        to.omega,
+        phase_target,
+        to.growth,
+    ];
+    frame
+}
+
+/// The move and the phase target in a frame.
+pub(super) fn read_move(frame: &Frame) -> (Move, f64) {
+    let [response, duration, amplitude, omega, phase_target, growth] = frame.values;
+    let to = Move { response, duration, amplitude, omega, growth };
+    (to, phase_target)
 }
 
 #[cfg(test)]
@@ -101,10 +126,10 @@ mod tests {
         }
 
         #[test]
-        fn drives_survive_the_frame(omega in 0.0..1e6, amplitude in 0.0..1e6, displacement in -1e6..1e6, settled: bool, state in -1..8, fault in 0..6) {
+        fn drives_survive_the_frame(omega in 0.0..1e6, amplitude in 0.0..1e6, displacement in -1e6..1e6, phase_error in proptest::option::of(-3.0..3.0), settled: bool, state in -1..8, fault in 0..7) {
             let command = Command {
                 drive: Drive { omega, amplitude, displacement },
-                phase_error: -0.5,
+                phase_error,
                 settled,
                 state: LoopState::of_number(state),
                 fault: Fault::of_number(fault),

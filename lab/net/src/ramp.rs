@@ -1,6 +1,6 @@
 //! The drive of a served rig: the last valid one, or after a shutdown a ramp to zero.
 
-use vines_testbench::rig::Drive;
+use vines_testbench::rig::{Drive, Rig, RigError};
 
 /// Number of samples of the ramp to zero after a shutdown.
 pub const RAMP_SAMPLES: u32 = 100;
@@ -9,15 +9,27 @@ pub const RAMP_SAMPLES: u32 = 100;
 #[derive(Debug, Clone, Copy, Default)]
 pub(super) struct Ramp {
     drive: Drive,
+    /// Whether the rig holds the displacement of the drive.
+    pub holds: bool,
     /// Remaining samples of the ramp after the shutdown.
     left: Option<u32>,
 }
 
 impl Ramp {
     /// Sets a new drive; without effect after the shutdown.
-    pub fn set(&mut self, drive: Drive) {
+    pub fn set(&mut self, drive: Drive, holds: bool) {
         if self.left.is_none() {
-            self.drive = drive;
+            (self.drive, self.holds) = (drive, holds);
+        }
+    }
+
+    /// Drives the rig for the next sample period of `step` seconds.
+    pub fn apply(&mut self, rig: &mut dyn Rig, step: f64) -> Result<(), RigError> {
+        let drive = self.next();
+        if self.holds {
+            rig.hold(drive.displacement, step)
+        } else {
+            rig.advance(drive, step)
         }
     }
 
@@ -37,7 +49,7 @@ impl Ramp {
     }
 
     /// The drive of the next sample period.
-    pub fn next(&mut self) -> Drive {
+    fn next(&mut self) -> Drive {
         let Some(left) = &mut self.left else {
             return self.drive;
         };
@@ -59,7 +71,7 @@ mod tests {
     fn after_a_shutdown_the_drive_ramps_to_zero_and_stays_there() {
         let drive = Drive { omega: 2.0, amplitude: 1.0, displacement: 0.5 };
         let mut ramp = Ramp::default();
-        ramp.set(drive);
+        ramp.set(drive, false);
         assert_eq!(ramp.next(), drive);
         ramp.shut_down();
         let mut before = drive.amplitude;
@@ -67,7 +79,7 @@ mod tests {
             let now = ramp.next().amplitude;
             assert!(now < before && before - now < 0.011);
             before = now;
-            ramp.set(drive);
+            ramp.set(drive, false);
         }
         let down = Drive { amplitude: 0.0, displacement: 0.0, ..drive };
         assert_eq!(ramp.next(), down);

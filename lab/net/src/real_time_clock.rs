@@ -3,52 +3,104 @@
 use std::fmt::{self, Display, Formatter};
 use std::time::{Duration, Instant};
 
-use serde::Serialize;
+use hdrhistogram::Histogram;
+use serde::ser::SerializeStruct;
+use serde::{Serialize, Serializer};
 
-/// Upper limits of the classes of lateness, in sample periods; the last class has none. A sample that is late by a whole
-/// period has missed its deadline, because the next one is due then.
-pub const CLASSES: [f64; 6] = [0.0625, 0.125, 0.25, 0.5, 1.0, 2.0];
+/// Largest lateness that is told apart, ns.
+const LONGEST: u64 = 60_000_000_000;
+/// Digits of a lateness.
+const DIGITS: u8 = 3;
+/// s per ns.
+const NANO: f64 = 1e-9;
+/// The quantiles that are reported, and their names.
+const QUANTILES: [(&str, f64); 3] = [("p50", 0.5), ("p99", 0.99), ("p99_99", 0.9999)];
 
-/// Statistics of the lateness.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
+/// Statistics of the lateness of the samples.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Punctuality {
-    /// Number of samples per class; [`CLASSES`] has the upper limits.
-    pub histogram: [u64; CLASSES.len() + 1],
+    /// Lateness, ns; None before the first sample.
+    histogram: Option<Histogram<u64>>,
     /// Number of samples that were late by a whole period or more.
     pub missed: u64,
     /// Largest lateness, s.
     pub worst: f64,
 }
 
+impl Default for Punctuality {
+    fn default() -> Self {
+        // The bounds are valid.
+        let histogram = Histogram::new_with_bounds(1, LONGEST, DIGITS).ok();
+        Self { histogram, missed: 0, worst: 0.0 }
+    }
+}
+
 impl Punctuality {
     /// Counts a sample that was late by `lateness`, s, of a sample period, s.
     pub fn record(&mut self, lateness: f64, period: f64) {
-        let share = lateness / period;
-        let class = CLASSES.iter().take_while(|end| share >= **end).count();
-        self.histogram[class] += 1;
-        self.missed += u64::from(share >= 1.0);
+        if let Some(histogram) = &mut self.histogram {
+            histogram.saturating_record((lateness / NANO) as u64);
+        }
+        self.missed += u64::from(lateness >= period);
         self.worst = self.worst.max(lateness);
+    }
+
+    /// Number of samples.
+    #[must_use]
+    pub fn samples(&self) -> u64 {
+        self.histogram.as_ref().map_or(0, Histogram::len)
+    }
+
+    /// Lateness, s, that this share of the samples does not exceed.
+    #[must_use]
+    pub fn quantile(&self, share: f64) -> f64 {
+        let nanoseconds = self.histogram.as_ref().map_or(0, |all| all.value_at_quantile(share));
+        // The upper limit of a class may be above the largest value in it.
+        (nanoseconds as f64 * NANO).min(self.worst)
+    }
+
+    /// The classes that samples are in: upper limit of the lateness, s, and number of samples.
+    #[must_use]
+    pub fn classes(&self) -> Vec<(f64, u64)> {
+        let recorded = self.histogram.iter().flat_map(Histogram::iter_recorded);
+        recorded
+            .map(|one| (one.value_iterated_to() as f64 * NANO, one.count_at_value()))
+            .collect()
+    }
+}
+
+impl Serialize for Punctuality {
+    /// Seconds.
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let mut all = serializer.serialize_struct("Punctuality", QUANTILES.len() + 4)?;
+        all.serialize_field("samples", &self.samples())?;
+        for (name, share) in QUANTILES {
+            all.serialize_field(name, &self.quantile(share))?;
+        }
+        all.serialize_field("worst", &self.worst)?;
+        all.serialize_field("missed", &self.missed)?;
+        all.serialize_field("histogram", &self.classes())?;
+        all.end()
     }
 }
 
 impl Display for Punctuality {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        write!(f, "  lateness of {} samples:", self.samples())?;
+        for (name, share) in QUANTILES {
+            write!(f, " {} {:.1} us,", name.replace('_', "."), 1e6 * self.quantile(share))?;
+        }
         writeln!(
             f,
-            "  {} deadlines missed, at worst {:.3} ms late; lateness in sample periods:",
-            self.missed,
-            1e3 * self.worst
-        )?;
-        for (n, count) in self.histogram.iter().enumerate() {
-            let class = CLASSES.get(n).map_or("longer".into(), |end| format!("below {end}"));
-            writeln!(f, "    {class:<13}{count:>10}")?;
-        }
-        Ok(())
+            " maximum {:.1} us; {} deadlines missed",
+            1e6 * self.worst,
+            self.missed
+        )
     }
 }
 
 /// The clock of a rig in real time.
-#[derive(Debug, Clone, Copy)]
+#[derive(Debug, Clone)]
 pub(super) struct RealTimeClock {
     start: Instant,
     /// s
@@ -83,12 +135,23 @@ mod tests {
     use super::*;
 
     #[test]
-    fn lateness_is_counted_in_its_class_and_a_whole_period_is_a_missed_deadline() {
+    fn quantiles_and_missed_deadlines_are_those_of_the_samples() {
         let mut all = Punctuality::default();
-        for share in [0.0, 0.0625, 0.3, 0.999, 1.0, 5.0] {
-            all.record(share * 0.25, 0.25);
+        for n in 1..=10_000 {
+            all.record(f64::from(n) * 1e-6, 9.9995e-3);
         }
-        assert_eq!(all.histogram, [1, 1, 0, 1, 1, 1, 1]);
-        assert_eq!((all.missed, all.worst), (2, 1.25));
+        for (share, expected) in [(0.5, 5e-3), (0.99, 9.9e-3), (0.9999, 9.999e-3)] {
+            assert!(
+                (all.quantile(share) / expected - 1.0).abs() < 1e-3,
+                "{share}: {}",
+                all.quantile(share)
+            );
+        }
+        assert_eq!((all.samples(), all.missed, all.worst), (10_000, 1, 1e-2));
+        assert_eq!(all.classes().iter().map(|(_, count)| count).sum::<u64>(), 10_000);
+        assert!(
+            all.to_string().contains("p99.99 10000.0 us, maximum 10000.0 us"),
+            "{all}"
+        );
     }
 }

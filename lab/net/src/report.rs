@@ -121,6 +121,8 @@ pub struct Timing {
     pub worst: f64,
     /// Samples without a drive in time.
     pub held: u64,
+    /// Lateness that 99 % and 99.99 % of the samples do not exceed, s.
+    pub quantiles: [f64; 2],
 }
 
 impl Timing {
@@ -131,31 +133,57 @@ impl Timing {
     }
 
     pub(super) fn write(&self, session: u64) -> Frame {
-        let Self { samples, missed, worst, held } = *self;
+        let Self { samples, missed, worst, held, quantiles: [p99, p9999] } = *self;
         Frame {
-            values: [samples as f64, missed as f64, worst, held as f64, 0.0, 0.0],
+            values: [samples as f64, missed as f64, worst, held as f64, p99, p9999],
             ..Frame::new(Kind::Report, session)
         }
     }
 
     pub(super) fn read(frame: &Frame) -> Self {
-        let [samples, missed, worst, held, ..] = frame.values;
+        let [samples, missed, worst, held, p99, p9999] = frame.values;
         Self {
             samples: samples as u64,
             missed: missed as u64,
             worst,
             held: held as u64,
+            quantiles: [p99, p9999],
         }
     }
 }
 
 impl Display for Timing {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { samples, missed, worst, held } = self;
+        let Self { samples, missed, worst, held, quantiles } = self;
+        let [p99, p9999] = quantiles.map(|lateness| 1e3 * lateness);
         write!(
             f,
-            "of {samples} samples, {missed} missed their deadline (at worst {:.3} ms late), and {held} had no drive in time",
+            "of {samples} samples, {missed} missed their deadline (99 % were at most {p99:.3} ms late, 99.99 % {p9999:.3} ms, the worst \
+             {:.3} ms), and {held} had no drive in time",
             1e3 * worst
         )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_session_without_a_sample_reports_numbers_only() {
+        let session = Session {
+            peer: ([127, 0, 0, 1], 1).into(),
+            ended: Ended::Silence,
+            samples: 0,
+            sample_time: 1e-3,
+            seconds: 0.0,
+            punctuality: None,
+            counters: Some(Counters::default()),
+        };
+        let text = session.to_string();
+        assert!(
+            text.contains("0 samples in 0.000 s: 0.0 per second") && !text.contains("NaN"),
+            "{text}"
+        );
     }
 }

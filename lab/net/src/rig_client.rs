@@ -6,9 +6,10 @@ use std::time::{Duration, Instant};
 use super::address::Address;
 use super::client::Client;
 use super::error::LinkError;
-use super::frame::{Frame, Kind};
+use super::frame::{Frame, Kind, flag};
 use super::payload::{Reading, read_reading, write_command};
 use super::report::{Counters, Timing};
+use super::seal::Key;
 use vines_testbench::rig::{Command, Drive, GroundTruth, Rig, RigError, Sensors};
 use vines_testbench::scene::Definition;
 
@@ -36,8 +37,16 @@ impl NetRig {
     /// # Errors
     /// A server that does not answer, refuses, or has another version.
     pub fn connect(peer: Address, sample_time: f64) -> Result<Self, LinkError> {
+        Self::connect_with(peer, sample_time, None)
+    }
+
+    /// As [`NetRig::connect`], with a shared key.
+    ///
+    /// # Errors
+    /// As there; a server with another key does not answer.
+    pub fn connect_with(peer: Address, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
         Ok(Self {
-            client: Client::connect(peer, false, sample_time)?,
+            client: Client::connect(peer, false, sample_time, key)?,
             now: None,
             good: Reading::default(),
             newest: None,
@@ -119,11 +128,11 @@ impl NetRig {
         Ok(())
     }
 
-    fn drive(&mut self, drive: Drive, step: f64) -> Result<(), LinkError> {
+    fn drive(&mut self, drive: Drive, flags: u8, step: f64) -> Result<(), LinkError> {
         self.client.check_step(step)?;
         let command = Command { drive, ..Command::default() };
-        self.client
-            .send(write_command(self.client.frame(Kind::Drive), &command))?;
+        let frame = write_command(self.client.frame(Kind::Drive), &command);
+        self.client.send(Frame { flags: frame.flags | flags, ..frame })?;
         self.client.at += 1;
         self.now = None;
         Ok(())
@@ -149,7 +158,12 @@ impl Rig for NetRig {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        Ok(self.drive(drive, step)?)
+        Ok(self.drive(drive, 0, step)?)
+    }
+
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        let drive = Drive { displacement, ..Drive::default() };
+        Ok(self.drive(drive, flag::HOLD, step)?)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

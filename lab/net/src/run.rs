@@ -7,7 +7,7 @@ use super::error::ServerError;
 use super::frame::{Frame, Kind, flag};
 use super::handshake::{Refusal, Service};
 use super::link::Listener;
-use super::payload::{Reading, read_reading, write_command, write_reading};
+use super::payload::{Reading, read_move, read_reading, write_command, write_reading};
 use super::ramp::Ramp;
 use super::real_time_clock::RealTimeClock;
 use super::report::{Counters, Ended, Session, Timing};
@@ -125,10 +125,15 @@ impl Run {
                 listener.send(&answer, self.peer)?;
                 Ok(Ok(()))
             }
+            (Served::Controller(controller), Kind::Move) => {
+                let (to, phase_target) = read_move(frame);
+                // No answer: the next drive follows from it. A refusal ends the session.
+                Ok(controller.hold_response(to, phase_target).map_err(|_| Refusal::Move))
+            }
             (Served::Rig(_), Kind::Drive) => match self.service.drive(frame) {
                 Err(refusal) => Ok(Err(refusal)),
                 Ok(drive) => {
-                    self.drive.set(drive);
+                    self.drive.set(drive, frame.has(flag::HOLD));
                     self.advance()?;
                     self.tell_reading(listener)?;
                     Ok(Ok(()))
@@ -145,7 +150,7 @@ impl Run {
         self.counters.late += u64::from(known || frame.sequence < self.at);
         self.counters.malformed += u64::from(drive.is_none());
         if let Some(drive) = drive.filter(|_| !known) {
-            self.drive.set(drive);
+            self.drive.set(drive, frame.has(flag::HOLD));
             self.newest = frame.sequence;
             self.clock
                 .get_or_insert_with(|| RealTimeClock::start(self.service.sample_time));
@@ -180,7 +185,7 @@ impl Run {
 
     fn advance(&mut self) -> Result<(), ServerError> {
         if let Served::Rig(rig) = &mut self.served {
-            rig.advance(self.drive.next(), self.service.sample_time)?;
+            self.drive.apply(rig.as_mut(), self.service.sample_time)?;
             self.at += 1;
         }
         Ok(())
@@ -202,12 +207,13 @@ impl Run {
     }
 
     fn timing(&self) -> Timing {
-        let punctuality = self.clock.map(|clock| clock.punctuality).unwrap_or_default();
+        let punctuality = self.clock.as_ref().map(|clock| &clock.punctuality);
         Timing {
             samples: self.at,
-            missed: punctuality.missed,
-            worst: punctuality.worst,
+            missed: punctuality.map_or(0, |all| all.missed),
+            worst: punctuality.map_or(0.0, |all| all.worst),
             held: self.counters.held,
+            quantiles: punctuality.map_or([0.0; 2], |all| [0.99, 0.9999].map(|share| all.quantile(share))),
         }
     }
 
@@ -217,10 +223,10 @@ impl Run {
         if let Served::Rig(rig) = &mut self.served {
             while !self.drive.is_down() {
                 // An error of the rig changes nothing now: the session ends.
-                let _ = rig.advance(self.drive.next(), self.service.sample_time);
+                let _ = self.drive.apply(rig.as_mut(), self.service.sample_time);
             }
         }
-        let began = self.clock.map_or(self.opened, |clock| clock.due(0));
+        let began = self.clock.as_ref().map_or(self.opened, |clock| clock.due(0));
         Session {
             peer: self.peer,
             ended: self.ended.unwrap_or(Ended::Stopped),

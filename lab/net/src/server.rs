@@ -11,6 +11,7 @@ use super::handshake::{Refusal, Service};
 use super::link::{Listener, Received};
 use super::report::{Ended, Session};
 use super::run::{Run, Served};
+use super::seal::Key;
 
 /// Interval at which a server without a running clock checks whether it should stop.
 const IDLE: Duration = Duration::from_millis(50);
@@ -29,7 +30,15 @@ impl Server {
     /// # Errors
     /// An address that is not available.
     pub fn listen(address: Address, service: Service) -> Result<Self, LinkError> {
-        let listener = Listener::bind(address).map_err(|source| LinkError::Listen { address, source })?;
+        Self::listen_with(address, service, None)
+    }
+
+    /// As [`Server::listen`], for clients with a shared key only.
+    ///
+    /// # Errors
+    /// An address that is not available.
+    pub fn listen_with(address: Address, service: Service, key: Option<Key>) -> Result<Self, LinkError> {
+        let listener = Listener::bind(address, key).map_err(|source| LinkError::Listen { address, source })?;
         Ok(Self { listener, service })
     }
 
@@ -95,7 +104,7 @@ impl Server {
         from: SocketAddr,
         make: &mut impl FnMut() -> Result<Served, ServerError>,
     ) -> Result<Option<Run>, ServerError> {
-        let welcome = match self.service.welcome(hello) {
+        let mut welcome = match self.service.welcome(hello) {
             Ok(welcome) => welcome,
             Err(refusal) => {
                 self.refuse(refusal, hello, from)?;
@@ -103,7 +112,10 @@ impl Server {
             }
         };
         self.listener.prefer(from);
-        let real_time = matches!(self.listener, Listener::Udp(_));
+        let drawn = self.listener.seal.draw().map_err(io::Error::other)?;
+        welcome.values[3..5].copy_from_slice(&drawn);
+        self.listener.seal.begin(hello.session, drawn);
+        let real_time = self.listener.is_real_time();
         let mut run = Run::new(make()?, self.service, real_time, from, welcome);
         run.welcome(&mut self.listener)?;
         Ok(Some(run))
@@ -115,10 +127,15 @@ impl Server {
             (Err(FrameError::Closed), Some(run)) if run.peer == from => run.end(Ended::Farewell),
             (Err(FrameError::Closed), _) => {}
             (Err(error), run) => {
+                let version = matches!(error, FrameError::Version(_));
                 if let Some(run) = run {
                     run.counters.malformed += 1;
+                    // Over TCP, the refusal closes the connection.
+                    if version && run.peer == from && !self.listener.is_real_time() {
+                        run.end(Ended::Refused);
+                    }
                 }
-                if let FrameError::Version(_) = error {
+                if version {
                     self.refuse(Refusal::Version(VERSION), &Frame::new(Kind::Hello, 0), from)?;
                 }
             }

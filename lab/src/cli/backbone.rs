@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn, scene::Scene};
+use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
 use super::{
     check::LoopCheckArguments,
@@ -53,6 +53,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     rig: Endpoint,
 
+    /// The controller: `built-in`, an FMU with the inputs `hold_response` and `move.*` of PhaseLock.fmu, or tcp://HOST:PORT
+    #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
+    controller: Endpoint,
+
     #[command(flatten)]
     reach: ReachArguments,
 
@@ -67,17 +71,21 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
     log_warnings();
-    let controller = |scene: &Scene| BuiltIn::new(&scene.backbone_config()).map_err(Failure::input);
-    controller(&scene)?;
+    let reach = arguments.reach.reach()?;
+    BuiltIn::new(&scene.backbone_config())?;
     writable(&arguments.out)?;
-    let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
+    let mut open = arguments.rig.rig(&scene, reach)?;
     arguments.loop_check.before(&mut open.rig, &mut scene)?;
-    let mut controller = controller(&scene)?;
+    let config = scene.backbone_config();
+    let mut controller = arguments
+        .controller
+        .controller(&config, &scene.controller_names, reach, open.pace)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
-    let tracked = track(&mut open.rig, &mut controller, &scene, |done, _| {
+    let tracked = track(&mut open.rig, controller.as_mut(), &scene, |done, _| {
         bar.set_position(done as u64);
     });
     bar.finish_and_clear();
+    drop(controller);
     let timing = open.close();
     let tracked = tracked?;
     let found = TrackedComparison::of(&tracked, &scene);

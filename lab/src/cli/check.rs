@@ -3,7 +3,7 @@
 use clap::Args;
 use vines::{
     experiment::ExperimentError,
-    loop_check::{Channel, LoopCheck, Trials, Verdict, check, trials},
+    loop_check::{Channel, LockTime, LoopCheck, Trials, Verdict, check, lock_times, trials},
     report::Table,
     rig::Rig,
     scene::Scene,
@@ -23,6 +23,8 @@ those of the scene's linear resonator at rest:
   phase  less the expected one, degrees; 180 for a reversed sensor
   delay  the same in samples; of the response it contains what a wrong natural frequency adds
   noise  RMS of everything else, and the RMS without a drive (floor), m
+Below the table: the linear response as it grew, and the gains that follow from it and from controller.bandwidth, the only tuning
+parameter, with their phase margin.
 The exit code is 1 unless all are as expected. `vines identify` and `vines backbone` check every rig that is not a simulation first.
 
 Examples:
@@ -47,6 +49,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N")]
     trials: Option<usize>,
 
+    /// Print how fast the phase locks over the bandwidth, in a simulation of the scene, beside published times
+    #[arg(long)]
+    lock_times: bool,
+
     /// Seed of the trials
     #[arg(long, default_value_t = 1)]
     seed: u64,
@@ -67,8 +73,16 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             Ok(counted(&found))
         };
     }
+    if arguments.lock_times {
+        let times = lock_times(&scene).map_err(Failure::run)?;
+        return if arguments.json {
+            json(&times)
+        } else {
+            Ok(listed(&times))
+        };
+    }
     scene.start = Default::default();
-    let mut open = arguments.rig.rig(&scene, arguments.reach.reach())?;
+    let mut open = arguments.rig.rig(&scene, arguments.reach.reach()?)?;
     let found = check(&mut open.rig, &scene).map_err(ExperimentError::from)?;
     open.close();
     let text = if arguments.json {
@@ -127,11 +141,44 @@ fn described(found: &LoopCheck) -> String {
     let rows = [("response", Some(&found.response)), ("base", found.base.as_ref())];
     let rows = rows.into_iter().filter_map(|(name, channel)| Some(row(name, channel?)));
     let table = Table::new(["channel", "gain", "phase", "delay", "noise", "floor"]).rows(rows);
-    format!(
+    let mut text = format!(
         "{}\nAt E = {:.2e} m: {}\n",
         table.markdown(),
         found.amplitude,
         found.verdict
+    );
+    if let Some(linear) = &found.linear {
+        let (damping, gain) = (linear.damping_rate, linear.response_gain);
+        text += &format!(
+            "Linear response: {:.4} rad/s, damping rate {damping:.4} ± {:.1e} rad/s, response gain {gain:.3} 1/s.\n\
+             Gains at a bandwidth of {:.3} rad/s: {:.4} 1/s and {:.4} 1/s²; phase margin {:.0} degrees.\n\
+             To use the measured response: --set phase_lock.damping_rate={damping:.4} --set phase_lock.response_gain={gain:.3}\n",
+            linear.omega_0,
+            linear.u_damping_rate,
+            linear.bandwidth,
+            linear.gains[0],
+            linear.gains[1],
+            linear.phase_margin,
+        );
+    }
+    text
+}
+
+fn listed(times: &[LockTime]) -> String {
+    let periods = |time: Option<f64>| time.map_or_else(|| "-".into(), |time| format!("{time:.0}"));
+    let rows = times.iter().map(|time| {
+        let reported = format!("{:.0}", time.reported);
+        [
+            time.bandwidth.to_string(),
+            periods(time.from_start),
+            periods(time.from_motion),
+            reported,
+        ]
+    });
+    let table = Table::new(["bandwidth", "from the start", "from a steady motion", "reported"]).rows(rows);
+    format!(
+        "Periods until the phase error has stayed within 2 degrees for twenty of them\n\n{}",
+        table.markdown()
     )
 }
 
@@ -139,6 +186,17 @@ fn counted(found: &Trials) -> String {
     let mut text = format!(
         "{} of {} healthy rigs passed, {} of {} faults were named correctly.\n",
         found.healthy[1], found.healthy[0], found.faulty[1], found.faulty[0]
+    );
+    let [integral, gain, damping] = found.linear;
+    text += &format!(
+        "Linear response of the healthy rigs, median and largest errors: integral gain {:.2} and {:.2} %, response gain {:.2} and {:.2} %, \
+         damping rate {:.1} and {:.1} standard uncertainties.\n",
+        100.0 * integral[0],
+        100.0 * integral[1],
+        100.0 * gain[0],
+        100.0 * gain[1],
+        damping[0],
+        damping[1],
     );
     for (expected, given) in &found.wrong {
         text += &format!("expected: {expected:?}\n{}", described(given));

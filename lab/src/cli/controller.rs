@@ -16,7 +16,8 @@ Examples:
 
 Answers every reading with a drive. After --silence the session ends. See docs/network-protocol.md.
 
-The server listens on this machine only, unless --allow-remote is given: there is no authentication and no encryption.";
+The server listens on this machine only, unless --key or --allow-remote is given. With --key, every frame is authenticated; nothing is
+encrypted. Without it, everyone who can reach the address can drive the rig.";
 
 /// Serve the phase-locked loop to a rig or an experiment across the network
 #[derive(Debug, Args)]
@@ -35,12 +36,14 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let first = BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
+    let first = BuiltIn::new(&scene.controller_config())?;
     let service = Service {
         role: Role::Controller,
         sample_time: scene.sample_time(),
         silence: arguments.silence,
     };
-    let make = || Served::Controller(Box::new(first.clone()));
-    arguments.serving.serve("controller", Address::Tcp, service, make)
+    let make = || Ok(Served::Controller(Box::new(first.clone())));
+    arguments
+        .serving
+        .serve("controller", Address::Tcp, service, make, |_| {})
 }

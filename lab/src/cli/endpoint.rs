@@ -1,23 +1,25 @@
 //! `--rig` and `--controller`: the implementations of the two sides of the bench.
 
 use std::{
-    path::PathBuf,
+    path::{Path, PathBuf},
     str::FromStr,
     sync::{Arc, OnceLock},
 };
 
 use clap::Args;
+use phase_lock::Config;
 use vines::{
-    fmu::{FmuController, FmuRig},
-    net::{Address, BindScope, NetController, NetRig, Timing},
-    rig::{BuiltIn, Chain, Controller, Rig, Simulated},
-    scene::Scene,
+    fmu::{FmuController, FmuError, FmuRig},
+    net::{
+        Address, BindScope, Key, NetController, NetRig, Timing,
+        helic::{Channels, DEFAULT_PORT, HelicRig, Network},
+        resolve,
+    },
+    rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable},
+    scene::{Name, Names, Scene},
 };
 
-use super::{
-    failure::Failure,
-    interrupt::{Interruptible, stop_flag},
-};
+use super::{failure::Failure, interrupt::stop_flag};
 
 /// An implementation, as written on the command line.
 #[derive(Debug, Clone, PartialEq)]
@@ -46,7 +48,7 @@ impl FromStr for Endpoint {
         } else {
             Err(format!(
                 "{text} does not exist; give `built-in`, the path of an FMU, tcp://HOST:PORT, or for a rig in real time \
-                 udp://HOST:PORT"
+                 udp://HOST:PORT or helic://HOST[:PORT]"
             ))
         }
     }
@@ -54,7 +56,7 @@ impl FromStr for Endpoint {
 
 /// A rig.
 pub(super) struct OpenRig {
-    pub rig: Interruptible,
+    pub rig: Stoppable,
     /// In real time, the longest silence that it tolerates, s.
     pub pace: Option<f64>,
     /// In real time, what it reports when the session has ended.
@@ -78,12 +80,10 @@ impl Endpoint {
                 let plant = Simulated::new(scene.plant, scene.start).map_err(Failure::input)?;
                 Box::new(plant.with_sensors(scene.resonance))
             }
-            Self::Fmu(file) => {
-                let rig = FmuRig::load(file, &scene.start_values(), scene.resonance, &scene.plant);
-                Box::new(rig.map_err(Failure::run)?)
-            }
+            Self::Fmu(file) => Box::new(fmu(file, scene).map_err(Failure::run)?),
+            Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
             Self::Network(address) => {
-                let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time())?;
+                let rig = NetRig::connect_with(Address::parse(address, scope)?, scene.sample_time(), scope.key())?;
                 let rig = rig.with_sensors(scene.resonance)?;
                 pace = rig.pace();
                 timing = rig.timing();
@@ -92,22 +92,28 @@ impl Endpoint {
         };
         let (d, samples) = (scene.dimensionless(), scene.controller.samples_per_period);
         let rig = Chain::around(rig, &scene.chain, &d, samples);
-        let rig = Interruptible::around(rig, scene.sample_time(), &stop_flag()?);
+        let rig = Stoppable::around(rig, scene.sample_time(), &stop_flag()?);
         Ok(OpenRig { rig, pace, timing })
     }
 
-    /// The controller of this endpoint, for a rig of that `pace`.
+    /// The controller of this endpoint with its configuration, for a rig of that `pace`. One at a network address has its own.
     pub(super) fn controller(
         &self,
-        scene: &Scene,
+        config: &Config,
+        names: &Names,
         scope: BindScope,
         pace: Option<f64>,
     ) -> Result<Box<dyn Controller>, Failure> {
         Ok(match self {
-            Self::BuiltIn => Box::new(BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?),
-            Self::Fmu(file) => Box::new(FmuController::load(file, &scene.controller_config()).map_err(Failure::run)?),
+            Self::BuiltIn => Box::new(BuiltIn::new(config)?),
+            Self::Fmu(file) => Box::new(FmuController::load(file, config, names).map_err(Failure::run)?),
             Self::Network(address) => match Address::parse(address, scope)? {
-                Address::Tcp(peer) => Box::new(NetController::connect(peer, scene.sample_time(), pace)?),
+                Address::Tcp(peer) => Box::new(NetController::connect_with(
+                    peer,
+                    config.sample_time,
+                    pace,
+                    scope.key(),
+                )?),
                 Address::Udp(_) => {
                     return Err(Failure::input(format!(
                         "{address}: a controller has an address tcp://HOST:PORT"
@@ -118,26 +124,96 @@ impl Endpoint {
     }
 }
 
+/// The rig in an FMU.
+pub(super) fn fmu(file: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuError> {
+    FmuRig::load(
+        file,
+        &scene.start_values(),
+        scene.resonance,
+        &scene.plant,
+        &scene.rig_names,
+    )
+}
+
+/// The helic device at `helic://HOST[:PORT]`.
+fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Network>, Failure> {
+    no_key(scope)?;
+    let place = address.trim_start_matches("helic://");
+    let has_port = place
+        .rsplit_once(':')
+        .is_some_and(|(_, port)| port.parse::<u16>().is_ok());
+    let place = if has_port {
+        place.into()
+    } else {
+        format!("{place}:{DEFAULT_PORT}")
+    };
+    let network = Network::connect(resolve(&place, scope)?);
+    let network =
+        network.map_err(|error| Failure::run(format!("no answer from {address}: {error}; {HELIC_ADVICE}")))?;
+    let samples = scene.controller.samples_per_period;
+    HelicRig::new(network, channels(&scene.rig_names)?, scene.sample_time(), samples).map_err(Failure::run)
+}
+
+/// The sources of a device and the gain of its output, by the scene's names `response`, `base` and `E`.
+fn channels(names: &Names) -> Result<Channels, Failure> {
+    if let Some(name) = names.unknown(&["response", "base", "E"]) {
+        return Err(Failure::input(format!(
+            "[rig.names] maps `{name}`; for a helic device there are response, base and E"
+        )));
+    }
+    let Channels { mut response, mut reference, mut gain } = Channels::default();
+    if let Some(Name { name, factor }) = names.mapped("response") {
+        response = (name.clone(), *factor);
+    }
+    if let Some(Name { name, factor }) = names.mapped("base") {
+        // A device without a base sensor: "".
+        reference = Some((name.clone(), *factor)).filter(|(name, _)| !name.is_empty());
+    }
+    if let Some(Name { factor, .. }) = names.mapped("E") {
+        gain = *factor;
+    }
+    Ok(Channels { response, reference, gain })
+}
+
+/// Refuses a key where the protocol has none.
+pub(super) fn no_key(scope: BindScope) -> Result<(), Failure> {
+    let message = "--key: the helic protocol has no authentication; drop --key, and use --allow-remote only on a network where everyone may \
+                   drive the rig";
+    scope.key().map_or(Ok(()), |_| Err(Failure::input(message)))
+}
+
+const HELIC_ADVICE: &str = "is `vines rig --protocol helic` or a device running there?";
+
 /// Refuses settings with which no experiment can begin, before anything is written or driven.
 pub(super) fn check(scene: &Scene) -> Result<(), Failure> {
-    BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
+    BuiltIn::new(&scene.controller_config())?;
     Ok(())
 }
 
 /// `--allow-remote`, which several commands share.
 #[derive(Debug, Args)]
 pub(super) struct ReachArguments {
-    /// Allow network addresses beyond this machine. There is no authentication: anyone who can reach the address can drive the rig
+    /// Allow network addresses beyond this machine without a key: anyone who can reach the address can drive the rig
     #[arg(long)]
     allow_remote: bool,
+
+    /// File with a shared key of 16 bytes or more, the same on both sides; allows network addresses beyond this machine
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
 }
 
 impl ReachArguments {
-    pub(super) fn reach(&self) -> BindScope {
-        if self.allow_remote {
-            BindScope::Remote
-        } else {
-            BindScope::Loopback
-        }
+    pub(super) fn reach(&self) -> Result<BindScope, Failure> {
+        let Some(file) = &self.key else {
+            return Ok(if self.allow_remote {
+                BindScope::Remote
+            } else {
+                BindScope::Loopback
+            });
+        };
+        let refused = |reason: String| Failure::input(format!("--key {}: {reason}", file.display()));
+        let secret = std::fs::read(file).map_err(|error| refused(error.to_string()))?;
+        let short = || refused("16 bytes or more are needed; `openssl rand -hex 32` writes a good key".into());
+        Key::of(&secret).map(BindScope::Keyed).ok_or_else(short)
     }
 }

@@ -2,9 +2,16 @@
 
 use std::fmt::{self, Display, Formatter};
 
-use vines::{experiment::ExperimentError, net::LinkError, pack::PackError, rig::RigError, scene::SceneError};
+use phase_lock::ConfigError;
+use vines::{
+    experiment::ExperimentError,
+    net::LinkError,
+    pack::PackError,
+    rig::{Interrupted, RigError},
+    scene::{SceneError, refusal},
+};
 
-use super::interrupt::{INTERRUPTED, Interrupted};
+use super::interrupt::INTERRUPTED;
 
 /// A message and an exit code.
 #[derive(Debug)]
@@ -62,6 +69,12 @@ impl Display for Failure {
 impl From<SceneError> for Failure {
     fn from(error: SceneError) -> Self {
         Self::input(error)
+    }
+}
+
+impl From<ConfigError> for Failure {
+    fn from(error: ConfigError) -> Self {
+        Self::input(refusal(&error))
     }
 }
 

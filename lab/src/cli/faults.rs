@@ -6,15 +6,10 @@ use clap::Args;
 use vines::{
     faults::{During, FAULTS, Faults, Kind, Row, Worst},
     report::Table,
-    rig::Rig,
+    rig::{Rig, Stoppable},
 };
 
-use super::{
-    failure::Failure,
-    interrupt::{Interruptible, stop_flag},
-    json,
-    scene_arguments::SceneArguments,
-};
+use super::{failure::Failure, interrupt::stop_flag, json, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Injects faults into runs on the built-in plant, at several instants while the loop locks, holds, tracks and releases, and prints the worst
@@ -60,7 +55,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     panic::set_hook(Box::new(|_| {}));
     let around = |rig: Box<dyn Rig>| -> Box<dyn Rig> {
         stop.store(false, Ordering::Relaxed);
-        Box::new(Interruptible::around(rig, scene.sample_time(), &stop))
+        Box::new(Stoppable::around(rig, scene.sample_time(), &stop))
     };
     let faults = Faults::new(&scene, &around)?;
     let calls = CALLS.map(|(name, call)| (name, Kind::Call(call)));

@@ -69,7 +69,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
     log_warnings();
-    let reach = arguments.reach.reach();
+    let reach = arguments.reach.reach()?;
     check(&scene)?;
     let (mut open, fmus) = match &arguments.rig {
         Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&arguments.out)?),
@@ -79,7 +79,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         }
     };
     arguments.loop_check.before(&mut open.rig, &mut scene)?;
-    let mut controller = arguments.controller.controller(&scene, reach, open.pace)?;
+    let mut controller =
+        arguments
+            .controller
+            .controller(&scene.controller_config(), &scene.controller_names, reach, open.pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(&plan);
     let mut samples = Vec::new();

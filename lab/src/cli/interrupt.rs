@@ -8,8 +8,6 @@ use std::{
     },
 };
 
-use vines::rig::{Drive, GroundTruth, Rig, RigError, Sensors};
-
 use super::failure::Failure;
 
 /// Exit code of a program that a signal ended: 128 and the number of SIGINT.
@@ -30,46 +28,4 @@ pub(super) fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
     })
     .map_err(|error| Failure::run(format!("cannot wait for Ctrl-C: {error}")))?;
     Ok(flag)
-}
-
-/// The run was interrupted.
-#[derive(Debug, thiserror::Error)]
-#[error("interrupted by a signal; the drive is zero")]
-pub(super) struct Interrupted;
-
-/// A rig that stops on a signal.
-pub(super) struct Interruptible {
-    rig: Box<dyn Rig>,
-    sample_time: f64,
-    stop: Arc<AtomicBool>,
-}
-
-impl Interruptible {
-    /// `sample_time` in s.
-    pub(super) fn around(rig: Box<dyn Rig>, sample_time: f64, stop: &Arc<AtomicBool>) -> Self {
-        Self { rig, sample_time, stop: Arc::clone(stop) }
-    }
-}
-
-impl Rig for Interruptible {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        let sensors = self.rig.sense()?;
-        if self.stop.load(Ordering::Relaxed) {
-            self.rig.advance(Drive::default(), self.sample_time)?;
-            return Err(RigError::Failed(Interrupted.into()));
-        }
-        Ok(sensors)
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.rig.advance(drive, step)
-    }
-
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.rig.hold(displacement, step)
-    }
-
-    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
-        self.rig.ground_truth()
-    }
 }

@@ -54,7 +54,7 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     // Invalid settings are refused before anything runs or is written.
-    BuiltIn::new(&scene.controller_config()).map_err(Failure::input)?;
+    BuiltIn::new(&scene.controller_config())?;
     if arguments.x.axis == arguments.y.axis {
         return Err(Failure::input(format!(
             "--x and --y are both {}: take two of sigma, G and r",

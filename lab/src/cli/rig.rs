@@ -2,14 +2,16 @@
 
 use std::str::FromStr;
 
-use clap::Args;
+use clap::{Args, ValueEnum};
 use vines::faults::{FAULTS, Kind, rehearsal_rig};
-use vines::net::{Address, Role, Served, Service};
-use vines::rig::Simulated;
+use vines::net::{Address, Role, Served, Service, Session, helic::Device};
+use vines::rig::{Rig, RigError, Simulated};
 
 use super::{
+    endpoint::{Endpoint, fmu},
     failure::Failure,
     print,
+    real_time::RealTimeArguments,
     scene_arguments::SceneArguments,
     serving::{ServingArguments, positive},
 };
@@ -19,6 +21,9 @@ Examples:
   vines rig --listen 127.0.0.1:5510                 in real time; then: vines identify --rig udp://127.0.0.1:5510
   vines rig --listen 127.0.0.1:5510 --lock-step     as fast as the drives arrive, with the bits of the built-in plant;
                                                     then: vines identify --rig tcp://127.0.0.1:5510
+  vines rig --listen 127.0.0.1:5510 --rig LoViNes.fmu     an FMU
+  vines rig --protocol helic --listen 127.0.0.1:2350
+                                                    as a device of helic-daq; then: vines identify --rig helic://127.0.0.1
   vines rig --listen 127.0.0.1:5510 --sensors-only --set chain.snr=40 --set chain.adc_bits=12 --fault \"response sensor dead@60\"
                                                     a rehearsal: noise, converters, and a sensor that is unplugged after 60 s
 
@@ -27,8 +32,8 @@ server take the sample time from their scene: use the same scene for both. In re
 last valid one is held. When the newest drive is older than --silence, the drive ramps to zero and stays there until another session
 starts. In lock-step, a drive that is not allowed ends the session. See docs/network-protocol.md.
 
-The server listens on this machine only, unless --allow-remote is given: there is no authentication and no encryption, and everyone
-who can reach the address can drive the rig.";
+The server listens on this machine only, unless --key or --allow-remote is given. With --key, every frame is authenticated; nothing is
+encrypted. Without it, everyone who can reach the address can drive the rig.";
 
 /// Longest silence in real time, s: about one period of the default scene.
 const SILENCE_PACED: f64 = 0.1;
@@ -44,6 +49,26 @@ pub(super) struct Arguments {
 
     #[command(flatten)]
     serving: ServingArguments,
+
+    #[command(flatten)]
+    real_time: RealTimeArguments,
+
+    /// The protocol: `vines` (docs/network-protocol.md), or `helic`, as a device of helic-daq (docs/helic.md)
+    #[arg(long, value_enum, default_value_t = Protocol::Vines)]
+    protocol: Protocol,
+
+    /// With `--protocol helic`: samples of the device per sample of the scene
+    #[arg(long, value_name = "N", default_value_t = 8, value_parser = clap::value_parser!(u16).range(1..=100))]
+    oversampling: u16,
+
+    /// The rig that is served: `built-in` or an FMU
+    #[arg(
+        long,
+        value_name = "ENDPOINT",
+        default_value = "built-in",
+        conflicts_with = "sensors_only"
+    )]
+    rig: Endpoint,
 
     /// Advance when a drive arrives instead of in real time
     #[arg(long)]
@@ -100,10 +125,21 @@ impl FromStr for Fault {
     }
 }
 
+#[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
+enum Protocol {
+    Vines,
+    Helic,
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
-    if arguments.sensors_only {
+    let helic = arguments.protocol == Protocol::Helic;
+    if arguments.sensors_only || helic {
+        // A device runs on between its hosts.
         scene.start = Default::default();
+    }
+    if helic {
+        scene.controller.samples_per_period *= f64::from(arguments.oversampling);
     }
     let first = Simulated::new(scene.plant, scene.start)
         .map_err(Failure::input)?
@@ -119,21 +155,47 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         ("in real time", Address::Udp)
     };
     let max_amplitude = arguments.max_amplitude.unwrap_or(scene.plant.half_width);
+    let fault = arguments
+        .fault
+        .unwrap_or(Fault { kind: Kind::None, seconds: f64::INFINITY });
+    let json = arguments.serving.json;
+    let make = || -> Result<Box<dyn Rig>, RigError> {
+        Ok(match &arguments.rig {
+            Endpoint::Fmu(file) => Box::new(fmu(file, &scene)?),
+            _ if arguments.sensors_only => {
+                rehearsal_rig(&scene, fault.kind, fault.seconds, move |zero| tell(zero, json))
+            }
+            _ => Box::new(first.clone()),
+        })
+    };
+    match &arguments.rig {
+        Endpoint::Network(address) => {
+            return Err(Failure::input(format!(
+                "--rig {address}: only `built-in` or an FMU can be served"
+            )));
+        }
+        // An FMU that cannot be loaded is reported before a client comes.
+        Endpoint::Fmu(file) => drop(fmu(file, &scene).map_err(Failure::run)?),
+        Endpoint::BuiltIn => {}
+    }
+    arguments.real_time.apply()?;
+    let keep = |session: &Session| arguments.real_time.keep(session);
+    if helic {
+        if arguments.lock_step {
+            let message = "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic";
+            return Err(Failure::input(message));
+        }
+        let step = scene.sample_time();
+        let device = Device::new(make().map_err(Failure::run)?, step, max_amplitude).map_err(Failure::run)?;
+        return arguments.serving.serve_helic(device, step, keep);
+    }
     let service = Service {
         role: Role::Rig { max_amplitude, sensors: scene.resonance },
         sample_time: scene.sample_time(),
         silence: arguments.silence.unwrap_or(default),
     };
     let what = format!("rig, {mode}, {:.1} samples per second,", 1.0 / service.sample_time);
-    let fault = arguments
-        .fault
-        .unwrap_or(Fault { kind: Kind::None, seconds: f64::INFINITY });
-    let json = arguments.serving.json;
-    let make = || {
-        Served::Rig(match arguments.sensors_only {
-            true => rehearsal_rig(&scene, fault.kind, fault.seconds, move |zero| tell(zero, json)),
-            false => Box::new(first.clone()),
-        })
-    };
-    arguments.serving.serve(&what, transport, service, make)
+    arguments
+        .serving
+        .serve(&what, transport, service, || Ok(Served::Rig(make()?)), keep)
 }

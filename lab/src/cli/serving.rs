@@ -6,9 +6,18 @@ use std::{
 };
 
 use clap::Args;
-use vines::net::{Address, Served, Server, Service, Session, resolve};
+use vines::net::{
+    Address, LinkError, Served, Server, ServerError, Service, Session,
+    helic::{Device, HelicServer},
+    resolve,
+};
 
-use super::{endpoint::ReachArguments, failure::Failure, interrupt::stop_flag, print};
+use super::{
+    endpoint::{ReachArguments, no_key},
+    failure::Failure,
+    interrupt::stop_flag,
+    print,
+};
 
 #[derive(Debug, Args)]
 pub(super) struct ServingArguments {
@@ -33,29 +42,64 @@ pub(super) struct ServingArguments {
 }
 
 impl ServingArguments {
-    /// Serves `what` at a TCP or UDP address: prints the address, then a report per session.
+    /// Serves `what` at a TCP or UDP address: prints the address, then a report per session, which `keep` gets, too.
     pub(super) fn serve(
         &self,
         what: &str,
         transport: fn(std::net::SocketAddr) -> Address,
         service: Service,
-        mut make: impl FnMut() -> Served,
+        make: impl FnMut() -> Result<Served, ServerError>,
+        keep: impl Fn(&Session),
     ) -> Result<String, Failure> {
-        let mut server = Server::listen(transport(resolve(&self.listen, self.reach.reach())?), service)?;
+        let scope = self.reach.reach()?;
+        let mut server = Server::listen_with(transport(resolve(&self.listen, scope)?), service, scope.key())?;
+        let address = server.address().map_err(Failure::run)?;
+        self.run(&format!("{what} on {address}"), keep, |stop, tell| {
+            server.serve(make, stop, tell)
+        })
+    }
+
+    /// Serves `device` as a device of helic-daq, sampled every `sample_time`, s.
+    pub(super) fn serve_helic(
+        &self,
+        device: Device,
+        sample_time: f64,
+        keep: impl Fn(&Session),
+    ) -> Result<String, Failure> {
+        let scope = self.reach.reach()?;
+        no_key(scope)?;
+        let address = resolve(&self.listen, scope)?;
+        let listen = |source| LinkError::Listen { address: Address::Tcp(address), source };
+        let mut server = HelicServer::listen(address, device, sample_time).map_err(listen)?;
+        let what = format!("helic device, {:.1} samples per second, on", 1.0 / sample_time);
+        let address = server.address().map_err(Failure::run)?;
+        self.run(&format!("{what} helic://{address}"), keep, |stop, tell| {
+            server.serve(stop, tell)
+        })
+    }
+
+    /// Runs a server: prints `what`, then a report per session.
+    fn run(
+        &self,
+        what: &str,
+        keep: impl Fn(&Session),
+        serve: impl FnOnce(&mut dyn FnMut() -> bool, &mut dyn FnMut(&Session)) -> Result<(), ServerError>,
+    ) -> Result<String, Failure> {
         let stop = stop_flag()?;
-        print(&format!("{what} on {}\n", server.address().map_err(Failure::run)?))?;
+        print(&format!("{what}\n"))?;
         let enough = Arc::clone(&stop);
         let end = self
             .duration
             .map(|seconds| Instant::now() + Duration::from_secs_f64(seconds));
-        let stop = move || stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end);
+        let mut stop = move || stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end);
         let (json, sessions, mut served) = (self.json, self.sessions, 0);
-        let tell = move |session: &Session| {
+        let mut tell = move |session: &Session| {
             let text = if json {
                 serde_json::to_string(session).map_or_else(|e| e.to_string(), |line| line + "\n")
             } else {
                 session.to_string()
             };
+            keep(session);
             // A closed output does not stop the server.
             let _ = print(&text);
             served += 1;
@@ -63,7 +107,7 @@ impl ServingArguments {
                 enough.store(true, Ordering::Relaxed);
             }
         };
-        server.serve(|| Ok(make()), stop, tell).map_err(Failure::run)?;
+        serve(&mut stop, &mut tell).map_err(Failure::run)?;
         Ok(String::new())
     }
 }

@@ -34,7 +34,8 @@ Examples:
   vines sweep --axis sigma=-5:5:101 --axis excitation.G=0.1:3:59 --out map.zarr
   vines sweep --axis start.q1=random:-0.01:0.01 --axis start.dq1=random:-1:1 --samples 10000 --sigma=-1.14 --out basin.zarr
   vines sweep --axis sigma=-5:5:1000 --axis excitation.G=0.1:3:1000 --shard 3/8 --out map.zarr
-  vines sweep --axis plant.r=0.3:1:71 --axis plant.b=0.005:0.02:61 --results response,orbits --out gap.zarr";
+  vines sweep --axis plant.r=0.3:1:71 --axis plant.b=0.005:0.02:61 --results response,orbits --out gap.zarr
+  vines sweep --axis sigma=-5:5:1000 --axis excitation.G=0.1:3:1000 --periods 400 --adaptive --out fine.zarr";
 
 /// Sweep over any numbers of a scene and of its start, to a Zarr store
 #[derive(Debug, Args)]
@@ -71,6 +72,10 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "CELLS", default_value_t = Settings::default().chunk)]
     chunk: u64,
 
+    /// Only the regime: compute every N-th cell of two grids, then where neighbours differ; infer the rest and mark it in `inferred`
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "4", conflicts_with_all = ["shard", "merge"])]
+    adaptive: Option<u64>,
+
     /// Folder of the store; made if it is not there
     #[arg(long, value_name = "DIR", default_value = "sweep.zarr")]
     out: PathBuf,
@@ -97,6 +102,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         periods: arguments.periods,
         results: Results::parse(arguments.results.iter().map(String::as_str)).map_err(Failure::input)?,
         chunk: arguments.chunk,
+        adaptive: arguments.adaptive,
     };
     let plan = Plan::new(arguments.scene.family()?, settings).map_err(Failure::input)?;
     if !arguments.merge.is_empty() {
@@ -122,6 +128,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         plan.cells(),
         plan.chunks()
     );
+    let inferred = monitor.inferred.load(Relaxed);
+    if inferred > 0 {
+        let share = 100.0 * inferred as f64 / plan.cells() as f64;
+        text += &format!("{inferred} cells ({share:.1} %) were inferred from their neighbours\n");
+    }
     if let Some(reason) = monitor.reason.lock().ok().and_then(|mut reason| reason.take()) {
         text += &format!("First failure: {reason}\n");
     }

@@ -144,7 +144,13 @@ impl Panel {
         self
     }
 
+    /// Adds a series, unless it has nothing to draw: the legend does not name what is not there.
     fn add(&mut self, kind: Kind, style: ShapeStyle, label: &str) {
+        if let Kind::Curve(points) | Kind::Dashed(points) | Kind::Circles(points, _) | Kind::Crosses(points) = &kind
+            && points.is_empty()
+        {
+            return;
+        }
         let label = (!label.is_empty()).then(|| label.to_string());
         self.series.push(Series { kind, style, label });
     }

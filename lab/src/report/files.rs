@@ -92,6 +92,20 @@ pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>,
     write_files(out, &[("interrupted.csv", table(samples))])
 }
 
+/// Writes a histogram to `file`: upper limits of the lateness, s, and numbers of samples.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf>, WriteError> {
+    let mut text = String::from("lateness_s,samples\n");
+    classes
+        .iter()
+        .for_each(|(limit, count)| text += &format!("{limit:e},{count}\n"));
+    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
+    write_files(folder.unwrap_or(Path::new(".")), &[(name, text)])
+}
+
 /// Writes `coverage.svg` into `out` and returns its path, as [`write()`] does.
 ///
 /// # Errors

@@ -62,10 +62,14 @@ impl Results {
 /// Result of a cell; all is absent in a cell that failed.
 #[derive(Debug, Clone, Default)]
 pub struct Cell {
+    /// The regime, unless the cell failed.
+    pub regime: Option<Regime>,
+    /// Whether the regime is that of the neighbours, not computed.
+    pub inferred: bool,
     pub(crate) point: Option<Point>,
-    response: Option<Response>,
-    orbits: Option<Vec<Orbit>>,
-    lock: Option<Lock>,
+    pub(crate) response: Option<Response>,
+    pub(crate) orbits: Option<Vec<Orbit>>,
+    pub(crate) lock: Option<Lock>,
     /// `k b^2 omega0`, W.
     pub(crate) power: f64,
     /// Why the cell failed; empty if it did not.
@@ -86,6 +90,8 @@ pub(crate) fn compute(scene: &Scene, sigma: f64, g: Option<f64>, periods: usize,
         Ok((point, response)) => {
             let lock = results.lock.then(|| locked(scene)).transpose();
             Cell {
+                regime: Some(point.regime),
+                inferred: false,
                 point: Some(point),
                 response,
                 orbits: results.orbits.then(|| symmetric_orbits(&numbers, sigma)),
@@ -127,12 +133,6 @@ fn simulated(
 impl Cell {
     pub(crate) fn failed(failure: String) -> Self {
         Self { failure, ..Self::default() }
-    }
-
-    /// The regime, unless the cell failed.
-    #[must_use]
-    pub fn regime(&self) -> Option<Regime> {
-        self.point.map(|point| point.regime)
     }
 
     pub(crate) fn number(&self, of: impl Fn(&Point) -> f64) -> f64 {

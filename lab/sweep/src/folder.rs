@@ -47,9 +47,9 @@ impl Folder {
         complete().inspect_err(|_| drop(fs::remove_file(&path)))
     }
 
-    /// Removes what kills have left.
-    pub(crate) fn tidy(&self) -> io::Result<()> {
-        match fs::remove_dir_all(self.path(PARTIAL)) {
+    /// Removes a folder inside, if it is there.
+    pub(crate) fn remove(&self, name: &str) -> io::Result<()> {
+        match fs::remove_dir_all(self.path(name)) {
             Err(error) if error.kind() != io::ErrorKind::NotFound => Err(error),
             _ => Ok(()),
         }

@@ -5,6 +5,7 @@
 
 #![forbid(unsafe_code)]
 
+mod adaptive;
 mod axis;
 mod cell;
 mod folder;

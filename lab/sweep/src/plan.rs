@@ -98,7 +98,7 @@ impl Plan {
     /// Bytes of the store before compression, without coordinates.
     #[must_use]
     pub fn bytes(&self) -> f64 {
-        variables(self.settings.results).count() as f64 * 7.0 * self.cells() as f64
+        variables(&self.settings).count() as f64 * 7.0 * self.cells() as f64
     }
 
     /// Number of chunks along each dimension.
@@ -131,7 +131,7 @@ impl Plan {
     }
 
     /// Indices of the n-th cell of a chunk; None outside the sweep.
-    fn cell_index(&self, chunk: &[u64], n: u64) -> Option<Vec<u64>> {
+    pub(crate) fn cell_index(&self, chunk: &[u64], n: u64) -> Option<Vec<u64>> {
         let mut index = position(n, &self.chunk);
         for (one, (chunk, part)) in index.iter_mut().zip(chunk.iter().zip(&self.chunk)) {
             *one += chunk * part;
@@ -159,9 +159,12 @@ impl Plan {
 
     /// Computes the n-th cell of a chunk; outside the sweep it is empty.
     pub(crate) fn cell(&self, chunk: &[u64], n: u64) -> Cell {
-        let Some(index) = self.cell_index(chunk, n) else {
-            return Cell::default();
-        };
+        self.cell_index(chunk, n)
+            .map_or_else(Cell::default, |index| self.cell_at(&index))
+    }
+
+    /// Computes the cell with these indices.
+    pub(crate) fn cell_at(&self, index: &[u64]) -> Cell {
         let (mut sigma, mut g) = (self.sigma, None);
         let mut values = Vec::with_capacity(self.sequences.len());
         for (axis, sequence, dimension) in self.coordinates() {
@@ -204,6 +207,7 @@ impl Plan {
             "periods": self.settings.periods,
             "results": self.settings.results.names(),
             "chunk": self.chunk,
+            "adaptive": self.settings.adaptive,
         })
     }
 }

@@ -12,6 +12,7 @@ use std::{
 use rayon::prelude::*;
 
 use crate::{
+    adaptive,
     cell::Cell,
     plan::Plan,
     store::{Store, StoreError},
@@ -26,10 +27,27 @@ pub struct Monitor {
     pub computed: AtomicU64,
     /// Those of them that failed.
     pub failed: AtomicU64,
+    /// Cells that were inferred; known at the end of an adaptive sweep.
+    pub inferred: AtomicU64,
     /// Ends the sweep within the duration of a cell; unfinished chunks are dropped.
     pub stop: AtomicBool,
     /// Reason of the first failure.
     pub reason: Mutex<Option<String>>,
+}
+
+impl Monitor {
+    /// Counts a cell.
+    pub(crate) fn note(&self, cell: &Cell) {
+        if !cell.failure.is_empty() {
+            self.failed.fetch_add(1, Relaxed);
+            if let Ok(mut reason) = self.reason.lock() {
+                reason.get_or_insert_with(|| cell.failure.clone());
+            }
+        }
+        if cell.regime.is_some() || !cell.failure.is_empty() {
+            self.computed.fetch_add(1, Relaxed);
+        }
+    }
 }
 
 /// The part of a sweep that one process computes.
@@ -62,6 +80,17 @@ pub fn run(plan: &Plan, folder: &Path, shard: Shard, monitor: &Monitor) -> Resul
         if store.has(&index) {
             monitor.found.fetch_add(plan.chunk_cells(&index), Relaxed);
         }
+    }
+    if let Some(stride) = plan.settings().adaptive {
+        if shard != Shard::ALL {
+            return Err(StoreError::Part);
+        }
+        if monitor.found.load(Relaxed) == plan.cells() {
+            store.tidy()?;
+            return Ok(true);
+        }
+        monitor.found.store(0, Relaxed);
+        return adaptive::run(plan, &store, stride as usize, monitor);
     }
     let next = Mutex::new(chunks());
     let error = Mutex::new(None);
@@ -138,15 +167,7 @@ fn chunk(plan: &Plan, index: &[u64], monitor: &Monitor) -> Option<Vec<Cell>> {
                 return None;
             }
             let cell = plan.cell(index, n);
-            if !cell.failure.is_empty() {
-                monitor.failed.fetch_add(1, Relaxed);
-                if let Ok(mut reason) = monitor.reason.lock() {
-                    reason.get_or_insert_with(|| cell.failure.clone());
-                }
-            }
-            if cell.regime().is_some() || !cell.failure.is_empty() {
-                monitor.computed.fetch_add(1, Relaxed);
-            }
+            monitor.note(&cell);
             Some(cell)
         })
         .collect()

@@ -3,6 +3,7 @@
 use vines_testbench::scene::SceneError;
 
 use crate::{
+    adaptive,
     axis::{Axis, SIGMA},
     cell::Results,
     sobol,
@@ -25,6 +26,8 @@ pub struct Settings {
     pub results: Results,
     /// Largest number of cells in a chunk of the store.
     pub chunk: u64,
+    /// Only the regime is computed, at first in cells so far apart, and then where neighbours differ; two grids.
+    pub adaptive: Option<u64>,
 }
 
 impl Default for Settings {
@@ -37,6 +40,7 @@ impl Default for Settings {
             periods: vines_model::map::LIMIT,
             results: Results::default(),
             chunk: 4096,
+            adaptive: None,
         }
     }
 }
@@ -70,6 +74,32 @@ impl Settings {
         }
         if self.chunk == 0 {
             return refused("a chunk of 0 cells: at least 1 is needed".into());
+        }
+        self.adaptive.map_or(Ok(()), |stride| self.check_adaptive(stride))
+    }
+
+    fn check_adaptive(&self, stride: u64) -> Result<(), PlanError> {
+        let refused = |message: String| Err(PlanError::Setting(message));
+        if !stride.is_power_of_two() || !(2..=64).contains(&stride) {
+            return refused(format!(
+                "adaptive refinement from every {stride}-th cell: 2, 4, 8, 16, 32 or 64 are allowed"
+            ));
+        }
+        let points: Vec<u64> = self.axes.iter().filter_map(Axis::points).collect();
+        if points.len() != 2 || self.axes.len() != 2 {
+            return refused("adaptive refinement needs exactly two axes, each a grid or a list".into());
+        }
+        if points[0]
+            .checked_mul(points[1])
+            .is_none_or(|cells| cells > adaptive::MOST)
+        {
+            return refused(format!(
+                "adaptive refinement of more than {} cells, which must be in memory",
+                adaptive::MOST
+            ));
+        }
+        if self.results != Results::default() {
+            return refused("adaptive refinement has the regime only: leave out other results".into());
         }
         Ok(())
     }

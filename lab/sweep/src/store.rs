@@ -14,6 +14,7 @@ use zarrs::array::{
 };
 
 use crate::{
+    adaptive::ROUNDS,
     cell::Cell,
     folder::{Folder, PARTIAL},
     plan::Plan,
@@ -37,6 +38,11 @@ pub enum StoreError {
     /// The folder holds something else.
     #[error("{} is not the store of a sweep; name another folder", .0.display())]
     NotAStore(PathBuf),
+    /// An adaptive sweep in parts.
+    #[error(
+        "an adaptive sweep cannot be computed in parts: what is computed next depends on all cells. Leave out the part"
+    )]
+    Part,
     /// Reading or writing failed.
     #[error("cannot write to {}: {source}. Complete chunks stay; the same command goes on with the sweep", folder.display())]
     Write {
@@ -64,7 +70,7 @@ impl Store {
     pub(crate) fn open(plan: &Plan, root: &Path) -> Result<Self, StoreError> {
         let failed = |source| StoreError::Write { folder: root.into(), source };
         let folder = Arc::new(Folder::new(root));
-        let arrays = variables(plan.settings().results)
+        let arrays = variables(plan.settings())
             .map(|one| Ok((one, variable(plan, &folder, &one)?)))
             .collect::<Result<_, Box<dyn std::error::Error + Send + Sync>>>()
             .map_err(failed)?;
@@ -196,14 +202,25 @@ impl Store {
         })
     }
 
+    /// What was kept beside the arrays under this key.
+    pub(crate) fn read(&self, key: &str) -> Option<Vec<u8>> {
+        fs::read(self.folder.path(key)).ok()
+    }
+
+    /// Keeps something beside the arrays until the store is complete.
+    pub(crate) fn keep(&self, key: &str, content: &[u8]) -> Result<(), StoreError> {
+        self.folder.write(key, content).map_err(|error| self.failed(error))
+    }
+
     fn failed(&self, source: impl Into<Box<dyn std::error::Error + Send + Sync>>) -> StoreError {
         StoreError::Write { folder: self.root.clone(), source: source.into() }
     }
 
     /// Removes what kills have left. Only for a complete store, to which nobody else writes.
     pub(crate) fn tidy(&self) -> Result<(), StoreError> {
-        self.folder
-            .tidy()
+        [ROUNDS, PARTIAL]
+            .iter()
+            .try_for_each(|name| self.folder.remove(name))
             .map_err(|error| StoreError::Write { folder: self.root.clone(), source: error.into() })
     }
 }
@@ -240,9 +257,9 @@ fn variable(
 }
 
 /// Code of the regime of a cell.
-fn code(cell: &Cell) -> u8 {
+pub(crate) fn code(cell: &Cell) -> u8 {
     let position = |regime| Regime::SIMULATED.iter().position(|one| *one == regime);
-    cell.regime().and_then(position).map_or(ABSENT, |code| code as u8)
+    cell.regime.and_then(position).map_or(ABSENT, |code| code as u8)
 }
 
 /// A chunk in which all is absent is written too: its file says that it is complete.

@@ -1,6 +1,6 @@
 //! The variables that are stored of a cell.
 
-use crate::cell::{Cell, Results};
+use crate::{cell::Cell, settings::Settings};
 
 /// Code of a cell without a regime: not computed yet, or failed.
 pub const ABSENT: u8 = 255;
@@ -38,8 +38,9 @@ use Read::{Count, Failure, Number, Regime as Code};
 
 /// All variables. The last one is written last: where its chunk is, all others are.
 #[rustfmt::skip]
-const VARIABLES: [Variable; 24] = [
-    variable("regime", "regime", "1", "regime of the response", Code),
+const VARIABLES: [Variable; 25] = [
+    variable("", "regime", "1", "regime of the response", Code),
+    variable("adaptive", "inferred", "1", "1 if the regime is that of the neighbours, 0 if it was computed", Count(|c| u32::from(c.inferred))),
     variable("regime", "followed", "1", "periods of the base that were simulated", Count(|c| c.point.map_or(0, |p| p.followed as u32))),
     variable("regime", "settling", "1", "periods of the base before the regime began", Number(|c| c.number(|p| p.transient))),
     variable("regime", "impacts_per_period", "1", "impacts per period of the base", Number(|c| c.number(|p| p.impacts_per_period))),
@@ -62,11 +63,16 @@ const VARIABLES: [Variable; 24] = [
     variable("lock", "lock_C", "1", "amplitude of the first harmonic of v over b at the lock", Number(|c| c.lock(|l| l.c))),
     variable("lock", "lock_B", "1", "mean speed of the particle over b omega0 at the lock", Number(|c| c.lock(|l| l.b.unwrap_or(f64::NAN)))),
     variable("lock", "periods_to_lock", "1", "periods from the start to the settled lock", Number(|c| c.lock(|l| l.periods_to_lock))),
-    variable("regime", "failure", "", "why the cell failed; empty if it did not", Failure),
+    variable("", "failure", "", "why the cell failed; empty if it did not", Failure),
 ];
 
-/// The variables of these results.
-pub(crate) fn variables(results: Results) -> impl Iterator<Item = Variable> {
-    let groups = results.names();
-    VARIABLES.into_iter().filter(move |one| groups.contains(&one.group))
+/// The variables of a sweep.
+pub(crate) fn variables(settings: &Settings) -> impl Iterator<Item = Variable> {
+    let groups = if settings.adaptive.is_some() {
+        vec!["adaptive"]
+    } else {
+        settings.results.names()
+    };
+    let stored = move |one: &Variable| one.group.is_empty() || groups.contains(&one.group);
+    VARIABLES.into_iter().filter(stored)
 }

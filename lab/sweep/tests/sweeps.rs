@@ -1,64 +1,17 @@
 //! Sweeps against single cells and the regime map, and what is refused.
 
+mod common;
+
 use std::{
-    collections::BTreeMap,
     fs,
-    path::Path,
     sync::atomic::{AtomicBool, Ordering::Relaxed},
 };
+
+use common::{files, numbers, plan, refused, settings};
 
 use vines_model::map::{LIMIT, Plan as MapPlan};
 use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, estimate, merge, run};
 use vines_testbench::scene::Family;
-
-fn settings(axes: &[&str]) -> Settings {
-    Settings {
-        axes: axes.iter().map(|axis| axis.parse().unwrap()).collect(),
-        periods: 200,
-        chunk: 7,
-        ..Settings::default()
-    }
-}
-
-fn plan(settings: Settings) -> Result<Plan, String> {
-    Plan::new(Family::parse("", None, &[]).unwrap(), settings).map_err(|error| error.to_string())
-}
-
-fn refused(settings: Settings) -> String {
-    plan(settings).unwrap_err()
-}
-
-/// All files of a store.
-fn files(folder: &Path) -> BTreeMap<String, Vec<u8>> {
-    let mut all = BTreeMap::new();
-    let mut folders = vec![folder.to_path_buf()];
-    while let Some(one) = folders.pop() {
-        for entry in fs::read_dir(&one).unwrap().flatten() {
-            let path = entry.path();
-            if path.is_dir() {
-                folders.push(path);
-            } else {
-                let name = path.strip_prefix(folder).unwrap().display().to_string();
-                all.insert(name, fs::read(&path).unwrap());
-            }
-        }
-    }
-    all
-}
-
-/// The numbers of a variable with one chunk.
-fn numbers(folder: &Path, name: &str) -> Vec<f64> {
-    use std::sync::Arc;
-    use zarrs::{array::Array, storage::store::MemoryStore};
-    let memory = MemoryStore::new();
-    for (key, value) in files(&folder.join(name)) {
-        use zarrs::storage::WritableStorageTraits;
-        let key = format!("a/{key}").as_str().try_into().unwrap();
-        memory.set(&key, value.into()).unwrap();
-    }
-    let array = Array::open(Arc::new(memory), "/a").unwrap();
-    array.retrieve_array_subset(&array.subset_all()).unwrap()
-}
 
 #[test]
 fn a_sweep_over_sigma_and_g_has_the_bits_of_the_map() {

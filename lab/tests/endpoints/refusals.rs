@@ -54,6 +54,36 @@ fn nothing_leaves_this_machine_without_permission() {
 }
 
 #[test]
+fn combinations_that_do_not_exist_say_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let [short, key] = ["short", "key"].map(|name| folder.path().join(name).to_str().unwrap().to_owned());
+    std::fs::write(&short, "secret\n").unwrap();
+    std::fs::write(&key, "0123456789abcdef\n").unwrap();
+    let rig = ["rig", "--listen", "127.0.0.1:0"];
+    for (options, code, reason) in [
+        (&["--protocol", "helic", "--lock-step"][..], 2, "its own clock"),
+        (&["--protocol", "helic", "--key", &key], 2, "no authentication"),
+        (&["--key", &short], 2, "16 bytes"),
+        (&["--key", "no-such-file"], 2, "no-such-file"),
+        (&["--rig", "udp://127.0.0.1:1"], 2, "can be served"),
+        (&["--cpu", "5000"], 1, "--cpu 5000"),
+    ] {
+        fails(&[&rig[..], options].concat(), code, reason);
+    }
+    fails(
+        &["identify", "--rig", "helic://127.0.0.1", "--key", &key],
+        2,
+        "no authentication",
+    );
+    fails(&["identify", "--rig", "helic://192.0.2.1"], 2, "--allow-remote");
+    fails(
+        &["identify", "--rig", "helic://127.0.0.1:1"],
+        1,
+        "vines rig --protocol helic",
+    );
+}
+
+#[test]
 fn a_port_in_use_is_named() {
     let taken = std::net::UdpSocket::bind("127.0.0.1:0").unwrap();
     let address = taken.local_addr().unwrap().to_string();

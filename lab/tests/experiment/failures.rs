@@ -2,7 +2,9 @@
 
 use vines::experiment::{self, ExperimentError};
 use vines::net::LinkError;
-use vines::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Fault, Rig, RigError, Sensors, Simulated};
+use vines::rig::{
+    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Fault, Rig, RigError, Sensors, Simulated,
+};
 
 use crate::{plan, scene};
 
@@ -42,6 +44,26 @@ fn noise_is_never_locked_and_ends_the_experiment_with_its_reason() {
         Err(ExperimentError::Tripped { fault: Fault::NoSignal, .. })
     ));
     assert!(samples.len() < 2500, "{}", samples.len());
+}
+
+#[test]
+fn a_sensor_of_two_bits_has_no_phase_rather_than_a_phase_error_of_zero() {
+    let scene = scene(&[
+        "chain.adc_bits=2",
+        "controller.silence_periods='none'",
+        "record.lock_periods=5",
+    ]);
+    let plant = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut rig = Chain::around(
+        Box::new(plant),
+        &scene.chain,
+        &scene.dimensionless(),
+        scene.controller.samples_per_period,
+    );
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let outcome = experiment::run(&mut *rig, &mut controller, &plan(&scene), |_, _, _| {});
+    let message = outcome.unwrap_err().to_string();
+    assert!(message.contains("the phase cannot be measured"), "{message}");
 }
 
 #[test]

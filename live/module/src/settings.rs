@@ -1,7 +1,7 @@
 //! Settings of the page, and the scene that they make.
 
 use lovines::{Parameters, State};
-use vines_testbench::scene::{Backbone, Chain, Controller, Definition, Dimensionless, Record, Scene};
+use vines_testbench::scene::{Backbone, Chain, Controller, Definition, Dimensionless, Names, PhaseLock, Record, Scene};
 
 /// Constants from scenes/paper.toml and live/settings.json: the default scene, and an index for each setting.
 mod generated {
@@ -34,6 +34,9 @@ pub fn default_scene() -> Scene {
         controller: Controller::default(),
         record: Record::default(),
         backbone: Backbone::default(),
+        phase_lock: PhaseLock::default(),
+        rig_names: Names::default(),
+        controller_names: Names::default(),
         chain: Chain::default(),
         resonance: Definition::default(),
     }

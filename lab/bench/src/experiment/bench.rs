@@ -104,7 +104,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> Bench<'a, R, C> {
     pub fn no_lock(&self, command: &Command) -> ExperimentError {
         ExperimentError::NoLock {
             periods: self.periods,
-            phase_error: command.phase_error.to_degrees(),
+            phase_error: command.phase_error.map(f64::to_degrees),
             omega: command.drive.omega,
         }
     }

@@ -29,11 +29,11 @@ pub fn table(samples: &[Sample]) -> String {
             .map_or_else(String::new, |state| (state as u8).to_string());
         let fault = command.fault.map_or(0, |fault| fault as u8);
         let response = sensors.response;
+        let phase_error = command.phase_error.map_or_else(String::new, |error| error.to_string());
         // Writing to a string cannot fail.
         let _ = writeln!(
             text,
-            "{time},{response},{reference},{omega},{amplitude},{},{state},{fault}",
-            command.phase_error
+            "{time},{response},{reference},{omega},{amplitude},{phase_error},{state},{fault}"
         );
     }
     text

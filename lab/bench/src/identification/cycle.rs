@@ -82,7 +82,7 @@ impl Cycle {
             (response[0] * base.conj() * Complex::from_polar(1.0, -target)).arg()
         } else {
             // The controller compensates the delay.
-            mean(|s| s.command.phase_error)
+            mean(|s| s.command.phase_error.unwrap_or(0.0))
         };
         Some(Self {
             commanded: [commanded.harmonic(1), commanded.drift(1)],

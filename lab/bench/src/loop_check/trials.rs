@@ -1,5 +1,6 @@
 //! The check on random rigs, healthy and with random faults.
 
+use phase_lock::Gains;
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, Uniform};
 use serde::Serialize;
@@ -7,7 +8,7 @@ use serde::Serialize;
 use super::{LoopCheck, Verdict, check};
 use crate::faults::{FaultyRig, Kind, Log, Sensor};
 use crate::rig::{Chain, Rig, Simulated};
-use crate::scene::{Scene, SceneError};
+use crate::scene::{Parameters, Scene, SceneError};
 
 /// Outcome of many checks.
 #[derive(Debug, Clone, Default, Serialize)]
@@ -16,6 +17,9 @@ pub struct Trials {
     pub healthy: [usize; 2],
     /// Checks of rigs with a fault, and how many named it.
     pub faulty: [usize; 2],
+    /// Relative errors of the integral gain of the loop and of the response gain of the healthy rigs, and the error of the damping rate
+    /// in standard uncertainties: median and largest of each.
+    pub linear: [[f64; 2]; 3],
     /// The wrong verdicts: expected and given.
     pub wrong: Vec<(Verdict, LoopCheck)>,
 }
@@ -63,7 +67,7 @@ fn fault(random: &mut Random) -> (Verdict, Kind) {
 }
 
 /// A random scene at rest, and a plant whose natural frequency and damping deviate from it by up to 0.5 % and 20 %.
-fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Scene, Box<dyn Rig>), SceneError> {
+fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Scene, Box<dyn Rig>, Parameters), SceneError> {
     let mut scene = scene.clone();
     let (mass, stiffness) = (scene.plant.primary_mass, scene.plant.stiffness);
     let epsilon = random.log(0.001, 0.05);
@@ -75,8 +79,8 @@ fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Scene, Box<dyn
     scene.chain.snr = Some(random.between(30.0, 80.0));
     scene.chain.seed = random.between(0.0, 1e6) as u64;
     scene.chain.delay = random.between(0.0, 4.0) as u32;
-    scene.chain.filter = random.between(8.0, 40.0);
-    scene.chain.adc_bits = random.between(16.0, 25.0) as u32;
+    scene.chain.filter = Some(random.between(8.0, 40.0));
+    scene.chain.adc_bits = Some(random.between(16.0, 25.0) as u32);
     let mut plant = scene.plant;
     plant.stiffness *= random.between(0.99, 1.01);
     plant.damping *= random.between(0.8, 1.2);
@@ -92,7 +96,7 @@ fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Scene, Box<dyn
     );
     let samples = scene.controller.samples_per_period;
     let rig = Chain::around(Box::new(faulty), &scene.chain, &d, samples);
-    Ok((scene, rig))
+    Ok((scene, rig, plant))
 }
 
 /// Checks `count` healthy rigs, and as many with a random fault.
@@ -102,13 +106,14 @@ fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Scene, Box<dyn
 pub fn trials(scene: &Scene, count: usize, seed: u64) -> Result<Trials, SceneError> {
     let mut random = Random(ChaCha8Rng::seed_from_u64(seed));
     let mut trials = Trials::default();
+    let mut errors = [const { Vec::new() }; 3];
     for n in 0..2 * count {
         let (expected, kind) = if n % 2 == 0 {
             (Verdict::Healthy, Kind::None)
         } else {
             fault(&mut random)
         };
-        let (scene, mut rig) = rig(scene, &mut random, kind)?;
+        let (scene, mut rig, plant) = rig(scene, &mut random, kind)?;
         let tally = if n % 2 == 0 {
             &mut trials.healthy
         } else {
@@ -116,10 +121,24 @@ pub fn trials(scene: &Scene, count: usize, seed: u64) -> Result<Trials, SceneErr
         };
         tally[0] += 1;
         match check(&mut *rig, &scene) {
-            Ok(found) if found.verdict == expected => tally[1] += 1,
+            Ok(found) if found.verdict == expected => {
+                tally[1] += 1;
+                if let Some(linear) = found.linear {
+                    let gain = 0.5 * (plant.stiffness / plant.primary_mass).sqrt();
+                    let damping = 0.5 * plant.damping / plant.primary_mass;
+                    let integral = Gains::from_bandwidth(linear.bandwidth, damping).integral;
+                    errors[0].push((linear.gains[1] / integral - 1.0).abs());
+                    errors[1].push((linear.response_gain / gain - 1.0).abs());
+                    errors[2].push((linear.damping_rate - damping).abs() / linear.u_damping_rate);
+                }
+            }
             Ok(found) => trials.wrong.push((expected, found)),
             Err(_) => {}
         }
     }
+    trials.linear = errors.map(|mut errors| {
+        errors.sort_by(f64::total_cmp);
+        [errors.len() / 2, errors.len().saturating_sub(1)].map(|n| errors.get(n).copied().unwrap_or(f64::NAN))
+    });
     Ok(trials)
 }

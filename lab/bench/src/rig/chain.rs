@@ -26,7 +26,8 @@ pub struct Chain {
     rig: Box<dyn Rig>,
     response: Channel,
     base: Option<Channel>,
-    output: Option<Converter>,
+    /// For an output that is held: its converter, unless that is ideal.
+    output: Option<Option<Converter>>,
     normal: NormalDistribution,
     /// Standard deviation of the sampling instants, in samples.
     jitter: f64,
@@ -42,7 +43,7 @@ pub struct Chain {
 struct Channel {
     sensor: Option<Sensor>,
     filter: Option<LowPass>,
-    converter: Converter,
+    converter: Option<Converter>,
 }
 
 impl Channel {
@@ -55,8 +56,13 @@ impl Channel {
             Some(filter) => filter.pass(noisy, elapsed),
             None => noisy,
         };
-        self.converter.convert(filtered)
+        converted(self.converter.as_ref(), filtered)
     }
+}
+
+/// The value behind a converter, if there is one.
+fn converted(converter: Option<&Converter>, value: f64) -> f64 {
+    converter.map_or(value, |converter| converter.convert(value))
 }
 
 impl Chain {
@@ -78,21 +84,38 @@ impl Chain {
             sensor: settings
                 .snr
                 .map(|snr| Sensor::new(snr, settings.snr_of, range, samples_per_period)),
-            filter: (settings.filter > 0.0).then(|| LowPass::new(settings.filter * d.omega0)),
-            converter: Converter::new(settings.adc_bits, range),
+            filter: settings.filter.map(|cut_off| LowPass::new(cut_off * d.omega0)),
+            converter: settings.adc_bits.map(|bits| Converter::new(bits, range)),
         };
         let base_range = d.amplitude(settings.base_range);
         Self {
             rig,
             response: channel(settings.response_range * d.b),
             base: settings.reference.then(|| channel(base_range)),
-            output: settings.hold.then(|| Converter::new(settings.dac_bits, base_range)),
+            output: settings
+                .hold
+                .then(|| settings.dac_bits.map(|bits| Converter::new(bits, base_range))),
             normal: NormalDistribution::new(settings.seed),
             jitter: settings.jitter,
             late: 0.0,
             under_way: vec![Sensors::default(); settings.delay as usize].into(),
             elapsed: 0.0,
         }
+    }
+}
+
+impl Chain {
+    /// Duration of a sample period of `step` seconds, whose end is not where it should be.
+    fn taken(&mut self, step: f64) -> f64 {
+        let late = if self.jitter > 0.0 {
+            self.jitter * self.normal.next().clamp(-JITTER_MAX, JITTER_MAX)
+        } else {
+            0.0
+        };
+        let taken = step * (1.0 + late - self.late);
+        self.late = late;
+        self.elapsed += taken;
+        taken
     }
 }
 
@@ -116,18 +139,17 @@ impl Rig for Chain {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let late = if self.jitter > 0.0 {
-            self.jitter * self.normal.next().clamp(-JITTER_MAX, JITTER_MAX)
-        } else {
-            0.0
-        };
-        let taken = step * (1.0 + late - self.late);
-        self.late = late;
-        self.elapsed += taken;
-        match &self.output {
-            Some(output) => self.rig.hold(output.convert(drive.displacement), taken),
-            None => self.rig.advance(drive, taken),
+        if self.output.is_some() {
+            return self.hold(drive.displacement, step);
         }
+        let taken = self.taken(step);
+        self.rig.advance(drive, taken)
+    }
+
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        let taken = self.taken(step);
+        let output = self.output.as_ref().and_then(Option::as_ref);
+        self.rig.hold(converted(output, displacement), taken)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

@@ -20,7 +20,8 @@ pub enum RigError {
     Refused(#[from] InvalidValue),
     /// The rig cannot be driven by held samples.
     #[error(
-        "the rig accepts frequency and amplitude only, not the samples of the base displacement that chain.hold = true sends"
+        "the rig accepts frequency and amplitude only, not samples of the base displacement: chain.hold = true needs a rig that does, and so \
+         does `vines rig --protocol helic`"
     )]
     NoHold,
 }
@@ -32,7 +33,9 @@ pub enum ControllerError {
     #[error("the controller: {0}")]
     Failed(#[source] Cause),
     /// The controller cannot control the response.
-    #[error("the controller cannot hold the amplitude of the response; use the built-in controller")]
+    #[error(
+        "the controller cannot hold the amplitude of the response; use the built-in controller, PhaseLock.fmu or `vines controller`"
+    )]
     NoResponseLoop,
     /// The controller refused a value.
     #[error("the controller: {0}")]

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Controller, SceneError, validate::Quantity};
+use super::{Controller, SceneError, option::option, validate::Quantity};
 
 /// Reference of a signal-to-noise ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -18,10 +18,12 @@ pub enum RatioOf {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Chain {
-    /// Resolution of the inputs, bits; 0 for an ideal one.
-    pub adc_bits: u32,
-    /// Resolution of the output, bits; 0 for an ideal one. Needs `hold`.
-    pub dac_bits: u32,
+    /// Resolution of the inputs, bits; absent: ideal.
+    #[serde(deserialize_with = "option")]
+    pub adc_bits: Option<u32>,
+    /// Resolution of the output, bits; absent: ideal. Needs `hold`.
+    #[serde(deserialize_with = "option")]
+    pub dac_bits: Option<u32>,
     /// Range of the response channel, ± this value, over b; readings saturate there.
     pub response_range: f64,
     /// Range of the base channel and of the output, ± this value, over `b epsilon`.
@@ -29,13 +31,15 @@ pub struct Chain {
     /// The base follows held samples instead of an oscillator in the rig.
     pub hold: bool,
     /// Signal-to-noise ratio of the sensors, dB; absent: no noise.
+    #[serde(deserialize_with = "option")]
     pub snr: Option<f64>,
     /// Reference of that ratio.
     pub snr_of: RatioOf,
     /// Seed of noise and jitter.
     pub seed: u64,
-    /// Cut-off of the anti-alias filter (Butterworth, second order), in units of omega0; 0 for none.
-    pub filter: f64,
+    /// Cut-off of the anti-alias filter (Butterworth, second order), in units of omega0; absent: no filter.
+    #[serde(deserialize_with = "option")]
+    pub filter: Option<f64>,
     /// Standard deviation of the sampling instants, in samples.
     pub jitter: f64,
     /// Delay from the sensors to the controller, samples.
@@ -49,15 +53,15 @@ pub struct Chain {
 impl Default for Chain {
     fn default() -> Self {
         Self {
-            adc_bits: 0,
-            dac_bits: 0,
+            adc_bits: None,
+            dac_bits: None,
             response_range: 2.0,
             base_range: 4.0,
             hold: false,
             snr: None,
             snr_of: RatioOf::Signal,
             seed: 1,
-            filter: 0.0,
+            filter: None,
             jitter: 0.0,
             delay: 0,
             reference: true,
@@ -81,7 +85,7 @@ impl Chain {
             reference,
             ..
         } = *self;
-        adc_bits > 0 || dac_bits > 0 || hold || snr.is_some() || filter > 0.0 || jitter > 0.0 || delay > 0 || !reference
+        adc_bits.or(dac_bits).is_some() || hold || snr.or(filter).is_some() || jitter > 0.0 || delay > 0 || !reference
     }
 
     /// Delay from the drive to the sensors that the controller compensates, in units of 1/omega0, for samples `step` apart: on
@@ -97,19 +101,20 @@ impl Chain {
 
     /// Phase of the filter at omega0, as a delay in units of 1/omega0.
     fn filter_delay(&self) -> f64 {
-        if self.filter == 0.0 {
-            return 0.0;
-        }
-        let x = 1.0 / self.filter;
-        (std::f64::consts::SQRT_2 * x).atan2(1.0 - x * x)
+        self.filter.map_or(0.0, |cut_off| {
+            let x = 1.0 / cut_off;
+            (std::f64::consts::SQRT_2 * x).atan2(1.0 - x * x)
+        })
     }
 
     pub(super) fn check(&self, controller: &Controller) -> Result<(), SceneError> {
         for (key, bits) in [("chain.adc_bits", self.adc_bits), ("chain.dac_bits", self.dac_bits)] {
-            Quantity::new(key, bits.into(), "bits").check(bits <= 32, "must be from 0 (ideal) to 32")?;
+            let bits = bits.unwrap_or(1);
+            Quantity::new(key, bits.into(), "bits")
+                .check((1..=32).contains(&bits), "must be from 1 to 32, or \"none\"")?;
         }
-        Quantity::new("chain.dac_bits", self.dac_bits.into(), "bits").check(
-            self.dac_bits == 0 || self.hold,
+        Quantity::new("chain.dac_bits", self.dac_bits.unwrap_or(0).into(), "bits").check(
+            self.dac_bits.is_none() || self.hold,
             "needs chain.hold = true: only samples of the drive can be quantised",
         )?;
         Quantity::new("chain.response_range", self.response_range, "(over b)").positive()?;
@@ -118,10 +123,12 @@ impl Chain {
             Quantity::new("chain.snr", snr, "dB").check((-40.0..=300.0).contains(&snr), "must be from -40 to 300")?;
         }
         let nyquist = 0.5 * controller.samples_per_period;
-        Quantity::new("chain.filter", self.filter, "(omega0)").check(
-            self.filter == 0.0 || (2.0..=nyquist).contains(&self.filter),
-            format!("must be 0 (none) or from 2 to {nyquist} (half the sampling frequency)"),
-        )?;
+        if let Some(filter) = self.filter {
+            Quantity::new("chain.filter", filter, "(omega0)").check(
+                (2.0..=nyquist).contains(&filter),
+                format!("must be from 2 to {nyquist} (half the sampling frequency), or \"none\""),
+            )?;
+        }
         Quantity::new("chain.jitter", self.jitter, "samples")
             .check((0.0..=0.1).contains(&self.jitter), "must be from 0 to 0.1")?;
         Quantity::new("chain.delay", self.delay.into(), "samples").check(self.delay <= 1000, "must be from 0 to 1000")

@@ -86,39 +86,39 @@ impl Scene {
         };
         let amplitude_max = d.amplitude(self.g_max());
         let defaults = Config::for_resonance(omega0, self.amplitude);
-        Config {
+        self.phase_lock.apply(Config {
             sample_time: self.sample_time(),
             omega_start: c.omega_start * omega0,
             omega_min: c.omega_min * omega0,
             omega_max: c.omega_max * omega0,
             bandwidth: c.bandwidth * omega0,
-            damping_rate: damping * omega0,
+            damping_rate: Some(damping * omega0).filter(|rate| *rate > 0.0),
             phase_target: self.phase_target().radians(),
             delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0
                 + (c.delay + f64::from(u8::from(self.resonance.is_late()))) * self.sample_time(),
             amplitude_max: Some(amplitude_max),
-            response_max: Some(c.c_max * d.b),
+            response_max: c.c_max.map(|c| c * d.b),
             ramp_rate: match c.ramp_periods {
                 Some(periods) => rate(self.amplitude, periods),
                 // The velocity of a base that moves with the largest amplitude.
                 None => Some(amplitude_max * omega0),
             },
             release_rate: rate(self.amplitude, c.release_periods),
-            omega_rate: Some(match c.omega_rate {
-                Some(rate) => rate * omega0 / period,
+            omega_rate: match c.omega_rate {
+                Some(limit) => limit.map(|rate| rate * omega0 / period),
                 // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
-                None => (c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period),
-            }),
+                None => Some((c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period)),
+            },
             acquire_timeout: Some(self.lock_periods() * period),
-            signal_timeout: Some(c.silence_periods * period),
-            residual_max: Some(c.residual_max.unwrap_or_else(|| self.residual())),
+            signal_timeout: c.silence_periods.map(|periods| periods * period),
+            residual_max: c.residual_max.unwrap_or_else(|| Some(self.residual())),
             reference_connected: self.chain.reference,
             approach_gain,
             capture_response: self.captures().then_some(CAPTURE * d.b),
             captured_max: self.captured_max().map(|c| c * d.b),
             lock: self.lock_criterion(approach_gain),
             ..defaults
-        }
+        })
     }
 
     /// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.

@@ -5,7 +5,11 @@ use std::f64::consts::TAU;
 use phase_lock::Config;
 use serde::{Deserialize, Serialize};
 
-use super::{SceneError, validate::Quantity};
+use super::{
+    SceneError,
+    option::{given, option},
+    validate::Quantity,
+};
 
 /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -37,8 +41,8 @@ pub struct Controller {
     #[serde(rename = "G_max")]
     pub g_max: Option<f64>,
     /// Response above which the drive is shut down, over b.
-    #[serde(rename = "C_max")]
-    pub c_max: f64,
+    #[serde(rename = "C_max", deserialize_with = "option")]
+    pub c_max: Option<f64>,
     /// Duration of the ramp of the drive to its amplitude, and to zero after a fault, natural periods; 0 to jump. By default the
     /// amplitude changes as fast as a base with the largest one moves.
     pub ramp_periods: Option<f64>,
@@ -46,12 +50,15 @@ pub struct Controller {
     pub release_periods: f64,
     /// Largest change of the frequency in a natural period, in units of omega0; by default the distance of the two limits, or
     /// as much in half a time constant of the detector if that is shorter.
-    pub omega_rate: Option<f64>,
+    #[serde(deserialize_with = "given")]
+    pub omega_rate: Option<Option<f64>>,
     /// Longest time without a valid measurement, natural periods.
-    pub silence_periods: f64,
+    #[serde(deserialize_with = "option")]
+    pub silence_periods: Option<f64>,
     /// Largest difference between a reading and its prediction, as a share of the amplitude, beyond twice those of the last periods; by
     /// default 0.3, and for an accelerometer what an impact adds.
-    pub residual_max: Option<f64>,
+    #[serde(deserialize_with = "given")]
+    pub residual_max: Option<Option<f64>>,
     /// How much faster than under a constant drive the response approaches its steady state; by default from the damping.
     pub approach_gain: Option<f64>,
     /// Whether the response first rises until impacts begin; by default where the start is at rest.
@@ -74,11 +81,11 @@ impl Default for Controller {
             amplitude_tolerance: 8e-5,
             dwell_periods: 20,
             g_max: None,
-            c_max: 4.0,
+            c_max: Some(4.0),
             ramp_periods: None,
             release_periods: 0.0,
             omega_rate: None,
-            silence_periods: 20.0,
+            silence_periods: Some(20.0),
             residual_max: None,
             approach_gain: None,
             capture: None,
@@ -169,16 +176,20 @@ impl Controller {
         }
         for (key, value, unit) in [
             ("controller.G_max", self.g_max.unwrap_or(1.0), "(over b epsilon)"),
-            ("controller.C_max", self.c_max, "(over b)"),
+            ("controller.C_max", self.c_max.unwrap_or(1.0), "(over b)"),
             (
                 "controller.omega_rate",
-                self.omega_rate.unwrap_or(1.0),
+                self.omega_rate.flatten().unwrap_or(1.0),
                 "(omega0 per natural period)",
             ),
-            ("controller.silence_periods", self.silence_periods, "(natural periods)"),
+            (
+                "controller.silence_periods",
+                self.silence_periods.unwrap_or(1.0),
+                "(natural periods)",
+            ),
             (
                 "controller.residual_max",
-                self.residual_max.unwrap_or(1.0),
+                self.residual_max.flatten().unwrap_or(1.0),
                 "(of the amplitude)",
             ),
         ] {

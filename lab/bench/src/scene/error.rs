@@ -3,6 +3,7 @@
 use std::path::PathBuf;
 
 use lovines::InvalidValue;
+use phase_lock::Number;
 
 use super::SyntaxError;
 
@@ -37,7 +38,7 @@ pub enum SceneError {
         message: String,
     },
     /// A number outside its range.
-    #[error("{key} = {value} {unit}: {allowed}")]
+    #[error("{key} = {} {unit}: {allowed}", Number(*value))]
     Value {
         /// Dotted key.
         key: &'static str,

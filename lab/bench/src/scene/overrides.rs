@@ -90,7 +90,10 @@ impl Override {
                 section.remove(other);
             }
         }
-        section.insert(self.key.clone(), self.value.clone());
+        match (section.get_mut(&self.key), &self.value) {
+            (Some(Value::Table(group)), Value::Table(set)) => group.extend(set.clone()),
+            _ => _ = section.insert(self.key.clone(), self.value.clone()),
+        }
         Ok(())
     }
 }

@@ -22,8 +22,9 @@ pub struct Record {
     pub lock_periods: Option<f64>,
     /// How long the settled lock is held and measured, natural periods.
     pub hold_periods: f64,
-    /// Length of the recorded decay, natural periods; 0: until the loss of synchrony that theory expects, and a quarter more.
-    pub decay_periods: f64,
+    /// Length of the recorded decay, natural periods; by default until the loss of synchrony that theory expects,
+    /// and a quarter more.
+    pub decay_periods: Option<f64>,
     /// Window of the fit along the decay, periods of the motion.
     pub window_periods: f64,
     /// How frequency and amplitude along the decay are estimated.
@@ -35,7 +36,7 @@ impl Default for Record {
         Self {
             lock_periods: None,
             hold_periods: 20.0,
-            decay_periods: 0.0,
+            decay_periods: None,
             window_periods: 2.5,
             estimator: Estimator::Fit,
         }
@@ -54,17 +55,16 @@ impl Record {
             (3.0..=1e6).contains(&self.hold_periods),
             "must be from 3 (to count impacts and measure) to 1000000",
         )?;
-        Quantity::new("record.decay_periods", self.decay_periods, unit).not_negative()?;
-        let longest = if self.decay_periods > 0.0 {
-            self.decay_periods
-        } else {
-            1000.0
-        };
+        if let Some(decay_periods) = self.decay_periods {
+            Quantity::new("record.decay_periods", decay_periods, unit).positive()?;
+        }
+        let longest = self.decay_periods.unwrap_or(1000.0);
         Quantity::new("record.window_periods", self.window_periods, "(periods)").check(
             (0.5..=longest).contains(&self.window_periods),
             format!("must be from 0.5 to {longest} (decay_periods, or 1000)"),
         )?;
-        let samples = controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods);
+        let samples =
+            controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods.unwrap_or(0.0));
         Quantity::new("samples_per_period times all periods of [record]", samples, "samples")
             .check(samples <= MOST_SAMPLES, "must be at most 20 million")
     }

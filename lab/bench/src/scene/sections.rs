@@ -4,7 +4,7 @@ use lovines::Parameters;
 use serde::Deserialize;
 
 use super::{
-    Backbone, Chain, Controller, Definition, Dimensionless, Record, Reference, Scene, SceneError,
+    Backbone, Chain, Controller, Definition, Dimensionless, Names, PhaseLock, Record, Reference, Scene, SceneError,
     plant::{PlantSection, StartSection},
     validate::Quantity,
 };
@@ -17,10 +17,20 @@ pub(super) struct Sections {
     start: StartSection,
     excitation: Excitation,
     controller: Controller,
+    phase_lock: PhaseLock,
     record: Record,
     backbone: Backbone,
     chain: Chain,
     resonance: Definition,
+    rig: RigSection,
+    controller_names: Names,
+}
+
+/// A rig other than the simulated one.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RigSection {
+    names: Names,
 }
 
 /// The base amplitude; exactly one of the two keys is given.
@@ -64,6 +74,7 @@ impl Sections {
             "start" => self.start = StartSection::deserialize(table)?,
             "excitation" => self.excitation = Excitation::deserialize(table)?,
             "controller" => self.controller = Controller::deserialize(table)?,
+            "phase_lock" => self.phase_lock = PhaseLock::deserialize(table)?,
             "record" => self.record = Record::deserialize(table)?,
             "backbone" => self.backbone = Backbone::deserialize(table)?,
             "chain" => self.chain = Chain::deserialize(table)?,
@@ -79,10 +90,13 @@ impl Sections {
             amplitude: self.excitation.resolve(origin, &plant)?,
             plant,
             controller: self.controller,
+            phase_lock: self.phase_lock,
             record: self.record,
             backbone: self.backbone,
             chain: self.chain,
             resonance: self.resonance,
+            rig_names: self.rig.names,
+            controller_names: self.controller_names,
         };
         scene.controller.check()?;
         let needed = scene.impact_drive();

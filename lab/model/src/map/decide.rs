@@ -4,19 +4,27 @@ use std::f64::consts::PI;
 
 use super::run::{Point, Run};
 use crate::numerics::{mean, standard_deviation};
-use crate::orbit::stable_near;
+use crate::orbit::{Periodic, periodic_near};
 use crate::regime::{Regime, synchrony};
 
 /// Longest repetition in the search, half periods of the base.
 const LONGEST: usize = 192;
 /// Smallest number of half periods over which a motion repeats itself.
 const REPEATED: usize = 64;
+/// Among so many of the last impacts, the strongest is looked for in the past; another one is similar within this, in half periods
+/// and over b omega0.
+const RECENT: usize = 8;
+const SIMILAR: f64 = 0.05;
 /// Largest difference of states that repeat: far above rounding, far below what separates two motions.
 const SAME: f64 = 1e-6;
-/// Below this, differences are rounding errors, which need not shrink.
-const ROUNDING: f64 = 1e-11;
+/// Below this, differences need not shrink: they are rounding errors, or what is left out of a chatter that ends.
+const ROUNDING: f64 = 1e-8;
 /// Differences below which a stable periodic motion is searched for.
-const SETTLING: f64 = 1e-3;
+const SETTLING: f64 = 1e-2;
+/// The same for a decision before the limit that another motion than a 1:1 one is periodic: chaos stays close to one for a while.
+const SEVERAL: f64 = 5e-4;
+/// Slowest approach to it, per period, that decides before the limit: a slower one is close to a bifurcation.
+const SLOW: f64 = 0.004;
 /// A transient ends where the state is this close to that one repetition before.
 const TRANSIENT: f64 = 1e-2;
 /// Share of a motion without repetition that is left out of the averages, and number of blocks that the rest is cut into.
@@ -33,7 +41,7 @@ impl Run {
     /// What is common to all regimes, over the half periods from `from` on.
     fn point(&self, regime: Regime, from: usize) -> Point {
         let periods = 0.5 * (self.halves() - from) as f64;
-        let [[before, rested], [all, rests]] = [self.counts[from], self.counts[self.halves()]];
+        let [[before, rested], [all, rests]] = [self.counts(from), self.counts(self.halves())];
         Point {
             regime,
             followed: self.halves() / 2,
@@ -46,14 +54,14 @@ impl Run {
             impacts: 0,
             periods: 0,
             sticks_per_period: (rests - rested) as f64 / periods,
-            state: self.states[self.halves()],
+            state: self.state(self.halves()),
         }
     }
 
     /// The particle rests, and the primary mass cannot reach it: the free part of its motion only decays.
     pub(super) fn without_impacts(&self) -> Option<Point> {
         let n = self.halves();
-        let [q1, dq1, q2, dq2] = self.states[n];
+        let [q1, dq1, q2, dq2] = self.state(n);
         let reach = self.driven.reach(PI * n as f64, [q1, dq1]);
         (dq2 == 0.0 && reach + q2.abs() < 1.0).then(|| {
             let last = self.impacts.last().map_or(0.0, |one| one.time / PI);
@@ -64,11 +72,10 @@ impl Run {
     /// Distance between the state at half period `n` and that `count` half periods earlier, or its mirror image.
     fn distance(&self, n: usize, count: usize) -> f64 {
         let sign = if count % 2 == 1 { -1.0 } else { 1.0 };
-        let (now, then) = (&self.states[n], &self.states[n - count]);
-        now.iter()
-            .zip(then)
-            .map(|(a, b)| (sign * a - b).abs())
-            .fold(0.0, f64::max)
+        let (now, then) = (self.state(n), self.state(n - count));
+        let apart = now.iter().zip(then).map(|(a, b)| (sign * a - b).abs());
+        // Nothing is near what cannot be computed: the steady response at an undamped resonance.
+        apart.fold(0.0, |most, one| if one <= most { most } else { one })
     }
 
     /// The largest differences between states and those `count` half periods before, in the first and the second half of the last
@@ -76,34 +83,68 @@ impl Run {
     fn differences(&self, count: usize, bound: f64) -> Option<[f64; 2]> {
         let n = self.halves();
         let span = (2 * count).max(REPEATED).min(n - count);
-        let largest = |from: usize, to: usize| (from..=to).map(|one| self.distance(one, count)).fold(0.0, f64::max);
-        let close = self.distance(n, count) < bound && largest(n - span, n) < bound;
-        close.then(|| [largest(n - span, n - span / 2), largest(n - span / 2, n)])
+        // From the ends: most motions that do not repeat themselves are far off there.
+        let close = |one: &usize| Some(self.distance(*one, count)).filter(|apart| *apart < bound);
+        [n, n - span].iter().all(|one| close(one).is_some()).then_some(())?;
+        let largest = |from: usize, to: usize| (from..=to).try_fold(0.0, |most: f64, one| Some(most.max(close(&one)?)));
+        Some([largest(n - span, n - span / 2)?, largest(n - span / 2, n)?])
     }
 
-    fn counts(&self) -> std::ops::RangeInclusive<usize> {
-        1..=LONGEST.min(self.halves() / 4)
+    /// Numbers of half periods after which the motion may repeat itself: the strongest of the last impacts came at the same phase with
+    /// about the same velocity.
+    fn repetitions(&self) -> impl Iterator<Item = usize> {
+        let most = LONGEST.min(self.halves() / 4);
+        let recent = &self.impacts[self.impacts.len().saturating_sub(RECENT)..];
+        let last = recent
+            .iter()
+            .copied()
+            .max_by(|one, other| one.velocity.abs().total_cmp(&other.velocity.abs()));
+        let earlier = last
+            .into_iter()
+            .flat_map(move |last| self.impacts.iter().rev().map(move |one| (last, one)));
+        let mut found = 0;
+        earlier
+            .map(|(last, one)| ((last.time - one.time) / PI, last.velocity, one.velocity))
+            .take_while(move |(apart, ..)| *apart < most as f64 + 0.5)
+            .filter_map(move |(apart, now, then)| {
+                let count = apart.round().max(0.0) as usize;
+                let sign = if count % 2 == 1 { -1.0 } else { 1.0 };
+                let close = (apart - apart.round()).abs() < SIMILAR && (sign * now - then).abs() < SIMILAR;
+                let new = close && count > found && count <= most;
+                new.then(|| {
+                    found = count;
+                    count
+                })
+            })
+    }
+
+    /// An exact periodic motion close to the present state.
+    fn periodic(&self) -> Option<Periodic> {
+        periodic_near(&self.scene, self.sigma, 0.0, self.state(self.halves()))
     }
 
     /// Repetitions approach each other, and there is a stable periodic motion close by: its multipliers decide.
-    pub(super) fn settling(&self) -> Option<Point> {
+    pub(super) fn settling(&self, early: bool) -> Option<Point> {
         let n = self.halves();
         let approach = |count| {
             self.differences(count, SETTLING)
                 .is_some_and(|[first, second]| second <= first.max(ROUNDING))
         };
-        self.counts().find(|count| approach(*count))?;
-        let motion = stable_near(&self.scene, self.sigma, PI * (n % 2) as f64, self.states[n])?;
+        self.repetitions().find(|count| approach(*count))?;
+        let motion = self.periodic().filter(|motion| motion.stable)?;
         let pattern = &motion.pattern;
+        let exponent = 2.0 * motion.moduli()[3].ln() / f64::from(pattern.half_periods);
         let regime = match (pattern.impacts(), pattern.periods(), pattern.mirrored) {
             (2, 1, true) => Regime::Symmetric,
             (2, 1, false) if pattern.walls[0] != pattern.walls[1] => Regime::Asymmetric,
             _ => Regime::Several,
         };
         let count = pattern.half_periods as usize;
-        Some(Point {
-            recurrence: Some(self.distance(n, count)),
-            exponent: Some(2.0 * motion.moduli()[3].ln() / count as f64),
+        let recurrence = self.distance(n, count);
+        let surely = exponent < -SLOW && (regime != Regime::Several || recurrence < SEVERAL);
+        (surely || !early).then(|| Point {
+            recurrence: Some(recurrence),
+            exponent: Some(exponent),
             exponent_error: Some(0.0),
             impacts: pattern.impacts(),
             periods: pattern.periods(),
@@ -112,14 +153,16 @@ impl Run {
     }
 
     /// The motion repeats itself after the same number of half periods again and again, and the differences do not grow. This finds
-    /// what has no exact orbit, patterns with sticking or very many impacts, and what Newton's method misses close to a bifurcation.
-    pub(super) fn repeating(&self) -> Option<Point> {
+    /// what has no exact orbit, patterns with sticking or very many impacts, and what Newton's method misses close to a bifurcation. Near
+    /// an unstable exact orbit, a motion may repeat itself for more than a thousand periods.
+    pub(super) fn repeating(&self, early: bool) -> Option<Point> {
         let n = self.halves();
         let (count, [first, second]) = self
-            .counts()
+            .repetitions()
             .find_map(|count| Some((count, self.differences(count, SAME)?)))?;
-        let impacts = self.counts[n][0] - self.counts[n - count][0];
-        if impacts == 0 || second > first.max(ROUNDING) {
+        let impacts = self.counts(n)[0] - self.counts(n - count)[0];
+        let other = || self.periodic().is_some_and(|motion| early || !motion.stable);
+        if impacts == 0 || second > first.max(ROUNDING) || other() {
             return None;
         }
         // A repetition of an odd number of half periods is followed by its mirror image.
@@ -151,13 +194,13 @@ impl Run {
         }
     }
 
-    /// Largest Lyapunov exponent per period over the half periods from `from` on, and its standard error from the scatter of blocks.
+    /// Largest Lyapunov exponent per period over the periods from `from` on, and its standard error from the scatter of blocks.
     pub(super) fn exponent(&self, from: usize) -> (f64, f64) {
         let growth = &self.growth[from..];
         let length = (growth.len() / BLOCKS).max(1);
         let blocks: Vec<f64> = growth
             .chunks_exact(length)
-            .map(|block| 2.0 * mean(block.iter().copied()))
+            .map(|block| mean(block.iter().copied()))
             .collect();
         (
             mean(blocks.iter().copied()),
@@ -169,7 +212,7 @@ impl Run {
     pub(super) fn irregular(&self) -> Point {
         let n = self.halves();
         let from = (LEFT_OUT * n as f64) as usize;
-        let (exponent, error) = self.exponent(from);
+        let (exponent, error) = self.exponent(from / 2);
         // The uncertainty; a growth that is only linear in time, as on a torus, gives the first number.
         let linear = 2.0 * (0.5 * n as f64).ln() / (0.5 * n as f64);
         let zero = linear.max(SIGNIFICANT * error);

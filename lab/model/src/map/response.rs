@@ -38,9 +38,8 @@ impl Run {
         let periods = unit * AVERAGED.div_ceil(unit);
         let plant = &mut self.plant;
         let (omega, e) = (self.drive.omega, self.drive.amplitude);
-        let (damping, start) = (plant.parameters().damping, 0.5 * self.growth.len() as f64);
-        // The phase of the base is counted from the start of the run; a half period more turns it by pi.
-        let phase = |n: usize| 2.0 * PI * (n as f64 / STEPS as f64 + start.fract());
+        let damping = plant.parameters().damping;
+        let phase = |n: usize| 2.0 * PI * n as f64 / STEPS as f64;
         let energy = |plant: &lovines::Plant, n: usize| plant.energy(e * phase(n).sin());
         let before = (energy(plant, 0), plant.totals().dissipated, plant.state().q1);
         let count = periods * STEPS;

@@ -1,13 +1,14 @@
 //! One point of the map: a plant is driven until its regime is decided.
 
-use std::f64::consts::PI;
+use std::cell::OnceCell;
+use std::f64::consts::{PI, TAU};
 
 use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
 
 use super::response::Response;
 use crate::Dimensionless;
-use crate::orbit::{Driven, Tangent};
+use crate::orbit::{Driven, Moment};
 use crate::regime::{Impact, Regime};
 
 /// Result at one point.
@@ -41,8 +42,8 @@ pub struct Point {
 }
 
 /// Periods after which the motion is examined for the first time; from then on whenever their number has grown by [`LATER`].
-const FIRST: usize = 64;
-const LATER: f64 = 1.3;
+const FIRST: usize = 32;
+const LATER: f64 = 1.15;
 /// Periods over which the exponent of a repeating motion is measured.
 const EXPONENT: usize = 256;
 
@@ -56,7 +57,20 @@ const CONTINUED: usize = 4;
 /// # Errors
 /// Invalid parameters or an invalid start.
 pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize) -> Result<Point, InvalidValue> {
-    Run::new(scene, sigma, start)?.decided(limit)
+    Run::new(scene, sigma, start)?.decided(0, limit)
+}
+
+/// As [`observe`], but every motion is followed for `limit` periods before it is examined: what early decisions are compared with.
+///
+/// # Errors
+/// As [`observe`].
+pub fn observe_in_full(
+    scene: &Dimensionless,
+    sigma: f64,
+    start: [f64; 4],
+    limit: usize,
+) -> Result<Point, InvalidValue> {
+    Run::new(scene, sigma, start)?.decided(limit, limit)
 }
 
 /// As [`observe`], with the response of the motion found.
@@ -70,25 +84,33 @@ pub fn observe_response(
     limit: usize,
 ) -> Result<(Point, Response), InvalidValue> {
     let mut run = Run::new(scene, sigma, start)?;
-    let point = run.decided(limit)?;
+    let point = run.decided(0, limit)?;
     Ok((point, run.response(&point)?))
 }
 
-/// A simulated motion, half period by half period.
+/// Number of periods at the next examination.
+fn later(periods: usize, last: usize) -> usize {
+    ((periods as f64 * LATER) as usize).min(last)
+}
+
+/// A simulated motion.
 pub(super) struct Run {
     pub(super) scene: Dimensionless,
     pub(super) sigma: f64,
     pub(super) plant: Plant,
     pub(super) drive: Drive,
     pub(super) driven: Driven,
-    tangent: Tangent,
-    /// States at the beginning of every half period and now.
-    pub(super) states: Vec<[f64; 4]>,
-    /// Growth of a disturbance over each, as a natural logarithm.
+    /// Periods so far.
+    periods: usize,
+    /// The motion after every event.
+    moments: Vec<Moment>,
+    /// States at the beginning of every half period and now, as far as they were needed.
+    states: Vec<OnceCell<[f64; 4]>>,
+    /// Growth of a disturbance over each period, as a natural logarithm; a period without impacts may belong to the next one.
     pub(super) growth: Vec<f64>,
-    /// Number of impacts until the end of each, and of times that the particle came to rest.
-    pub(super) counts: Vec<[usize; 2]>,
     pub(super) impacts: Vec<Impact>,
+    /// Phases of the base at which the particle came to rest, rad.
+    sticks: Vec<f64>,
 }
 
 impl Run {
@@ -100,28 +122,34 @@ impl Run {
             plant: scene.plant(start)?,
             drive,
             driven: Driven::new(scene, drive.omega),
-            tangent: Tangent::new(scene),
-            states: vec![start],
+            periods: 0,
+            moments: Vec::new(),
+            states: vec![OnceCell::from(start)],
             growth: Vec::new(),
-            counts: vec![[0, 0]],
             impacts: Vec::new(),
+            sticks: Vec::new(),
         })
     }
 
-    /// Follows the motion until its regime is decided.
-    fn decided(&mut self, limit: usize) -> Result<Point, InvalidValue> {
+    /// Follows the motion until its regime is decided; it is not examined before `first` periods.
+    fn decided(&mut self, first: usize, limit: usize) -> Result<Point, InvalidValue> {
         let mut next = FIRST.min(limit);
         loop {
             self.follow(next)?;
-            if let Some(point) = self.without_impacts().or_else(|| self.settling()) {
+            if next < first.min(limit) {
+                next = later(next, limit);
+                continue;
+            }
+            let early = next < limit;
+            if let Some(point) = self.without_impacts().or_else(|| self.settling(early)) {
                 return Ok(point);
             }
-            if self.repeating().is_some() {
+            if self.repeating(early).is_some() {
                 // Near an unstable motion, recurrence lasts a while: it must last longer, and disturbances must shrink.
-                let settled = self.halves();
-                self.follow(settled / 2 + EXPONENT)?;
+                let settled = self.periods;
+                self.follow(settled + EXPONENT)?;
                 let (exponent, error) = self.exponent(settled);
-                if let Some(point) = self.repeating().filter(|_| exponent < 0.0) {
+                if let Some(point) = self.repeating(early).filter(|_| exponent < 0.0) {
                     return Ok(Point {
                         exponent: Some(exponent),
                         exponent_error: Some(error),
@@ -135,46 +163,64 @@ impl Run {
                     return Ok(point);
                 }
             }
-            let last = if next < limit { limit } else { CONTINUED * limit };
-            next = ((next as f64 * LATER) as usize).min(last);
+            next = later(next, if early { limit } else { CONTINUED * limit });
         }
     }
 
     /// Half periods so far.
     pub(super) fn halves(&self) -> usize {
-        self.growth.len()
+        2 * self.periods
     }
 
+    /// (q1, q1', q2, q2') at the beginning of half period `n`.
+    pub(super) fn state(&self, n: usize) -> [f64; 4] {
+        *self.states[n].get_or_init(|| {
+            let phase = PI * n as f64;
+            let after = self.moments.partition_point(|one| one.phase <= phase);
+            self.driven.state(&self.moments[after - 1], phase)
+        })
+    }
+
+    /// Number of impacts before half period `n`, and of times that the particle came to rest.
+    pub(super) fn counts(&self, n: usize) -> [usize; 2] {
+        let phase = PI * n as f64;
+        [
+            self.impacts.partition_point(|one| one.time < phase),
+            self.sticks.partition_point(|one| *one < phase),
+        ]
+    }
+
+    /// Follows the motion to the end of so many periods, in one step of the plant.
     pub(super) fn follow(&mut self, periods: usize) -> Result<(), InvalidValue> {
-        let step = PI / self.drive.omega;
-        while self.halves() < 2 * periods {
-            let n = self.halves();
-            let [q1, dq1, ..] = self.states[n];
-            let mut sticks = self.counts[n][1];
-            let (driven, tangent, impacts, omega) =
-                (&self.driven, &mut self.tangent, &mut self.impacts, self.drive.omega);
-            let mut flight = driven.from(PI * n as f64, [q1, dq1], self.plant.contact().is_some());
-            self.plant.advance_with(self.drive, step, |event| match event {
-                Event::Impact { t, velocity, .. } => {
-                    let acceleration = flight.impact(t, velocity);
-                    tangent.impact(t, velocity, acceleration);
-                    impacts.push(Impact { time: PI * n as f64 + omega * t, velocity });
-                }
-                Event::Stuck { t, .. } => {
-                    flight.stick(t);
-                    tangent.stick(t);
-                    sticks += 1;
-                }
-                Event::Released { t, .. } => {
-                    flight.release(t);
-                    tangent.release(t);
-                }
-            })?;
-            self.growth.push(tangent.end(step));
-            self.counts.push([self.impacts.len(), sticks]);
-            let State { q1, dq1, q2, dq2 } = self.plant.state();
-            self.states.push([q1, dq1, q2, dq2]);
+        if periods <= self.periods {
+            return Ok(());
         }
+        let (start, end) = (TAU * self.periods as f64, TAU * periods as f64);
+        let omega = self.drive.omega;
+        self.growth.resize(periods, 0.0);
+        let Self { driven, moments, growth, impacts, sticks, .. } = self;
+        moments.push(driven.begin(start, self.plant.state(), self.plant.contact()));
+        let mut period = self.periods;
+        self.plant.advance_with(self.drive, (end - start) / omega, |event| {
+            let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) = event;
+            let phase = start + omega * t;
+            let now = ((phase / TAU) as usize).min(periods - 1);
+            if now > period {
+                growth[period] = driven.growth(phase);
+                period = now;
+            }
+            moments.push(driven.pass(phase, &event));
+            match event {
+                Event::Impact { velocity, .. } => impacts.push(Impact { time: phase, velocity }),
+                Event::Stuck { .. } => sticks.push(phase),
+                Event::Released { .. } => {}
+            }
+        })?;
+        growth[period] = driven.growth(end);
+        let State { q1, dq1, q2, dq2 } = self.plant.state();
+        self.periods = periods;
+        self.states.resize_with(2 * periods, OnceCell::new);
+        self.states.push(OnceCell::from([q1, dq1, q2, dq2]));
         Ok(())
     }
 }

@@ -15,9 +15,11 @@ use super::{
 use crate::Dimensionless;
 
 /// States after one repetition that are closer than this belong to a motion that settles, if there is a stable one near.
-const NEAR: f64 = 1e-3;
+const NEAR: f64 = 1e-2;
 /// The same for an exact motion.
 const EXACT: f64 = 1e-8;
+/// Patterns that are tried, from the shortest: after a period doubling, only the second is stable.
+const MULTIPLES: usize = 3;
 /// Longest pattern in the search, impacts.
 const LONGEST: usize = 48;
 
@@ -38,39 +40,47 @@ pub fn settle(
         plant.advance(drive, TAU / drive.omega)?;
     }
     let State { q1, dq1, q2, dq2 } = plant.state();
-    Ok(stable_near(scene, sigma, 0.0, [q1, dq1, q2, dq2]))
+    Ok(periodic_near(scene, sigma, 0.0, [q1, dq1, q2, dq2]).filter(|motion| motion.stable))
 }
 
-/// The stable periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at a phase of the base, rad.
+/// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at a phase of the base, rad; a
+/// stable one rather than an unstable one.
 #[must_use]
-pub fn stable_near(scene: &Dimensionless, sigma: f64, phase: f64, state: [f64; 4]) -> Option<Periodic> {
+pub fn periodic_near(scene: &Dimensionless, sigma: f64, phase: f64, state: [f64; 4]) -> Option<Periodic> {
     let map = ImpactMap::new(scene, 1.0 + scene.epsilon * sigma, scene.g);
     let first = map.first(phase, state)?;
-    let bounces: Vec<Bounce> = std::iter::successors(Some(first), |from| map.next(from))
-        .take(2 * LONGEST)
-        .collect();
     let Bounce { phase, q1, dq1, dq2, .. } = first;
     let guess = Unknowns::from([phase, q1, dq1, dq2, sigma, scene.g]);
     let conditions = [Condition::Sigma(sigma), Condition::Excitation(scene.g)];
-    let found = patterns(&bounces, NEAR).find_map(|pattern| {
+    let mut unstable = None;
+    let found = patterns(&map, first, NEAR).take(MULTIPLES).find_map(|pattern| {
         let found = Periodic::find(scene, &pattern, &guess, conditions)?;
-        let close = (found.unknowns() - guess).norm() < 100.0 * NEAR;
-        (found.stable && close).then_some(found)
-    })?;
+        let close = (found.unknowns() - guess).norm() < 10.0 * NEAR;
+        if close && !found.stable {
+            unstable.get_or_insert(found);
+            return None;
+        }
+        close.then_some(found)
+    });
+    let Some(found) = found else {
+        return unstable;
+    };
     // The pattern may be a multiple of that of the motion: near a period doubling the motion settles slowly, in alternation.
-    let exact: Vec<Bounce> = std::iter::successors(Some(found.bounces[0]), |from| map.next(from))
-        .take(1 + found.bounces.len())
-        .collect();
-    let shortest = patterns(&exact, EXACT).next()?;
-    Periodic::find(scene, &shortest, &found.unknowns(), conditions)
+    let shortest = patterns(&map, found.bounces[0], EXACT)
+        .take_while(|one| one.walls.len() < found.bounces.len())
+        .next();
+    match shortest {
+        Some(pattern) => Periodic::find(scene, &pattern, &found.unknowns(), conditions),
+        None => Some(found),
+    }
 }
 
-/// The patterns that the bounces repeat, from the shortest.
-fn patterns(bounces: &[Bounce], tolerance: f64) -> impl Iterator<Item = ImpactPattern> {
-    let first = bounces[0];
+/// The patterns that the bounces from `first` on repeat, from the shortest.
+fn patterns(map: &ImpactMap, first: Bounce, tolerance: f64) -> impl Iterator<Item = ImpactPattern> {
     let half = std::f64::consts::PI;
-    (1..=LONGEST.min(bounces.len() - 1)).filter_map(move |n| {
-        let then = &bounces[n];
+    let mut walls = vec![first.wall];
+    let following = std::iter::successors(map.next(&first), |from| map.next(from));
+    following.take(LONGEST).filter_map(move |then| {
         let half_periods = ((then.phase - first.phase) / half).round();
         let mirrored = half_periods % 2.0 == 1.0;
         let sign = if mirrored { -1.0 } else { 1.0 };
@@ -82,10 +92,12 @@ fn patterns(bounces: &[Bounce], tolerance: f64) -> impl Iterator<Item = ImpactPa
             sign * then.wall - first.wall,
         ];
         let same = half_periods > 0.0 && apart.iter().all(|one| one.abs() < tolerance);
-        same.then(|| ImpactPattern {
-            walls: bounces[..n].iter().map(|one| one.wall).collect(),
+        let pattern = same.then(|| ImpactPattern {
+            walls: walls.clone(),
             half_periods: half_periods as u32,
             mirrored,
-        })
+        });
+        walls.push(then.wall);
+        pattern
     })
 }

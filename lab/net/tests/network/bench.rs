@@ -153,6 +153,11 @@ impl Rig for Spy {
         self.0.advance(drive, step)
     }
 
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        self.1.lock().unwrap().push(Drive { displacement, ..Drive::default() });
+        self.0.hold(displacement, step)
+    }
+
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         self.0.ground_truth()
     }

@@ -5,7 +5,8 @@ use std::thread::sleep;
 use std::time::Duration;
 
 use vines_net::{Ended, LinkError, NetController};
-use vines_testbench::rig::{Command, Controller, ControllerError, Sensors};
+use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Move, Rig, Sensors, Simulated};
+use vines_testbench::scene::Scene;
 
 use crate::bench::{drive, scene, serve_controller, socket};
 
@@ -79,7 +80,7 @@ struct Broken;
 
 impl Controller for Broken {
     fn sample(&mut self, _: Sensors, _: bool) -> Result<Command, ControllerError> {
-        Ok(Command { phase_error: f64::NAN, ..Command::default() })
+        Ok(Command { phase_error: Some(f64::NAN), ..Command::default() })
     }
 }
 
@@ -103,4 +104,50 @@ fn a_client_that_was_silent_for_too_long_gets_no_drive() {
     let Some(LinkError::ShutDown { .. }) = error.cause::<LinkError>() else {
         panic!("{error}");
     };
+}
+
+/// Drives the plant with a controller, moves the response at half the samples, and returns the commands.
+fn moved(scene: &Scene, controller: &mut dyn Controller, samples: usize) -> Vec<Command> {
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut commands = Vec::new();
+    for n in 0..samples {
+        if n == samples / 2 {
+            let to = Move {
+                response: 0.6 * scene.plant.half_width,
+                duration: 2.0,
+                amplitude: -1e-6,
+                omega: 0.01,
+            };
+            controller.hold_response(to, -1.5).unwrap();
+        }
+        let command = controller.sample(rig.sense().unwrap(), true).unwrap();
+        rig.advance(command.drive, scene.sample_time()).unwrap();
+        commands.push(command);
+    }
+    commands
+}
+
+#[test]
+fn the_response_is_controlled_across_the_network_with_the_same_bits() {
+    let scene = scene(&["phase_lock.harmonics=4", "phase_lock.base_bandwidth=0.5"]);
+    let config = scene.controller_config();
+    let server = serve_controller(&scene, PATIENT, move || Box::new(BuiltIn::new(&config).unwrap()));
+    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None).unwrap();
+    let far = moved(&scene, &mut peer, 4000);
+    let near = moved(&scene, &mut BuiltIn::new(&config).unwrap(), 4000);
+    assert_eq!(far, near);
+    // The move did something.
+    assert!(far[3999].drive.amplitude != far[1999].drive.amplitude);
+}
+
+#[test]
+fn a_move_that_the_controller_cannot_make_ends_the_session_with_the_reason() {
+    let scene = scene(&[]);
+    let config = scene.controller_config();
+    let server = serve_controller(&scene, PATIENT, move || Box::new(BuiltIn::new(&config).unwrap()));
+    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None).unwrap();
+    peer.sample(reading(0), false).unwrap();
+    peer.hold_response(Move::default(), 0.0).unwrap();
+    let error = peer.sample(reading(1), false).unwrap_err();
+    assert!(error.to_string().contains("the loop must be closed"), "{error}");
 }

@@ -4,7 +4,7 @@ use std::time::{Duration, Instant};
 
 use vines_net::{Ended, LinkError, NetController, NetRig, RAMP_SAMPLES, Refusal};
 use vines_testbench::experiment::{self, Plan, Record};
-use vines_testbench::rig::{BuiltIn, Controller, Drive, Rig, RigError, Simulated};
+use vines_testbench::rig::{BuiltIn, Chain, Controller, Drive, Rig, RigError, Simulated};
 use vines_testbench::scene::Scene;
 
 use crate::bench::{controller, drive, lock_step_rig, scene, shake, socket};
@@ -34,6 +34,32 @@ fn an_experiment_across_the_network_gives_the_same_bits() {
         assert_eq!(session[0].ended, Ended::Farewell);
         assert_eq!(session[0].samples, direct.samples.len() as u64);
     }
+}
+
+#[test]
+fn held_samples_cross_the_network_with_the_same_bits_and_ramp_to_zero() {
+    let scene = scene(&["chain.hold=true", "chain.dac_bits=12", "record.decay_periods=150"]);
+    let chain = |rig: Box<dyn Rig>| Chain::around(rig, &scene.chain, &scene.dimensionless(), 100.0);
+    let controller = || BuiltIn::new(&scene.controller_config()).unwrap();
+    let plant = Simulated::new(scene.plant, scene.start).unwrap();
+    let direct = measure(&scene, chain(Box::new(plant)).as_mut(), &mut controller());
+    let (server, log) = lock_step_rig(&scene, 5.0);
+    let rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    assert_eq!(
+        measure(&scene, chain(Box::new(rig)).as_mut(), &mut controller()),
+        direct
+    );
+    server.sessions(1);
+    let mut rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    rig.sense().unwrap();
+    rig.hold(1e-3, scene.sample_time()).unwrap();
+    rig.sense().unwrap();
+    drop(rig);
+    server.sessions(2);
+    let log = log.lock().unwrap();
+    let ramp = &log[log.len() - RAMP_SAMPLES as usize - 1..];
+    assert!(ramp.windows(2).all(|pair| pair[1].displacement < pair[0].displacement));
+    assert_eq!((ramp[0].displacement, ramp[ramp.len() - 1].displacement), (1e-3, 0.0));
 }
 
 #[test]

@@ -50,7 +50,7 @@ fn the_rig_keeps_its_rate_and_reports_the_lateness_of_its_samples() {
     let nominal = 1.0 / session.sample_time;
     assert!((session.rate() / nominal - 1.0).abs() < 0.2, "{}", session.rate());
     let punctuality = session.punctuality.unwrap();
-    assert_eq!(punctuality.histogram.iter().sum::<u64>(), session.samples);
+    assert_eq!(punctuality.samples(), session.samples);
     assert!(punctuality.missed <= session.samples && punctuality.worst >= 0.0);
     // The client gets the figures of the time before its farewell.
     let timing = timing.expect("the report arrives");

@@ -1,0 +1,118 @@
+//! The floating-point type of the core and its functions: `f64`, or `f32` for processors without double precision.
+//!
+//! Both precisions give the same bits on every processor: no function of the system, no fused multiply-add.
+
+pub use precision::*;
+
+#[cfg(not(feature = "f32"))]
+mod precision {
+    pub use core::f64::consts;
+
+    pub use libm::{atan2, ceil, cos, exp, expm1, hypot, pow, rint, sin, sincos, sqrt};
+
+    /// The floating-point type.
+    pub type Real = f64;
+
+    /// Largest valid reading, m. The squares of smaller readings cause no overflow.
+    pub const READING_MAX: Real = 1e100;
+
+    /// A sum of many small terms.
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+    pub struct Sum(Real);
+
+    impl Sum {
+        /// A sum that is this number.
+        pub const fn new(value: Real) -> Self {
+            Self(value)
+        }
+
+        /// The sum.
+        pub const fn get(self) -> Real {
+            self.0
+        }
+
+        /// Adds a term.
+        pub fn add(&mut self, term: Real) {
+            self.0 += term;
+        }
+    }
+}
+
+#[cfg(feature = "f32")]
+mod precision {
+    pub use core::f32::consts;
+
+    pub use libm::{
+        atan2f as atan2, ceilf as ceil, expf as exp, expm1f as expm1, powf as pow, rintf as rint, sqrtf as sqrt,
+    };
+
+    /// The floating-point type.
+    pub type Real = f32;
+
+    /// Largest valid reading, m. The squares of smaller readings cause no overflow.
+    pub const READING_MAX: Real = 1e15;
+
+    /// A sum of many small terms, with the rounding error of the last one: in single precision, terms below 6e-8 of the sum
+    /// would otherwise be lost (Kahan's algorithm).
+    #[derive(Clone, Copy, Debug, Default, PartialEq)]
+    #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+    pub struct Sum {
+        value: Real,
+        missing: Real,
+    }
+
+    impl Sum {
+        /// A sum that is this number.
+        pub const fn new(value: Real) -> Self {
+            Self { value, missing: 0.0 }
+        }
+
+        /// The sum.
+        pub const fn get(self) -> Real {
+            self.value
+        }
+
+        /// Adds a term.
+        pub fn add(&mut self, term: Real) {
+            let term = term + self.missing;
+            let sum = self.value + term;
+            self.missing = term - (sum - self.value);
+            self.value = sum;
+        }
+    }
+
+    // The functions below take the place of those of libm, which compute in double precision inside.
+
+    /// Length of a vector of components below 1e19.
+    pub fn hypot(x: Real, y: Real) -> Real {
+        sqrt(x * x + y * y)
+    }
+
+    /// Sine and cosine of a few turns, to 2e-7: polynomials up to pi/4 (S. Moshier, Cephes, sinf.c).
+    pub fn sincos(x: Real) -> (Real, Real) {
+        // pi/2 in two parts, so that the product with a small whole number is exact in the first one.
+        const HALF_PI: [Real; 2] = [1.570_312_5, 4.838_268e-4];
+        let quarter = rint(x * consts::FRAC_2_PI);
+        let x = (x - quarter * HALF_PI[0]) - quarter * HALF_PI[1];
+        let z = x * x;
+        let sine = ((-1.951_529_6e-4 * z + 8.332_161e-3) * z - 0.166_666_55) * z * x + x;
+        let cosine = ((2.443_315_7e-5 * z - 1.388_731_6e-3) * z + 4.166_664_6e-2) * z * z - 0.5 * z + 1.0;
+        match quarter as i32 & 3 {
+            0 => (sine, cosine),
+            1 => (cosine, -sine),
+            2 => (-sine, -cosine),
+            _ => (-cosine, sine),
+        }
+    }
+
+    /// Sine of a few turns.
+    pub fn sin(x: Real) -> Real {
+        sincos(x).0
+    }
+
+    /// Cosine of a few turns.
+    pub fn cos(x: Real) -> Real {
+        sincos(x).1
+    }
+}

@@ -1,0 +1,69 @@
+//! The linear response of a rig from its growth in the loop check, and the gains that follow from it.
+//!
+//! From period to period the phasor of the response obeys `z' = q z + c` with `q = exp(-r T)`, `r = delta + i (omega - omega_0)` and
+//! `c = -i g E (1 - q)/r`. Least squares over all periods give `q` and `c`.
+
+use num_complex::Complex64;
+use phase_lock::Gains;
+use serde::Serialize;
+
+use crate::scene::Scene;
+
+/// The linear response, and the tuning of the loop for it.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Linear {
+    /// Natural frequency, rad/s.
+    pub omega_0: f64,
+    /// Damping rate, rad/s, and its standard uncertainty.
+    pub damping_rate: f64,
+    /// As above.
+    pub u_damping_rate: f64,
+    /// Growth rate of the response at resonance per amplitude of the base, 1/s.
+    pub response_gain: f64,
+    /// Bandwidth of the detector, rad/s, from which the gains follow.
+    pub bandwidth: f64,
+    /// Proportional gain, rad/s per rad, and integral gain, rad/s² per rad.
+    pub gains: [f64; 2],
+    /// Phase margin of the loop with a delay of one sample, degrees.
+    pub phase_margin: f64,
+}
+
+impl Linear {
+    /// The response whose phasors relative to the base, m, are given period by period, `period` seconds apart. `None` without a growth.
+    pub(super) fn of(phasors: &[Complex64], base: f64, omega: f64, period: f64, scene: &Scene) -> Option<Self> {
+        let steps = phasors.len() as f64 - 1.0;
+        let (before, after) = (&phasors[..phasors.len() - 1], &phasors[1..]);
+        let mean = |values: &[Complex64]| values.iter().sum::<Complex64>() / steps;
+        let (mean_before, mean_after) = (mean(before), mean(after));
+        let power: f64 = before.iter().map(|z| (z - mean_before).norm_sqr()).sum();
+        let products = before.iter().zip(after);
+        let q = products
+            .map(|(z, next)| (z - mean_before).conj() * next)
+            .sum::<Complex64>()
+            / power;
+        let c = mean_after - q * mean_before;
+        let errors = before.iter().zip(after).map(|(z, next)| (next - q * z - c).norm_sqr());
+        let u_q = (errors.sum::<f64>() / (2.0 * steps - 4.0) / power).sqrt();
+        let rate = -q.ln() / period;
+        let response_gain = (c * rate / (1.0 - q)).norm() / base;
+        if !(response_gain.is_finite() && u_q.is_finite() && q.norm() > 0.0) {
+            return None;
+        }
+        // Scatter, and what the growth within a period adds to its phasor as a component of twice the frequency.
+        let noise = u_q / (q.norm() * period);
+        let leakage = rate.norm_sqr() * period / std::f64::consts::TAU;
+        let bandwidth = scene.controller.bandwidth * scene.dimensionless().omega0;
+        let gains = Gains::from_bandwidth(bandwidth, rate.re.max(0.0));
+        Some(Self {
+            omega_0: omega - rate.im,
+            damping_rate: rate.re,
+            u_damping_rate: noise.hypot(leakage),
+            response_gain,
+            bandwidth,
+            gains: [gains.proportional, gains.integral],
+            phase_margin: gains
+                .phase_margin(bandwidth, rate.re.max(0.0), scene.sample_time())
+                .to_degrees(),
+        })
+    }
+}

@@ -1,0 +1,133 @@
+//! `[rig.names]` and `[controller_names]`: the user's names for the variables of a rig or a controller, with their units.
+
+use std::collections::BTreeMap;
+use std::f64::consts::{PI, TAU};
+
+use serde::{Deserialize, Serialize};
+
+/// Units, and SI units per unit.
+const UNITS: [(&str, f64); 12] = [
+    ("m", 1.0),
+    ("mm", 1e-3),
+    ("um", 1e-6),
+    ("m/s", 1.0),
+    ("mm/s", 1e-3),
+    ("s", 1.0),
+    ("ms", 1e-3),
+    ("rad", 1.0),
+    ("deg", PI / 180.0),
+    ("rad/s", 1.0),
+    ("Hz", TAU),
+    ("1/min", TAU / 60.0),
+];
+
+/// A variable of a rig or a controller.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Written")]
+pub struct Name {
+    /// Its name there.
+    pub name: String,
+    /// SI units per unit of the variable; negative for the opposite sign.
+    pub factor: f64,
+}
+
+/// As written: `"name"`, or a table with `name` and one of `unit` and `factor`.
+#[derive(Deserialize)]
+#[serde(untagged, deny_unknown_fields)]
+enum Written {
+    Plain(String),
+    Full {
+        name: String,
+        unit: Option<String>,
+        factor: Option<f64>,
+    },
+}
+
+impl TryFrom<Written> for Name {
+    type Error = String;
+
+    fn try_from(written: Written) -> Result<Self, String> {
+        let (name, unit, factor) = match written {
+            Written::Plain(name) => (name, None, None),
+            Written::Full { name, unit, factor } => (name, unit, factor),
+        };
+        let of = |unit: &str| {
+            UNITS
+                .iter()
+                .find(|(known, _)| *known == unit)
+                .map(|(_, factor)| *factor)
+        };
+        let known = || UNITS.map(|(unit, _)| unit).join(", ");
+        let factor = match (unit, factor) {
+            (Some(_), Some(_)) => return Err(format!("{name}: give a unit or a factor, not both")),
+            (Some(unit), None) => of(&unit).ok_or_else(|| {
+                format!(
+                    "{name}: the unit {unit} is unknown; there are {}, or give a factor",
+                    known()
+                )
+            })?,
+            (None, factor) => factor.unwrap_or(1.0),
+        };
+        if !factor.is_finite() || factor == 0.0 {
+            return Err(format!(
+                "{name}: the factor {factor} must be a finite number other than 0"
+            ));
+        }
+        Ok(Self { name, factor })
+    }
+}
+
+/// The names that differ, by the names of this bench.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(transparent)]
+pub struct Names(BTreeMap<String, Name>);
+
+impl Names {
+    /// The variable for `ours`; if it is not mapped, it has the same name, in SI units.
+    #[must_use]
+    pub fn of(&self, ours: &str) -> Name {
+        let same = || Name { name: ours.into(), factor: 1.0 };
+        self.0.get(ours).cloned().unwrap_or_else(same)
+    }
+
+    /// The variable for `ours`, if it is mapped.
+    #[must_use]
+    pub fn mapped(&self, ours: &str) -> Option<&Name> {
+        self.0.get(ours)
+    }
+
+    /// Whether nothing is mapped.
+    #[must_use]
+    pub fn is_empty(&self) -> bool {
+        self.0.is_empty()
+    }
+
+    /// A name that is mapped and not among `known`.
+    #[must_use]
+    pub fn unknown(&self, known: &[&str]) -> Option<&str> {
+        self.0.keys().map(String::as_str).find(|name| !known.contains(name))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_have_units_or_factors_and_mistakes_are_named() {
+        let text = "response = \"y\"\nbase = { name = \"x\", unit = \"mm\" }\nE = { name = \"A\", factor = -0.5 }";
+        let names: Names = toml::from_str(text).unwrap();
+        let seen = ["response", "base", "E", "omega"].map(|ours| names.of(ours));
+        assert_eq!(seen.each_ref().map(|one| one.factor), [1.0, 1e-3, -0.5, 1.0]);
+        assert_eq!(seen.each_ref().map(|one| &*one.name), ["y", "x", "A", "omega"]);
+        assert_eq!(names.unknown(&["response", "base"]), Some("E"));
+        for (text, reason) in [
+            ("a = { name = \"x\", unit = \"furlong\" }", "unknown"),
+            ("a = { name = \"x\", unit = \"m\", factor = 2 }", "not both"),
+            ("a = { name = \"x\", factor = 0.0 }", "other than 0"),
+        ] {
+            let refused = toml::from_str::<Names>(text).unwrap_err().to_string();
+            assert!(refused.contains(reason), "{refused}");
+        }
+    }
+}

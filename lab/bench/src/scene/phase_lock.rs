@@ -1,0 +1,113 @@
+//! The `[phase_lock]` section: parameters of the controller that no other key sets, in SI units and by their names in `PhaseLock.fmu`.
+
+use phase_lock::{Config, ConfigError, NONE, PARAMETERS, Parameter, Value as Setting};
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+/// The parameters that other keys of a scene set, in units that suit any plant.
+pub const KEYS: [(&str, &str); 23] = [
+    ("sample_time", "controller.samples_per_period"),
+    ("omega_start", "controller.omega_start"),
+    ("omega_min", "controller.omega_min"),
+    ("omega_max", "controller.omega_max"),
+    ("omega_rate", "controller.omega_rate"),
+    ("amplitude", "excitation.G"),
+    ("amplitude_max", "controller.G_max"),
+    ("ramp_rate", "controller.ramp_periods"),
+    ("release_rate", "controller.release_periods"),
+    ("phase_target", "controller.phase_target"),
+    ("bandwidth", "controller.bandwidth"),
+    ("delay", "controller.delay"),
+    ("lock.phase_tolerance", "controller.phase_tolerance"),
+    ("lock.frequency_drift", "controller.frequency_tolerance"),
+    ("lock.amplitude_drift", "controller.amplitude_tolerance"),
+    ("lock.dwell", "controller.dwell_periods"),
+    ("response_max", "controller.C_max"),
+    ("acquire_timeout", "record.lock_periods"),
+    ("signal_timeout", "controller.silence_periods"),
+    ("residual_max", "controller.residual_max"),
+    ("reference_connected", "chain.reference"),
+    ("approach_gain", "controller.approach_gain"),
+    ("capture_response", "controller.capture"),
+];
+
+/// The message for a refused configuration, with the keys of the scene.
+#[must_use]
+pub fn refusal(error: &ConfigError) -> String {
+    let key = |name: &str| {
+        let key = KEYS.iter().find(|(parameter, _)| *parameter == name);
+        key.map_or_else(|| format!("phase_lock.{name}"), |(_, key)| (*key).to_string())
+    };
+    let mut text = format!("{}: {error}", key(error.name));
+    let words = error.allowed.split([' ', ',', '(', ')']);
+    for name in words.filter(|word| Parameter::find(word).is_some()) {
+        text += &format!("; {name} is {}", key(name));
+    }
+    text
+}
+
+/// Values by the names of the controller's parameters.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "Table")]
+pub struct PhaseLock(Table);
+
+impl TryFrom<Table> for PhaseLock {
+    type Error = String;
+
+    fn try_from(table: Table) -> Result<Self, String> {
+        let mut flat = Table::new();
+        for (name, value) in table {
+            match value {
+                Value::Table(group) => flat.extend(group.into_iter().map(|(key, one)| (format!("{name}.{key}"), one))),
+                value => _ = flat.insert(name, value),
+            }
+        }
+        let mut config = Config::for_resonance(1.0, 1.0);
+        for (name, value) in &flat {
+            set(&mut config, name, value)?;
+        }
+        Ok(Self(flat))
+    }
+}
+
+impl PhaseLock {
+    /// The configuration with these values.
+    pub(super) fn apply(&self, mut config: Config) -> Config {
+        for (name, value) in &self.0 {
+            // Names, types and whole numbers were checked when the scene was read; `Config::build` checks the rest.
+            let _ = set(&mut config, name, value);
+        }
+        config
+    }
+}
+
+fn set(config: &mut Config, name: &str, value: &Value) -> Result<(), String> {
+    if let Some((_, key)) = KEYS.iter().find(|(parameter, _)| *parameter == name) {
+        return Err(format!("phase_lock.{name} is set by {key}"));
+    }
+    let parameter = Parameter::find(name).ok_or_else(|| {
+        let free = PARAMETERS.iter().map(|one| one.name);
+        let free: Vec<&str> = free.filter(|one| KEYS.iter().all(|(name, _)| name != one)).collect();
+        format!(
+            "the controller has no parameter `{name}`; expected one of {}",
+            free.join(", ")
+        )
+    })?;
+    let setting = match (parameter.get(config), value) {
+        (Setting::Real(_), Value::Float(number)) => Setting::Real(*number),
+        (Setting::Real(_), Value::Integer(number)) => Setting::Real(*number as f64),
+        (Setting::Real(_), Value::String(word)) if word == "none" => Setting::Real(NONE),
+        (Setting::Real(_), Value::Boolean(false)) => Setting::Real(NONE),
+        (Setting::Integer(_), Value::Integer(number)) => Setting::Integer(i32::try_from(*number).unwrap_or(i32::MAX)),
+        (Setting::Boolean(_), Value::Boolean(one)) => Setting::Boolean(*one),
+        _ => {
+            let (allowed, given) = (parameter.range.allowed(), value.type_str());
+            return Err(format!(
+                "phase_lock.{name} is a {given}, which is refused; allowed is {allowed}"
+            ));
+        }
+    };
+    parameter
+        .set(config, setting)
+        .map_err(|error| format!("phase_lock.{error}"))
+}

@@ -1,0 +1,184 @@
+//! A device at a network address: control channel, stream and beacon, with the clock of the device.
+
+use std::io::{self, ErrorKind, Read, Write};
+use std::net::{SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::thread;
+use std::time::{Duration, Instant};
+
+use super::codec::{BEACON_REQUEST, Frame, beacon};
+use super::device::{Device, EXPERIMENT};
+use crate::address::is_loopback;
+use crate::error::ServerError;
+use crate::real_time_clock::RealTimeClock;
+use crate::report::{Ended, Session};
+
+/// Port of the control channel; stream and beacon have the next two.
+pub const DEFAULT_PORT: u16 = 2350;
+/// Polling interval.
+const POLL: Duration = Duration::from_micros(50);
+
+/// The server of a device.
+pub struct HelicServer {
+    control: TcpListener,
+    stream: UdpSocket,
+    /// Absent where another device of this machine has the port.
+    beacon: Option<UdpSocket>,
+    device: Device,
+    sample_time: f64,
+}
+
+/// The host.
+struct Connection {
+    stream: TcpStream,
+    peer: SocketAddr,
+    bytes: Vec<u8>,
+    opened: Instant,
+    first: u64,
+}
+
+impl HelicServer {
+    /// Listens on `address` (TCP), and with the next two ports for primers of the stream and for the beacon. With port 0 the system
+    /// chooses all ports.
+    ///
+    /// # Errors
+    /// An address that is not available.
+    pub fn listen(address: SocketAddr, device: Device, sample_time: f64) -> io::Result<Self> {
+        let beside = |offset: u16| match address.port() {
+            0 => address,
+            port => SocketAddr::new(address.ip(), port.saturating_add(offset)),
+        };
+        let control = TcpListener::bind(address)?;
+        // On this machine, the host itself binds that port.
+        let source = if is_loopback(address.ip()) {
+            SocketAddr::new(address.ip(), 0)
+        } else {
+            beside(1)
+        };
+        let (stream, beacon) = (UdpSocket::bind(source)?, UdpSocket::bind(beside(2)).ok());
+        control.set_nonblocking(true)?;
+        stream.set_nonblocking(true)?;
+        if let Some(beacon) = &beacon {
+            beacon.set_nonblocking(true)?;
+        }
+        Ok(Self { control, stream, beacon, device, sample_time })
+    }
+
+    /// Address of the control channel.
+    ///
+    /// # Errors
+    /// The system's.
+    pub fn address(&self) -> io::Result<SocketAddr> {
+        self.control.local_addr()
+    }
+
+    /// Serves until `stop` returns true. `tell` receives a report when a host has left.
+    ///
+    /// # Errors
+    /// A rig that fails, or the network.
+    pub fn serve(&mut self, mut stop: impl FnMut() -> bool, mut tell: impl FnMut(&Session)) -> Result<(), ServerError> {
+        let mut clock = RealTimeClock::start(self.sample_time);
+        let mut host: Option<Connection> = None;
+        let mut tick = 0;
+        loop {
+            let stopped = stop();
+            if host.is_none()
+                && let Ok((stream, peer)) = self.control.accept()
+            {
+                stream.set_nodelay(true)?;
+                stream.set_nonblocking(true)?;
+                clock.punctuality = Default::default();
+                host = Some(Connection {
+                    stream,
+                    peer,
+                    bytes: Vec::new(),
+                    opened: Instant::now(),
+                    first: tick,
+                });
+            }
+            let uptime = clock.due(0).elapsed().as_millis() as u32;
+            let left = host
+                .as_mut()
+                .is_some_and(|host| !host.exchange(&mut self.device, uptime));
+            if let Some(host) = host.take_if(|_| left || stopped) {
+                self.device.disconnect();
+                tell(&Session {
+                    peer: host.peer,
+                    ended: if left { Ended::Farewell } else { Ended::Stopped },
+                    samples: tick - host.first,
+                    sample_time: self.sample_time,
+                    seconds: host.opened.elapsed().as_secs_f64(),
+                    punctuality: Some(clock.punctuality.clone()),
+                    counters: None,
+                });
+            }
+            if stopped {
+                return Ok(());
+            }
+            self.answer_beacon();
+            while Instant::now() >= clock.due(tick + 1) {
+                tick += 1;
+                self.tick(&mut clock, tick, host.as_ref().map(|host| host.peer))?;
+            }
+            thread::sleep(clock.due(tick + 1).saturating_duration_since(Instant::now()).min(POLL));
+        }
+    }
+
+    fn tick(&mut self, clock: &mut RealTimeClock, number: u64, host: Option<SocketAddr>) -> Result<(), ServerError> {
+        clock.serve(number);
+        let began = Instant::now();
+        let packet = self.device.tick()?;
+        if let (Some((port, bytes)), Some(host)) = (packet, host) {
+            // What cannot be sent now is lost in the network.
+            let _ = self.stream.send_to(&bytes, (host.ip(), port));
+        }
+        let registry = &mut self.device.registry;
+        let spent = began.elapsed().as_micros() as u32;
+        registry.put_number("loop_time_last", spent);
+        registry.put_number("loop_time_max", registry.number("loop_time_max").max(spent));
+        registry.put_number("clock_jitter", (1e6 * clock.punctuality.worst) as u32);
+        registry.put_number("overruns", clock.punctuality.missed as u32);
+        Ok(())
+    }
+
+    fn answer_beacon(&self) {
+        // The content of primers has no meaning; they must only not fill the buffer.
+        let mut bytes = [0; 64];
+        while self.stream.recv_from(&mut bytes).is_ok() {}
+        let Some(beacon_socket) = &self.beacon else {
+            return;
+        };
+        while let Ok((size, from)) = beacon_socket.recv_from(&mut bytes) {
+            if bytes[..size] == BEACON_REQUEST {
+                let port = self.address().map_or(DEFAULT_PORT, |address| address.port());
+                let firmware = concat!("vines ", env!("CARGO_PKG_VERSION"));
+                let _ = beacon_socket.send_to(&beacon(port, EXPERIMENT, firmware), from);
+            }
+        }
+    }
+}
+
+impl Connection {
+    /// Answers what has arrived; false if the host has left, or has sent what is not a frame.
+    fn exchange(&mut self, device: &mut Device, uptime: u32) -> bool {
+        let mut more = [0; 2048];
+        match self.stream.read(&mut more) {
+            Ok(0) => return false,
+            Ok(size) => self.bytes.extend(&more[..size]),
+            Err(error) if error.kind() == ErrorKind::WouldBlock => return true,
+            Err(_) => return false,
+        }
+        loop {
+            match Frame::decode(&self.bytes) {
+                Err(_) => return false,
+                Ok(None) => return true,
+                Ok(Some((request, length))) => {
+                    self.bytes.drain(..length);
+                    let answer = device.handle(&request, uptime).encode();
+                    if self.stream.write_all(&answer).is_err() {
+                        return false;
+                    }
+                }
+            }
+        }
+    }
+}

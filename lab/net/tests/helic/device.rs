@@ -1,0 +1,352 @@
+//! The device alone: parameters, errors, generators, stream, and the loop with its latched loss of lock.
+
+use std::collections::HashMap;
+
+use vines_net::helic::Device;
+use vines_net::helic::codec::{ErrorCode, Frame, Packet, message, reals, text};
+use vines_testbench::rig::{Drive, Rig, RigError, Sensors, Simulated};
+use vines_testbench::scene::{PAPER, Scene};
+
+pub fn scene() -> Scene {
+    let mut scene = Scene::parse("paper.toml", PAPER, &[]).unwrap();
+    scene.start = Default::default();
+    scene
+}
+
+/// The plant of the default scene at rest.
+pub fn device() -> Device {
+    let scene = scene();
+    let rig = Simulated::new(scene.plant, scene.start).unwrap();
+    Device::new(Box::new(rig), scene.sample_time(), scene.plant.half_width).unwrap()
+}
+
+/// A host that knows the protocol and nothing of the client of this project.
+pub struct Host {
+    pub device: Device,
+    parameters: HashMap<String, (u16, u8)>,
+}
+
+impl Host {
+    pub fn new(mut device: Device) -> Self {
+        let mut parameters = HashMap::new();
+        loop {
+            let start = parameters.len() as u16;
+            let request = Frame {
+                kind: message::GET_PARAMS,
+                sequence: 7,
+                payload: start.to_le_bytes().into(),
+            };
+            let answer = device.handle(&request, 0);
+            assert_eq!((answer.kind, answer.sequence), (message::GET_PARAMS, 7));
+            assert_eq!(answer.payload[..2], start.to_le_bytes());
+            assert!(answer.payload.len() <= 1024);
+            let mut rest = &answer.payload[4..];
+            while !rest.is_empty() {
+                let (name, definition) = text(rest).unwrap();
+                assert!(name.len() <= 23, "{name}");
+                parameters.insert(name, (parameters.len() as u16, definition[0]));
+                rest = &definition[4..];
+            }
+            let next = u16::from_le_bytes([answer.payload[2], answer.payload[3]]);
+            assert_eq!(usize::from(next), parameters.len());
+            if next == start {
+                break;
+            }
+        }
+        Self { device, parameters }
+    }
+
+    pub fn ask(&mut self, kind: u8, payload: &[u8]) -> Result<Vec<u8>, ErrorCode> {
+        let answer = self
+            .device
+            .handle(&Frame { kind, sequence: 1, payload: payload.into() }, 0);
+        match answer.kind {
+            message::ERROR => {
+                assert_eq!(answer.payload[1], kind);
+                Err(ErrorCode::of_number(answer.payload[0]).unwrap())
+            }
+            same => {
+                assert_eq!(same, kind);
+                Ok(answer.payload)
+            }
+        }
+    }
+
+    pub fn set(&mut self, name: &str, values: &[f32]) -> Result<(), ErrorCode> {
+        let (index, code) = self.parameters[name];
+        let mut payload = index.to_le_bytes().to_vec();
+        payload.extend(values.iter().flat_map(|value| match code {
+            b'f' => value.to_le_bytes(),
+            _ => (*value as u32).to_le_bytes(),
+        }));
+        self.ask(message::SET_PAR, &payload).map(drop)
+    }
+
+    pub fn get(&mut self, name: &str) -> Vec<u8> {
+        let index = self.parameters[name].0;
+        self.ask(message::GET_PAR, &index.to_le_bytes()).unwrap()
+    }
+
+    fn number(&mut self, name: &str) -> u32 {
+        u32::from_le_bytes(self.get(name).try_into().unwrap())
+    }
+
+    fn sources(&mut self) -> Vec<String> {
+        let answer = self.ask(message::GET_SOURCES, &[]).unwrap();
+        let (mut names, mut rest) = (Vec::new(), &answer[..]);
+        while !rest.is_empty() {
+            let (name, after) = text(rest).unwrap();
+            assert!(name.len() <= 15);
+            names.push(name);
+            rest = text(after).unwrap().1;
+        }
+        names
+    }
+
+    fn set_up(&mut self, names: &[&str], decimation: u16, count: u32) -> Result<(), ErrorCode> {
+        let all = self.sources();
+        let mut payload = [
+            &decimation.to_le_bytes()[..],
+            &count.to_le_bytes(),
+            &[names.len() as u8],
+        ]
+        .concat();
+        payload.extend(
+            names
+                .iter()
+                .map(|name| all.iter().position(|one| one == name).unwrap() as u8),
+        );
+        self.ask(message::STREAM_SETUP, &payload).map(drop)
+    }
+
+    /// A finite capture: all records, and their samples.
+    fn capture(&mut self, names: &[&str], decimation: u16, count: u32) -> (Vec<u32>, Vec<Vec<f32>>) {
+        self.set_up(names, decimation, count).unwrap();
+        self.ask(message::STREAM_START, &5000u16.to_le_bytes()).unwrap();
+        let (mut at, mut records, mut sequence) = (Vec::new(), Vec::new(), 0);
+        for _ in 0..=count * u32::from(decimation) + 100 {
+            if let Some((port, bytes)) = self.device.tick().unwrap() {
+                let packet = Packet::decode(&bytes).unwrap();
+                assert_eq!((port, packet.sequence, packet.decimation), (5000, sequence, decimation));
+                assert!(bytes.len() <= 1472);
+                sequence += 1;
+                for (n, record) in packet.values.chunks_exact(names.len()).enumerate() {
+                    at.push(packet.first + n as u32 * u32::from(decimation));
+                    records.push(record.to_vec());
+                }
+            }
+        }
+        assert_eq!(records.len(), count as usize);
+        (at, records)
+    }
+}
+
+fn cosine(amplitude: f32) -> [f32; 33] {
+    let mut coefficients = [0.0; 33];
+    coefficients[1] = amplitude;
+    coefficients
+}
+
+#[test]
+fn every_error_code_has_its_case() {
+    let mut host = Host::new(device());
+    let table = host.parameters["table"].0.to_le_bytes();
+    let block = |offset: u32, data: &[f32]| {
+        let mut payload = [&table[..], &offset.to_le_bytes()].concat();
+        payload.extend(data.iter().flat_map(|value| value.to_le_bytes()));
+        payload
+    };
+    let commit = |length: u32| [&table[..], &length.to_le_bytes()].concat();
+    assert_eq!(host.ask(128, &[]), Err(ErrorCode::UnknownType));
+    assert_eq!(host.ask(message::GET_PAR, &[255, 0]), Err(ErrorCode::BadIndex));
+    assert_eq!(host.ask(message::GET_PAR, &[0]), Err(ErrorCode::BadLength));
+    assert_eq!(host.ask(message::GET_PAR, &table), Err(ErrorCode::BadLength));
+    assert_eq!(host.ask(message::GET_PARAMS, &[255, 0]), Err(ErrorCode::BadIndex));
+    assert_eq!(host.ask(message::GET_PARAMS, &[]), Err(ErrorCode::BadLength));
+    assert_eq!(host.set("ticks", &[1.0]), Err(ErrorCode::ReadOnly));
+    assert_eq!(host.set("freq", &[1.0, 2.0]), Err(ErrorCode::BadLength));
+    assert_eq!(host.set("freq", &[f32::NAN]), Err(ErrorCode::BadValue));
+    assert_eq!(host.set("freq", &[450.0]), Err(ErrorCode::BadValue));
+    assert_eq!(host.set("forcing_coeffs", &cosine(10.1)), Err(ErrorCode::BadValue));
+    assert_eq!(host.set("pll_freq_min", &[1.0]), Err(ErrorCode::BadValue));
+    assert_eq!(host.set("control_mode", &[1.0]), Err(ErrorCode::BadValue));
+    assert_eq!(host.set("arm", &[2.0]), Err(ErrorCode::BadValue));
+    assert_eq!(host.ask(message::COMMIT, &commit(1)), Err(ErrorCode::BadValue));
+    assert_eq!(
+        host.ask(message::SET_BLOCK, &block(4096, &[0.0])),
+        Err(ErrorCode::BadLength)
+    );
+    assert_eq!(host.ask(message::STREAM_START, &[1, 0]), Err(ErrorCode::BadValue));
+    assert_eq!(host.set_up(&["out"], 0, 0), Err(ErrorCode::BadValue));
+    host.ask(message::SET_BLOCK, &block(0, &[0.5, 1.0])).unwrap();
+    host.ask(message::COMMIT, &commit(2)).unwrap();
+    assert_eq!(host.ask(message::COMMIT, &commit(2)), Err(ErrorCode::Busy));
+    host.device.tick().unwrap();
+    host.ask(message::COMMIT, &commit(2)).unwrap();
+    host.set_up(&["out"], 1, 0).unwrap();
+    host.ask(message::STREAM_START, &[1, 0]).unwrap();
+    assert_eq!(host.set_up(&["out"], 1, 0), Err(ErrorCode::Busy));
+    // A refused value leaves the one before.
+    assert_eq!(host.get("freq"), 0f32.to_le_bytes());
+}
+
+#[test]
+fn forcing_reaches_the_plant_only_when_armed_and_a_host_that_leaves_disarms() {
+    let mut host = Host::new(device());
+    host.set("freq", &[8.8]).unwrap();
+    host.set("forcing_coeffs", &cosine(0.1)).unwrap();
+    let (_, quiet) = host.capture(&["forcing", "out", "reference"], 1, 200);
+    assert!(quiet.iter().any(|record| record[0].abs() > 0.09));
+    assert!(quiet.iter().all(|record| record[1..] == [0.0, 0.0]));
+    host.set("arm", &[1.0]).unwrap();
+    let (at, driven) = host.capture(&["forcing", "out", "reference"], 3, 100);
+    assert!(at.windows(2).all(|pair| pair[1] - pair[0] == 3));
+    assert!(driven.iter().all(|record| record[0] == record[1]));
+    assert!(driven.iter().any(|record| record[2].abs() > 0.09));
+    assert_eq!(host.number("safety"), 1);
+    host.device.disconnect();
+    host.device.tick().unwrap();
+    assert_eq!((host.number("arm"), host.number("safety")), (0, 8));
+}
+
+#[test]
+fn a_sum_above_the_limit_is_clamped_and_says_so() {
+    let mut host = Host::new(device());
+    host.set("forcing_coeffs", &cosine(8.0)).unwrap();
+    host.set("target_coeffs", &cosine(8.0)).unwrap();
+    host.set("arm", &[1.0]).unwrap();
+    let (_, records) = host.capture(&["out"], 1, 5);
+    assert!(records.iter().all(|record| record[0] == 10.0));
+    assert_eq!(host.number("safety"), 0b101);
+}
+
+#[test]
+fn commands_are_counted_at_the_sample_that_they_take_effect() {
+    let mut host = Host::new(device());
+    let epoch = |host: &mut Host| host.capture(&["cmd_epoch"], 1, 1).1[0][0];
+    assert_eq!(epoch(&mut host), 0.0);
+    host.set("freq", &[1.0]).unwrap();
+    host.set("ctrl_reset", &[0.0]).unwrap();
+    host.set("diag_reset", &[1.0]).unwrap();
+    host.set("arm", &[1.0]).unwrap();
+    assert_eq!(epoch(&mut host), 1.0);
+    host.set("freq", &[1.5]).unwrap();
+    host.set("freq", &[2.0]).unwrap();
+    assert_eq!(epoch(&mut host), 3.0);
+}
+
+#[test]
+fn the_table_is_played_free_locked_and_once() {
+    let mut host = Host::new(device());
+    let table = host.parameters["table"].0.to_le_bytes();
+    let values = [0.0f32, 1.0, 0.0, -1.0].map(f32::to_le_bytes).concat();
+    host.ask(message::SET_BLOCK, &[&table[..], &0u32.to_le_bytes(), &values].concat())
+        .unwrap();
+    host.ask(message::COMMIT, &[&table[..], &4u32.to_le_bytes()].concat())
+        .unwrap();
+    assert_eq!(host.get("table_len"), 4u16.to_le_bytes());
+    let rate = reals(&host.get("sample_freq"))[0];
+    host.set("table_freq", &[rate / 40.0]).unwrap();
+    host.set("table_mode", &[1.0]).unwrap();
+    let shown = |host: &mut Host| -> Vec<f32> { host.capture(&["table"], 1, 80).1.concat() };
+    let linear = shown(&mut host);
+    assert!(
+        (linear[5] - 0.5).abs() < 1e-4 && (linear[10] - 1.0).abs() < 1e-4,
+        "{linear:?}"
+    );
+    assert!((linear[45] - linear[5]).abs() < 1e-4);
+    host.set("table_interp", &[0.0]).unwrap();
+    assert!(shown(&mut host).iter().all(|value| [0.0, 1.0, -1.0].contains(value)));
+    host.set("table_mode", &[2.0]).unwrap();
+    assert_eq!(shown(&mut host), [0.0; 80]);
+    host.set("table_trigger", &[1.0]).unwrap();
+    let once = shown(&mut host);
+    assert!(
+        once[12] == 1.0 && once[32] == -1.0 && once[41..] == [0.0; 39],
+        "{once:?}"
+    );
+    host.set("freq", &[rate / 80.0]).unwrap();
+    host.set("table_mult", &[2.0]).unwrap();
+    host.set("table_mode", &[3.0]).unwrap();
+    let locked = shown(&mut host);
+    assert_eq!(locked.iter().filter(|value| **value == 1.0).count(), 20, "{locked:?}");
+}
+
+/// A rig that answers like a resonator far below the noise until it is switched off.
+struct Resonator {
+    plant: Simulated,
+    taken: usize,
+    dies: usize,
+}
+
+impl Rig for Resonator {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        let sensors = self.plant.sense()?;
+        Ok(if self.taken >= self.dies {
+            Sensors { response: 0.0, ..sensors }
+        } else {
+            sensors
+        })
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.plant.advance(drive, step)
+    }
+
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        self.taken += 1;
+        self.plant.hold(displacement, step)
+    }
+}
+
+#[test]
+fn the_loop_of_the_device_finds_phase_resonance_and_a_lost_lock_latches() {
+    let scene = scene();
+    let dies = 60_000;
+    let plant = Simulated::new(scene.plant, scene.start).unwrap();
+    let rig = Resonator { plant, taken: 0, dies };
+    let mut host = Host::new(Device::new(Box::new(rig), scene.sample_time(), scene.plant.half_width).unwrap());
+    let resonance = (scene.dimensionless().omega0 / std::f64::consts::TAU) as f32;
+    let settings = [
+        ("pll_freq_max", 1.05 * resonance),
+        ("pll_centre_freq", 1.01 * resonance),
+        ("pll_freq_min", 0.95 * resonance),
+        ("pll_ki", 4e-4),
+        ("pll_kp", 5e-4),
+        ("pll_demod_tau", 0.5),
+        // The base is held, and read before it changes: its mean is half a sample earlier.
+        ("pll_delay_s", -0.5 * scene.sample_time() as f32),
+        ("pll_response_min", 0.01),
+        ("pll_lock_freq_tol", 0.01),
+        ("pll_lock_dwell", 2.0),
+        ("pll_unlock_dwell", 2.0),
+        ("pll_acquire_timeout", 100.0),
+        ("control_mode", 2.0),
+    ];
+    for (name, value) in settings {
+        host.set(name, &[value]).unwrap();
+    }
+    // So small that nothing hits: the linear resonance.
+    host.set("forcing_coeffs", &cosine(0.02)).unwrap();
+    host.set("arm", &[1.0]).unwrap();
+    assert_eq!(host.set("control_mode", &[0.0]), Err(ErrorCode::BadValue), "armed");
+    let names = ["pll_state", "pll_phase", "pll_freq_actual", "out"];
+    // Not at one instant of every period: the detector has a ripple.
+    let (_, records) = host.capture(&names, 97, (dies / 97) as u32 - 5);
+    let last = &records[records.len() - 97..];
+    let mean = |n: usize| last.iter().map(|record| record[n]).sum::<f32>() / last.len() as f32;
+    assert_eq!(mean(0), 2.0, "locked");
+    assert!((mean(1) + 90.0).abs() < 0.2, "{}", mean(1));
+    assert!((mean(2) / resonance - 1.0).abs() < 1e-4, "{} {resonance}", mean(2));
+    let (_, after) = host.capture(&names, 100, 200);
+    assert_eq!((after[199][0], after[199][3]), (3.0, 0.0), "{:?}", after[199]);
+    assert_eq!(host.number("safety") & 2, 2);
+    // Neither reacquisition nor arming again clears it; a reset does.
+    host.set("pll_reacquire", &[1.0]).unwrap();
+    host.set("arm", &[1.0]).unwrap();
+    assert_eq!(host.capture(&names, 1, 5).1[4][0], 3.0);
+    assert_eq!(host.number("safety") & 2, 2);
+    host.set("ctrl_reset", &[1.0]).unwrap();
+    host.set("arm", &[1.0]).unwrap();
+    assert_eq!(host.capture(&names, 1, 5).1[4][0], 1.0);
+}

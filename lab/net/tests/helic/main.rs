@@ -1,0 +1,6 @@
+//! The helic protocol: its published vectors, the device, and the device as a rig.
+
+mod device;
+mod network;
+mod rig;
+mod vectors;

@@ -1,0 +1,186 @@
+//! The device as a rig of the bench, sample by sample and without a clock: the same figures on any machine.
+
+use std::collections::VecDeque;
+use std::io;
+
+use vines_net::helic::codec::Frame;
+use vines_net::helic::{Channels, Device, HelicRig, Transport};
+use vines_testbench::experiment::{self, Plan};
+use vines_testbench::identification::identify;
+use vines_testbench::rig::{BuiltIn, Drive, Rig, Simulated};
+
+use super::device::{Host, device, scene};
+
+/// A device that takes its samples when a datagram is asked for; `fate` says how often a datagram arrives.
+struct Direct<F> {
+    device: Device,
+    fate: F,
+    number: usize,
+    waiting: VecDeque<Vec<u8>>,
+}
+
+impl<F: FnMut(usize) -> usize> Direct<F> {
+    fn new(fate: F) -> Self {
+        Self { device: device(), fate, number: 0, waiting: VecDeque::new() }
+    }
+}
+
+impl<F: FnMut(usize) -> usize> Transport for Direct<F> {
+    fn request(&mut self, request: &Frame) -> io::Result<Frame> {
+        Ok(self.device.handle(request, 0))
+    }
+
+    fn datagram(&mut self) -> io::Result<Vec<u8>> {
+        for _ in 0..2000 {
+            if let Some(bytes) = self.waiting.pop_front() {
+                return Ok(bytes);
+            }
+            if let Some((_, bytes)) = self.device.tick().unwrap() {
+                let copies = (self.fate)(self.number);
+                self.waiting.extend(std::iter::repeat_n(bytes, copies));
+                self.number += 1;
+            }
+        }
+        Err(io::ErrorKind::TimedOut.into())
+    }
+
+    fn port(&self) -> io::Result<u16> {
+        Ok(1)
+    }
+}
+
+fn connect<F: FnMut(usize) -> usize>(fate: F) -> HelicRig<Direct<F>> {
+    let scene = scene();
+    let samples = scene.controller.samples_per_period;
+    HelicRig::new(Direct::new(fate), Channels::default(), scene.sample_time(), samples).unwrap()
+}
+
+#[test]
+fn the_experiment_on_a_device_gives_the_backbone_of_the_plant() {
+    let mut scene = scene();
+    scene.record.decay_periods = Some(150.0);
+    let plant = || Simulated::new(scene.plant, scene.start).unwrap();
+    let step = scene.sample_time();
+    let run = |rig: &mut dyn Rig| {
+        let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+        let record = experiment::run(rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
+        identify(&record, &scene).unwrap().lock
+    };
+    let expected = run(&mut plant());
+    // The device holds its output for a sample, which is half a sample late: the difference is proportional to its sample time.
+    let [coarse, fine] = [8.0, 16.0].map(|samples| {
+        let device = Device::new(Box::new(plant()), step / samples, scene.plant.half_width).unwrap();
+        let direct = Direct { device, ..Direct::new(|_| 1) };
+        let mut rig = HelicRig::new(direct, Channels::default(), step, 100.0).unwrap();
+        let found = run(&mut rig);
+        assert!(!rig.counters.is_troubled(), "{}", rig.counters);
+        assert!((found.c - expected.c).abs() < 1e-3);
+        found.sigma - expected.sigma
+    });
+    println!(
+        "sigma = {}, {coarse} more with 8 and {fine} more with 16 samples of the device",
+        expected.sigma
+    );
+    assert!(
+        (coarse / fine - 2.0).abs() < 0.2 && fine.abs() < 0.003,
+        "{coarse} {fine}"
+    );
+}
+
+#[test]
+fn lost_and_repeated_datagrams_are_counted_and_bridged() {
+    let scene = scene();
+    // Every seventh is lost, every fifth comes twice.
+    let mut rig = connect(|n| if n % 7 == 3 { 0 } else { 1 + usize::from(n % 5 == 2) });
+    let drive = Drive { omega: 55.0, amplitude: 9e-5, displacement: 0.0 };
+    let mut readings = Vec::new();
+    for _ in 0..4000 {
+        readings.push(rig.sense().unwrap());
+        rig.advance(drive, scene.sample_time()).unwrap();
+    }
+    println!("{}", rig.counters);
+    assert!(rig.counters.held > 400 && rig.counters.late > 100, "{}", rig.counters);
+    // The samples keep their times: the base still has the frequency of the drive.
+    let base: Vec<f64> = readings[3000..]
+        .iter()
+        .map(|sensors| sensors.reference.unwrap())
+        .collect();
+    let turns = |n: usize| 55.0 * n as f64 * scene.sample_time();
+    let part =
+        |wave: fn(f64) -> f64| base.iter().enumerate().map(|(n, e)| e * wave(turns(n))).sum::<f64>() * 2.0 / 1000.0;
+    let amplitude = part(f64::sin).hypot(part(f64::cos));
+    assert!((amplitude / 9e-5 - 1.0).abs() < 0.03, "{amplitude}");
+}
+
+#[test]
+fn a_device_that_has_tripped_ends_the_run() {
+    let scene = scene();
+    let mut rig = connect(|_| 1);
+    rig.advance(
+        Drive { omega: 55.0, amplitude: 9e-5, displacement: 0.0 },
+        scene.sample_time(),
+    )
+    .unwrap();
+    rig.sense().unwrap();
+    let mut host = Host::new(device());
+    std::mem::swap(&mut host.device, &mut rig.transport().device);
+    host.set("arm", &[0.0]).unwrap();
+    std::mem::swap(&mut host.device, &mut rig.transport().device);
+    let error = (0..1000).find_map(|_| rig.sense().and_then(|_| rig.advance(Drive::default(), 0.0)).err());
+    assert!(error.unwrap().to_string().contains("output of the helic device is off"));
+}
+
+#[test]
+fn names_and_rates_that_do_not_fit_are_explained() {
+    let scene = scene();
+    let step = scene.sample_time();
+    let channels = Channels { response: ("laser".into(), 1e-3), ..Channels::default() };
+    let refused = HelicRig::new(Direct::new(|_| 1), channels, step, 100.0)
+        .err()
+        .unwrap()
+        .to_string();
+    assert!(
+        refused.contains("no source \"laser\"") && refused.contains("response [mm]"),
+        "{refused}"
+    );
+    let refused = HelicRig::new(Direct::new(|_| 1), Channels::default(), 0.7 * step, 70.0)
+        .err()
+        .unwrap();
+    assert!(
+        refused.to_string().contains("controller.samples_per_period"),
+        "{refused}"
+    );
+}
+
+#[test]
+fn a_slower_scene_uses_every_second_sample_of_the_device() {
+    let scene = scene();
+    let mut rig = HelicRig::new(Direct::new(|_| 1), Channels::default(), 2.0 * scene.sample_time(), 50.0).unwrap();
+    for _ in 0..100 {
+        rig.sense().unwrap();
+        rig.advance(Drive::default(), 2.0 * scene.sample_time()).unwrap();
+    }
+    assert!(!rig.counters.is_troubled());
+}
+
+#[test]
+fn the_drive_begins_with_phase_zero_wherever_the_oscillator_of_the_device_is() {
+    let scene = scene();
+    let mut direct = Direct::new(|_| 1);
+    let mut host = Host::new(direct.device);
+    host.set("freq", &[37.0]).unwrap();
+    (0..777).for_each(|_| drop(host.device.tick().unwrap()));
+    direct.device = host.device;
+    let mut rig = HelicRig::new(direct, Channels::default(), scene.sample_time(), 100.0).unwrap();
+    let drive = Drive { omega: 55.0, amplitude: 9e-5, displacement: 0.0 };
+    let mut base = Vec::new();
+    for _ in 0..200 {
+        base.push(rig.sense().unwrap().reference.unwrap());
+        rig.advance(drive, scene.sample_time()).unwrap();
+    }
+    let start = base.iter().position(|e| e.abs() > 1e-9).unwrap();
+    for (n, e) in base[start..].iter().enumerate() {
+        let expected = 9e-5 * (55.0 * (n + 1) as f64 * scene.sample_time()).sin();
+        assert!((e - expected).abs() < 1e-9, "{n}: {e} {expected}");
+    }
+}

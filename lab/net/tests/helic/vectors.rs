@@ -1,0 +1,106 @@
+//! The vectors of the protocol, version 3 (`docs/protocol.md` of helic-daq, "Known-answer vectors").
+
+use vines_net::helic::codec::{BEACON_REQUEST, Frame, Packet, Status, beacon, crc16, message, text};
+
+use super::device::device;
+
+fn bytes(hex: &str) -> Vec<u8> {
+    hex.split_whitespace()
+        .map(|byte| u8::from_str_radix(byte, 16).unwrap())
+        .collect()
+}
+
+#[test]
+fn the_checksum_has_the_published_values() {
+    assert_eq!(crc16(b"123456789"), 0x29b1);
+    assert_eq!(crc16(b""), 0xffff);
+    assert_eq!(crc16(&[0]), 0xe1f0);
+}
+
+#[test]
+fn every_frame_of_the_published_vectors_is_encoded_and_decoded() {
+    let vectors = [
+        (message::GET_PARAMS, 1, "00 00", "48 4C 01 01 02 00 00 00 89 0C"),
+        (message::GET_SOURCES, 1, "", "48 4C 02 01 00 00 98 5E"),
+        (
+            message::SET_BLOCK,
+            2,
+            "0C 00 04 03 02 01 AA BB",
+            "48 4C 05 02 08 00 0C 00 04 03 02 01 AA BB 39 A7",
+        ),
+        (
+            message::COMMIT,
+            3,
+            "0C 00 04 03 02 01",
+            "48 4C 06 03 06 00 0C 00 04 03 02 01 08 D1",
+        ),
+        (
+            message::STATUS,
+            1,
+            "03 11 00 0D 00 00 FA 45 10 A4 00 00",
+            "48 4C 0A 01 0C 00 03 11 00 0D 00 00 FA 45 10 A4 00 00 76 0A",
+        ),
+    ];
+    for (kind, sequence, payload, expected) in vectors {
+        let frame = Frame { kind, sequence, payload: bytes(payload) };
+        assert_eq!(frame.encode(), bytes(expected), "{expected}");
+        let length = bytes(expected).len();
+        assert_eq!(Frame::decode(&bytes(expected)), Ok(Some((frame, length))));
+        for cut in 0..length {
+            assert_eq!(
+                Frame::decode(&bytes(expected)[..cut]),
+                Ok(None),
+                "{cut} bytes of {expected}"
+            );
+        }
+    }
+    let status = Status {
+        version: 3,
+        parameters: 17,
+        sources: 13,
+        sample_rate: 8000.0,
+        uptime: 42000,
+    };
+    assert_eq!(status.encode(), bytes(vectors[4].2));
+    assert_eq!(Status::decode(&status.encode()), Ok(status));
+}
+
+#[test]
+fn definitions_and_sources_have_the_published_form() {
+    let mut device = device();
+    let page = device.handle(
+        &Frame { kind: message::GET_PARAMS, sequence: 0, payload: vec![0, 0] },
+        0,
+    );
+    let published = bytes("66 72 65 71 00 66 01 00 01");
+    assert!(page.payload.windows(published.len()).any(|part| part == published));
+    let entries = bytes("61 64 63 30 00 56 00 6C 61 73 65 72 00 6D 6D 00");
+    let (name, rest) = text(&entries).unwrap();
+    let (unit, rest) = text(rest).unwrap();
+    assert_eq!((&*name, &*unit, text(rest).unwrap().0.as_str()), ("adc0", "V", "laser"));
+}
+
+#[test]
+fn the_beacon_has_the_published_form() {
+    assert_eq!(BEACON_REQUEST[..], bytes("48 4C 01"));
+    let expected = "48 4C 02 03 2E 09 02 48 4C 00 00 01 63 62 63 2D 72 69 67 00 00 00 00 00 00 00 00 00 68 65 6C 69 63 2D 64 61 71 20 73 69 6D \
+                    00 00 00";
+    assert_eq!(beacon(2350, "cbc-rig", "helic-daq sim"), bytes(expected));
+}
+
+#[test]
+fn a_packet_of_the_stream_has_the_published_layout() {
+    let packet = Packet {
+        sequence: 0x0102_0304,
+        first: 5,
+        dropped: 6,
+        decimation: 7,
+        width: 2,
+        values: vec![1.0, -2.0, 0.5, 0.0],
+    };
+    let expected =
+        "48 4C 03 02 04 03 02 01 05 00 00 00 06 00 00 00 07 00 02 00 00 00 80 3F 00 00 00 C0 00 00 00 3F 00 00 00 00";
+    assert_eq!(packet.encode(), bytes(expected));
+    assert_eq!(Packet::decode(&bytes(expected)), Ok(packet));
+    assert!(Packet::decode(&bytes(expected)[..30]).is_err());
+}

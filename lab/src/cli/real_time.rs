@@ -1,0 +1,108 @@
+//! Options of a program that must keep its time: priority, memory and processor.
+
+use std::path::PathBuf;
+
+use clap::Args;
+use vines::{net::Session, report};
+
+use super::failure::Failure;
+
+#[derive(Debug, Args)]
+pub(super) struct RealTimeArguments {
+    /// Real-time priority (SCHED_FIFO), from 1 to 99
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=99))]
+    priority: Option<u8>,
+
+    /// Lock all memory, so that nothing is paged out
+    #[arg(long)]
+    lock_memory: bool,
+
+    /// Run on this processor only, from 0
+    #[arg(long, value_name = "N")]
+    cpu: Option<usize>,
+
+    /// Write the histogram of the lateness of each session to this file (CSV; the last session stays)
+    #[arg(long, value_name = "FILE")]
+    histogram: Option<PathBuf>,
+}
+
+impl RealTimeArguments {
+    /// Asks the system for what the user wants.
+    pub(super) fn apply(&self) -> Result<(), Failure> {
+        if let Some(priority) = self.priority {
+            system::priority(priority).map_err(|error| {
+                let help = "allow it with `ulimit -r 99`, rtprio in /etc/security/limits.conf, or CAP_SYS_NICE";
+                Failure::run(format!("--priority {priority}: the system refuses: {error}; {help}"))
+            })?;
+        }
+        if self.lock_memory {
+            system::lock_memory().map_err(|error| {
+                let help = "allow it with `ulimit -l unlimited`, memlock in /etc/security/limits.conf, or CAP_IPC_LOCK";
+                Failure::run(format!("--lock-memory: the system refuses: {error}; {help}"))
+            })?;
+        }
+        if let Some(cpu) = self.cpu {
+            system::processor(cpu).map_err(|error| {
+                let help = "`nproc` prints how many processors there are; the first is 0";
+                Failure::run(format!("--cpu {cpu}: the system refuses: {error}; {help}"))
+            })?;
+        }
+        Ok(())
+    }
+
+    /// Writes the histogram of a session.
+    pub(super) fn keep(&self, session: &Session) {
+        let (Some(file), Some(all)) = (&self.histogram, &session.punctuality) else {
+            return;
+        };
+        if let Err(error) = report::write_lateness(&all.classes(), file) {
+            eprintln!("warning: {error}");
+        }
+    }
+}
+
+#[cfg(target_os = "linux")]
+mod system {
+    use rustix::{mm, thread};
+    use thread_priority::{
+        RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy, set_thread_priority_and_policy,
+        thread_native_id,
+    };
+
+    pub fn priority(priority: u8) -> Result<(), String> {
+        let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+        let value = ThreadPriority::Crossplatform(priority.try_into()?);
+        set_thread_priority_and_policy(thread_native_id(), value, policy).map_err(|error| error.to_string())
+    }
+
+    pub fn lock_memory() -> Result<(), String> {
+        let all = mm::MlockAllFlags::CURRENT | mm::MlockAllFlags::FUTURE;
+        mm::mlockall(all).map_err(|error| error.to_string())
+    }
+
+    pub fn processor(number: usize) -> Result<(), String> {
+        if number >= thread::CpuSet::MAX_CPU {
+            return Err("there is no such processor".into());
+        }
+        let mut set = thread::CpuSet::new();
+        set.set(number);
+        thread::sched_setaffinity(None, &set).map_err(|error| error.to_string())
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod system {
+    const ABSENT: &str = "this option exists on Linux only";
+
+    pub fn priority(_: u8) -> Result<(), &'static str> {
+        Err(ABSENT)
+    }
+
+    pub fn lock_memory() -> Result<(), &'static str> {
+        Err(ABSENT)
+    }
+
+    pub fn processor(_: usize) -> Result<(), &'static str> {
+        Err(ABSENT)
+    }
+}

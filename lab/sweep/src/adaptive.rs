@@ -1,0 +1,189 @@
+//! Adaptive refinement: the regime is computed where neighbouring cells differ, and inferred elsewhere.
+//!
+//! A grid of distant cells comes first. The neighbours of every pair that differs are computed until borders are surrounded by equal
+//! cells; then the distance is halved, and a new cell takes the regime of the neighbour before it. What is computed next follows from
+//! what is known, so that a sweep that was killed reads the results of its rounds again and goes on.
+
+use std::{collections::BTreeMap, sync::atomic::Ordering::Relaxed};
+
+use rayon::prelude::*;
+use vines_model::regime::Regime;
+
+use crate::{
+    cell::Cell,
+    plan::Plan,
+    run::Monitor,
+    store::{Store, StoreError, code},
+    variables::ABSENT,
+};
+
+/// Folder of the results of rounds; removed at the end.
+pub(crate) const ROUNDS: &str = ".rounds";
+/// Code of a cell that is not known yet.
+const UNKNOWN: u8 = 254;
+
+/// Largest number of cells: all their regimes are in memory, two bytes per cell.
+pub(crate) const MOST: u64 = 1_000_000_000;
+
+/// What is known of all cells.
+struct Map {
+    rows: usize,
+    columns: usize,
+    codes: Vec<u8>,
+    computed: Vec<bool>,
+    failures: BTreeMap<usize, String>,
+}
+
+/// Computes the store of an adaptive sweep. False if the monitor stopped it.
+pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) -> Result<bool, StoreError> {
+    let [rows, columns] = [plan.shape[0] as usize, plan.shape[1] as usize];
+    let mut map = Map {
+        rows,
+        columns,
+        codes: vec![UNKNOWN; rows * columns],
+        computed: vec![false; rows * columns],
+        failures: BTreeMap::new(),
+    };
+    let mut stride = stride;
+    let mut next = map.grid(stride);
+    let mut round = 0;
+    loop {
+        while !next.is_empty() {
+            for (batch, cells) in next.chunks(plan.chunk_size()).enumerate() {
+                if !map.compute(plan, store, &format!("{ROUNDS}/{round}-{batch}"), cells, monitor)? {
+                    return Ok(false);
+                }
+            }
+            round += 1;
+            // Only a cell that was computed, or one beside it, can differ now.
+            let near: Vec<usize> = next.iter().flat_map(|n| map.beside(*n, stride).chain([*n])).collect();
+            next = map.differing(near, stride);
+        }
+        if stride == 1 {
+            break;
+        }
+        stride /= 2;
+        map.infer(stride);
+        next = map.differing(map.grid(stride), stride);
+    }
+    map.write(plan, store, monitor)
+}
+
+impl Map {
+    /// All cells of the grid with this distance.
+    fn grid(&self, stride: usize) -> Vec<usize> {
+        let rows = (0..self.rows).step_by(stride);
+        rows.flat_map(|row| {
+            (0..self.columns)
+                .step_by(stride)
+                .map(move |column| row * self.columns + column)
+        })
+        .collect()
+    }
+
+    /// The eight neighbours of a cell at this distance.
+    fn beside(&self, n: usize, stride: usize) -> impl Iterator<Item = usize> + use<> {
+        let (rows, columns) = (self.rows, self.columns);
+        let around = move |at: usize, size: usize| {
+            [at.checked_sub(stride), Some(at), Some(at + stride)]
+                .into_iter()
+                .flatten()
+                .filter(move |one| *one < size)
+        };
+        around(n / columns, rows)
+            .flat_map(move |row| around(n % columns, columns).map(move |column| row * columns + column))
+            .filter(move |other| *other != n)
+    }
+
+    /// Those of the cells that are not computed and differ from a neighbour, in order.
+    fn differing(&self, mut cells: Vec<usize>, stride: usize) -> Vec<usize> {
+        cells
+            .retain(|n| !self.computed[*n] && self.beside(*n, stride).any(|other| self.codes[other] != self.codes[*n]));
+        cells.sort_unstable();
+        cells.dedup();
+        cells
+    }
+
+    /// New cells of the grid with this distance have the regime of the neighbour before them.
+    fn infer(&mut self, stride: usize) {
+        for n in self.grid(stride) {
+            let (row, column) = (n / self.columns, n % self.columns);
+            if self.codes[n] == UNKNOWN {
+                self.codes[n] = self.codes[(row - row % (2 * stride)) * self.columns + column - column % (2 * stride)];
+            }
+        }
+    }
+
+    /// Computes cells, or reads their results. False if the monitor stopped it.
+    fn compute(
+        &mut self,
+        plan: &Plan,
+        store: &Store,
+        key: &str,
+        cells: &[usize],
+        monitor: &Monitor,
+    ) -> Result<bool, StoreError> {
+        let kept = store
+            .read(key)
+            .and_then(|text| serde_json::from_slice::<Vec<(u8, String)>>(&text).ok());
+        let results = match kept.filter(|results| results.len() == cells.len()) {
+            Some(results) => {
+                monitor.found.fetch_add(cells.len() as u64, Relaxed);
+                results
+            }
+            None => {
+                let one = |n: &usize| {
+                    let index = [(n / self.columns) as u64, (n % self.columns) as u64];
+                    (!monitor.stop.load(Relaxed)).then(|| {
+                        let cell = plan.cell_at(&index);
+                        monitor.note(&cell);
+                        (code(&cell), cell.failure)
+                    })
+                };
+                let Some(results) = cells.par_iter().map(one).collect::<Option<Vec<_>>>() else {
+                    return Ok(false);
+                };
+                store.keep(key, &serde_json::to_vec(&results).unwrap_or_default())?;
+                results
+            }
+        };
+        for (n, (code, failure)) in cells.iter().zip(results) {
+            self.codes[*n] = code;
+            self.computed[*n] = true;
+            if !failure.is_empty() {
+                self.failures.insert(*n, failure);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Writes the chunks that the store does not have.
+    fn write(&self, plan: &Plan, store: &Store, monitor: &Monitor) -> Result<bool, StoreError> {
+        let cell = |index: Vec<u64>| {
+            let n = index[0] as usize * self.columns + index[1] as usize;
+            let regime = Some(self.codes[n]).filter(|code| *code != ABSENT);
+            Cell {
+                regime: regime.map(|code| Regime::SIMULATED[usize::from(code)]),
+                inferred: !self.computed[n],
+                failure: self.failures.get(&n).cloned().unwrap_or_default(),
+                ..Cell::default()
+            }
+        };
+        for index in (0..plan.chunks())
+            .map(|n| plan.chunk_index(n))
+            .filter(|index| !store.has(index))
+        {
+            if monitor.stop.load(Relaxed) {
+                return Ok(false);
+            }
+            let cells: Vec<Cell> = (0..plan.chunk_size() as u64)
+                .map(|n| plan.cell_index(&index, n).map_or_else(Cell::default, cell))
+                .collect();
+            store.write(&index, &cells)?;
+        }
+        let inferred = self.computed.iter().filter(|computed| !**computed).count();
+        monitor.inferred.store(inferred as u64, Relaxed);
+        store.tidy()?;
+        Ok(true)
+    }
+}

@@ -1,0 +1,83 @@
+//! Adaptive maps against full ones, their resumption, and what is refused.
+
+mod common;
+
+use std::{path::Path, sync::atomic::Ordering::Relaxed};
+
+use common::{array, files, plan, refused, settings};
+use vines_sweep::{Monitor, Results, Settings, Shard, run};
+
+#[test]
+fn an_adaptive_map_computes_borders_infers_the_rest_and_resumes_to_the_same_bytes() {
+    let [full, whole, stopped] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
+    let settings = Settings {
+        chunk: 400,
+        ..settings(&["sigma=-1.6:-0.9:40", "excitation.G=0.8:1.3:40"])
+    };
+    assert!(
+        run(
+            &plan(settings.clone()).unwrap(),
+            full.path(),
+            Shard::ALL,
+            &Monitor::default()
+        )
+        .unwrap()
+    );
+    let plan = plan(Settings { adaptive: Some(8), ..settings }).unwrap();
+    let monitor = Monitor::default();
+    assert!(run(&plan, whole.path(), Shard::ALL, &monitor).unwrap());
+    let (computed, inferred) = (monitor.computed.load(Relaxed), monitor.inferred.load(Relaxed));
+    assert_eq!(computed + inferred, 1600);
+    let same = differences(full.path(), whole.path());
+    println!("{computed} computed, {inferred} inferred, {same} differ");
+    assert!(inferred > 600 && same < 80, "{inferred} inferred, {same} differ");
+    // The first rounds are read again, whatever has been removed.
+    let monitor = Monitor::default();
+    monitor.stop.store(true, Relaxed);
+    assert!(!run(&plan, stopped.path(), Shard::ALL, &monitor).unwrap());
+    let monitor = Monitor::default();
+    std::thread::scope(|scope| {
+        scope.spawn(|| {
+            while monitor.computed.load(Relaxed) < computed / 2 {
+                std::thread::yield_now();
+            }
+            monitor.stop.store(true, Relaxed);
+        });
+        // It may end before the flag is set.
+        run(&plan, stopped.path(), Shard::ALL, &monitor).unwrap();
+    });
+    let monitor = Monitor::default();
+    assert!(run(&plan, stopped.path(), Shard::ALL, &monitor).unwrap());
+    assert!(monitor.found.load(Relaxed) > 0);
+    assert!(files(whole.path()) == files(stopped.path()));
+    let part = run(&plan, stopped.path(), Shard { number: 0, of: 2 }, &Monitor::default());
+    assert!(part.unwrap_err().to_string().contains("in parts"));
+}
+
+/// Number of cells whose regimes differ.
+fn differences(one: &Path, other: &Path) -> usize {
+    let codes = |folder: &Path| -> Vec<u8> {
+        let array = array(folder, "regime");
+        array.retrieve_array_subset(&array.subset_all()).unwrap()
+    };
+    codes(one)
+        .iter()
+        .zip(codes(other))
+        .filter(|(one, other)| *one != other)
+        .count()
+}
+
+#[test]
+fn adaptive_sweeps_that_make_no_sense_are_refused() {
+    let adaptive = |axes: &[&str], stride| refused(Settings { adaptive: Some(stride), ..settings(axes) });
+    assert!(adaptive(&["sigma=-1:1:9", "plant.r=0.5,0.6"], 3).contains("every 3-th"));
+    assert!(adaptive(&["sigma=-1:1:9"], 8).contains("two axes"));
+    assert!(adaptive(&["sigma=-1:1:99999", "plant.r=0.5:0.6:99999"], 8).contains("in memory"));
+    let results = Results::parse(["response"]).unwrap();
+    let more = Settings {
+        adaptive: Some(8),
+        results,
+        ..settings(&["sigma=-1:1:9", "plant.r=0.5,0.6"])
+    };
+    assert!(refused(more).contains("the regime only"));
+}
