@@ -53,6 +53,8 @@ pub struct Move {
     pub amplitude: Real,
     /// Expected change of the frequency, rad/s; 0 if unknown.
     pub omega: Real,
+    /// Growth of the setpoint at the end, m/s, at which it goes on from there; 0 to hold it.
+    pub growth: Real,
 }
 
 /// State of the loop while it controls the response.
@@ -67,6 +69,10 @@ pub struct AmplitudeState {
     samples: u64,
     /// Samples since the start of the trajectory.
     taken: u64,
+    /// Growth at the start and at the end, as multiples of the mean growth of the trajectory.
+    growths: [Real; 2],
+    /// Growth in the last sample, m.
+    growth: Real,
     /// Present setpoint of the response amplitude, m.
     setpoint: Real,
     /// Reading of the detector that the setpoint leads to, m.
@@ -83,18 +89,23 @@ impl AmplitudeState {
             from: response,
             samples: 0,
             taken: 0,
+            growths: [0.0; 2],
+            growth: 0.0,
             setpoint: response,
             expected: response,
             integral: amplitude,
         }
     }
 
-    /// Starts a trajectory at the present setpoint.
+    /// Starts a trajectory at the present setpoint, with its present growth.
     pub fn start(&mut self, trajectory: Move, sample_time: Real) {
         self.from = self.setpoint;
         self.trajectory = trajectory;
         self.samples = real::ceil(trajectory.duration / sample_time) as u64;
         self.taken = 0;
+        let mean = (trajectory.response - self.from) / self.samples as Real;
+        let relative = |growth: Real| Some(growth / mean).filter(|growth| growth.is_finite());
+        self.growths = [self.growth, trajectory.growth * sample_time].map(|growth| relative(growth).unwrap_or(0.0));
         if self.samples == 0 {
             self.setpoint = trajectory.response;
             self.integral += trajectory.amplitude;
@@ -113,12 +124,14 @@ impl AmplitudeState {
 
     /// Advances the trajectory by one sample. Returns the share of the trajectory in this sample, and the growth of the
     /// setpoint, m.
-    fn advance(&mut self) -> (Real, Real) {
+    fn advance(&mut self, sample_time: Real) -> (Real, Real) {
         if self.has_arrived() {
-            return (0.0, 0.0);
+            self.growth = self.trajectory.growth * sample_time;
+            self.setpoint += self.growth;
+            return (0.0, self.growth);
         }
         let before = self.setpoint;
-        let share = |taken: u64| smooth(taken as Real / self.samples as Real);
+        let share = |taken: u64| smooth(taken as Real / self.samples as Real, self.growths);
         let progress = share(self.taken + 1) - share(self.taken);
         self.taken += 1;
         self.setpoint = if self.has_arrived() {
@@ -126,13 +139,15 @@ impl AmplitudeState {
         } else {
             self.from + (self.trajectory.response - self.from) * share(self.taken)
         };
-        (progress, self.setpoint - before)
+        self.growth = self.setpoint - before;
+        (progress, self.growth)
     }
 }
 
-/// Rises from 0 to 1 with continuous velocity and acceleration at both ends.
-fn smooth(x: Real) -> Real {
-    x - real::sin(TAU * x) / TAU
+/// Rises from 0 to 1, with the slopes `begin` and `end` at the ends; velocity and, between equal slopes, acceleration are continuous there.
+fn smooth(x: Real, [begin, end]: [Real; 2]) -> Real {
+    let ramp = begin * x + 0.5 * (end - begin) * x * x;
+    ramp + (1.0 - 0.5 * (begin + end)) * (x - real::sin(TAU * x) / TAU)
 }
 
 impl AmplitudeLoop {
@@ -160,7 +175,7 @@ impl AmplitudeLoop {
     /// acts. Returns the drive amplitude, m, which differs from `before` at most by the ramp's rate, and the shift of the
     /// frequency, rad/s.
     pub fn follow(&self, state: &mut AmplitudeState, before: Real, reading: Option<Real>) -> (Real, Real) {
-        let (progress, growth) = state.advance();
+        let (progress, growth) = state.advance(self.sample_time);
         state.expected += self.detector_step * (state.setpoint - state.expected);
         let planned = state.integral + progress * state.trajectory.amplitude;
         state.integral = planned.clamp(0.0, self.amplitude_max);

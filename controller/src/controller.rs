@@ -98,6 +98,7 @@ impl PhaseLock {
         Quantity::new("duration", to.duration, "s").not_negative()?;
         Quantity::new("amplitude", to.amplitude, "m").check(true, "a finite number")?;
         Quantity::new("omega", to.omega, "rad/s").check(true, "a finite number")?;
+        Quantity::new("growth", to.growth, "m/s").check(true, "a finite number")?;
         if self.config.amplitude_max.is_none() {
             return Err(ConfigError {
                 name: "amplitude_max",

@@ -33,11 +33,12 @@ impl Signal {
 pub const INPUTS: [(&str, &str); 3] = [("response", "m"), ("reference", "m"), ("active", "")];
 
 /// The fields of a [`Move`](crate::Move), with their units.
-pub const MOVE: [(&str, &str); 4] = [
+pub const MOVE: [(&str, &str); 5] = [
     ("response", "m"),
     ("duration", "s"),
     ("amplitude", "m"),
     ("omega", "rad/s"),
+    ("growth", "m/s"),
 ];
 
 macro_rules! outputs {

@@ -88,7 +88,7 @@ proptest! {
         for (n, (response, reference, active)) in readings.into_iter().enumerate() {
             if hold && n % 50 == 40 {
                 // Refused while the loop is open; otherwise the outputs must stay within the limits.
-                let to = Move { response: 0.01, duration: 0.1, amplitude: 1.0, omega: -500.0 };
+                let to = Move { response: 0.01, duration: 0.1, amplitude: 1.0, omega: -500.0, growth: 0.0 };
                 let _ = controller.hold_response(&mut state, to);
             }
             let output = controller.process(&mut state, Input { response, reference, active });

@@ -22,7 +22,7 @@ fn the_response_amplitude_is_controlled_and_moved_to_another_setpoint() {
             response: share * before,
             duration: 0.5,
             amplitude: drive,
-            omega: 0.0,
+            ..Move::default()
         };
         bench
             .controller

@@ -149,7 +149,7 @@ fn holding(config: Config) -> Bench {
         response: 0.5 * bench.sample().response_amplitude,
         duration: 1.0,
         amplitude: -0.5 * AMPLITUDE,
-        omega: 0.0,
+        ..Move::default()
     };
     bench
         .controller

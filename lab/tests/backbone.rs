@@ -38,6 +38,16 @@ fn tracked(settings: &[&str]) -> TrackedComparison {
 
 #[test]
 fn clean_points_lie_within_1e_3_of_the_exact_orbits_at_equal_c_at_15_periods_each() {
+    for epsilon in ["plant.epsilon=0.001", "plant.epsilon=0.02"] {
+        let report = tracked(&[epsilon, "plant.lambda=1.43"]);
+        assert!(report.periods_per_point() <= 15.0);
+        for one in &report.points {
+            let (exact, point) = (one.exact.unwrap(), one.point);
+            let (sigma, g) = (exact.sigma.unwrap().abs(), exact.g.unwrap().abs());
+            assert!(sigma <= 1e-3 && g <= 1e-3, "{one:?}");
+            assert!(sigma <= 4.0 * point.u_sigma && g <= 4.0 * point.u_g, "{one:?}");
+        }
+    }
     let report = tracked(&[]);
     assert!(report.worst().unwrap().at_equal_c <= 1e-3);
     assert!(report.periods_per_point() <= 15.0);

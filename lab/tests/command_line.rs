@@ -204,7 +204,6 @@ fn absurd_curves_and_maps_are_refused() {
     fails(&["orbit", "--sigma=-1", "--set", "excitation.G=0.6"], 1, "vines map");
     fails(&["orbit", "--response", "--set", "excitation.G=0"], 1, "G = 0");
     fails(&["orbit", "--response", "--range=2:-2"], 2, "first below the last");
-    fails(&["identify", "--set", "resonance.definition='peak'"], 2, "phase_target");
     fails(&["theory", "--sigma=nan"], 2, "finite");
     fails(&["decay", "--set", "chain.snr=20"], 2, "[chain] has no effect");
     let refused = ["identify", "--set", "controller.G_max=1.0"];

@@ -203,6 +203,8 @@ typedef struct PhaseLockMove {
   PhaseLockReal amplitude;
   // Expected change of the frequency, rad/s; 0: none.
   PhaseLockReal omega;
+  // Growth of the setpoint at the end, m/s, at which it goes on from there; 0 to hold it.
+  PhaseLockReal growth;
 } PhaseLockMove;
 
 #ifdef __cplusplus

@@ -96,6 +96,7 @@ impl From<&PhaseLockMove> for Move {
             duration: to.duration,
             amplitude: to.amplitude,
             omega: to.omega,
+            growth: to.growth,
         }
     }
 }

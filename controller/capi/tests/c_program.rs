@@ -59,6 +59,7 @@ fn by_the_core() -> String {
                 duration: 1.0,
                 amplitude: -0.5 * amplitude,
                 omega: 0.0,
+                ..Move::default()
             };
             controller.hold_response(&mut state, to).unwrap();
         }

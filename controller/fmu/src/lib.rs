@@ -129,6 +129,7 @@ impl Component for Controller {
             Real::move_duration => self.to.duration,
             Real::move_amplitude => self.to.amplitude,
             Real::move_omega => self.to.omega,
+            Real::move_growth => self.to.growth,
             computed => match self.value(computed) {
                 Value::Real(value) => value,
                 other => unreachable!("{computed:?} = {other:?} is a real number"),
@@ -144,6 +145,7 @@ impl Component for Controller {
             Real::move_duration => self.to.duration = value,
             Real::move_amplitude => self.to.amplitude = value,
             Real::move_omega => self.to.omega = value,
+            Real::move_growth => self.to.growth = value,
             parameter => return self.set_parameter(parameter, Value::Real(value)),
         }
         Ok(())

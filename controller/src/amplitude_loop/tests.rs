@@ -64,7 +64,7 @@ fn an_expected_change_of_the_drive_reduces_the_control_error() {
         response: 0.8,
         duration: 60.0,
         amplitude: -0.2 * DELTA / GAIN,
-        omega: 0.0,
+        ..Move::default()
     };
     let expected = worst(to, 0);
     let unexpected = worst(Move { amplitude: 0.0, ..to }, 0);
@@ -100,10 +100,46 @@ fn the_drive_stays_within_its_limits_without_windup() {
 }
 
 #[test]
+fn a_move_with_a_growth_goes_on_at_that_rate_until_the_next_one() {
+    let control = amplitude_loop(1.0);
+    let (_, mut state) = settled();
+    // Largest and smallest rate after some samples of a move.
+    let mut go = |to: Move, skipped: usize, samples: usize| {
+        state.start(to, DT);
+        let mut rates = [f64::INFINITY, f64::NEG_INFINITY];
+        for n in 0..samples {
+            let before = state.setpoint();
+            control.follow(&mut state, 0.0, Some(1.0));
+            let rate = (state.setpoint() - before) / DT;
+            if n >= skipped {
+                rates = [rates[0].min(rate), rates[1].max(rate)];
+            }
+        }
+        rates
+    };
+    let is = |rates: [f64; 2], rate: f64| rates.iter().all(|one| (one - rate).abs() < 1e-9);
+    let crossing = Move {
+        response: 0.9,
+        duration: 1.0,
+        growth: -0.1,
+        ..Move::default()
+    };
+    assert!(is(go(crossing, 100, 120), -0.1));
+    assert!(is(go(Move { response: 0.78, ..crossing }, 0, 100), -0.1));
+    assert!(is(
+        go(Move { response: 0.75, duration: 1.0, ..Move::default() }, 101, 110),
+        0.0
+    ));
+}
+
+#[test]
 fn the_shifts_of_the_frequency_add_up_to_the_expected_change() {
     let control = amplitude_loop(1.0);
     let (_, mut state) = settled();
-    state.start(Move { response: 1.1, duration: 3.0, amplitude: 0.0, omega: -0.7 }, DT);
+    state.start(
+        Move { response: 1.1, duration: 3.0, omega: -0.7, ..Move::default() },
+        DT,
+    );
     let shifted: f64 = (0..400).map(|_| control.follow(&mut state, 0.0, Some(1.0)).1).sum();
     assert!((shifted + 0.7).abs() < 1e-12);
 }

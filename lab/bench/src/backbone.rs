@@ -10,6 +10,7 @@ mod peak;
 mod point;
 mod predictor;
 mod settle;
+mod sweep;
 mod track;
 
 pub use point::{Point, Tracked};

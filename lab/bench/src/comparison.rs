@@ -10,7 +10,7 @@ use vines_model::orbit::{self, Orbit};
 use vines_model::theory::{BackbonePoint, free_sigma, resonant};
 
 use crate::identification::{DecayEnd, DecayPoint, Identification, Lock};
-use crate::scene::{Resonance, Scene};
+use crate::scene::{PhaseTarget, Resonance, Scene};
 
 pub use exact_curve::{Distance, ExactCurve};
 pub use tracked::{TrackedComparison, TrackedPoint, Worst};
@@ -25,6 +25,9 @@ pub const COMPARED_ABOVE: f64 = 0.2;
 pub struct Comparison {
     /// The numbers all of this belongs to.
     pub parameters: Dimensionless,
+    /// The phase that the lock held.
+    #[serde(flatten)]
+    pub phase: PhaseTarget,
     /// The locked point as measured.
     pub lock: Lock,
     /// First-order theory at the same G: the stable solution nearest to the lock; absent if the phase target is not
@@ -63,7 +66,6 @@ impl Comparison {
     #[must_use]
     pub fn of(found: &Identification, scene: &Scene) -> Self {
         let (parameters, lock) = (found.parameters, found.lock);
-        // At the peak the user gives the phase.
         let peak = scene.resonance.resonance == Resonance::Peak;
         let at_resonance = peak || scene.controller.is_at_phase_resonance();
         let distance = |sigma: f64, c: f64| (sigma - lock.sigma).hypot(c - lock.c);
@@ -96,6 +98,7 @@ impl Comparison {
             rms_sigma_exact: rms(&decay, |one| Some(one.point.sigma - one.sigma_exact?)),
             rms_steady_exact: rms(&decay, steady),
             parameters,
+            phase: scene.phase_target(),
             lock,
             theory,
             exact,

@@ -6,6 +6,7 @@ mod cycle;
 mod decay;
 mod fit;
 mod lock;
+mod motion;
 mod regime;
 mod response;
 
@@ -17,7 +18,7 @@ use crate::scene::{Dimensionless, Scene};
 pub use balance::{Balance, Slopes};
 pub use cycle::Cycle;
 pub use decay::{DecayEnd, DecayPoint, DecayPoints, decay_points};
-pub use lock::Lock;
+pub use lock::{LATE, Lock};
 use regime::longer_after;
 pub use regime::{classify, impacts};
 pub use response::regime_by_response;

@@ -23,6 +23,7 @@ use serde::{Deserialize, Serialize};
 
 pub use backbone::{Backbone, Predictor};
 pub use chain::{Chain, RatioOf};
+pub use configuration::{PhaseOrigin, PhaseTarget};
 pub use controller::Controller;
 pub use error::SceneError;
 pub use family::Family;

@@ -216,8 +216,8 @@ impl Controller for FmuController {
 
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
         let inputs = self.response_loop.as_ref().ok_or(ControllerError::NoResponseLoop)?;
-        let Move { response, duration, amplitude, omega } = to;
-        let values = [phase_target, response, duration, amplitude, omega];
+        let Move { response, duration, amplitude, omega, growth } = to;
+        let values = [phase_target, response, duration, amplitude, omega, growth];
         let values: Vec<f64> = inputs
             .reals
             .iter()

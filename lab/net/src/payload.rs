@@ -89,14 +89,22 @@ pub(super) fn read_command(frame: &Frame) -> Command {
 /// Writes a move of the response and its phase target, rad, into a frame.
 pub(super) fn write_move(mut frame: Frame, to: Move, phase_target: f64) -> Frame {
     frame.kind = Kind::Move;
-    frame.values = [to.response, to.duration, to.amplitude, to.omega, phase_target, 0.0];
+    frame.values = [
+        to.response,
+        to.duration,
+        to.amplitude,
+        to.omega,
+        phase_target,
+        to.growth,
+    ];
     frame
 }
 
 /// The move and the phase target in a frame.
 pub(super) fn read_move(frame: &Frame) -> (Move, f64) {
-    let [response, duration, amplitude, omega, phase_target, _] = frame.values;
-    (Move { response, duration, amplitude, omega }, phase_target)
+    let [response, duration, amplitude, omega, phase_target, growth] = frame.values;
+    let to = Move { response, duration, amplitude, omega, growth };
+    (to, phase_target)
 }
 
 #[cfg(test)]

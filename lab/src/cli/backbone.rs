@@ -16,7 +16,7 @@ use super::{
 };
 
 const HELP: &str = "\
-Holds the response at one level after another, and measures the drive and the frequency:
+Leads the response from level to level, and measures the drive and the frequency:
   C           amplitude of the first harmonic of the response that the scene's sensor reads, over b
   sigma       detuning (Omega - 1)/epsilon of resonance as [resonance] defines it
   G           base amplitude over b epsilon

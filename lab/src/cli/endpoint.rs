@@ -16,7 +16,7 @@ use vines::{
         resolve,
     },
     rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable},
-    scene::{Name, Names, Resonance, Scene},
+    scene::{Name, Names, Scene},
 };
 
 use super::{failure::Failure, interrupt::stop_flag};
@@ -186,12 +186,6 @@ const HELIC_ADVICE: &str = "is `vines rig --protocol helic` or a device running 
 
 /// Refuses settings with which no experiment can begin, before anything is written or driven.
 pub(super) fn check(scene: &Scene) -> Result<(), Failure> {
-    if scene.resonance.resonance == Resonance::Peak && scene.controller.phase_target == -90.0 {
-        return Err(Failure::input(
-            "resonance.definition = \"peak\" with controller.phase_target = -90 degrees: the loop holds a phase, so set phase_target to the \
-             phase at the peak, which `vines orbit` computes and `vines backbone` measures",
-        ));
-    }
     BuiltIn::new(&scene.controller_config())?;
     Ok(())
 }

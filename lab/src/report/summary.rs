@@ -5,7 +5,7 @@ use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPo
 use crate::identification::{DecayEnd, Regime};
 use crate::map::Map;
 use crate::orbit::Orbit;
-use crate::scene::{Definition, Dimensionless, Sensor};
+use crate::scene::{Definition, Dimensionless, PhaseOrigin, Sensor};
 
 /// Periods over which the ripple of an acceleration averages out.
 const RIPPLE: usize = 200;
@@ -65,13 +65,22 @@ pub fn identification(found: &Comparison) -> String {
     } else {
         ""
     };
+    let phase = match found.phase.origin {
+        PhaseOrigin::Scene => String::new(),
+        PhaseOrigin::ExactOrbit => format!(
+            "  (held at {:.3} degrees, the phase of the exact orbit of these parameters at the peak; on a rig with other parameters the peak \
+             is elsewhere, and `vines backbone` measures it)\n",
+            found.phase.degrees
+        ),
+        PhaseOrigin::Theory => "  (held at -90 degrees, where first-order theory has the peak)\n".into(),
+    };
     let ripple = if found.parameters.definition.sensor == Sensor::Acceleration && lock.averaged < RIPPLE {
         "  (the impacts leave a ripple on an acceleration: hold 200 periods, record.hold_periods, for 1e-3 in sigma and C)\n"
     } else {
         ""
     };
     format!(
-        "{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{ripple}{}\n{}\n{}\n",
+        "{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{phase}{ripple}{}\n{}\n{}\n",
         rig(&found.parameters),
         with_uncertainty(lock.g, lock.u_g),
         lock.periods_to_lock,

@@ -6,7 +6,7 @@ use vines::comparison::Comparison;
 use vines::experiment::{self, Plan, Record};
 use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
 use vines::rig::{BuiltIn, Chain, Drive, GroundTruth, Rig, RigError, Sensors, Simulated};
-use vines::scene::{Override, Scene};
+use vines::scene::{Override, PhaseOrigin, PhaseTarget, Scene};
 
 fn scene(settings: &[&str]) -> Scene {
     let overrides: Vec<Override> = settings.iter().map(|s| s.parse().unwrap()).collect();
@@ -78,15 +78,18 @@ fn the_lock_is_the_exact_orbit_for_every_sensor_and_reference() {
             assert!(sigma < 2e-3 && c < 2e-3, "{reference} {sensor}");
         }
     }
-    // At the phase of the exact peak, the lock is the peak.
-    let peak = scene(&["resonance.definition='peak'"]).dimensionless();
-    let orbits = vines::orbit::phase_resonant(&peak);
-    let phase = orbits.iter().find(|one| one.stable).unwrap().gamma.to_degrees();
-    let (sigma, c) = lock(&[
-        "resonance.definition='peak'",
-        &format!("controller.phase_target={phase}"),
-    ]);
-    assert!(sigma < 2e-3 && c < 2e-3);
+    // The lab takes the phase of the peak from the exact orbit.
+    let peak = "resonance.definition='peak'";
+    let found = identified(&[peak]);
+    assert_eq!(found.phase.origin, PhaseOrigin::ExactOrbit);
+    assert!((found.phase.degrees + 89.0).abs() < 0.1, "{:?}", found.phase);
+    for settings in [[peak, "resonance.sensor='q1'"], [peak, "excitation.G=1.3"]] {
+        let (sigma, c) = lock(&settings);
+        assert!(sigma < 2e-3 && c < 2e-3, "{settings:?}");
+    }
+    // A phase that the scene states is held.
+    let stated = scene(&[peak, "controller.phase_target=-88"]).phase_target();
+    assert_eq!(stated, PhaseTarget { degrees: -88.0, origin: PhaseOrigin::Scene });
 }
 
 #[test]

@@ -11,6 +11,10 @@ pub(super) struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
     pub bench: experiment::Bench<'a, R, C>,
     pub stage: Stage,
     pub target: f64,
+    /// The last period.
+    pub last: Option<Cycle>,
+    /// Whether the response changes at a constant rate.
+    pub sweeping: bool,
 }
 
 impl<'a, R: Rig + ?Sized, C: ?Sized> Deref for Bench<'a, R, C> {
@@ -39,6 +43,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
             }
             let phase = first * std::f64::consts::TAU;
             if let Some(cycle) = Cycle::of(&self.samples[begin..], self.sample_time, phase, self.target) {
+                self.last = Some(cycle);
                 return Ok(cycle);
             }
         }

@@ -13,6 +13,12 @@ use vines_model::{Dimensionless, numerics::mean};
 /// Phases from resonance at which every level is held, rad.
 pub const PHASES: [f64; 3] = [-0.25, 0.0, 0.25];
 
+/// Error of the drives at the level `c` over that of sigma at the peak which follows from them: the phase of the peak is the slope of the
+/// drive over the phase, and sigma changes by G/(2 C) with it.
+pub fn share_of_drive(c: f64) -> f64 {
+    (c * (PHASES[2] - PHASES[0]) * std::f64::consts::SQRT_2).min(1.0)
+}
+
 /// Drive and detuning that hold the resonance `(C, G, sigma)` at the phase `x`, rad, from it.
 pub fn at_phase(known: &Known, x: f64, epsilon: f64) -> [f64; 2] {
     let g = known.g / x.cos();

@@ -1,6 +1,6 @@
 //! Prediction of the drive and the frequency at the next level.
 
-use crate::identification::Slopes;
+use crate::identification::{LATE, Slopes};
 use crate::scene::{Predictor, Scene};
 use vines_model::Dimensionless;
 use vines_model::theory::{SlowFlow, backbone_at_level};
@@ -58,7 +58,7 @@ pub fn move_periods(scene: &Scene, from: Option<&Known>, level: f64) -> f64 {
 }
 
 /// Slopes of the backbone at a level by the last points, or what is known without them: their order of magnitude.
-pub fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
+pub fn slopes(scene: &Scene, known: &[Known], [level, phase]: [f64; 2]) -> Slopes {
     let d = scene.dimensionless();
     let flow = SlowFlow::new(d.lambda, d.r);
     let drift = flow.drift(level).map_or([0.0; 2], |drift| [drift.g, drift.sigma]);
@@ -73,12 +73,20 @@ pub fn slopes(scene: &Scene, known: &[Known], level: f64) -> Slopes {
         }
         _ => ([1.0, 2.0], [0.0, 5.0]),
     };
+    let step = 1e-3 * level;
+    let by_theory = |c: f64| backbone_at_level(&d, c).map(|point| [point.g, point.sigma]);
+    let bend = match [level - step, level, level + step].map(by_theory) {
+        [Some(low), Some(middle), Some(high)] => [0, 1].map(|i| (low[i] - 2.0 * middle[i] + high[i]) / (step * step)),
+        _ => [0.0; 2],
+    };
     Slopes {
         base: g.map(|g| d.amplitude(g) / d.b),
         omega: sigma.map(|sigma| d.omega_change(sigma) / d.b),
+        late: LATE,
+        // The damper's force on the base leads it by 2 zeta.
+        phase: [phase, d.epsilon * d.lambda],
         drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
-        // The spread of a held amplitude is small.
-        curvature: [0.0; 2],
+        curvature: [d.amplitude(bend[0]), d.omega_change(bend[1])].map(|bend| bend / (d.b * d.b)),
     }
 }
 

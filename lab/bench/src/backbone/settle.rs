@@ -20,6 +20,8 @@ pub struct Criterion {
     pub tolerance: [f64; 2],
     /// Phase error at which the point is held, rad.
     pub phase: f64,
+    /// Largest relative deviation of the amplitude within the periods, unless it is noise.
+    pub spread: f64,
     /// Fewest periods.
     pub fewest: usize,
     /// Slopes of the backbone, as far as they are known.
@@ -61,12 +63,12 @@ impl Found {
 
 /// Largest deviation of the phase, rad, from that which is held.
 const PHASE_RANGE: f64 = 0.3;
-/// Largest relative deviation of the amplitude within the periods, unless it is noise.
-const SPREAD: f64 = 0.01;
 /// Difference of the halves, in its standard uncertainties, that still counts as noise.
 const RANDOM: f64 = 2.0;
 /// Largest scatter of the residuals over the noise of the sensors for a steady motion whose uncertainty is not yet small.
 const STEADY: f64 = 2.0;
+/// Relative uncertainty of the effect of the curvature.
+pub const BENT: f64 = 0.05;
 /// Shares of the periods that are considered, from the last one backwards.
 const SHARES: [f64; 6] = [1.0, 0.85, 0.7, 0.55, 0.45, 0.35];
 
@@ -77,8 +79,15 @@ impl Criterion {
         let n = cycles.len();
         let counts = SHARES.map(|share| (share * n as f64).round() as usize);
         let considered = counts.into_iter().filter(|count| *count >= self.fewest);
+        self.best_of(considered.map(|count| &cycles[n - count..]))
+    }
+
+    /// The best estimate from all of some periods; `None` for too few.
+    #[must_use]
+    pub fn best_of<'a>(&self, considered: impl IntoIterator<Item = &'a [Cycle]>) -> Option<Found> {
         considered
-            .filter_map(|count| self.from(&cycles[n - count..]))
+            .into_iter()
+            .filter_map(|cycles| self.from(cycles))
             .filter(|found| found.at.iter().all(|one| (one.value + one.uncertainty).is_finite()))
             .min_by(|one, other| self.size(one).total_cmp(&self.size(other)))
     }
@@ -104,7 +113,7 @@ impl Criterion {
         let noise = 4.0 * cycles[0].noise[0].sqrt();
         let is_near = |cycle: &Cycle| {
             let deviation = (cycle.amplitude() - amplitude).abs();
-            deviation <= (SPREAD * amplitude).max(noise) && (cycle.phase_error - self.phase).abs() <= PHASE_RANGE
+            deviation <= (self.spread * amplitude).max(noise) && (cycle.phase_error - self.phase).abs() <= PHASE_RANGE
         };
         if !cycles.iter().all(is_near) {
             return None;
@@ -118,14 +127,15 @@ impl Criterion {
             let noise = first[i].uncertainty.hypot(second[i].uncertainty);
             ((first[i].value - second[i].value).abs() - RANDOM * noise).max(0.0)
         });
-        let systematic = [0, 1].map(|i| drifts[i].hypot(whole.remainders[i]));
+        let bent = whole.bent();
+        let systematic = [0, 1].map(|i| drifts[i].hypot(whole.remainders[i]).hypot(BENT * bent[i]));
         Some(Found {
             periods: cycles.len(),
             response: whole.response,
             phase_error: whole.phase_error,
             at: [0, 1].map(|i| {
                 Estimate::new(
-                    estimates[i].value,
+                    estimates[i].value - bent[i],
                     &[estimates[i].uncertainty, slopes[i], systematic[i]],
                 )
             }),

@@ -5,6 +5,7 @@ use super::peak;
 use super::point::{Point, Tracked};
 use super::predictor::{self, FIRST, Known, LAST, PHASE};
 use super::settle::{Criterion, Found};
+use super::sweep;
 use crate::experiment::{self, ExperimentError, Sample, Stage};
 use crate::identification::{Cycle, Regime, classify, regime_by_response};
 use crate::rig::{Controller, LoopState, Move, Rig};
@@ -33,6 +34,8 @@ pub fn track(
         bench: experiment::Bench::new(rig, controller, scene.sample_time(), &mut samples),
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
+        last: None,
+        sweeping: false,
     };
     approach(&mut bench, scene.lock_periods())?;
     let periods_to_lock = bench.periods;
@@ -43,15 +46,21 @@ pub fn track(
     };
     let mut scans: Vec<Vec<Point>> = vec![Vec::new(); phases.len()];
     // The last point, and the phase at which it was held.
-    let mut last: Option<(Point, f64)> = None;
-    let mut ended = None;
+    let (mut last, mut ended) = (None::<(Point, f64)>, None);
     'levels: for (n, &level) in levels.iter().enumerate() {
         progress(n, levels.len());
         for k in 0..phases.len() {
             // The next level begins at the phase at which this one ends.
             let scan = if n % 2 == 0 { k } else { phases.len() - 1 - k };
             let order = &Order { level, phase: phases[scan], known: known(&scans[scan], last) };
-            match go(&mut bench, scene, order, last) {
+            // The last level is held: a crossing would go beyond it.
+            let crossed = last.filter(|_| phases.len() == 1 && n + 1 < levels.len());
+            let crossing = crossed.and_then(|(last, _)| Some((last, sweep::periods(&bench, scene, order, &last)?)));
+            let next = match crossing {
+                Some((last, periods)) => sweep::cross(&mut bench, scene, order, (&last, periods)),
+                None => go(&mut bench, scene, order, last),
+            };
+            match next {
                 Ok(point) => {
                     scans[scan].push(point);
                     last = Some((point, order.phase));
@@ -74,13 +83,13 @@ pub fn track(
 }
 
 /// What is to be held next.
-struct Order {
+pub(super) struct Order {
     /// Response amplitude over b.
-    level: f64,
+    pub level: f64,
     /// Phase error, rad.
-    phase: f64,
+    pub phase: f64,
     /// The points before.
-    known: Vec<Known>,
+    pub known: Vec<Known>,
 }
 
 /// The points of a scan; before its first, the last one of another.
@@ -121,13 +130,17 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
         duration: periods * d.natural_period(),
         amplitude: d.amplitude(g),
         omega: d.omega_change(sigma),
+        growth: 0.0,
     };
     let target = bench.target + phase;
+    bench.sweeping = false;
     bench.controller.hold_response(to, target)?;
     let changed = last.map_or(FIRST, |(_, held)| if held == phase { -LAST } else { PHASE });
     hold(bench, scene, order, periods + changed)
 }
 
+/// Largest relative deviation of a held amplitude within the periods, unless it is noise.
+const SPREAD: f64 = 0.01;
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
 /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
@@ -158,15 +171,21 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
 }
 
 /// The criterion for a settled point.
-fn criterion(scene: &Scene, order: &Order) -> Criterion {
+pub(super) fn criterion(scene: &Scene, order: &Order) -> Criterion {
     let (settings, d) = (&scene.backbone, scene.dimensionless());
+    let share = match scene.resonance.resonance {
+        Resonance::Phase => 1.0,
+        Resonance::Peak => peak::share_of_drive(order.level),
+    };
     let pair = |size: f64| [d.amplitude(size), d.omega_change(size)];
+    let [base, omega] = pair(settings.tolerance);
     Criterion {
         omega0: d.omega0,
         precision: pair(settings.precision),
-        tolerance: pair(settings.tolerance),
+        tolerance: [share * base, omega],
+        spread: SPREAD,
         fewest: settings.dwell_min as usize,
-        slopes: predictor::slopes(scene, &order.known, order.level),
+        slopes: predictor::slopes(scene, &order.known, [order.level, order.phase]),
         phase: order.phase,
     }
 }
@@ -179,27 +198,56 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     move_periods: f64,
 ) -> Result<Point, ExperimentError> {
     let level = order.level;
-    let (settings, d) = (&scene.backbone, scene.dimensionless());
+    let settings = &scene.backbone;
     let start = bench.periods;
     bench.samples.clear();
     while bench.periods - start < move_periods {
         bench.cycle()?;
     }
     let criterion = criterion(scene, order);
-    let is_reached = |found: &Found| {
-        let Estimate { value, uncertainty } = found.response.scaled(1.0 / d.b);
-        (value - level).abs() <= (REACHED * level).max(4.0 * uncertainty)
-    };
     let mut cycles: Vec<Cycle> = Vec::new();
     let most = settings.dwell_max as usize;
     let found = loop {
         cycles.push(bench.cycle()?);
         let found = criterion.best(&cycles);
-        if cycles.len() >= most || found.is_some_and(|found| criterion.is_met(&found) && is_reached(&found)) {
+        if cycles.len() >= most
+            || found.is_some_and(|found| criterion.is_met(&found) && is_reached(scene, level, &found))
+        {
             break found;
         }
     };
     let said = found.unwrap_or_else(|| Found::unsettled(&cycles[cycles.len() / 2..]));
+    let taken = Taken {
+        periods: bench.periods - start,
+        settled: said.steady || criterion.is_met(&said),
+        reached: is_reached(scene, level, &said),
+    };
+    Ok(point(bench, scene, level, &said, &cycles, &taken))
+}
+
+/// Whether the response is at its level.
+pub(super) fn is_reached(scene: &Scene, level: f64, found: &Found) -> bool {
+    let Estimate { value, uncertainty } = found.response.scaled(1.0 / scene.dimensionless().b);
+    (value - level).abs() <= (REACHED * level).max(4.0 * uncertainty)
+}
+
+/// How a point was taken: periods of the move and at the level, and whether the motion was steady and at its level.
+pub(super) struct Taken {
+    pub periods: f64,
+    pub settled: bool,
+    pub reached: bool,
+}
+
+/// The point of an estimate from the last of some periods.
+pub(super) fn point<R: Rig + ?Sized, C: Controller + ?Sized>(
+    bench: &Bench<R, C>,
+    scene: &Scene,
+    level: f64,
+    said: &Found,
+    cycles: &[Cycle],
+    taken: &Taken,
+) -> Point {
+    let d = scene.dimensionless();
     let samples: usize = cycles[cycles.len() - said.periods..]
         .iter()
         .map(|cycle| cycle.samples)
@@ -207,7 +255,7 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     let averaged = &bench.samples[bench.samples.len() - samples..];
     let [base, omega] = said.at;
     let regime = regime_by_response(averaged, scene, base.value, omega.value);
-    Ok(Point {
+    Point {
         level,
         c: said.response.value / d.b,
         sigma: d.sigma(omega.value),
@@ -217,14 +265,14 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
         u_sigma: omega.uncertainty / d.omega_change(1.0),
         u_g: d.excitation(base.uncertainty),
         u_phase_deg: said.phase_error.uncertainty.to_degrees(),
-        periods: bench.periods - start,
+        periods: taken.periods,
         regime,
         regime_by_impacts: bench.samples[0]
             .ground_truth
             .map(|_| classify(averaged, bench.sample_time, omega.value).1),
         averaged: said.periods,
         // An irregular motion can seem steady for a while.
-        settled: regime != Regime::Other && (said.steady || criterion.is_met(&said)),
-        reached: is_reached(&said),
-    })
+        settled: regime != Regime::Other && taken.settled,
+        reached: taken.reached,
+    }
 }

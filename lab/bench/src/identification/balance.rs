@@ -20,6 +20,7 @@ use nalgebra::Complex;
 use vines_model::numerics::{Estimate, Line, Prior, Regression, mean};
 
 use super::Cycle;
+use super::motion::{Motion, motion};
 
 /// What is known of the backbone about a point in advance.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -30,8 +31,20 @@ pub struct Slopes {
     pub omega: [f64; 2],
     /// Changes of `E_R` and `omega_R` per rate of change of the amplitude, because the impacts follow it late: s and rad/m.
     pub drift: [f64; 2],
+    /// Relative uncertainty of these.
+    pub late: f64,
+    /// Phase error that is held, rad, and the relative change of `E_R` per rad beyond it, with the opposite sign.
+    pub phase: [f64; 2],
     /// Second derivatives of `E_R`, 1/m, and `omega_R`, rad/(s m²), over the amplitude; 0 where they are not known.
     pub curvature: [f64; 2],
+}
+
+impl Slopes {
+    /// The part of a drive, or of its integral, that a phase beyond the one that is held adds to the balance of the amplitude.
+    fn beyond(&self, drive: Complex<f64>) -> f64 {
+        let [held, by_phase] = self.phase;
+        by_phase * (drive * Complex::from_polar(1.0, -held)).im
+    }
 }
 
 /// The two lines, fitted to some periods.
@@ -66,10 +79,10 @@ pub struct Balance {
 
 /// Size of the neglected terms relative to those of the second order.
 const REMAINDER: f64 = 0.7;
+/// Relative uncertainty of the effect of a phase beyond that which is held.
+const ASIDE: f64 = 0.5;
 /// A slope weighs integrated noise by a parabola, whose variance is this multiple of that of a mean.
 const PARABOLA: f64 = 1.2;
-/// Relative uncertainty of the effect of a drift of the amplitude.
-const LATE: f64 = 0.15;
 
 impl Balance {
     /// From at least four periods of an oscillator of the natural frequency `omega0`, rad/s.
@@ -82,7 +95,7 @@ impl Balance {
         let omega = mean(cycles.iter().map(|cycle| cycle.omega));
         let gain = 0.5 * omega0 * omega0 / omega;
         let motion = motion(cycles);
-        let response = mean(motion.iter().map(|one| one.0));
+        let response = mean(motion.iter().map(|one| one.amplitude));
         let base = mean(cycles.iter().map(|cycle| cycle.base.norm()));
         let phase_error = mean(cycles.iter().map(|cycle| cycle.phase_error));
         let [noise, base_noise] = [0, 1].map(|i| mean(cycles.iter().map(|cycle| cycle.noise[i])).sqrt());
@@ -90,31 +103,29 @@ impl Balance {
         let noise = noise.max(1e-14 * response);
         let middle = mean(cycles.iter().map(|cycle| cycle.time));
         let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
-        let spread = mean(motion.iter().map(|one| (one.0 - response).powi(2)));
+        let spread = mean(motion.iter().map(|one| (one.amplitude - response).powi(2)));
         let bend = ((spread - noise * noise).max(0.0), slopes.curvature);
-        let deviation = integral(&time, motion.iter().map(|one| one.0 - response));
+        let deviation = integral(&time, motion.iter().map(|one| one.amplitude - response));
         let columns = [vec![1.0; cycles.len()], time, deviation];
         let calibration = total(cycles, |cycle| cycle.base.norm()) / total(cycles, |cycle| cycle.commanded[0].norm());
-        let drives = drives(cycles, calibration);
+        let drives = drives(cycles, &motion, calibration);
         // The integral of A' is A. Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
         let [late, turned] = [1.0 + gain * slopes.drift[0], slopes.drift[1]];
-        let balanced = motion.into_iter().zip(&drives).map(|((amplitude, phase), drive)| {
-            let phase = phase + (gain * drive.work.im - inertia * drive.force.re) / response - turned * amplitude;
-            (
-                amplitude * late - inertia * drive.force.im - gain * drive.work.re,
-                phase,
-            )
+        let balanced = motion.into_iter().zip(&drives).map(|(one, Drive { force, work })| {
+            let worked = gain * (work.re + slopes.beyond(*work));
+            let phase = one.phase + (gain * work.im - inertia * force.re) / response - turned * one.amplitude;
+            (one.amplitude * late - inertia * force.im - worked, phase)
         });
         let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
         let prior = |[value, uncertainty]: [f64; 2]| [Prior { coefficient: 2, value, uncertainty }];
         let [slope, width] = slopes.base;
         let drive = Regression::fit(&columns, &amplitudes, &prior([-gain * slope, gain * width]), noise)?;
         let turning = Regression::fit(&columns, &phases, &prior(slopes.omega), noise / response)?;
-        let remainders = remainders(cycles, &drives, [inertia, gain, response], slopes.drift);
+        let remainders = remainders(cycles, &drives, [inertia, gain, response], slopes);
         let phase_noise = (noise / response).hypot(base_noise / base);
         let excess = drive.excess.max(turning.excess);
-        let of = |value: f64, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
+        let of = |value, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
         Some(Self {
             periods: cycles.len(),
             response: of(response, noise),
@@ -155,6 +166,14 @@ impl Balance {
         ]
     }
 
+    /// What the curvature of the backbone adds to `E_R`, m, and `omega_R`, rad/s, of amplitudes that vary evenly: a slope weighs the
+    /// rates by a parabola.
+    #[must_use]
+    pub fn bent(&self) -> [f64; 2] {
+        let (spread, curvature) = self.bend;
+        curvature.map(|curvature| 0.3 * curvature * spread)
+    }
+
     /// Frequency, rad/s, and amplitude, m, that a constant base of the commanded amplitude `command`, m, leads to.
     ///
     /// The base sensor calibrates both this base and the drive that it is compared with; its noise cancels.
@@ -181,14 +200,15 @@ impl Balance {
 }
 
 /// Sizes of the terms beyond those of the second order and beyond the drift: a share of them.
-fn remainders(cycles: &[Cycle], drives: &[Drive], [inertia, gain, response]: [f64; 3], late: [f64; 2]) -> [f64; 2] {
+fn remainders(cycles: &[Cycle], drives: &[Drive], [inertia, gain, response]: [f64; 3], slopes: &Slopes) -> [f64; 2] {
     let duration = cycles[cycles.len() - 1].time - cycles[0].time;
     let slope = |values: Vec<f64>| Line::fit(&values).slope * cycles.len() as f64 / duration;
     let inertial = REMAINDER * inertia * slope(drives.iter().map(|drive| drive.force.re).collect());
-    let drift = LATE * slope(cycles.iter().map(Cycle::amplitude).collect());
+    let drift = slopes.late * slope(cycles.iter().map(Cycle::amplitude).collect());
+    let aside = mean(drives.iter().map(|drive| slopes.beyond(drive.force)));
     [
-        (inertial / gain).hypot(drift * late[0]),
-        (inertial / response).hypot(drift * late[1]),
+        (inertial / gain).hypot(drift * slopes.drift[0]).hypot(ASIDE * aside),
+        (inertial / response).hypot(drift * slopes.drift[1]),
     ]
 }
 
@@ -219,7 +239,7 @@ fn total(cycles: &[Cycle], value: fn(&Cycle) -> f64) -> f64 {
     cycles.iter().map(value).sum()
 }
 
-fn drives(cycles: &[Cycle], calibration: f64) -> Vec<Drive> {
+fn drives(cycles: &[Cycle], motion: &[Motion], calibration: f64) -> Vec<Drive> {
     let relative = |cycle: &Cycle| {
         let turned = cycle.response[0] * cycle.commanded[0].conj();
         turned / turned.norm()
@@ -232,48 +252,18 @@ fn drives(cycles: &[Cycle], calibration: f64) -> Vec<Drive> {
     let mut sum = Complex::<f64>::default();
     cycles
         .iter()
-        .map(|cycle| {
+        .zip(motion)
+        .map(|(cycle, motion)| {
             let [middle, change] = cycle.commanded;
             let growth = (change * middle.conj()).re / middle.norm();
-            let share = relative(cycle) * turn / turn.norm() * calibration;
+            let corrected = Complex::from_polar(1.0, motion.correction);
+            let share = relative(cycle) * corrected * turn / turn.norm() * calibration;
             let before = sum;
             sum += share * cycle.duration * middle.norm();
             Drive {
                 force: share * middle.norm(),
                 work: before + share * cycle.duration * (0.5 * middle.norm() - growth / 6.0),
             }
-        })
-        .collect()
-}
-
-/// Amplitudes and phases of the response, continuous from period to period, without the influence of their own drift.
-///
-/// Over one period from the phase 0 on, a drift z' of the complex amplitude per radian changes the fitted amplitude by
-/// -i conj(z')/2.
-fn motion(cycles: &[Cycle]) -> Vec<(f64, f64)> {
-    let mut before = cycles[0].response[0];
-    let mut turned = before.arg();
-    let phases: Vec<f64> = cycles
-        .iter()
-        .map(|cycle| {
-            turned += (cycle.response[0] * before.conj()).arg();
-            before = cycle.response[0];
-            cycle.drive_phase + turned
-        })
-        .collect();
-    let last = cycles.len() - 1;
-    (0..=last)
-        .map(|n| {
-            let (from, to) = (n.saturating_sub(1), (n + 1).min(last));
-            let time = (cycles[to].time - cycles[from].time) * cycles[n].omega;
-            let growth = (cycles[to].amplitude() - cycles[from].amplitude()) / time;
-            let amplitude = cycles[n].amplitude();
-            // The frequency of the drive may jump from period to period; that of the response does not.
-            let turning = amplitude * ((phases[to] - phases[from]) / time - 1.0);
-            let z = cycles[n].response[0];
-            let drift = Complex::new(growth, turning) * z / amplitude;
-            let correction = Complex::new(0.0, 0.5) * drift.conj() / z;
-            (amplitude * (1.0 + correction.re), phases[n] + correction.im)
         })
         .collect()
 }

@@ -32,8 +32,8 @@ pub struct Cycle {
     pub duration: f64,
 }
 
-/// Offset, and sine and cosine of three harmonics.
-const TERMS: usize = 7;
+/// Offset, sine and cosine of three harmonics, and the drift of the first.
+const TERMS: usize = 9;
 
 impl Cycle {
     /// The samples of one period; `phase` (rad) is that of the drive at the first, `target` (rad) that of the response to the
@@ -52,11 +52,14 @@ impl Cycle {
             .map(|n| drive_phase + (n as f64 - middle) * sample_time * mean_omega)
             .collect();
         let basis = HarmonicBasis::new(&uniform, 0, &[Some(0); 3]);
+        // A change of the amplitude within the period is not noise.
+        let drifting = HarmonicBasis::new(&uniform, 0, &[Some(1), Some(0), Some(0)]);
         let degrees = (samples.len() - TERMS) as f64;
         let fitted = |value: fn(&Sample) -> f64| {
             let values = DVector::from_iterator(samples.len(), samples.iter().map(value));
             let fit = basis.fit(&values)?;
-            let variance = basis.residual(&values, &fit).norm_squared() / degrees;
+            let residual = drifting.residual(&values, &drifting.fit(&values)?);
+            let variance = residual.norm_squared() / degrees;
             Some((fit, variance * 2.0 / samples.len() as f64))
         };
         let (response, noise) = fitted(|s| s.sensors.response)?;
@@ -65,7 +68,6 @@ impl Cycle {
         let before = |n: usize| samples[n.saturating_sub(1)].command.drive.amplitude;
         let motion =
             |amplitude: &dyn Fn(usize) -> f64| DVector::from_fn(samples.len(), |n, _| amplitude(n) * phases[n].sin());
-        let drifting = HarmonicBasis::new(&uniform, 0, &[Some(1), Some(0), Some(0)]);
         let commanded = drifting.fit(&motion(&|n| 0.5 * (before(n) + samples[n].command.drive.amplitude)))?;
         let as_read = basis.fit(&motion(&before))?.harmonic(1);
         let measured = samples.iter().all(|s| s.sensors.reference.is_some());

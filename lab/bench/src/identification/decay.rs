@@ -166,7 +166,7 @@ impl Piece {
 /// after the release, where the drift begins. Both are parts of the uncertainty. `None` where the first is as large as the effect
 /// (towards the fold), because the series in the rate of the drift fails there.
 fn correction(flow: &SlowFlow, d: &Dimensionless, [c, rate]: [f64; 2], tau: f64) -> Option<Estimate> {
-    let by_drift = |c: f64, rate: f64| Some(flow.drift(c)?.sigma * rate + second_order(flow, d, c, rate));
+    let by_drift = |c: f64, rate: f64| Some(flow.drift(c)?.sigma * rate);
     let b = flow.manifold.b(c, BranchSide::Right)?;
     let multipliers = half_period_multipliers(d.r, b);
     let delay = multipliers
@@ -184,15 +184,6 @@ fn correction(flow: &SlowFlow, d: &Dimensionless, [c, rate]: [f64; 2], tau: f64)
     let value = by_drift(c, rate)?;
     let incomplete = value * slowest.min(1.0).powf(tau / PI);
     (late.abs() < value.abs()).then(|| Estimate::new(value, &[late, incomplete]))
-}
-
-/// The change of sigma by `C''`: `C''/(2 epsilon C)` with `C'' = C' dC'/dC`, where `C' = -epsilon G/2` along the decay.
-fn second_order(flow: &SlowFlow, d: &Dimensionless, c: f64, rate: f64) -> f64 {
-    let at = |c: f64| flow.manifold.b(c, BranchSide::Right).map(|b| flow.backbone_at(b).g);
-    let step = 1e-3 * c;
-    let slope = at(c + step).zip(at(c)).map_or(0.0, |(after, at)| (after - at) / step);
-    let second = rate * -0.5 * d.epsilon * slope;
-    second / (2.0 * d.epsilon * c)
 }
 
 /// Fits in a sliding window of `periods`. Each fit starts from the frequency of the one before, the first from `omega`.

@@ -66,22 +66,24 @@ impl Lock {
 /// Most periods before the release that are evaluated.
 const MOST: f64 = 240.0;
 /// Largest relative deviation of the amplitude from that of the hold, unless it is noise.
-const SPREAD: f64 = 0.03;
+const SPREAD: f64 = 0.008;
 /// Largest phase error of a period, rad, for the same.
-const PHASE_RANGE: f64 = 0.3;
+const PHASE_RANGE: f64 = 0.1;
 /// Fewest periods of an estimate.
 const FEWEST: usize = 8;
 /// Difference, in standard uncertainties, that still counts as noise.
 const RANDOM: f64 = 2.0;
+/// Relative uncertainty of the effect of a drift of the amplitude.
+pub const LATE: f64 = 0.15;
 /// Relative standard uncertainty of the slopes by first-order theory.
 const SLOPE: f64 = 0.3;
 
 pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let d = scene.dimensionless();
     let (dt, hold) = (record.sample_time, record.hold());
-    let target = scene.controller.phase_target_radians();
+    let target = scene.phase_target().radians();
     let held = Cycle::all(hold, dt, target);
-    let approach = approached(record, scene, &held);
+    let approach = approached(record, scene, target, &held);
     let slopes = slopes(scene, mean(held.iter().map(Cycle::amplitude)) / d.b);
     // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
@@ -154,10 +156,10 @@ fn limits(approach: &[Cycle], omega0: f64, command: f64, slopes: &Slopes) -> Opt
 }
 
 /// The periods before the release in which the motion was as near as in the hold.
-fn approached(record: &Record, scene: &Scene, held: &[Cycle]) -> Vec<Cycle> {
+fn approached(record: &Record, scene: &Scene, target: f64, held: &[Cycle]) -> Vec<Cycle> {
     let most = (MOST * scene.controller.samples_per_period) as usize;
     let samples = &record.samples[record.released.saturating_sub(most.max(record.hold().len()))..record.released];
-    let mut cycles = Cycle::all(samples, record.sample_time, scene.controller.phase_target_radians());
+    let mut cycles = Cycle::all(samples, record.sample_time, target);
     let level = mean(held.iter().map(Cycle::amplitude));
     let noise = 4.0 * mean(held.iter().map(|cycle| cycle.noise[0])).sqrt();
     let is_near = |cycle: &&Cycle| {
@@ -209,6 +211,8 @@ fn slopes(scene: &Scene, c: f64) -> Slopes {
     Slopes {
         base: pair(g).map(|g| d.amplitude(g) / d.b),
         omega: pair(sigma).map(|sigma| d.omega_change(sigma) / d.b),
+        late: LATE,
+        phase: [0.0, d.epsilon * d.lambda],
         drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
         curvature: [d.amplitude(bend[0]), d.omega_change(bend[1])].map(|bend| bend / (d.b * d.b)),
     }

@@ -4,10 +4,44 @@ use std::f64::consts::PI;
 
 use lovines::State;
 use phase_lock::{Config, LockCriterion};
+use serde::Serialize;
 use vines_model::orbit::phase_resonant;
 
-use super::{Scene, Sensor, plant::symbols};
+use super::{Resonance, Scene, Sensor, plant::symbols};
 use crate::advice;
+
+/// The phase of the response relative to the reference that a lock holds.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct PhaseTarget {
+    /// Degrees.
+    #[serde(rename = "phase_target_deg")]
+    pub degrees: f64,
+    /// Where it comes from.
+    #[serde(rename = "phase_from")]
+    pub origin: PhaseOrigin,
+}
+
+/// Where a phase target comes from.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum PhaseOrigin {
+    /// `controller.phase_target`.
+    #[serde(rename = "scene")]
+    Scene,
+    /// The exact orbit at the peak of the response at the scene's drive.
+    #[serde(rename = "exact orbit")]
+    ExactOrbit,
+    /// First-order theory, for which the peak is at phase resonance; there is no stable exact orbit.
+    #[serde(rename = "theory")]
+    Theory,
+}
+
+impl PhaseTarget {
+    /// In radians.
+    #[must_use]
+    pub fn radians(&self) -> f64 {
+        self.degrees.to_radians()
+    }
+}
 
 impl Scene {
     /// Parameters and start of the plant, under the names of the FMU's variables.
@@ -17,6 +51,24 @@ impl Scene {
         let State { q1, dq1, q2, dq2 } = self.start;
         let [q1, dq1] = [("q1", q1), ("der(q1)", dq1)];
         [mass, k, c, m, b, r, q1, dq1, ("q2", q2), ("der(q2)", dq2)]
+    }
+
+    /// The phase that a lock at the scene's drive holds. At the peak of the response it depends on the drive: unless the scene states
+    /// another phase than that of phase resonance, it is that of the exact orbit.
+    #[must_use]
+    pub fn phase_target(&self) -> PhaseTarget {
+        let stated = self.controller.phase_target;
+        if self.resonance.resonance == Resonance::Phase || !self.controller.is_at_phase_resonance() {
+            return PhaseTarget { degrees: stated, origin: PhaseOrigin::Scene };
+        }
+        let orbits = phase_resonant(&self.dimensionless());
+        let peak = orbits.iter().rev().find(|orbit| orbit.stable);
+        peak.map_or(PhaseTarget { degrees: stated, origin: PhaseOrigin::Theory }, |peak| {
+            PhaseTarget {
+                degrees: peak.gamma.to_degrees(),
+                origin: PhaseOrigin::ExactOrbit,
+            }
+        })
     }
 
     /// Configuration of the controller for the scene's excitation.
@@ -41,7 +93,7 @@ impl Scene {
             omega_max: c.omega_max * omega0,
             bandwidth: c.bandwidth * omega0,
             damping_rate: Some(damping * omega0).filter(|rate| *rate > 0.0),
-            phase_target: c.phase_target_radians(),
+            phase_target: self.phase_target().radians(),
             delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0
                 + (c.delay + f64::from(u8::from(self.resonance.is_late()))) * self.sample_time(),
             amplitude_max: Some(amplitude_max),
@@ -153,6 +205,7 @@ impl Scene {
             bandwidth: self.backbone.bandwidth * d.omega0,
             // The amplitude loop takes over as soon as the phase is near resonance.
             approach_gain: 0.0,
+            phase_target: self.controller.phase_target_radians(),
             ..self.controller_config()
         }
     }

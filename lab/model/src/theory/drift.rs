@@ -30,11 +30,15 @@ impl SlowFlow {
         let rate = 1e-6 * c;
         let [up, down] = [rate, -rate].map(|rate| self.flight(c, b, rate));
         let slope = |i: usize| (up[i] - down[i]) / (2.0 * rate);
+        let step = 1e-3 * c;
+        let drive = |c: f64| Some(self.backbone_at(self.manifold.b(c, BranchSide::Right)?).g);
+        let by_drive = (drive(c + step)? - drive(c)?) / step;
         let drift = Drift {
-            // The damper acts on the velocity, which a change of C shifts in phase; and at phase resonance the damper's force
-            // on the base leads it by 2 zeta.
-            sigma: slope(0) + 1.5 * self.lambda / c,
-            g: slope(1),
+            // The damper acts on the velocity, which a change of C shifts in phase; at phase resonance the damper's force
+            // on the base leads it by 2 zeta; and the losses change with C.
+            sigma: slope(0) + 1.5 * self.lambda / c - 0.25 * by_drive / c,
+            // The mean over half a period, in which the particle's force grows, is not that of the first harmonic in its middle.
+            g: slope(1) - self.backbone_at(b).sigma,
         };
         (drift.sigma.is_finite() && drift.g.is_finite()).then_some(drift)
     }

@@ -26,7 +26,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         Ok(found) => Comparison::of(&found, scene),
         Err(error) => return Ok(without_backbone(section, &error)),
     };
-    describe(&mut section, &found, scene.controller.phase_target);
+    describe(&mut section, &found, found.phase.degrees);
     section.figure(
         "history",
         "Amplitude and frequency over time. Left: the loop searches for phase resonance and holds it; measured once per period. Right: \
