@@ -171,6 +171,7 @@ fn the_fmu_moves_the_response_with_the_bits_of_the_built_in_controller() {
                 duration: 2.0,
                 amplitude: -1e-6,
                 omega: 0.01,
+                growth: 0.0,
             };
             fmu.hold_response(to, -1.5).unwrap();
             own.hold_response(to, -1.5).unwrap();

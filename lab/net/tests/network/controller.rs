@@ -117,6 +117,7 @@ fn moved(scene: &Scene, controller: &mut dyn Controller, samples: usize) -> Vec<
                 duration: 2.0,
                 amplitude: -1e-6,
                 omega: 0.01,
+                growth: 0.0,
             };
             controller.hold_response(to, -1.5).unwrap();
         }
