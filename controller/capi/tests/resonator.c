@@ -33,7 +33,7 @@ int main(int argc, char **argv) {
     for (int n = 0; n < samples; n++) {
         PhaseLockInput input = {q, {true, output.drive}, true};
         if (n == 50000) {
-            PhaseLockMove to = {0.5 * output.response_amplitude, 1.0, -0.5 * amplitude, 0.0};
+            PhaseLockMove to = {0.5 * output.response_amplitude, 1.0, -0.5 * amplitude, 0.0, 0.0};
             if (phase_lock_hold_response(&controller, &to, message, sizeof message)) {
                 fprintf(stderr, "%s\n", message);
                 return 1;
