@@ -17,7 +17,10 @@ target=$(realpath -m "${CARGO_TARGET_DIR:-target}")
 for folder in "${CARGO_HOME:-$HOME/.cargo}=/cargo" "$PWD=/vines"; do
     case $folder in
         *" "*) say "warning: libraries will contain the path ${folder%=*}, because it has a space" ;;
-        *) export RUSTFLAGS="${RUSTFLAGS:+$RUSTFLAGS }--remap-path-prefix=$folder" ;;
+        *) case " ${RUSTFLAGS:-} " in
+            *" --remap-path-prefix=$folder "*) ;; # A script that another one calls.
+            *) export RUSTFLAGS="${RUSTFLAGS:+$RUSTFLAGS }--remap-path-prefix=$folder" ;;
+        esac ;;
     esac
 done
 
