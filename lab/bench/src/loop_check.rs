@@ -305,6 +305,8 @@ fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bool) -> Verd
         () if has_base && reversed(response) && reversed(base) => Verdict::BothReversed,
         () if reversed(response) => Verdict::ResponseReversed,
         () if has_base && reversed(base) => Verdict::BaseReversed,
+        // What delays both, such as a connection, cancels in the phase that the controller holds.
+        () if has_base && in_time(is_off(response.phase - base.phase, 0.0)) => Verdict::Healthy,
         () if has_base && !in_time(base.phase.to_radians()) => Verdict::BaseLate,
         () if !in_time(response.phase.to_radians()) => Verdict::ResponseLate,
         () => Verdict::Healthy,

@@ -97,3 +97,27 @@ fn the_check_measures_the_linear_response_and_states_gains_with_a_phase_margin()
         assert!((50.0..60.0).contains(&found.phase_margin));
     }
 }
+
+/// A rig behind a connection: both channels are this many samples late.
+struct Delayed(Simulated, Vec<Sensors>);
+
+impl Rig for Delayed {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.1.push(self.0.sense()?);
+        Ok(self.1.remove(0))
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.0.advance(drive, step)
+    }
+}
+
+#[test]
+fn a_delay_of_both_channels_cancels_and_is_healthy() {
+    let scene = scene();
+    let still = Sensors { response: 0.0, reference: Some(0.0) };
+    let mut rig = Delayed(Simulated::new(scene.plant, scene.start).unwrap(), vec![still; 16]);
+    let found = check(&mut rig, &scene).unwrap();
+    assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+    assert!((found.base.unwrap().delay - 16.0).abs() < 0.5, "{found:?}");
+}
