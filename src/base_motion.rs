@@ -103,11 +103,6 @@ impl BaseMotion {
         self.drive.signal[0] + oscillator
     }
 
-    /// The motion from now on under another drive, its phase going on.
-    pub fn with(&self, drive: Drive) -> Self {
-        Self { drive, ..*self }
-    }
-
     /// The same motion seen from `t` seconds later.
     pub fn after(&self, t: f64) -> Self {
         Self {
