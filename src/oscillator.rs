@@ -149,15 +149,16 @@ impl Oscillator {
         // Coefficients of the motion that starts with a displacement of 0 and a velocity of 1/t.
         let (mut c, mut s, mut p) = ([(0.0, 0.0), (1.0, 0.0)], (1.0, 0.0), (0.0, 0.0));
         for n in 2..PLAIN {
-            let sum = plus(times(damping, times(c[1], ((n - 1) as f64, 0.0))), times(spring, c[0]));
-            let (next, error) = divided(sum, ((n - 1) * n) as f64);
+            // The divisions do not wait for the last term.
+            let (damping, spring) = (divided(damping, n as f64), divided(spring, ((n - 1) * n) as f64));
+            let (next, error) = plus(times(damping, c[1]), times(spring, c[0]));
             c = [c[1], (-next, -error)];
             s = plus(s, c[1]);
             p = plus(p, times(c[1], (n as f64, 0.0)));
         }
         let (mut c, mut small) = (c.map(|(c, _)| c), (0.0, 0.0));
         for n in PLAIN..TERMS {
-            let next = (damping.0 * (n - 1) as f64 * c[1] + spring.0 * c[0]) / ((n - 1) * n) as f64;
+            let next = damping.0 / n as f64 * c[1] + spring.0 / ((n - 1) * n) as f64 * c[0];
             c = [c[1], -next];
             small = (small.0 - next, small.1 - n as f64 * next);
         }
