@@ -28,6 +28,7 @@ pub struct Drive {
 
 impl Drive {
     /// A harmonic base motion from the built-in oscillator alone.
+    #[inline]
     pub fn harmonic(amplitude: f64, omega: f64) -> Self {
         Self { amplitude, omega, ..Self::default() }
     }
