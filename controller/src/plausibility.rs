@@ -3,7 +3,6 @@
 
 use crate::real::consts::TAU;
 
-use crate::angle::wrap;
 use crate::config::Config;
 use crate::detector::Estimate;
 use crate::real::Real;
@@ -48,8 +47,6 @@ pub struct Differences {
     distorted: [Real; 2],
     /// Phase since the amplitude of each channel changed fast, rad.
     steady: [Real; 2],
-    /// Phase of the base relative to the oscillator when its amplitude began to change fast, rad.
-    lag: Option<Real>,
     /// Whether the last readings were plausible.
     implausible: bool,
 }
@@ -93,7 +90,6 @@ impl Plausibility {
             if let Some(limit) = self.limit {
                 let fast = !(1.0 / FAST..FAST).contains(&change);
                 let [steady, distorted] = [&mut state.steady[n], &mut state.distorted[n]];
-                let was_settled = *steady > SETTLES * TAU;
                 *steady = if fast { 0.0 } else { *steady + turn };
                 let settled = *steady > SETTLES * TAU;
                 let clear = !settled || estimate.harmonics() <= DISTORTION * limit * amplitude;
@@ -101,24 +97,9 @@ impl Plausibility {
                 let slack = if settled { 0.0 } else { SLACK * change.max(1.0) };
                 let expected = (share * limit * change + slack) * amplitude + normal;
                 state.implausible |= difference > expected || *distorted > LASTS * TAU;
-                // A delay that begins while the drive changes shows afterwards, for the lag of the base does not depend on the drive.
-                if n == 1 && was_settled != settled {
-                    let lag = estimate.argument();
-                    let shift = state
-                        .lag
-                        .filter(|_| settled)
-                        .map_or(0.0, |before| wrap(lag - before).abs());
-                    state.implausible |= (shift - limit) * amplitude > normal;
-                    state.lag = Some(lag);
-                }
             }
             *now = now.max(difference);
         }
-    }
-
-    /// Forgets what belongs to one run of the closed loop.
-    pub fn restart(&self, state: &mut Differences) {
-        state.lag = None;
     }
 
     /// Whether the last readings show a fault, `closed` seconds after the loop was closed.

@@ -168,7 +168,6 @@ impl Sensing {
     /// Ends the watch when the loop opens.
     pub fn stop_watching(&self, state: &mut Channels) {
         (state.invalid, state.closed, state.seen) = (0.0, 0.0, false);
-        self.plausibility.restart(&mut state.differences);
     }
 
     /// Updates the detectors, and compares the readings with what they predicted.

@@ -1,6 +1,6 @@
 //! Injected faults at a few instants; `vines faults` takes more.
 
-use vines_testbench::faults::{FAULTS, Faults, Kind, Sensor};
+use vines_testbench::faults::{FAULTS, Faults, Kind};
 use vines_testbench::rig::Rig;
 use vines_testbench::scene::{Override, PAPER, Scene};
 
@@ -36,12 +36,4 @@ fn every_fault_switches_the_drive_off_within_its_ramp() {
 #[test]
 fn every_fault_is_found_through_noise_and_12_bits() {
     inject(&["chain.snr=40", "chain.adc_bits=12", "controller.ramp_periods=0.5"], 1);
-}
-
-#[test]
-fn a_delay_of_the_base_that_begins_while_the_drive_changes_is_found_afterwards() {
-    let around = |rig: Box<dyn Rig>| rig;
-    let faults = Faults::new(&scene(&[]), &around).unwrap();
-    let row = faults.row("base sensor late", Kind::Base(Sensor::Late(25)), 16);
-    assert_eq!(row.worst.map(|worst| worst.missed), [0; 4], "{row:?}");
 }
