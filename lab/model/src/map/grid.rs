@@ -19,7 +19,7 @@ use crate::theory::SlowFlow;
 /// Usual largest number of periods that a cell is followed.
 pub const LIMIT: usize = 20_000;
 /// Usual number of further motions that must agree where chance decides when chaos ends.
-pub const CONFIRMATIONS: usize = 4;
+pub const CONFIRMATIONS: usize = 6;
 
 /// Settings of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
