@@ -3,7 +3,7 @@
 //!
 //! The comparison has its own rules: the pattern of the impacts instead of the state, and a disturbed second plant instead of the
 //! linearised disturbance. `CELLS` sets the number of cells per map, `PERIODS` those of the other plant and
-//! `CONFIRMATIONS` the number of motions that must agree (`scripts/stress --map`).
+//! `CONFIRMATIONS` the number of motions that must agree, `MAP` (1 to 3) selects one map (`scripts/stress --map`).
 
 use std::f64::consts::{PI, TAU};
 
@@ -179,7 +179,8 @@ fn regimes_agree_with_those_further_on_and_of_another_plant() {
     let (cells, first) = (setting("CELLS", 8), setting("SEED", 1));
     let periods = setting("PERIODS", LIMIT as u64) as usize;
     let others = setting("CONFIRMATIONS", CONFIRMATIONS as u64) as usize;
-    for (n, case) in CASES.iter().enumerate() {
+    let only = setting("MAP", 0) as usize;
+    for (n, case) in CASES.iter().enumerate().filter(|(n, _)| only == 0 || n + 1 == only) {
         let one = |seed| cell(case, (first << 32) + seed, periods, others);
         let mut found: Vec<_> = (0..cells).into_par_iter().map(one).collect();
         let count = |regime: Regime| found.iter().filter(|one| one.0.regime == regime).count();
