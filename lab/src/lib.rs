@@ -6,6 +6,7 @@ mod files;
 pub mod pack;
 pub mod report;
 
+pub use files::FileError;
 pub use vines_fmu as fmu;
 pub use vines_model::{map, numerics, orbit, regime, theory};
 pub use vines_net as net;
