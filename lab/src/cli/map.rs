@@ -4,7 +4,6 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use vines::{
     map::{Axis, LIMIT, Map, Plan, Range},
     orbit::{Branch, phase_resonant},
@@ -15,7 +14,7 @@ use vines::{
     scene::Scene,
 };
 
-use super::{failure::Failure, scene_arguments::SceneArguments, writable, written};
+use super::{failure::Failure, progress_bar, scene_arguments::SceneArguments, writable, written};
 
 const HELP: &str = "\
 Every cell is one plant, driven at a fixed frequency from the scene's start:
@@ -78,9 +77,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     let plan = plan(arguments, &scene)?;
     writable(&arguments.out)?;
-    let style = ProgressStyle::with_template("mapping regimes [{wide_bar}] {pos}/{len} cells")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(plan.cells() as u64).with_style(style);
+    let bar = progress_bar(plan.cells() as u64, "mapping regimes [{wide_bar}] {pos}/{len} cells");
     let map = plan.run(|| bar.inc(1)).map_err(Failure::input)?;
     bar.finish_and_clear();
     let files = report::write_map(&map, &arguments.out).map_err(Failure::run)?;

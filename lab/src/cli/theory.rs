@@ -8,7 +8,7 @@ use vines::{
     theory::{Activation, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, SlowFlow, backbone, resonant},
 };
 
-use super::{failure::Failure, json, scene_arguments::SceneArguments, yes_no};
+use super::{failure::Failure, output, scene_arguments::SceneArguments, yes_no};
 
 const HELP: &str = "\
 Everything is of first order in epsilon. Both branches of the slow invariant manifold are one curve over B, the particle's
@@ -97,10 +97,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         equilibria: at_sigma.unwrap_or_default(),
         backbone: backbone(&scene, highest / points as f64, highest, points),
     };
-    if arguments.json {
-        return json(&report);
-    }
-    Ok(readable(&report, arguments.sigma.is_some()))
+    output(arguments.json, &report, || readable(&report, arguments.sigma.is_some()))
 }
 
 fn readable(report: &Report, listed: bool) -> String {
@@ -148,16 +145,9 @@ fn equilibria(found: &[Equilibrium]) -> String {
         row.extend([one.impacts_stable, one.slow_flow_stable].map(yes_no));
         row
     });
-    Table::new([
-        "branch",
-        "C",
-        "B",
-        "phase, degrees",
-        "impacts stable",
-        "slow flow stable",
-    ])
-    .rows(rows)
-    .text()
+    Table::new("branch | C | B | phase, degrees | impacts stable | slow flow stable")
+        .rows(rows)
+        .text()
 }
 
 fn branch(side: BranchSide) -> &'static str {
@@ -177,7 +167,7 @@ fn solutions(points: &[BackbonePoint]) -> String {
         row.extend([point.impacts_stable, point.slow_flow_stable].map(yes_no));
         row
     });
-    Table::new(["branch", "sigma", "C", "B", "impacts stable", "slow flow stable"])
+    Table::new("branch | sigma | C | B | impacts stable | slow flow stable")
         .rows(rows)
         .text()
 }

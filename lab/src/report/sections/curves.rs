@@ -110,7 +110,7 @@ fn changes(found: &[Response]) -> Table {
             .flat_map(|branch| &branch.special)
             .map(|special| (one.g, special))
     });
-    Table::new(["G", "what", "σ", "C", "B"]).rows(all.map(|(g, special)| {
+    Table::new("G | what | σ | C | B").rows(all.map(|(g, special)| {
         let Periodic { sigma, c, b, .. } = special.motion;
         let mut cells = vec![format!("{g:.4}"), special.name().into()];
         cells.extend([sigma, c, b].map(|one| format!("{one:.5}")));
