@@ -11,7 +11,8 @@ use vines::{
     scene::{SceneError, refusal},
 };
 
-use super::interrupt::INTERRUPTED;
+/// Exit code of a program that a signal ended: 128 and the number of SIGINT.
+pub(super) const INTERRUPTED: u8 = 130;
 
 /// A message and an exit code.
 #[derive(Debug)]

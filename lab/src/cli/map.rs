@@ -5,8 +5,8 @@ use std::path::PathBuf;
 
 use clap::Args;
 use vines::{
-    map::{Axis, LIMIT, Map, Plan, Range},
-    orbit::{Branch, phase_resonant},
+    map::{LIMIT, Map, Plan, Range},
+    orbit::Branch,
     report::{
         self,
         summary::{parameters, regimes},
@@ -90,26 +90,17 @@ fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
             "--sigma = {sigma} (dimensionless) is not a finite number"
         )));
     }
-    let numbers = scene.dimensionless();
-    let needed = arguments.x.axis != Axis::Sigma && arguments.y.axis != Axis::Sigma;
-    let resonant = || {
-        let orbits = phase_resonant(&numbers);
-        let stable = orbits.iter().find(|orbit| orbit.stable);
-        stable.map_or(0.0, |orbit| orbit.sigma)
-    };
-    let sigma = match arguments.sigma {
-        Some(sigma) => sigma,
-        None if needed => resonant(),
-        None => 0.0,
-    };
+    let plan = Plan::new(
+        scene.dimensionless(),
+        scene.dimensionless_start(),
+        arguments.x,
+        arguments.y,
+    );
     Ok(Plan {
-        scene: numbers,
-        sigma,
-        start: scene.dimensionless_start(),
-        x: arguments.x,
-        y: arguments.y,
+        sigma: arguments.sigma.unwrap_or(plan.sigma),
         limit: arguments.periods,
         starts: arguments.starts,
+        ..plan
     })
 }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::phase_resonant;
-use crate::{Dimensionless, theory::resonant};
+use crate::{Dimensionless, numerics::mean, theory::resonant};
 
 /// Theory minus exact orbit at one mass ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -61,9 +61,7 @@ pub fn convergence(scene: &Dimensionless, halvings: u32) -> Option<Convergence> 
 /// Least-squares slope of `ln |y|` over `ln x`.
 fn slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
     let logs: Vec<(f64, f64)> = points.map(|(x, y)| (x.ln(), y.abs().ln())).collect();
-    let n = logs.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| logs.iter().map(of).sum::<f64>() / n;
-    let (x0, y0) = (mean(|one| one.0), mean(|one| one.1));
+    let [x0, y0] = [mean(logs.iter().map(|one| one.0)), mean(logs.iter().map(|one| one.1))];
     let (mut up, mut down) = (0.0, 0.0);
     for (x, y) in &logs {
         up += (x - x0) * (y - y0);
