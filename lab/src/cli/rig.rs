@@ -1,10 +1,11 @@
 //! `vines rig`: the plant at a network address.
 
-use std::str::FromStr;
+use std::{path::PathBuf, str::FromStr};
 
 use clap::{Args, ValueEnum};
 use vines::faults::{FAULTS, Kind, rehearsal_rig};
 use vines::net::{Address, Role, Served, Service, Session, helic::Device};
+use vines::report;
 use vines::rig::{Rig, RigError, Simulated};
 use vines::scene::Scene;
 
@@ -12,7 +13,6 @@ use super::{
     endpoint::{Endpoint, fmu},
     failure::Failure,
     print,
-    real_time::RealTimeArguments,
     scene_arguments::SceneArguments,
     serving::{ServingArguments, positive},
 };
@@ -51,8 +51,9 @@ pub(super) struct Arguments {
     #[command(flatten)]
     serving: ServingArguments,
 
-    #[command(flatten)]
-    real_time: RealTimeArguments,
+    /// Write the histogram of the lateness of each session to this file (CSV; the last session stays)
+    #[arg(long, value_name = "FILE")]
+    histogram: Option<PathBuf>,
 
     /// The protocol: `vines` (docs/network-protocol.md), or `helic`, as a device of helic-daq (docs/helic.md)
     #[arg(long, value_enum, default_value_t = Protocol::Vines)]
@@ -178,8 +179,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         })
     };
     refuse(arguments, &scene)?;
-    arguments.real_time.apply()?;
-    let keep = |session: &Session| arguments.real_time.keep(session);
+    let keep = |session: &Session| {
+        let (Some(file), Some(all)) = (&arguments.histogram, &session.punctuality) else {
+            return;
+        };
+        if let Err(error) = report::write_lateness(&all.classes(), file) {
+            eprintln!("warning: {error}");
+        }
+    };
     if helic {
         let step = scene.sample_time();
         let device = Device::new(make().map_err(Failure::run)?, step, max_amplitude).map_err(Failure::run)?;
