@@ -78,9 +78,11 @@ client_environments() {
     done
 }
 
-# The program `vines` and the libraries of the two FMUs. One call for all: cargo would build the plant again for another
-# selection of packages, because the features differ.
+# The program `vines` and the libraries of the two FMUs; with the argument `sweep`, the program has the command of that name, whose store
+# is a third of the build. One call for all: cargo would build the plant again for another selection of packages, because the features differ.
 build() {
+    local features=lovines/fmu
+    [ "${1:-}" != sweep ] || features=$features,vines/sweep
     stage "Building vines and the FMUs (the first time: some minutes)"
-    progress build --release --locked -p vines -p lovines -p phase-lock-fmu --features lovines/fmu
+    progress build --release --locked -p vines -p lovines -p phase-lock-fmu --no-default-features --features "$features"
 }

@@ -21,6 +21,10 @@ mod rig;
 mod rigs;
 mod scene_arguments;
 mod serving;
+#[cfg(feature = "sweep")]
+mod sweep;
+#[cfg(not(feature = "sweep"))]
+#[path = "cli/without_sweep.rs"]
 mod sweep;
 mod theory;
 

@@ -47,6 +47,7 @@ impl Failure {
     }
 
     /// Ended by a signal: exit code 130.
+    #[cfg(feature = "sweep")]
     pub(super) fn interrupted(message: impl Display) -> Self {
         Self { code: INTERRUPTED, message: message.to_string() }
     }
