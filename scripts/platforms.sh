@@ -102,6 +102,16 @@ linker() {
 
 host_triple() { rustc -vV | sed -n 's/^host: //p'; }
 
+# The platform of this machine.
+host_platform() {
+    local name triple
+    triple=$(host_triple)
+    for name in "${!TRIPLES[@]}"; do
+        [ "${TRIPLES[$name]}" != "$triple" ] || { printf '%s' "$name"; return; }
+    done
+    fail "there is no FMU for $triple; there are $PLATFORMS"
+}
+
 # mingw TRIPLE: the linker's name, that of the variant with POSIX threads first.
 mingw() {
     local name=${1%%-*}-w64-mingw32-gcc
@@ -165,6 +175,18 @@ build_platform() (
     say "Building for $platform ($kind toolchain, $with linker) ..."
     cargo "$verb" "${options[@]}" --target "$triple" || fail "cargo could not build for $platform"
 )
+
+# pack_options PLATFORM ...: builds the libraries of the FMUs, and prints the options with which `vines pack` takes them, one on a line.
+pack_options() {
+    local platform library folder=$target/platforms
+    echo --only-binaries
+    for platform; do
+        build_platform "$platform" "$folder" "${LIBRARIES[@]}" >&2 || return
+        for library in lovines phase_lock_fmu; do
+            printf -- '--binary\n%s\n' "$platform=$(built_library "$platform" "$folder" "$library")"
+        done
+    done
+}
 
 # built_library PLATFORM FOLDER NAME: the path of a library that build_platform has made.
 built_library() {

@@ -78,20 +78,11 @@ client_environments() {
     done
 }
 
-# The `fmi` crate, with which the lab loads FMUs, generates its C bindings with libclang. LIBCLANG_PATH selects one; the
-# default is the one from PyPI, which lacks the header files of a compiler.
-libclang() {
-    [ -z "${LIBCLANG_PATH:-}" ] || return 0
-    environment .venv-build scripts/requirements-build.txt || { cat .venv-build.log >&2; fail "libclang could not be installed"; }
-    LIBCLANG_PATH=$(.venv-build/bin/python -c 'import clang, pathlib; print(pathlib.Path(clang.__file__).parent / "native")')
-    export LIBCLANG_PATH
-    export BINDGEN_EXTRA_CLANG_ARGS="-I$(cc -print-file-name=include) ${BINDGEN_EXTRA_CLANG_ARGS:-}"
-}
-
-# The program `vines` and the libraries of the two FMUs. One call for all: cargo would build the plant again for another
-# selection of packages, because the features differ.
+# The program `vines` and the libraries of the two FMUs; with the argument `sweep`, the program has the command of that name, whose store
+# is a third of the build. One call for all: cargo would build the plant again for another selection of packages, because the features differ.
 build() {
-    libclang
+    local features=lovines/fmu
+    [ "${1:-}" != sweep ] || features=$features,vines/sweep
     stage "Building vines and the FMUs (the first time: some minutes)"
-    progress build --release --locked -p vines -p lovines -p phase-lock-fmu --features lovines/fmu
+    progress build --release --locked -p vines -p lovines -p phase-lock-fmu --no-default-features --features "$features"
 }

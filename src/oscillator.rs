@@ -4,8 +4,10 @@
 //! entries are written so that none loses digits at any damping ratio, however near to critical.
 
 use crate::arithmetic::{divided, plus, product, quotient, sincos_of_product, split_coefficient, times, two_sum};
-use crate::overdamped::APART;
 use num_complex::Complex64;
+
+/// Below this part of the decay rate the two rates are too near each other to be told apart by subtraction.
+pub(crate) const APART: f64 = 0.1;
 
 /// Coefficients of one oscillator, derived once from mass, stiffness and damping.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,10 +4,7 @@
 //! With damping far above critical the position at which such a motion comes to rest at last lies far off, and taking it off
 //! at the start to add it again later would leave no digits of what happens in between.
 
-use crate::oscillator::{Oscillator, Regime};
-
-/// Below this part of the decay rate the two rates are too near each other to be told apart by subtraction.
-pub(crate) const APART: f64 = 0.1;
+use crate::oscillator::{APART, Oscillator, Regime};
 
 /// Whether the rates of `oscillator` are far apart.
 pub(crate) fn is_apart(oscillator: &Oscillator) -> bool {

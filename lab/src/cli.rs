@@ -7,6 +7,7 @@ mod check;
 mod controller;
 mod decay;
 mod endpoint;
+mod experiment;
 mod failure;
 mod faults;
 mod identify;
@@ -20,6 +21,10 @@ mod rig;
 mod rigs;
 mod scene_arguments;
 mod serving;
+#[cfg(feature = "sweep")]
+mod sweep;
+#[cfg(not(feature = "sweep"))]
+#[path = "cli/without_sweep.rs"]
 mod sweep;
 mod theory;
 
@@ -30,6 +35,7 @@ use std::{
 };
 
 use clap::{Parser, Subcommand};
+use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use vines::net::Timing;
 
@@ -159,11 +165,7 @@ fn result(
     paths: &[PathBuf],
     timing: Option<Timing>,
 ) -> Result<String, Failure> {
-    let text = if as_json {
-        json(found)?
-    } else {
-        format!("{summary}\n{}", written(paths))
-    };
+    let text = output(as_json, found, || format!("{summary}\n{}", written(paths)))?;
     match timing {
         Some(timing) if timing.share() > TOLERATED => {
             print(&text)?;
@@ -178,6 +180,16 @@ fn result(
     }
 }
 
-fn json(found: &impl Serialize) -> Result<String, Failure> {
-    Ok(serde_json::to_string_pretty(found)? + "\n")
+/// What was found as JSON, or as text.
+fn output(as_json: bool, found: &impl Serialize, text: impl FnOnce() -> String) -> Result<String, Failure> {
+    if as_json {
+        return Ok(serde_json::to_string_pretty(found)? + "\n");
+    }
+    Ok(text())
+}
+
+/// A progress bar on stderr; indicatif hides it if that is not a terminal.
+fn progress_bar(length: u64, template: &str) -> ProgressBar {
+    let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
+    ProgressBar::new(length).with_style(style)
 }

@@ -6,9 +6,11 @@ mod files;
 pub mod pack;
 pub mod report;
 
+pub use files::FileError;
 pub use vines_fmu as fmu;
 pub use vines_model::{map, numerics, orbit, regime, theory};
 pub use vines_net as net;
+#[cfg(feature = "sweep")]
 pub use vines_sweep as sweep;
 pub use vines_testbench::{
     advice, backbone, calibration, chain_effects, comparison, estimators, experiment, faults, identification,

@@ -9,23 +9,18 @@ mod error;
 mod fmu;
 mod library;
 mod platform;
-mod portable;
 mod symbols;
 mod system;
 
-use std::{
-    io::Write,
-    path::{Path, PathBuf},
-};
+use std::path::{Path, PathBuf};
 
 pub use binary::Binary;
 pub use components::{Component, components};
 pub use documentation::documentation;
 pub use error::PackError;
 pub use platform::Platform;
-pub use portable::{GLIBC, portable};
 
-use crate::{files::temporary, scene::Scene};
+use crate::{files, scene::Scene};
 
 /// Where the libraries come from.
 #[derive(Debug, Clone)]
@@ -58,7 +53,7 @@ struct File {
 /// A library that is missing, for another platform, of another version or not an FMI 2.0 component, and failures of the
 /// file system.
 pub fn pack(components: &[Component], libraries: &Libraries, out: &Path) -> Result<Vec<PathBuf>, PackError> {
-    keep(out, &fmu::all(components, libraries)?)
+    keep(out, fmu::all(components, libraries)?)
 }
 
 /// Packs plant and controller into `out`, and the two of them coupled as `bench.ssp` with the parameters of the scene.
@@ -68,24 +63,12 @@ pub fn pack(components: &[Component], libraries: &Libraries, out: &Path) -> Resu
 pub fn pack_bench(scene: &Scene, libraries: &Libraries, out: &Path) -> Result<Vec<PathBuf>, PackError> {
     let mut files = fmu::all(&components(), libraries)?;
     files.push(system::file(scene, &files)?);
-    keep(out, &files)
+    keep(out, files)
 }
 
-/// Writes all of the files under temporary names before any of them gets its own.
-fn keep(out: &Path, files: &[File]) -> Result<Vec<PathBuf>, PackError> {
-    let failed = |path: &Path, source| PackError::Write { path: path.into(), source };
-    std::fs::create_dir_all(out).map_err(|source| failed(out, source))?;
-    let mut finished = Vec::new();
-    for file in files {
-        let path = out.join(&file.name);
-        let mut kept = temporary(out).map_err(|source| failed(out, source))?;
-        kept.write_all(&file.content).map_err(|source| failed(&path, source))?;
-        finished.push((kept, path));
-    }
-    let mut written = Vec::new();
-    for (file, path) in finished {
-        file.persist(&path).map_err(|error| failed(&path, error.error))?;
-        written.push(path);
-    }
-    Ok(written)
+fn keep(out: &Path, files: Vec<File>) -> Result<Vec<PathBuf>, PackError> {
+    Ok(files::write(
+        out,
+        files.into_iter().map(|file| (file.name, file.content)),
+    )?)
 }

@@ -126,7 +126,6 @@ fn packing_refuses_what_it_cannot_pack_before_it_writes() {
     fails(&pack(&["--binary", "win64"]), 2, "PLATFORM=PATH");
     fails(&pack(&["--binary", "amiga=x.so"]), 2, "amiga");
     fails(&pack(&["--set", "plant.r=2"]), 2, "r (coefficient of restitution) = 2");
-    fails(&pack(&["--portable"]), 2, "--portable cannot be done");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
 

@@ -72,8 +72,8 @@ impl ResponseLoop {
         let reals = std::iter::once("phase_target".to_owned()).chain(moves());
         let reals = reals.map(|ours| fmu.named(Kind::Real, names, &ours));
         let reals: Option<Vec<Named>> = reals.collect::<Result<_, _>>()?;
-        let hold = fmu.named(Kind::Boolean, names, "hold_response")?;
-        Ok(reals.zip(hold).map(|(reals, (hold, _))| Self { reals, hold }))
+        let hold = fmu.switch(Kind::Boolean, names, "hold_response")?;
+        Ok(reals.zip(hold).map(|(reals, hold)| Self { reals, hold }))
     }
 }
 
@@ -102,11 +102,10 @@ impl FmuController {
             fmu.need_named(Kind::Real, names, "E")?,
         ];
         let phase_error = fmu.named(Kind::Real, names, "phase_error")?;
-        let settled = match ["settled", "locked"].map(|ours| fmu.named(Kind::Boolean, names, ours)) {
-            [Ok(Some((settled, _))), _] => Settled::Told(settled),
-            [Err(error), _] | [_, Err(error)] => return Err(error),
-            [Ok(None), Ok(locked)] => {
-                let locked = locked.map(|(locked, _)| locked);
+        let switch = |ours| fmu.switch(Kind::Boolean, names, ours);
+        let settled = match (switch("settled")?, switch("locked")?) {
+            (Some(settled), _) => Settled::Told(settled),
+            (None, locked) => {
                 if locked.is_none() && phase_error.is_none() {
                     log::warn!(
                         "{} has none of `settled`, `locked` and `phase_error`: its lock is judged by its frequency alone",
@@ -116,14 +115,10 @@ impl FmuController {
                 Settled::Judged(locked, Judge::new(config))
             }
         };
-        let integer = |ours| {
-            fmu.named(Kind::Integer, names, ours)
-                .map(|found| found.map(|(reference, _)| reference))
-        };
+        let integer = |ours| fmu.switch(Kind::Integer, names, ours);
         let states = [integer("state")?, integer("fault")?];
         let displacement = fmu.named(Kind::Real, names, "drive")?;
-        let phase_measured = fmu.named(Kind::Boolean, names, "phase_measured")?;
-        let phase_measured = phase_measured.map(|(reference, _)| reference);
+        let phase_measured = switch("phase_measured")?;
         let response_loop = ResponseLoop::of(&fmu, names)?;
         fmu.start(names, &parameters(config))?;
         Ok(Self {
@@ -165,18 +160,10 @@ impl FmuController {
 
     fn exchange(&mut self, sensors: Sensors, active: bool) -> Result<Command, FmuError> {
         let readings = [sensors.response, sensors.reference.unwrap_or(0.0)];
-        let given: Vec<f64> = self
-            .sensors
-            .iter()
-            .zip(readings)
-            .map(|((_, factor), x)| x / factor)
-            .collect();
-        let references: Vec<Reference> = self.sensors.iter().map(|(reference, _)| *reference).collect();
-        let active_reference = [self.active];
-        self.fmu.ask("take its inputs", |i| {
-            i.set_real(&references, &given)?;
-            i.set_boolean(&active_reference, &[active.into()])
-        })?;
+        self.fmu.write("take its inputs", &self.sensors, &readings)?;
+        let reference = [self.active];
+        self.fmu
+            .ask("take its inputs", |i| i.set_boolean(&reference, &[active.into()]))?;
         self.fmu.step(self.sample_time)?;
         let [omega, amplitude] = self.fmu.read("give its outputs", self.drive)?;
         let told = match self.settled {
@@ -218,17 +205,10 @@ impl Controller for FmuController {
         let inputs = self.response_loop.as_ref().ok_or(ControllerError::NoResponseLoop)?;
         let Move { response, duration, amplitude, omega, growth } = to;
         let values = [phase_target, response, duration, amplitude, omega, growth];
-        let values: Vec<f64> = inputs
-            .reals
-            .iter()
-            .zip(values)
-            .map(|((_, factor), x)| x / factor)
-            .collect();
-        let references: Vec<Reference> = inputs.reals.iter().map(|(reference, _)| *reference).collect();
-        self.fmu.ask("take its inputs", |i| {
-            i.set_real(&references, &values)?;
-            i.set_boolean(&[inputs.hold], &[true.into()])
-        })?;
+        self.fmu.write("take its inputs", &inputs.reals, &values)?;
+        let hold = [inputs.hold];
+        self.fmu
+            .ask("take its inputs", |i| i.set_boolean(&hold, &[true.into()]))?;
         Ok(())
     }
 }

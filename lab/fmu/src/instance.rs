@@ -16,45 +16,21 @@ use crate::error::{CallError, LoadError};
 
 /// Reason why an FMU cannot be used, or cannot continue.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum FmuError {
-    /// The file cannot be loaded as an FMU.
     #[error("cannot load {}: {source}", path.display())]
-    Load {
-        /// The FMU.
-        path: PathBuf,
-        /// Reason.
-        source: LoadError,
-    },
-    /// The FMU lacks a variable that the bench needs.
+    Load { path: PathBuf, source: LoadError },
     #[error("{} has no {kind} variable `{name}`, which the bench needs; [rig.names] and [controller_names] of the scene map names", path.display())]
-    Variable {
-        /// The FMU.
-        path: PathBuf,
-        /// Its type.
-        kind: Kind,
-        /// Its name.
-        name: String,
-    },
-    /// The scene maps a name that this bench does not have.
+    Variable { path: PathBuf, kind: Kind, name: String },
     #[error(
         "[rig.names] or [controller_names] of the scene maps `{name}`, which this bench does not have; it has: {known}"
     )]
-    Name {
-        /// The name.
-        name: String,
-        /// What there is.
-        known: String,
-    },
-    /// The FMU refused a call; its own message has been logged.
+    Name { name: String, known: String },
     #[error("{} refused to {action} at t = {time} s: {source}", path.display())]
     Refused {
-        /// The FMU.
         path: PathBuf,
-        /// What the FMU should have done.
         action: &'static str,
-        /// Simulated time, s.
         time: f64,
-        /// The status of the call.
         source: CallError,
     },
 }
@@ -73,12 +49,10 @@ impl From<FmuError> for ControllerError {
 
 /// Type of a variable in FMI.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[expect(missing_docs, reason = "the names are those of the standard")]
 pub enum Kind {
-    /// A real number.
     Real,
-    /// A whole number.
     Integer,
-    /// True or false.
     Boolean,
 }
 
@@ -155,6 +129,11 @@ impl Fmu {
         }
     }
 
+    /// The same for a variable without a unit.
+    pub fn switch(&self, kind: Kind, names: &Names, ours: &str) -> Result<Option<Reference>, FmuError> {
+        Ok(self.named(kind, names, ours)?.map(|(reference, _)| reference))
+    }
+
     /// The same for a variable that the bench needs.
     pub fn need_named(&self, kind: Kind, names: &Names, ours: &str) -> Result<Named, FmuError> {
         let missing = || FmuError::Variable { path: self.path.clone(), kind, name: ours.into() };
@@ -197,21 +176,22 @@ impl Fmu {
         Ok(())
     }
 
-    /// Values of real variables.
-    pub fn reals<const N: usize>(
-        &mut self,
-        action: &'static str,
-        references: [Reference; N],
-    ) -> Result<[f64; N], FmuError> {
-        let mut values = [0.0; N];
-        self.ask(action, |i| i.get_real(&references, &mut values))?;
-        Ok(values)
-    }
-
     /// Values of real variables, SI units.
     pub fn read<const N: usize>(&mut self, action: &'static str, variables: [Named; N]) -> Result<[f64; N], FmuError> {
-        let values = self.reals(action, variables.map(|(reference, _)| reference))?;
+        let (references, mut values) = (variables.map(|(reference, _)| reference), [0.0; N]);
+        self.ask(action, |i| i.get_real(&references, &mut values))?;
         Ok(std::array::from_fn(|n| values[n] * variables[n].1))
+    }
+
+    /// Sets real variables, SI units.
+    pub fn write(&mut self, action: &'static str, variables: &[Named], values: &[f64]) -> Result<(), FmuError> {
+        let (references, factors): (Vec<_>, Vec<_>) = variables.iter().copied().unzip();
+        let values: Vec<f64> = values
+            .iter()
+            .zip(factors)
+            .map(|(value, factor)| value / factor)
+            .collect();
+        self.ask(action, |i| i.set_real(&references, &values)).map(drop)
     }
 
     /// Calls the FMU; `action` completes the message "refused to …".

@@ -1,7 +1,7 @@
 //! FMUs on the bench: any FMI 2.0 co-simulation component as a rig or as a controller.
 //!
-//! The `fmi` crate loads them. Its limits are those of the bench: an FMU must name a category in every log message, because
-//! NULL ends the program; it must not step asynchronously (`fmi2Pending`); and macOS on ARM is not supported.
+//! The `fmi` crate loads them. Its limits are those of the bench: an FMU must not step asynchronously (`fmi2Pending`), and macOS on
+//! ARM is not supported.
 
 #![forbid(unsafe_code)]
 

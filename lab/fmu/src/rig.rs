@@ -130,26 +130,22 @@ impl Rig for FmuRig {
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        let Some([(omega, of_omega), (amplitude, of_amplitude)]) = self.inputs else {
+        let Some(inputs) = self.inputs else {
             // The middle of the step: the mean of what is held is then in time.
             let displacement = drive.amplitude * (self.phase + 0.5 * drive.omega * step).sin();
             self.phase = (self.phase + drive.omega * step) % TAU;
             return self.hold(displacement, step);
         };
-        let values = [drive.omega / of_omega, drive.amplitude / of_amplitude];
         self.fmu
-            .ask("take a drive", |i| i.set_real(&[omega, amplitude], &values))?;
+            .write("take a drive", &inputs, &[drive.omega, drive.amplitude])?;
         Ok(self.fmu.step(step)?)
     }
 
     fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        let (held, factor) = self.held.ok_or(RigError::NoHold)?;
-        let zero = self.inputs.map(|[_, (amplitude, _)]| amplitude);
-        let (references, values) = ([Some(held), zero], [displacement / factor, 0.0]);
-        let references: Vec<Reference> = references.into_iter().flatten().collect();
-        self.fmu.ask("take a sample of the base", |i| {
-            i.set_real(&references, &values[..references.len()])
-        })?;
+        let mut inputs = vec![self.held.ok_or(RigError::NoHold)?];
+        inputs.extend(self.inputs.map(|[_, amplitude]| amplitude));
+        let values = [displacement, 0.0];
+        self.fmu.write("take a sample of the base", &inputs, &values)?;
         Ok(self.fmu.step(step)?)
     }
 

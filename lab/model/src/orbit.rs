@@ -40,7 +40,7 @@ pub use from_rest::impacts_from_rest;
 pub use impact_map::ImpactMap;
 pub use pattern::{ImpactPattern, Unknowns};
 pub use periodic::Periodic;
-pub use search::{exact_backbone, phase_resonant, symmetric_orbits};
+pub use search::{exact_backbone, phase_resonant, stable_resonant, symmetric_orbits};
 pub use settle::{periodic_near, settle};
 
 /// An exact symmetric 1:1 orbit. At phase resonance, the first harmonic of `v = q1 + epsilon q2` lags the base by pi/2.

@@ -1,19 +1,10 @@
 //! `vines backbone`: the backbone, tracked with the loop closed.
 
-use std::path::PathBuf;
-
 use clap::Args;
 use indicatif::ProgressBar;
 use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
-use super::{
-    check::LoopCheckArguments,
-    endpoint::{Endpoint, ReachArguments},
-    failure::Failure,
-    log_warnings, result,
-    scene_arguments::SceneArguments,
-    writable, written,
-};
+use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, result, writable, written};
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:
@@ -43,11 +34,7 @@ Writes tracked.json, tracked.csv and tracked.svg.";
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
     #[command(flatten)]
-    scene: SceneArguments,
-
-    /// Folder for the results; made if it is not there
-    #[arg(long, value_name = "DIR", default_value = "out")]
-    out: PathBuf,
+    experiment: ExperimentArguments,
 
     /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), or udp://HOST:PORT (in real time)
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
@@ -56,26 +43,15 @@ pub(super) struct Arguments {
     /// The controller: `built-in`, an FMU with the inputs `hold_response` and `move.*` of PhaseLock.fmu, or tcp://HOST:PORT
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     controller: Endpoint,
-
-    #[command(flatten)]
-    reach: ReachArguments,
-
-    #[command(flatten)]
-    loop_check: LoopCheckArguments,
-
-    /// Print tracked.json instead of the table
-    #[arg(long)]
-    json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let mut scene = arguments.scene.load()?;
-    log_warnings();
-    let reach = arguments.reach.reach()?;
+    let experiment = &arguments.experiment;
+    let (mut scene, reach) = experiment.begin()?;
     BuiltIn::new(&scene.backbone_config())?;
-    writable(&arguments.out)?;
+    writable(&experiment.out)?;
     let mut open = arguments.rig.rig(&scene, reach)?;
-    arguments.loop_check.before(&mut open.rig, &mut scene)?;
+    experiment.check_loop(&mut open.rig, &mut scene)?;
     let config = scene.backbone_config();
     let mut controller = arguments
         .controller
@@ -89,7 +65,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let timing = open.close();
     let tracked = tracked?;
     let found = TrackedComparison::of(&tracked, &scene);
-    let files = report::write_tracked(&found, &arguments.out).map_err(Failure::run)?;
+    let files = report::write_tracked(&found, &experiment.out).map_err(Failure::run)?;
     if let Some(ended) = tracked.ended {
         let points = found.points.len();
         return Err(Failure::run(format!(
@@ -98,5 +74,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         )));
     }
     let summary = report::summary::tracked(&found);
-    result(arguments.json, &found, &summary, &files, timing)
+    result(experiment.json, &found, &summary, &files, timing)
 }

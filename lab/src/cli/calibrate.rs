@@ -8,7 +8,7 @@ use vines::calibration::{self, Calibration, Coverage, Kind, OTHER_RIGS, Part, RA
 use vines::report::{self, Table};
 use vines::scene::Scene;
 
-use super::{failure::Failure, json, writable, written};
+use super::{failure::Failure, output, writable, written};
 
 /// The scene whose settings the rigs change.
 const SCENE: &str = include_str!("../../../scenes/dimensionless.toml");
@@ -56,16 +56,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let found = calibration::calibrate(load, rigs, seeds, |done| bar.set_position(done)).map_err(Failure::input)?;
     bar.finish_and_clear();
     let files = report::write_calibration(&found, &arguments.out).map_err(Failure::run)?;
-    if arguments.json {
-        return json(&found.outcomes);
-    }
-    Ok(format!(
-        "{}\n{}\n{}\n{}",
-        table(&found).markdown(),
-        missing(&found).markdown(),
-        totals(&found),
-        written(&files)
-    ))
+    output(arguments.json, &found.outcomes, || {
+        let tables = format!("{}\n{}", table(&found).markdown(), missing(&found).markdown());
+        format!("{tables}\n{}\n{}", totals(&found), written(&files))
+    })
 }
 
 /// One row for each ratio and quantity.
@@ -86,16 +80,7 @@ fn table(found: &Calibration) -> Table {
             ]
         })
     });
-    Table::new([
-        "noise",
-        "result",
-        "number",
-        "covered",
-        "worst",
-        "RMS error",
-        "Cramér–Rao",
-    ])
-    .rows(rows)
+    Table::new("noise | result | number | covered | worst | RMS error | Cramér–Rao").rows(rows)
 }
 
 /// The results under study.
@@ -127,7 +112,7 @@ fn missing(found: &Calibration) -> Table {
             count(Part::Settled),
         ]
     });
-    Table::new(["noise", "no lock", "tracking ended early", "points not settled"]).rows(rows)
+    Table::new("noise | no lock | tracking ended early | points not settled").rows(rows)
 }
 
 fn totals(found: &Calibration) -> String {

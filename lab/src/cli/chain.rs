@@ -4,7 +4,7 @@ use clap::Args;
 use vines::chain_effects::{self, Effect};
 use vines::report::Table;
 
-use super::{failure::Failure, json, scene_arguments::SceneArguments};
+use super::{failure::Failure, output, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Locks the plant with each stage of [chain] alone and with some combinations, and prints a Markdown table:
@@ -31,29 +31,21 @@ pub(super) struct Arguments {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let effects = chain_effects::effects(|further| arguments.scene.load_with(further));
     let effects = effects.map_err(Failure::input)?;
-    if arguments.json {
-        return json(&effects);
-    }
-    Ok(table(&effects).markdown())
+    output(arguments.json, &effects, || table(&effects).markdown())
 }
 
 /// The effects, each against the ideal chain, which is the first.
 fn table(effects: &[Effect]) -> Table {
     let ideal = effects[0];
-    Table::new([
-        "stage",
-        "sigma moves by",
-        "C moves by",
-        "sigma wanders by",
-        "time of a sample",
-    ])
-    .rows(effects.iter().map(|effect| {
-        [
-            effect.name.to_string(),
-            format!("{:+.1e}", effect.sigma - ideal.sigma),
-            format!("{:+.1e}", effect.c - ideal.c),
-            format!("{:.0e}", effect.wander),
-            format!("× {:.2}", effect.sample_seconds / ideal.sample_seconds),
-        ]
-    }))
+    Table::new("stage | sigma moves by | C moves by | sigma wanders by | time of a sample").rows(effects.iter().map(
+        |effect| {
+            [
+                effect.name.to_string(),
+                format!("{:+.1e}", effect.sigma - ideal.sigma),
+                format!("{:+.1e}", effect.c - ideal.c),
+                format!("{:.0e}", effect.wander),
+                format!("× {:.2}", effect.sample_seconds / ideal.sample_seconds),
+            ]
+        },
+    ))
 }

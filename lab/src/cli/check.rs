@@ -5,14 +5,12 @@ use vines::{
     experiment::ExperimentError,
     loop_check::{Channel, LockTime, LoopCheck, Trials, Verdict, check, lock_times, trials},
     report::Table,
-    rig::Rig,
-    scene::Scene,
 };
 
 use super::{
     endpoint::{Endpoint, ReachArguments},
     failure::Failure,
-    json, log_warnings,
+    log_warnings, output,
     scene_arguments::SceneArguments,
 };
 
@@ -67,29 +65,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     log_warnings();
     if let Some(count) = arguments.trials {
         let found = trials(&scene, count, arguments.seed)?;
-        return if arguments.json {
-            json(&found)
-        } else {
-            Ok(counted(&found))
-        };
+        return output(arguments.json, &found, || counted(&found));
     }
     if arguments.lock_times {
         let times = lock_times(&scene).map_err(Failure::run)?;
-        return if arguments.json {
-            json(&times)
-        } else {
-            Ok(listed(&times))
-        };
+        return output(arguments.json, &times, || listed(&times));
     }
     scene.start = Default::default();
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach()?)?;
     let found = check(&mut open.rig, &scene).map_err(ExperimentError::from)?;
     open.close();
-    let text = if arguments.json {
-        json(&found)?
-    } else {
-        described(&found)
-    };
+    let text = output(arguments.json, &found, || described(&found))?;
     if found.verdict == Verdict::Healthy {
         return Ok(text);
     }
@@ -97,37 +83,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     Err(Failure::run(format!("the loop check failed: {}", found.verdict)))
 }
 
-/// `--no-check`, for the commands that drive a rig.
-#[derive(Debug, Args)]
-pub(super) struct LoopCheckArguments {
-    /// Do not check the loop of a rig that is not a simulation first; see `vines check`
-    #[arg(long)]
-    no_check: bool,
-}
-
-impl LoopCheckArguments {
-    /// Checks a rig that is not a simulation, and refuses one that is not as expected. Such a rig starts at rest.
-    pub(super) fn before(&self, rig: &mut impl Rig, scene: &mut Scene) -> Result<(), Failure> {
-        rig.sense().map_err(ExperimentError::from)?;
-        if rig.ground_truth().map_err(ExperimentError::from)?.is_some() {
-            return Ok(());
-        }
-        scene.start = Default::default();
-        if self.no_check {
-            return Ok(());
-        }
-        let found = check(rig, scene).map_err(ExperimentError::from)?;
-        eprint!("{}", described(&found));
-        match found.verdict {
-            Verdict::Healthy => Ok(()),
-            verdict => Err(Failure::run(format!(
-                "the loop check failed, and the drive is off: {verdict}; --no-check skips it"
-            ))),
-        }
-    }
-}
-
-fn described(found: &LoopCheck) -> String {
+pub(super) fn described(found: &LoopCheck) -> String {
     let row = |name: &str, channel: &Channel| {
         [
             name.to_string(),
@@ -140,7 +96,7 @@ fn described(found: &LoopCheck) -> String {
     };
     let rows = [("response", Some(&found.response)), ("base", found.base.as_ref())];
     let rows = rows.into_iter().filter_map(|(name, channel)| Some(row(name, channel?)));
-    let table = Table::new(["channel", "gain", "phase", "delay", "noise", "floor"]).rows(rows);
+    let table = Table::new("channel | gain | phase | delay | noise | floor").rows(rows);
     let mut text = format!(
         "{}\nAt E = {:.2e} m: {}\n",
         table.markdown(),
@@ -175,7 +131,7 @@ fn listed(times: &[LockTime]) -> String {
             reported,
         ]
     });
-    let table = Table::new(["bandwidth", "from the start", "from a steady motion", "reported"]).rows(rows);
+    let table = Table::new("bandwidth | from the start | from a steady motion | reported").rows(rows);
     format!(
         "Periods until the phase error has stayed within 2 degrees for twenty of them\n\n{}",
         table.markdown()

@@ -5,7 +5,7 @@ use vines::estimators::{self, Quality};
 use vines::report::Table;
 use vines::scene::Estimator;
 
-use super::{failure::Failure, json, scene_arguments::SceneArguments};
+use super::{failure::Failure, output, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Locks the built-in plant, releases it, and estimates sigma along the decay with every estimator and window, on clean data and
@@ -36,25 +36,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         ));
     }
     let qualities = estimators::qualities(&scene).map_err(Failure::run)?;
-    if arguments.json {
-        return json(&qualities);
-    }
-    Ok(table(&qualities).markdown())
+    output(arguments.json, &qualities, || table(&qualities).markdown())
 }
 
 /// One row per estimator and window, with a column for each noise level.
 fn table(qualities: &[Quality]) -> Table {
     let rows = qualities.chunk_by(|one, other| (one.estimator, one.window) == (other.estimator, other.window));
-    Table::new([
-        "estimator",
-        "window, periods",
-        "clean: bias",
-        "clean: RMS",
-        "60 dB",
-        "50 dB",
-        "40 dB",
-    ])
-    .rows(rows.map(|row| {
+    Table::new("estimator | window, periods | clean: bias | clean: RMS | 60 dB | 50 dB | 40 dB").rows(rows.map(|row| {
         let name = match row[0].estimator {
             Estimator::Fit => "least squares",
             Estimator::Crossings => "zero crossings",

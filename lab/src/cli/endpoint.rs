@@ -184,12 +184,6 @@ pub(super) fn no_key(scope: BindScope) -> Result<(), Failure> {
 
 const HELIC_ADVICE: &str = "is `vines rig --protocol helic` or a device running there?";
 
-/// Refuses settings with which no experiment can begin, before anything is written or driven.
-pub(super) fn check(scene: &Scene) -> Result<(), Failure> {
-    BuiltIn::new(&scene.controller_config())?;
-    Ok(())
-}
-
 /// Options of every command that may use a network.
 #[derive(Debug, Args)]
 pub(super) struct ReachArguments {

@@ -11,7 +11,8 @@ use vines::{
     scene::{SceneError, refusal},
 };
 
-use super::interrupt::INTERRUPTED;
+/// Exit code of a program that a signal ended: 128 and the number of SIGINT.
+pub(super) const INTERRUPTED: u8 = 130;
 
 /// A message and an exit code.
 #[derive(Debug)]
@@ -46,6 +47,7 @@ impl Failure {
     }
 
     /// Ended by a signal: exit code 130.
+    #[cfg(feature = "sweep")]
     pub(super) fn interrupted(message: impl Display) -> Self {
         Self { code: INTERRUPTED, message: message.to_string() }
     }

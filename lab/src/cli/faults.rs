@@ -9,7 +9,7 @@ use vines::{
     rig::{Rig, Stoppable},
 };
 
-use super::{failure::Failure, interrupt::stop_flag, json, scene_arguments::SceneArguments};
+use super::{failure::Failure, interrupt::stop_flag, output, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Injects faults into runs on the built-in plant, at several instants while the loop locks, holds, tracks and releases, and prints the worst
@@ -66,11 +66,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         .collect();
     let allowed = AT_ONCE + faults.ramp();
     let failed = |worst: &Worst| worst.missed > 0 || worst.shutdown > allowed;
-    let text = if arguments.json {
-        json(&rows)?
-    } else {
-        table(&rows).markdown()
-    };
+    let text = output(arguments.json, &rows, || table(&rows).markdown())?;
     if rows.iter().any(|row| row.worst.iter().any(failed)) {
         super::print(&text)?;
         return Err(Failure::run(format!(
@@ -93,14 +89,7 @@ fn signal(name: &str) {
 }
 
 fn table(rows: &[Row]) -> Table {
-    let headings = [
-        "fault",
-        "locking",
-        "holding",
-        "tracking",
-        "releasing",
-        "reason, while tracking",
-    ];
+    let headings = "fault | locking | holding | tracking | releasing | reason, while tracking";
     Table::new(headings).rows(rows.iter().map(|row| {
         let cell = |n: usize| {
             let Worst { detection, shutdown, missed } = row.worst[n];

@@ -3,26 +3,21 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
+use indicatif::ProgressBar;
 use tempfile::TempDir;
 use vines::{
     advice,
     comparison::Comparison,
-    experiment::{self, ExperimentError, Plan, Sample, Stage},
+    experiment::{ExperimentError, Plan, Sample, Stage, run_into},
     identification::{self, IdentificationError},
     pack, report,
+    rig::BuiltIn,
     scene::Scene,
 };
 
 use super::{
-    check::LoopCheckArguments,
-    endpoint::{Endpoint, ReachArguments, check},
-    failure::Failure,
-    log_warnings,
-    pack::beside_this_program,
-    result,
-    scene_arguments::SceneArguments,
-    written,
+    endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, pack::beside_this_program, progress_bar,
+    result, written,
 };
 
 const HELP: &str = "\
@@ -40,11 +35,7 @@ Without --rig, writes LoViNes.fmu and PhaseLock.fmu and runs the first; then wri
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
     #[command(flatten)]
-    scene: SceneArguments,
-
-    /// Folder for the results; made if it is not there
-    #[arg(long, value_name = "DIR", default_value = "out")]
-    out: PathBuf,
+    experiment: ExperimentArguments,
 
     /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), or udp://HOST:PORT (in real time) [default: this program's plant FMU, packed into the
     /// folder of the results]
@@ -54,39 +45,29 @@ pub(super) struct Arguments {
     /// The controller: `built-in`, an FMU, or tcp://HOST:PORT
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     controller: Endpoint,
-
-    #[command(flatten)]
-    reach: ReachArguments,
-
-    #[command(flatten)]
-    loop_check: LoopCheckArguments,
-
-    /// Print identification.json instead of the table
-    #[arg(long)]
-    json: bool,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let mut scene = arguments.scene.load()?;
-    log_warnings();
-    let reach = arguments.reach.reach()?;
-    check(&scene)?;
+    let experiment = &arguments.experiment;
+    let (mut scene, reach) = experiment.begin()?;
+    // Invalid settings are refused before anything is written or driven.
+    BuiltIn::new(&scene.controller_config())?;
     let (mut open, fmus) = match &arguments.rig {
-        Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&arguments.out)?),
+        Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&experiment.out)?),
         None => {
-            let fmus = Packed::at(&arguments.out)?;
+            let fmus = Packed::at(&experiment.out)?;
             (Endpoint::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
         }
     };
-    arguments.loop_check.before(&mut open.rig, &mut scene)?;
+    experiment.check_loop(&mut open.rig, &mut scene)?;
     let mut controller =
         arguments
             .controller
             .controller(&scene.controller_config(), &scene.controller_names, reach, open.pace)?;
     let plan = Plan::of(&scene);
-    let bar = progress_bar(&plan);
+    let bar = progress_bar(plan.lock as u64, "{msg:29} [{wide_bar}] {pos}/{len} samples");
     let mut samples = Vec::new();
-    let record = experiment::run_into(
+    let record = run_into(
         &mut samples,
         &mut open.rig,
         controller.as_mut(),
@@ -98,7 +79,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let timing = open.close();
     let record = match record {
         Ok(record) => record,
-        Err(error) => return Err(interrupted(error, &samples, &scene, &arguments.out)),
+        Err(error) => return Err(interrupted(error, &samples, &scene, &experiment.out)),
     };
     let found = identification::identify(&record, &scene).map_err(|error| match error {
         IdentificationError::Regime { regime, .. } => {
@@ -108,10 +89,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         other => Failure::run(other),
     })?;
     let found = Comparison::of(&found, &scene);
-    let mut files = report::write(&found, &arguments.out).map_err(Failure::run)?;
+    let mut files = report::write(&found, &experiment.out).map_err(Failure::run)?;
     files.extend(fmus.keep()?);
     let summary = report::summary::identification(&found);
-    result(arguments.json, &found, &summary, &files, timing)
+    result(experiment.json, &found, &summary, &files, timing)
 }
 
 /// The failure of an experiment that ended early, with the reason that the exact orbits know, and what was measured in a file.
@@ -166,13 +147,6 @@ impl Packed {
         }
         Ok(kept)
     }
-}
-
-/// A progress bar on stderr; indicatif hides it if that is not a terminal.
-fn progress_bar(plan: &Plan) -> ProgressBar {
-    let style = ProgressStyle::with_template("{msg:29} [{wide_bar}] {pos}/{len} samples")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    ProgressBar::new(plan.lock as u64).with_style(style)
 }
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {

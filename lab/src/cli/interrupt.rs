@@ -8,10 +8,7 @@ use std::{
     },
 };
 
-use super::failure::Failure;
-
-/// Exit code of a program that a signal ended: 128 and the number of SIGINT.
-pub(super) const INTERRUPTED: u8 = 130;
+use super::failure::{Failure, INTERRUPTED};
 
 /// A flag that a signal sets. A second signal ends the program at once.
 pub(super) fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {

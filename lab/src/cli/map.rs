@@ -4,10 +4,9 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use vines::{
-    map::{Axis, CONFIRMATIONS, LIMIT, Map, Plan, Range},
-    orbit::{Branch, phase_resonant},
+    map::{CONFIRMATIONS, LIMIT, Map, Plan, Range},
+    orbit::Branch,
     report::{
         self,
         summary::{parameters, regimes},
@@ -15,7 +14,7 @@ use vines::{
     scene::Scene,
 };
 
-use super::{failure::Failure, scene_arguments::SceneArguments, writable, written};
+use super::{failure::Failure, progress_bar, scene_arguments::SceneArguments, writable, written};
 
 const HELP: &str = "\
 Every cell is one plant, driven at a fixed frequency from the scene's start:
@@ -84,9 +83,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     let plan = plan(arguments, &scene)?;
     writable(&arguments.out)?;
-    let style = ProgressStyle::with_template("mapping regimes [{wide_bar}] {pos}/{len} cells")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(plan.cells() as u64).with_style(style);
+    let bar = progress_bar(plan.cells() as u64, "mapping regimes [{wide_bar}] {pos}/{len} cells");
     let map = plan.run(|| bar.inc(1)).map_err(Failure::input)?;
     bar.finish_and_clear();
     let files = report::write_map(&map, &arguments.out).map_err(Failure::run)?;
@@ -99,27 +96,18 @@ fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
             "--sigma = {sigma} (dimensionless) is not a finite number"
         )));
     }
-    let numbers = scene.dimensionless();
-    let needed = arguments.x.axis != Axis::Sigma && arguments.y.axis != Axis::Sigma;
-    let resonant = || {
-        let orbits = phase_resonant(&numbers);
-        let stable = orbits.iter().find(|orbit| orbit.stable);
-        stable.map_or(0.0, |orbit| orbit.sigma)
-    };
-    let sigma = match arguments.sigma {
-        Some(sigma) => sigma,
-        None if needed => resonant(),
-        None => 0.0,
-    };
+    let plan = Plan::new(
+        scene.dimensionless(),
+        scene.dimensionless_start(),
+        arguments.x,
+        arguments.y,
+    );
     Ok(Plan {
-        scene: numbers,
-        sigma,
-        start: scene.dimensionless_start(),
-        x: arguments.x,
-        y: arguments.y,
+        sigma: arguments.sigma.unwrap_or(plan.sigma),
         limit: arguments.periods,
         starts: arguments.starts,
         confirmations: arguments.confirmations,
+        ..plan
     })
 }
 

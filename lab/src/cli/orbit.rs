@@ -108,15 +108,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         return defined(&scene, arguments.json);
     }
     let orbits = phase_resonant(&scene);
-    if arguments.json {
-        return super::json(&orbits);
-    }
     let title = format!("Exact symmetric 1:1 orbits at resonance: {}", scene.definition.name());
-    Ok(format!(
-        "{title}\n  {}\n\n{}",
-        parameters(&scene),
-        listing(&scene, &orbits)
-    ))
+    shown(&scene, &title, &orbits, arguments.json, || listing(&scene, &orbits))
 }
 
 /// All components of the frequency response.
@@ -205,7 +198,7 @@ fn described(pattern: &str, motion: &Periodic) -> String {
         cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
         cells
     });
-    let table = Table::new(["wall", "phase, degrees", "q1", "q1' after", "q2' after"]).rows(rows);
+    let table = Table::new("wall | phase, degrees | q1 | q1' after | q2' after").rows(rows);
     format!(
         "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
         gamma.to_degrees(),
@@ -224,10 +217,9 @@ fn shown(
     json: bool,
     text: impl FnOnce() -> String,
 ) -> Result<String, Failure> {
-    if json {
-        return super::json(found);
-    }
-    Ok(format!("{title}\n  {}\n\n{}", parameters(scene), text()))
+    super::output(json, found, || {
+        format!("{title}\n  {}\n\n{}", parameters(scene), text())
+    })
 }
 
 fn curve(name: &str, branch: &Branch) -> String {
@@ -249,7 +241,7 @@ fn curve(name: &str, branch: &Branch) -> String {
         cells.extend([number(largest), yes_no(motion.stable)]);
         cells
     };
-    let table = Table::new(["sigma", "G", "C", "phase, degrees", "B", "largest mult.", "stable"]);
+    let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
     let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(ROWS));
     text += &table.rows(thinned.map(row)).text();
     for special in &branch.special {
@@ -278,18 +270,7 @@ fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
         row.push(yes_no(orbit.stable));
         row
     });
-    Table::new([
-        "sigma",
-        "Omega",
-        "C",
-        "phase, degrees",
-        "B",
-        "mult1",
-        "mult2",
-        "mult3",
-        "mult4",
-        "stable",
-    ])
-    .rows(rows)
-    .text()
+    Table::new("sigma | Omega | C | phase, degrees | B | mult1 | mult2 | mult3 | mult4 | stable")
+        .rows(rows)
+        .text()
 }

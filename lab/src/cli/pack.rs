@@ -3,16 +3,16 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::pack::{Binary, Libraries, components, pack_bench, portable};
+use vines::pack::{Binary, Libraries, pack_bench};
 
 use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Examples:
   scripts/pack --out fmus                                      builds the libraries first
+  scripts/pack --out fmus --portable                           for older Linux (glibc 2.17)
   vines pack --libraries target/debug --out fmus               libraries of `cargo build --features lovines/fmu`
   vines pack --out fmus --scene scenes/dimensionless.toml      bench.ssp with other parameters
-  vines pack --out fmus --portable                             for older Linux; run it in the sources' folder
   vines pack --out fmus --binary win64=lovines.dll --binary win64=phase_lock_fmu.dll";
 
 /// Write LoViNes.fmu (the plant), PhaseLock.fmu (the controller) and bench.ssp (the two coupled)
@@ -30,17 +30,13 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR")]
     libraries: Option<PathBuf>,
 
-    /// Build libraries that load on older Linux (glibc 2.17) with `cargo zigbuild`, and pack those
-    #[arg(long, conflicts_with = "libraries")]
-    portable: bool,
-
     /// Add a library for another platform, such as win64 or aarch64-linux; may be given many times. The guid inside tells
     /// which FMU it belongs to
     #[arg(long = "binary", value_name = "PLATFORM=FILE")]
     binaries: Vec<Binary>,
 
     /// Pack the libraries given by --binary, and none of this platform
-    #[arg(long, requires = "binaries", conflicts_with_all = ["libraries", "portable"])]
+    #[arg(long, requires = "binaries", conflicts_with = "libraries")]
     only_binaries: bool,
 }
 
@@ -48,7 +44,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     let folder = match &arguments.libraries {
         Some(folder) => folder.clone(),
-        None if arguments.portable => portable(&components())?,
         None => beside_this_program()?,
     };
     let libraries = Libraries {

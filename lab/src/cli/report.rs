@@ -3,14 +3,13 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use vines::{
     map::Range,
     report::{Subject, write_report},
     rig::BuiltIn,
 };
 
-use super::{failure::Failure, scene_arguments::SceneArguments, writable};
+use super::{failure::Failure, progress_bar, scene_arguments::SceneArguments, writable};
 
 const HELP: &str = "\
 Runs the experiment, tracks the backbone, follows the exact curves, studies the convergence, maps the regimes, and writes
@@ -63,9 +62,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     }
     writable(&arguments.out)?;
     let subject = Subject { scene, map: [arguments.x, arguments.y] };
-    let style = ProgressStyle::with_template("{msg:10} [{wide_bar}] {percent} %")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(1000).with_style(style);
+    let bar = progress_bar(1000, "{msg:10} [{wide_bar}] {percent} %");
     let precision = std::fs::read_to_string(&arguments.work_precision).ok();
     let report = write_report(
         &subject,

@@ -7,6 +7,7 @@ use vines::faults::{FAULTS, Kind, rehearsal_rig};
 use vines::net::{Address, Role, Served, Service, Session, helic::Device};
 use vines::report;
 use vines::rig::{Rig, RigError, Simulated};
+use vines::scene::Scene;
 
 use super::{
     endpoint::{Endpoint, fmu},
@@ -132,6 +133,20 @@ enum Protocol {
     Helic,
 }
 
+/// Refuses what cannot be served before a client comes.
+fn refuse(arguments: &Arguments, scene: &Scene) -> Result<(), Failure> {
+    match &arguments.rig {
+        Endpoint::Network(address) => Err(Failure::input(format!(
+            "--rig {address}: only `built-in` or an FMU can be served"
+        ))),
+        _ if arguments.lock_step && arguments.protocol == Protocol::Helic => Err(Failure::input(
+            "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic",
+        )),
+        Endpoint::Fmu(file) => fmu(file, scene).map(drop).map_err(Failure::run),
+        Endpoint::BuiltIn => Ok(()),
+    }
+}
+
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
     let helic = arguments.protocol == Protocol::Helic;
@@ -145,15 +160,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let first = Simulated::new(scene.plant, scene.start)
         .map_err(Failure::input)?
         .with_sensors(scene.resonance);
-    let default = if arguments.lock_step {
-        SILENCE_LOCK_STEP
-    } else {
-        SILENCE_PACED
-    };
-    let (mode, transport): (_, fn(_) -> _) = if arguments.lock_step {
-        ("in lock-step", Address::Tcp)
-    } else {
-        ("in real time", Address::Udp)
+    let (silence, mode, transport): (_, _, fn(_) -> _) = match arguments.lock_step {
+        true => (SILENCE_LOCK_STEP, "in lock-step", Address::Tcp),
+        false => (SILENCE_PACED, "in real time", Address::Udp),
     };
     let max_amplitude = arguments.max_amplitude.unwrap_or(scene.plant.half_width);
     let fault = arguments
@@ -169,16 +178,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             _ => Box::new(first.clone()),
         })
     };
-    match &arguments.rig {
-        Endpoint::Network(address) => {
-            return Err(Failure::input(format!(
-                "--rig {address}: only `built-in` or an FMU can be served"
-            )));
-        }
-        // An FMU that cannot be loaded is reported before a client comes.
-        Endpoint::Fmu(file) => drop(fmu(file, &scene).map_err(Failure::run)?),
-        Endpoint::BuiltIn => {}
-    }
+    refuse(arguments, &scene)?;
     let keep = |session: &Session| {
         let (Some(file), Some(all)) = (&arguments.histogram, &session.punctuality) else {
             return;
@@ -188,10 +188,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         }
     };
     if helic {
-        if arguments.lock_step {
-            let message = "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic";
-            return Err(Failure::input(message));
-        }
         let step = scene.sample_time();
         let device = Device::new(make().map_err(Failure::run)?, step, max_amplitude).map_err(Failure::run)?;
         return arguments.serving.serve_helic(device, step, keep);
@@ -199,7 +195,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let service = Service {
         role: Role::Rig { max_amplitude, sensors: scene.resonance },
         sample_time: scene.sample_time(),
-        silence: arguments.silence.unwrap_or(default),
+        silence: arguments.silence.unwrap_or(silence),
     };
     let what = format!("rig, {mode}, {:.1} samples per second,", 1.0 / service.sample_time);
     arguments

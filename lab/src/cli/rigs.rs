@@ -5,7 +5,7 @@ use vines::random_rigs::{self, Outcome, Row};
 use vines::report::Table;
 use vines::scene::Override;
 
-use super::{failure::Failure, json};
+use super::{failure::Failure, output};
 
 const HELP: &str = "\
 Draws rigs at random, each with a drive at which a stable symmetric 1:1 orbit exists: epsilon from 0.001 to 0.05, lambda from
@@ -44,14 +44,9 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let rows = random_rigs::locks(arguments.count, arguments.seed, &arguments.set).map_err(Failure::input)?;
-    if arguments.json {
-        return json(&rows);
-    }
-    Ok(format!(
-        "{}\n{}",
-        summary(&rows).markdown(),
-        exceptions(&rows).markdown()
-    ))
+    output(arguments.json, &rows, || {
+        format!("{}\n{}", summary(&rows).markdown(), exceptions(&rows).markdown())
+    })
 }
 
 fn summary(rows: &[Row]) -> Table {
@@ -62,15 +57,7 @@ fn summary(rows: &[Row]) -> Table {
         ("no lock", Outcome::NoLock),
         ("failed", Outcome::Failed),
     ];
-    let headings = [
-        "outcome",
-        "rigs",
-        "periods: median",
-        "90 %",
-        "most",
-        "distance: median",
-        "largest",
-    ];
+    let headings = "outcome | rigs | periods: median | 90 % | most | distance: median | largest";
     Table::new(headings).rows(outcomes.iter().map(|(name, outcome)| {
         let of = |value: fn(&Row) -> Option<f64>| {
             let mut values: Vec<f64> = rows
@@ -100,7 +87,7 @@ fn summary(rows: &[Row]) -> Table {
 /// Every rig that did not lock as expected.
 fn exceptions(rows: &[Row]) -> Table {
     let others = rows.iter().filter(|row| row.outcome != Outcome::Locked);
-    Table::new(["epsilon", "lambda", "r", "G", "distance", "message"]).rows(others.map(|row| {
+    Table::new("epsilon | lambda | r | G | distance | message").rows(others.map(|row| {
         let d = &row.parameters;
         [
             format!("{:.4}", d.epsilon),

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::scene::{Family, Override, Scene, SceneError};
+#[cfg(feature = "sweep")]
+use vines::scene::Family;
+use vines::scene::{Override, Scene, SceneError};
 
 #[derive(Debug, Args)]
 pub(super) struct SceneArguments {
@@ -22,6 +24,7 @@ impl SceneArguments {
     }
 
     /// The scene, of which numbers may vary.
+    #[cfg(feature = "sweep")]
     pub(super) fn family(&self) -> Result<Family, SceneError> {
         let Some(path) = &self.scene else {
             return Family::parse("", None, &self.set);

@@ -8,10 +8,9 @@ use std::{
 };
 
 use clap::Args;
-use indicatif::{ProgressBar, ProgressStyle};
 use vines::sweep::{self, Axis, Estimate, Monitor, Plan, Results, Settings, Shard};
 
-use super::{failure::Failure, interrupt::stop_flag, scene_arguments::SceneArguments};
+use super::{failure::Failure, interrupt::stop_flag, progress_bar, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Axes; a key is sigma (the detuning) or section.key of a scene:
@@ -170,9 +169,8 @@ fn merge(plan: &Plan, arguments: &Arguments) -> Result<String, Failure> {
 /// Runs the sweep with a bar that shows the progress, until it is complete or a signal stops it.
 fn watched(plan: &Plan, arguments: &Arguments, monitor: &Monitor) -> Result<bool, Failure> {
     let signal = stop_flag()?;
-    let style = ProgressStyle::with_template("sweeping [{wide_bar}] {pos}/{len} cells, {per_sec}, {eta} left")
-        .unwrap_or_else(|_| ProgressStyle::default_bar());
-    let bar = ProgressBar::new(plan.cells()).with_style(style);
+    let template = "sweeping [{wide_bar}] {pos}/{len} cells, {per_sec}, {eta} left";
+    let bar = progress_bar(plan.cells(), template);
     thread::scope(|scope| {
         let work = scope.spawn(|| sweep::run(plan, &arguments.out, arguments.shard.unwrap_or(Shard::ALL), monitor));
         let mut started = false;

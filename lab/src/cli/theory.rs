@@ -8,7 +8,7 @@ use vines::{
     theory::{Activation, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, SlowFlow, backbone, resonant},
 };
 
-use super::{failure::Failure, json, scene_arguments::SceneArguments, yes_no};
+use super::{failure::Failure, output, scene_arguments::SceneArguments, yes_no};
 
 const HELP: &str = "\
 Everything is of first order in epsilon, except the thresholds from rest. Both branches of the slow invariant manifold are one curve over B, the particle's
@@ -97,10 +97,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         equilibria: at_sigma.unwrap_or_default(),
         backbone: backbone(&scene, highest / points as f64, highest, points),
     };
-    if arguments.json {
-        return json(&report);
-    }
-    Ok(readable(&report, arguments.sigma.is_some()))
+    output(arguments.json, &report, || readable(&report, arguments.sigma.is_some()))
 }
 
 fn readable(report: &Report, listed: bool) -> String {
@@ -146,45 +143,36 @@ fn thresholds(report: &Report) -> String {
 }
 
 fn equilibria(found: &[Equilibrium]) -> String {
-    if found.is_empty() {
-        return "  none at this excitation\n".into();
-    }
-    let rows = found.iter().map(|one| {
-        let mut row = vec![branch(one.branch).to_string()];
-        row.extend([one.c, one.b, one.gamma.to_degrees()].map(number));
-        row.extend([one.impacts_stable, one.slow_flow_stable].map(yes_no));
-        row
-    });
-    Table::new([
-        "branch",
-        "C",
-        "B",
-        "phase, degrees",
-        "impacts stable",
-        "slow flow stable",
-    ])
-    .rows(rows)
-    .text()
-}
-
-fn branch(side: BranchSide) -> &'static str {
-    match side {
-        BranchSide::Left => "left",
-        BranchSide::Right => "right",
-    }
+    let row = |one: &Equilibrium| {
+        let numbers = [one.c, one.b, one.gamma.to_degrees()];
+        row(one.branch, numbers, [one.impacts_stable, one.slow_flow_stable])
+    };
+    listed("branch | C | B | phase, degrees", found.iter().map(row))
 }
 
 fn solutions(points: &[BackbonePoint]) -> String {
-    if points.is_empty() {
-        return "  none at this excitation\n".into();
+    let row = |one: &BackbonePoint| {
+        let numbers = [one.sigma, one.c, one.b];
+        row(one.branch, numbers, [one.impacts_stable, one.slow_flow_stable])
+    };
+    listed("branch | sigma | C | B", points.iter().map(row))
+}
+
+fn row(branch: BranchSide, numbers: [f64; 3], stable: [bool; 2]) -> Vec<String> {
+    let side = match branch {
+        BranchSide::Left => "left",
+        BranchSide::Right => "right",
+    };
+    let mut cells = vec![side.to_string()];
+    cells.extend(numbers.map(number));
+    cells.extend(stable.map(yes_no));
+    cells
+}
+
+fn listed(headings: &str, rows: impl Iterator<Item = Vec<String>>) -> String {
+    let table = Table::new(&format!("{headings} | impacts stable | slow flow stable")).rows(rows);
+    match table.is_empty() {
+        true => "  none at this excitation\n".into(),
+        false => table.text(),
     }
-    let rows = points.iter().map(|point| {
-        let mut row = vec![branch(point.branch).to_string()];
-        row.extend([point.sigma, point.c, point.b].map(number));
-        row.extend([point.impacts_stable, point.slow_flow_stable].map(yes_no));
-        row
-    });
-    Table::new(["branch", "sigma", "C", "B", "impacts stable", "slow flow stable"])
-        .rows(rows)
-        .text()
 }

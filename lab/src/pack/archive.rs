@@ -4,8 +4,18 @@ use std::io::{self, Cursor, Write};
 
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
-/// The archive of `entries`, (name inside, content).
-pub(super) fn zip(entries: &[(&str, &[u8])]) -> io::Result<Vec<u8>> {
+use super::{File, PackError};
+use crate::files::FileError;
+
+/// The archive of `entries`, (name inside, content), as a file.
+pub(super) fn file(name: String, entries: &[(&str, &[u8])]) -> Result<File, PackError> {
+    match zip(entries) {
+        Ok(content) => Ok(File { name, content }),
+        Err(source) => Err(FileError { path: name.into(), source }.into()),
+    }
+}
+
+fn zip(entries: &[(&str, &[u8])]) -> io::Result<Vec<u8>> {
     let mut zip = ZipWriter::new(Cursor::new(Vec::new()));
     for (name, content) in entries {
         // Without a time of day, and with nothing compressed twice.

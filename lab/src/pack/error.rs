@@ -4,9 +4,8 @@ use std::path::PathBuf;
 
 /// A failure that names the file and what to do; `build_options` are those of `cargo build --release`.
 #[derive(Debug, thiserror::Error)]
-#[expect(missing_docs, reason = "the messages explain the fields")]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum PackError {
-    /// There is no such library.
     #[error(
         "the library of {identifier} is not there: looked for {}; build it with \
          `cargo build --release {build_options}`, or say where it is with --libraries", path.display()
@@ -16,10 +15,8 @@ pub enum PackError {
         path: PathBuf,
         build_options: String,
     },
-    /// The library exists but cannot be read.
     #[error("cannot read {}: {source}", path.display())]
     Read { path: PathBuf, source: std::io::Error },
-    /// The library cannot run here.
     #[error(
         "{} is {found}, but this platform needs {needed}; build it here with `cargo build --release {build_options}`",
         path.display()
@@ -30,13 +27,11 @@ pub enum PackError {
         needed: &'static str,
         build_options: String,
     },
-    /// The library is one for this platform, but without FMI functions.
     #[error(
         "{} has no function fmi2Instantiate, so it is no FMI 2.0 component; \
          build it with `cargo build --release {build_options}`", path.display()
     )]
     NotAComponent { path: PathBuf, build_options: String },
-    /// The library was built from other variables than the description has.
     #[error(
         "{} was built from other variables than {identifier} has now: build it anew with \
          `cargo build --release {build_options}`", path.display()
@@ -46,31 +41,22 @@ pub enum PackError {
         identifier: &'static str,
         build_options: String,
     },
-    /// A library for another platform that cannot be used.
     #[error("{} {problem}", path.display())]
     Binary { path: PathBuf, problem: String },
-    /// No platform is served.
     #[error(
         "there is no library of {identifier} for any platform: give one by --binary PLATFORM=FILE, or leave out \
          --only-binaries"
     )]
     Unserved { identifier: &'static str },
-    /// The date of the files is no date.
     #[error(
         "SOURCE_DATE_EPOCH = {0:?} is refused; allowed are seconds since 1970, for instance {example}",
         example = 1_700_000_000
     )]
     Date(String),
-    /// There are no portable libraries.
-    #[error("--portable cannot be done: {0}")]
-    Portable(String),
-    /// The scene's controller cannot work.
     #[error("the scene's controller: {0}")]
     Controller(#[from] phase_lock::ConfigError),
-    /// The description is no XML.
     #[error("the description cannot be read: {0}")]
     Description(fmi2_description::Error),
-    /// A file could not be written.
-    #[error("cannot write {}: {source}", path.display())]
-    Write { path: PathBuf, source: std::io::Error },
+    #[error(transparent)]
+    Write(#[from] crate::files::FileError),
 }

@@ -56,9 +56,5 @@ fn one(component: &Component, libraries: &[&Fitted], date: Option<&str>) -> Resu
     let mut entries = vec![("modelDescription.xml", description.as_bytes())];
     entries.extend(pages.iter().map(|(name, page)| (name.as_str(), page.as_slice())));
     entries.extend(libraries.iter().map(|(name, content)| (name.as_str(), *content)));
-    let name = format!("{identifier}.fmu");
-    match archive::zip(&entries) {
-        Ok(content) => Ok(File { name, content }),
-        Err(source) => Err(PackError::Write { path: name.into(), source }),
-    }
+    archive::file(format!("{identifier}.fmu"), &entries)
 }

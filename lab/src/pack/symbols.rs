@@ -1,11 +1,8 @@
-//! What a library says of itself: its symbols, and the version of the C library that it needs.
+//! The symbols of a library.
 
 use object::{
     FileKind, NameOrOrdinal, Object,
-    read::{
-        ImportFlags,
-        macho::{FatArch, MachOFatFile32, MachOFatFile64},
-    },
+    read::macho::{FatArch, MachOFatFile32, MachOFatFile64},
 };
 
 /// The library itself, or those in a universal library for macOS.
@@ -42,20 +39,6 @@ fn one_exports(image: &[u8], function: &str) -> bool {
         Ok(NameOrOrdinal::Name(name)) => name.strip_prefix(b"_").unwrap_or(name) == function.as_bytes(),
         _ => false,
     })
-}
-
-/// The newest version of the GNU C library that the library asks for; none where it asks for none.
-pub(super) fn glibc(file: &[u8]) -> Option<(u32, u32)> {
-    let parsed = object::File::parse(file).ok()?;
-    let versions = parsed.imports().ok()?.filter_map(|import| {
-        let ImportFlags::Elf { version, .. } = import.ok()?.flags() else {
-            return None;
-        };
-        let text = std::str::from_utf8(version?).ok()?;
-        let mut numbers = text.strip_prefix("GLIBC_")?.split('.').map(str::parse);
-        Some((numbers.next()?.ok()?, numbers.next()?.ok()?))
-    });
-    versions.max()
 }
 
 /// Whether `text` stands anywhere in the library.

@@ -41,9 +41,5 @@ pub(super) fn file(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
     ];
     let fmus = inside.iter().zip(fmus);
     entries.extend(fmus.map(|(name, fmu)| (name.as_str(), fmu.content.as_slice())));
-    let name = String::from("bench.ssp");
-    match archive::zip(&entries) {
-        Ok(content) => Ok(File { name, content }),
-        Err(source) => Err(PackError::Write { path: name.into(), source }),
-    }
+    archive::file("bench.ssp".into(), &entries)
 }

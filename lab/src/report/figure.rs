@@ -217,8 +217,10 @@ pub fn amplitude(p: &Dimensionless) -> &'static str {
 
 /// The caption of a figure that belongs to a scene.
 pub fn caption(p: &Dimensionless, g: f64) -> String {
-    format!(
-        "ε = {:.5}, λ = {:.3}, r = {}, G = {g:.3}; lengths over b, times over 1/ω₀",
-        p.epsilon, p.lambda, p.r
-    )
+    format!("{}, G = {g:.3}; lengths over b, times over 1/ω₀", rig(p))
+}
+
+/// The numbers of a rig, for captions.
+pub fn rig(p: &Dimensionless) -> String {
+    format!("ε = {:.5}, λ = {:.3}, r = {}", p.epsilon, p.lambda, p.r)
 }

@@ -1,6 +1,5 @@
 //! The files of a run: tables, figures and JSON, each complete or absent.
 
-use std::io::{self, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -12,28 +11,20 @@ use super::theme::dark;
 use crate::calibration::Calibration;
 use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
 use crate::experiment::{Sample, table};
-use crate::files::temporary;
+use crate::files::{self, FileError};
 use crate::map::{Cell, Map};
 use crate::regime::Regime;
 
 /// Why the files of a run could not be written.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum WriteError {
-    /// The file system refused.
-    #[error("cannot write {}: {source}", path.display())]
-    File {
-        /// What was being written.
-        path: PathBuf,
-        /// Why not.
-        source: io::Error,
-    },
-    /// A figure could not be drawn.
+    #[error(transparent)]
+    File(#[from] FileError),
     #[error(transparent)]
     Figure(#[from] FigureError),
-    /// A table could not be written as CSV.
     #[error("cannot write a table as CSV: {0}")]
     Csv(#[from] csv::Error),
-    /// A result could not be written as JSON.
     #[error("cannot write JSON: {0}")]
     Json(#[from] serde_json::Error),
 }
@@ -51,7 +42,7 @@ pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, WriteError>
         ("backbone.svg", backbone::figure(found).svg()?),
         ("sim.svg", manifold::figure(found).svg()?),
     ];
-    write_files(out, &files)
+    Ok(files::write(out, files)?)
 }
 
 /// Writes `map.csv`, `map.svg`, `map-dark.svg` and, over sigma and G, `bifurcations.csv` into `out` and returns their paths, as [`write()`] does.
@@ -68,7 +59,7 @@ pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
     if !map.curves.is_empty() {
         files.push(("bifurcations.csv", bifurcations_csv(map)?));
     }
-    write_files(out, &files)
+    Ok(files::write(out, files)?)
 }
 
 /// Writes `tracked.json`, `tracked.csv` and `tracked.svg` into `out` and returns their paths, as [`write()`] does.
@@ -81,7 +72,7 @@ pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBu
         ("tracked.csv", tracked_csv(found)?),
         ("tracked.svg", tracked::figure_with_drive(found).svg()?),
     ];
-    write_files(out, &files)
+    Ok(files::write(out, files)?)
 }
 
 /// Writes `interrupted.csv`: the samples of an experiment that ended early.
@@ -89,7 +80,7 @@ pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBu
 /// # Errors
 /// A file that cannot be written.
 pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>, WriteError> {
-    write_files(out, &[("interrupted.csv", table(samples))])
+    Ok(files::write(out, [("interrupted.csv", table(samples))])?)
 }
 
 /// Writes a histogram to `file`: upper limits of the lateness, s, and numbers of samples.
@@ -97,13 +88,11 @@ pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>,
 /// # Errors
 /// A file that cannot be written.
 pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf>, WriteError> {
-    let mut text = String::from("lateness_s,samples\n");
-    classes
-        .iter()
-        .for_each(|(limit, count)| text += &format!("{limit:e},{count}\n"));
-    let name = file.file_name().unwrap_or_default().to_string_lossy();
+    let lines = classes.iter().map(|(limit, count)| format!("{limit:e},{count}\n"));
+    let text = String::from("lateness_s,samples\n") + &lines.collect::<String>();
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
-    write_files(folder.unwrap_or(Path::new(".")), &[(name, text)])
+    let name = file.file_name().unwrap_or_default();
+    Ok(files::write(folder.unwrap_or(Path::new(".")), [(name, text)])?)
 }
 
 /// Writes `coverage.svg` into `out` and returns its path, as [`write()`] does.
@@ -111,25 +100,7 @@ pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf
 /// # Errors
 /// As [`write()`].
 pub fn write_calibration(found: &Calibration, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
-    write_files(out, &[("coverage.svg", coverage::figure(found).svg()?)])
-}
-
-/// Writes each file under a temporary name, and gives it its own once it is complete.
-pub(super) fn write_files<N: AsRef<str>>(out: &Path, files: &[(N, String)]) -> Result<Vec<PathBuf>, WriteError> {
-    let refused = |path: &Path| {
-        let path = path.to_path_buf();
-        move |source| WriteError::File { path, source }
-    };
-    std::fs::create_dir_all(out).map_err(refused(out))?;
-    let mut written = Vec::new();
-    for (name, text) in files {
-        let path = out.join(name.as_ref());
-        let mut file = temporary(out).map_err(refused(&path))?;
-        file.write_all(text.as_bytes()).map_err(refused(&path))?;
-        file.persist(&path).map_err(|error| refused(&path)(error.error))?;
-        written.push(path);
-    }
-    Ok(written)
+    Ok(files::write(out, [("coverage.svg", coverage::figure(found).svg()?)])?)
 }
 
 pub(super) fn json(found: &impl Serialize) -> Result<String, WriteError> {

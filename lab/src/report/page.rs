@@ -116,7 +116,7 @@ fn rendered(block: &Block, figures: &mut u32) -> Markup {
 fn budget(sections: &[Section]) -> Markup {
     let lines = sections.iter().flat_map(|section| &section.budget);
     let rows = lines.map(|one| [one.what.clone(), one.size.clone(), one.why.clone()]);
-    let table = Table::new(["what", "how far off", "why, and from where"]).rows(rows);
+    let table = Table::new("what | how far off | why, and from where").rows(rows);
     html! {
         section.budget {
             h2 { "What the numbers are worth" } "\n"

@@ -4,61 +4,40 @@ use serde::{Deserialize, Serialize};
 
 use super::table::Table;
 
-/// One part of a section.
+/// One part of a section. A figure is SVG for white paper; its name is that of its files, without ending.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the names say it")]
 pub enum Block {
-    /// A paragraph.
     Words(String),
-    /// A figure, as SVG for white paper.
-    Figure {
-        /// Name of its files, without ending.
-        name: String,
-        /// What it shows.
-        caption: String,
-        /// The drawing.
-        svg: String,
-    },
-    /// A table.
-    Table {
-        /// What it shows.
-        caption: String,
-        /// Its cells.
-        table: Table,
-    },
+    Figure { name: String, caption: String, svg: String },
+    Table { caption: String, table: Table },
 }
 
 /// A file beside the page.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the names say it")]
 pub struct Attachment {
-    /// Its name.
     pub name: String,
-    /// Its content.
     pub text: String,
 }
 
-/// One line of the error budget.
+/// One line of the error budget: what is uncertain, by how much, and where that number comes from.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the names say it")]
 pub struct Budget {
-    /// What is uncertain.
     pub what: String,
-    /// By how much.
     pub size: String,
-    /// Source and meaning of that number.
     pub why: String,
 }
 
-/// A section.
+/// A section, with what was found in a sentence or two. The attachments are tables for programs.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[expect(missing_docs, reason = "the names say it")]
 pub struct Section {
-    /// Its heading.
     pub title: String,
-    /// What was found, in a sentence or two.
     pub finding: String,
-    /// Its body.
     pub blocks: Vec<Block>,
-    /// Its lines of the error budget.
     pub budget: Vec<Budget>,
-    /// Tables for programs.
     pub attachments: Vec<Attachment>,
 }
 

@@ -14,7 +14,6 @@ use super::figure::FigureError;
 use super::files::WriteError;
 use super::section::Section;
 use crate::map::{MapError, Range};
-use crate::rig::{Chain, Rig, Simulated};
 use crate::scene::Scene;
 
 /// The subject of a report.
@@ -26,34 +25,14 @@ pub struct Subject {
     pub map: [Range; 2],
 }
 
-impl Subject {
-    /// The simulated plant of the scene, with its measurement chain.
-    fn rig(&self) -> Result<Box<dyn Rig>, InvalidValue> {
-        let plant = Simulated::new(self.scene.plant, self.scene.start)?.with_sensors(self.scene.resonance);
-        let scene = &self.scene;
-        Ok(Chain::around(
-            Box::new(plant),
-            &scene.chain,
-            &scene.dimensionless(),
-            scene.controller.samples_per_period,
-        ))
-    }
-}
-
 /// Why a section could not be made.
 #[derive(Debug, Error)]
+#[error(transparent)]
+#[expect(missing_docs, reason = "each is named by what it contains")]
 pub enum SectionError {
-    /// The plant refuses a parameter or the start.
-    #[error(transparent)]
     Plant(#[from] InvalidValue),
-    /// The controller refuses a setting.
-    #[error(transparent)]
     Controller(#[from] ConfigError),
-    /// The map cannot be made.
-    #[error(transparent)]
     Map(#[from] MapError),
-    /// A figure or a table could not be made.
-    #[error(transparent)]
     Write(#[from] WriteError),
 }
 

@@ -6,10 +6,11 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::dark;
-use super::files::{WriteError, write_files};
+use super::files::WriteError;
 use super::page::page;
 use super::section::{Block, Section};
 use super::sections::{SECTIONS, SectionError, Subject};
+use crate::files;
 
 /// Folder of cached sections, inside the folder of the report.
 const KEPT: &str = ".vines";
@@ -70,7 +71,7 @@ pub fn write_report(
         let section = make(subject, &|part| progress(at(part)))?;
         let entry = Kept { key, section };
         let text = serde_json::to_string(&entry).map_err(WriteError::from)?;
-        write_files(&out.join(KEPT), &[(file, text)])?;
+        files::write(&out.join(KEPT), [(file, text)]).map_err(WriteError::from)?;
         sections.push(entry.section);
     }
     let mut files = vec![(
@@ -88,7 +89,7 @@ pub fn write_report(
         files.extend(attachments.map(|one| (one.name.clone(), one.text.clone())));
     }
     Ok(Report {
-        written: write_files(out, &files)?,
+        written: files::write(out, files).map_err(WriteError::from)?,
         kept,
         findings: sections.into_iter().map(|one| one.finding).collect(),
     })

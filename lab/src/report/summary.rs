@@ -38,7 +38,7 @@ pub fn regimes(map: &Map) -> Table {
         let shares = [share(all, map.cells.len()), share(here, inside)];
         [vec![regime.name().to_string(), all.to_string()], shares.into()].concat()
     });
-    Table::new(["regime", "cells", "share", "inside the theory's stable island"]).rows(rows)
+    Table::new("regime | cells | share | inside the theory's stable island").rows(rows)
 }
 
 /// An identification: the locked point beside theory and exact orbit, then the decay.
@@ -55,10 +55,7 @@ pub fn identification(found: &Comparison) -> String {
     let exact = exact.map(|one| row("exact orbit", one.sigma, one.c, Some(one.b)));
     let theory = found.theory.iter();
     let theory = theory.map(|one| row("theory, first order", one.sigma, one.c, Some(one.b)));
-    let table = Table::new(["", "sigma", "C", "B"])
-        .rows([measured])
-        .rows(exact)
-        .rows(theory);
+    let table = Table::new(" | sigma | C | B").rows([measured]).rows(exact).rows(theory);
     let alone = found.exact.is_none() && found.theory.is_none();
     let note = if alone {
         "  (theory and exact orbits are for phase resonance, -90 degrees; there is none to compare with)\n"
@@ -170,17 +167,8 @@ pub fn tracked(found: &TrackedComparison) -> String {
         ]);
         cells
     });
-    let table = Table::new([
-        "C",
-        "sigma",
-        "G",
-        "off target",
-        "periods",
-        "averaged",
-        "error",
-        "regime by response / by impacts",
-    ])
-    .rows(rows);
+    let table = Table::new("C | sigma | G | off target | periods | averaged | error | regime by response / by impacts")
+        .rows(rows);
     let worst = found.worst().map_or(String::new(), |worst| {
         format!(
             "Largest error of a settled point, in sigma or G against the exact backbone at the same C: {:.1e} (distance from the nearest \

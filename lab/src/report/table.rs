@@ -11,13 +11,11 @@ pub struct Table {
 }
 
 impl Table {
-    /// An empty table with these headings.
+    /// An empty table with these headings, separated by ` | `.
     #[must_use]
-    pub fn new<const N: usize>(headings: [&str; N]) -> Self {
-        Self {
-            headings: headings.map(String::from).into(),
-            rows: Vec::new(),
-        }
+    pub fn new(headings: &str) -> Self {
+        let headings = headings.split(" | ").map(String::from).collect();
+        Self { headings, rows: Vec::new() }
     }
 
     /// With a row for each item; a row has as many cells as there are headings.
@@ -112,7 +110,7 @@ mod tests {
     use super::*;
 
     fn table() -> Table {
-        Table::new(["what", "C"]).rows([["a < b", "0.5"], ["c", "-10.25"]].map(|row| row.map(String::from)))
+        Table::new("what | C").rows([["a < b", "0.5"], ["c", "-10.25"]].map(|row| row.map(String::from)))
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! What a sweep computes: its cells in their order.
 
 use serde_json::{Value, json};
-use vines_model::orbit::phase_resonant;
+use vines_model::orbit::stable_resonant;
 use vines_testbench::scene::{Family, Scene};
 
 use crate::{
@@ -58,13 +58,8 @@ impl Plan {
                 sequence
             })
             .collect();
-        let sigma = settings.sigma.unwrap_or_else(|| {
-            let orbits = phase_resonant(&scene.dimensionless());
-            orbits
-                .iter()
-                .find(|orbit| orbit.stable)
-                .map_or(0.0, |orbit| orbit.sigma)
-        });
+        let resonant = || stable_resonant(&scene.dimensionless()).map_or(0.0, |orbit| orbit.sigma);
+        let sigma = settings.sigma.unwrap_or_else(resonant);
         Ok(Self {
             family,
             settings,

@@ -1,6 +1,7 @@
 //! The errors of the results, and their statistics.
 
 use serde::Serialize;
+use vines_model::numerics::mean_square;
 
 /// What a result belongs to.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
@@ -60,16 +61,13 @@ impl Coverage {
     pub fn of<'a>(outcomes: impl Iterator<Item = &'a Outcome> + Clone) -> Self {
         let count = outcomes.clone().count();
         let pulls = outcomes.clone().map(|one| one.error.abs() / one.uncertainty);
-        let square = |values: &mut dyn Iterator<Item = f64>| {
-            (values.map(|value| value * value).sum::<f64>() / count as f64).sqrt()
-        };
         let bounds: Option<Vec<f64>> = outcomes.clone().map(|one| one.bound).collect();
         Self {
             count,
             covered: pulls.clone().filter(|pull| *pull <= HALF_WIDTH).count() as f64 / count as f64,
             worst: pulls.fold(0.0, f64::max),
-            rms: square(&mut outcomes.map(|one| one.error)),
-            bound: bounds.map(|bounds| square(&mut bounds.into_iter())),
+            rms: mean_square(outcomes.map(|one| one.error)).sqrt(),
+            bound: bounds.map(|bounds| mean_square(bounds).sqrt()),
         }
     }
 }

@@ -12,7 +12,7 @@ use super::{
     run::{Point, observe, observe_confirmed},
 };
 use crate::Dimensionless;
-use crate::orbit::{BifurcationCurve, Limits, bifurcation_curves, random_state};
+use crate::orbit::{BifurcationCurve, Limits, bifurcation_curves, random_state, stable_resonant};
 use crate::regime::Regime;
 use crate::theory::SlowFlow;
 
@@ -95,6 +95,25 @@ pub enum MapError {
 }
 
 impl Plan {
+    /// A map from one start per cell, at the detuning of the stable resonant orbit (0 without one) if that is not on an axis.
+    #[must_use]
+    pub fn new(scene: Dimensionless, start: [f64; 4], x: Range, y: Range) -> Self {
+        let mut plan = Self {
+            scene,
+            sigma: 0.0,
+            start,
+            x,
+            y,
+            limit: LIMIT,
+            starts: 1,
+            confirmations: 0,
+        };
+        if x.axis != Axis::Sigma && y.axis != Axis::Sigma {
+            plan.sigma = stable_resonant(&scene).map_or(0.0, |orbit| orbit.sigma);
+        }
+        plan
+    }
+
     /// Detuning and scene at a point of the plane.
     #[must_use]
     pub fn at(&self, x: f64, y: f64) -> (f64, Dimensionless) {

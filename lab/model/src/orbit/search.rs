@@ -33,6 +33,12 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
     orbits
 }
 
+/// The stable one of [`phase_resonant`] with the smallest C.
+#[must_use]
+pub fn stable_resonant(scene: &Dimensionless) -> Option<Orbit> {
+    phase_resonant(scene).into_iter().find(|orbit| orbit.stable)
+}
+
 /// The exact backbone: all phase-resonant orbits at the frequency `omega` (over omega0), at any G.
 ///
 /// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.

@@ -22,7 +22,7 @@ pub(super) fn converged(scene: &Dimensionless, json: bool) -> Result<String, Fai
             .iter()
             .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}")));
         let [sigma, c, b] = study.slopes;
-        let table = Table::new(["epsilon", "sigma", "C", "B"]).rows(rows);
+        let table = Table::new("epsilon | sigma | C | B").rows(rows);
         format!(
             "{}\nExponent of epsilon: sigma {sigma:.3}, C {c:.3}, B {b:.3}\n",
             table.text()
@@ -63,23 +63,9 @@ pub(super) fn defined(scene: &Dimensionless, json: bool) -> Result<String, Failu
                 cells.push(format!("{:.2}", one.study.slopes[1]));
                 cells
             };
-            let table = Table::new([
-                "resonance",
-                "sigma",
-                "C",
-                "sigma: eps",
-                "eps/2",
-                "eps/4",
-                "eps/8",
-                "eps/16",
-                "exponent",
-                "C: eps",
-                "eps/2",
-                "eps/4",
-                "eps/8",
-                "eps/16",
-                "exponent",
-            ]);
+            let table = Table::new(
+                "resonance | sigma | C | sigma: eps | eps/2 | eps/4 | eps/8 | eps/16 | exponent | C: eps | eps/2 | eps/4 | eps/8 | eps/16 | exponent",
+            );
             let missing = Definition::all().len() - all.len();
             let note = match missing {
                 0 => String::new(),

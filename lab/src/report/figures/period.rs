@@ -6,7 +6,7 @@ use plotters::chart::SeriesLabelPosition;
 
 use crate::numerics::range;
 use crate::orbit::Periodic;
-use crate::report::figure::{Axis, Figure, Panel, Place, line};
+use crate::report::figure::{Axis, Figure, Panel, Place, line, rig};
 use crate::report::theme::{DECAY, EXACT, LOCK, THEORY};
 use crate::scene::Dimensionless;
 use crate::theory::{BackbonePoint, Waveform};
@@ -41,8 +41,10 @@ fn course(rows: &[[f64; 5]], what: impl Fn(&[f64; 5]) -> f64) -> Vec<Place> {
 /// Primary mass with its walls, and the particle between them.
 fn displacements(p: &Dimensionless, motion: &Periodic, rows: &[[f64; 5]], impacts: &[(f64, f64, f64)]) -> Panel {
     let caption = format!(
-        "ε = {:.5}, λ = {:.3}, r = {}, G = {:.3}, exact orbit at σ = {:.4}; lengths over b",
-        p.epsilon, p.lambda, p.r, motion.g, motion.sigma
+        "{}, G = {:.3}, exact orbit at σ = {:.4}; lengths over b",
+        rig(p),
+        motion.g,
+        motion.sigma
     );
     let (q1, q2) = (course(rows, |row| row[1]), course(rows, |row| row[3]));
     let farthest = q1.iter().chain(&q2).map(|(_, value)| value.abs() + 1.0);

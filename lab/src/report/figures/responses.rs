@@ -4,7 +4,7 @@ use plotters::chart::SeriesLabelPosition;
 use plotters::style::BLACK;
 
 use crate::orbit::{Branch, Response};
-use crate::report::figure::{Axis, DETUNING, Figure, Marked, Panel, Place, amplitude, clipped, line, thinned};
+use crate::report::figure::{Axis, DETUNING, Figure, Marked, Panel, Place, amplitude, clipped, line, rig, thinned};
 use crate::report::theme::{EXACT, FAINT, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
 use crate::theory::{self, B_SYMMETRY_BREAKING, ResponsePoint, SlowFlow};
@@ -23,13 +23,7 @@ pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
         .fold(0.6, |most: f64, one| most.max(1.08 * one.c));
     let (x, y) = (DETUNINGS, (0.0, top));
     let list: Vec<String> = responses.iter().map(|one| format!("{:.3}", one.g)).collect();
-    let caption = format!(
-        "ε = {:.5}, λ = {:.3}, r = {}; G = {}; amplitudes over b",
-        p.epsilon,
-        p.lambda,
-        p.r,
-        list.join(", ")
-    );
+    let caption = format!("{}; G = {}; amplitudes over b", rig(p), list.join(", "));
     let mut panel = Panel::new(Axis::new(x, DETUNING), Axis::new(y, amplitude(p)))
         .heading("Frequency responses and backbone", &caption)
         .legend(SeriesLabelPosition::UpperRight);

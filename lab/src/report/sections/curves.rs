@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::{SectionError, Subject};
 use crate::orbit::{
-    Branch, Condition, Exploration, ImpactPattern, Limits, Periodic, Response, backbone, phase_resonant, response,
+    Branch, Condition, Exploration, ImpactPattern, Limits, Periodic, Response, backbone, response, stable_resonant,
 };
 use crate::report::figures::{period, responses};
 use crate::report::files::csv;
@@ -110,7 +110,7 @@ fn changes(found: &[Response]) -> Table {
             .flat_map(|branch| &branch.special)
             .map(|special| (one.g, special))
     });
-    Table::new(["G", "what", "σ", "C", "B"]).rows(all.map(|(g, special)| {
+    Table::new("G | what | σ | C | B").rows(all.map(|(g, special)| {
         let Periodic { sigma, c, b, .. } = special.motion;
         let mut cells = vec![format!("{g:.4}"), special.name().into()];
         cells.extend([sigma, c, b].map(|one| format!("{one:.5}")));
@@ -120,7 +120,7 @@ fn changes(found: &[Response]) -> Table {
 
 /// The stable resonant motion at the scene's excitation.
 fn locked(p: &Dimensionless) -> Option<Periodic> {
-    let orbit = phase_resonant(p).into_iter().find(|one| one.stable)?;
+    let orbit = stable_resonant(p)?;
     let conditions = [Condition::Excitation(p.g), Condition::backbone(p)];
     Periodic::find(p, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions)
 }

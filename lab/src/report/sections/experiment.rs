@@ -11,12 +11,12 @@ use crate::report::figures::{backbone, history, manifold};
 use crate::report::files::{decay_csv, json};
 use crate::report::section::Section;
 use crate::report::table::{Table, number};
-use crate::rig::{BuiltIn, Rig};
+use crate::rig::{BuiltIn, Rig, Simulated};
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
     let mut section = Section::new("The experiment");
     let scene = &subject.scene;
-    let mut rig = subject.rig()?;
+    let mut rig = Simulated::of(scene)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
     let record = match recorded(rig.as_mut(), &mut controller, &Plan::of(scene), done) {
         Ok(record) => record,
@@ -166,6 +166,6 @@ fn describe_lock(section: &mut Section, found: &Comparison) {
     }
     section.table(
         "The locked point. σ: detuning, C: amplitude of v over b, B: particle speed over b ω₀.",
-        Table::new(["", "σ", "C", "B"]).rows(rows),
+        Table::new(" | σ | C | B").rows(rows),
     );
 }

@@ -3,8 +3,7 @@
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::{SectionError, Subject};
-use crate::map::{Axis, LIMIT, Map, Plan};
-use crate::orbit::phase_resonant;
+use crate::map::{LIMIT, Map, Plan};
 use crate::regime::Regime;
 use crate::report::figures::regimes;
 use crate::report::files::{bifurcations_csv, map_csv};
@@ -13,20 +12,8 @@ use crate::report::summary;
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
     let mut section = Section::new("Regimes of the driven response");
-    let scene = subject.scene.dimensionless();
-    let [x, y] = subject.map;
-    let held = x.axis != Axis::Sigma && y.axis != Axis::Sigma;
-    let orbits = if held { phase_resonant(&scene) } else { Vec::new() };
-    let plan = Plan {
-        scene,
-        sigma: orbits.iter().find(|one| one.stable).map_or(0.0, |one| one.sigma),
-        start: subject.scene.dimensionless_start(),
-        x,
-        y,
-        limit: LIMIT,
-        starts: 1,
-        confirmations: 0,
-    };
+    let (scene, [x, y]) = (&subject.scene, subject.map);
+    let plan = Plan::new(scene.dimensionless(), scene.dimensionless_start(), x, y);
     let (count, all) = (AtomicUsize::new(0), plan.cells());
     let map = plan.run(|| {
         let n = count.fetch_add(1, Ordering::Relaxed) + 1;

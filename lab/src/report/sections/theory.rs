@@ -53,7 +53,7 @@ pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Sectio
                 .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}")));
             section.table(
                 "Theory minus exact orbit at phase resonance; λ, r and G as in the scene.",
-                Table::new(["ε", "in σ", "in C", "in B"]).rows(rows),
+                Table::new("ε | in σ | in C | in B").rows(rows),
             );
             section.words(section.finding.clone());
             section.attach("convergence.csv", csv(&study.rows)?);

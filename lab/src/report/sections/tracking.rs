@@ -7,13 +7,13 @@ use crate::identification::Regime;
 use crate::report::figures::tracked as figure;
 use crate::report::files::tracked_csv;
 use crate::report::section::Section;
-use crate::rig::BuiltIn;
+use crate::rig::{BuiltIn, Simulated};
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
     let mut section = Section::new("The backbone, tracked with the loop closed");
     let scene = &subject.scene;
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
-    let mut rig = subject.rig()?;
+    let mut rig = Simulated::of(scene)?;
     let found = track(rig.as_mut(), &mut controller, scene, |at, of| {
         done(at as f64 / of.max(1) as f64);
     });
