@@ -58,7 +58,7 @@ impl Default for Backbone {
             bandwidth: 0.15,
             move_periods: 4.0,
             dwell_min: 8,
-            dwell_max: 90,
+            dwell_max: 150,
             tolerance: 5e-4,
             precision: 1.25e-3,
             predictor: Predictor::Previous,

@@ -52,6 +52,15 @@ pub fn student_factor(degrees: f64) -> f64 {
     1.0 + (first + second + third) / z
 }
 
+/// Standard deviation of a sum of residuals over that of as many independent ones, from the correlation of neighbours (a process of first
+/// order): the effective number of values is smaller than their number.
+fn colour(residuals: &[f64]) -> f64 {
+    let neighbours: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    let squares: f64 = residuals.iter().map(|one| one * one).sum();
+    let correlation = (neighbours / squares).clamp(0.0, 0.9);
+    ((1.0 + correlation) / (1.0 - correlation)).sqrt()
+}
+
 /// What is known of a coefficient in advance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
@@ -74,7 +83,7 @@ pub struct Regression {
 
 impl Regression {
     /// Fits `values` by the sum of `columns`. `noise` is the standard deviation of a value, 0 where it is not known; where the
-    /// residuals scatter significantly more, their scatter counts, with Student's distribution. Priors need a known noise. `None` for
+    /// residuals scatter significantly more, their scatter counts, with Student's distribution and the correlation of neighbours. Priors need a known noise. `None` for
     /// too few values, or columns that are not independent.
     #[must_use]
     pub fn fit(columns: &[Vec<f64>], values: &[f64], priors: &[Prior], noise: f64) -> Option<Self> {
@@ -110,7 +119,7 @@ impl Regression {
         let deviation = if is_noise {
             noise
         } else {
-            scatter * student_factor(degrees)
+            scatter * student_factor(degrees) * colour(&residual.as_slice()[..rows])
         };
         let variance = deviation * deviation;
         let excess = if noise > 0.0 { scatter / noise } else { 1.0 };
