@@ -178,9 +178,16 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
                 return Row { outcome: Outcome::Locked, ..row };
             }
             let is_noise = off[0] <= NOISE * lock.u_sigma && off[1] <= NOISE * lock.u_c;
-            let outcome = if is_noise { Outcome::Uncertain } else { Outcome::Inaccurate };
+            let outcome = if is_noise {
+                Outcome::Uncertain
+            } else {
+                Outcome::Inaccurate
+            };
             let why = if is_noise {
-                format!("the standard uncertainties are {:.1e} in sigma and {:.1e} in C", lock.u_sigma, lock.u_c)
+                format!(
+                    "the standard uncertainties are {:.1e} in sigma and {:.1e} in C",
+                    lock.u_sigma, lock.u_c
+                )
             } else if off[0].max(off[1]) < NEAR {
                 "the response still approaches the orbit, slowly; set smaller controller.frequency_tolerance and \
                  controller.amplitude_tolerance"
@@ -188,11 +195,7 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
             } else {
                 reason(lock.regime)
             };
-            Row {
-                outcome,
-                message: message(lock.sigma, lock.c, &why),
-                ..row
-            }
+            Row { outcome, message: message(lock.sigma, lock.c, &why), ..row }
         }
         Err(IdentificationError::Regime { regime, sigma, c, .. }) => {
             let off = distance(sigma, c);

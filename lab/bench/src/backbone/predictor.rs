@@ -78,8 +78,11 @@ pub fn slopes(scene: &Scene, known: &[Known], [level, phase]: [f64; 2]) -> Slope
             let width = other.c - one.c;
             let steeper = slope(level).zip(slope(0.5 * (one.c + other.c)));
             let steeper = steeper.map_or([0.0; 2], |(here, there)| [0, 1].map(|i| here[i] - there[i]));
-            [(other.g - one.g) / width + steeper[0], (other.sigma - one.sigma) / width + steeper[1]]
-                .map(|slope| [slope, WIDTH * slope.abs() + 0.5])
+            [
+                (other.g - one.g) / width + steeper[0],
+                (other.sigma - one.sigma) / width + steeper[1],
+            ]
+            .map(|slope| [slope, WIDTH * slope.abs() + 0.5])
         }
         _ => [[1.0, 2.0], [0.0, 5.0]],
     };

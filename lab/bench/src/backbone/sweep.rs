@@ -15,6 +15,7 @@ use crate::experiment::ExperimentError;
 use crate::identification::{Cycle, PARABOLA, Regime};
 use crate::rig::{Controller, Move, Rig};
 use crate::scene::Scene;
+use vines_model::theory::SlowFlow;
 
 /// Fewest periods of a crossing.
 const FEWEST: f64 = 10.0;
@@ -24,12 +25,14 @@ const MOST: f64 = 24.0;
 const LEAD: f64 = 0.65;
 /// Largest distance of two levels, relative to the level.
 const WIDEST: f64 = 0.15;
+/// Largest distance of two levels, relative to that from the fold, if noise makes a crossing slower: nearer to it, a hold takes no longer.
+const FOLD: f64 = 0.5;
 /// Share of the drive that may change the amplitude.
 const SHARE: f64 = 0.76;
 /// Relative uncertainty of the effect of a steady drift.
 const LATE: f64 = 0.036;
 /// Largest parts of the uncertainty of sigma, over `backbone.precision`, by the drift and by noise.
-const PARTS: [f64; 2] = [0.645, 0.55];
+const PARTS: [f64; 2] = [0.6, 0.55];
 /// Largest part of it by the curvature, where periods of the neighbours are used.
 const STRAIGHT: f64 = 0.15;
 /// Most periods of a crossing that noise makes slower.
@@ -85,16 +88,25 @@ pub fn periods<R: Rig + ?Sized, C: Controller + ?Sized>(
     let [slow, bent] = crossable(order, last.level).filter(|_| last.reached)?;
     let next = |level: f64| Order { level, ..order.clone() };
     let follows = after.is_some_and(|after| crossable(&next(after), order.level).is_some());
-    let by_noise = (1..=MOST_BY_NOISE).find(|n| predicted(scene, order, &cycle, f64::from(*n)) <= PARTS[1] * precision)?;
+    let by_noise =
+        (1..=MOST_BY_NOISE).find(|n| predicted(scene, order, &cycle, f64::from(*n)) <= PARTS[1] * precision)?;
     // Two neighbours lend the half of their periods, where the backbone is straight enough for twice the distance.
     let lent = follows && !bench.sweep.crossed.is_empty() && 4.0 * bent <= STRAIGHT * precision;
+    let d = scene.dimensionless();
+    let from_fold = order.level - SlowFlow::new(d.lambda, d.r).manifold.c_min();
+    if f64::from(by_noise) > slow && (order.level - last.level).abs() > FOLD * from_fold {
+        return None;
+    }
     Some(slow.max(if lent { 0.5 } else { 1.0 } * f64::from(by_noise)).ceil())
 }
 
 /// Standard uncertainty of the frequency, rad/s, or of the drive in terms of it, by the noise of `n` such periods.
 fn predicted(scene: &Scene, order: &Order, cycle: &Cycle, n: f64) -> f64 {
     let slopes = predictor::slopes(scene, &order.known, [order.level, order.phase]);
-    let [noise, base] = [cycle.noise[0].sqrt() / cycle.amplitude(), cycle.noise[1].sqrt() / cycle.base.norm()];
+    let [noise, base] = [
+        cycle.noise[0].sqrt() / cycle.amplitude(),
+        cycle.noise[1].sqrt() / cycle.base.norm(),
+    ];
     // A slope in time; and the amplitude that it belongs to.
     let slope = (12.0 / n.powi(3)).sqrt() * noise.hypot(base) * cycle.omega / TAU;
     let level = (PARABOLA / n).sqrt() * noise * cycle.amplitude() * slopes.omega[0].abs();

@@ -11,6 +11,8 @@ pub struct Estimate {
     pub uncertainty: f64,
 }
 
+/// Scatter over the noise beyond which it is a misfit.
+const MISFIT: f64 = 10.0;
 /// Quantile of the normal distribution for a two-sided interval of 95 %.
 const NORMAL: f64 = 1.959_964;
 
@@ -57,7 +59,9 @@ pub fn student_factor(degrees: f64) -> f64 {
 fn colour(residuals: &[f64]) -> f64 {
     let neighbours: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();
     let squares: f64 = residuals.iter().map(|one| one * one).sum();
-    let correlation = (neighbours / squares).clamp(0.0, 0.9);
+    // A correlation over more than a twelfth of the record cannot be told from a trend.
+    let longest = (1.0 - 12.0 / residuals.len() as f64).clamp(0.0, 0.9);
+    let correlation = (neighbours / squares).clamp(0.0, longest);
     ((1.0 + correlation) / (1.0 - correlation)).sqrt()
 }
 
@@ -119,7 +123,13 @@ impl Regression {
         let deviation = if is_noise {
             noise
         } else {
-            scatter * student_factor(degrees) * colour(&residual.as_slice()[..rows])
+            // Residuals far above the noise are those of the model, not a random process.
+            let colour = if scatter <= MISFIT * noise {
+                colour(&residual.as_slice()[..rows])
+            } else {
+                1.0
+            };
+            scatter * student_factor(degrees) * colour
         };
         let variance = deviation * deviation;
         let excess = if noise > 0.0 { scatter / noise } else { 1.0 };
@@ -167,6 +177,16 @@ mod tests {
         assert!((mean.value - 5.0).abs() < 1e-12);
         // The standard deviation is sqrt(10), for four degrees of freedom.
         assert!((mean.uncertainty - (10f64 / 5.0).sqrt() * student_factor(4.0)).abs() < 1e-9);
+    }
+
+    #[test]
+    fn a_wandering_mean_is_less_certain_than_one_of_independent_values() {
+        // Each value repeated four times has a quarter of the independent ones.
+        let values: Vec<f64> = (0..200).map(|n| f64::from((n / 4 * 37) % 50) - 24.5).collect();
+        let fit = Regression::fit(&[vec![1.0; 200]], &values, &[], 3.0).unwrap();
+        let independent = 50f64.mul_add(50.0, -1.0) / 12.0 / 200.0;
+        let ratio = fit.estimate(&[1.0]).uncertainty / independent.sqrt();
+        assert!((1.8..3.0).contains(&ratio), "{ratio}");
     }
 
     #[test]
