@@ -191,6 +191,8 @@ pub(super) fn criterion(scene: &Scene, order: &Order) -> Criterion {
         omega0: d.omega0,
         precision: pair(settings.precision),
         tolerance: [share * base, omega],
+        // Evenly distributed within the tolerance.
+        least: [share * base, omega].map(|most| most / 3f64.sqrt()),
         spread: SPREAD,
         fewest: settings.dwell_min as usize,
         slopes: predictor::slopes(scene, &order.known, [order.level, order.phase]),
