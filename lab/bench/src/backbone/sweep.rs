@@ -15,6 +15,7 @@ use crate::experiment::ExperimentError;
 use crate::identification::{Cycle, PARABOLA, Regime};
 use crate::rig::{Controller, Move, Rig};
 use crate::scene::Scene;
+use vines_model::numerics::{Estimate, mean};
 use vines_model::theory::SlowFlow;
 
 /// Fewest periods of a crossing.
@@ -171,10 +172,15 @@ pub fn cross<R: Rig + ?Sized, C: Controller + ?Sized>(
     let said = criterion
         .best_of([&cycles[..], &cycles[1..]])
         .unwrap_or_else(|| Found::unsettled(&cycles));
+    // All periods lie evenly about the level.
+    let response = Estimate {
+        value: mean(cycles.iter().map(Cycle::amplitude)),
+        ..said.response
+    };
     let taken = Taken {
         periods: bench.periods - start,
         settled: said.steady || criterion.is_met(&said),
-        reached: is_reached(scene, order.level, &said),
+        reached: is_reached(scene, order.level, &Found { response, ..said }),
     };
     Ok(point(bench, scene, order.level, &said, &cycles, &taken))
 }
