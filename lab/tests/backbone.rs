@@ -258,7 +258,7 @@ impl Rig for Dying {
 fn a_sensor_that_stops_ends_tracking_and_keeps_the_points_before() {
     let scene = scene(&[]);
     let rig = Simulated::new(scene.plant, scene.start).unwrap();
-    let mut rig = Dying { rig, left: 20_000, stuck: 0.0 };
+    let mut rig = Dying { rig, left: 18_000, stuck: 0.0 };
     let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
     let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
     let reason = tracked.ended.unwrap();

@@ -44,7 +44,10 @@ pub enum Outcome {
     /// Locked on a stable symmetric orbit, within 2e-3.
     #[serde(rename = "locked")]
     Locked,
-    /// Locked in the right regime, but farther from the orbit.
+    /// Locked in the right regime and farther from the orbit, but within four stated standard uncertainties.
+    #[serde(rename = "uncertain")]
+    Uncertain,
+    /// Locked in the right regime, but farther from the orbit than that.
     #[serde(rename = "inaccurate")]
     Inaccurate,
     /// Locked in another regime; the message says in which.
@@ -175,9 +178,14 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
                 return Row { outcome: Outcome::Locked, ..row };
             }
             let is_noise = off[0] <= NOISE * lock.u_sigma && off[1] <= NOISE * lock.u_c;
+            let outcome = if is_noise {
+                Outcome::Uncertain
+            } else {
+                Outcome::Inaccurate
+            };
             let why = if is_noise {
                 format!(
-                    "the difference is within the noise: the standard uncertainties are {:.1e} in sigma and {:.1e} in C",
+                    "the standard uncertainties are {:.1e} in sigma and {:.1e} in C",
                     lock.u_sigma, lock.u_c
                 )
             } else if off[0].max(off[1]) < NEAR {
@@ -187,11 +195,7 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
             } else {
                 reason(lock.regime)
             };
-            Row {
-                outcome: Outcome::Inaccurate,
-                message: message(lock.sigma, lock.c, &why),
-                ..row
-            }
+            Row { outcome, message: message(lock.sigma, lock.c, &why), ..row }
         }
         Err(IdentificationError::Regime { regime, sigma, c, .. }) => {
             let off = distance(sigma, c);

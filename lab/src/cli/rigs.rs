@@ -11,7 +11,8 @@ const HELP: &str = "\
 Draws rigs at random, each with a drive at which a stable symmetric 1:1 orbit exists: epsilon from 0.001 to 0.05, lambda from
 0.1 to 3, r from 0.2 to 0.97. Locks each from rest and compares the lock with the exact orbit:
   locked      on a stable symmetric orbit, within 2e-3 in sigma and C
-  inaccurate  symmetric, but farther from the orbit
+  uncertain   farther from it, but within four of the standard uncertainties that the lock states
+  inaccurate  symmetric, but farther from the orbit than that
   other       another regime, which coexists with the orbit; the message says so
   no lock     nothing stationary in the time allowed; the message says why
   failed      neither a lock nor a reason
@@ -52,6 +53,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 fn summary(rows: &[Row]) -> Table {
     let outcomes = [
         ("locked", Outcome::Locked),
+        ("uncertain", Outcome::Uncertain),
         ("inaccurate", Outcome::Inaccurate),
         ("other regime", Outcome::OtherRegime),
         ("no lock", Outcome::NoLock),

@@ -2,6 +2,7 @@
 
 use std::ops::{Deref, DerefMut};
 
+use super::sweep::Sweep;
 use crate::experiment::{self, ExperimentError, Stage};
 use crate::identification::Cycle;
 use crate::rig::{Controller, Rig};
@@ -13,8 +14,8 @@ pub(super) struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
     pub target: f64,
     /// The last period.
     pub last: Option<Cycle>,
-    /// Whether the response changes at a constant rate.
-    pub sweeping: bool,
+    /// The levels that are being crossed; none while the response is held.
+    pub sweep: Sweep,
 }
 
 impl<'a, R: Rig + ?Sized, C: ?Sized> Deref for Bench<'a, R, C> {

@@ -3,7 +3,9 @@
 use serde::Serialize;
 
 use super::predictor::Known;
+use super::settle::Found;
 use crate::identification::Regime;
+use vines_model::Dimensionless;
 
 /// One point of the backbone; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -47,6 +49,28 @@ pub struct Point {
 impl Point {
     pub(super) fn known(&self) -> Known {
         Known { c: self.c, g: self.g, sigma: self.sigma }
+    }
+
+    /// A level by an estimate, of which nothing else is known yet.
+    pub(super) fn new(level: f64, found: &Found, d: &Dimensionless) -> Self {
+        let [base, omega] = found.at;
+        Self {
+            level,
+            c: found.response.value / d.b,
+            sigma: d.sigma(omega.value),
+            g: d.excitation(base.value),
+            phase_error_deg: found.phase_error.value.to_degrees(),
+            u_c: found.response.uncertainty / d.b,
+            u_sigma: omega.uncertainty / d.omega_change(1.0),
+            u_g: d.excitation(base.uncertainty),
+            u_phase_deg: found.phase_error.uncertainty.to_degrees(),
+            periods: 0.0,
+            averaged: found.periods,
+            settled: false,
+            reached: false,
+            regime: Regime::Unknown,
+            regime_by_impacts: None,
+        }
     }
 }
 

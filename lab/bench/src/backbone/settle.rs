@@ -18,6 +18,8 @@ pub struct Criterion {
     pub precision: [f64; 2],
     /// Largest parts of them that are not noise.
     pub tolerance: [f64; 2],
+    /// Smallest standard uncertainties: smaller transients are not seen.
+    pub least: [f64; 2],
     /// Phase error at which the point is held, rad.
     pub phase: f64,
     /// Largest relative deviation of the amplitude within the periods, unless it is noise.
@@ -90,6 +92,12 @@ impl Criterion {
             .filter_map(|cycles| self.from(cycles))
             .filter(|found| found.at.iter().all(|one| (one.value + one.uncertainty).is_finite()))
             .min_by(|one, other| self.size(one).total_cmp(&self.size(other)))
+            .map(|mut found| {
+                for (estimate, least) in found.at.iter_mut().zip(self.least) {
+                    estimate.uncertainty = estimate.uncertainty.max(least);
+                }
+                found
+            })
     }
 
     /// Whether the uncertainties are small enough.

@@ -5,7 +5,7 @@ use super::peak;
 use super::point::{Point, Tracked};
 use super::predictor::{self, FIRST, Known, LAST, PHASE};
 use super::settle::{Criterion, Found};
-use super::sweep;
+use super::sweep::{self, Sweep};
 use crate::experiment::{self, ExperimentError, Sample, Stage};
 use crate::identification::{Cycle, Regime, classify, regime_by_response};
 use crate::rig::{Controller, LoopState, Move, Rig};
@@ -35,7 +35,7 @@ pub fn track(
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
         last: None,
-        sweeping: false,
+        sweep: Sweep::default(),
     };
     approach(&mut bench, scene.lock_periods())?;
     let periods_to_lock = bench.periods;
@@ -52,18 +52,23 @@ pub fn track(
         for k in 0..phases.len() {
             // The next level begins at the phase at which this one ends.
             let scan = if n % 2 == 0 { k } else { phases.len() - 1 - k };
-            let order = &Order { level, phase: phases[scan], known: known(&scans[scan], last) };
+            let order = Order { level, phase: phases[scan], known: known(&scans[scan], last) };
             // The last level is held: a crossing would go beyond it.
             let crossed = last.filter(|_| phases.len() == 1 && n + 1 < levels.len());
-            let crossing = crossed.and_then(|(last, _)| Some((last, sweep::periods(&bench, scene, order, &last)?)));
+            let after = levels.get(n + 1).filter(|_| n + 2 < levels.len());
+            let crossing = crossed
+                .and_then(|(last, _)| Some((last, sweep::periods(&bench, scene, &order, (&last, after.copied()))?)));
             let next = match crossing {
-                Some((last, periods)) => sweep::cross(&mut bench, scene, order, (&last, periods)),
-                None => go(&mut bench, scene, order, last),
+                Some((last, periods)) => sweep::cross(&mut bench, scene, &order, (&last, periods)),
+                None => go(&mut bench, scene, &order, last),
             };
             match next {
                 Ok(point) => {
-                    scans[scan].push(point);
                     last = Some((point, order.phase));
+                    if let Some(before) = scans[scan].last_mut() {
+                        bench.sweep.refine(scene, before);
+                    }
+                    scans[scan].push(point);
                 }
                 // What was measured is kept.
                 Err(error) if last.is_some() => {
@@ -83,6 +88,7 @@ pub fn track(
 }
 
 /// What is to be held next.
+#[derive(Clone)]
 pub(super) struct Order {
     /// Response amplitude over b.
     pub level: f64,
@@ -133,7 +139,7 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
         growth: 0.0,
     };
     let target = bench.target + phase;
-    bench.sweeping = false;
+    bench.sweep = Sweep::default();
     bench.controller.hold_response(to, target)?;
     let changed = last.map_or(FIRST, |(_, held)| if held == phase { -LAST } else { PHASE });
     hold(bench, scene, order, periods + changed)
@@ -141,6 +147,8 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
 
 /// Largest relative deviation of a held amplitude within the periods, unless it is noise.
 const SPREAD: f64 = 0.01;
+/// Periods in succession in which the criterion must be met: the halves of a transient can agree by chance.
+const CONFIRMED: usize = 3;
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
 /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
@@ -183,6 +191,8 @@ pub(super) fn criterion(scene: &Scene, order: &Order) -> Criterion {
         omega0: d.omega0,
         precision: pair(settings.precision),
         tolerance: [share * base, omega],
+        // Evenly distributed within the tolerance.
+        least: [share * base, omega].map(|most| most / 3f64.sqrt()),
         spread: SPREAD,
         fewest: settings.dwell_min as usize,
         slopes: predictor::slopes(scene, &order.known, [order.level, order.phase]),
@@ -207,12 +217,13 @@ fn hold<R: Rig + ?Sized, C: Controller + ?Sized>(
     let criterion = criterion(scene, order);
     let mut cycles: Vec<Cycle> = Vec::new();
     let most = settings.dwell_max as usize;
+    let mut confirmed = 0;
     let found = loop {
         cycles.push(bench.cycle()?);
         let found = criterion.best(&cycles);
-        if cycles.len() >= most
-            || found.is_some_and(|found| criterion.is_met(&found) && is_reached(scene, level, &found))
-        {
+        let is_met = found.is_some_and(|found| criterion.is_met(&found) && is_reached(scene, level, &found));
+        confirmed = if is_met { confirmed + 1 } else { 0 };
+        if cycles.len() >= most || confirmed >= CONFIRMED {
             break found;
         }
     };
@@ -256,23 +267,14 @@ pub(super) fn point<R: Rig + ?Sized, C: Controller + ?Sized>(
     let [base, omega] = said.at;
     let regime = regime_by_response(averaged, scene, base.value, omega.value);
     Point {
-        level,
-        c: said.response.value / d.b,
-        sigma: d.sigma(omega.value),
-        g: d.excitation(base.value),
-        phase_error_deg: said.phase_error.value.to_degrees(),
-        u_c: said.response.uncertainty / d.b,
-        u_sigma: omega.uncertainty / d.omega_change(1.0),
-        u_g: d.excitation(base.uncertainty),
-        u_phase_deg: said.phase_error.uncertainty.to_degrees(),
         periods: taken.periods,
         regime,
         regime_by_impacts: bench.samples[0]
             .ground_truth
             .map(|_| classify(averaged, bench.sample_time, omega.value).1),
-        averaged: said.periods,
         // An irregular motion can seem steady for a while.
         settled: regime != Regime::Other && taken.settled,
         reached: taken.reached,
+        ..Point::new(level, said, &d)
     }
 }

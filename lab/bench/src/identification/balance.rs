@@ -82,7 +82,7 @@ const REMAINDER: f64 = 0.7;
 /// Relative uncertainty of the effect of a phase beyond that which is held.
 const ASIDE: f64 = 0.5;
 /// A slope weighs integrated noise by a parabola, whose variance is this multiple of that of a mean.
-const PARABOLA: f64 = 1.2;
+pub const PARABOLA: f64 = 1.2;
 
 impl Balance {
     /// From at least four periods of an oscillator of the natural frequency `omega0`, rad/s.

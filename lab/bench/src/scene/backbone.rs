@@ -31,7 +31,7 @@ pub struct Backbone {
     /// Largest drive allowed, base amplitude over `b epsilon`.
     #[serde(rename = "G_max")]
     pub g_max: f64,
-    /// Bandwidth of the detector while tracking, in units of omega0.
+    /// Largest bandwidth of the detector while tracking, in units of omega0; less where the loops of phase and amplitude would be coupled.
     pub bandwidth: f64,
     /// Duration of the move from one level to the next, periods.
     pub move_periods: f64,
@@ -58,7 +58,7 @@ impl Default for Backbone {
             bandwidth: 0.15,
             move_periods: 4.0,
             dwell_min: 8,
-            dwell_max: 90,
+            dwell_max: 150,
             tolerance: 5e-4,
             precision: 1.25e-3,
             predictor: Predictor::Previous,

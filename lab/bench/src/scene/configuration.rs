@@ -6,6 +6,7 @@ use lovines::State;
 use phase_lock::{Config, LockCriterion};
 use serde::Serialize;
 use vines_model::orbit::phase_resonant;
+use vines_model::theory::backbone_at_level;
 
 use super::{Resonance, Scene, Sensor, plant::symbols};
 use crate::advice;
@@ -202,15 +203,26 @@ impl Scene {
         let d = self.dimensionless();
         Config {
             amplitude_max: Some(d.amplitude(self.backbone.g_max.min(self.controller.g_max.unwrap_or(f64::INFINITY)))),
-            bandwidth: self.backbone.bandwidth * d.omega0,
+            bandwidth: self.backbone.bandwidth.min(self.coupled_bandwidth()) * d.omega0,
             // The amplitude loop takes over as soon as the phase is near resonance.
             approach_gain: 0.0,
             phase_target: self.controller.phase_target_radians(),
             ..self.controller_config()
         }
     }
+
+    /// Largest bandwidth of the loops of phase and amplitude, in units of omega0, at which their coupling is weak. A drive that changes shifts
+    /// the phase that the detectors read, and a frequency that changes shifts the amplitude. From loop to loop the gain is the cube of the
+    /// bandwidth times C/(epsilon G).
+    fn coupled_bandwidth(&self) -> f64 {
+        let d = self.dimensionless();
+        let c = self.backbone.c_from.max(self.backbone.c_to);
+        backbone_at_level(&d, c).map_or(f64::INFINITY, |point| COUPLED * (d.epsilon * point.g / c).cbrt())
+    }
 }
 
+/// That bandwidth over the cube root of epsilon G/C, where a crossing takes away three quarters of the drive.
+const COUPLED: f64 = 0.9;
 /// Share of the amplitude by which a reading may differ from its prediction: a resonant response changes slowly.
 const RESIDUAL: f64 = 0.3;
 /// Response amplitude over b at which impacts certainly occur: a particle at rest in the middle is hit at 1.

@@ -11,6 +11,8 @@ pub struct Estimate {
     pub uncertainty: f64,
 }
 
+/// Scatter over the noise beyond which it is a misfit.
+const MISFIT: f64 = 10.0;
 /// Quantile of the normal distribution for a two-sided interval of 95 %.
 const NORMAL: f64 = 1.959_964;
 
@@ -52,6 +54,17 @@ pub fn student_factor(degrees: f64) -> f64 {
     1.0 + (first + second + third) / z
 }
 
+/// Standard deviation of a sum of residuals over that of as many independent ones, from the correlation of neighbours (a process of first
+/// order): the effective number of values is smaller than their number.
+fn colour(residuals: &[f64]) -> f64 {
+    let neighbours: f64 = residuals.windows(2).map(|pair| pair[0] * pair[1]).sum();
+    let squares: f64 = residuals.iter().map(|one| one * one).sum();
+    // A correlation over more than a twelfth of the record cannot be told from a trend.
+    let longest = (1.0 - 12.0 / residuals.len() as f64).clamp(0.0, 0.9);
+    let correlation = (neighbours / squares).clamp(0.0, longest);
+    ((1.0 + correlation) / (1.0 - correlation)).sqrt()
+}
+
 /// What is known of a coefficient in advance.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Prior {
@@ -74,7 +87,7 @@ pub struct Regression {
 
 impl Regression {
     /// Fits `values` by the sum of `columns`. `noise` is the standard deviation of a value, 0 where it is not known; where the
-    /// residuals scatter significantly more, their scatter counts, with Student's distribution. Priors need a known noise. `None` for
+    /// residuals scatter significantly more, their scatter counts, with Student's distribution and the correlation of neighbours. Priors need a known noise. `None` for
     /// too few values, or columns that are not independent.
     #[must_use]
     pub fn fit(columns: &[Vec<f64>], values: &[f64], priors: &[Prior], noise: f64) -> Option<Self> {
@@ -110,7 +123,13 @@ impl Regression {
         let deviation = if is_noise {
             noise
         } else {
-            scatter * student_factor(degrees)
+            // Residuals far above the noise are those of the model, not a random process.
+            let colour = if scatter <= MISFIT * noise {
+                colour(&residual.as_slice()[..rows])
+            } else {
+                1.0
+            };
+            scatter * student_factor(degrees) * colour
         };
         let variance = deviation * deviation;
         let excess = if noise > 0.0 { scatter / noise } else { 1.0 };
