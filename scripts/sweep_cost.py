@@ -99,25 +99,43 @@ def child(threads, code="batch"):
     return float(subprocess.run(command, env=environment, check=True, capture_output=True, text=True).stdout)
 
 
-def main():
-    FOLDER.mkdir(parents=True, exist_ok=True)
-    print("| sweep | time | processor time | memory | store | files |\n|---|---|---|---|---|---|")
+def ratios():
+    """Ratios of times: two threads, processes and workers against one, and Python against Rust."""
+    one, two = (
+        measure(f"9 x 10^4 cells of the default map, {name}", default((300, 300)), threads)
+        for threads, name in ((1, "one thread"), (2, "two threads"))
+    )
+    print(f"cells per second and core on the default map: {90_000 / one:.0f}")
+    print(f"two threads: {one / two:.2f} times the throughput of one", flush=True)
+    print(
+        f"two processes (shards): {shards(default((300, 300)), 1) / shards(default((300, 300)), 2):.2f} times",
+        flush=True,
+    )
+    print(f"two workers of Dask: {cluster(1) / cluster(2):.2f} times", flush=True)
+    # In turns: the speed of a processor changes from minute to minute.
+    rounds = [(child(CORES, "rust"), child(CORES), child(1)) for _ in range(3)]
+    rust, python, single = (min(column) for column in zip(*rounds, strict=True))
+    print(f"batch of 10^4 plants: Rust {rust:.3f} s, Python {python:.3f} s: {python / rust:.2f} times")
+    print(f"batch, {CORES} threads: {single / python:.2f} times the throughput of one")
+
+
+def tables():
+    """Cells from 10^3 to 10^7, and chunk sizes."""
     for name, points in [("10^3", (25, 40)), ("10^4", (100, 100)), ("10^5", (250, 400)), ("10^6", (1000, 1000))]:
         measure(f"{name} cells of the default map", default(points))
     for name, points in [("10^4", (100, 100)), ("10^5", (250, 400)), ("10^6", (1000, 1000)), ("10^7", (2500, 4000))]:
         measure(f"{name} cells at rest", rest(points))
     for chunk in (1000, 20_000, 100_000):
         measure(f"10^6 cells at rest, chunks of {chunk}", [*rest((1000, 1000)), f"--chunk={chunk}"])
-    one = measure("9 x 10^4 cells of the default map, one thread", default((300, 300)), 1)
-    print(f"cells per second and core on the default map: {90_000 / one:.0f}")
-    print(
-        f"two threads: {one / measure('the same, two threads', default((300, 300)), 2):.2f} times the throughput of one"
-    )
-    print(f"two processes (shards): {shards(default((300, 300)), 1) / shards(default((300, 300)), 2):.2f} times")
-    print(f"two workers of Dask: {cluster(1) / cluster(2):.2f} times")
-    rust, python = child(CORES, "rust"), child(CORES)
-    print(f"batch of 10^4 plants: Rust {rust:.3f} s, Python {python:.3f} s: {python / rust:.2f} times")
-    print(f"batch, two threads: {child(1) / child(2):.2f} times the throughput of one")
+
+
+def main():
+    FOLDER.mkdir(parents=True, exist_ok=True)
+    print("| sweep | time | processor time | memory | store | files |\n|---|---|---|---|---|---|")
+    if sys.argv[2:] != ["ratios"]:
+        tables()
+    ratios()
+    shutil.rmtree(FOLDER)
 
 
 if __name__ == "__main__":

@@ -71,8 +71,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "CELLS", default_value_t = Settings::default().chunk)]
     chunk: u64,
 
-    /// Only the regime: compute every N-th cell of two grids, then where neighbours differ; infer the rest and mark it in `inferred`
-    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "4", conflicts_with_all = ["shard", "merge"])]
+    /// Only the regime: compute every N-th cell of two grids, then where neighbours differ or inferences fail; `inferred` marks the rest
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "8", conflicts_with_all = ["shard", "merge"])]
     adaptive: Option<u64>,
 
     /// Folder of the store; made if it is not there

@@ -1,8 +1,9 @@
 //! Adaptive refinement: the regime is computed where neighbouring cells differ, and inferred elsewhere.
 //!
 //! A grid of distant cells comes first. The neighbours of every pair that differs are computed until borders are surrounded by equal
-//! cells; then the distance is halved, and a new cell takes the regime of the neighbour before it. What is computed next follows from
-//! what is known, so that a sweep that was killed reads the results of its rounds again and goes on.
+//! cells; then the distance is halved, and a new cell takes the regime of the neighbour before it. In the end inferred cells are tested
+//! where most of those tested before were wrong, and the borders found are followed again. What is computed next follows from what is
+//! known, so that a sweep that was killed reads the results of its rounds again and goes on.
 
 use std::{collections::BTreeMap, sync::atomic::Ordering::Relaxed};
 
@@ -11,6 +12,7 @@ use vines_model::regime::Regime;
 
 use crate::{
     cell::Cell,
+    doubt::Doubt,
     plan::Plan,
     run::Monitor,
     store::{Store, StoreError, code},
@@ -45,26 +47,40 @@ pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) 
         failures: BTreeMap::new(),
     };
     let mut stride = stride;
-    let mut next = map.grid(stride);
     let mut round = 0;
+    let mut next = map.grid(stride);
+    let mut doubt = Doubt::new(rows, columns);
     loop {
         while !next.is_empty() {
-            for (batch, cells) in next.chunks(plan.chunk_size()).enumerate() {
-                if !map.compute(plan, store, &format!("{ROUNDS}/{round}-{batch}"), cells, monitor)? {
-                    return Ok(false);
-                }
+            if !map.compute(plan, store, &mut round, &next, monitor)? {
+                return Ok(false);
             }
-            round += 1;
+            if round == 1 {
+                doubt.expect(&map.codes, stride);
+            }
             // Only a cell that was computed, or one beside it, can differ now.
             let near: Vec<usize> = next.iter().flat_map(|n| map.beside(*n, stride).chain([*n])).collect();
             next = map.differing(near, stride);
         }
-        if stride == 1 {
+        if stride > 1 {
+            stride /= 2;
+            map.infer(stride);
+            next = map.differing(map.grid(stride), stride);
+            continue;
+        }
+        next = doubt.cells(&map.computed);
+        if next.is_empty() {
             break;
         }
-        stride /= 2;
-        map.infer(stride);
-        next = map.differing(map.grid(stride), stride);
+        let inferred: Vec<u8> = next.iter().map(|n| map.codes[*n]).collect();
+        if !map.compute(plan, store, &mut round, &next, monitor)? {
+            return Ok(false);
+        }
+        for (n, inferred) in next.iter().zip(inferred) {
+            doubt.tested(*n, map.codes[*n] != inferred);
+        }
+        let near: Vec<usize> = next.iter().flat_map(|n| map.beside(*n, 1)).collect();
+        next = map.differing(near, 1);
     }
     map.write(plan, store, monitor)
 }
@@ -114,8 +130,25 @@ impl Map {
         }
     }
 
-    /// Computes cells, or reads their results. False if the monitor stopped it.
+    /// Computes the cells of a round, or reads their results. False if the monitor stopped it.
     fn compute(
+        &mut self,
+        plan: &Plan,
+        store: &Store,
+        round: &mut usize,
+        cells: &[usize],
+        monitor: &Monitor,
+    ) -> Result<bool, StoreError> {
+        for (batch, cells) in cells.chunks(plan.chunk_size()).enumerate() {
+            if !self.compute_batch(plan, store, &format!("{ROUNDS}/{round}-{batch}"), cells, monitor)? {
+                return Ok(false);
+            }
+        }
+        *round += 1;
+        Ok(true)
+    }
+
+    fn compute_batch(
         &mut self,
         plan: &Plan,
         store: &Store,

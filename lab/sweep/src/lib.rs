@@ -8,6 +8,7 @@
 mod adaptive;
 mod axis;
 mod cell;
+mod doubt;
 mod folder;
 mod plan;
 mod run;

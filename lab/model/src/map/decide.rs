@@ -5,15 +5,18 @@ use std::f64::consts::PI;
 use super::run::{Point, Run};
 use crate::numerics::{mean, standard_deviation};
 use crate::orbit::{Periodic, periodic_near};
-use crate::regime::{Regime, synchrony};
+use crate::regime::{Impact, Regime, synchrony};
 
 /// Longest repetition in the search, half periods of the base.
 const LONGEST: usize = 192;
 /// Smallest number of half periods over which a motion repeats itself.
 const REPEATED: usize = 64;
-/// Among so many of the last impacts, the strongest is looked for in the past; another one is similar within this, in half periods
-/// and over b omega0.
+/// Among so many of the last impacts, the strongest is looked for in the past, and those that are at least this part as strong; another
+/// one is similar within this velocity over b omega0, and as close to its wall over b at the time of that one.
 const RECENT: usize = 8;
+const STRONG: f64 = 0.5;
+/// Largest number of repetitions that are tried: a slow modulation has very many that are nearly right.
+const CANDIDATES: usize = 32;
 const SIMILAR: f64 = 0.05;
 /// Largest difference of states that repeat: far above rounding, far below what separates two motions.
 const SAME: f64 = 1e-6;
@@ -91,36 +94,48 @@ impl Run {
     }
 
     /// Numbers of half periods after which the motion may repeat itself: the strongest of the last impacts came at the same phase with
-    /// about the same velocity.
+    /// about the same velocity, and so did all others of them that were strong.
     fn repetitions(&self) -> impl Iterator<Item = usize> {
         let most = LONGEST.min(self.halves() / 4);
         let recent = &self.impacts[self.impacts.len().saturating_sub(RECENT)..];
-        let last = recent
-            .iter()
-            .copied()
-            .max_by(|one, other| one.velocity.abs().total_cmp(&other.velocity.abs()));
-        let earlier = last
-            .into_iter()
-            .flat_map(move |last| self.impacts.iter().rev().map(move |one| (last, one)));
+        let speed = |one: &Impact| one.velocity.abs();
+        let last = recent.iter().max_by(|one, other| speed(one).total_cmp(&speed(other)));
         let mut found = 0;
-        earlier
-            .map(|(last, one)| ((last.time - one.time) / PI, last.velocity, one.velocity))
-            .take_while(move |(apart, ..)| *apart < most as f64 + 0.5)
-            .filter_map(move |(apart, now, then)| {
-                let count = apart.round().max(0.0) as usize;
-                let sign = if count % 2 == 1 { -1.0 } else { 1.0 };
-                let close = (apart - apart.round()).abs() < SIMILAR && (sign * now - then).abs() < SIMILAR;
-                let new = close && count > found && count <= most;
-                new.then(|| {
-                    found = count;
-                    count
-                })
-            })
+        let counts = last.into_iter().flat_map(move |last| {
+            let from = last.time - PI * (most as f64 + 0.5);
+            let earlier = self.impacts.iter().rev().take_while(move |one| one.time > from);
+            earlier
+                .filter(move |one| (speed(one) - speed(last)).abs() < SIMILAR && one.time < last.time)
+                .map(|one| ((last.time - one.time) / PI).round() as usize)
+        });
+        let candidates = counts.filter(move |count| {
+            let new = *count > found && *count <= most;
+            found = found.max(*count);
+            let strong = |one: &&Impact| speed(one) >= STRONG * last.map_or(0.0, speed);
+            new && recent.iter().filter(strong).all(|one| self.has_similar(one, *count))
+        });
+        candidates.take(CANDIDATES)
+    }
+
+    /// Whether there was an impact like this one, or its mirror image, so many half periods before.
+    fn has_similar(&self, one: &Impact, count: usize) -> bool {
+        let sign = if count % 2 == 1 { -1.0 } else { 1.0 };
+        // At the time of the one, the other is this far from its wall.
+        let (time, apart) = (one.time - PI * count as f64, SIMILAR / one.velocity.abs());
+        let from = self.impacts.partition_point(|other| other.time <= time - apart);
+        let near = self.impacts[from..]
+            .iter()
+            .take_while(|other| other.time < time + apart);
+        near.into_iter()
+            .any(|other| (other.velocity - sign * one.velocity).abs() < SIMILAR)
     }
 
     /// An exact periodic motion close to the present state.
-    fn periodic(&self) -> Option<Periodic> {
-        periodic_near(&self.scene, self.sigma, 0.0, self.state(self.halves()))
+    fn periodic(&self) -> Option<&Periodic> {
+        let found = self
+            .periodic
+            .get_or_init(|| periodic_near(&self.scene, self.sigma, 0.0, self.state(self.halves())));
+        found.as_ref()
     }
 
     /// Repetitions approach each other, and there is a stable periodic motion close by: its multipliers decide.
@@ -130,7 +145,10 @@ impl Run {
             self.differences(count, SETTLING)
                 .is_some_and(|[first, second]| second <= first.max(ROUNDING))
         };
-        self.repetitions().find(|count| approach(*count))?;
+        let count = self.repetitions().find(|count| approach(*count))?;
+        if early && count > 2 && self.distance(n, count) > SEVERAL {
+            return None;
+        }
         let motion = self.periodic().filter(|motion| motion.stable)?;
         let pattern = &motion.pattern;
         let exponent = 2.0 * motion.moduli()[3].ln() / f64::from(pattern.half_periods);

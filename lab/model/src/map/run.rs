@@ -7,7 +7,7 @@ use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
 
 use crate::Dimensionless;
-use crate::orbit::{Driven, Moment};
+use crate::orbit::{Driven, Moment, Periodic};
 use crate::regime::{Impact, Regime};
 
 /// Result at one point.
@@ -45,6 +45,9 @@ const FIRST: usize = 32;
 const LATER: f64 = 1.15;
 /// Periods over which the exponent of a repeating motion is measured.
 const EXPONENT: usize = 256;
+
+/// Number of events for which there is room at first.
+const EXPECTED: usize = 1024;
 
 /// Cells that are undecided after the limit are continued to so many times its number of periods.
 const CONTINUED: usize = 4;
@@ -111,6 +114,8 @@ pub struct Run {
     pub(super) impacts: Vec<Impact>,
     /// Phases of the base at which the particle came to rest, rad.
     sticks: Vec<f64>,
+    /// The exact motion close to the present state, if it was looked for.
+    pub(super) periodic: OnceCell<Option<Periodic>>,
 }
 
 impl Run {
@@ -127,11 +132,12 @@ impl Run {
             drive,
             driven: Driven::new(scene, drive.omega),
             periods: 0,
-            moments: Vec::new(),
+            moments: Vec::with_capacity(EXPECTED),
             states: vec![OnceCell::from(start)],
             growth: Vec::new(),
-            impacts: Vec::new(),
+            impacts: Vec::with_capacity(EXPECTED),
             sticks: Vec::new(),
+            periodic: OnceCell::new(),
         })
     }
 
@@ -212,20 +218,23 @@ impl Run {
             let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) = event;
             let phase = start + omega * t;
             let now = ((phase / TAU) as usize).min(periods - 1);
+            driven.flow(phase);
             if now > period {
-                growth[period] = driven.growth(phase);
+                growth[period] = driven.growth();
                 period = now;
             }
-            moments.push(driven.pass(phase, &event));
+            moments.push(driven.jump(&event));
             match event {
                 Event::Impact { velocity, .. } => impacts.push(Impact { time: phase, velocity }),
                 Event::Stuck { .. } => sticks.push(phase),
                 Event::Released { .. } => {}
             }
         })?;
-        growth[period] = driven.growth(end);
+        driven.flow(end);
+        growth[period] = driven.growth();
         let State { q1, dq1, q2, dq2 } = self.plant.state();
         self.periods = periods;
+        self.periodic.take();
         self.states.resize_with(2 * periods, OnceCell::new);
         self.states.push(OnceCell::from([q1, dq1, q2, dq2]));
         Ok(())

@@ -106,9 +106,10 @@ impl Driven {
         self.now
     }
 
-    /// Passes an event where the base has the phase `phase`, rad.
-    pub fn pass(&mut self, phase: f64, event: &Event) -> Moment {
-        let (steady, acceleration) = self.flow(phase);
+    /// Passes an event; [`Self::flow`] has led to it.
+    pub fn jump(&mut self, event: &Event) -> Moment {
+        let phase = self.now.phase;
+        let (steady, acceleration) = self.mode(self.now.wall).steady(phase);
         let motion = self.now.free + steady;
         match *event {
             Event::Impact { wall, velocity, .. } => {
@@ -138,9 +139,8 @@ impl Driven {
         self.now
     }
 
-    /// The natural logarithm of the growth of the disturbance since the last call, until the base has the phase `phase`, rad.
-    pub fn growth(&mut self, phase: f64) -> f64 {
-        self.flow(phase);
+    /// The natural logarithm of the growth of the disturbance since the last call.
+    pub fn growth(&mut self) -> f64 {
         let size = self.primary.norm().hypot(self.particle.norm());
         self.primary /= size;
         self.particle /= size;
@@ -175,12 +175,11 @@ impl Driven {
         (phase - from.phase) / self.modes[0].omega
     }
 
-    /// Moves motion and disturbance on; returns the steady response there.
-    fn flow(&mut self, phase: f64) -> (Vector2<f64>, f64) {
+    /// Moves motion and disturbance on to where the base has the phase `phase`, rad; there is no event before.
+    pub fn flow(&mut self, phase: f64) {
         let t = self.elapsed(&self.now, phase);
         let stuck = self.now.wall != 0.0;
-        let mode = *self.mode(self.now.wall);
-        let propagator = mode.propagator(t);
+        let propagator = self.mode(self.now.wall).propagator(t);
         self.primary = propagator * self.primary;
         if stuck {
             self.particle = self.primary;
@@ -190,7 +189,6 @@ impl Driven {
         }
         self.now.free = propagator * self.now.free;
         self.now.phase = phase;
-        mode.steady(phase)
     }
 
     /// The disturbance passes an impact with the relative velocity `dw` before it, where the relative acceleration is `ddw`.
