@@ -49,7 +49,7 @@ pub fn periods<R: Rig + ?Sized, C: Controller + ?Sized>(
     let by_drift = LATE * slopes.drift[1].abs() * width * d.b * d.omega0 / (TAU * PARTS[0] * precision);
     let cycle = bench.last?;
     let noise = cycle.noise[0].sqrt() / cycle.amplitude() * cycle.omega / TAU;
-    let by_noise = (12.0 * (noise / (PARTS[1] * precision)).powi(2)).cbrt();
+    let by_noise = (12.0 * (noise / (PARTS[1] * precision)).powi(2)).powf(1.0 / 3.0);
     let periods = by_drive.max(by_drift).max(FEWEST).ceil();
     (periods <= MOST && by_noise <= periods).then_some(periods)
 }
