@@ -19,7 +19,7 @@ use vines::{
     scene::{Name, Names, Scene},
 };
 
-use super::{failure::Failure, interrupt::stop_flag};
+use super::{failure::Failure, interrupt::stop_flag, real_time::RealTimeArguments};
 
 /// An implementation, as written on the command line.
 #[derive(Debug, Clone, PartialEq)]
@@ -190,9 +190,12 @@ pub(super) fn check(scene: &Scene) -> Result<(), Failure> {
     Ok(())
 }
 
-/// `--allow-remote`, which several commands share.
+/// Options of every command that may use a network.
 #[derive(Debug, Args)]
 pub(super) struct ReachArguments {
+    #[command(flatten)]
+    real_time: RealTimeArguments,
+
     /// Allow network addresses beyond this machine without a key: anyone who can reach the address can drive the rig
     #[arg(long)]
     allow_remote: bool,
@@ -203,7 +206,9 @@ pub(super) struct ReachArguments {
 }
 
 impl ReachArguments {
+    /// Asks the system for what keeping time needs; what the network may reach.
     pub(super) fn reach(&self) -> Result<BindScope, Failure> {
+        self.real_time.apply()?;
         let Some(file) = &self.key else {
             return Ok(if self.allow_remote {
                 BindScope::Remote

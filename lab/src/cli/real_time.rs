@@ -1,9 +1,6 @@
 //! Options of a program that must keep its time: priority, memory and processor.
 
-use std::path::PathBuf;
-
 use clap::Args;
-use vines::{net::Session, report};
 
 use super::failure::Failure;
 
@@ -20,10 +17,6 @@ pub(super) struct RealTimeArguments {
     /// Run on this processor only, from 0
     #[arg(long, value_name = "N")]
     cpu: Option<usize>,
-
-    /// Write the histogram of the lateness of each session to this file (CSV; the last session stays)
-    #[arg(long, value_name = "FILE")]
-    histogram: Option<PathBuf>,
 }
 
 impl RealTimeArguments {
@@ -48,16 +41,6 @@ impl RealTimeArguments {
             })?;
         }
         Ok(())
-    }
-
-    /// Writes the histogram of a session.
-    pub(super) fn keep(&self, session: &Session) {
-        let (Some(file), Some(all)) = (&self.histogram, &session.punctuality) else {
-            return;
-        };
-        if let Err(error) = report::write_lateness(&all.classes(), file) {
-            eprintln!("warning: {error}");
-        }
     }
 }
 

@@ -1,17 +1,17 @@
 //! `vines rig`: the plant at a network address.
 
-use std::str::FromStr;
+use std::{path::PathBuf, str::FromStr};
 
 use clap::{Args, ValueEnum};
 use vines::faults::{FAULTS, Kind, rehearsal_rig};
 use vines::net::{Address, Role, Served, Service, Session, helic::Device};
+use vines::report;
 use vines::rig::{Rig, RigError, Simulated};
 
 use super::{
     endpoint::{Endpoint, fmu},
     failure::Failure,
     print,
-    real_time::RealTimeArguments,
     scene_arguments::SceneArguments,
     serving::{ServingArguments, positive},
 };
@@ -50,8 +50,9 @@ pub(super) struct Arguments {
     #[command(flatten)]
     serving: ServingArguments,
 
-    #[command(flatten)]
-    real_time: RealTimeArguments,
+    /// Write the histogram of the lateness of each session to this file (CSV; the last session stays)
+    #[arg(long, value_name = "FILE")]
+    histogram: Option<PathBuf>,
 
     /// The protocol: `vines` (docs/network-protocol.md), or `helic`, as a device of helic-daq (docs/helic.md)
     #[arg(long, value_enum, default_value_t = Protocol::Vines)]
@@ -178,8 +179,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         Endpoint::Fmu(file) => drop(fmu(file, &scene).map_err(Failure::run)?),
         Endpoint::BuiltIn => {}
     }
-    arguments.real_time.apply()?;
-    let keep = |session: &Session| arguments.real_time.keep(session);
+    let keep = |session: &Session| {
+        let (Some(file), Some(all)) = (&arguments.histogram, &session.punctuality) else {
+            return;
+        };
+        if let Err(error) = report::write_lateness(&all.classes(), file) {
+            eprintln!("warning: {error}");
+        }
+    };
     if helic {
         if arguments.lock_step {
             let message = "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic";

@@ -5,7 +5,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, Uniform};
 use serde::Serialize;
 
-use super::{LoopCheck, Verdict, check};
+use super::{LoopCheck, Verdict, check, expected};
 use crate::faults::{FaultyRig, Kind, Log, Sensor};
 use crate::rig::{Chain, Rig, Simulated};
 use crate::scene::{Parameters, Scene, SceneError};
@@ -24,6 +24,9 @@ pub struct Trials {
     pub wrong: Vec<(Verdict, LoopCheck)>,
 }
 
+/// Steps of its converter in the response of a sensor with too small a gain.
+const STEPS: f64 = 4.0;
+
 /// A random number between two.
 struct Random(ChaCha8Rng);
 
@@ -38,13 +41,20 @@ impl Random {
     }
 }
 
-/// The faults that a check can see, with one random severity each.
-fn fault(random: &mut Random) -> (Verdict, Kind) {
+/// The faults that a check of a scene can see, with one random severity each.
+fn fault(scene: &Scene, random: &mut Random) -> (Verdict, Kind) {
     let period = 100.0;
-    let gain = if random.between(0.0, 1.0) < 0.5 {
+    // A reading of less than some steps of its converter is that of a dead sensor.
+    let steps = scene
+        .chain
+        .adc_bits
+        .map_or(f64::INFINITY, |bits| 2_f64.powi(bits as i32 - 1));
+    let range = scene.chain.response_range * scene.plant.half_width;
+    let least = STEPS * range / (steps * expected(scene)[0].norm());
+    let gain = if random.between(0.0, 1.0) < 0.5 || least > 0.25 {
         random.log(4.0, 1000.0)
     } else {
-        random.log(0.04, 0.25)
+        random.log(least.max(0.04), 0.25)
     };
     let late = (random.between(0.17, 0.33) * period) as usize;
     match random.between(0.0, 14.0) as usize {
@@ -66,8 +76,8 @@ fn fault(random: &mut Random) -> (Verdict, Kind) {
     }
 }
 
-/// A random scene at rest, and a plant whose natural frequency and damping deviate from it by up to 0.5 % and 20 %.
-fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Scene, Box<dyn Rig>, Parameters), SceneError> {
+/// A random scene at rest.
+fn random_scene(scene: &Scene, random: &mut Random) -> Scene {
     let mut scene = scene.clone();
     let (mass, stiffness) = (scene.plant.primary_mass, scene.plant.stiffness);
     let epsilon = random.log(0.001, 0.05);
@@ -81,6 +91,11 @@ fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Scene, Box<dyn
     scene.chain.delay = random.between(0.0, 4.0) as u32;
     scene.chain.filter = Some(random.between(8.0, 40.0));
     scene.chain.adc_bits = Some(random.between(16.0, 25.0) as u32);
+    scene
+}
+
+/// A rig of a scene, whose natural frequency and damping deviate from it by up to 0.5 % and 20 %.
+fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Box<dyn Rig>, Parameters), SceneError> {
     let mut plant = scene.plant;
     plant.stiffness *= random.between(0.99, 1.01);
     plant.damping *= random.between(0.8, 1.2);
@@ -96,7 +111,7 @@ fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Scene, Box<dyn
     );
     let samples = scene.controller.samples_per_period;
     let rig = Chain::around(Box::new(faulty), &scene.chain, &d, samples);
-    Ok((scene, rig, plant))
+    Ok((rig, plant))
 }
 
 /// Checks `count` healthy rigs, and as many with a random fault.
@@ -108,12 +123,13 @@ pub fn trials(scene: &Scene, count: usize, seed: u64) -> Result<Trials, SceneErr
     let mut trials = Trials::default();
     let mut errors = [const { Vec::new() }; 3];
     for n in 0..2 * count {
+        let scene = random_scene(scene, &mut random);
         let (expected, kind) = if n % 2 == 0 {
             (Verdict::Healthy, Kind::None)
         } else {
-            fault(&mut random)
+            fault(&scene, &mut random)
         };
-        let (scene, mut rig, plant) = rig(scene, &mut random, kind)?;
+        let (mut rig, plant) = rig(&scene, &mut random, kind)?;
         let tally = if n % 2 == 0 {
             &mut trials.healthy
         } else {

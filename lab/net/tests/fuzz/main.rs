@@ -4,6 +4,7 @@
 
 mod helic;
 mod noise;
+mod relay;
 mod vines;
 
 use std::env;

@@ -11,7 +11,7 @@ use vines_net::helic::{Channels, HelicRig, HelicServer, Network};
 use vines_net::{Ended, Session};
 use vines_testbench::rig::{Drive, Rig};
 
-use super::device::{device, scene};
+use super::host::{device, scene};
 
 /// A server in a thread.
 struct Served {

@@ -9,7 +9,7 @@ use vines_testbench::experiment::{self, Plan};
 use vines_testbench::identification::identify;
 use vines_testbench::rig::{BuiltIn, Drive, Rig, Simulated};
 
-use super::device::{Host, device, scene};
+use super::host::{Host, device, scene};
 
 /// A device that takes its samples when a datagram is asked for; `fate` says how often a datagram arrives.
 struct Direct<F> {

@@ -2,7 +2,7 @@
 
 use vines_net::helic::codec::{BEACON_REQUEST, Frame, Packet, Status, beacon, crc16, message, text};
 
-use super::device::device;
+use super::host::device;
 
 fn bytes(hex: &str) -> Vec<u8> {
     hex.split_whitespace()

@@ -1,0 +1,66 @@
+//! A rig that is driven with its loop open.
+
+use std::f64::consts::TAU;
+
+use super::rms;
+use crate::rig::{Drive, Rig, RigError};
+
+/// Periods between looks at a response that falls, how often, and the share of it that is left at most.
+pub(super) const DECAY: usize = 10;
+/// As above.
+const PAUSES: usize = 40;
+/// As above.
+const FALLS: f64 = 0.98;
+
+/// A rig whose loop is open, and what it has read: the phase of its oscillator, rad, response and base.
+pub(super) struct OpenLoop<'a, R: ?Sized> {
+    pub rig: &'a mut R,
+    pub omega: f64,
+    pub step: f64,
+    pub phase: f64,
+    pub readings: Vec<[f64; 3]>,
+    pub has_base: bool,
+}
+
+impl<R: Rig + ?Sized> OpenLoop<'_, R> {
+    /// Drives with an amplitude, m, and keeps the readings.
+    pub fn drive(&mut self, samples: usize, amplitude: f64) -> Result<(), RigError> {
+        for _ in 0..samples {
+            let (omega, phase) = (self.omega, self.phase);
+            let sensors = self.rig.sense()?;
+            self.has_base |= sensors.reference.is_some();
+            self.readings
+                .push([phase, sensors.response, sensors.reference.unwrap_or(0.0)]);
+            let drive = Drive { omega, amplitude, displacement: amplitude * phase.sin() };
+            self.rig.advance(drive, self.step)?;
+            self.phase += omega * self.step;
+        }
+        Ok(())
+    }
+
+    /// Listens for `quiet` samples, and as long as a response above `enough` (RMS, m) falls from one `pause` to the next.
+    pub fn rest(&mut self, quiet: usize, pause: usize, enough: f64) -> Result<(), RigError> {
+        let mut before = f64::INFINITY;
+        for n in 0..=PAUSES {
+            self.drive(if n == 0 { quiet } else { pause }, 0.0)?;
+            let last = &self.readings[self.readings.len() - quiet..];
+            let response = rms(last.iter().map(|reading| reading[1]));
+            // Noise does not fall.
+            if !(response > enough && response < FALLS * before) {
+                break;
+            }
+            before = response;
+        }
+        Ok(())
+    }
+
+    /// Brings the phase of the rig's oscillator to a multiple of 2 pi, with no drive.
+    pub fn end(&mut self, samples: usize) -> Result<(), RigError> {
+        let omega = (TAU - self.phase % TAU) / (samples as f64 * self.step);
+        for _ in 0..samples {
+            self.rig.sense()?;
+            self.rig.advance(Drive { omega, ..Drive::default() }, self.step)?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,119 @@
+//! What the check of a loop says of its channels.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+use std::fmt;
+
+use serde::Serialize;
+
+use super::{Channel, NOISE};
+
+/// Share of the expected amplitude below which a sensor is dead.
+const DEAD: f64 = 0.01;
+/// Factor by which an amplitude may differ from the expected one, or its inverse: the damping is known roughly.
+const GAIN: f64 = 2.0;
+/// RMS of the response without a drive over that of its noise with it, from which the rig moves.
+const AT_REST: f64 = 3.0;
+/// Deviation of the phase, rad, up to which a channel is in time, and from which it is reversed.
+const IN_TIME: f64 = 0.7;
+
+/// What the check found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum Verdict {
+    /// Signs, gains, delays and noise are as expected.
+    Healthy,
+    /// A sensor reads no number.
+    NotANumber,
+    /// The response moves before there is a drive.
+    NotAtRest,
+    /// Neither channel answers the drive: the shaker is off.
+    ShakerOff,
+    /// A channel does not answer the drive.
+    ResponseDead,
+    /// As above.
+    BaseDead,
+    /// Response and base are exchanged.
+    Swapped,
+    /// A channel has the opposite sign.
+    ResponseReversed,
+    /// As above.
+    BaseReversed,
+    /// Both have: the shaker is reversed.
+    BothReversed,
+    /// A channel has another amplitude: a wrong unit or factor.
+    ResponseGain,
+    /// As above.
+    BaseGain,
+    /// A channel is late.
+    ResponseLate,
+    /// As above.
+    BaseLate,
+    /// A channel is noisy.
+    ResponseNoisy,
+    /// As above.
+    BaseNoisy,
+}
+
+impl fmt::Display for Verdict {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Healthy => "signs, gains, delays and noise are as expected",
+            Self::NotANumber => "a sensor reads no number: check its converter",
+            Self::NotAtRest => "the response moves without a drive: wait until the rig is at rest",
+            Self::ShakerOff => "no sensor answers the drive: check the amplifier of the shaker and the cables",
+            Self::ResponseDead => "the response does not answer the drive, or too little to be seen: check its sensor, cable and factor",
+            Self::BaseDead => "the base sensor does not answer the drive: check it and its cable",
+            Self::Swapped => "response and base are exchanged: swap the two channels",
+            Self::ResponseReversed => "the response has the opposite sign: reverse its sensor, or its factor",
+            Self::BaseReversed => "the base sensor has the opposite sign: reverse it, or its factor",
+            Self::BothReversed => "both sensors have the opposite sign: the shaker is reversed",
+            Self::ResponseGain => "the response has another amplitude: check its unit and factor, and mass, spring and damper of the scene",
+            Self::BaseGain => "the base has another amplitude than the drive: check its unit and factor, and the gain of the shaker",
+            Self::ResponseLate => "the response is late: check its filter and delay, and the natural frequency of the scene",
+            Self::BaseLate => "the base sensor is late: check its filter and delay, and that of the shaker",
+            Self::ResponseNoisy => "the response is noisy: check its shield and range",
+            Self::BaseNoisy => "the base sensor is noisy: check its shield and range",
+        })
+    }
+}
+
+/// Judges response and base, whose expected amplitudes are `expected`, m.
+pub(super) fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bool) -> Verdict {
+    let [response, base] = channels;
+    if !(response.gain + base.gain + response.noise + base.noise).is_finite() {
+        return Verdict::NotANumber;
+    }
+    // Amplitudes in the other channel's units: exchanged sensors read each other's signal.
+    let crossed = [
+        response.gain * expected[0] / expected[1],
+        base.gain * expected[1] / expected[0],
+    ];
+    let near = |gain: f64| (1.0 / GAIN..GAIN).contains(&gain);
+    let is_off = |phase: f64, from: f64| (phase.to_radians() - from + PI).rem_euclid(TAU) - PI;
+    let crossed_phases = [is_off(response.phase, FRAC_PI_2), is_off(base.phase, -FRAC_PI_2)];
+    let in_time = |phase: f64| phase.abs() < IN_TIME;
+    let reversed = |channel: &Channel| in_time(is_off(channel.phase, PI));
+    let noisy = |channel: &Channel, expected: f64| channel.noise > NOISE * channel.gain * expected;
+    let dead = channels.map(|channel| channel.gain < DEAD);
+    // The response's converter may be too coarse for the motion of the base.
+    let as_base = dead[0] || near(crossed[0]) && in_time(crossed_phases[0]);
+    match () {
+        () if response.floor > (AT_REST * response.noise).max(NOISE * expected[0]) => Verdict::NotAtRest,
+        () if dead[0] && (dead[1] || !has_base) => Verdict::ShakerOff,
+        () if has_base && as_base && near(crossed[1]) && in_time(crossed_phases[1]) => Verdict::Swapped,
+        () if dead[0] => Verdict::ResponseDead,
+        () if has_base && dead[1] => Verdict::BaseDead,
+        // A signal that exceeds the range of its converter is distorted, too.
+        () if has_base && !near(base.gain) => Verdict::BaseGain,
+        () if !near(response.gain) => Verdict::ResponseGain,
+        () if noisy(response, expected[0]) => Verdict::ResponseNoisy,
+        () if has_base && noisy(base, expected[1]) => Verdict::BaseNoisy,
+        () if has_base && reversed(response) && reversed(base) => Verdict::BothReversed,
+        () if reversed(response) => Verdict::ResponseReversed,
+        () if has_base && reversed(base) => Verdict::BaseReversed,
+        // What delays both, such as a connection, cancels in the phase that the controller holds.
+        () if in_time(is_off(response.phase - if has_base { base.phase } else { 0.0 }, 0.0)) => Verdict::Healthy,
+        () if has_base && !in_time(base.phase.to_radians()) => Verdict::BaseLate,
+        () => Verdict::ResponseLate,
+    }
+}
