@@ -26,6 +26,8 @@ pub struct Row {
     pub relative: f64,
     /// Output of the controller.
     pub output: Output,
+    /// The drive from this sample on: the controller's, or that of the open loop.
+    pub drive: Drive,
 }
 
 /// Impacts that are kept to determine the regime from.
@@ -148,6 +150,7 @@ impl Bench {
             response: sensors.response,
             relative: self.rig.plant.relative_displacement(),
             output: self.output,
+            drive,
         };
         if is_last {
             self.before = (self.rig.plant, drive);

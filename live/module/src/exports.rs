@@ -142,8 +142,8 @@ pub extern "C" fn run(samples: u32) -> i32 {
                 row.response,
                 row.relative,
                 controller.phase_error.unwrap_or(0.0).to_degrees(),
-                controller.omega,
-                controller.amplitude,
+                row.drive.omega,
+                row.drive.amplitude,
                 controller.response_amplitude,
             ]);
         })
