@@ -119,7 +119,8 @@ mingw() {
 }
 
 # build_platform PLATFORM FOLDER [options of cargo build]: the packages of the options, stripped and the same bytes wherever
-# they are built, in FOLDER/TRIPLE/release (or another profile, in `profile`).
+# they are built, in FOLDER/TRIPLE/release (or another profile, in `profile`;
+# or another command of cargo than build, in `verb`).
 build_platform() (
     platform=$1 folder=$2
     triple=${TRIPLES[$platform]}
@@ -151,7 +152,7 @@ build_platform() (
     flags+=("--remap-path-prefix=$("${RUSTC:-rustc}" --print sysroot)=rust")
     # Cargo gives rustc relative paths of sources inside the folder that it is called in.
     flags+=("--remap-path-prefix=$RUST_WEB/usr=rust")
-    verb=build
+    verb=${verb:-build}
     case $with in
         mingw)
             variable=CARGO_TARGET_$(tr 'a-z-' 'A-Z_' <<<"$triple")_LINKER

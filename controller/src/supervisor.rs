@@ -85,11 +85,11 @@ impl Fault {
     pub fn of_number(number: i32) -> Option<Self> {
         Self::ALL.into_iter().find(|fault| *fault as i32 == number)
     }
-}
 
-impl fmt::Display for Fault {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
+    /// What has happened.
+    #[must_use]
+    pub fn text(self) -> &'static str {
+        match self {
             Self::Sensor => "a sensor read no number, or did not change for a sixth of a period",
             Self::ResponseTooLarge => "the response exceeded its limit",
             Self::TimedOut => "the time limit for the lock is over",
@@ -98,7 +98,13 @@ impl fmt::Display for Fault {
                 "the response or the base could not be measured: too small an amplitude, or too much noise"
             }
             Self::Implausible => "a reading differed from its prediction: a sensor, the drive or the clock has failed",
-        })
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.text())
     }
 }
 

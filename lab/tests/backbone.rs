@@ -261,7 +261,7 @@ fn a_sensor_that_stops_ends_tracking_and_keeps_the_points_before() {
     let mut rig = Dying { rig, left: 18_000, stuck: 0.0 };
     let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
     let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
-    let reason = tracked.ended.unwrap();
+    let reason = tracked.ended.unwrap().to_string();
     assert!(reason.contains("a reading differed from its prediction"), "{reason}");
     assert!((5..15).contains(&tracked.points.len()), "{}", tracked.points.len());
     for point in &tracked.points {

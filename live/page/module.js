@@ -2,7 +2,10 @@
 
 const COLUMNS = ["time", "base", "response", "relative", "phaseError", "omega", "amplitude", "responseAmplitude"];
 const STATUS = ["time", "sampleTime", "omega0", "sigma", "C", "B", "phaseError", "G", "locked", "settled", "state", "fault", "impacts", "perPeriod", "dissipated"];
-const LOOK = ["time", "base", "q1", "q2", "relative", "speed", "wall"];
+const LOOK = ["time", "base", "q1", "q2", "relative", "speed", "wall", "impacts"];
+
+// States of the loop, by number.
+export const LOOP = ["idle", "the drive rises", "searching", "locked", "lock lost", "switched off", "shut down", "capturing impacts"];
 
 const named = (names, values) => Object.fromEntries(names.map((name, i) => [name, values[i]]));
 
@@ -34,7 +37,10 @@ class Bench {
 
   message() {
     const bytes = new Uint8Array(this.exports.memory.buffer, this.exports.message_address(), this.exports.message_length());
-    return new TextDecoder().decode(bytes);
+    const text = new TextDecoder().decode(bytes);
+    const numbers = new Float64Array(this.exports.memory.buffer, this.exports.output_address(), text.split("{}").length - 1);
+    let n = 0;
+    return text.replace(/\{\}/g, () => Number(numbers[n++].toPrecision(6)));
   }
 
   #check(count) {
@@ -56,7 +62,7 @@ class Bench {
   look(ahead) { return named(LOOK, this.#values(this.exports.look(ahead))); }
   nextImpact(after) { return this.#values(this.exports.next_impact(after))[0]; }
   status() { return named(STATUS, this.#values(this.exports.status())); }
-  // [regime, state of the loop, fault]
+  // [regime, fault of the loop]
   words() { this.exports.words(); return this.message().split("|"); }
   #rows(count, width) {
     const values = this.#values(count);

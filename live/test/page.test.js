@@ -116,6 +116,37 @@ for (const { name, options } of BROWSERS) {
       await page.close();
     });
 
+    test("every scene shows what its name says", async () => {
+      const { page, errors } = await open();
+      await ready(page);
+      const found = await page.evaluate(() => {
+        const one = window.live.page;
+        one.play(false);
+        return one.table.scenes.map((scene) => {
+          one.start(scene.values);
+          one.goTo(40000 * one.step, 40001);
+          const regimes = {};
+          let stuck = 0;
+          for (let look = 0; look < 2000; look++) {
+            one.goTo(one.shown + 10.3 * one.step, 11);
+            stuck += one.bench.look(one.shown - (one.samples - 1) * one.step).wall !== 0;
+            const [regime] = one.bench.words();
+            regimes[regime] = (regimes[regime] ?? 0) + 1;
+          }
+          return { name: scene.name, stuck, regimes };
+        });
+      });
+      const scene = (name) => found.find((one) => one.name === name);
+      for (const name of ["Default lock", "From rest"]) assert.deepEqual(scene(name).regimes, { "symmetric 1:1": 2000 }, name);
+      const captures = scene("Capture and loss").regimes;
+      const captured = (captures["symmetric 1:1"] ?? 0) + (captures["asymmetric 1:1"] ?? 0);
+      assert.ok(captured > 100 && captured < 1900, JSON.stringify(captures));
+      assert.ok(scene("Chatter").stuck > 100, JSON.stringify(scene("Chatter")));
+      assert.deepEqual(scene("Chaos").regimes, { irregular: 2000 });
+      assert.deepEqual(errors, []);
+      await page.close();
+    });
+
     test("a link repeats the motion bit by bit", async () => {
       const { page } = await open("#excitation=1.3&changes=500:restitution:0.7,1500:drive:0&samples=3000");
       await ready(page);

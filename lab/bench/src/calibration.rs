@@ -226,7 +226,7 @@ fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<TrackedOutcome
     let log = Log::default();
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let found = track(&mut chained(scene, &log)?, &mut controller, scene, |_, _| {})?;
-    let ended = found.ended.map(|why| (Part::Levels, why));
+    let ended = found.ended.map(|why| (Part::Levels, why.to_string()));
     let (mut outcomes, mut missing) = (Vec::new(), Vec::from_iter(ended));
     for point in &found.points {
         let Some([sigma, g]) = curve.at(point.c).filter(|_| point.settled) else {

@@ -186,7 +186,9 @@ impl<'a> Faults<'a> {
 
     fn track(&self, kind: Kind, log: &Log) -> Result<Option<String>, ExperimentError> {
         let controller = &mut self.controller(kind, log, During::Tracking);
-        Ok(track(&mut *self.rig(kind, log), controller, &self.scene, |_, _| {})?.ended)
+        Ok(track(&mut *self.rig(kind, log), controller, &self.scene, |_, _| {})?
+            .ended
+            .map(|why| why.to_string()))
     }
 
     /// One run with a fault: detection and shutdown, s, and the reason; `None` if it was missed.

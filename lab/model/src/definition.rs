@@ -64,6 +64,20 @@ impl Definition {
         cases.into_iter().flat_map(with).collect()
     }
 
+    /// Whether resonance is the peak of the response. Without the feature `peak` nothing that finds the peak is compiled.
+    ///
+    /// # Panics
+    /// For a peak without the feature.
+    #[must_use]
+    pub fn is_peak(&self) -> bool {
+        let peak = self.resonance == Resonance::Peak;
+        assert!(
+            !peak || cfg!(feature = "peak"),
+            "the peak of the response needs the feature `peak`"
+        );
+        peak && cfg!(feature = "peak")
+    }
+
     /// Whether the sensors need differences of samples, so that response and reference are read one sample late.
     #[must_use]
     pub fn is_late(&self) -> bool {

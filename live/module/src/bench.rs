@@ -8,6 +8,7 @@ use vines_model::regime::Impact;
 use vines_testbench::rig::{Command, Drive};
 use vines_testbench::scene::Scene;
 
+use crate::message::Message;
 use crate::rig::NoisyRig;
 use crate::settings::{COUNT, Settings, changed, default_scene, index, settings_of};
 use crate::tracking::Tracking;
@@ -25,6 +26,8 @@ pub struct Row {
     pub relative: f64,
     /// Output of the controller.
     pub output: Output,
+    /// The drive from this sample on: the controller's, or that of the open loop.
+    pub drive: Drive,
 }
 
 /// Impacts that are kept to determine the regime from.
@@ -62,10 +65,10 @@ impl Bench {
     ///
     /// # Errors
     /// The message for a value that plant or controller refuse.
-    pub fn new(settings: Settings) -> Result<Self, String> {
-        let scene = changed(&default_scene(), &settings);
-        let plant = Plant::new(scene.plant, scene.start).map_err(|error| error.to_string())?;
-        let lock = scene.controller_config().build().map_err(|error| error.to_string())?;
+    pub fn new(settings: Settings) -> Result<Self, Message> {
+        let scene = changed(default_scene(), &settings);
+        let plant = Plant::new(scene.plant, scene.start)?;
+        let lock = scene.controller_config().build()?;
         let state = lock.start();
         Ok(Self {
             lock,
@@ -93,18 +96,15 @@ impl Bench {
     ///
     /// # Errors
     /// The message for a value that is refused; then nothing changes.
-    pub fn apply(&mut self, settings: Settings) -> Result<(), String> {
+    pub fn apply(&mut self, settings: Settings) -> Result<(), Message> {
         let differs = |one: usize| settings[one] != self.settings[one];
         if differs(index::GAP) || differs(index::MASS_RATIO) {
             *self = Self::new(settings)?;
             return Ok(());
         }
-        let scene = changed(&default_scene(), &settings);
-        let lock = scene.controller_config().build().map_err(|error| error.to_string())?;
-        self.rig
-            .plant
-            .set_parameters(scene.plant)
-            .map_err(|error| error.to_string())?;
+        let scene = changed(default_scene(), &settings);
+        let lock = scene.controller_config().build()?;
+        self.rig.plant.set_parameters(scene.plant)?;
         self.rig.noise = settings[index::NOISE] * 0.01 * scene.plant.half_width;
         self.tracking = None;
         (self.lock, self.scene, self.settings) = (lock, scene, settings);
@@ -117,11 +117,20 @@ impl Bench {
         self.tracking = None;
     }
 
-    /// One sample: sensors, controller, drive. Returns the row of the record.
+    /// Takes `samples` samples and hands the rows of the record to `on_row`.
     ///
     /// # Errors
     /// The message for a drive that the plant refuses.
-    pub fn sample(&mut self) -> Result<Row, String> {
+    pub fn run(&mut self, samples: usize, mut on_row: impl FnMut(&Row)) -> Result<(), Message> {
+        for left in (0..samples).rev() {
+            // Only the last sample can be looked into. A plant is large: copies of it would take a third of the time.
+            on_row(&self.sample(left == 0)?);
+        }
+        Ok(())
+    }
+
+    /// One sample: sensors, controller, drive. Returns the row of the record.
+    fn sample(&mut self, is_last: bool) -> Result<Row, Message> {
         let due = self.tracking.as_mut().and_then(|tracking| tracking.due(self.samples));
         if let Some((to, phase_target)) = due {
             self.hold_response(to, phase_target)?;
@@ -141,8 +150,11 @@ impl Bench {
             response: sensors.response,
             relative: self.rig.plant.relative_displacement(),
             output: self.output,
+            drive,
         };
-        self.before = (self.rig.plant, drive);
+        if is_last {
+            self.before = (self.rig.plant, drive);
+        }
         self.step(drive)?;
         self.samples += 1;
         Ok(row)
@@ -158,7 +170,7 @@ impl Bench {
         Drive { omega, amplitude, ..Drive::default() }
     }
 
-    fn step(&mut self, drive: Drive) -> Result<(), String> {
+    fn step(&mut self, drive: Drive) -> Result<(), Message> {
         let (impacts, phase) = (&mut self.impacts, self.phase);
         let mut count = |event: Event| {
             if let Event::Impact { t, velocity, .. } = event {
@@ -166,21 +178,17 @@ impl Bench {
             }
         };
         let step = self.lock.config().sample_time;
-        self.rig
-            .step(drive, step, &mut count)
-            .map_err(|error| error.to_string())?;
+        self.rig.step(drive, step, &mut count)?;
         let surplus = self.impacts.len().saturating_sub(KEPT);
         self.impacts.drain(..surplus);
         self.phase += drive.omega * step;
         Ok(())
     }
 
-    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), String> {
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), Message> {
         let amplitude = self.lock.config().amplitude;
-        let retuned = self.lock.retune(amplitude, phase_target);
-        retuned
-            .and_then(|()| self.lock.hold_response(&mut self.state, to))
-            .map_err(|error| error.to_string())
+        self.lock.retune(amplitude, phase_target)?;
+        Ok(self.lock.hold_response(&mut self.state, to)?)
     }
 
     /// Time of the next sample, s.

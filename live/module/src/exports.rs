@@ -3,7 +3,7 @@
 //! | call | result in the output array |
 //! |---|---|
 //! | [`run`] | rows of the record: time (s), base, response, relative displacement (m), phase error (degrees), frequency (rad/s), base amplitude, response amplitude (m) |
-//! | [`look`] | time (s), base, q1, q2, relative displacement (m), particle's velocity (m/s), wall that it rests on (-1, 0, 1) |
+//! | [`look`] | time (s), base, q1, q2, relative displacement (m), particle's velocity (m/s), wall that it rests on (-1, 0, 1), impacts since the start |
 //! | [`status`] | see there |
 //! | [`manifold`] | pairs (B, C) |
 //! | [`theory_backbone`], [`exact_backbone`] | triples (sigma, C, 1 if stable) |
@@ -13,6 +13,7 @@ use std::cell::RefCell;
 
 use crate::bench::Bench;
 use crate::curves;
+use crate::message::Message;
 use crate::settings::{COUNT, Settings};
 
 /// Largest number of values of one call.
@@ -21,7 +22,8 @@ const CAPACITY: usize = 1 << 16;
 const COLUMNS: usize = 8;
 
 struct Page {
-    bench: Option<Bench>,
+    // Boxed: bytes of zeros for a bench would be a part of the module.
+    bench: Option<Box<Bench>>,
     settings: Settings,
     output: Vec<f64>,
     message: String,
@@ -34,17 +36,26 @@ thread_local! {
     };
 }
 
+/// What fills the output array.
+type Action<'a> = dyn FnMut(&mut Bench, &mut Vec<f64>) -> Result<(), Message> + 'a;
+
 /// Runs `action`, puts its values into the output array and returns how many there are; -1 and a message at an error.
-fn values(action: impl FnOnce(&mut Bench, &mut Vec<f64>) -> Result<(), String>) -> i32 {
+fn values(mut action: impl FnMut(&mut Bench, &mut Vec<f64>) -> Result<(), Message>) -> i32 {
+    values_of(&mut action)
+}
+
+/// The same, compiled once.
+#[inline(never)]
+fn values_of(action: &mut Action) -> i32 {
     PAGE.with_borrow_mut(|page| {
         let Page { bench, output, message, .. } = page;
         output.clear();
         output.reserve_exact(CAPACITY);
-        let result = bench.as_mut().ok_or_else(|| "restart first".to_owned());
+        let result = bench.as_mut().ok_or_else(|| "restart first".into());
         match result.and_then(|bench| action(bench, output)) {
             Ok(()) => output.len() as i32,
             Err(error) => {
-                *message = error;
+                (*message, *output) = (error.text, error.numbers);
                 -1
             }
         }
@@ -70,7 +81,7 @@ pub extern "C" fn output_address() -> *const f64 {
     PAGE.with_borrow(|page| page.output.as_ptr())
 }
 
-/// Address of the message of the last error, UTF-8.
+/// Address of the message of the last error, UTF-8; each `{}` in it stands for a number of the output array.
 #[unsafe(no_mangle)]
 pub extern "C" fn message_address() -> *const u8 {
     PAGE.with_borrow(|page| page.message.as_ptr())
@@ -82,11 +93,11 @@ pub extern "C" fn message_length() -> usize {
     PAGE.with_borrow(|page| page.message.len())
 }
 
-fn with_settings(action: impl FnOnce(&mut Option<Bench>, Settings) -> Result<(), String>) -> i32 {
+fn with_settings(action: impl FnOnce(&mut Option<Box<Bench>>, Settings) -> Result<(), Message>) -> i32 {
     PAGE.with_borrow_mut(|page| match action(&mut page.bench, page.settings) {
         Ok(()) => 0,
-        Err(message) => {
-            page.message = message;
+        Err(Message { text, numbers }) => {
+            (page.message, page.output) = (text, numbers);
             -1
         }
     })
@@ -96,7 +107,7 @@ fn with_settings(action: impl FnOnce(&mut Option<Bench>, Settings) -> Result<(),
 #[unsafe(no_mangle)]
 pub extern "C" fn restart() -> i32 {
     with_settings(|bench, settings| {
-        *bench = Some(Bench::new(settings)?);
+        *bench = Some(Box::new(Bench::new(settings)?));
         Ok(())
     })
 }
@@ -106,7 +117,7 @@ pub extern "C" fn restart() -> i32 {
 pub extern "C" fn apply() -> i32 {
     with_settings(|bench, settings| match bench {
         Some(bench) => bench.apply(settings),
-        None => Err("restart first".to_owned()),
+        None => Err("restart first".into()),
     })
 }
 
@@ -123,8 +134,7 @@ pub extern "C" fn drive(on: i32) -> i32 {
 #[unsafe(no_mangle)]
 pub extern "C" fn run(samples: u32) -> i32 {
     values(|bench, output| {
-        for _ in 0..(samples as usize).min(CAPACITY / COLUMNS) {
-            let row = bench.sample()?;
+        bench.run((samples as usize).min(CAPACITY / COLUMNS), |row| {
             let controller = &row.output;
             output.extend([
                 row.time,
@@ -132,12 +142,11 @@ pub extern "C" fn run(samples: u32) -> i32 {
                 row.response,
                 row.relative,
                 controller.phase_error.unwrap_or(0.0).to_degrees(),
-                controller.omega,
-                controller.amplitude,
+                row.drive.omega,
+                row.drive.amplitude,
                 controller.response_amplitude,
             ]);
-        }
-        Ok(())
+        })
     })
 }
 
@@ -158,6 +167,7 @@ pub extern "C" fn look(ahead: f64) -> i32 {
             plant.relative_displacement(),
             state.dq2,
             wall,
+            plant.totals().impacts as f64,
         ]);
         Ok(())
     })
@@ -203,14 +213,13 @@ pub extern "C" fn status() -> i32 {
     })
 }
 
-/// Puts the names of the regime, of the loop's state and of its fault (or nothing) into the message, separated by `|`.
+/// Puts the name of the regime and the fault of the loop (or nothing) into the message, separated by `|`.
 #[unsafe(no_mangle)]
 pub extern "C" fn words() {
     PAGE.with_borrow_mut(|page| {
         if let Some(bench) = &page.bench {
-            let output = &bench.output;
-            let fault = output.fault.map(|fault| format!("{fault:?}")).unwrap_or_default();
-            page.message = format!("{}|{:?}|{fault}", bench.regime().name(), output.state);
+            let fault = bench.output.fault.map_or("", |fault| fault.text());
+            page.message = [bench.regime().name(), "|", fault].concat();
         }
     });
 }

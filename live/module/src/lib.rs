@@ -7,6 +7,9 @@
 pub mod bench;
 mod curves;
 pub mod exports;
+#[cfg(target_arch = "wasm32")]
+mod mathematics;
+pub mod message;
 mod rig;
 pub mod settings;
 mod status;

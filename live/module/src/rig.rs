@@ -1,8 +1,7 @@
 //! The plant with noisy sensors, as the rig of the test bench.
 
 use lovines::{Drive, Event, InvalidValue, Plant};
-use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
-use rand_distr::{Distribution, StandardNormal};
+use oorandom::Rand64;
 use vines_testbench::rig::{self, Rig, RigError, Sensors};
 
 /// The plant and the noise of its sensors.
@@ -11,27 +10,26 @@ pub struct NoisyRig {
     pub plant: Plant,
     /// Standard deviation of the noise, m; 0: the sensors read exact values.
     pub noise: f64,
-    random: ChaCha8Rng,
+    random: Rand64,
 }
 
 impl NoisyRig {
     pub fn new(plant: Plant, noise: f64) -> Self {
-        Self { plant, noise, random: ChaCha8Rng::seed_from_u64(1) }
+        Self { plant, noise, random: Rand64::new(1) }
     }
 
     /// What the sensors read, m.
     pub fn read(&mut self) -> Sensors {
-        let mut noise = || {
-            if self.noise > 0.0 {
-                let normal: f64 = StandardNormal.sample(&mut self.random);
-                self.noise * normal
-            } else {
-                0.0
-            }
-        };
+        let mut noise = [0.0; 2];
+        if self.noise > 0.0 {
+            // Two independent normal numbers (Box and Muller, 1958).
+            let size = self.noise * libm::sqrt(-2.0 * libm::log(1.0 - self.random.rand_float()));
+            let (sin, cos) = libm::sincos(std::f64::consts::TAU * self.random.rand_float());
+            noise = [size * cos, size * sin];
+        }
         Sensors {
-            response: self.plant.centre() + noise(),
-            reference: Some(self.plant.base_displacement() + noise()),
+            response: self.plant.centre() + noise[0],
+            reference: Some(self.plant.base_displacement() + noise[1]),
         }
     }
 

@@ -61,10 +61,9 @@ pub fn settings_of(scene: &Scene) -> Settings {
 
 /// `scene` with the values that differ from its own replaced. The others keep all their bits.
 #[must_use]
-pub fn changed(scene: &Scene, values: &Settings) -> Scene {
-    let before = settings_of(scene);
+pub fn changed(mut scene: Scene, values: &Settings) -> Scene {
+    let before = settings_of(&scene);
     let differs = |one: usize| values[one] != before[one];
-    let mut scene = scene.clone();
     let omega0 = scene.dimensionless().omega0;
     let plant = &mut scene.plant;
     if differs(index::MASS_RATIO) {

@@ -8,6 +8,7 @@ use vines_testbench::backbone::track;
 use vines_testbench::rig::{Command, Controller, ControllerError, Sensors};
 
 use crate::bench::Bench;
+use crate::message::Message;
 
 /// A point of the tracked backbone, dimensionless.
 #[derive(Debug, Clone, Copy)]
@@ -76,18 +77,13 @@ impl Bench {
     ///
     /// # Errors
     /// The message of a lab's error, such as no lock; then the bench runs on as before.
-    pub fn track(&mut self) -> Result<(), String> {
-        let lock = self
-            .scene
-            .backbone_config()
-            .build()
-            .map_err(|error| error.to_string())?;
+    pub fn track(&mut self) -> Result<(), Message> {
+        let lock = self.scene.backbone_config().build()?;
         let last = Cell::new((self.samples, 0.0));
         let mut controller = Ahead { lock, state: self.state, last: &last, moves: Vec::new() };
         let mut rig = self.rig.clone();
         let mut begun = Vec::new();
-        let tracked = track(&mut rig, &mut controller, &self.scene, |_, _| begun.push(last.get()))
-            .map_err(|error| error.to_string())?;
+        let tracked = track(&mut rig, &mut controller, &self.scene, |_, _| begun.push(last.get()))?;
         let ends = begun.into_iter().skip(1).chain([last.get()]);
         let points = tracked.points.iter().zip(ends);
         let points = points.map(|(point, (sample, omega))| Point {

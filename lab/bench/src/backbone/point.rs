@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::predictor::Known;
 use super::settle::Found;
+use crate::experiment::ExperimentError;
 use crate::identification::Regime;
 use vines_model::Dimensionless;
 
@@ -75,7 +76,7 @@ impl Point {
 }
 
 /// The tracked backbone.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+#[derive(Debug)]
 pub struct Tracked {
     /// The points, in the order in which they were taken.
     pub points: Vec<Point>,
@@ -84,5 +85,5 @@ pub struct Tracked {
     /// All periods, from the start to the last point.
     pub periods: f64,
     /// Why tracking ended before the last level; absent if it did not.
-    pub ended: Option<String>,
+    pub ended: Option<ExperimentError>,
 }

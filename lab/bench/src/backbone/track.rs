@@ -9,7 +9,7 @@ use super::sweep::{self, Sweep};
 use crate::experiment::{self, ExperimentError, Sample, Stage};
 use crate::identification::{Cycle, Regime, classify, regime_by_response};
 use crate::rig::{Controller, LoopState, Move, Rig};
-use crate::scene::{Resonance, Scene};
+use crate::scene::Scene;
 use vines_model::numerics::Estimate;
 
 /// Phase error, rad, below which the control of the response begins.
@@ -40,9 +40,10 @@ pub fn track(
     approach(&mut bench, scene.lock_periods())?;
     let periods_to_lock = bench.periods;
     bench.stage = Stage::Tracking;
-    let phases: &[f64] = match scene.resonance.resonance {
-        Resonance::Phase => &[0.0],
-        Resonance::Peak => &peak::PHASES,
+    let phases: &[f64] = if scene.resonance.is_peak() {
+        &peak::PHASES
+    } else {
+        &[0.0]
     };
     let mut scans: Vec<Vec<Point>> = vec![Vec::new(); phases.len()];
     // The last point, and the phase at which it was held.
@@ -72,16 +73,17 @@ pub fn track(
                 }
                 // What was measured is kept.
                 Err(error) if last.is_some() => {
-                    ended = Some(error.to_string());
+                    ended = Some(error);
                     break 'levels;
                 }
                 Err(error) => return Err(error),
             }
         }
     }
-    let points = match scene.resonance.resonance {
-        Resonance::Phase => scans.swap_remove(0),
-        Resonance::Peak => peak::peaks(&scans, &scene.dimensionless()),
+    let points = if scene.resonance.is_peak() {
+        peak::peaks(&scans, &scene.dimensionless())
+    } else {
+        scans.swap_remove(0)
     };
     let periods = bench.periods;
     Ok(Tracked { points, periods_to_lock, periods, ended })
@@ -181,9 +183,10 @@ fn approach<R: Rig + ?Sized, C: Controller + ?Sized>(
 /// The criterion for a settled point.
 pub(super) fn criterion(scene: &Scene, order: &Order) -> Criterion {
     let (settings, d) = (&scene.backbone, scene.dimensionless());
-    let share = match scene.resonance.resonance {
-        Resonance::Phase => 1.0,
-        Resonance::Peak => peak::share_of_drive(order.level),
+    let share = if scene.resonance.is_peak() {
+        peak::share_of_drive(order.level)
+    } else {
+        1.0
     };
     let pair = |size: f64| [d.amplitude(size), d.omega_change(size)];
     let [base, omega] = pair(settings.tolerance);

@@ -8,7 +8,7 @@ use serde::Serialize;
 use vines_model::orbit::phase_resonant;
 use vines_model::theory::backbone_at_level;
 
-use super::{Resonance, Scene, Sensor, plant::symbols};
+use super::{Scene, Sensor, plant::symbols};
 use crate::advice;
 
 /// The phase of the response relative to the reference that a lock holds.
@@ -59,7 +59,7 @@ impl Scene {
     #[must_use]
     pub fn phase_target(&self) -> PhaseTarget {
         let stated = self.controller.phase_target;
-        if self.resonance.resonance == Resonance::Phase || !self.controller.is_at_phase_resonance() {
+        if !self.resonance.is_peak() || !self.controller.is_at_phase_resonance() {
             return PhaseTarget { degrees: stated, origin: PhaseOrigin::Scene };
         }
         let orbits = phase_resonant(&self.dimensionless());

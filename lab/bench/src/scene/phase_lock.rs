@@ -1,7 +1,7 @@
 //! The `[phase_lock]` section: parameters of the controller that no other key sets, in SI units and by their names in `PhaseLock.fmu`.
 
 use phase_lock::{Config, ConfigError, NONE, PARAMETERS, Parameter, Value as Setting};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
 
 /// The parameters that other keys of a scene set, in units that suit any plant.
@@ -46,10 +46,10 @@ pub fn refusal(error: &ConfigError) -> String {
     text
 }
 
-/// Values by the names of the controller's parameters.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+/// Checked values by the names of the controller's parameters.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(try_from = "Table")]
-pub struct PhaseLock(Table);
+pub struct PhaseLock(Vec<(&'static str, Setting)>);
 
 impl TryFrom<Table> for PhaseLock {
     type Error = String;
@@ -62,26 +62,38 @@ impl TryFrom<Table> for PhaseLock {
                 value => _ = flat.insert(name, value),
             }
         }
-        let mut config = Config::for_resonance(1.0, 1.0);
-        for (name, value) in &flat {
-            set(&mut config, name, value)?;
-        }
-        Ok(Self(flat))
+        let settings = flat.iter().map(|(name, value)| setting(name, value));
+        Ok(Self(settings.collect::<Result<_, String>>()?))
+    }
+}
+
+impl Serialize for PhaseLock {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, setting)| {
+            let value = match *setting {
+                Setting::Real(NONE) => Value::from("none"),
+                Setting::Real(number) => Value::from(number),
+                Setting::Integer(number) => Value::from(number),
+                Setting::Boolean(one) => Value::from(one),
+            };
+            (name, value)
+        }))
     }
 }
 
 impl PhaseLock {
     /// The configuration with these values.
     pub(super) fn apply(&self, mut config: Config) -> Config {
-        for (name, value) in &self.0 {
+        for (name, setting) in &self.0 {
             // Names, types and whole numbers were checked when the scene was read; `Config::build` checks the rest.
-            let _ = set(&mut config, name, value);
+            let _ = Parameter::find(name).map(|parameter| parameter.set(&mut config, *setting));
         }
         config
     }
 }
 
-fn set(config: &mut Config, name: &str, value: &Value) -> Result<(), String> {
+/// Name and value of a parameter, from the name and the value in the file.
+fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), String> {
     if let Some((_, key)) = KEYS.iter().find(|(parameter, _)| *parameter == name) {
         return Err(format!("phase_lock.{name} is set by {key}"));
     }
@@ -93,7 +105,8 @@ fn set(config: &mut Config, name: &str, value: &Value) -> Result<(), String> {
             free.join(", ")
         )
     })?;
-    let setting = match (parameter.get(config), value) {
+    let mut config = Config::for_resonance(1.0, 1.0);
+    let setting = match (parameter.get(&config), value) {
         (Setting::Real(_), Value::Float(number)) => Setting::Real(*number),
         (Setting::Real(_), Value::Integer(number)) => Setting::Real(*number as f64),
         (Setting::Real(_), Value::String(word)) if word == "none" => Setting::Real(NONE),
@@ -107,7 +120,7 @@ fn set(config: &mut Config, name: &str, value: &Value) -> Result<(), String> {
             ));
         }
     };
-    parameter
-        .set(config, setting)
-        .map_err(|error| format!("phase_lock.{error}"))
+    let accepted = parameter.set(&mut config, setting);
+    accepted.map_err(|error| format!("phase_lock.{error}"))?;
+    Ok((parameter.name, setting))
 }

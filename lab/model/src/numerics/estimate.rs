@@ -114,8 +114,10 @@ impl Regression {
             column /= *length;
         }
         let factors = matrix.clone().qr();
-        let inverse = factors.r().try_inverse()?;
-        let scaled = &inverse * (factors.q().transpose() * &right);
+        let inverse = factors.r().solve_upper_triangular(&DMatrix::identity(terms, terms))?;
+        let mut turned = right.clone();
+        factors.q_tr_mul(&mut turned);
+        let scaled = &inverse * turned.rows(0, terms);
         let residual = &right - &matrix * &scaled;
         let scatter = (residual.norm_squared() / degrees.max(1.0)).sqrt();
         // White noise alone exceeds this in one case of twenty.
@@ -133,8 +135,9 @@ impl Regression {
         };
         let variance = deviation * deviation;
         let excess = if noise > 0.0 { scatter / noise } else { 1.0 };
-        let covariance = &inverse * inverse.transpose() * variance;
-        let covariance = DMatrix::from_fn(terms, terms, |i, j| covariance[(i, j)] / (lengths[i] * lengths[j]));
+        let covariance = DMatrix::from_fn(terms, terms, |i, j| {
+            inverse.row(i).dot(&inverse.row(j)) * variance / (lengths[i] * lengths[j])
+        });
         let coefficients = DVector::from_fn(terms, |i, _| scaled[i] / lengths[i]);
         coefficients
             .iter()

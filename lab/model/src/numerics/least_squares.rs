@@ -67,7 +67,8 @@ impl HarmonicBasis {
     #[must_use]
     pub fn variances(&self, harmonic: usize, degree: usize) -> [f64; 2] {
         let column = self.columns[harmonic - 1] + 2 * degree;
-        let Some(inverse) = self.factors.r().try_inverse() else {
+        let identity = DMatrix::identity(self.terms(), self.terms());
+        let Some(inverse) = self.factors.r().solve_upper_triangular(&identity) else {
             return [f64::NAN; 2];
         };
         [column, column + 1].map(|row| inverse.row(row).norm_squared())

@@ -4,8 +4,8 @@ use super::{
     Condition, ImpactPattern, Orbit, Periodic, Unknowns,
     candidate::{Candidate, Family},
 };
+use crate::Dimensionless;
 use crate::numerics::{bisection, golden_section};
-use crate::{Dimensionless, Resonance};
 
 /// Frequencies searched, over omega0.
 const SEARCHED: [f64; 2] = [0.2, 3.0];
@@ -24,7 +24,7 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
         .filter(resonates)
         .filter_map(|candidate| accept(scene, &candidate))
         .collect();
-    if scene.definition.resonance == Resonance::Peak {
+    if scene.definition.is_peak() {
         let peak = |orbit: &Orbit| peak(scene, orbit, Condition::Excitation(scene.g));
         orbits = orbits.iter().filter_map(peak).collect();
     }
@@ -50,11 +50,11 @@ pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
         .flatten()
         .filter(resonates)
         .filter_map(|candidate| accept(scene, &candidate));
-    match scene.definition.resonance {
-        Resonance::Phase => orbits.collect(),
-        Resonance::Peak => orbits
-            .filter_map(|orbit| peak(scene, &orbit, Condition::Sigma(orbit.sigma)))
-            .collect(),
+    if scene.definition.is_peak() {
+        let peak = |orbit: Orbit| peak(scene, &orbit, Condition::Sigma(orbit.sigma));
+        orbits.filter_map(peak).collect()
+    } else {
+        orbits.collect()
     }
 }
 
