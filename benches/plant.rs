@@ -60,9 +60,17 @@ fn cases() -> Vec<Case> {
     add(
         "default lock, a step per period, state read after each",
         "impact",
-        "70 ns",
+        "",
         Box::new(move || at_lock.follow(PERIODS, period, states)),
         Some(Box::new(by_period)),
+    );
+    // What a new plant computes once counts less.
+    add(
+        "the same, ten times as long",
+        "impact",
+        "70 ns",
+        Box::new(move || at_lock.follow(10 * PERIODS, period, states)),
+        None,
     );
     for g in [1.2, 1.5] {
         for sigma in [-0.5, 0.0, 1.0] {

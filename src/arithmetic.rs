@@ -45,6 +45,7 @@ impl Sum {
 }
 
 impl From<f64> for Sum {
+    #[inline(always)]
     fn from(value: f64) -> Self {
         Self { value, error: 0.0 }
     }

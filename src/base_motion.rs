@@ -28,6 +28,7 @@ pub struct Drive {
 
 impl Drive {
     /// A harmonic base motion from the built-in oscillator alone.
+    #[inline]
     pub fn harmonic(amplitude: f64, omega: f64) -> Self {
         Self { amplitude, omega, ..Self::default() }
     }
@@ -101,11 +102,6 @@ impl BaseMotion {
             self.drive.amplitude * libm::sin(self.phase.0)
         };
         self.drive.signal[0] + oscillator
-    }
-
-    /// The motion from now on under another drive, its phase going on.
-    pub fn with(&self, drive: Drive) -> Self {
-        Self { drive, ..*self }
     }
 
     /// The same motion seen from `t` seconds later.

@@ -85,11 +85,10 @@ pub fn first_closure<const N: usize>(
         looks += 1;
         let (gaps, derivatives) = look(t);
         let left = limit - t;
-        let window = left;
-        let mut step = window;
+        let mut step = left;
         let mut nearest: Option<(f64, usize)> = None;
         for (which, gap) in gaps.iter().enumerate() {
-            let open = bounds.open(gap, &derivatives, window);
+            let open = bounds.open(gap, &derivatives, left);
             if open * fastest < NEAR && open < left {
                 let contact = gap.contact_nearby(2.0 * NEAR / fastest);
                 if let Some(h) = contact.filter(|h| *h <= left)
@@ -111,9 +110,9 @@ pub fn first_closure<const N: usize>(
             // in which nothing that can be told happens.
             let blurred = gaps.map(|gap| {
                 let gap = Gap { gap: gap.gap + resolution, ..gap };
-                bounds.open(&gap, &derivatives, window)
+                bounds.open(&gap, &derivatives, left)
             });
-            least = blurred.into_iter().fold(window, f64::min).max(least);
+            least = blurred.into_iter().fold(left, f64::min).max(least);
         }
         t += step.max(least);
     }
@@ -125,10 +124,9 @@ impl Gap {
     /// derivative over `[0, h]`.
     pub fn certainly_open(&self, window: f64, jerk: impl Fn(f64) -> f64) -> f64 {
         let mut safe = 0.0f64;
-        let limit = window;
         // No bound reaches beyond where the gap would close with no jerk at all.
         let mut window =
-            first_root(self.gap, self.closing, self.acceleration).map_or(limit, |root| limit.min(1.5 * root));
+            first_root(self.gap, self.closing, self.acceleration).map_or(window, |root| window.min(1.5 * root));
         // A shorter window has a smaller remainder: down to the one that the answer itself asks for.
         for _ in 0..MOST_WINDOWS {
             safe = safe.max(self.open_within(window, jerk(window)));

@@ -26,6 +26,7 @@ impl Wall {
     pub const BOTH: [Wall; 2] = [Wall::Plus, Wall::Minus];
 
     /// +1 or -1.
+    #[inline(always)]
     pub fn sign(self) -> f64 {
         match self {
             Wall::Plus => 1.0,

@@ -196,10 +196,11 @@ impl FastPath {
         let increment = if !drive.is_straight() || drive.omega < 0.0 || t * fastest > LONGEST_COAST {
             self.rotations = ROTATIONS;
             let (x, v) = (moving.masses.x.value(), moving.masses.v.value());
-            let (dx, dv) = Segment::new(oscillator, moving.base, (x, v)).departure(t);
+            let motion = Segment::new(oscillator, moving.base, (x, v));
+            let there = motion.at(&motion.series(), t);
             Increment {
-                y: dx + (v - drive.signal[1]) * t,
-                dy: dv,
+                y: there.moved - drive.signal[1] * t,
+                dy: there.departure.1,
                 phasor: self.phasor,
             }
         } else {

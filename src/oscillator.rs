@@ -139,21 +139,33 @@ impl Oscillator {
     /// What the free motion over `t` seconds adds: a Taylor series over a time that is short against every rate, doubled as often as
     /// needed.
     pub(crate) fn increment(&self, t: f64) -> Increment {
-        const TERMS: usize = 16;
-        let doublings = libm::ceil(libm::log2(32.0 * self.fastest * t)).max(0.0);
+        // Terms from `PLAIN` on are so small that rounding them leaves 24 digits; those from `TERMS` on are below that.
+        const PLAIN: usize = 8;
+        const TERMS: usize = 18;
+        let doublings = libm::ceil(libm::log2(4.0 * self.fastest * t)).max(0.0);
         let t = t * libm::exp2(-doublings);
         let (damping, spring) = self.rates();
         let (damping, spring) = (times(damping, (t, 0.0)), times(spring, product(t, t)));
         // Coefficients of the motion that starts with a displacement of 0 and a velocity of 1/t.
         let (mut c, mut s, mut p) = ([(0.0, 0.0), (1.0, 0.0)], (1.0, 0.0), (0.0, 0.0));
-        for n in 2..TERMS {
-            let sum = plus(times(damping, times(c[1], ((n - 1) as f64, 0.0))), times(spring, c[0]));
-            let (next, error) = divided(sum, ((n - 1) * n) as f64);
+        for n in 2..PLAIN {
+            // The divisions do not wait for the last term.
+            let (damping, spring) = (divided(damping, n as f64), divided(spring, ((n - 1) * n) as f64));
+            let (next, error) = plus(times(damping, c[1]), times(spring, c[0]));
             c = [c[1], (-next, -error)];
             s = plus(s, c[1]);
             p = plus(p, times(c[1], (n as f64, 0.0)));
         }
-        let short = Increment { p, s: times(s, (t, 0.0)) };
+        let (mut c, mut small) = (c.map(|(c, _)| c), (0.0, 0.0));
+        for n in PLAIN..TERMS {
+            let next = damping.0 / n as f64 * c[1] + spring.0 / ((n - 1) * n) as f64 * c[0];
+            c = [c[1], -next];
+            small = (small.0 - next, small.1 - n as f64 * next);
+        }
+        let short = Increment {
+            p: plus(p, (small.1, 0.0)),
+            s: times(plus(s, (small.0, 0.0)), (t, 0.0)),
+        };
         (0..doublings as u32).fold(short, |one, _| self.both(&one, &one))
     }
 
@@ -210,6 +222,13 @@ impl Oscillator {
 pub(crate) struct Increment {
     p: (f64, f64),
     s: (f64, f64),
+}
+
+/// From its two maps ([`Oscillator::split`]).
+impl From<&(Transition, Transition)> for Increment {
+    fn from((head, tail): &(Transition, Transition)) -> Self {
+        Self { p: two_sum(head.vv, tail.vv), s: two_sum(head.xv, tail.xv) }
+    }
 }
 
 #[cfg(test)]

@@ -166,11 +166,6 @@ impl Segment {
         Series { coefficients: c, reach: SERIES_REACH / self.fastest() }
     }
 
-    /// `x - x0 - v0 t` (m) and `v - v0` (m/s) after `t` seconds.
-    pub fn departure(&self, t: f64) -> (f64, f64) {
-        self.at(&self.series(), t).departure
-    }
-
     /// What happens `t` seconds after the start; `series` is that of this motion.
     pub fn at(&self, series: &Series, t: f64) -> Instant {
         if t <= series.reach {

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from growth import growths, samples
 from judge import short, time_at_the_limit
-from tables import NONE, markdown_table, number, ratio, replace, text_table
+from tables import NONE, markdown_table, number, ratio, replace, text_table, wrapped
 
 
 def machine():
@@ -130,6 +130,7 @@ def notes(bench):
     yield (
         "Every method is asked for the state after each step of the scene, and stops there as a co-simulation master "
         "has it, on one thread. CVODE in C restarts at impacts and where the drive changes, and interpolates between. "
+        "Programs and libraries in Rust are built as the FMUs are: the release profile, no link-time optimisation. "
         "Just-in-time compilation (heyoka) and setting up are not in the times. Runs take turns in an "
         "order drawn anew each round. In the loop, all methods get the drive recorded from controller and plant."
     )
@@ -198,7 +199,7 @@ def renew(readme, bench):
     before, rest = text.split(BEGIN)
     after = rest.split(END)[1]
     table = markdown_table(*matrix(bench))
-    replace(readme, f"{before}{BEGIN}\n{MATRIX_NOTE}\n\n{table}\n{END}{after}")
+    replace(readme, wrapped(f"{before}{BEGIN}\n{MATRIX_NOTE}\n\n{table}\n{END}{after}"))
 
 
 def write(bench, growth, loop, profiles, run_times, folder):
@@ -247,7 +248,7 @@ def write(bench, growth, loop, profiles, run_times, folder):
     text += [pair]
     mark += [pair, ""]
     replace(folder / "performance.txt", "\n".join(text) + "\n")
-    replace(folder / "performance.md", "\n".join(mark).rstrip() + "\n")
+    replace(folder / "performance.md", wrapped("\n".join(mark).rstrip() + "\n"))
     table = io.StringIO()
     sheet = csv.writer(table, lineterminator="\n")
     sheet.writerow(

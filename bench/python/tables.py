@@ -1,5 +1,7 @@
 """Numbers and tables as text and Markdown, and files that are replaced whole."""
 
+import textwrap
+
 # Where there is nothing to be said.
 NONE = "\N{EN DASH}"
 
@@ -33,6 +35,13 @@ def text_table(head, rows):
 def markdown_table(head, rows):
     align = ["---"] + ["---:"] * (len(head) - 2) + ["---"]
     return "\n".join("| " + " | ".join(row) + " |" for row in [head, align, *rows])
+
+
+def wrapped(text):
+    """Markdown with prose in lines of at most 150 characters."""
+    kept = ("|", "!", "#")
+    fill = textwrap.TextWrapper(150, break_long_words=False, break_on_hyphens=False).fill
+    return "\n".join(fill(line) if len(line) > 150 and not line.startswith(kept) else line for line in text.split("\n"))
 
 
 def replace(file, text):

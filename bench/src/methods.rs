@@ -9,7 +9,7 @@ mod moreau;
 mod plant;
 mod rk4;
 
-pub use brent::{Baseline as BrentBaseline, baseline_of as brent_baseline};
+pub use brent::Baseline as BrentBaseline;
 pub use plant::begin;
 
 use std::time::Duration;

@@ -1,26 +1,16 @@
 //! What a careful user would write in an afternoon: the closed form between impacts, walls looked for on a grid, and the
 //! instant of an impact by Brent's method (crate `roots`). The measure that this project's speed is told in.
 //!
-//! It shares no code with the plant, carries the phase from step to step, and knows no sticking: at the end of a chatter it stalls, and a
+//! It shares no code with the plant but the names of its parameters, carries the phase from step to step, and knows no sticking: at the end of a chatter it stalls, and a
 //! contact that begins and ends between two points of the grid it does not see.
 
+use lovines::Parameters;
 use roots::{SimpleConvergency, find_root_brent};
 
 /// Points of the grid per radian of the faster of drive and free oscillation: 24 per period.
 const POINTS_PER_RADIAN: f64 = 24.0 / core::f64::consts::TAU;
 /// So many impacts between two points of the grid are a stall.
 const MOST_IMPACTS: u32 = 1000;
-
-/// Rig and drive, SI units: `M q1'' + c q1' + k q1 = k e + c e'` with `e = amplitude sin(omega t + phase)`.
-#[derive(Clone, Copy, Debug)]
-pub struct Rig {
-    pub primary_mass: f64,
-    pub stiffness: f64,
-    pub damping: f64,
-    pub particle_mass: f64,
-    pub half_width: f64,
-    pub restitution: f64,
-}
 
 /// The end of a chatter: impacts without end in no time.
 #[derive(Clone, Copy, Debug)]
@@ -33,7 +23,7 @@ enum Free {
     Over { first: f64, second: f64, a: f64, b: f64 },
 }
 
-/// The motion of the primary mass from an instant on.
+/// The motion of the primary mass from an instant on: `M q1'' + c q1' + k q1 = k e + c e'` with `e = amplitude sin(omega t + phase)`.
 #[derive(Clone, Copy, Debug)]
 struct Motion {
     from: f64,
@@ -54,8 +44,8 @@ impl Motion {
         if self.secular { (x * t, v * t + x) } else { (x, v) }
     }
 
-    fn new(rig: &Rig, amplitude: f64, omega: f64, phase: f64, from: f64, x: f64, v: f64) -> Self {
-        let Rig { primary_mass: m, stiffness: k, damping: c, .. } = *rig;
+    fn new(rig: &Parameters, amplitude: f64, omega: f64, phase: f64, from: f64, x: f64, v: f64) -> Self {
+        let Parameters { primary_mass: m, stiffness: k, damping: c, .. } = *rig;
         let (detuning, damping) = (k - m * omega * omega, c * omega);
         let square = detuning * detuning + damping * damping;
         let secular = square == 0.0 && amplitude != 0.0;
@@ -117,7 +107,7 @@ impl Motion {
 /// The method under way.
 #[derive(Clone, Copy, Debug)]
 pub struct Baseline {
-    rig: Rig,
+    rig: Parameters,
     tolerance: f64,
     pub q1: f64,
     pub dq1: f64,
@@ -134,7 +124,7 @@ pub struct Baseline {
 
 impl Baseline {
     /// At `start` (q1, q1', q2, q2'); impact instants are found to `tolerance` seconds.
-    pub fn new(rig: Rig, start: [f64; 4], tolerance: f64) -> Self {
+    pub fn new(rig: Parameters, start: [f64; 4], tolerance: f64) -> Self {
         let [q1, dq1, q2, dq2] = start;
         Self {
             rig,
@@ -202,7 +192,7 @@ impl Baseline {
     }
 
     fn impact(&mut self, time: f64, x: f64, v: f64, wall: f64) {
-        let Rig { primary_mass, particle_mass, restitution, .. } = self.rig;
+        let Parameters { primary_mass, particle_mass, restitution, .. } = self.rig;
         let momentum = primary_mass * v + particle_mass * self.dq2;
         let total = primary_mass + particle_mass;
         let separation = -restitution * (v - self.dq2);

@@ -5,7 +5,7 @@ use std::hint::black_box;
 
 use lovines::{Drive, Parameters, Plant, State};
 
-use crate::baseline::{Baseline, Rig};
+use crate::baseline::Baseline;
 
 const EPSILON: f64 = 0.0084;
 /// Periods of a run.
@@ -82,16 +82,7 @@ impl Scene {
     }
 
     fn baseline(&self) -> Baseline {
-        let p = self.parameters;
-        let rig = Rig {
-            primary_mass: p.primary_mass,
-            stiffness: p.stiffness,
-            damping: p.damping,
-            particle_mass: p.particle_mass,
-            half_width: p.half_width,
-            restitution: p.restitution,
-        };
-        Baseline::new(rig, self.start, 1e-12)
+        Baseline::new(self.parameters, self.start, 1e-12)
     }
 
     /// So many equal steps; `read` after each. The impacts met.

@@ -8,7 +8,7 @@ use crate::base_motion::Drive;
 use crate::oscillator::Oscillator;
 
 /// Flights kept: a motion of so many different flights per period, or flights and parts of them, is predicted.
-const FLIGHTS: usize = 6;
+const FLIGHTS: usize = 8;
 /// So many flights in a row must be the followers of those before until the next one is predicted.
 const ENOUGH: u8 = 3;
 
@@ -56,7 +56,9 @@ impl Cache {
             return None;
         }
         let propagator = &mut self.flights[usize::from(self.followers[usize::from(self.last)]) % FLIGHTS];
-        propagator.prepare(oscillator, coefficients);
+        if propagator.omega != coefficients.omega {
+            propagator.respond(oscillator, coefficients);
+        }
         Some(propagator)
     }
 

@@ -51,7 +51,11 @@ impl FastPath {
         let mut start = Start::new(moving, point);
         let found = match out_of_reach(&self.coefficients, &start) {
             Some(t) if t > self.coefficients.stretch => Found::Free(t),
-            _ => self.look(&mut start, left),
+            _ => {
+                start.here.sample.ddw = start.acceleration(&self.coefficients, &point);
+                let hop = self.hop(&start, left).map(Found::Contact);
+                hop.unwrap_or_else(|| self.march(&start, left, None))
+            }
         };
         self.take(moving, &point, &found, left, duration)
     }
@@ -66,16 +70,6 @@ impl FastPath {
                 self.coast(moving, point, t.min(left), duration)
             }
             Found::Nothing => Next::Search(left),
-        }
-    }
-
-    /// A short hop, or a march.
-    #[inline(always)]
-    fn look(&mut self, start: &mut Start, left: f64) -> Found {
-        start.here.sample.ddw = start.acceleration(&self.coefficients, &start.here.point);
-        match self.hop(start, left) {
-            Some(hop) => Found::Contact(hop),
-            None => self.march(start, left, None),
         }
     }
 

@@ -7,7 +7,7 @@ use super::FastPath;
 use super::coefficients::{Coefficients, TERMS};
 use super::propagator::{Increment, Nearby, Point, Propagator};
 use super::verify::{Sample, Start};
-use crate::oscillator::Oscillator;
+use crate::oscillator::{self, Oscillator};
 
 /// Points of the grid: its span is a little more than half a period of the fastest rate.
 pub(super) const POINTS: usize = 36;
@@ -16,43 +16,48 @@ pub(super) const STRETCH: usize = 24;
 /// Up to here after a mark, in distances between points, it serves as its own point.
 const ITSELF: f64 = 0.65;
 
-/// The propagators over 1 to [`POINTS`] times the spacing.
+/// The propagators over 1 to [`POINTS`] times the spacing, as far as they have been needed: of a regular motion, few are.
 #[derive(Clone, Copy, Debug)]
-pub(super) struct Grid {
-    /// The key, s; 0 before the first use.
-    spacing: f64,
-    propagators: [Propagator; POINTS],
-}
+pub(super) struct Grid([Propagator; POINTS]);
 
 impl Default for Grid {
     fn default() -> Self {
-        Self { spacing: 0.0, propagators: [Propagator::default(); POINTS] }
+        Self([Propagator::default(); POINTS])
     }
 }
 
 impl Grid {
-    #[inline(never)]
-    fn build(&mut self, oscillator: &Oscillator, spacing: f64) {
-        self.spacing = spacing;
-        let once = oscillator.increment(spacing);
-        let mut increment = once;
-        for (n, propagator) in self.propagators.iter_mut().enumerate() {
-            if n > 0 {
-                increment = oscillator.both(&increment, &once);
-            }
-            *propagator = Propagator::new((n + 1) as f64 * spacing, oscillator.split(&increment));
+    /// What the free motion adds over `n` times the spacing: what two shorter times add.
+    fn free(&mut self, oscillator: &Oscillator, spacing: f64, n: usize) -> oscillator::Increment {
+        let t = n as f64 * spacing;
+        if self.0[n - 1].t != t {
+            let increment = if n == 1 {
+                oscillator.increment(t)
+            } else {
+                let most = 1 << (n - 1).ilog2();
+                let parts = [most, n - most].map(|n| self.free(oscillator, spacing, n));
+                oscillator.both(&parts[0], &parts[1])
+            };
+            self.0[n - 1] = Propagator::new(t, oscillator.split(&increment));
         }
+        // The same bits whether it has just been computed or not.
+        oscillator::Increment::from(&self.0[n - 1].free)
     }
 
-    /// The propagator over `n` times the spacing, n from 1 on.
+    #[inline(never)]
+    fn fill(&mut self, oscillator: &Oscillator, coefficients: &Coefficients, n: usize) {
+        self.free(oscillator, coefficients.spacing, n);
+        self.0[n - 1].respond(oscillator, coefficients);
+    }
+
+    /// The propagator over `n` times the spacing, n from 1 to [`POINTS`].
     #[inline(always)]
     fn over(&mut self, oscillator: &Oscillator, coefficients: &Coefficients, n: usize) -> &Propagator {
-        if self.spacing != coefficients.spacing {
-            self.build(oscillator, coefficients.spacing);
+        let propagator = &self.0[(n - 1) % POINTS];
+        if propagator.t != n as f64 * coefficients.spacing || propagator.omega != coefficients.omega {
+            self.fill(oscillator, coefficients, n);
         }
-        let propagator = &mut self.propagators[(n - 1) % POINTS];
-        propagator.prepare(oscillator, coefficients);
-        propagator
+        &self.0[(n - 1) % POINTS]
     }
 }
 

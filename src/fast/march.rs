@@ -42,7 +42,10 @@ impl FastPath {
             {
                 return Found::Contact(*arrival);
             }
-            if let Some(arrival) = self.rest(start, &from) {
+            // The start of a predicted flight has been tried.
+            if (predicted.is_none() || from.t > 0.0)
+                && let Some(arrival) = self.rest(start, &from)
+            {
                 return Found::Contact(arrival);
             }
             let to = self.mark(start, &from, n);

@@ -50,10 +50,10 @@ pub(super) struct Propagator {
     /// The key: time, s; NaN where the propagator is empty.
     pub t: f64,
     /// The key of the response, rad/s.
-    omega: f64,
+    pub omega: f64,
     /// What the free motion adds, if `complete`: the sum of both, because a propagator is used many times and the same rounding error
     /// would add up.
-    free: (Transition, Transition),
+    pub free: (Transition, Transition),
     complete: bool,
     response: Response,
     /// `omega t` in [0, 2π), and its rounding error.
@@ -134,15 +134,8 @@ impl Propagator {
     }
 
     /// Makes the response that of these coefficients' frequency.
-    #[inline(always)]
-    pub fn prepare(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) {
-        if self.omega != coefficients.omega {
-            self.respond(oscillator, coefficients);
-        }
-    }
-
     #[inline(never)]
-    fn respond(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) {
+    pub fn respond(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) {
         if !self.complete {
             *self = Self::new(self.t, oscillator.split(&oscillator.increment(self.t)));
         }

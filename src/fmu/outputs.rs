@@ -138,7 +138,7 @@ impl LoViNes {
     /// The base as it stands, with the inputs as they are set now.
     pub(super) fn base_motion(&self, plant: &Plant) -> BaseMotion {
         if self.inputs_set {
-            plant.base().with(self.drive)
+            BaseMotion { drive: self.drive, ..plant.base() }
         } else {
             plant.base()
         }

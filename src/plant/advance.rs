@@ -77,6 +77,7 @@ impl Plant {
         Ok(outcome)
     }
 
+    #[inline]
     fn check_duration(&self, duration: f64) -> Result<(), InvalidValue> {
         InvalidValue::unless(
             (0.0..=1e100).contains(&duration),

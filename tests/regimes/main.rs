@@ -13,7 +13,7 @@ use families::Family;
 use scan::Worst;
 
 /// Largest error after up to a thousand periods, relative to the motion and to what drives it.
-const LIMIT: f64 = 1e-12;
+const LIMIT: f64 = 1e-13;
 
 #[test]
 fn no_regime_loses_digits() {

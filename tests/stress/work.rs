@@ -38,8 +38,7 @@ struct Hardest {
     impacts: f64,
     ns: f64,
     evaluations: Option<f64>,
-    /// Time and evaluations per impact, drive cycle or natural period, whichever are the most in that period.
-    ns_per_unit: f64,
+    /// Evaluations per impact, drive cycle or natural period, whichever are the most in that period.
     per_unit: Option<f64>,
 }
 
@@ -51,7 +50,6 @@ impl Hardest {
 
     fn or(self, other: Self) -> Self {
         let mut more = if other.weight() > self.weight() { other } else { self };
-        more.ns_per_unit = self.ns_per_unit.max(other.ns_per_unit);
         more.per_unit = match (self.per_unit, other.per_unit) {
             (Some(a), Some(b)) => Some(a.max(b)),
             (a, b) => a.or(b),
@@ -88,7 +86,6 @@ fn hardest(zeta: f64, amplitude: f64, ratio: f64) -> Hardest {
             ratio,
             impacts: in_a_period,
             ns,
-            ns_per_unit: ns / units,
             evaluations: counted,
             per_unit: counted.map(|n| n / units),
         });
@@ -134,12 +131,11 @@ pub fn sweep(long: bool, table: &mut Table) {
                 .evaluations
                 .map_or_else(|| "not counted".to_owned(), |n| format!("{n:.0}"));
             format!(
-                "| {zeta:e} | {followed} of {drives} | E = {:e} b, omega = {:e} omega0 | {:.0} | {:.1} | {:.0} | {counted} | {} |",
+                "| {zeta:e} | {followed} of {drives} | E = {:e} b, omega = {:e} omega0 | {:.0} | {:.1} | {counted} | {} |",
                 w.amplitude,
                 w.ratio,
                 w.impacts,
                 1e-3 * w.ns,
-                w.ns_per_unit,
                 shown(w.per_unit),
             )
         })
@@ -147,7 +143,7 @@ pub fn sweep(long: bool, table: &mut Table) {
     table.second(
         "Work in a natural period, at most, over all drives of a damping ratio. Per unit: per impact, drive cycle or \
          natural period, whichever are the most.",
-        "| damping ratio | drives | hardest drive | impacts | µs | ns per unit | evaluations | evaluations per unit |",
+        "| damping ratio | drives | hardest drive | impacts | µs | evaluations | evaluations per unit |",
         &lines,
     );
     for (zeta, drives, _, worst) in rows {

@@ -9,7 +9,7 @@ use vines_model::{Dimensionless, map::observe, regime::Regime};
 
 use super::reference::{Lock, RIG, drive, evaluations, more, settle, timed};
 use super::{Effort, Methods, median};
-use crate::methods::{BrentBaseline, brent_baseline};
+use crate::methods::BrentBaseline;
 
 /// Periods over which a motion without repetition is followed before its regime is decided, as in `vines map`.
 const FOLLOWED: usize = 400;
@@ -84,7 +84,7 @@ impl Settled {
             sigma,
             g,
             drive,
-            brent: Some(brent_baseline(RIG, state, time(TIMED_TOLERANCE))),
+            brent: Some(BrentBaseline::new(RIG, state, time(TIMED_TOLERANCE))),
             regime: found.regime.name(),
             pattern: (found.impacts, found.periods),
             impacts_per_period: found.impacts_per_period,
@@ -167,7 +167,7 @@ fn units(impacts: u64, periods: u32) -> f64 {
 /// Largest difference of the plant and the closed form with Brent's method from the same state on; none if the latter stalls.
 fn difference(state: [f64; 4], drive: Drive) -> Option<f64> {
     let mut plant = begin(state, drive).ok()?;
-    let mut brent = brent_baseline(RIG, state, time(TOLERANCE));
+    let mut brent = BrentBaseline::new(RIG, state, time(TOLERANCE));
     let period = TAU / drive.omega;
     for _ in 0..COMPARED {
         plant.advance(drive, period).ok()?;

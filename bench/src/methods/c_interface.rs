@@ -12,10 +12,9 @@ pub struct Shell {
     state: [f64; 4],
 }
 
-/// Value references of q1, der(q1), q2 and der(q2), of omega and of E.
+/// Value references of q1, der(q1), q2 and der(q2), and of omega and E.
 const STATE: [u32; 4] = [9, 10, 11, 12];
-const OMEGA: u32 = 8;
-const AMPLITUDE: u32 = 7;
+const INPUTS: [u32; 2] = [8, 7];
 
 impl Method for Shell {
     fn start(scene: &Scene, _setting: f64) -> Result<Self, Failure> {
@@ -35,19 +34,18 @@ impl Method for Shell {
             rig.well(rig.set_real(vr, value));
         }
         if let Some(first) = scene.steps.first() {
-            rig.well(rig.set_real(OMEGA, first.omega));
-            rig.well(rig.set_real(AMPLITUDE, first.amplitude));
+            rig.well(rig.set_reals(&INPUTS, &[first.omega, first.amplitude]));
         }
         rig.start();
         Ok(Self { rig, time: 0.0, state: scene.start })
     }
 
     fn step(&mut self, step: &Step) -> Result<(), Failure> {
-        self.rig.well(self.rig.set_real(OMEGA, step.omega));
-        self.rig.well(self.rig.set_real(AMPLITUDE, step.amplitude));
+        self.rig
+            .well(self.rig.set_reals(&INPUTS, &[step.omega, step.amplitude]));
         self.rig.well(self.rig.step(self.time, step.duration));
         self.time += step.duration;
-        self.state = STATE.map(|vr| self.rig.real(vr));
+        self.state = self.rig.reals(&STATE);
         Ok(())
     }
 

@@ -12,7 +12,7 @@ mod response;
 mod run;
 
 pub use axis::{Axis, Range};
-pub use grid::{Cell, LIMIT, Map, MapError, Plan};
+pub use grid::{CONFIRMATIONS, Cell, LIMIT, Map, MapError, Plan};
 pub use island::outline;
 pub use response::Response;
-pub use run::{Point, observe, observe_in_full, observe_response};
+pub use run::{Point, Run, observe, observe_confirmed};

@@ -147,10 +147,53 @@ fn a_torus_is_reported_as_modulation_only_where_the_motion_was_stable() {
     }
 }
 
+fn setting(name: &str, default: u64) -> u64 {
+    std::env::var(name).map_or(default, |text| {
+        text.parse().unwrap_or_else(|_| panic!("{name}: a number"))
+    })
+}
+
+#[test]
+fn two_bifurcations_close_together_are_both_found() {
+    // At sigma = 4.0125 a complex pair leaves the unit circle and, at 4.0138, one of the two returns: in one step.
+    let found = followed(1.1514);
+    list(&found);
+    let folds = found
+        .symmetric()
+        .flat_map(|one| &one.special)
+        .filter(|one| one.kind == Bifurcation::Fold);
+    assert!(folds.into_iter().any(|one| (one.motion.sigma - 4.0138).abs() < 1e-3));
+}
+
+#[test]
+fn a_branch_reaches_the_motion_that_it_joins() {
+    let scene = Dimensionless::new(0.004, 1.0, 0.5, 1.4982);
+    let found = response(
+        &scene,
+        &Limits::default(),
+        Exploration { starts: 0, ..Exploration::default() },
+    );
+    for one in &found.components {
+        let points = &one.branch.points;
+        let ends = [&points[0], &points[points.len() - 1]]
+            .into_iter()
+            .zip(one.branch.ended);
+        for (end, _) in ends.filter(|(_, ended)| *ended == Ended::Joins) {
+            let asymmetry = end.bounces[1].phase - end.bounces[0].phase - std::f64::consts::PI;
+            assert!(
+                asymmetry.abs() < 0.01,
+                "{}: {asymmetry} at sigma = {}",
+                one.name,
+                end.sigma
+            );
+        }
+    }
+}
+
 /// Settles from random starts at random detunings; counts the 1:1 motions, the others, and those of each that no component contains.
 fn missing(scene: &Dimensionless, count: usize, seed: u64) -> [usize; 4] {
     let default = Exploration::default();
-    let starts = std::env::var("STARTS").map_or(default.starts, |text| text.parse().expect("STARTS: a number"));
+    let starts = setting("STARTS", default.starts as u64) as usize;
     let found = response(scene, &Limits::default(), Exploration { starts, ..default });
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut counts = [0; 4];
@@ -175,10 +218,10 @@ fn missing(scene: &Dimensionless, count: usize, seed: u64) -> [usize; 4] {
 
 #[test]
 fn no_stable_orbit_from_random_starts_is_missing_from_the_components() {
-    let mut random = ChaCha8Rng::seed_from_u64(20_261_121);
+    // SCENES sets their number, SEED their seed, STARTS the number of random starts: docs/theory.md has longer runs.
+    let mut random = ChaCha8Rng::seed_from_u64(setting("SEED", 20_261_121));
     let mut sums = [0; 4];
-    // SCENES sets their number, STARTS that of the random starts: docs/theory.md has longer runs.
-    let scenes: u64 = std::env::var("SCENES").map_or(4, |text| text.parse().expect("SCENES: a number"));
+    let scenes = setting("SCENES", 4);
     for n in 0..scenes {
         let mut within = |low: f64, high: f64| low + (high - low) * (random.next_u64() as f64 / u64::MAX as f64);
         let epsilon = within(0.003_f64.ln(), 0.05_f64.ln()).exp();

@@ -24,6 +24,7 @@ fn plan(x: &str, y: &str) -> Plan {
         y: y.parse().unwrap(),
         limit: 2000,
         starts: 1,
+        confirmations: 0,
     }
 }
 

@@ -6,7 +6,7 @@ use std::path::PathBuf;
 use clap::Args;
 use indicatif::{ProgressBar, ProgressStyle};
 use vines::{
-    map::{Axis, LIMIT, Map, Plan, Range},
+    map::{Axis, CONFIRMATIONS, LIMIT, Map, Plan, Range},
     orbit::{Branch, phase_resonant},
     report::{
         self,
@@ -25,11 +25,12 @@ Every cell is one plant, driven at a fixed frequency from the scene's start:
   quasi-periodic  nothing repeats; the largest Lyapunov exponent is zero within its uncertainty
   modulated       the exponent is positive, and a fifth of the impacts or more are captured into 1:1 resonance for a while
   chaotic         the exponent is positive, with fewer captures
-  undecided       none of these was shown within --periods
+  undecided       none of these was shown within --periods, or motions that start 1e-9 apart differ after them
 A cell is followed until it repeats itself, or for --periods; the table has the periods followed, the duration of the transient,
 the recurrence, the exponent with its standard error, the share of captured impacts, and how often the particle sticks to a wall.
 
-Modulated and chaotic cells are so for --periods: chaos may end later (docs/regimes.md says how often).
+Chaos may end, after a time that chance decides: modulated and chaotic cells are so for --periods in all of 1 + --confirmations motions
+(docs/regimes.md says how often it ends later). The column `coexisting` has the regimes of motions that differ.
 Where several regimes are stable the start decides; a particle at rest may stay so where a moving one does not.
 
 Examples:
@@ -68,6 +69,11 @@ pub(super) struct Arguments {
     /// Starts per cell: that of the scene, and random ones that show where regimes coexist
     #[arg(long, value_name = "N", default_value_t = 1)]
     starts: usize,
+
+    /// Further motions, from starts 1e-9 apart, that must lead to the same regime where chance decides when chaos ends: in chaotic and
+    /// modulated cells, and after transients of more than 500 periods
+    #[arg(long, value_name = "N", default_value_t = CONFIRMATIONS)]
+    confirmations: usize,
 
     /// Folder for the results; made if it is not there
     #[arg(long, value_name = "DIR", default_value = "out")]
@@ -113,6 +119,7 @@ fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
         y: arguments.y,
         limit: arguments.periods,
         starts: arguments.starts,
+        confirmations: arguments.confirmations,
     })
 }
 

@@ -11,7 +11,7 @@ use vines::{
 use super::{failure::Failure, json, scene_arguments::SceneArguments, yes_no};
 
 const HELP: &str = "\
-Everything is of first order in epsilon. Both branches of the slow invariant manifold are one curve over B, the particle's
+Everything is of first order in epsilon, except the thresholds from rest. Both branches of the slow invariant manifold are one curve over B, the particle's
 speed over b omega0; C is the amplitude of v over b, and sigma the detuning (Omega - 1)/epsilon.
 
 Examples:
@@ -93,7 +93,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         },
         solutions,
         sigma,
-        activation: flow.activation(sigma),
+        activation: flow.activation(scene.epsilon, sigma),
         equilibria: at_sigma.unwrap_or_default(),
         backbone: backbone(&scene, highest / points as f64, highest, points),
     };
@@ -127,13 +127,20 @@ fn readable(report: &Report, listed: bool) -> String {
 }
 
 fn thresholds(report: &Report) -> String {
-    let Activation { steady_linear, from_rest, existence, stable } = report.activation;
+    let Activation {
+        steady_linear,
+        from_rest,
+        from_rest_any_phase,
+        existence,
+        stable,
+    } = report.activation;
     let stable = stable.map_or("none at any G".into(), |g| format!("G = {g:.6}"));
     format!(
-        "Activation at sigma = {:.6}\n  steady linear response reaches the wall   G = {steady_linear:.6}\n  \
-         impacts begin from rest (first beat)      G = {from_rest:.6}\n  \
-         some 1:1 motion exists                    G = {existence:.6}\n  \
-         a stable one exists                       {stable}\n",
+        "Activation at sigma = {:.6}\n  steady linear response reaches the wall      G = {steady_linear:.6}\n  \
+         impacts begin from rest, e = E sin(omega t)  G = {from_rest:.6} (exact)\n  \
+         the same with the best phase of e            G = {from_rest_any_phase:.6} (exact)\n  \
+         some 1:1 motion exists                       G = {existence:.6}\n  \
+         a stable one exists                          {stable}\n",
         report.sigma
     )
 }

@@ -1,7 +1,7 @@
 //! One cell of a sweep: its result, and the variables that are stored of it.
 
 use vines_model::{
-    map::{Point, Response, observe, observe_response},
+    map::{Point, Response, Run},
     orbit::{Orbit, symmetric_orbits},
     regime::Regime,
 };
@@ -123,11 +123,10 @@ fn simulated(
     periods: usize,
     response: bool,
 ) -> Result<(Point, Option<Response>), lovines::InvalidValue> {
-    if response {
-        observe_response(numbers, sigma, start, periods).map(|(point, response)| (point, Some(response)))
-    } else {
-        observe(numbers, sigma, start, periods).map(|point| (point, None))
-    }
+    let mut run = Run::new(numbers, sigma, start)?;
+    let point = run.decided(0, periods)?;
+    let response = response.then(|| run.response(&point)).transpose()?;
+    Ok((point, response))
 }
 
 impl Cell {

@@ -32,6 +32,7 @@ fn a_sweep_over_sigma_and_g_has_the_bits_of_the_map() {
         y: "sigma=-3:3:7".parse().unwrap(),
         limit: 400,
         starts: 1,
+        confirmations: 0,
     }
     .run(|| {})
     .unwrap();

@@ -142,9 +142,7 @@ impl Master {
     /// If it cannot be read.
     #[must_use]
     pub fn real(&self, vr: u32) -> f64 {
-        let mut value = f64::NAN;
-        // SAFETY: one reference, one place.
-        self.well(unsafe { (self.f.fmi2GetReal)(self.c, &vr, 1, &mut value) });
+        let [value] = self.reals(&[vr]);
         value
     }
 
@@ -163,8 +161,26 @@ impl Master {
     /// Sets a real variable.
     #[must_use]
     pub fn set_real(&self, vr: u32, value: f64) -> Status {
-        // SAFETY: one reference, one value.
-        unsafe { (self.f.fmi2SetReal)(self.c, &vr, 1, &value) }
+        self.set_reals(&[vr], &[value])
+    }
+
+    /// Several real variables in one call.
+    ///
+    /// # Panics
+    /// If one cannot be read.
+    #[must_use]
+    pub fn reals<const N: usize>(&self, vrs: &[u32; N]) -> [f64; N] {
+        let mut values = [f64::NAN; N];
+        // SAFETY: as many places as references.
+        self.well(unsafe { (self.f.fmi2GetReal)(self.c, vrs.as_ptr(), N, values.as_mut_ptr()) });
+        values
+    }
+
+    /// Sets several real variables in one call.
+    #[must_use]
+    pub fn set_reals<const N: usize>(&self, vrs: &[u32; N], values: &[f64; N]) -> Status {
+        // SAFETY: as many values as references.
+        unsafe { (self.f.fmi2SetReal)(self.c, vrs.as_ptr(), N, values.as_ptr()) }
     }
 
     /// Takes a step.

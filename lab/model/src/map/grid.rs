@@ -9,7 +9,7 @@ use lovines::InvalidValue;
 
 use super::{
     axis::{Axis, Range},
-    run::{Point, observe},
+    run::{Point, observe, observe_confirmed},
 };
 use crate::Dimensionless;
 use crate::orbit::{BifurcationCurve, Limits, bifurcation_curves, random_state};
@@ -18,6 +18,8 @@ use crate::theory::SlowFlow;
 
 /// Usual largest number of periods that a cell is followed.
 pub const LIMIT: usize = 20_000;
+/// Usual number of further motions that must agree where chance decides when chaos ends.
+pub const CONFIRMATIONS: usize = 6;
 
 /// Settings of a map.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -36,6 +38,8 @@ pub struct Plan {
     pub limit: usize,
     /// Starts per cell: that of the scene, and random ones.
     pub starts: usize,
+    /// Motions from starts close by that must lead to the same regime where chance decides when chaos ends.
+    pub confirmations: usize,
 }
 
 /// One cell of the map.
@@ -53,7 +57,7 @@ pub struct Cell {
     pub point: Point,
     /// First-order theory has a stable symmetric 1:1 motion here.
     pub theory_stable: bool,
-    /// Other regimes that random starts lead to.
+    /// Other regimes that random starts lead to and, where motions from starts close by differ, theirs; the cell is undecided then.
     pub coexisting: Vec<Regime>,
 }
 
@@ -144,8 +148,14 @@ impl Plan {
             .map(|n| {
                 let (x, y) = (self.x.at(n % self.x.points), self.y.at(n / self.x.points));
                 let (sigma, scene) = self.at(x, y);
-                let point = observe(&scene, sigma, self.start, self.limit)?;
-                let coexisting = self.coexisting(&scene, sigma, n, point.regime)?;
+                let (mut point, other) = observe_confirmed(&scene, sigma, self.start, self.limit, self.confirmations)?;
+                let mut coexisting = self.coexisting(&scene, sigma, n, point.regime)?;
+                if let Some(other) = other {
+                    coexisting.extend([point.regime, other]);
+                    coexisting.sort();
+                    coexisting.dedup();
+                    point.regime = Regime::Undecided;
+                }
                 done();
                 Ok(Cell {
                     sigma,

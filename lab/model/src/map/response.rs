@@ -29,7 +29,10 @@ pub struct Response {
 
 impl Run {
     /// Follows the motion further, and reads its response over whole repetitions or, if nothing repeats, over 64 periods.
-    pub(super) fn response(&mut self, point: &Point) -> Result<Response, InvalidValue> {
+    ///
+    /// # Errors
+    /// As [`Run::new`].
+    pub fn response(&mut self, point: &Point) -> Result<Response, InvalidValue> {
         let repeats = point.periods > 0;
         if let Some(exponent) = point.exponent.filter(|exponent| repeats && *exponent < 0.0) {
             self.follow(self.halves() / 2 + (-SHRUNK / exponent).min(LONGEST) as usize + 1)?;

@@ -6,7 +6,6 @@ use std::f64::consts::{PI, TAU};
 use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
 
-use super::response::Response;
 use crate::Dimensionless;
 use crate::orbit::{Driven, Moment};
 use crate::regime::{Impact, Regime};
@@ -60,32 +59,33 @@ pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize)
     Run::new(scene, sigma, start)?.decided(0, limit)
 }
 
-/// As [`observe`], but every motion is followed for `limit` periods before it is examined: what early decisions are compared with.
-///
-/// # Errors
-/// As [`observe`].
-pub fn observe_in_full(
-    scene: &Dimensionless,
-    sigma: f64,
-    start: [f64; 4],
-    limit: usize,
-) -> Result<Point, InvalidValue> {
-    Run::new(scene, sigma, start)?.decided(limit, limit)
-}
+/// Difference of the starts of motions that must agree, and periods from which on a transient may be chaos that ends at random.
+const APART: f64 = 1e-9;
+const LATE: f64 = 500.0;
 
-/// As [`observe`], with the response of the motion found.
+/// As [`observe`], with the regime of a motion from another start, 1e-9 and more apart, that differs. `others` such motions are followed
+/// where chance decides when chaos ends: the regime is irregular, or it began late.
 ///
 /// # Errors
 /// As [`observe`].
-pub fn observe_response(
+pub fn observe_confirmed(
     scene: &Dimensionless,
     sigma: f64,
     start: [f64; 4],
     limit: usize,
-) -> Result<(Point, Response), InvalidValue> {
-    let mut run = Run::new(scene, sigma, start)?;
-    let point = run.decided(0, limit)?;
-    Ok((point, run.response(&point)?))
+    others: usize,
+) -> Result<(Point, Option<Regime>), InvalidValue> {
+    let point = observe(scene, sigma, start, limit)?;
+    let irregular = point.impacts == 0 && ![Regime::NoImpacts, Regime::Undecided].contains(&point.regime);
+    let count = if irregular || point.transient > LATE { others } else { 0 };
+    for n in 1..=count {
+        let [q1, dq1, q2, dq2] = start;
+        let regime = observe(scene, sigma, [q1, dq1 + n as f64 * APART, q2, dq2], limit)?.regime;
+        if regime != point.regime {
+            return Ok((point, Some(regime)));
+        }
+    }
+    Ok((point, None))
 }
 
 /// Number of periods at the next examination.
@@ -94,7 +94,7 @@ fn later(periods: usize, last: usize) -> usize {
 }
 
 /// A simulated motion.
-pub(super) struct Run {
+pub struct Run {
     pub(super) scene: Dimensionless,
     pub(super) sigma: f64,
     pub(super) plant: Plant,
@@ -114,7 +114,11 @@ pub(super) struct Run {
 }
 
 impl Run {
-    fn new(scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<Self, InvalidValue> {
+    /// The dimensionless plant of `scene` at the detuning `sigma`, from `start` = (q1, q1', q2, q2').
+    ///
+    /// # Errors
+    /// Invalid parameters or an invalid start.
+    pub fn new(scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<Self, InvalidValue> {
         let drive = scene.drive(sigma);
         Ok(Self {
             scene: *scene,
@@ -131,8 +135,11 @@ impl Run {
         })
     }
 
-    /// Follows the motion until its regime is decided; it is not examined before `first` periods.
-    fn decided(&mut self, first: usize, limit: usize) -> Result<Point, InvalidValue> {
+    /// Follows the motion until its regime is decided, for at most `limit` periods; it is not examined before `first` periods.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn decided(&mut self, first: usize, limit: usize) -> Result<Point, InvalidValue> {
         let mut next = FIRST.min(limit);
         loop {
             self.follow(next)?;

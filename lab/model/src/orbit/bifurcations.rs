@@ -2,10 +2,7 @@
 
 use serde::Serialize;
 
-use super::{
-    Bifurcation, Branch, Condition, Exploration, Limits, Periodic, Special, components::apart, continue_both_ways,
-    response,
-};
+use super::{Bifurcation, Branch, Condition, Exploration, Limits, Special, continue_both_ways, response};
 use crate::Dimensionless;
 use crate::numerics::equally_spaced;
 
@@ -61,16 +58,7 @@ impl BifurcationCurve {
         if self.kind != special.kind || self.branch.points[0].pattern.mirrored != motion.pattern.mirrored {
             return false;
         }
-        let distance = |one: &Periodic, other: &Periodic| apart(one, other).hypot(one.g - other.g);
-        self.branch.points.windows(2).any(|pair| {
-            let [from, to] = [&pair[0], &pair[1]];
-            if distance(from, motion).max(distance(to, motion)) > 1.2 * distance(from, to) + 1e-6 {
-                return false;
-            }
-            let part = ((motion.g - from.g) / (to.g - from.g)).clamp(0.0, 1.0);
-            let guess = from.unknowns() + (to.unknowns() - from.unknowns()) * if part.is_nan() { 0.5 } else { part };
-            let conditions = [Condition::Excitation(motion.g), Condition::Bifurcation(self.kind)];
-            Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|one| distance(&one, motion) < 1e-4)
-        })
+        let conditions = [Condition::Excitation(motion.g), Condition::Bifurcation(self.kind)];
+        self.branch.leads_to(scene, motion, conditions, |one| one.g, 1e-4)
     }
 }

@@ -31,6 +31,13 @@ impl Bounce {
         Self { phase, q1, dq1, dq2, wall }
     }
 
+    /// How far `later` is from repeating this state after the base has turned by `turn`, rad; with the sign -1, from its mirror image.
+    pub(super) fn apart(&self, later: &Bounce, turn: f64, sign: f64) -> Vector4<f64> {
+        let mut apart = later.vector() * sign - self.vector();
+        apart[0] = later.phase - self.phase - turn;
+        apart
+    }
+
     /// Displacement of the particle over b.
     #[must_use]
     pub fn q2(&self) -> f64 {

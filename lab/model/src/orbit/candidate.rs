@@ -29,26 +29,12 @@ pub(super) struct Candidate {
     pub c: f64,
     /// Base amplitude over `b epsilon`.
     pub g: f64,
-    /// Harmonic amplitude of the base displacement over b.
-    base: Complex<f64>,
-    /// State (q1, q1') just before the impact at the wall w = +1.
-    before: Vector2<f64>,
+    /// The state just after the impact on the wall w = +1.
+    pub start: AfterImpact,
     /// Phase of the first harmonic of the response relative to the reference, rad.
     pub gamma: f64,
     /// The first harmonic of the response lags the reference by pi/2, rather than leading it.
     pub(super) lags: bool,
-}
-
-impl Candidate {
-    pub(super) fn after_impact(&self, epsilon: f64) -> AfterImpact {
-        AfterImpact {
-            phase: self.base.arg(),
-            q1: self.before[0],
-            dq1: self.before[1] - 2.0 * epsilon * self.b,
-            q2: self.before[0] - 1.0,
-            dq2: self.b,
-        }
-    }
 }
 
 /// All symmetric motions at one frequency, whatever drives them: everything is linear in B.
@@ -128,14 +114,21 @@ impl Family {
         let v = y + self.kappa * b;
         let base = y * self.base_over_y;
         let p_before = self.p - Vector2::new(0.0, 1.0);
+        let [q1, before] = (Vector2::new(y.im, self.omega * y.re) - p_before * (2.0 * self.epsilon * b)).into();
+        let start = AfterImpact {
+            phase: base.arg(),
+            q1,
+            dq1: before - 2.0 * self.epsilon * b,
+            q2: q1 - 1.0,
+            dq2: b,
+        };
         Candidate {
             omega: self.omega,
             b,
             c: v.norm() * self.scale,
             gamma: (v * (base * self.reference).conj()).arg(),
             g: base.norm() / self.epsilon,
-            base,
-            before: Vector2::new(y.im, self.omega * y.re) - p_before * (2.0 * self.epsilon * b),
+            start,
             lags: (v * (base * self.reference).conj()).im < -1e-12 * v.norm() * base.norm(),
         }
     }

@@ -190,12 +190,12 @@ impl Response {
 }
 
 /// Numbers that a motion shares with its mirror image and with itself one period later.
-fn invariants(motion: &Periodic) -> [f64; 4] {
+fn invariants(motion: &Periodic) -> [f64; 5] {
     let (sine, cosine) = motion.gamma.sin_cos();
-    [motion.sigma, motion.c * cosine, motion.c * sine, motion.b]
+    [motion.sigma, motion.c * cosine, motion.c * sine, motion.b, motion.g]
 }
 
-pub(super) fn apart(one: &Periodic, other: &Periodic) -> f64 {
+fn apart(one: &Periodic, other: &Periodic) -> f64 {
     let (one, other) = (invariants(one), invariants(other));
     one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
 }
@@ -208,18 +208,30 @@ impl Branch {
         if pattern(&self.points[0]) != pattern(motion) {
             return false;
         }
+        let conditions = [Condition::Sigma(motion.sigma), Condition::Excitation(motion.g)];
+        self.leads_to(scene, motion, conditions, |one| one.sigma, SAME)
+    }
+
+    /// Whether Newton's method for `conditions` leads from this branch to a motion, within `same`. `along` is a coordinate that the
+    /// conditions fix.
+    pub(super) fn leads_to(
+        &self,
+        scene: &Dimensionless,
+        motion: &Periodic,
+        conditions: [Condition; 2],
+        along: impl Fn(&Periodic) -> f64,
+        same: f64,
+    ) -> bool {
         self.points.windows(2).any(|pair| {
             let [from, to] = [&pair[0], &pair[1]];
-            let length = apart(from, to) + SAME;
             // Where the curve bends, its points are close together.
-            if apart(from, motion).max(apart(to, motion)) > 1.2 * length {
+            if apart(from, motion).max(apart(to, motion)) > 1.2 * (apart(from, to) + SAME) {
                 return false;
             }
-            let part = ((motion.sigma - from.sigma) / (to.sigma - from.sigma)).clamp(0.0, 1.0);
+            let part = ((along(motion) - along(from)) / (along(to) - along(from))).clamp(0.0, 1.0);
             let guess = from.unknowns() + (to.unknowns() - from.unknowns()) * if part.is_nan() { 0.5 } else { part };
-            let conditions = [Condition::Sigma(motion.sigma), Condition::Excitation(motion.g)];
             // At a fold Newton's method may fail.
-            Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|found| apart(&found, motion) < SAME)
+            Periodic::find(scene, &from.pattern, &guess, conditions).is_none_or(|found| apart(&found, motion) < same)
         })
     }
 }

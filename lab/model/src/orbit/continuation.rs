@@ -22,6 +22,8 @@ const STRAIGHT: f64 = 0.98;
 /// Moduli this close to one still count as inside: rounding in conservative motions.
 const ON_CIRCLE: f64 = 1e-7;
 
+/// Part of the longest step with which a branch reaches the one that it joins: near there, the plane at the end of a step meets both.
+const APPROACH: f64 = 1.0 / 256.0;
 /// Fraction of a step to which a bifurcation is located.
 const FINEST: f64 = 1e-12;
 
@@ -87,8 +89,7 @@ impl Curve<'_> {
                 return true;
             }
             Condition::Bifurcation(_) => {}
-            _ if outside(last) != outside(motion) => branch.special.extend(self.locate(last, tangent, step)),
-            _ => {}
+            _ => branch.special.extend(self.located(last, tangent, step)),
         }
         false
     }
@@ -101,19 +102,12 @@ impl Curve<'_> {
         if branch.points.len() <= 10 || apart.norm() >= step || turned.dot(first) <= 0.9 {
             return false;
         }
-        branch
-            .special
-            .extend(self.special_at_start(branch, turned, apart.norm()));
+        if let Some(last) = branch.points.last().filter(|last| outside(last) != outside(self.start)) {
+            // A little beyond the start, which the plane at the end of the step may miss.
+            branch.special.extend(self.located(last, turned, 1.1 * apart.norm()));
+        }
         branch.ended[1] = Ended::Closed;
         true
-    }
-
-    /// A bifurcation between the last motion of a closed branch and its start, at that distance.
-    fn special_at_start(&self, branch: &Branch, tangent: &Unknowns, distance: f64) -> Option<Special> {
-        let last = branch.points.last()?;
-        // A little beyond the start, which the plane at the end of the step may miss.
-        let within = || self.locate(last, tangent, 1.1 * distance);
-        (outside(last) != outside(self.start)).then(within)?
     }
 
     /// The last motion within a step before the one that the branch doubles.
@@ -125,13 +119,33 @@ impl Curve<'_> {
         at(end)
     }
 
-    /// Where the number of multipliers outside the unit circle changes within a step.
-    fn locate(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Special> {
+    /// Where the number of multipliers outside the unit circle changes within a step: close to a double multiplier, more than once.
+    fn located(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Vec<Special> {
         let x = from.unknowns();
         let at = |part: f64| self.motion(&self.correct(&x, tangent, part * step)?);
-        let like_from = |part: f64| at(part).map(|one| outside(&one) == outside(from)).ok_or(());
-        let (_, beyond) = try_bisection(0.0, 1.0, FINEST, like_from).ok()?;
-        let motion = at(beyond)?;
+        let Some(end) = at(1.0) else {
+            return Vec::new();
+        };
+        let (mut found, mut last, mut begin, mut stable) = (Vec::new(), from.clone(), 0.0, from.stable);
+        while outside(&last) != outside(&end) {
+            let like_last = |part: f64| at(part).map(|one| outside(&one) == outside(&last)).ok_or(());
+            let Ok((_, beyond)) = try_bisection(begin, 1.0, FINEST, like_last) else {
+                break;
+            };
+            let Some(motion) = at(beyond) else {
+                break;
+            };
+            let count = outside(&motion);
+            // Close to the circle, rounding decides what is stable.
+            let beyond_stable = if count == outside(&end) { end.stable } else { count == 0 };
+            found.extend(self.special(&motion, stable || beyond_stable));
+            (last, begin, stable) = (motion, beyond, beyond_stable);
+        }
+        found
+    }
+
+    /// The bifurcation at a motion with a multiplier on the unit circle, of a motion that is stable on one side.
+    fn special(&self, motion: &Periodic, of_stable: bool) -> Option<Special> {
         let [re, im] = motion
             .multipliers
             .into_iter()
@@ -145,8 +159,7 @@ impl Curve<'_> {
         } else {
             Bifurcation::PeriodDoubling
         };
-        let of_stable = [Some(from.stable), at(1.0).map(|one| one.stable)].contains(&Some(true));
-        Some(Special { kind, of_stable, motion })
+        Some(Special { kind, of_stable, motion: motion.clone() })
     }
 }
 
@@ -197,6 +210,10 @@ pub fn continue_from(
             step /= 2.0;
             continue;
         };
+        if step > APPROACH * limits.step && joins(branch.points.last().unwrap_or(start), &motion) {
+            step /= 2.0;
+            continue;
+        }
         if curve.ends(&mut branch, &tangent, step, &motion) {
             return branch;
         }

@@ -1,9 +1,11 @@
 //! How first-order theory approaches the exact orbits as epsilon shrinks.
 
+use std::f64::consts::LN_2;
+
 use serde::Serialize;
 
 use super::phase_resonant;
-use crate::{Dimensionless, theory::resonant};
+use crate::{Dimensionless, numerics::Line, theory::resonant};
 
 /// Theory minus exact orbit at one mass ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -53,21 +55,11 @@ pub fn convergence(scene: &Dimensionless, halvings: u32) -> Option<Convergence> 
             })
         })
         .collect::<Option<_>>()?;
-    let slope = |of: fn(&Difference) -> f64| slope(rows.iter().map(|row| (row.epsilon, of(row))));
+    // From row to row ln(epsilon) changes by -ln 2.
+    let slope = |of: fn(&Difference) -> f64| {
+        let logs: Vec<f64> = rows.iter().map(|row| of(row).abs().ln()).collect();
+        -Line::fit(&logs).slope / LN_2
+    };
     let slopes = [slope(|row| row.sigma), slope(|row| row.c), slope(|row| row.b)];
     (halvings > 0).then_some(Convergence { rows, slopes })
-}
-
-/// Least-squares slope of `ln |y|` over `ln x`.
-fn slope(points: impl Iterator<Item = (f64, f64)>) -> f64 {
-    let logs: Vec<(f64, f64)> = points.map(|(x, y)| (x.ln(), y.abs().ln())).collect();
-    let n = logs.len() as f64;
-    let mean = |of: fn(&(f64, f64)) -> f64| logs.iter().map(of).sum::<f64>() / n;
-    let (x0, y0) = (mean(|one| one.0), mean(|one| one.1));
-    let (mut up, mut down) = (0.0, 0.0);
-    for (x, y) in &logs {
-        up += (x - x0) * (y - y0);
-        down += (x - x0).powi(2);
-    }
-    up / down
 }

@@ -27,6 +27,15 @@ pub(super) struct Step {
     pub impulse_by: RowByAll,
 }
 
+/// The impact that ends a flight.
+struct Landed {
+    duration: f64,
+    /// Velocity of the primary mass and relative velocity just before the impact.
+    dq1: f64,
+    dw: f64,
+    next: Bounce,
+}
+
 /// The map at one frequency and excitation.
 #[derive(Debug, Clone, Copy)]
 pub struct ImpactMap {
@@ -50,45 +59,43 @@ impl ImpactMap {
     /// impacts accumulate.
     #[must_use]
     pub fn next(&self, from: &Bounce) -> Option<Bounce> {
-        self.landed(&ParticleFlight::new(&self.oscillator, from))
+        Some(self.landed(&ParticleFlight::new(&self.oscillator, from))?.next)
     }
 
     /// The state just after the first impact that follows from (q1, q1', q2, q2') at a phase of the base, rad, with the
     /// particle inside its cavity; None as for [`Self::next`].
     #[must_use]
     pub fn first(&self, phase: f64, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
-        self.landed(&ParticleFlight::between(
-            &self.oscillator,
-            phase,
-            [q1, dq1, q2, dq2],
-            q1 - q2,
-        ))
+        let flight = ParticleFlight::between(&self.oscillator, phase, [q1, dq1, q2, dq2], q1 - q2);
+        Some(self.landed(&flight)?.next)
     }
 
-    fn landed(&self, flight: &ParticleFlight) -> Option<Bounce> {
+    fn landed(&self, flight: &ParticleFlight) -> Option<Landed> {
         let (duration, wall) = flight.contact()?;
         let [q1, dq1] = flight.primary(duration).into();
         let dw = dq1 - flight.dq2;
-        let particle = (1.0 + self.r) / (1.0 + self.epsilon);
-        Some(Bounce {
+        let particle = self.particle();
+        let next = Bounce {
             phase: flight.phase + self.oscillator.omega * duration,
             q1,
             dq1: dq1 - self.epsilon * particle * dw,
             dq2: flight.dq2 + particle * dw,
             wall,
-        })
+        };
+        Some(Landed { duration, dq1, dw, next })
+    }
+
+    /// Jump of the particle's velocity over the relative velocity before the impact.
+    fn particle(&self) -> f64 {
+        (1.0 + self.r) / (1.0 + self.epsilon)
     }
 
     /// The same with its derivatives.
     pub(super) fn step(&self, from: &Bounce) -> Option<Step> {
-        let flight = ParticleFlight::new(&self.oscillator, from);
-        let (t, wall) = flight.contact()?;
-        let [q1, dq1] = flight.primary(t).into();
-        let dw = dq1 - from.dq2;
-        let particle = (1.0 + self.r) / (1.0 + self.epsilon);
+        let Landed { duration: t, dq1, dw, next } = self.landed(&ParticleFlight::new(&self.oscillator, from))?;
 
         // (q1, q1') just before the impact, at a fixed time of flight.
-        let end = from.phase + self.oscillator.omega * t;
+        let end = next.phase;
         let propagator = self.oscillator.free.propagator(t);
         let mut fixed = SMatrix::<f64, 2, 6>::zeros();
         let by_phase = self.oscillator.by_phase(end) - propagator * self.oscillator.by_phase(from.phase);
@@ -105,22 +112,17 @@ impl ImpactMap {
         // The condition w = wall at the end gives the change of the flight time.
         let by_w = fixed.row(0) - by_q1 - by_dq2 * t;
         let t_by = by_w / -dw;
-        let acceleration = self.oscillator.free.free_acceleration(q1, dq1) + self.oscillator.force(end);
+        let acceleration = self.oscillator.free.free_acceleration(next.q1, dq1) + self.oscillator.force(end);
         let q1_by = fixed.row(0) + t_by * dq1;
         let dq1_by = fixed.row(1) + t_by * acceleration;
         let phase_by = unit_row(0) + unit_row(4) * t + t_by * self.oscillator.omega;
         let dw_by = dq1_by - by_dq2;
 
+        let particle = self.particle();
         let impulse = -self.epsilon * particle;
         let by = ByAll::from_rows(&[phase_by, q1_by, dq1_by + dw_by * impulse, by_dq2 + dw_by * particle]);
         Some(Step {
-            next: Bounce {
-                phase: end,
-                q1,
-                dq1: dq1 + impulse * dw,
-                dq2: from.dq2 + particle * dw,
-                wall,
-            },
+            next,
             duration: t,
             impulse: impulse * dw,
             by,

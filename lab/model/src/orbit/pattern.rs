@@ -130,8 +130,8 @@ pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknown
         return None;
     }
     let map = ImpactMap::new(scene, omega, g);
-    let mut at = Bounce::from_vector(&x.fixed_rows::<4>(0).into(), pattern.walls[0]);
-    let start = at.vector();
+    let start = Bounce::from_vector(&x.fixed_rows::<4>(0).into(), pattern.walls[0]);
+    let mut at = start;
     let mut by = ByAll::identity();
     let mut sum = Complex::new(0.0, 0.0);
     let mut sum_by = [RowByAll::zeros(); 2];
@@ -157,8 +157,7 @@ pub(super) fn follow(scene: &Dimensionless, pattern: &ImpactPattern, x: &Unknown
         sum_by[1] += impulse_by * phasor.im + phase_by * phasor.re;
     }
 
-    let mut residual = at.vector() * pattern.sign() - start;
-    residual[0] = at.phase - start[0] - pattern.turn();
+    let residual = start.apart(&at, pattern.turn(), pattern.sign());
     by.fixed_rows_mut::<3>(1).scale_mut(pattern.sign());
     let monodromy: Matrix4<f64> = by.fixed_columns::<4>(0).into();
     by.fixed_columns_mut::<4>(0)

@@ -109,9 +109,7 @@ impl Periodic {
     pub(super) fn halves_apart(&self) -> Option<Vector4<f64>> {
         let half = self.pattern.halved()?;
         let (first, middle) = (&self.bounces[0], &self.bounces[half.walls.len()]);
-        let mut apart = middle.vector() * half.sign() - first.vector();
-        apart[0] = middle.phase - first.phase - half.turn();
-        Some(apart)
+        Some(first.apart(middle, half.turn(), half.sign()))
     }
 
     /// A complex pair of multipliers is on the unit circle.

@@ -89,12 +89,11 @@ fn resonates(candidate: &Candidate) -> bool {
 
 /// Keeps what is physical: the particle moves, and its next contact is that of the candidate, half a period later.
 fn accept(scene: &Dimensionless, candidate: &Candidate) -> Option<Orbit> {
-    let Candidate { omega, b, c, g, .. } = *candidate;
+    let Candidate { omega, b, c, g, start, .. } = *candidate;
     let sizes = [b, c, g];
     if sizes.iter().any(|size| !size.is_finite()) || b <= 0.0 || c <= 1e-12 {
         return None;
     }
-    let start = candidate.after_impact(scene.epsilon);
     let sigma = (omega - 1.0) / scene.epsilon;
     let unknowns = Unknowns::from([start.phase, start.q1, start.dq1, start.dq2, sigma, g]);
     let motion = Periodic::closed(scene, &ImpactPattern::symmetric(), &unknowns)?;

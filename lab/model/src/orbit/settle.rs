@@ -84,14 +84,8 @@ fn patterns(map: &ImpactMap, first: Bounce, tolerance: f64) -> impl Iterator<Ite
         let half_periods = ((then.phase - first.phase) / half).round();
         let mirrored = half_periods % 2.0 == 1.0;
         let sign = if mirrored { -1.0 } else { 1.0 };
-        let apart = [
-            then.phase - first.phase - half_periods * half,
-            sign * then.q1 - first.q1,
-            sign * then.dq1 - first.dq1,
-            sign * then.dq2 - first.dq2,
-            sign * then.wall - first.wall,
-        ];
-        let same = half_periods > 0.0 && apart.iter().all(|one| one.abs() < tolerance);
+        let apart = first.apart(&then, half_periods * half, sign);
+        let same = half_periods > 0.0 && sign * then.wall == first.wall && apart.amax() < tolerance;
         let pattern = same.then(|| ImpactPattern {
             walls: walls.clone(),
             half_periods: half_periods as u32,

@@ -1,10 +1,9 @@
 //! Activation: the smallest excitation of a 1:1 regime.
 
-use std::f64::consts::FRAC_PI_2;
-
 use serde::Serialize;
 
 use crate::numerics::{bisection, golden_section};
+use crate::orbit::impacts_from_rest;
 
 use super::{
     slow_flow::SlowFlow,
@@ -17,8 +16,10 @@ pub struct Activation {
     /// The steady linear response reaches the wall, C = 1. Below, a particle at rest in the middle stays at rest once the start
     /// of the drive is forgotten.
     pub steady_linear: f64,
-    /// The beat after the drive is switched on reaches the wall: impacts begin from rest.
+    /// Impacts begin from rest: the beat after the drive is switched on, as `e = E sin(omega t)`, reaches the wall. Exact.
     pub from_rest: f64,
+    /// The same if the base begins at the phase that needs the least. Exact.
+    pub from_rest_any_phase: f64,
     /// Some 1:1 motion exists, stable or not.
     pub existence: f64,
     /// A 1:1 motion exists that is stable in its impacts and on the slow flow; it is reached from a moving particle.
@@ -52,24 +53,10 @@ impl SlowFlow {
             .any(|one| one.impacts_stable && one.slow_flow_stable)
     }
 
-    /// Largest amplitude of the linear response after the drive is switched on at rest, over the steady one: the largest
-    /// `|1 - exp(-(lambda/2 + i sigma) tau1)|`.
+    /// The activation thresholds at the detuning `sigma`; the mass ratio `epsilon` matters only for those from rest.
     #[must_use]
-    pub fn overshoot(&self, sigma: f64) -> f64 {
-        if sigma == 0.0 {
-            return 1.0;
-        }
-        let size = |turned: f64| {
-            let left = (-0.5 * self.lambda * turned / sigma.abs()).exp();
-            (1.0 - left * turned.cos()).hypot(left * turned.sin())
-        };
-        // The first beat is the largest: every later one has decayed more.
-        size(golden_section(FRAC_PI_2, 3.0 * FRAC_PI_2, |turned| -size(turned))).max(1.0)
-    }
-
-    /// The activation thresholds at the detuning `sigma`.
-    #[must_use]
-    pub fn activation(&self, sigma: f64) -> Activation {
+    pub fn activation(&self, epsilon: f64, sigma: f64) -> Activation {
+        let [from_rest, from_rest_any_phase] = impacts_from_rest(epsilon, self.lambda, sigma);
         let g = |b: f64| self.excitation_at(sigma, b);
         // Every B that a smallest G may need: the loss alone makes G grow with B far beyond the fold.
         let highest = 2.0 * B_SYMMETRY_BREAKING;
@@ -78,7 +65,8 @@ impl SlowFlow {
         let stable = smallest(range, |b| self.stable_at(sigma, b), g);
         Activation {
             steady_linear: self.lambda.hypot(2.0 * sigma),
-            from_rest: self.lambda.hypot(2.0 * sigma) / self.overshoot(sigma),
+            from_rest,
+            from_rest_any_phase,
             // Where the two minima are one, rounding does not order them.
             existence: stable.map_or(all, |g| all.min(g)),
             stable,

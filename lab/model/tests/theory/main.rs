@@ -9,6 +9,7 @@ mod waveforms;
 
 use vines_model::theory::SlowFlow;
 
+const EPSILON: f64 = 0.0084;
 const LAMBDA: f64 = 1.43;
 const R: f64 = 0.65;
 

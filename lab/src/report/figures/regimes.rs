@@ -135,8 +135,13 @@ fn caption(map: &Map) -> String {
             MapAxis::G => format!(", G = {:.3}", plan.scene.g),
             MapAxis::R => format!(", r = {}", plan.scene.r),
         });
+    let dashed = if map.curves.is_empty() {
+        ""
+    } else {
+        "; dashed: of unstable motions"
+    };
     format!(
-        "ε = {:.5}, λ = {:.3}{}; each cell from the same start, followed until it repeats, at most {} periods",
+        "ε = {:.5}, λ = {:.3}{}; each cell from the same start, followed until it repeats, at most {} periods{dashed}",
         plan.scene.epsilon,
         plan.scene.lambda,
         held.collect::<String>(),

@@ -25,6 +25,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         y,
         limit: LIMIT,
         starts: 1,
+        confirmations: 0,
     };
     let (count, all) = (AtomicUsize::new(0), plan.cells());
     let map = plan.run(|| {

@@ -6,6 +6,7 @@ use crate::report::figures::{approach, backbones};
 use crate::report::files::csv;
 use crate::report::section::Section;
 use crate::report::table::Table;
+use crate::scene::Dimensionless;
 use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, resonant};
 
 /// Halvings of epsilon in the convergence study.
@@ -23,7 +24,7 @@ pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Sectio
         flow.manifold.c_min(),
         flow.manifold.b_min()
     ));
-    describe_activation(&mut section, &flow, stable.map_or(0.0, |one| one.sigma));
+    describe_activation(&mut section, &p, stable.map_or(0.0, |one| one.sigma));
     if let Some(point) = &stable {
         section.figure(
             "approach",
@@ -64,14 +65,15 @@ pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Sectio
     Ok(section)
 }
 
-fn describe_activation(section: &mut Section, flow: &SlowFlow, sigma: f64) {
-    let activation = flow.activation(sigma);
+fn describe_activation(section: &mut Section, scene: &Dimensionless, sigma: f64) {
+    let activation = SlowFlow::new(scene.lambda, scene.r).activation(scene.epsilon, sigma);
     let stable = activation.stable.map_or("exists at no G".into(), |g| {
         format!("needs less, G = {g:.4}, but only a particle that is already moving reaches it")
     });
     section.words(format!(
         "How much base motion is needed? At σ = {sigma:.4}, the steady linear response reaches the wall at G = {:.4}. When the drive is \
-         switched on at rest, the first beat is larger than that: impacts start at G = {:.4}. A stable 1:1 motion {stable}.",
-        activation.steady_linear, activation.from_rest
+         switched on at rest, the first beat is larger than that: impacts start at G = {:.4}, or at G = {:.4} with the phase of the base \
+         that needs the least. A stable 1:1 motion {stable}.",
+        activation.steady_linear, activation.from_rest, activation.from_rest_any_phase
     ));
 }
