@@ -43,13 +43,3 @@ fn a_known_noise_is_the_least_uncertainty_and_a_prior_narrows_it() {
     assert!((held.uncertainty - free / 2f64.sqrt()).abs() < 1e-9);
     assert_eq!(Regression::fit(&[vec![0.0; 3]], &[1.0; 3], &[], 0.1), None);
 }
-
-#[test]
-fn a_wandering_mean_is_less_certain_than_one_of_independent_values() {
-    // Each value repeated four times has a quarter of the independent ones.
-    let values: Vec<f64> = (0..200).map(|n| f64::from((n / 4 * 37) % 50) - 24.5).collect();
-    let fit = Regression::fit(&[vec![1.0; 200]], &values, &[], 3.0).unwrap();
-    let independent = 50f64.mul_add(50.0, -1.0) / 12.0 / 200.0;
-    let ratio = fit.estimate(&[1.0]).uncertainty / independent.sqrt();
-    assert!((1.8..3.0).contains(&ratio), "{ratio}");
-}
