@@ -41,7 +41,8 @@ def zig_path() -> str:
 def portable(zig_path, tmp_path_factory) -> Bench:
     """The bench for older Linux."""
     folder = tmp_path_factory.mktemp("portable")
-    subprocess.run([ROOT / "scripts" / "pack", "--portable", "--out", folder], check=True, stdout=subprocess.DEVNULL)
+    command = [ROOT / "scripts" / "pack", "--portable", "--out", folder]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL, env=os.environ | {"PATH": zig_path})
     return Bench(folder)
 
 
