@@ -82,7 +82,9 @@ client_environments() {
 # is a third of the build. One call for all: cargo would build the plant again for another selection of packages, because the features differ.
 build() {
     local features=lovines/fmu
-    [ "${1:-}" != sweep ] || features=$features,vines/sweep
+    # Scripts that this one calls build the same.
+    [ "${1:-}" != sweep ] || export VINES_SWEEPS=1
+    [ -z "${VINES_SWEEPS:-}" ] || features=$features,vines/sweep
     stage "Building vines and the FMUs (the first time: some minutes)"
     progress build --release --locked -p vines -p lovines -p phase-lock-fmu --no-default-features --features "$features"
 }
