@@ -89,7 +89,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
     let channels = [0, 1].map(|n| {
         let seen = Seen::of(&readings[begins + driven - window..], n + 1);
         let ratio = seen.phasor / expected[n];
-        let floor = rms(readings[begins - quiet..begins].iter().map(|reading| reading[n + 1]));
+        let floor = scatter(&readings[begins - quiet..begins], n + 1);
         Channel {
             gain: ratio.norm(),
             phase: ratio.arg().to_degrees(),
@@ -132,6 +132,12 @@ fn expected(scene: &Scene) -> [Complex64; 2] {
     // A delay that the chain states is expected.
     let stated = Complex64::from_polar(1.0, -scene.controller_config().delay * omega);
     [growth * amplitude * stated, stated * amplitude]
+}
+
+/// RMS of a reading about its mean: a sensor has an offset, and so has the centre of mass of a rig whose particle does not lie in the middle.
+fn scatter(readings: &[[f64; 3]], of: usize) -> f64 {
+    let mean = readings.iter().map(|reading| reading[of]).sum::<f64>() / readings.len() as f64;
+    rms(readings.iter().map(|reading| reading[of] - mean))
 }
 
 fn rms(values: impl Iterator<Item = f64>) -> f64 {

@@ -56,6 +56,17 @@ fn a_rig_that_moves_before_the_drive_comes_to_rest_first_or_is_named() {
     }
 }
 
+#[test]
+fn a_particle_that_lies_beside_the_middle_is_an_offset_and_no_motion() {
+    let scene = scene();
+    for (q2, dq2) in [(0.95, 0.0), (-0.5, 0.005)] {
+        let start = State { q2: q2 * scene.plant.half_width, dq2, ..State::default() };
+        let mut rig = Simulated::new(scene.plant, start).unwrap();
+        let found = check(&mut rig, &scene).unwrap();
+        assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+    }
+}
+
 /// A rig that moves at first, or that something else drives all the time.
 struct Moving(Simulated, bool);
 

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::rms;
+use super::scatter;
 use crate::rig::{Drive, Rig, RigError};
 
 /// Periods between looks at a response that falls, how often, and the share of it that is left at most.
@@ -11,6 +11,8 @@ pub(super) const DECAY: usize = 10;
 const PAUSES: usize = 40;
 /// As above.
 const FALLS: f64 = 0.98;
+/// Looks in succession at which the response has not fallen: a particle that still hits the walls now and then makes it rise for a while.
+const PATIENCE: usize = 4;
 
 /// A rig whose loop is open, and what it has read: the phase of its oscillator, rad, response and base.
 pub(super) struct OpenLoop<'a, R: ?Sized> {
@@ -40,16 +42,17 @@ impl<R: Rig + ?Sized> OpenLoop<'_, R> {
 
     /// Listens for `quiet` samples, and as long as a response above `enough` (RMS, m) falls from one `pause` to the next.
     pub fn rest(&mut self, quiet: usize, pause: usize, enough: f64) -> Result<(), RigError> {
-        let mut before = f64::INFINITY;
+        let (mut least, mut since) = (f64::INFINITY, 0);
         for n in 0..=PAUSES {
             self.drive(if n == 0 { quiet } else { pause }, 0.0)?;
             let last = &self.readings[self.readings.len() - quiet..];
-            let response = rms(last.iter().map(|reading| reading[1]));
+            let response = scatter(last, 1);
             // Noise does not fall.
-            if !(response > enough && response < FALLS * before) {
+            since = if response < FALLS * least { 0 } else { since + 1 };
+            least = least.min(response);
+            if response <= enough || since >= PATIENCE {
                 break;
             }
-            before = response;
         }
         Ok(())
     }
