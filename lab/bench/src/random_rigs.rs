@@ -9,7 +9,7 @@ use vines_model::orbit::{Orbit, phase_resonant};
 
 use crate::advice;
 use crate::experiment::{self, ExperimentError, Plan, Record};
-use crate::identification::{self, IdentificationError};
+use crate::identification::{self, IdentificationError, Lock};
 use crate::rig::{BuiltIn, Chain, Simulated};
 use crate::scene::{Dimensionless, Override, Scene, SceneError};
 
@@ -134,6 +134,29 @@ fn lock(d: &Dimensionless, stable: &[Orbit], settings: &[Override]) -> Result<Ro
     Ok(judge(&scene, stable, outcome))
 }
 
+/// The outcome of a lock that is `off` the nearest stable orbit, in sigma and C, and why it is not on it.
+fn of_lock(lock: &Lock, off: [f64; 2], reason: impl FnOnce() -> String) -> (Outcome, Option<String>) {
+    let largest = off[0].max(off[1]);
+    if largest <= CORRECT {
+        return (Outcome::Locked, None);
+    }
+    if off[0] <= NOISE * lock.u_sigma && off[1] <= NOISE * lock.u_c {
+        let why = format!(
+            "the standard uncertainties are {:.1e} in sigma and {:.1e} in C",
+            lock.u_sigma, lock.u_c
+        );
+        return (Outcome::Uncertain, Some(why));
+    }
+    let why = if largest < NEAR {
+        "the response still approaches the orbit, slowly; set smaller controller.frequency_tolerance and \
+         controller.amplitude_tolerance"
+            .into()
+    } else {
+        reason()
+    };
+    (Outcome::Inaccurate, Some(why))
+}
+
 /// Judges a record, or the error of a run and its reason.
 fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentError, Option<String>)>) -> Row {
     let parameters = scene.dimensionless();
@@ -174,28 +197,9 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
             let lock = found.lock;
             let off = distance(lock.sigma, lock.c);
             let row = Row { distance: Some(off[0].max(off[1])), ..row };
-            if off[0].max(off[1]) <= CORRECT {
-                return Row { outcome: Outcome::Locked, ..row };
-            }
-            let is_noise = off[0] <= NOISE * lock.u_sigma && off[1] <= NOISE * lock.u_c;
-            let outcome = if is_noise {
-                Outcome::Uncertain
-            } else {
-                Outcome::Inaccurate
-            };
-            let why = if is_noise {
-                format!(
-                    "the standard uncertainties are {:.1e} in sigma and {:.1e} in C",
-                    lock.u_sigma, lock.u_c
-                )
-            } else if off[0].max(off[1]) < NEAR {
-                "the response still approaches the orbit, slowly; set smaller controller.frequency_tolerance and \
-                 controller.amplitude_tolerance"
-                    .into()
-            } else {
-                reason(lock.regime)
-            };
-            Row { outcome, message: message(lock.sigma, lock.c, &why), ..row }
+            let (outcome, why) = of_lock(&lock, off, || reason(lock.regime));
+            let message = why.and_then(|why| message(lock.sigma, lock.c, &why));
+            Row { outcome, message, ..row }
         }
         Err(IdentificationError::Regime { regime, sigma, c, .. }) => {
             let off = distance(sigma, c);
