@@ -217,7 +217,9 @@ impl Scene {
     fn coupled_bandwidth(&self) -> f64 {
         let d = self.dimensionless();
         let c = self.backbone.c_from.max(self.backbone.c_to);
-        backbone_at_level(&d, c).map_or(f64::INFINITY, |point| COUPLED * (d.epsilon * point.g / c).powf(1.0 / 3.0))
+        backbone_at_level(&d, c).map_or(f64::INFINITY, |point| {
+            COUPLED * (d.epsilon * point.g / c).powf(1.0 / 3.0)
+        })
     }
 }
 
