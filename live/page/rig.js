@@ -11,7 +11,7 @@ export class Rig {
     const { colour } = this;
     c.clearRect(0, 0, width, height);
     const b = Math.min(width / 9, height / 3.2);
-    const floor = height * 0.78;
+    const floor = Math.min(height - 24, height / 2 + 0.875 * b);
     const centre = width * 0.6 + look.q1 * b;
     const half = 1.28 * b;
     const wall = width * 0.09 + look.base * b * 0.35;
