@@ -103,7 +103,7 @@ pub fn periods<R: Rig + ?Sized, C: Controller + ?Sized>(
 
 /// Standard uncertainty of the frequency, rad/s, or of the drive in terms of it, by the noise of `n` such periods.
 fn predicted(scene: &Scene, order: &Order, cycle: &Cycle, n: f64) -> f64 {
-    let slopes = predictor::slopes(scene, &order.known, [order.level, order.phase]);
+    let slopes = order.slopes(scene);
     let [noise, base] = [
         cycle.noise[0].sqrt() / cycle.amplitude(),
         cycle.noise[1].sqrt() / cycle.base.norm(),
@@ -119,7 +119,7 @@ fn predicted(scene: &Scene, order: &Order, cycle: &Cycle, n: f64) -> f64 {
 fn slowest(scene: &Scene, order: &Order, before: f64) -> Option<[f64; 2]> {
     let d = scene.dimensionless();
     let width = (order.level - before).abs();
-    let slopes = predictor::slopes(scene, &order.known, [order.level, order.phase]);
+    let slopes = order.slopes(scene);
     let precision = scene.backbone.precision * d.omega_change(1.0);
     let bent = BENT * slopes.curvature[1].abs() * (width * d.b).powi(2) / 40.0;
     if !(width > 0.0 && width <= WIDEST * order.level && bent <= precision) {
