@@ -2,7 +2,7 @@
 
 use crate::scene::{Predictor, Scene};
 use vines_model::Dimensionless;
-use vines_model::theory::backbone_at_level;
+use vines_model::theory::{BranchSide, SlowFlow, backbone_at_level, half_period_multipliers};
 
 /// A working point: response amplitude, drive amplitude, detuning; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -43,6 +43,10 @@ fn extrapolate(points: &[Known], c: f64) -> (f64, f64) {
 pub const FIRST: f64 = 32.0;
 /// Last periods of a move, in which the response is within 1 % of its level.
 pub const LAST: f64 = 1.0;
+/// Delays of the particle behind the amplitude after which a move is over.
+const DELAYS: f64 = 3.0;
+/// Most periods of that.
+const MOST_LATE: f64 = 8.0;
 /// Periods of a change of the phase more than those of the move, for the same reason.
 pub const PHASE: f64 = 8.0;
 /// Share of the drive that a move may need in addition to the drive that holds the response.
@@ -54,6 +58,16 @@ pub fn move_periods(scene: &Scene, from: Option<&Known>, level: f64) -> f64 {
         2.0 * (level - from.c).abs() / (MOVE_SHARE * scene.dimensionless().epsilon * from.g * std::f64::consts::TAU)
     });
     scene.backbone.move_periods.max(slowest)
+}
+
+/// Periods after a move to the level `c` in which the particle still follows: many near the fold, where a multiplier of its map tends to 1.
+pub fn late(d: &Dimensionless, c: f64) -> f64 {
+    let manifold = SlowFlow::new(d.lambda, d.r).manifold;
+    let slowest = |b: f64| half_period_multipliers(d.r, b).map(|one| 0.5 / (1.0 - one).norm());
+    let delay = manifold
+        .b(c, BranchSide::Right)
+        .map_or(0.0, |b| slowest(b).into_iter().fold(0.0, f64::max));
+    (DELAYS * delay).min(MOST_LATE)
 }
 
 #[cfg(test)]

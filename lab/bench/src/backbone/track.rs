@@ -150,7 +150,13 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
     let target = bench.target + phase;
     bench.sweep = Sweep::default();
     bench.controller.hold_response(to, target)?;
-    let changed = last.map_or(FIRST, |(_, held)| if held == phase { -LAST } else { PHASE });
+    let changed = last.map_or(FIRST, |(_, held)| {
+        if held == phase {
+            predictor::late(&d, level) - LAST
+        } else {
+            PHASE
+        }
+    });
     hold(bench, scene, order, periods + changed)
 }
 
