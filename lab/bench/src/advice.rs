@@ -55,7 +55,7 @@ pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
 pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     let d = scene.dimensionless();
     let stable: Vec<Orbit> = phase_resonant(&d).into_iter().filter(|orbit| orbit.stable).collect();
-    let Some(orbit) = stable.last() else {
+    let Some(last) = stable.last() else {
         let range = stable_range(&d).map_or("at no G".into(), |[low, high]| {
             format!("for G from {low:.3} to {high:.3}")
         });
@@ -64,15 +64,22 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
             d.g
         ));
     };
-    let place = format!(
-        "the stable symmetric 1:1 orbit of this G is at sigma = {:.4}, C = {:.4}",
-        orbit.sigma, orbit.c
-    );
-    let (omega, [low, high]) = (
-        1.0 + d.epsilon * orbit.sigma,
-        [scene.controller.omega_min, scene.controller.omega_max],
-    );
-    if !(low..=high).contains(&omega) {
+    let places: Vec<String> = stable
+        .iter()
+        .map(|orbit| format!("sigma = {:.4}, C = {:.4}", orbit.sigma, orbit.c))
+        .collect();
+    let name = if stable.len() == 1 {
+        "orbit of this G is"
+    } else {
+        "orbits of this G are"
+    };
+    let place = format!("the stable symmetric 1:1 {name} at {}", places.join(" and at "));
+    let omega = 1.0 + d.epsilon * last.sigma;
+    let [low, high] = [scene.controller.omega_min, scene.controller.omega_max];
+    if !stable
+        .iter()
+        .any(|orbit| (low..=high).contains(&(1.0 + d.epsilon * orbit.sigma)))
+    {
         return Some(format!(
             "{place}, thus at omega = {omega:.4} omega0, which controller.omega_min = {low} and controller.omega_max = {high} exclude"
         ));
@@ -85,7 +92,7 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
             d.lambda
         )),
         Regime::Symmetric => Some(format!(
-            "the motion is symmetric but not on the stable orbit: {place}. A symmetric orbit of larger amplitude may be unstable and lose \
+            "the motion is symmetric but on no stable orbit: {place}. A symmetric orbit of larger amplitude may be unstable and lose \
              its symmetry slowly. Near the end of its stable range the loop may need a smaller \
              controller.approach_gain or more record.lock_periods"
         )),

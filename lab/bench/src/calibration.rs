@@ -118,7 +118,8 @@ pub fn calibrate(
     let runs = (0..count).into_par_iter().map(|n| {
         let at = (n % scenes.len() as u64) as usize;
         let (ratio, mut scene) = scenes[at].clone();
-        scene.chain.seed = seeds.start + n / scenes.len() as u64;
+        // Runs of the same noise would not be independent.
+        scene.chain.seed = seeds.start * scenes.len() as u64 + n;
         let run = run(&scene, ratio, &curves[at]);
         progress(done.fetch_add(1, Ordering::Relaxed) + 1);
         run

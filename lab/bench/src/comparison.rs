@@ -107,6 +107,13 @@ impl Comparison {
             decay_end: found.decay.end,
         }
     }
+
+    /// The stable orbits at this G that the lock did not follow.
+    pub fn others(&self) -> impl Iterator<Item = &Orbit> {
+        self.orbits
+            .iter()
+            .filter(|orbit| orbit.stable && self.exact.as_ref() != Some(*orbit))
+    }
 }
 
 /// RMS of an error over the points above [`COMPARED_ABOVE`]; `None` where there is none.

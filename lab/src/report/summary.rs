@@ -4,7 +4,6 @@ use super::table::{Table, number, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use crate::identification::{DecayEnd, Regime};
 use crate::map::Map;
-use crate::orbit::Orbit;
 use crate::scene::{Definition, Dimensionless, PhaseOrigin, Sensor};
 
 /// Periods over which the ripple of an acceleration averages out.
@@ -94,9 +93,8 @@ pub fn identification(found: &Comparison) -> String {
 
 /// The phase-resonant orbits at this G that the lock did not follow, where there is more than one that a loop could lock.
 fn others(found: &Comparison) -> String {
-    let followed = |orbit: &&Orbit| found.exact.as_ref().is_some_and(|exact| exact == *orbit);
-    let other = found.orbits.iter().filter(|orbit| orbit.stable && !followed(orbit));
-    let mut text: String = other
+    let mut text: String = found
+        .others()
         .map(|orbit| {
             format!(
                 "  (another stable orbit at this G, not followed: sigma = {:.4}, C = {:.4}, B = {:.4})\n",

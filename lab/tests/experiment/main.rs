@@ -134,6 +134,16 @@ fn of_two_stable_orbits_the_one_that_was_not_followed_is_named() {
         other.sigma, other.c
     );
     assert!(table.contains(&line), "{table}");
+    // A motion that is neither of them is told about both.
+    let refused = vines::advice::reason(&scene(&settings), Some(Regime::Asymmetric)).unwrap();
+    for orbit in found.orbits.iter().filter(|orbit| orbit.stable) {
+        let place = format!("sigma = {:.4}, C = {:.4}", orbit.sigma, orbit.c);
+        assert!(refused.contains(&place), "{refused}");
+    }
+    // The file names all of them, and the one that was followed.
+    let file = serde_json::to_value(&found).unwrap();
+    assert_eq!(file["orbits"].as_array().unwrap().len(), found.orbits.len());
+    assert_eq!(file["exact"]["C"], followed.c);
 }
 
 #[test]

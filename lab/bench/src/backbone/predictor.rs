@@ -1,9 +1,8 @@
 //! Prediction of the drive and the frequency at the next level.
 
-use crate::identification::{LATE, Slopes};
 use crate::scene::{Predictor, Scene};
 use vines_model::Dimensionless;
-use vines_model::theory::{SlowFlow, backbone_at_level};
+use vines_model::theory::{BranchSide, SlowFlow, backbone_at_level, half_period_multipliers};
 
 /// A working point: response amplitude, drive amplitude, detuning; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -44,6 +43,10 @@ fn extrapolate(points: &[Known], c: f64) -> (f64, f64) {
 pub const FIRST: f64 = 32.0;
 /// Last periods of a move, in which the response is within 1 % of its level.
 pub const LAST: f64 = 1.0;
+/// Delays of the particle behind the amplitude after which a move is over.
+const DELAYS: f64 = 3.0;
+/// Most periods of that.
+const MOST_LATE: f64 = 8.0;
 /// Periods of a change of the phase more than those of the move, for the same reason.
 pub const PHASE: f64 = 8.0;
 /// Share of the drive that a move may need in addition to the drive that holds the response.
@@ -57,44 +60,14 @@ pub fn move_periods(scene: &Scene, from: Option<&Known>, level: f64) -> f64 {
     scene.backbone.move_periods.max(slowest)
 }
 
-/// Relative standard uncertainty of the slopes, beside 0.5.
-const WIDTH: f64 = 0.5;
-
-/// Slopes of the backbone at a level by the last points, or what is known without them: their order of magnitude.
-pub fn slopes(scene: &Scene, known: &[Known], [level, phase]: [f64; 2]) -> Slopes {
-    let d = scene.dimensionless();
-    let flow = SlowFlow::new(d.lambda, d.r);
-    let drift = flow.drift(level).map_or([0.0; 2], |drift| [drift.g, drift.sigma]);
-    let step = 1e-3 * level;
-    let by_theory = |c: f64| backbone_at_level(&d, c).map(|point| [point.g, point.sigma]);
-    let around = |c: f64| Some([by_theory(c - step)?, by_theory(c)?, by_theory(c + step)?]);
-    let slope = |c: f64| around(c).map(|[low, _, high]| [0, 1].map(|i| (high[i] - low[i]) / (2.0 * step)));
-    let bend = around(level).map_or([0.0; 2], |[low, middle, high]| {
-        [0, 1].map(|i| (low[i] - 2.0 * middle[i] + high[i]) / (step * step))
-    });
-    let [g, sigma] = match known {
-        [.., one, other] if one.c != other.c => {
-            // Theory knows how much steeper the backbone is here than between the last two points.
-            let width = other.c - one.c;
-            let steeper = slope(level).zip(slope(0.5 * (one.c + other.c)));
-            let steeper = steeper.map_or([0.0; 2], |(here, there)| [0, 1].map(|i| here[i] - there[i]));
-            [
-                (other.g - one.g) / width + steeper[0],
-                (other.sigma - one.sigma) / width + steeper[1],
-            ]
-            .map(|slope| [slope, WIDTH * slope.abs() + 0.5])
-        }
-        _ => [[1.0, 2.0], [0.0, 5.0]],
-    };
-    Slopes {
-        base: g.map(|g| d.amplitude(g) / d.b),
-        omega: sigma.map(|sigma| d.omega_change(sigma) / d.b),
-        late: LATE,
-        // The damper's force on the base leads it by 2 zeta.
-        phase: [phase, d.epsilon * d.lambda],
-        drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
-        curvature: [d.amplitude(bend[0]), d.omega_change(bend[1])].map(|bend| bend / (d.b * d.b)),
-    }
+/// Periods after a move to the level `c` in which the particle still follows: many near the fold, where a multiplier of its map tends to 1.
+pub fn late(d: &Dimensionless, c: f64) -> f64 {
+    let manifold = SlowFlow::new(d.lambda, d.r).manifold;
+    let slowest = |b: f64| half_period_multipliers(d.r, b).map(|one| 0.5 / (1.0 - one).norm());
+    let delay = manifold
+        .b(c, BranchSide::Right)
+        .map_or(0.0, |b| slowest(b).into_iter().fold(0.0, f64::max));
+    (DELAYS * delay).min(MOST_LATE)
 }
 
 #[cfg(test)]

@@ -71,16 +71,16 @@ const RANDOM: f64 = 2.0;
 const STEADY: f64 = 2.0;
 /// Relative uncertainty of the effect of the curvature.
 pub const BENT: f64 = 0.05;
-/// Shares of the periods that are considered, from the last one backwards.
-const SHARES: [f64; 6] = [1.0, 0.85, 0.7, 0.55, 0.45, 0.35];
+/// Shares of the periods that are considered, from the last one backwards: noise can hide the end of the move in the first ones.
+const SHARES: [f64; 5] = [0.85, 0.7, 0.55, 0.45, 0.35];
 
 impl Criterion {
     /// The best estimate from the last of these periods; `None` for too few.
     #[must_use]
     pub fn best(&self, cycles: &[Cycle]) -> Option<Found> {
         let n = cycles.len();
-        let counts = SHARES.map(|share| (share * n as f64).round() as usize);
-        let considered = counts.into_iter().filter(|count| *count >= self.fewest);
+        let counts = SHARES.map(|share| ((share * n as f64).round() as usize).max(self.fewest));
+        let considered = counts.into_iter().filter(|count| *count <= n);
         self.best_of(considered.map(|count| &cycles[n - count..]))
     }
 
@@ -129,7 +129,7 @@ impl Criterion {
         let [first, second] = [first, second].map(|half| half.at(amplitude - half.response.value));
         let slopes = whole
             .slopes()
-            .map(|slope| (slope.value.abs() + slope.uncertainty) * whole.u_level);
+            .map(|slope| slope.value.hypot(slope.uncertainty) * whole.u_level);
         let estimates = whole.at(0.0);
         let drifts = [0, 1].map(|i| {
             let noise = first[i].uncertainty.hypot(second[i].uncertainty);

@@ -22,8 +22,9 @@ use vines_model::theory::SlowFlow;
 const FEWEST: f64 = 10.0;
 /// Most periods: where more are needed, a hold is better.
 const MOST: f64 = 24.0;
-/// Periods in which the rate is reached, over those of the crossing.
+/// Periods in which the rate is reached, over those of the crossing; and the fewest, because the loops must be steady again by then.
 const LEAD: f64 = 0.65;
+const SHORTEST: f64 = 15.0;
 /// Largest distance of two levels, relative to the level.
 const WIDEST: f64 = 0.15;
 /// Largest distance of two levels, relative to that from the fold, if noise makes a crossing slower: nearer to it, a hold takes no longer.
@@ -103,7 +104,7 @@ pub fn periods<R: Rig + ?Sized, C: Controller + ?Sized>(
 
 /// Standard uncertainty of the frequency, rad/s, or of the drive in terms of it, by the noise of `n` such periods.
 fn predicted(scene: &Scene, order: &Order, cycle: &Cycle, n: f64) -> f64 {
-    let slopes = predictor::slopes(scene, &order.known, [order.level, order.phase]);
+    let slopes = order.slopes(scene);
     let [noise, base] = [
         cycle.noise[0].sqrt() / cycle.amplitude(),
         cycle.noise[1].sqrt() / cycle.base.norm(),
@@ -119,7 +120,7 @@ fn predicted(scene: &Scene, order: &Order, cycle: &Cycle, n: f64) -> f64 {
 fn slowest(scene: &Scene, order: &Order, before: f64) -> Option<[f64; 2]> {
     let d = scene.dimensionless();
     let width = (order.level - before).abs();
-    let slopes = predictor::slopes(scene, &order.known, [order.level, order.phase]);
+    let slopes = order.slopes(scene);
     let precision = scene.backbone.precision * d.omega_change(1.0);
     let bent = BENT * slopes.curvature[1].abs() * (width * d.b).powi(2) / 40.0;
     if !(width > 0.0 && width <= WIDEST * order.level && bent <= precision) {
@@ -147,21 +148,21 @@ pub fn cross<R: Rig + ?Sized, C: Controller + ?Sized>(
     bench.samples.clear();
     let predicted = |c: f64| predictor::change(scene.backbone.predictor, &order.known, c, &d);
     let before = order.level - 0.5 * width;
-    let crossing = (before, order.level + 0.5 * width, 1.0);
-    let legs = [(last.level, before, LEAD), crossing];
+    let crossing = (before, order.level + 0.5 * width, periods);
+    let legs = [(last.level, before, (LEAD * periods).max(SHORTEST)), crossing];
     let mut cycles = Vec::new();
-    for &(from, to, share) in &legs[usize::from(!bench.sweep.cycles.is_empty())..] {
+    for &(from, to, taken) in &legs[usize::from(!bench.sweep.cycles.is_empty())..] {
         let ((g_from, sigma_from), (g, sigma)) = (predicted(from), predicted(to));
         let leg = Move {
             response: to * d.b,
-            duration: share * periods * period,
+            duration: taken * period,
             amplitude: d.amplitude(g - g_from),
             omega: d.omega_change(sigma - sigma_from),
             growth: width * d.b / (periods * period),
         };
         bench.controller.hold_response(leg, target)?;
         cycles.clear();
-        for _ in 0..(share * periods).round() as usize {
+        for _ in 0..taken.round() as usize {
             cycles.push(bench.cycle()?);
         }
     }

@@ -7,7 +7,7 @@ use super::predictor::{self, FIRST, Known, LAST, PHASE};
 use super::settle::{Criterion, Found};
 use super::sweep::{self, Sweep};
 use crate::experiment::{self, ExperimentError, Sample, Stage};
-use crate::identification::{Cycle, Regime, classify, regime_by_response};
+use crate::identification::{Cycle, Regime, Slopes, classify, regime_by_response};
 use crate::rig::{Controller, LoopState, Move, Rig};
 use crate::scene::Scene;
 use vines_model::numerics::Estimate;
@@ -100,6 +100,13 @@ pub(super) struct Order {
     pub known: Vec<Known>,
 }
 
+impl Order {
+    /// What theory knows of the backbone there.
+    pub fn slopes(&self, scene: &Scene) -> Slopes {
+        Slopes::by_theory(&scene.dimensionless(), self.level, self.phase)
+    }
+}
+
 /// The points of a scan; before its first, the last one of another.
 fn known(scan: &[Point], last: Option<(Point, f64)>) -> Vec<Known> {
     let finite = |known: &Known| known.g.is_finite() && known.sigma.is_finite();
@@ -143,7 +150,13 @@ fn go<R: Rig + ?Sized, C: Controller + ?Sized>(
     let target = bench.target + phase;
     bench.sweep = Sweep::default();
     bench.controller.hold_response(to, target)?;
-    let changed = last.map_or(FIRST, |(_, held)| if held == phase { -LAST } else { PHASE });
+    let changed = last.map_or(FIRST, |(_, held)| {
+        if held == phase {
+            predictor::late(&d, level) - LAST
+        } else {
+            PHASE
+        }
+    });
     hold(bench, scene, order, periods + changed)
 }
 
@@ -198,7 +211,7 @@ pub(super) fn criterion(scene: &Scene, order: &Order) -> Criterion {
         least: [share * base, omega].map(|most| most / 3f64.sqrt()),
         spread: SPREAD,
         fewest: settings.dwell_min as usize,
-        slopes: predictor::slopes(scene, &order.known, [order.level, order.phase]),
+        slopes: order.slopes(scene),
         phase: order.phase,
     }
 }

@@ -19,33 +19,8 @@
 use nalgebra::Complex;
 use vines_model::numerics::{Estimate, Line, Prior, Regression, mean};
 
-use super::Cycle;
 use super::motion::{Motion, motion};
-
-/// What is known of the backbone about a point in advance.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Slopes {
-    /// Slope of the drive `E_R` over the amplitude, dimensionless: value and standard uncertainty.
-    pub base: [f64; 2],
-    /// The same of the frequency `omega_R`, rad/(s m).
-    pub omega: [f64; 2],
-    /// Changes of `E_R` and `omega_R` per rate of change of the amplitude, because the impacts follow it late: s and rad/m.
-    pub drift: [f64; 2],
-    /// Relative uncertainty of these.
-    pub late: f64,
-    /// Phase error that is held, rad, and the relative change of `E_R` per rad beyond it, with the opposite sign.
-    pub phase: [f64; 2],
-    /// Second derivatives of `E_R`, 1/m, and `omega_R`, rad/(s m²), over the amplitude; 0 where they are not known.
-    pub curvature: [f64; 2],
-}
-
-impl Slopes {
-    /// The part of a drive, or of its integral, that a phase beyond the one that is held adds to the balance of the amplitude.
-    fn beyond(&self, drive: Complex<f64>) -> f64 {
-        let [held, by_phase] = self.phase;
-        by_phase * (drive * Complex::from_polar(1.0, -held)).im
-    }
-}
+use super::{Cycle, Slopes};
 
 /// The two lines, fitted to some periods.
 #[derive(Debug, Clone)]
@@ -186,15 +161,12 @@ impl Balance {
         let (spread, curvature) = self.bend;
         let bent = curvature.map(|curvature| 0.5 * curvature * (ahead * ahead + spread));
         // The uncertainty of the slope is in that of the drive at the limit.
-        let limit = Estimate::new(
-            self.response.value + ahead,
-            &[self.u_level, drive.uncertainty / by_base, bent[0] / by_base],
-        );
+        let aside = drive.uncertainty.hypot(bent[0]) / by_base;
         let turning = self.at(ahead)[1];
-        let change = by_omega * limit.uncertainty;
+        // The noise within the integrals moves the amplitude that the frequency belongs to as it moves the limit: it cancels.
         [
-            Estimate::new(turning.value, &[turning.uncertainty, change, bent[1]]),
-            limit,
+            Estimate::new(turning.value, &[turning.uncertainty, by_omega * aside, bent[1]]),
+            Estimate::new(self.response.value + ahead, &[self.u_level, aside]),
         ]
     }
 }

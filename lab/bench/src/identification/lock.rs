@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use vines_model::numerics::{Estimate, mean};
 use vines_model::regime::Regime;
-use vines_model::theory::{BranchSide, Manifold, SlowFlow};
+use vines_model::theory::{BranchSide, Manifold};
 
 use super::regime::classify;
 use super::response::regime_by_response;
@@ -73,10 +73,6 @@ const PHASE_RANGE: f64 = 0.1;
 const FEWEST: usize = 8;
 /// Difference, in standard uncertainties, that still counts as noise.
 const RANDOM: f64 = 2.0;
-/// Relative uncertainty of the effect of a drift of the amplitude.
-pub const LATE: f64 = 0.15;
-/// Relative standard uncertainty of the slopes by first-order theory.
-const SLOPE: f64 = 0.3;
 
 pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let d = scene.dimensionless();
@@ -84,7 +80,7 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let target = scene.phase_target().radians();
     let held = Cycle::all(hold, dt, target);
     let approach = approached(record, scene, target, &held);
-    let slopes = slopes(scene, mean(held.iter().map(Cycle::amplitude)) / d.b);
+    let slopes = Slopes::by_theory(&d, mean(held.iter().map(Cycle::amplitude)) / d.b, 0.0);
     // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
     let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
@@ -187,35 +183,6 @@ fn means(held: &[Cycle]) -> [Estimate; 3] {
         },
         Estimate { value: response, uncertainty: noise },
     ]
-}
-
-/// Slopes of the backbone at the amplitude `c` by first-order theory, with a generous uncertainty.
-fn slopes(scene: &Scene, c: f64) -> Slopes {
-    let d = scene.dimensionless();
-    let flow = SlowFlow::new(d.lambda, d.r);
-    let at = |c: f64| flow.manifold.b(c, BranchSide::Right).map(|b| flow.backbone_at(b));
-    let step = 1e-3 * c;
-    let ([g, sigma], bend, drift) = match (at(c - step), at(c), at(c + step), flow.drift(c)) {
-        (Some(low), Some(middle), Some(high), Some(drift)) => {
-            let slope = |low: f64, high: f64| (high - low) / (2.0 * step);
-            let bend = |low: f64, middle: f64, high: f64| (low - 2.0 * middle + high) / (step * step);
-            (
-                [slope(low.g, high.g), slope(low.sigma, high.sigma)],
-                [bend(low.g, middle.g, high.g), bend(low.sigma, middle.sigma, high.sigma)],
-                [drift.g, drift.sigma],
-            )
-        }
-        _ => ([d.lambda, 0.0], [0.0; 2], [0.0; 2]),
-    };
-    let pair = |slope: f64| [slope, SLOPE * slope.abs() + 0.1];
-    Slopes {
-        base: pair(g).map(|g| d.amplitude(g) / d.b),
-        omega: pair(sigma).map(|sigma| d.omega_change(sigma) / d.b),
-        late: LATE,
-        phase: [0.0, d.epsilon * d.lambda],
-        drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
-        curvature: [d.amplitude(bend[0]), d.omega_change(bend[1])].map(|bend| bend / (d.b * d.b)),
-    }
 }
 
 /// Slope of the particle speed over the amplitude `c` by first-order theory.

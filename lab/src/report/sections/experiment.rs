@@ -142,6 +142,8 @@ fn describe_lock(section: &mut Section, found: &Comparison) {
     let percent = |c: f64, reference: f64| 100.0 * (c / reference - 1.0).abs();
     if let Some(exact) = &found.exact {
         rows.push(cells("exact orbit", exact.sigma, exact.c, Some(exact.b)));
+        let others = found.others();
+        rows.extend(others.map(|one| cells("another stable orbit, not followed", one.sigma, one.c, Some(one.b))));
         let sigma = (lock.sigma - exact.sigma).abs();
         section.budget(
             "lock, measured against the exact orbit",
