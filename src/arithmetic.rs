@@ -127,6 +127,7 @@ pub(crate) fn times(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
 }
 
 /// The sum of two pairs, each a number and its rounding error.
+#[inline(always)]
 pub(crate) fn plus(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     let (value, error) = two_sum(a.0, b.0);
     (value, error + (a.1 + b.1))

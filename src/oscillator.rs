@@ -55,10 +55,10 @@ pub enum Regime {
 pub struct Transition {
     /// Position per position.
     pub xx: f64,
-    /// Position per velocity, s.
-    pub xv: f64,
     /// Velocity per position, 1/s.
     pub vx: f64,
+    /// Position per velocity, s.
+    pub xv: f64,
     /// Velocity per velocity.
     pub vv: f64,
 }

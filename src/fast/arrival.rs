@@ -3,9 +3,9 @@
 use super::FastPath;
 use super::coefficients::{Coefficients, NEAR};
 use super::grid::Mark;
-use super::propagator::{Angle, Increment, Nearby, Point, Propagator, angle};
+use super::propagator::{Increment, Nearby, Point, Propagator, angle};
 use super::verify::{Sample, Start};
-use crate::arithmetic::Sum;
+use crate::arithmetic::{Sum, plus};
 use crate::contact::Wall;
 
 /// Points of the grid that are tried.
@@ -26,8 +26,8 @@ pub(super) struct Arrival {
     pub wall: Wall,
     /// What the motion adds to the start until then.
     pub added: Increment,
-    /// The angle by which the base turns.
-    pub angle: Angle,
+    /// The angle by which the base turns, and its rounding error.
+    pub angle: (f64, f64),
 }
 
 impl Arrival {
@@ -68,7 +68,7 @@ pub(super) fn arrive(coefficients: &Coefficients, propagator: &Propagator, start
         t: Sum::of(propagator.t, h),
         wall,
         added: nearby.at(h),
-        angle: (propagator.angle, coefficients.omega * h),
+        angle: plus(propagator.angle, (coefficients.omega * h, 0.0)),
     })
 }
 
@@ -146,7 +146,7 @@ impl FastPath {
                     t: Sum::of(at, h),
                     wall,
                     added,
-                    angle: (angle(omega, at), omega * h),
+                    angle: plus(angle(omega, at), (omega * h, 0.0)),
                 });
             }
             h += step;
