@@ -20,7 +20,7 @@ mod propagator;
 mod short_step;
 mod verify;
 
-use crate::arithmetic::{Sum, plus};
+use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
 use crate::oscillator::Oscillator;
@@ -140,7 +140,7 @@ impl FastPath {
         let (mut angle, mut t) = (response.angle, step.t);
         if late != 0.0 {
             increment = increment.later(&moving.rig.alone, drive, (start.y, start.dy), late);
-            angle = plus(angle, (drive.omega * late, 0.0));
+            angle = propagator::both_angles(angle, drive.omega * late);
             t += late;
         }
         if !drive.is_held() {

@@ -3,9 +3,9 @@
 use super::FastPath;
 use super::coefficients::{Coefficients, NEAR};
 use super::grid::Mark;
-use super::propagator::{Increment, Nearby, Point, Propagator, angle};
+use super::propagator::{Increment, Nearby, Point, Propagator, angle, both_angles};
 use super::verify::{Sample, Start};
-use crate::arithmetic::{Sum, plus};
+use crate::arithmetic::Sum;
 use crate::contact::Wall;
 
 /// Points of the grid that are tried.
@@ -68,7 +68,7 @@ pub(super) fn arrive(coefficients: &Coefficients, propagator: &Propagator, start
         t: Sum::of(propagator.t, h),
         wall,
         added: nearby.at(h),
-        angle: plus(propagator.angle, (coefficients.omega * h, 0.0)),
+        angle: both_angles(propagator.angle, coefficients.omega * h),
     })
 }
 
@@ -146,7 +146,7 @@ impl FastPath {
                     t: Sum::of(at, h),
                     wall,
                     added,
-                    angle: plus(angle(omega, at), (omega * h, 0.0)),
+                    angle: both_angles(angle(omega, at), omega * h),
                 });
             }
             h += step;

@@ -3,10 +3,9 @@
 use super::arrival::{Arrival, arrive};
 use super::coefficients::Coefficients;
 use super::horizon::Horizon;
-use super::propagator::{Nearby, Point};
+use super::propagator::{Nearby, Point, both_angles};
 use super::verify::Start;
 use super::{FastPath, Moving, Next};
-use crate::arithmetic::plus;
 use crate::base_motion::BaseMotion;
 use crate::plant::Rig;
 
@@ -103,7 +102,7 @@ impl FastPath {
             if w.abs() >= start.rig.parameters.half_width || !start.is_monotone(&start.here, left) {
                 return None;
             }
-            let angle = plus(propagator.angle, (self.coefficients.omega * h, 0.0));
+            let angle = both_angles(propagator.angle, self.coefficients.omega * h);
             self.cache.learn(&self.coefficients, left);
             let dx = self.apply(moving, &increment, angle, left);
             self.drift(moving, dx, left);

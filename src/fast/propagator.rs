@@ -103,16 +103,15 @@ pub(super) const ROTATION: [[f64; 2]; 6] = {
 
 /// Polynomials with these coefficients, at `x`.
 #[inline(always)]
-pub(super) fn polynomials<const N: usize>(coefficients: &[[f64; 2]; N], x: f64) -> [f64; 2] {
-    (0..N - 1).rev().fold(coefficients[N - 1], |[a, b], n| {
-        [coefficients[n][0] + x * a, coefficients[n][1] + x * b]
-    })
+pub(super) fn polynomials(coefficients: &[[f64; 2]], x: f64) -> [f64; 2] {
+    let last = coefficients.len() - 1;
+    (coefficients[..last].iter().rev()).fold(coefficients[last], |[a, b], c| [c[0] + x * a, c[1] + x * b])
 }
 
-/// Cosine and sine of a small angle.
+/// Cosine and sine of a small angle from their Taylor series, up to degree `N + 2`.
 #[inline(always)]
-pub(super) fn rotation(angle: f64) -> (f64, f64) {
-    let [cos, sin] = polynomials(&ROTATION, -angle * angle);
+pub(super) fn rotation<const N: usize>(angle: f64) -> (f64, f64) {
+    let [cos, sin] = polynomials(&ROTATION[..N / 2 + 2], -angle * angle);
     (cos, angle * sin)
 }
 
@@ -120,6 +119,13 @@ pub(super) fn rotation(angle: f64) -> (f64, f64) {
 #[inline(always)]
 pub(super) fn forced(amplitude: f64, (cos, sin): (f64, f64), k: Complex64) -> f64 {
     amplitude * (k.re * sin + k.im * cos)
+}
+
+/// An angle with its rounding error, and a smaller one.
+#[inline(always)]
+pub(super) fn both_angles((angle, error): (f64, f64), more: f64) -> (f64, f64) {
+    let sum = angle + more;
+    (sum, error + (more - (sum - angle)))
 }
 
 /// `omega t` from -2π to 2π, and its rounding error.
@@ -226,7 +232,7 @@ impl<const N: usize> Nearby<N> {
     /// The phasor of the base then.
     #[inline(always)]
     pub fn phasor(&self, h: f64) -> (f64, f64) {
-        rotate(self.there.phasor, rotation(self.omega * h))
+        rotate(self.there.phasor, rotation::<N>(self.omega * h))
     }
 
     /// What is added to the start, `h` seconds after that instant.
