@@ -61,7 +61,7 @@ pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
 
 /// The leading half of the digits, and the rest (Veltkamp).
 #[inline(always)]
-pub(crate) fn halves(x: f64) -> (f64, f64) {
+pub(crate) const fn halves(x: f64) -> (f64, f64) {
     let scaled = 134_217_729.0 * x; // 2^27 + 1
     let high = scaled - (scaled - x);
     (high, x - high)
@@ -69,7 +69,7 @@ pub(crate) fn halves(x: f64) -> (f64, f64) {
 
 /// `a b` as a rounded product and its rounding error (Dekker, with Veltkamp's splitting: no FMA instruction needed).
 #[inline(always)]
-pub(crate) fn product(a: f64, b: f64) -> (f64, f64) {
+pub(crate) const fn product(a: f64, b: f64) -> (f64, f64) {
     let (rounded, error) = product_with(a, (b, halves(b)));
     // Above 1e300 the splitting overflows; such products are not physical.
     (rounded, if error.is_finite() { error } else { 0.0 })
@@ -77,21 +77,21 @@ pub(crate) fn product(a: f64, b: f64) -> (f64, f64) {
 
 /// The same; the second factor comes with its halves.
 #[inline(always)]
-pub(crate) fn product_with(a: f64, (b, (b1, b2)): (f64, (f64, f64))) -> (f64, f64) {
+pub(crate) const fn product_with(a: f64, (b, (b1, b2)): (f64, (f64, f64))) -> (f64, f64) {
     let (a1, a2) = halves(a);
     let rounded = a * b;
     (rounded, ((a1 * b1 - rounded) + a1 * b2 + a2 * b1) + a2 * b2)
 }
 
 /// `a / b` as a rounded quotient and its rounding error.
-pub(crate) fn quotient(a: f64, b: f64) -> (f64, f64) {
+pub(crate) const fn quotient(a: f64, b: f64) -> (f64, f64) {
     let rounded = a / b;
     let (got, got_error) = product(rounded, b);
     (rounded, ((a - got) - got_error) / b)
 }
 
 /// A number with its rounding error, divided by a number.
-pub(crate) fn divided((value, error): (f64, f64), by: f64) -> (f64, f64) {
+pub(crate) const fn divided((value, error): (f64, f64), by: f64) -> (f64, f64) {
     let (rounded, lost) = quotient(value, by);
     (rounded, lost + error / by)
 }
@@ -121,6 +121,7 @@ pub(crate) fn sincos_of_product((omega, omega_error): (f64, f64), t: f64) -> (f6
 }
 
 /// The product of two pairs, each a number and its rounding error.
+#[inline(always)]
 pub(crate) fn times(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     let (value, error) = product(a.0, b.0);
     (value, error + (a.0 * b.1 + a.1 * b.0))
