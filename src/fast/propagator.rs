@@ -39,19 +39,19 @@ impl Increment {
     }
 }
 
-/// The closed form at time `t`; what follows from that is computed when it is needed.
-#[derive(Clone, Copy, Debug)]
+/// The closed form at time `t`; what follows from that is computed when it is needed. By default it is that over no time.
+#[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(from = "f64", into = "f64"))]
 pub(super) struct Propagator {
-    /// The key: time, s; NaN where the propagator is empty.
+    /// The key: time, s.
     pub t: f64,
-    /// The key of the response, rad/s.
+    /// The key of the response, rad/s; NaN after a reset.
     pub omega: f64,
-    /// What the free motion adds, if `complete`: the sum of both, because a propagator is used many times and the same rounding error
-    /// would add up.
+    /// What the free motion adds: the sum of both, because a propagator is used many times and the same rounding error would add up.
     pub free: (Transition, Transition),
-    complete: bool,
+    /// The key of the free motion, s.
+    pub free_t: f64,
     response: Response,
     /// `omega t` in [0, 2π), and its rounding error.
     pub angle: (f64, f64),
@@ -65,20 +65,7 @@ impl From<Propagator> for f64 {
 
 impl From<f64> for Propagator {
     fn from(t: f64) -> Self {
-        Self {
-            t,
-            omega: f64::NAN,
-            free: Default::default(),
-            complete: false,
-            response: Response::default(),
-            angle: (0.0, 0.0),
-        }
-    }
-}
-
-impl Default for Propagator {
-    fn default() -> Self {
-        Self::from(f64::NAN)
+        Self { t, omega: f64::NAN, ..Self::default() }
     }
 }
 
@@ -140,23 +127,21 @@ pub(super) fn angle(omega: f64, t: f64) -> (f64, f64) {
 }
 
 impl Propagator {
-    /// The propagator over `t` seconds; `free` is what the free motion adds in that time.
-    pub fn new(t: f64, free: (Transition, Transition)) -> Self {
-        Self { t, free, complete: true, ..Self::default() }
-    }
-
     /// Makes it the propagator over `t` seconds.
     #[inline(always)]
     pub fn reset(&mut self, t: f64) {
-        (self.t, self.omega, self.complete) = (t, f64::NAN, false);
+        (self.t, self.omega) = (t, f64::NAN);
+    }
+
+    /// The same; `free` is what the free motion adds in that time.
+    pub fn set(&mut self, t: f64, free: (Transition, Transition)) {
+        self.reset(t);
+        (self.free, self.free_t) = (free, t);
     }
 
     /// Makes the response that of these coefficients' frequency.
     #[inline(never)]
     pub fn respond(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) {
-        if !self.complete {
-            *self = Self::new(self.t, oscillator.split(&oscillator.increment(self.t)));
-        }
         let (head, tail) = &self.free;
         let free = Transition {
             xx: 1.0 + (head.xx + tail.xx),
