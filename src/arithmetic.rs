@@ -2,14 +2,13 @@
 
 /// A rounded value and its rounding error, which is smaller than half a unit in the last place of the value.
 ///
-/// Adding many small increments to a plain number loses up to half a unit in its last place at every addition. Here the
-/// loss is kept and added again (compensated summation: Kahan, "Further remarks on reducing truncation errors", CACM 8
-/// (1965) 40).
+/// Adding many small increments to a plain number loses up to half a unit in its last place at every addition. Here the loss is kept and
+/// added again (compensated summation: Kahan, "Further remarks on reducing truncation errors", CACM 8 (1965) 40).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sum {
-    value: f64,
-    error: f64,
+    pub(crate) value: f64,
+    pub(crate) error: f64,
 }
 
 impl Sum {
@@ -105,8 +104,7 @@ pub(crate) fn split_coefficient((coefficient, error): (f64, f64)) -> (f64, f64) 
     (head, rest + error)
 }
 
-/// Sine and cosine of `omega t`, exact to the last digits even after millions of turns; `omega` is a frequency and its
-/// rounding error.
+/// Sine and cosine of `omega t`, exact to the last digits even after millions of turns; `omega` is a frequency and its rounding error.
 pub(crate) fn sincos_of_product((omega, omega_error): (f64, f64), t: f64) -> (f64, f64) {
     let (angle, error) = product(omega, t);
     let error = error + omega_error * t;

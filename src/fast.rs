@@ -140,11 +140,11 @@ impl FastPath {
         let (mut angle, mut t) = (response.angle, step.t);
         if late != 0.0 {
             increment = increment.later(&moving.rig.alone, drive, (start.y, start.dy), late);
-            angle = propagator::both_angles(angle, drive.omega * late);
+            angle = angle.plus(drive.omega * late);
             t += late;
         }
         if !drive.is_held() {
-            increment = increment.bent(drive.signal, step);
+            increment.bend(drive.signal, step);
         }
         let dx = self.apply(moving, &increment, angle, t);
         self.drift(moving, dx, t);
@@ -152,7 +152,7 @@ impl FastPath {
 
     /// Adds an increment to velocities, base and displacement of the primary mass; returns what is added to that.
     #[inline(always)]
-    fn apply(&mut self, moving: &mut Moving, increment: &Increment, angle: (f64, f64), t: f64) -> f64 {
+    fn apply(&mut self, moving: &mut Moving, increment: &Increment, angle: Sum, t: f64) -> f64 {
         let Moving { masses, base, .. } = moving;
         let mut dx = increment.y;
         if !base.drive.is_held() {

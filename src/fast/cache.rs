@@ -67,10 +67,8 @@ impl Cache {
     /// A flight to a contact, or what was left of a step, took `t` seconds.
     #[inline(always)]
     pub fn learn(&mut self, coefficients: &Coefficients, t: f64) {
-        if t < coefficients.near {
-            return; // An unused propagator is as near.
-        }
-        let is_near = |n: u8| (self.flights[usize::from(n) % FLIGHTS].t - t).abs() < coefficients.near;
+        // Nearer than an unused propagator, which has a time of 0.
+        let is_near = |n: u8| (self.flights[usize::from(n) % FLIGHTS].t - t).abs() < coefficients.near.min(t);
         let expected = self.followers[usize::from(self.last)];
         self.regular = is_near(expected);
         let n = if self.regular {

@@ -3,7 +3,7 @@
 use super::arrival::{Arrival, arrive};
 use super::coefficients::Coefficients;
 use super::horizon::Horizon;
-use super::propagator::{Nearby, Point, both_angles};
+use super::propagator::{Nearby, Point};
 use super::verify::Start;
 use super::{FastPath, Moving, Next};
 use crate::base_motion::BaseMotion;
@@ -102,7 +102,7 @@ impl FastPath {
             if w.abs() >= start.rig.parameters.half_width || !start.is_monotone(&start.here, left) {
                 return None;
             }
-            let angle = both_angles(propagator.angle, self.coefficients.omega * h);
+            let angle = propagator.angle.plus(self.coefficients.omega * h);
             self.cache.learn(&self.coefficients, left);
             let dx = self.apply(moving, &increment, angle, left);
             self.drift(moving, dx, left);

@@ -1,7 +1,7 @@
 //! A propagator: the closed form at one time, applied to any start.
 
 use super::coefficients::Coefficients;
-use crate::arithmetic::product;
+use crate::arithmetic::{Sum, product};
 use crate::base_motion::Phase;
 use crate::forcing::Response;
 use crate::oscillator::{Oscillator, Regime, Transition};
@@ -53,8 +53,8 @@ pub(super) struct Propagator {
     /// The key of the free motion, s.
     pub free_t: f64,
     response: Response,
-    /// `omega t` in [0, 2π), and its rounding error.
-    pub angle: (f64, f64),
+    /// `omega t` from -2π to 2π.
+    pub angle: Sum,
 }
 
 impl From<Propagator> for f64 {
@@ -77,16 +77,14 @@ pub(super) fn rotate(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
 
 /// Coefficients `1/(2n)!` and `1/(2n + 1)!` of cosine and sine over angle, in the square of the angle times -1. Up to 1/8 they leave out
 /// less than 1e-19.
-pub(super) const ROTATION: [[f64; 2]; 6] = {
-    let (mut terms, mut n) = ([[1.0; 2]; 6], 1);
-    while n < terms.len() {
-        let k = 2.0 * n as f64;
-        terms[n][0] = terms[n - 1][1] / k;
-        terms[n][1] = terms[n][0] / (k + 1.0);
-        n += 1;
-    }
-    terms
-};
+pub(super) const ROTATION: [[f64; 2]; 6] = [
+    [1.0, 1.0],
+    [1.0 / 2.0, 1.0 / 6.0],
+    [1.0 / 24.0, 1.0 / 120.0],
+    [1.0 / 720.0, 1.0 / 5040.0],
+    [1.0 / 40_320.0, 1.0 / 362_880.0],
+    [1.0 / 3_628_800.0, 1.0 / 39_916_800.0],
+];
 
 /// Polynomials with these coefficients, at `x`.
 #[inline(always)]
@@ -108,22 +106,14 @@ pub(super) fn forced(amplitude: f64, (cos, sin): (f64, f64), k: Complex64) -> f6
     amplitude * (k.re * sin + k.im * cos)
 }
 
-/// An angle with its rounding error, and a smaller one.
+/// `omega t` from -2π to 2π.
 #[inline(always)]
-pub(super) fn both_angles((angle, error): (f64, f64), more: f64) -> (f64, f64) {
-    let sum = angle + more;
-    (sum, error + (more - (sum - angle)))
-}
-
-/// `omega t` from -2π to 2π, and its rounding error.
-#[inline(always)]
-pub(super) fn angle(omega: f64, t: f64) -> (f64, f64) {
-    let (angle, error) = product(omega, t);
-    if angle.abs() < TAU {
-        (angle, error)
-    } else {
-        Phase::default().advanced(omega, t).parts()
+pub(super) fn angle(omega: f64, t: f64) -> Sum {
+    let (mut value, mut error) = product(omega, t);
+    if value.abs() >= TAU {
+        Phase(value, error) = Phase::default().advanced(omega, t);
     }
+    Sum { value, error }
 }
 
 impl Propagator {

@@ -6,7 +6,7 @@
 //! neither a sine nor a division. That holds for every damping ratio, at resonance and away from it.
 
 use super::propagator::{Increment, Point, ROTATION, forced, polynomials, rotate};
-use crate::arithmetic::{halves, product_with};
+use crate::arithmetic::{Sum, halves, product_with};
 use crate::base_motion::Drive;
 use crate::oscillator::{Oscillator, Transition};
 use num_complex::Complex64;
@@ -36,12 +36,12 @@ pub(super) struct ShortStep {
 }
 
 /// What a harmonic base adds in one step.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Response {
     /// The key, rad/s.
     omega: f64,
-    /// `omega t`, and its rounding error.
-    pub angle: (f64, f64),
+    /// `omega t`.
+    pub angle: Sum,
     /// Cosine of the angle, and sine over angle.
     rotation: [f64; 2],
     /// Displacement and velocity that a base displacement adds, and a base velocity.
@@ -61,15 +61,9 @@ impl From<f64> for ShortStep {
             t,
             halves: halves(t),
             free: Default::default(),
-            pushed: (0.0, 0.0),
-            moments: [[0.0; 2]; MOMENTS],
-            response: Response {
-                omega: f64::NAN,
-                angle: (0.0, 0.0),
-                rotation: [1.0; 2],
-                displacement: (0.0, 0.0),
-                slope: (0.0, 0.0),
-            },
+            pushed: Default::default(),
+            moments: Default::default(),
+            response: Response { omega: f64::NAN, ..Response::default() },
         }
     }
 }
@@ -114,32 +108,27 @@ impl ShortStep {
     /// The response at a frequency, kept for the next step.
     #[inline(always)]
     pub fn response(&mut self, oscillator: &Oscillator, omega: f64) -> Response {
-        // A copy: what was just stored is slow to load.
-        let mut response = self.response;
-        if response.omega != omega {
-            if response.omega.is_nan() {
-                self.complete(oscillator);
-            }
-            response = self.respond(omega);
-            self.response = response;
+        if self.response.omega == omega {
+            return self.response;
         }
-        response
-    }
-
-    #[inline(always)]
-    fn respond(&self, omega: f64) -> Response {
+        if self.response.omega.is_nan() {
+            self.complete(oscillator);
+        }
         let square = -omega * omega;
         // `K = even + i omega odd` and `K' = i omega K + F xv`.
         let [even, odd] = polynomials(&self.moments, square);
         let (steady, moving) = self.pushed;
-        let angle = product_with(omega, (self.t, self.halves));
-        Response {
+        let (value, error) = product_with(omega, (self.t, self.halves));
+        // A copy is returned: what was just stored is slow to load.
+        let response = Response {
             omega,
-            angle,
-            rotation: polynomials(&ROTATION, -angle.0 * angle.0),
+            angle: Sum { value, error },
+            rotation: polynomials(&ROTATION, -value * value),
             displacement: (even, steady + square * odd),
             slope: (odd, moving + even),
-        }
+        };
+        self.response = response;
+        response
     }
 
     /// What one step adds to `start` while the signal is a straight line.
@@ -155,21 +144,18 @@ impl ShortStep {
         Increment {
             y: y + (more_y + forced(response.displacement.0, response.slope.0)),
             dy: dy + (more_dy + forced(response.displacement.1, response.slope.1)),
-            phasor: rotate(start.phasor, (turned, response.angle.0 * sine)),
+            phasor: rotate(start.phasor, (turned, response.angle.value * sine)),
         }
     }
 }
 
 impl Increment {
-    /// The same with what the curvature and jerk of the signal add in one step.
+    /// Adds what the curvature and jerk of the signal add in one step.
     #[inline(always)]
-    pub fn bent(self, [.., u2, u3]: [f64; 4], step: &ShortStep) -> Self {
+    pub fn bend(&mut self, [.., u2, u3]: [f64; 4], step: &ShortStep) {
         let [[_, g1], [g2, g3], ..] = step.moments;
-        Self {
-            y: self.y + (2.0 * u2 * g2 + 6.0 * u3 * g3),
-            dy: self.dy + (2.0 * u2 * g1 + 6.0 * u3 * g2),
-            ..self
-        }
+        self.y += 2.0 * u2 * g2 + 6.0 * u3 * g3;
+        self.dy += 2.0 * u2 * g1 + 6.0 * u3 * g2;
     }
 
     /// The same for a step that is longer by `late` seconds, to first order; the signal is a straight line.
