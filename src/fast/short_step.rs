@@ -180,7 +180,7 @@ fn moment(oscillator: &Oscillator, n: usize, t: f64) -> f64 {
     let force = (1..=n).fold(1.0, |force, k| force * t / k as f64);
     let base = |k: usize| if k == n { force } else { 0.0 };
     let (mut before, mut last, mut sum) = (0.0, 0.0, 0.0);
-    for k in 0..n + 16 {
+    for k in n.max(1) - 1..n + 12 {
         let k1 = (k + 1) as f64;
         let next = (spring * (base(k) - before) + damping * k1 * (base(k + 1) - last)) / (k1 * (k1 + 1.0));
         sum += next;
