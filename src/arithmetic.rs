@@ -2,14 +2,13 @@
 
 /// A rounded value and its rounding error, which is smaller than half a unit in the last place of the value.
 ///
-/// Adding many small increments to a plain number loses up to half a unit in its last place at every addition. Here the
-/// loss is kept and added again (compensated summation: Kahan, "Further remarks on reducing truncation errors", CACM 8
-/// (1965) 40).
+/// Adding many small increments to a plain number loses up to half a unit in its last place at every addition. Here the loss is kept and
+/// added again (compensated summation: Kahan, "Further remarks on reducing truncation errors", CACM 8 (1965) 40).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sum {
-    value: f64,
-    error: f64,
+    pub(crate) value: f64,
+    pub(crate) error: f64,
 }
 
 impl Sum {
@@ -61,37 +60,36 @@ pub(crate) fn two_sum(a: f64, b: f64) -> (f64, f64) {
 
 /// The leading half of the digits, and the rest (Veltkamp).
 #[inline(always)]
-pub(crate) fn halves(x: f64) -> (f64, f64) {
+pub(crate) const fn halves(x: f64) -> (f64, f64) {
     let scaled = 134_217_729.0 * x; // 2^27 + 1
     let high = scaled - (scaled - x);
     (high, x - high)
 }
 
-/// `a b` as a rounded product and its rounding error (Dekker, with Veltkamp's splitting: no FMA instruction needed).
+/// `a b` as a rounded product and its rounding error (Dekker, with Veltkamp's splitting: no FMA instruction needed). Above 1e300 the
+/// splitting overflows; valid parameters and drives lead to no such values.
 #[inline(always)]
-pub(crate) fn product(a: f64, b: f64) -> (f64, f64) {
-    let (rounded, error) = product_with(a, (b, halves(b)));
-    // Above 1e300 the splitting overflows; such products are not physical.
-    (rounded, if error.is_finite() { error } else { 0.0 })
+pub(crate) const fn product(a: f64, b: f64) -> (f64, f64) {
+    product_with(a, (b, halves(b)))
 }
 
 /// The same; the second factor comes with its halves.
 #[inline(always)]
-pub(crate) fn product_with(a: f64, (b, (b1, b2)): (f64, (f64, f64))) -> (f64, f64) {
+pub(crate) const fn product_with(a: f64, (b, (b1, b2)): (f64, (f64, f64))) -> (f64, f64) {
     let (a1, a2) = halves(a);
     let rounded = a * b;
     (rounded, ((a1 * b1 - rounded) + a1 * b2 + a2 * b1) + a2 * b2)
 }
 
 /// `a / b` as a rounded quotient and its rounding error.
-pub(crate) fn quotient(a: f64, b: f64) -> (f64, f64) {
+pub(crate) const fn quotient(a: f64, b: f64) -> (f64, f64) {
     let rounded = a / b;
     let (got, got_error) = product(rounded, b);
     (rounded, ((a - got) - got_error) / b)
 }
 
 /// A number with its rounding error, divided by a number.
-pub(crate) fn divided((value, error): (f64, f64), by: f64) -> (f64, f64) {
+pub(crate) const fn divided((value, error): (f64, f64), by: f64) -> (f64, f64) {
     let (rounded, lost) = quotient(value, by);
     (rounded, lost + error / by)
 }
@@ -103,16 +101,10 @@ pub(crate) fn divided((value, error): (f64, f64), by: f64) -> (f64, f64) {
 /// The first part is short, so that the second is large enough to count.
 pub(crate) fn split_coefficient((coefficient, error): (f64, f64)) -> (f64, f64) {
     let (head, rest) = halves(coefficient);
-    if head.is_finite() {
-        (head, rest + error)
-    } else {
-        // Above 1e300 the splitting overflows.
-        (coefficient, 0.0)
-    }
+    (head, rest + error)
 }
 
-/// Sine and cosine of `omega t`, exact to the last digits even after millions of turns; `omega` is a frequency and its
-/// rounding error.
+/// Sine and cosine of `omega t`, exact to the last digits even after millions of turns; `omega` is a frequency and its rounding error.
 pub(crate) fn sincos_of_product((omega, omega_error): (f64, f64), t: f64) -> (f64, f64) {
     let (angle, error) = product(omega, t);
     let error = error + omega_error * t;
@@ -121,12 +113,14 @@ pub(crate) fn sincos_of_product((omega, omega_error): (f64, f64), t: f64) -> (f6
 }
 
 /// The product of two pairs, each a number and its rounding error.
+#[inline(always)]
 pub(crate) fn times(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     let (value, error) = product(a.0, b.0);
     (value, error + (a.0 * b.1 + a.1 * b.0))
 }
 
 /// The sum of two pairs, each a number and its rounding error.
+#[inline(always)]
 pub(crate) fn plus(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     let (value, error) = two_sum(a.0, b.0);
     (value, error + (a.1 + b.1))

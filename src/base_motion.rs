@@ -3,7 +3,7 @@
 //! `e(t) = u0 + u1 t + u2 t² + u3 t³ + E sin(phase + omega t)`, with `t` counted from now. The phase is carried
 //! instead of absolute time, so that a run of any length costs no accuracy.
 
-use crate::arithmetic::{product, two_sum};
+use crate::arithmetic::{Sum, plus, product};
 use crate::parameters::{FASTEST, InvalidValue};
 
 /// 2π as the nearest double and its rounding error.
@@ -45,16 +45,23 @@ impl Drive {
         (u2 | u3) << 1 == 0
     }
 
+    /// Whether the signal is constant.
+    #[inline(always)]
+    pub(crate) fn is_held(&self) -> bool {
+        let [_, u1, u2, u3] = self.signal.map(f64::to_bits);
+        (u1 | u2 | u3) << 1 == 0
+    }
+
     /// Checks every value.
     ///
     /// # Errors
     /// A value that is not finite or too large, with its unit and the allowed range.
     #[inline]
     pub fn validate(&self) -> Result<(), InvalidValue> {
-        let [u0, u1, u2, u3] = self.signal.map(f64::abs);
+        let [u0, u1, u2, u3] = self.signal.map(|u| u * u);
         // The sum is not a number if one of them is not.
-        let sum = (u0 + u1) + (u2 + u3) + self.amplitude.abs();
-        if sum <= LARGEST && self.omega.abs() <= FASTEST {
+        let sum = (u0 + u2) + (u1 + u3) + self.amplitude * self.amplitude;
+        if sum < LARGEST * LARGEST && self.omega * self.omega < FASTEST * FASTEST {
             return Ok(());
         }
         self.explain()
@@ -118,7 +125,7 @@ impl BaseMotion {
 /// Without the second part the rounding of equal steps adds up in one direction (1e-10 rad after a million of them).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Phase(f64, f64);
+pub struct Phase(pub(crate) f64, pub(crate) f64);
 
 impl Phase {
     /// The phase, rad, in [0, 2π).
@@ -134,17 +141,10 @@ impl Phase {
         }
     }
 
-    /// The phase and its rounding error.
-    pub(crate) fn parts(self) -> (f64, f64) {
-        (self.0, self.1)
-    }
-
-    /// The phase later by `angle` (from -2π to 2π, with its rounding error) and by `more`, which is small.
+    /// The phase later by `angle`, from -2π to 2π with its rounding error.
     #[inline(always)]
-    pub(crate) fn rotated(self, angle: (f64, f64), more: f64) -> Self {
-        let turn = angle.0 + more;
-        let (sum, error) = two_sum(self.0, turn);
-        let error = error + (self.1 + angle.1 + (more - (turn - angle.0)));
+    pub(crate) fn rotated(self, angle: Sum) -> Self {
+        let (sum, error) = plus((self.0, self.1), (angle.value, angle.error));
         if sum < 0.0 {
             Self(sum + TAU.0, error + TAU.1)
         } else if sum < TAU.0 {
@@ -159,15 +159,12 @@ impl Phase {
         let (angle, error) = product(omega, t);
         let rest = libm::fmod(angle, TAU.0);
         let turns = libm::round((angle - rest) / TAU.0);
-        self.rotated((rest, error - turns * TAU.1), 0.0)
+        self.rotated(Sum { value: rest, error: error - turns * TAU.1 })
     }
 }
 
 /// The polynomial's coefficients about `t` instead of 0.
 pub(crate) fn shift([u0, u1, u2, u3]: [f64; 4], t: f64) -> [f64; 4] {
-    if u1 == 0.0 && u2 == 0.0 && u3 == 0.0 {
-        return [u0, 0.0, 0.0, 0.0];
-    }
     [
         u0 + t * (u1 + t * (u2 + t * u3)),
         u1 + t * (2.0 * u2 + t * 3.0 * u3),

@@ -1,10 +1,9 @@
 //! The first instant a gap closes, with a certificate that it is the first.
 //!
-//! The search is *conservative advancement*. Of each gap `g` its value, closing speed, closing acceleration and a bound
-//! `J` on the third derivative are known, and Taylor's theorem with Lagrange's remainder gives
-//! `g(t+h) >= g - g1 h - g2 h²/2 - J h³/6`. Up to the first root of the right-hand side no contact is possible, so a march
-//! by such steps can never jump over one, however long the steps or shallow the graze; and as the right-hand side touches
-//! the gap to third order, the march closes in on a contact cubically.
+//! The search is *conservative advancement*. Of each gap `g` its value, closing speed, closing acceleration and a bound `J` on the third
+//! derivative are known, and Taylor's theorem with Lagrange's remainder gives `g(t+h) >= g - g1 h - g2 h²/2 - J h³/6`. Up to the first root
+//! of the right-hand side no contact is possible, so a march by such steps can never jump over one, however long the steps or shallow the
+//! graze; and as the right-hand side touches the gap to third order, the march closes in on a contact cubically.
 //!
 //! Sources: B. Mirtich, "Impulse-based dynamic simulation of rigid body systems", PhD thesis, UC Berkeley 1996, chapter 2
 //! (conservative advancement); R. E. Moore, "Interval Analysis", Prentice-Hall 1966 (bounding by Taylor's remainder).

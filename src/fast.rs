@@ -29,7 +29,7 @@ use crate::segment::Segment;
 use cache::Cache;
 use coefficients::Coefficients;
 use horizon::Horizon;
-use propagator::{Angle, Increment, Point};
+use propagator::{Increment, Point};
 use verify::Start;
 
 /// How often a phasor is rotated before it is computed from the phase again.
@@ -119,56 +119,62 @@ impl FastPath {
     #[inline]
     pub fn step(&mut self, moving: &mut Moving, duration: f64) -> bool {
         let late = duration - self.cache.step.t;
-        if !self.cache.step.serves(&moving.base.drive, late) || self.disabled {
+        if self.disabled || !self.cache.step.serves(&moving.base.drive, late) {
             return false;
         }
-        let start = self.point(moving);
-        if duration >= self.contact_free.t && !self.is_contact_free(moving, &start, duration) {
+        if duration >= self.contact_free.t && !self.is_contact_free(moving, duration) {
             return false;
         }
-        self.take_step(moving, &start, late);
+        self.take_step(moving, late);
         true
     }
 
     /// Takes a step that is longer than the cached one by `late` seconds.
     #[inline(always)]
-    fn take_step(&mut self, moving: &mut Moving, start: &Point, late: f64) {
-        let step = &mut self.cache.step;
+    fn take_step(&mut self, moving: &mut Moving, late: f64) {
         let drive = &moving.base.drive;
-        let (mut increment, angle) = step.increment(&moving.rig.alone, drive, start);
+        let response = self.cache.step.response(&moving.rig.alone, drive.omega);
+        let start = self.point(moving);
+        let step = &self.cache.step;
+        let mut increment = step.increment(&response, drive.amplitude, &start);
+        let (mut angle, mut t) = (response.angle, step.t);
         if late != 0.0 {
-            increment = increment.later(&moving.rig.alone, drive, start, late);
+            increment = increment.later(&moving.rig.alone, drive, (start.y, start.dy), late);
+            angle = angle.plus(drive.omega * late);
+            t += late;
         }
-        let t = step.t + late;
-        let more = drive.omega * late;
-        self.drift(moving, &increment, t);
-        self.apply(moving, &increment, (angle, more), t);
+        if !drive.is_held() {
+            increment.bend(drive.signal, step);
+        }
+        let dx = self.apply(moving, &increment, angle, t);
+        self.drift(moving, dx, t);
     }
 
-    /// Adds an increment to displacements, velocities and base.
+    /// Adds an increment to velocities, base and displacement of the primary mass; returns what is added to that.
     #[inline(always)]
-    fn apply(&mut self, moving: &mut Moving, increment: &Increment, (angle, more): Angle, t: f64) {
+    fn apply(&mut self, moving: &mut Moving, increment: &Increment, angle: Sum, t: f64) -> f64 {
         let Moving { masses, base, .. } = moving;
-        let dx = increment.y + base.drive.signal[1] * t;
-        if base.drive.signal[1] != 0.0 || !base.drive.is_straight() {
+        let mut dx = increment.y;
+        if !base.drive.is_held() {
+            dx += base.drive.signal[1] * t;
             base.drive.signal = shift(base.drive.signal, t);
         }
         masses.x = masses.x.plus(dx);
         masses.v = masses.v.plus(increment.dy);
         masses.dw += increment.dy;
-        base.phase = base.phase.rotated(angle, more);
+        base.phase = base.phase.rotated(angle);
         self.phasor = increment.phasor;
         self.rotations += 1;
         if self.rotations >= ROTATIONS {
             self.resynchronise(base.phase);
         }
+        dx
     }
 
-    /// Adds an increment to the relative displacement: no wall is met.
+    /// Adds `dx` to the relative displacement, and what the particle flies in `t` seconds: no wall is met.
     #[inline(always)]
-    fn drift(&mut self, moving: &mut Moving, increment: &Increment, t: f64) {
-        let Moving { rig, masses, base } = moving;
-        let dx = increment.y + base.drive.signal[1] * t;
+    fn drift(&mut self, moving: &mut Moving, dx: f64, t: f64) {
+        let Moving { rig, masses, .. } = moving;
         masses.w = masses.w.plus(dx - masses.particle * t);
         let (w, b) = (masses.w.value(), rig.parameters.half_width);
         if w.abs() > b {
@@ -178,9 +184,9 @@ impl FastPath {
     }
 
     /// Whether a bound from the start alone shows that no wall is met within `t`; it may reach further.
-    #[inline(always)]
-    fn is_contact_free(&mut self, moving: &Moving, start: &Point, t: f64) -> bool {
-        self.contact_free = Horizon::ahead(moving, start, t);
+    #[inline(never)]
+    fn is_contact_free(&mut self, moving: &Moving, t: f64) -> bool {
+        self.contact_free = Horizon::ahead(moving, &self.point(moving), t);
         self.contact_free.t >= t
     }
 
@@ -190,7 +196,7 @@ impl FastPath {
         let fastest = oscillator.fastest.max(drive.omega.abs());
         self.evaluations += 1;
         if t == duration && self.cache.repeats(oscillator, &drive, duration) {
-            self.take_step(moving, start, duration - self.cache.step.t);
+            self.take_step(moving, duration - self.cache.step.t);
             return Next::ContactFree(t);
         }
         let increment = if !drive.is_straight() || drive.omega < 0.0 || t * fastest > LONGEST_COAST {
@@ -210,8 +216,8 @@ impl FastPath {
             }
             self.after(&Start::new(moving, *start), t)
         };
-        self.drift(moving, &increment, t);
-        self.apply(moving, &increment, (propagator::angle(drive.omega, t), 0.0), t);
+        let dx = self.apply(moving, &increment, propagator::angle(drive.omega, t), t);
+        self.drift(moving, dx, t);
         Next::ContactFree(t)
     }
 }

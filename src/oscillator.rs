@@ -55,13 +55,23 @@ pub enum Regime {
 pub struct Transition {
     /// Position per position.
     pub xx: f64,
-    /// Position per velocity, s.
-    pub xv: f64,
     /// Velocity per position, 1/s.
     pub vx: f64,
+    /// Position per velocity, s.
+    pub xv: f64,
     /// Velocity per velocity.
     pub vv: f64,
 }
+
+/// `1/n!` with its rounding error.
+const PER_FACTORIAL: [(f64, f64); 18] = {
+    let (mut terms, mut n) = ([(1.0, 0.0); 18], 2);
+    while n < terms.len() {
+        terms[n] = divided(terms[n - 1], n as f64);
+        n += 1;
+    }
+    terms
+};
 
 impl Transition {
     /// Position and velocity after it.
@@ -141,37 +151,39 @@ impl Oscillator {
     /// What the free motion over `t` seconds adds: a Taylor series over a time that is short against every rate, doubled as often as
     /// needed.
     pub(crate) fn increment(&self, t: f64) -> Increment {
-        // Terms from `PLAIN` on are so small that rounding them leaves 24 digits; those from `TERMS` on are below that.
-        const PLAIN: usize = 8;
+        // Terms from `PLAIN` on are so small that rounding them leaves 23 digits; those from `TERMS` on are below that.
+        const PLAIN: usize = 7;
         const TERMS: usize = 18;
-        let doublings = libm::ceil(libm::log2(4.0 * self.fastest * t)).max(0.0);
-        let t = t * libm::exp2(-doublings);
-        let (damping, spring) = self.rates();
-        let (damping, spring) = (times(damping, (t, 0.0)), times(spring, product(t, t)));
-        // Coefficients of the motion that starts with a displacement of 0 and a velocity of 1/t.
-        let (mut c, mut s, mut p) = ([(0.0, 0.0), (1.0, 0.0)], (1.0, 0.0), (0.0, 0.0));
-        for n in 2..PLAIN {
-            // The divisions do not wait for the last term.
-            let (damping, spring) = (divided(damping, n as f64), divided(spring, ((n - 1) * n) as f64));
-            let (next, error) = plus(times(damping, c[1]), times(spring, c[0]));
-            c = [c[1], (-next, -error)];
-            s = plus(s, c[1]);
-            p = plus(p, times(c[1], (n as f64, 0.0)));
+        let (mut t, mut doublings) = (t, 0);
+        while 4.0 * self.fastest * t > 1.0 {
+            (t, doublings) = (0.5 * t, doublings + 1);
         }
-        let (mut c, mut small) = (c.map(|(c, _)| c), (0.0, 0.0));
+        let (damping, spring) = self.rates();
+        let (damping, spring) = (times(damping, (-t, 0.0)), times(spring, product(-t, t)));
+        // Derivatives of the motion that starts with a displacement of 0 and a velocity of 1/t, in units of time of t.
+        let (mut d, mut s, mut p) = ([(0.0, 0.0), (1.0, 0.0)], (1.0, 0.0), (0.0, 0.0));
+        for n in 2..PLAIN {
+            d = [d[1], plus(times(damping, d[1]), times(spring, d[0]))];
+            s = plus(s, times(d[1], PER_FACTORIAL[n]));
+            p = plus(p, times(d[1], PER_FACTORIAL[n - 1]));
+        }
+        let (mut d, mut small) = (d.map(|(d, _)| d), (0.0, 0.0));
         for n in PLAIN..TERMS {
-            let next = damping.0 / n as f64 * c[1] + spring.0 / ((n - 1) * n) as f64 * c[0];
-            c = [c[1], -next];
-            small = (small.0 - next, small.1 - n as f64 * next);
+            d = [d[1], damping.0 * d[1] + spring.0 * d[0]];
+            small = (
+                small.0 + PER_FACTORIAL[n].0 * d[1],
+                small.1 + PER_FACTORIAL[n - 1].0 * d[1],
+            );
         }
         let short = Increment {
             p: plus(p, (small.1, 0.0)),
             s: times(plus(s, (small.0, 0.0)), (t, 0.0)),
         };
-        (0..doublings as u32).fold(short, |one, _| self.both(&one, &one))
+        (0..doublings).fold(short, |one, _| self.both(&one, &one))
     }
 
     /// What two times, one after the other, add.
+    #[inline(always)]
     pub(crate) fn both(&self, a: &Increment, b: &Increment) -> Increment {
         let (damping, spring) = self.rates();
         let square = times(a.s, b.s);

@@ -228,8 +228,7 @@ impl Plant {
         &self.totals
     }
 
-    /// Mechanical energy, J: of both masses' motion, and of the spring between the primary mass and a base at
-    /// `displacement`, m.
+    /// Mechanical energy, J: of both masses' motion, and of the spring between the primary mass and a base at `displacement`, m.
     pub fn energy(&self, displacement: f64) -> f64 {
         let p = &self.moving.rig.parameters;
         let State { q1, dq1, dq2, .. } = self.state();

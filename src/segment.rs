@@ -5,6 +5,7 @@
 //! motion its Taylor series about the start is summed instead. It keeps the *relative* digits of what has changed since the
 //! start, which is what a particle hopping on its wall is made of.
 
+use crate::arithmetic::sincos_of_product;
 use crate::base_motion::BaseMotion;
 use crate::forcing::Forcing;
 use crate::oscillator::Oscillator;
@@ -170,8 +171,8 @@ impl Segment {
     pub fn at(&self, series: &Series, t: f64) -> Instant {
         if t <= series.reach {
             let (dx, dv) = series.departure(t);
-            let turned = |(z, forcing): (Complex64, Forcing)| z * rotation(forcing.omega, t);
-            let phasor = self.driven.map_or(Complex64::ZERO, turned);
+            let (sin, cos) = sincos_of_product((self.omega(), 0.0), t);
+            let phasor = (self.driven).map_or(Complex64::ZERO, |(z, _)| z * Complex64::new(cos, sin));
             let derivatives = self.by_equation(self.x0 + (self.v0 * t + dx), self.v0 + dv, phasor, t);
             Instant { moved: self.v0 * t + dx, departure: (dx, dv), derivatives }
         } else {
@@ -225,12 +226,6 @@ impl Series {
         }
         (x * t * t, v * t)
     }
-}
-
-/// `e^{i omega t}`.
-fn rotation(omega: f64, t: f64) -> Complex64 {
-    let (sin, cos) = crate::arithmetic::sincos_of_product((omega, 0.0), t);
-    Complex64::new(cos, sin)
 }
 
 /// `E e^{i phase}` for a frequency 0 or above: `E sin(phase - |omega| t) = -E sin(-phase + |omega| t)`.

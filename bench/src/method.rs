@@ -83,21 +83,28 @@ fn run<M: Method>(
     states: &mut Vec<[f64; 4]>,
 ) -> Result<(f64, u64), Failure> {
     let steps = M::steps(&scene.steps);
-    let mut checks = checks.iter().copied().peekable();
     // The clock is asked now and then only: it costs as much as a step without impact.
     let asked_every = (steps.len() / 50).max(1);
+    let mut stops: Vec<usize> = (1..=steps.len()).step_by(asked_every).chain([steps.len()]).collect();
+    stops.extend(checks.iter().filter(|&&check| check < steps.len()));
+    stops.sort_unstable();
+    stops.dedup();
     let mut method = M::start(scene, setting)?;
+    let mut done = 0;
     let began = Instant::now();
-    for (n, step) in steps.iter().enumerate() {
-        method.step(step)?;
-        let state = std::hint::black_box(method.state());
-        if checks.next_if_eq(&(n + 1)).is_some() {
-            states.push(state);
+    for stop in stops {
+        for step in &steps[done..stop] {
+            method.step(step)?;
+            std::hint::black_box(method.state());
         }
-        if n % asked_every == 0 && began.elapsed() > limit {
+        if checks.contains(&stop) {
+            states.push(method.state());
+        }
+        done = stop;
+        if began.elapsed() > limit {
             return Err(Failure(format!(
                 "time limit: {:.2} % done after {} s",
-                100.0 * (n + 1) as f64 / steps.len() as f64,
+                100.0 * done as f64 / steps.len() as f64,
                 limit.as_secs_f64()
             )));
         }

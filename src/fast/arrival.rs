@@ -3,7 +3,7 @@
 use super::FastPath;
 use super::coefficients::{Coefficients, NEAR};
 use super::grid::Mark;
-use super::propagator::{Angle, Increment, Nearby, Point, Propagator, angle};
+use super::propagator::{Increment, Nearby, Point, Propagator, angle};
 use super::verify::{Sample, Start};
 use crate::arithmetic::Sum;
 use crate::contact::Wall;
@@ -27,7 +27,7 @@ pub(super) struct Arrival {
     /// What the motion adds to the start until then.
     pub added: Increment,
     /// The angle by which the base turns.
-    pub angle: Angle,
+    pub angle: Sum,
 }
 
 impl Arrival {
@@ -68,7 +68,7 @@ pub(super) fn arrive(coefficients: &Coefficients, propagator: &Propagator, start
         t: Sum::of(propagator.t, h),
         wall,
         added: nearby.at(h),
-        angle: (propagator.angle, coefficients.omega * h),
+        angle: propagator.angle.plus(coefficients.omega * h),
     })
 }
 
@@ -107,8 +107,7 @@ impl FastPath {
         None
     }
 
-    /// The contact about `h` seconds after the time `at`, when there is a `gap` to the wall: by Newton's method on the Taylor
-    /// polynomial.
+    /// The contact about `h` seconds after the time `at`, when there is a `gap` to the wall: by Newton's method on the Taylor polynomial.
     #[inline(always)]
     pub(super) fn polish<const N: usize>(
         &self,
@@ -146,7 +145,7 @@ impl FastPath {
                     t: Sum::of(at, h),
                     wall,
                     added,
-                    angle: (angle(omega, at), omega * h),
+                    angle: angle(omega, at).plus(omega * h),
                 });
             }
             h += step;

@@ -9,8 +9,6 @@ use crate::oscillator::Oscillator;
 
 /// Flights kept: a motion of so many different flights per period, or flights and parts of them, is predicted.
 const FLIGHTS: usize = 8;
-/// So many flights in a row must be the followers of those before until the next one is predicted.
-const ENOUGH: u8 = 3;
 
 /// Propagators. What is saved of one is its key.
 #[derive(Clone, Copy, Debug, Default)]
@@ -23,8 +21,8 @@ pub(super) struct Cache {
     /// Which followed which when they were last used.
     followers: [u8; FLIGHTS],
     last: u8,
-    /// So many in a row were the follower of the one before, up to [`ENOUGH`].
-    regular: u8,
+    /// Whether the last one was the follower of the one before.
+    regular: bool,
     /// The one to be replaced next.
     oldest: u8,
     /// Of points of a march.
@@ -52,11 +50,15 @@ impl Cache {
     /// The propagator that followed the last one before, if flights have been regular.
     #[inline(always)]
     pub fn expected(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) -> Option<&Propagator> {
-        if self.regular < ENOUGH {
+        if !self.regular {
             return None;
         }
         let propagator = &mut self.flights[usize::from(self.followers[usize::from(self.last)]) % FLIGHTS];
         if propagator.omega != coefficients.omega {
+            if propagator.free_t != propagator.t {
+                let increment = self.grid.increment(oscillator, coefficients.spacing, propagator.t);
+                propagator.set(propagator.t, oscillator.split(&increment));
+            }
             propagator.respond(oscillator, coefficients);
         }
         Some(propagator)
@@ -65,13 +67,13 @@ impl Cache {
     /// A flight to a contact, or what was left of a step, took `t` seconds.
     #[inline(always)]
     pub fn learn(&mut self, coefficients: &Coefficients, t: f64) {
-        let is_near = |n: u8| (self.flights[usize::from(n) % FLIGHTS].t - t).abs() < coefficients.near;
+        // Nearer than an unused propagator, which has a time of 0.
+        let is_near = |n: u8| (self.flights[usize::from(n) % FLIGHTS].t - t).abs() < coefficients.near.min(t);
         let expected = self.followers[usize::from(self.last)];
-        let n = if is_near(expected) {
-            self.regular = (self.regular + 1).min(ENOUGH);
+        self.regular = is_near(expected);
+        let n = if self.regular {
             expected
         } else {
-            self.regular = 0;
             (0..FLIGHTS as u8).find(|&n| is_near(n)).unwrap_or_else(|| {
                 self.oldest = (self.oldest + 1) % FLIGHTS as u8;
                 self.flights[usize::from(self.oldest)].reset(t);

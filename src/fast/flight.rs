@@ -38,7 +38,7 @@ impl FastPath {
         let point = self.point(moving);
         let (rig, base) = (&moving.rig, &moving.base);
         let soon = left * rig.alone.fastest.max(base.drive.omega.abs()) <= 1.0;
-        if left < self.contact_free.t || (soon && self.is_contact_free(moving, &point, left)) {
+        if left < self.contact_free.t || (soon && self.is_contact_free(moving, left)) {
             return self.coast(moving, &point, left, duration);
         }
         if !applies(rig, base, &point) {
@@ -102,10 +102,10 @@ impl FastPath {
             if w.abs() >= start.rig.parameters.half_width || !start.is_monotone(&start.here, left) {
                 return None;
             }
-            let angle = (propagator.angle, self.coefficients.omega * h);
+            let angle = propagator.angle.plus(self.coefficients.omega * h);
             self.cache.learn(&self.coefficients, left);
-            self.drift(moving, &increment, left);
-            self.apply(moving, &increment, angle, left);
+            let dx = self.apply(moving, &increment, angle, left);
+            self.drift(moving, dx, left);
             return Some(Next::ContactFree(left));
         }
         let arrival = arrive(&self.coefficients, propagator, &start)?;

@@ -38,10 +38,21 @@ impl Grid {
                 let parts = [most, n - most].map(|n| self.free(oscillator, spacing, n));
                 oscillator.both(&parts[0], &parts[1])
             };
-            self.0[n - 1] = Propagator::new(t, oscillator.split(&increment));
+            self.0[n - 1].set(t, oscillator.split(&increment));
         }
         // The same bits whether it has just been computed or not.
         oscillator::Increment::from(&self.0[n - 1].free)
+    }
+
+    /// What the free motion adds over `t` seconds: over the nearest point, if there is one, and the rest.
+    pub fn increment(&mut self, oscillator: &Oscillator, spacing: f64, t: f64) -> oscillator::Increment {
+        match (t / spacing + 0.5) as usize {
+            n @ 1..=POINTS => {
+                let rest = oscillator.increment(t - n as f64 * spacing);
+                oscillator.both(&self.free(oscillator, spacing, n), &rest)
+            }
+            _ => oscillator.increment(t),
+        }
     }
 
     #[inline(never)]

@@ -34,7 +34,6 @@ impl Horizon {
     }
 
     /// What a bound from the start alone shows: no contact for `t` seconds or more, or nothing.
-    #[inline(never)]
     pub fn ahead(moving: &Moving, start: &Point, t: f64) -> Self {
         let Oscillator { delta, omega0, .. } = moving.rig.alone;
         let (b, w, dw) = (

@@ -1,7 +1,7 @@
 //! A propagator: the closed form at one time, applied to any start.
 
 use super::coefficients::Coefficients;
-use crate::arithmetic::product;
+use crate::arithmetic::{Sum, product};
 use crate::base_motion::Phase;
 use crate::forcing::Response;
 use crate::oscillator::{Oscillator, Regime, Transition};
@@ -39,25 +39,22 @@ impl Increment {
     }
 }
 
-/// An angle from -2π to 2π with its rounding error, and a small angle to be added.
-pub(super) type Angle = ((f64, f64), f64);
-
-/// The closed form at time `t`; what follows from that is computed when it is needed.
-#[derive(Clone, Copy, Debug)]
+/// The closed form at time `t`; what follows from that is computed when it is needed. By default it is that over no time.
+#[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 #[cfg_attr(feature = "serde", serde(from = "f64", into = "f64"))]
 pub(super) struct Propagator {
-    /// The key: time, s; NaN where the propagator is empty.
+    /// The key: time, s.
     pub t: f64,
-    /// The key of the response, rad/s.
+    /// The key of the response, rad/s; NaN after a reset.
     pub omega: f64,
-    /// What the free motion adds, if `complete`: the sum of both, because a propagator is used many times and the same rounding error
-    /// would add up.
+    /// What the free motion adds: the sum of both, because a propagator is used many times and the same rounding error would add up.
     pub free: (Transition, Transition),
-    complete: bool,
+    /// The key of the free motion, s.
+    pub free_t: f64,
     response: Response,
-    /// `omega t` in [0, 2π), and its rounding error.
-    pub angle: (f64, f64),
+    /// `omega t` from -2π to 2π.
+    pub angle: Sum,
 }
 
 impl From<Propagator> for f64 {
@@ -68,20 +65,7 @@ impl From<Propagator> for f64 {
 
 impl From<f64> for Propagator {
     fn from(t: f64) -> Self {
-        Self {
-            t,
-            omega: f64::NAN,
-            free: Default::default(),
-            complete: false,
-            response: Response::default(),
-            angle: (0.0, 0.0),
-        }
-    }
-}
-
-impl Default for Propagator {
-    fn default() -> Self {
-        Self::from(f64::NAN)
+        Self { t, omega: f64::NAN, ..Self::default() }
     }
 }
 
@@ -91,16 +75,28 @@ pub(super) fn rotate(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
 
+/// Coefficients `1/(2n)!` and `1/(2n + 1)!` of cosine and sine over angle, in the square of the angle times -1. Up to 1/8 they leave out
+/// less than 1e-19.
+pub(super) const ROTATION: [[f64; 2]; 6] = [
+    [1.0, 1.0],
+    [1.0 / 2.0, 1.0 / 6.0],
+    [1.0 / 24.0, 1.0 / 120.0],
+    [1.0 / 720.0, 1.0 / 5040.0],
+    [1.0 / 40_320.0, 1.0 / 362_880.0],
+    [1.0 / 3_628_800.0, 1.0 / 39_916_800.0],
+];
+
+/// Polynomials with these coefficients, at `x`.
+#[inline(always)]
+pub(super) fn polynomials(coefficients: &[[f64; 2]], x: f64) -> [f64; 2] {
+    let last = coefficients.len() - 1;
+    (coefficients[..last].iter().rev()).fold(coefficients[last], |[a, b], c| [c[0] + x * a, c[1] + x * b])
+}
+
 /// Cosine and sine of a small angle from their Taylor series, up to degree `N + 2`.
 #[inline(always)]
 pub(super) fn rotation<const N: usize>(angle: f64) -> (f64, f64) {
-    let square = angle * angle;
-    let (mut cos, mut sin) = (1.0, 1.0);
-    for n in (1..=N / 2 + 1).rev() {
-        let n = 2.0 * n as f64;
-        cos = 1.0 - square * (1.0 / (n * (n - 1.0))) * cos;
-        sin = 1.0 - square * (1.0 / (n * (n + 1.0))) * sin;
-    }
+    let [cos, sin] = polynomials(&ROTATION[..N / 2 + 2], -angle * angle);
     (cos, angle * sin)
 }
 
@@ -110,35 +106,32 @@ pub(super) fn forced(amplitude: f64, (cos, sin): (f64, f64), k: Complex64) -> f6
     amplitude * (k.re * sin + k.im * cos)
 }
 
-/// `omega t` from -2π to 2π, and its rounding error.
+/// `omega t` from -2π to 2π.
 #[inline(always)]
-pub(super) fn angle(omega: f64, t: f64) -> (f64, f64) {
-    let (angle, error) = product(omega, t);
-    if angle.abs() < TAU {
-        (angle, error)
-    } else {
-        Phase::default().advanced(omega, t).parts()
+pub(super) fn angle(omega: f64, t: f64) -> Sum {
+    let (mut value, mut error) = product(omega, t);
+    if value.abs() >= TAU {
+        Phase(value, error) = Phase::default().advanced(omega, t);
     }
+    Sum { value, error }
 }
 
 impl Propagator {
-    /// The propagator over `t` seconds; `free` is what the free motion adds in that time.
-    pub fn new(t: f64, free: (Transition, Transition)) -> Self {
-        Self { t, free, complete: true, ..Self::default() }
-    }
-
     /// Makes it the propagator over `t` seconds.
     #[inline(always)]
     pub fn reset(&mut self, t: f64) {
-        (self.t, self.omega, self.complete) = (t, f64::NAN, false);
+        (self.t, self.omega) = (t, f64::NAN);
+    }
+
+    /// The same; `free` is what the free motion adds in that time.
+    pub fn set(&mut self, t: f64, free: (Transition, Transition)) {
+        self.reset(t);
+        (self.free, self.free_t) = (free, t);
     }
 
     /// Makes the response that of these coefficients' frequency.
     #[inline(never)]
     pub fn respond(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) {
-        if !self.complete {
-            *self = Self::new(self.t, oscillator.split(&oscillator.increment(self.t)));
-        }
         let (head, tail) = &self.free;
         let free = Transition {
             xx: 1.0 + (head.xx + tail.xx),

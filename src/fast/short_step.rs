@@ -5,8 +5,8 @@
 //! belong to the step, not to the drive: a drive that changes at every sample costs two polynomials in `omega²`, and needs
 //! neither a sine nor a division. That holds for every damping ratio, at resonance and away from it.
 
-use super::propagator::{Increment, Point, forced, rotate, rotation};
-use crate::arithmetic::{halves, product_with};
+use super::propagator::{Increment, Point, ROTATION, forced, polynomials, rotate};
+use crate::arithmetic::{Sum, halves, product_with};
 use crate::base_motion::Drive;
 use crate::oscillator::{Oscillator, Transition};
 use num_complex::Complex64;
@@ -36,15 +36,17 @@ pub(super) struct ShortStep {
 }
 
 /// What a harmonic base adds in one step.
-#[derive(Clone, Copy, Debug)]
-struct Response {
+#[derive(Clone, Copy, Debug, Default)]
+pub(super) struct Response {
     /// The key, rad/s.
     omega: f64,
-    /// `omega t`, and its rounding error.
-    angle: (f64, f64),
-    rotation: (f64, f64),
-    position: Complex64,
-    velocity: Complex64,
+    /// `omega t`.
+    pub angle: Sum,
+    /// Cosine of the angle, and sine over angle.
+    rotation: [f64; 2],
+    /// Displacement and velocity that a base displacement adds, and a base velocity.
+    displacement: (f64, f64),
+    slope: (f64, f64),
 }
 
 impl From<ShortStep> for f64 {
@@ -59,15 +61,9 @@ impl From<f64> for ShortStep {
             t,
             halves: halves(t),
             free: Default::default(),
-            pushed: (0.0, 0.0),
-            moments: [[0.0; 2]; MOMENTS],
-            response: Response {
-                omega: f64::NAN,
-                angle: (0.0, 0.0),
-                rotation: (1.0, 0.0),
-                position: Complex64::ZERO,
-                velocity: Complex64::ZERO,
-            },
+            pushed: Default::default(),
+            moments: Default::default(),
+            response: Response { omega: f64::NAN, ..Response::default() },
         }
     }
 }
@@ -109,64 +105,64 @@ impl ShortStep {
         }
     }
 
-    /// The response at a frequency.
+    /// The response at a frequency, kept for the next step.
     #[inline(always)]
-    fn respond(&self, omega: f64) -> Response {
-        let g = &self.moments;
-        let square = -omega * omega;
-        // Those of even and of odd n, at once.
-        let [even, odd] = (0..MOMENTS - 1).rev().fold(g[MOMENTS - 1], |[even, odd], n| {
-            [g[n][0] + square * even, g[n][1] + square * odd]
-        });
-        let odd = omega * odd;
-        // `K' = i omega K + F xv`.
-        let (steady, moving) = self.pushed;
-        let angle = product_with(omega, (self.t, self.halves));
-        Response {
-            omega,
-            angle,
-            rotation: rotation::<8>(angle.0),
-            position: Complex64::new(even, odd),
-            velocity: Complex64::new(steady - omega * odd, omega * (moving + even)),
+    pub fn response(&mut self, oscillator: &Oscillator, omega: f64) -> Response {
+        if self.response.omega == omega {
+            return self.response;
         }
+        if self.response.omega.is_nan() {
+            self.complete(oscillator);
+        }
+        let square = -omega * omega;
+        // `K = even + i omega odd` and `K' = i omega K + F xv`.
+        let [even, odd] = polynomials(&self.moments, square);
+        let (steady, moving) = self.pushed;
+        let (value, error) = product_with(omega, (self.t, self.halves));
+        // A copy is returned: what was just stored is slow to load.
+        let response = Response {
+            omega,
+            angle: Sum { value, error },
+            rotation: polynomials(&ROTATION, -value * value),
+            displacement: (even, steady + square * odd),
+            slope: (odd, moving + even),
+        };
+        self.response = response;
+        response
     }
 
-    /// What one step adds to `start` under `drive`, and the angle by which its oscillator turns.
+    /// What one step adds to `start` while the signal is a straight line.
     #[inline(always)]
-    pub fn increment(&mut self, oscillator: &Oscillator, drive: &Drive, start: &Point) -> (Increment, (f64, f64)) {
-        // A copy: what was just stored is slow to load.
-        let mut response = self.response;
-        if response.omega != drive.omega {
-            if response.omega.is_nan() {
-                self.complete(oscillator);
-            }
-            response = self.respond(drive.omega);
-            self.response = response;
-        }
+    pub fn increment(&self, response: &Response, amplitude: f64, start: &Point) -> Increment {
         let (head, tail) = &self.free;
         let (y, dy) = head.of(start.y, start.dy);
-        let (mut more_y, mut more_dy) = tail.of(start.y, start.dy);
-        if !drive.is_straight() {
-            let [_, _, u2, u3] = drive.signal;
-            let [[_, g1], [g2, g3], ..] = self.moments;
-            more_y += 2.0 * u2 * g2 + 6.0 * u3 * g3;
-            more_dy += 2.0 * u2 * g1 + 6.0 * u3 * g2;
+        let (more_y, more_dy) = tail.of(start.y, start.dy);
+        let (cos, sin) = start.phasor;
+        let slope = response.omega * cos;
+        let forced = |per_displacement, per_slope| amplitude * (per_displacement * sin + per_slope * slope);
+        let [turned, sine] = response.rotation;
+        Increment {
+            y: y + (more_y + forced(response.displacement.0, response.slope.0)),
+            dy: dy + (more_dy + forced(response.displacement.1, response.slope.1)),
+            phasor: rotate(start.phasor, (turned, response.angle.value * sine)),
         }
-        let increment = Increment {
-            y: y + (more_y + forced(drive.amplitude, start.phasor, response.position)),
-            dy: dy + (more_dy + forced(drive.amplitude, start.phasor, response.velocity)),
-            phasor: rotate(start.phasor, response.rotation),
-        };
-        (increment, response.angle)
     }
 }
 
 impl Increment {
+    /// Adds what the curvature and jerk of the signal add in one step.
+    #[inline(always)]
+    pub fn bend(&mut self, [.., u2, u3]: [f64; 4], step: &ShortStep) {
+        let [[_, g1], [g2, g3], ..] = step.moments;
+        self.y += 2.0 * u2 * g2 + 6.0 * u3 * g3;
+        self.dy += 2.0 * u2 * g1 + 6.0 * u3 * g2;
+    }
+
     /// The same for a step that is longer by `late` seconds, to first order; the signal is a straight line.
     #[inline(never)]
-    pub fn later(&self, oscillator: &Oscillator, drive: &Drive, start: &Point, late: f64) -> Self {
+    pub fn later(self, oscillator: &Oscillator, drive: &Drive, (y, dy): (f64, f64), late: f64) -> Self {
         let Oscillator { delta, omega0_squared, .. } = *oscillator;
-        let (y, dy) = (start.y + self.y, start.dy + self.dy);
+        let (y, dy) = (y + self.y, dy + self.dy);
         let strength = Complex64::new(omega0_squared, 2.0 * delta * drive.omega);
         let forcing = forced(drive.amplitude, self.phasor, strength);
         Self {
@@ -184,7 +180,7 @@ fn moment(oscillator: &Oscillator, n: usize, t: f64) -> f64 {
     let force = (1..=n).fold(1.0, |force, k| force * t / k as f64);
     let base = |k: usize| if k == n { force } else { 0.0 };
     let (mut before, mut last, mut sum) = (0.0, 0.0, 0.0);
-    for k in 0..n + 16 {
+    for k in n.max(1) - 1..n + 12 {
         let k1 = (k + 1) as f64;
         let next = (spring * (base(k) - before) + damping * k1 * (base(k + 1) - last)) / (k1 * (k1 + 1.0));
         sum += next;

@@ -6,8 +6,7 @@
 //! free part, which cancel near resonance; it holds for every damping ratio and at an undamped resonance. From `R` follow bounds
 //! of all derivatives, and those of `w`, from the second on, are those of `y`.
 //!
-//! Taylor's theorem with Lagrange's remainder then bounds each gap from below (R. E. Moore, "Interval Analysis", Prentice-Hall
-//! 1966).
+//! Taylor's theorem with Lagrange's remainder then bounds each gap from below (R. E. Moore, "Interval Analysis", Prentice-Hall 1966).
 
 use super::Moving;
 use super::coefficients::Coefficients;
@@ -54,9 +53,8 @@ pub(super) fn speed_squared(oscillator: &Oscillator, at: &Point) -> f64 {
 impl Sample {
     /// Whether `|w| < b` up to time `t`, but for a start at a wall, for any motion with `|w'''| <= jerk`.
     ///
-    /// The remainder `jerk h³/6` is at most `(jerk t/3) h²/2`, so that parabolas bound the gap to either wall from below. A concave
-    /// one is above 0 if it is at the end. Only that of the wall ahead can be convex and fall at first; its least value
-    /// is then in between.
+    /// The remainder `jerk h³/6` is at most `(jerk t/3) h²/2`, so that parabolas bound the gap to either wall from below. A concave one is
+    /// above 0 if it is at the end. Only that of the wall ahead can be convex and fall at first; its least value is then in between.
     #[inline(always)]
     pub fn is_open(&self, b: f64, jerk: f64, t: f64) -> bool {
         let Self { w, dw, ddw } = *self;

@@ -15,7 +15,9 @@ fn a_short_step_agrees_with_the_closed_form_for_every_drive() {
             let base = BaseMotion { drive, ..BaseMotion::default() };
             let [x, v, ..] = Segment::new(&oscillator, base, (0.7, -0.4)).derivatives(t);
             let start = Point { y: 0.7 - 0.3, dy: -0.4 + 0.2, phasor: (1.0, 0.0) };
-            let (increment, _) = step.increment(&oscillator, &drive, &start);
+            let response = step.response(&oscillator, omega);
+            let mut increment = step.increment(&response, drive.amplitude, &start);
+            increment.bend(drive.signal, &step);
             let (got, dgot) = (0.7 + increment.y - 0.2 * t, -0.4 + increment.dy);
             assert!((got - x).abs() < 2e-15, "{zeta} {omega}: {got} {x}");
             assert!(
