@@ -13,6 +13,7 @@ mod components;
 mod condition;
 mod continuation;
 mod convergence;
+mod crossings;
 mod curves;
 mod driven;
 mod forced_oscillator;
