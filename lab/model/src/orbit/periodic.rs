@@ -112,6 +112,12 @@ impl Periodic {
         Some(first.apart(middle, half.turn(), half.sign()))
     }
 
+    /// Numbers that a motion shares with its mirror image and with itself one period later.
+    pub(super) fn invariants(&self) -> SVector<f64, 5> {
+        let (sine, cosine) = self.gamma.sin_cos();
+        [self.sigma, self.c * cosine, self.c * sine, self.b, self.g].into()
+    }
+
     /// A complex pair of multipliers is on the unit circle.
     pub(super) fn on_circle_in_pairs(&self) -> bool {
         let mut pairs = self.multipliers.iter().filter(|[_, im]| im.abs() > 1e-3);
