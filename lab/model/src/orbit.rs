@@ -30,9 +30,9 @@ use serde::Serialize;
 
 pub use bifurcations::{BifurcationCurve, bifurcation_curves};
 pub use bounce::Bounce;
-pub use branch::{Bifurcation, Branch, Ended, Limits, Special};
+pub use branch::{Branch, Ended, Limits, Special};
 pub use components::{Component, Exploration, Response, random_state, response};
-pub use condition::Condition;
+pub use condition::{Bifurcation, Condition};
 pub use continuation::{branch_off, continue_both_ways, continue_from};
 pub use convergence::{Convergence, Difference, convergence};
 pub use curves::backbone;

@@ -93,7 +93,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             scene.g
         ))
     };
-    let limits = Limits { sigma: arguments.range, ..Limits::default() };
+    let [lowest, highest] = Limits::default().g;
+    let limits = Limits {
+        sigma: arguments.range,
+        g: [lowest, highest.max(2.0 * scene.g)],
+        ..Limits::default()
+    };
     if arguments.backbone {
         let branch = backbone(&scene, &limits).ok_or_else(none)?;
         return shown(&scene, "Exact backbone", &branch, arguments.json, || {
@@ -146,13 +151,15 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> 
 fn searched(found: &Response) -> String {
     let Response { starts, settled, found_once, .. } = found;
     let mut text: String =
-        "Complete: symmetric 1:1 motions, and what branches off them. Other patterns: only those that random starts lead to.\n".into();
+        "Complete: symmetric 1:1 motions and what branches off them. Other patterns: only those that random starts lead to.\n"
+            .into();
     if *starts > 0 {
         let percent = 100.0 * (*found_once).max(1) as f64 / *starts as f64;
         let about = if *found_once == 0 { "below" } else { "about" };
-        text += &format!(
-            "Of {starts} random starts {settled} settle on these; {found_once} components were found by one of them only. The probability\n\
-             that another start settles on a motion that is not listed is {about} {percent:.2} %.\n"
+        let _ = writeln!(
+            text,
+            "{settled} of {starts} random starts settle on these; components found by one start only: {found_once}. A further start leads \
+             to a\nmotion that is missing here with a probability of {about} {percent:.2} %."
         );
     }
     text

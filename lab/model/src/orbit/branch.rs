@@ -2,7 +2,7 @@
 
 use serde::{Serialize, Serializer, ser::SerializeStruct};
 
-use super::{bounce::Bounce, periodic::Periodic};
+use super::{bounce::Bounce, condition::Bifurcation, periodic::Periodic};
 
 /// Limits of a continuation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,7 +41,7 @@ pub enum Ended {
     /// The largest number of points was reached.
     #[serde(rename = "number of points")]
     Points,
-    /// Its motions, which are not 1:1, have been unstable for a hundred points: beyond its stable part, such a branch winds on within chaos.
+    /// Its motions, which are not 1:1, are unstable for a hundred points from there on: such a branch winds on within chaos.
     #[serde(rename = "unstable from there on")]
     Unstable,
     /// It joins the branch whose symmetry it breaks or whose period it doubles; beyond that it is its own mirror image.
@@ -53,23 +53,6 @@ pub enum Ended {
     /// The pattern of impacts ends here: a graze, or impacts that accumulate.
     #[serde(rename = "graze")]
     Graze,
-}
-
-/// How stability changes at a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Bifurcation {
-    /// A multiplier passes +1: the frequency response turns back.
-    #[serde(rename = "fold")]
-    Fold,
-    /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
-    #[serde(rename = "symmetry breaking")]
-    SymmetryBreaking,
-    /// A multiplier of the whole period passes -1.
-    #[serde(rename = "period doubling")]
-    PeriodDoubling,
-    /// A complex pair leaves the unit circle (Neimark-Sacker): modulation begins.
-    #[serde(rename = "torus")]
-    Torus,
 }
 
 /// A point where stability changes.
@@ -174,19 +157,6 @@ fn off(motion: &Periodic, [from, to]: [&Periodic; 2]) -> f64 {
     );
     let part = (beside.dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
     (beside - chord * part).norm()
-}
-
-impl Bifurcation {
-    /// As in a table.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
-        match self {
-            Bifurcation::Fold => "fold",
-            Bifurcation::SymmetryBreaking => "symmetry breaking",
-            Bifurcation::PeriodDoubling => "period doubling",
-            Bifurcation::Torus => "Neimark-Sacker",
-        }
-    }
 }
 
 impl Ended {

@@ -172,7 +172,7 @@ impl Search<'_> {
             .collect();
         // One that ended early, where continuation failed, may be a part of this one.
         let impacts = branch.points[0].pattern.impacts();
-        let part = |old: &Branch| old.typical().into_iter().all(|one| branch.passes(self.scene, one));
+        let part = |old: &Branch| old.typical().all(|one| branch.passes(self.scene, one));
         self.found.retain(|old| !part(&old.branch));
         self.found.push(Found { branch, hits });
         if depth == self.doublings || 2 * impacts > LONGEST {
@@ -183,7 +183,7 @@ impl Search<'_> {
                 continue;
             };
             // A branch that joins two such points is found from both.
-            if branch.points.len() > 1 && !branch.typical().into_iter().all(|one| self.known(one)) {
+            if branch.points.len() > 1 && !branch.typical().all(|one| self.known(one)) {
                 self.follow(branch, None, depth + 1);
             }
         }
@@ -228,15 +228,11 @@ fn apart(one: &Periodic, other: &Periodic) -> f64 {
 }
 
 impl Branch {
-    /// The outermost stable motions, and the one in the middle: a branch that has these contains this one.
-    fn typical(&self) -> Vec<&Periodic> {
-        let mut stable = self.points.iter().filter(|one| one.stable);
-        let ends = [
-            stable.next(),
-            stable.next_back(),
-            self.points.get(self.points.len() / 2),
-        ];
-        ends.into_iter().flatten().collect()
+    /// The motion in the middle, and that in the middle of the stable ones: a branch that has these contains this one.
+    fn typical(&self) -> impl Iterator<Item = &Periodic> {
+        let stable: Vec<&Periodic> = self.points.iter().filter(|one| one.stable).collect();
+        let middle = stable.get(stable.len() / 2).copied();
+        [self.points.get(self.points.len() / 2), middle].into_iter().flatten()
     }
 
     /// Whether this branch of a frequency response passes a motion or its mirror image.

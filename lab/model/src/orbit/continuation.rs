@@ -7,8 +7,8 @@
 use nalgebra::{Matrix4, Matrix6, SVector};
 
 use super::{
-    branch::{Bifurcation, Branch, Ended, Limits, Special},
-    condition::Condition,
+    branch::{Branch, Ended, Limits, Special},
+    condition::{Bifurcation, Condition},
     crossings::Part,
     pattern::{Returned, Unknowns, follow},
     periodic::{Periodic, newton},
@@ -131,6 +131,12 @@ impl Curve<'_> {
         Part(move |part: f64| self.motion(&self.correct(&from, &tangent, part * step)?))
     }
 
+    /// Whether a motion lies in the ranges; that of G does not limit a curve at constant G.
+    fn within(&self, limits: &Limits, sigma: f64, g: f64) -> bool {
+        let free = !matches!(self.condition, Condition::Excitation(_));
+        limits.contain(sigma, if free { g } else { limits.g[0] })
+    }
+
     /// Whether the branch is back at its start after a step to `next`.
     fn closes(&self, branch: &mut Branch, next: &Unknowns, turned: &Unknowns, step: f64, first: &Unknowns) -> bool {
         // A phase difference of 2 pi is the same motion.
@@ -220,11 +226,15 @@ pub fn continue_from(
         if curve.closes(&mut branch, &next, &turned, step, &first_tangent) {
             return branch;
         }
-        if !limits.contain(next[4], next[5]) {
+        if !curve.within(limits, next[4], next[5]) {
+            let inside = |one: &Special| curve.within(limits, one.motion.sigma, one.motion.g);
+            branch.special.retain(inside);
             branch.ended[1] = Ended::Range;
             return branch;
         }
         if winds(&branch) {
+            let stable = branch.points.iter().rposition(|one| one.stable);
+            branch.points.truncate(stable.unwrap_or(0) + 2);
             branch.ended[1] = Ended::Unstable;
             return branch;
         }

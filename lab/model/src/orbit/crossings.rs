@@ -4,10 +4,7 @@
 //! (docs/theory.md, eq. 27). A change of its sign shows one bifurcation; two of a kind between two points of the branch cancel, and are
 //! found where the function is closest to zero.
 
-use super::{
-    branch::{Bifurcation, Special},
-    periodic::Periodic,
-};
+use super::{branch::Special, condition::Bifurcation, periodic::Periodic};
 use crate::numerics::{golden_section, try_bisection};
 use nalgebra::Complex;
 
