@@ -7,7 +7,8 @@ use rand_chacha::{
 use vines_model::{
     Dimensionless,
     orbit::{
-        Bifurcation, Ended, Exploration, Limits, Periodic, Response, random_state, response, settle, symmetric_orbits,
+        Bifurcation, Branch, Ended, Exploration, Limits, Periodic, Response, random_state, response, settle,
+        symmetric_orbits,
     },
 };
 
@@ -195,16 +196,20 @@ fn a_drawing_needs_fewer_motions_and_stays_within_1e_4() {
 }
 
 #[test]
-fn an_isola_between_two_detunings_of_the_search_is_found() {
-    // It begins at G = 0.62167597 and is 0.005 wide here; the detunings are 0.01 apart.
-    let found = response(
-        &scene(0.6216766),
-        &Limits::default(),
-        Exploration { starts: 0, ..Exploration::default() },
-    );
-    list(&found);
-    assert_eq!(found.components.len(), 1);
-    assert_eq!(found.components[0].branch.ended, [Ended::Closed; 2]);
+fn an_isola_between_two_detunings_of_the_search_is_found_with_its_folds() {
+    // It begins at G = 0.62167597. Up to 0.6216766, it is narrower than the detunings are apart; its equations are nearly singular.
+    for n in 0..20 {
+        let g = 0.6216761 + 5e-7 * f64::from(n);
+        let found = response(
+            &scene(g),
+            &Limits::default(),
+            Exploration { starts: 0, ..Exploration::default() },
+        );
+        list(&found);
+        assert_eq!(found.components.len(), 1);
+        let Branch { ended, special, .. } = &found.components[0].branch;
+        assert_eq!((*ended, special.len()), ([Ended::Closed; 2], 2));
+    }
 }
 
 #[test]
