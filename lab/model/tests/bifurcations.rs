@@ -35,9 +35,8 @@ fn off_circle(curve: &BifurcationCurve, motion: &Periodic) -> f64 {
 /// The bifurcations of the 1:1 motions at one excitation.
 fn bifurcations(scene: &Dimensionless) -> Vec<Special> {
     let found = response(scene, &LIMITS, Exploration { starts: 0, seed: 1, doublings: 1 });
-    let one_to_one = |motion: &Periodic| motion.pattern.impacts() == 2 && motion.pattern.periods() == 1;
     let specials = found.components.into_iter().flat_map(|one| one.branch.special);
-    specials.filter(|one| one_to_one(&one.motion)).collect()
+    specials.filter(|one| one.motion.pattern.is_one_to_one()).collect()
 }
 
 /// Distance in (sigma, G) of a bifurcation from the curves of its kind.
@@ -134,4 +133,19 @@ fn every_bifurcation_of_a_response_lies_on_a_curve_and_every_point_of_a_curve_is
         );
         assert!(n > 0 || counts[0] > 15 && counts[1] > 15, "{counts:?}");
     }
+}
+
+#[test]
+fn two_bifurcations_of_a_kind_within_a_step_are_both_found() {
+    // A pair of multipliers leaves the circle at sigma = -0.6139 and returns at -0.5910: the count of those outside does not change.
+    let scene = Dimensionless::new(0.021564311166206957, 1.5038521612880744, 0.7548147212665681, 0.9354);
+    let mut found: Vec<f64> = bifurcations(&scene)
+        .into_iter()
+        .filter(|one| one.kind == Bifurcation::Torus)
+        .map(|one| one.motion.sigma)
+        .filter(|sigma| (-0.65..-0.55).contains(sigma))
+        .collect();
+    found.sort_by(f64::total_cmp);
+    println!("{found:?}");
+    assert!(matches!(found[..], [first, second] if (first + 0.6139).abs() < 1e-3 && (second + 0.5910).abs() < 1e-3));
 }

@@ -7,7 +7,8 @@ use rand_chacha::{
 use vines_model::{
     Dimensionless,
     orbit::{
-        Bifurcation, Ended, Exploration, Limits, Periodic, Response, random_state, response, settle, symmetric_orbits,
+        Bifurcation, Branch, Ended, Exploration, Limits, Periodic, Response, random_state, response, settle,
+        symmetric_orbits,
     },
 };
 
@@ -166,6 +167,82 @@ fn two_bifurcations_close_together_are_both_found() {
 }
 
 #[test]
+fn a_drawing_needs_fewer_motions_and_stays_within_1e_4() {
+    let found = followed(2.7);
+    for one in &found.components {
+        let place = |one: &Periodic| [one.sigma, one.c, one.b];
+        let drawn: Vec<_> = one.branch.drawn().into_iter().map(place).collect();
+        let beside = |motion: &Periodic, [from, to]: [[f64; 3]; 2]| {
+            let at = place(motion);
+            let dot = |a: &dyn Fn(usize) -> f64, b: &dyn Fn(usize) -> f64| (0..3).map(|n| a(n) * b(n)).sum::<f64>();
+            let (chord, off) = (|n: usize| to[n] - from[n], |n: usize| at[n] - from[n]);
+            let part = (dot(&off, &chord) / dot(&chord, &chord)).clamp(0.0, 1.0);
+            let rest = |n: usize| off(n) - part * chord(n);
+            dot(&rest, &rest).sqrt()
+        };
+        let lines = || drawn.windows(2).map(|pair| [pair[0], pair[1]]);
+        let largest = |motion| lines().map(|line| beside(motion, line)).fold(f64::MAX, f64::min);
+        let largest = one.branch.points.iter().map(largest).fold(0.0, f64::max);
+        println!(
+            "{}: {} of {} motions, {largest:.1e}",
+            one.name,
+            drawn.len(),
+            one.branch.points.len()
+        );
+        assert!(largest < 1.01e-4 && drawn.len() <= one.branch.points.len());
+    }
+    let longest = found.components[0].branch.drawn().len();
+    assert!(longest < found.components[0].branch.points.len());
+}
+
+#[test]
+fn an_isola_between_two_detunings_of_the_search_is_found_with_its_folds() {
+    // It begins at G = 0.62167597. Up to 0.6216766, it is narrower than the detunings are apart; its equations are nearly singular.
+    for n in 0..20 {
+        let g = 0.6216761 + 5e-7 * f64::from(n);
+        let found = response(
+            &scene(g),
+            &Limits::default(),
+            Exploration { starts: 0, ..Exploration::default() },
+        );
+        list(&found);
+        assert_eq!(found.components.len(), 1);
+        let Branch { ended, special, .. } = &found.components[0].branch;
+        assert_eq!((*ended, special.len()), ([Ended::Closed; 2], 2));
+    }
+}
+
+#[test]
+fn a_response_is_followed_at_any_excitation() {
+    let found = response(
+        &scene(11.0),
+        &Limits::default(),
+        Exploration { starts: 0, ..Exploration::default() },
+    );
+    let ended: Vec<_> = found.symmetric().map(|one| one.ended).collect();
+    println!("{ended:?}");
+    assert!((1..=4).contains(&ended.len()));
+}
+
+#[test]
+fn continuation_does_not_step_from_one_branch_to_another_one_close_by() {
+    // At G = 0.84278 two branches meet at sigma = -0.435; below, each of them has a fold there, and above none.
+    for (g, folds) in [(0.84275, 2), (0.8428, 0), (0.84285, 0)] {
+        let scene = Dimensionless::new(0.008650812324298334, 1.3523112557067605, 0.9126958726492855, g);
+        let limits = Limits { sigma: [-5.0, 5.0], ..Limits::default() };
+        let found = response(&scene, &limits, Exploration { starts: 0, ..Exploration::default() });
+        list(&found);
+        let special = found.symmetric().flat_map(|one| &one.special);
+        assert_eq!(
+            special.filter(|one| one.kind == Bifurcation::Fold).count(),
+            folds,
+            "G = {g}"
+        );
+        assert_eq!(found.symmetric().count(), 2, "G = {g}");
+    }
+}
+
+#[test]
 fn a_branch_reaches_the_motion_that_it_joins() {
     let scene = Dimensionless::new(0.004, 1.0, 0.5, 1.4982);
     let found = response(
@@ -195,6 +272,10 @@ fn missing(scene: &Dimensionless, count: usize, seed: u64) -> [usize; 4] {
     let default = Exploration::default();
     let starts = setting("STARTS", default.starts as u64) as usize;
     let found = response(scene, &Limits::default(), Exploration { starts, ..default });
+    println!(
+        "expected missing: {:.2}",
+        (found.found_once * count) as f64 / starts as f64
+    );
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut counts = [0; 4];
     for _ in 0..count {
@@ -202,7 +283,7 @@ fn missing(scene: &Dimensionless, count: usize, seed: u64) -> [usize; 4] {
         let Ok(Some(motion)) = settle(scene, sigma, random_state(&mut random), 800) else {
             continue;
         };
-        let other = usize::from(!(motion.pattern.impacts() == 2 && motion.pattern.periods() == 1));
+        let other = usize::from(!motion.pattern.is_one_to_one());
         counts[other] += 1;
         if motion.stable && !found.contains(scene, &motion) {
             println!(

@@ -8,8 +8,8 @@ use clap::Args;
 use vines::{
     numerics::range,
     orbit::{
-        Branch, Condition, Ended, Exploration, Limits, Orbit, Periodic, backbone, continue_both_ways, phase_resonant,
-        response, settle,
+        Branch, Condition, Ended, Exploration, Limits, Orbit, Periodic, Response, backbone, continue_both_ways,
+        phase_resonant, response, settle,
     },
     report::{Table, number, summary::parameters},
     scene::Dimensionless,
@@ -26,8 +26,10 @@ Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon
   multipliers  moduli of the multipliers of the half-period map; stable if all are below 1
 
 With --backbone or --response, orbits are followed by pseudo-arclength through folds and symmetry breaking, stable and unstable
-ones alike; --json prints all of them. --response lists every component: those of symmetric 1:1 orbits over the whole range, those
-that branch off at symmetry breakings and period doublings (mirror images count once), and those on which random starts settle.
+ones alike; --json prints all of them. --response lists the components: all of symmetric 1:1 orbits over the whole range, those that
+branch off at symmetry breakings and period doublings, three in a row (mirror images count once), and those of other patterns on
+which random starts settle. Beside those there may be more, as between chaotic motions: the output says how likely that is. A
+branch that is not 1:1 ends after a hundred unstable orbits in a row.
 
 Examples:
   vines orbit
@@ -91,7 +93,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             scene.g
         ))
     };
-    let limits = Limits { sigma: arguments.range, ..Limits::default() };
+    let [lowest, highest] = Limits::default().g;
+    let limits = Limits {
+        sigma: arguments.range,
+        g: [lowest, highest.max(2.0 * scene.g)],
+        ..Limits::default()
+    };
     if arguments.backbone {
         let branch = backbone(&scene, &limits).ok_or_else(none)?;
         return shown(&scene, "Exact backbone", &branch, arguments.json, || {
@@ -132,11 +139,30 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> 
         let count = found.components.len();
         let all = found.components.iter().map(|one| curve(&one.name, &one.branch));
         format!(
-            "{count} component{}\n\n{}",
+            "{count} component{}\n{}\n{}",
             if count == 1 { "" } else { "s" },
+            searched(&found),
             all.collect::<String>()
         )
     })
+}
+
+/// What was searched for, and how likely it is that something is missing.
+fn searched(found: &Response) -> String {
+    let Response { starts, settled, found_once, .. } = found;
+    let mut text: String =
+        "Complete: symmetric 1:1 motions and what branches off them. Other patterns: only those that random starts lead to.\n"
+            .into();
+    if *starts > 0 {
+        let percent = 100.0 * (*found_once).max(1) as f64 / *starts as f64;
+        let about = if *found_once == 0 { "below" } else { "about" };
+        let _ = writeln!(
+            text,
+            "{settled} of {starts} random starts settle on these; components found by one start only: {found_once}. A further start leads \
+             to a\nmotion that is missing here with a probability of {about} {percent:.2} %."
+        );
+    }
+    text
 }
 
 /// Parses FIRST:LAST.

@@ -29,8 +29,7 @@ pub fn bifurcation_curves(scene: &Dimensionless, limits: &Limits) -> Vec<Bifurca
     for g in equally_spaced(low, high, LEVELS).filter(|g| *g > 0.0) {
         let scene = Dimensionless { g, ..*scene };
         for component in response(&scene, limits, exploration).components {
-            let pattern = &component.branch.points[0].pattern;
-            if pattern.impacts() != 2 || pattern.periods() != 1 {
+            if !component.branch.points[0].pattern.is_one_to_one() {
                 continue;
             }
             for special in &component.branch.special {

@@ -1,8 +1,8 @@
 //! A continued curve: its limits, its motions, and where its stability changes.
 
-use serde::Serialize;
+use serde::{Serialize, Serializer, ser::SerializeStruct};
 
-use super::periodic::Periodic;
+use super::{bounce::Bounce, condition::Bifurcation, periodic::Periodic};
 
 /// Limits of a continuation.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -41,6 +41,9 @@ pub enum Ended {
     /// The largest number of points was reached.
     #[serde(rename = "number of points")]
     Points,
+    /// Its motions, which are not 1:1, are unstable for a hundred points from there on: such a branch winds on within chaos.
+    #[serde(rename = "unstable from there on")]
+    Unstable,
     /// It joins the branch whose symmetry it breaks or whose period it doubles; beyond that it is its own mirror image.
     #[serde(rename = "joins a shorter pattern")]
     Joins,
@@ -50,23 +53,6 @@ pub enum Ended {
     /// The pattern of impacts ends here: a graze, or impacts that accumulate.
     #[serde(rename = "graze")]
     Graze,
-}
-
-/// How stability changes at a point.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum Bifurcation {
-    /// A multiplier passes +1: the frequency response turns back.
-    #[serde(rename = "fold")]
-    Fold,
-    /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
-    #[serde(rename = "symmetry breaking")]
-    SymmetryBreaking,
-    /// A multiplier of the whole period passes -1.
-    #[serde(rename = "period doubling")]
-    PeriodDoubling,
-    /// A complex pair leaves the unit circle (Neimark-Sacker): modulation begins.
-    #[serde(rename = "torus")]
-    Torus,
 }
 
 /// A point where stability changes.
@@ -80,8 +66,8 @@ pub struct Special {
     pub motion: Periodic,
 }
 
-/// A continued curve.
-#[derive(Debug, Clone, PartialEq, Serialize)]
+/// A continued curve. It is serialised with its pattern once, and with the points that a drawing needs.
+#[derive(Debug, Clone, PartialEq)]
 pub struct Branch {
     /// Its motions in order.
     pub points: Vec<Periodic>,
@@ -91,17 +77,86 @@ pub struct Branch {
     pub ended: [Ended; 2],
 }
 
-impl Bifurcation {
-    /// As in a table.
-    #[must_use]
-    pub fn name(&self) -> &'static str {
-        match self {
-            Bifurcation::Fold => "fold",
-            Bifurcation::SymmetryBreaking => "symmetry breaking",
-            Bifurcation::PeriodDoubling => "period doubling",
-            Bifurcation::Torus => "Neimark-Sacker",
+/// Largest distance of a motion of a branch from the lines between those that are serialised, in sigma, G, B and both parts of C.
+const DRAWN: f64 = 1e-4;
+
+/// A motion of a branch as it is serialised; the impacts follow from the first one.
+#[derive(Serialize)]
+struct Point<'a> {
+    #[serde(rename = "G")]
+    g: f64,
+    sigma: f64,
+    #[serde(rename = "C")]
+    c: f64,
+    gamma: f64,
+    #[serde(rename = "B")]
+    b: f64,
+    multipliers: [[f64; 2]; 4],
+    stable: bool,
+    start: &'a Bounce,
+}
+
+impl<'a> From<&'a Periodic> for Point<'a> {
+    fn from(motion: &'a Periodic) -> Self {
+        let Periodic { g, sigma, c, gamma, b, multipliers, stable, ref bounces, .. } = *motion;
+        Self {
+            g,
+            sigma,
+            c,
+            gamma,
+            b,
+            multipliers,
+            stable,
+            start: &bounces[0],
         }
     }
+}
+
+impl Serialize for Branch {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let points: Vec<Point> = self.drawn().into_iter().map(Point::from).collect();
+        let mut fields = serializer.serialize_struct("Branch", 4)?;
+        fields.serialize_field("shape", &self.points[0].pattern)?;
+        fields.serialize_field("points", &points)?;
+        fields.serialize_field("special", &self.special)?;
+        fields.serialize_field("ended", &self.ended)?;
+        fields.end()
+    }
+}
+
+impl Branch {
+    /// The motions that a drawing needs: the ends, both sides of a change of stability, and those without which a line is too far off.
+    #[must_use]
+    pub fn drawn(&self) -> Vec<&Periodic> {
+        let points = &self.points;
+        let (mut drawn, mut from) = (vec![&points[0]], 0);
+        for to in 1..points.len() {
+            let changes = |n: usize| points[n].stable != points[n - 1].stable;
+            let passed = from + 1..to;
+            let ends = changes(to) || to > 1 && changes(to - 1);
+            if !passed.is_empty()
+                && (ends
+                    || passed
+                        .into_iter()
+                        .any(|n| off(&points[n], [&points[from], &points[to]]) > DRAWN))
+            {
+                from = to - 1;
+                drawn.push(&points[from]);
+            }
+        }
+        drawn.extend(points[1..].last());
+        drawn
+    }
+}
+
+/// Distance of a motion from the line between two others.
+fn off(motion: &Periodic, [from, to]: [&Periodic; 2]) -> f64 {
+    let (chord, beside) = (
+        to.invariants() - from.invariants(),
+        motion.invariants() - from.invariants(),
+    );
+    let part = (beside.dot(&chord) / chord.norm_squared()).clamp(0.0, 1.0);
+    (beside - chord * part).norm()
 }
 
 impl Ended {
@@ -112,6 +167,7 @@ impl Ended {
             Ended::Range => "left the range",
             Ended::Closed => "closed",
             Ended::Points => "number of points",
+            Ended::Unstable => "unstable from there on",
             Ended::Joins => "joins a shorter pattern",
             Ended::Resonance => "strong resonance",
             Ended::Graze => "graze",

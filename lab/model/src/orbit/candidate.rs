@@ -109,6 +109,11 @@ impl Family {
         Some(speeds.map(|b| self.at(b)))
     }
 
+    /// The smallest excitation under which there is a motion: the discriminant of the quadratic is zero.
+    pub(super) fn least_excitation(&self) -> f64 {
+        self.base_over_y.norm() / self.epsilon * self.beta.abs() / self.alpha.hypot(self.beta)
+    }
+
     fn at(&self, b: f64) -> Candidate {
         let y = Complex::new(self.beta * b, 1.0 + self.alpha * b);
         let v = y + self.kappa * b;

@@ -1,7 +1,7 @@
 //! The exact frequency response at one excitation: all of its components.
 //!
 //! Symmetric 1:1 motions have a closed form at every sigma, so that none is missed on the grid of detunings that is searched, both ends of
-//! the range included. Motions of other patterns are reached by switching branches at symmetry breakings and period doublings,
+//! the range and isolas between two of its detunings included. Motions of other patterns are reached by switching branches at symmetry breakings and period doublings,
 //! and by settling from random starts.
 
 use std::f64::consts::TAU;
@@ -13,11 +13,13 @@ use rand_chacha::{
 use serde::Serialize;
 
 use super::{
-    Bifurcation, Branch, Condition, ImpactPattern, Limits, Periodic, branch_off, continue_both_ways, settle,
+    Bifurcation, Branch, Condition, ImpactPattern, Limits, Periodic, branch_off, continue_both_ways,
+    search::least_excitation,
+    settle::{LONGEST, settle},
     symmetric_orbits,
 };
 use crate::Dimensionless;
-use crate::numerics::equally_spaced;
+use crate::numerics::{equally_spaced, golden_section};
 
 /// The exact frequency response at one excitation.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -27,6 +29,13 @@ pub struct Response {
     pub g: f64,
     /// Its components; those of one pattern are consecutive, symmetric 1:1 first.
     pub components: Vec<Component>,
+    /// Random starts from which motions were searched for.
+    pub starts: usize,
+    /// Those of them that settled on a periodic motion.
+    pub settled: usize,
+    /// Components that were found by a random start and by one only. Their number over that of the starts estimates (Good and Turing) the
+    /// probability that another start settles on a motion that is missing here.
+    pub found_once: usize,
 }
 
 /// A curve of motions that continuation follows without a break.
@@ -52,7 +61,7 @@ pub struct Exploration {
 
 impl Default for Exploration {
     fn default() -> Self {
-        Self { starts: 900, seed: 1, doublings: 3 }
+        Self { starts: 2000, seed: 1, doublings: 3 }
     }
 }
 
@@ -88,24 +97,40 @@ pub fn response(scene: &Dimensionless, limits: &Limits, exploration: Exploration
         found: Vec::new(),
     };
     let [low, high] = limits.sigma;
-    for sigma in equally_spaced(low, high, GRID) {
+    let grid: Vec<f64> = equally_spaced(low, high, GRID).collect();
+    let least = |sigma: f64| least_excitation(scene, sigma);
+    // An isola between two detunings of the grid surrounds a minimum of the least excitation.
+    let narrow = grid
+        .windows(3)
+        .filter(|near| least(near[1]) <= least(near[0]).min(least(near[2])));
+    let narrow = narrow.map(|near| golden_section(near[0], near[2], least));
+    for sigma in grid.iter().copied().chain(narrow) {
         for orbit in symmetric_orbits(scene, sigma) {
             let conditions = [Condition::Sigma(sigma), condition];
             let pattern = ImpactPattern::symmetric();
             if let Some(motion) = Periodic::find(scene, &pattern, &orbit.unknowns(), conditions) {
-                search.add(&motion);
+                search.add(&motion, None);
             }
         }
     }
     let mut random = ChaCha8Rng::seed_from_u64(exploration.seed);
+    let mut settled = 0;
     for _ in 0..exploration.starts {
         let part = random.next_u64() as f64 / u64::MAX as f64;
         let (sigma, state) = (low + part * (high - low), random_state(&mut random));
         if let Ok(Some(motion)) = settle(scene, sigma, state, SETTLED) {
-            search.add(&motion);
+            settled += 1;
+            search.add(&motion, Some(1));
         }
     }
-    search.named()
+    let found_once = search.found.iter().filter(|one| one.hits == Some(1)).count();
+    Response {
+        g: scene.g,
+        components: search.named(),
+        starts: exploration.starts,
+        settled,
+        found_once,
+    }
 }
 
 struct Search<'a> {
@@ -113,23 +138,31 @@ struct Search<'a> {
     limits: &'a Limits,
     condition: Condition,
     doublings: usize,
-    found: Vec<Branch>,
+    found: Vec<Found>,
+}
+
+struct Found {
+    branch: Branch,
+    /// The starts that settled on it, if one of them found it.
+    hits: Option<usize>,
 }
 
 impl Search<'_> {
     /// Follows the component of a motion, and those that branch off it, unless it is known.
-    fn add(&mut self, motion: &Periodic) {
-        if !self.known(motion) {
+    fn add(&mut self, motion: &Periodic, hits: Option<usize>) {
+        if let Some(known) = self.found.iter_mut().find(|one| one.branch.passes(self.scene, motion)) {
+            known.hits = known.hits.map(|one| one + 1);
+        } else {
             let branch = continue_both_ways(self.scene, motion, self.condition, self.limits);
-            self.follow(branch, 0);
+            self.follow(branch, hits, 0);
         }
     }
 
     fn known(&self, motion: &Periodic) -> bool {
-        self.found.iter().any(|branch| branch.passes(self.scene, motion))
+        self.found.iter().any(|one| one.branch.passes(self.scene, motion))
     }
 
-    fn follow(&mut self, branch: Branch, depth: usize) {
+    fn follow(&mut self, branch: Branch, hits: Option<usize>, depth: usize) {
         let breaking = [Bifurcation::SymmetryBreaking, Bifurcation::PeriodDoubling];
         let specials: Vec<_> = branch
             .special
@@ -138,10 +171,11 @@ impl Search<'_> {
             .cloned()
             .collect();
         // One that ended early, where continuation failed, may be a part of this one.
-        self.found
-            .retain(|old| !branch.passes(self.scene, &old.points[old.points.len() / 2]));
-        self.found.push(branch);
-        if depth == self.doublings {
+        let impacts = branch.points[0].pattern.impacts();
+        let part = |old: &Branch| old.typical().all(|one| branch.passes(self.scene, one));
+        self.found.retain(|old| !part(&old.branch));
+        self.found.push(Found { branch, hits });
+        if depth == self.doublings || 2 * impacts > LONGEST {
             return;
         }
         for special in specials {
@@ -149,29 +183,29 @@ impl Search<'_> {
                 continue;
             };
             // A branch that joins two such points is found from both.
-            if branch.points.len() > 1 && !self.known(&branch.points[branch.points.len() / 2]) {
-                self.follow(branch, depth + 1);
+            if branch.points.len() > 1 && !branch.typical().all(|one| self.known(one)) {
+                self.follow(branch, None, depth + 1);
             }
         }
     }
 
-    fn named(mut self) -> Response {
-        let order = |one: &Branch| {
-            let pattern = &one.points[0].pattern;
+    fn named(mut self) -> Vec<Component> {
+        let pattern = |one: &Found| one.branch.points[0].pattern.clone();
+        let order = |pattern: ImpactPattern| {
             (
                 pattern.periods() as usize * pattern.impacts(),
                 pattern.periods(),
                 !pattern.mirrored,
             )
         };
-        self.found.sort_by_key(order);
-        let names: Vec<String> = self.found.iter().map(|one| one.points[0].pattern.name()).collect();
-        let components = self.found.into_iter().enumerate().map(|(n, branch)| {
+        self.found.sort_by_key(|one| order(pattern(one)));
+        let names: Vec<String> = self.found.iter().map(|one| pattern(one).name()).collect();
+        let components = self.found.into_iter().enumerate().map(|(n, Found { branch, .. })| {
             let of = names.iter().filter(|name| **name == names[n]).count();
             let number = names[..=n].iter().filter(|name| **name == names[n]).count();
             Component { name: format!("{}, {number} of {of}", names[n]), branch }
         });
-        Response { g: self.scene.g, components: components.collect() }
+        components.collect()
     }
 }
 
@@ -189,18 +223,18 @@ impl Response {
     }
 }
 
-/// Numbers that a motion shares with its mirror image and with itself one period later.
-fn invariants(motion: &Periodic) -> [f64; 5] {
-    let (sine, cosine) = motion.gamma.sin_cos();
-    [motion.sigma, motion.c * cosine, motion.c * sine, motion.b, motion.g]
-}
-
 fn apart(one: &Periodic, other: &Periodic) -> f64 {
-    let (one, other) = (invariants(one), invariants(other));
-    one.iter().zip(other).map(|(a, b)| (a - b).powi(2)).sum::<f64>().sqrt()
+    (one.invariants() - other.invariants()).norm()
 }
 
 impl Branch {
+    /// The motion in the middle, and that in the middle of the stable ones: a branch that has these contains this one.
+    fn typical(&self) -> impl Iterator<Item = &Periodic> {
+        let stable: Vec<&Periodic> = self.points.iter().filter(|one| one.stable).collect();
+        let middle = stable.get(stable.len() / 2).copied();
+        [self.points.get(self.points.len() / 2), middle].into_iter().flatten()
+    }
+
     /// Whether this branch of a frequency response passes a motion or its mirror image.
     #[must_use]
     pub fn passes(&self, scene: &Dimensionless, motion: &Periodic) -> bool {

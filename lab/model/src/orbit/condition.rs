@@ -1,11 +1,9 @@
 //! Equations that select a motion, in addition to the four that close it.
 
 use nalgebra::{Matrix4, Matrix6, RowSVector};
+use serde::Serialize;
 
-use super::{
-    branch::Bifurcation,
-    pattern::{ImpactPattern, Returned, Unknowns, follow},
-};
+use super::pattern::{ImpactPattern, Returned, Unknowns, follow};
 use crate::{Dimensionless, Resonance};
 
 /// An equation that selects a motion, in addition to the four that close it.
@@ -23,11 +21,41 @@ pub enum Condition {
     Bifurcation(Bifurcation),
 }
 
+/// How stability changes at a point.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+pub enum Bifurcation {
+    /// A multiplier passes +1: the frequency response turns back.
+    #[serde(rename = "fold")]
+    Fold,
+    /// The half-period map of a mirrored motion has a multiplier passing -1: it loses its symmetry.
+    #[serde(rename = "symmetry breaking")]
+    SymmetryBreaking,
+    /// A multiplier of the whole period passes -1.
+    #[serde(rename = "period doubling")]
+    PeriodDoubling,
+    /// A complex pair leaves the unit circle (Neimark-Sacker): modulation begins.
+    #[serde(rename = "torus")]
+    Torus,
+}
+
 /// The value of an equation and its derivative by the unknowns.
 pub(super) type Row = (f64, RowSVector<f64, 6>);
 
 /// Step of the central differences for conditions on second derivatives of the map. It affects how fast Newton's method converges, not where to.
 const STEP: f64 = 1e-6;
+
+impl Bifurcation {
+    /// As in a table.
+    #[must_use]
+    pub fn name(&self) -> &'static str {
+        match self {
+            Bifurcation::Fold => "fold",
+            Bifurcation::SymmetryBreaking => "symmetry breaking",
+            Bifurcation::PeriodDoubling => "period doubling",
+            Bifurcation::Torus => "Neimark-Sacker",
+        }
+    }
+}
 
 impl Condition {
     /// What selects the backbone by the scene's definition.

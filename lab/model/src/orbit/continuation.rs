@@ -7,8 +7,9 @@
 use nalgebra::{Matrix4, Matrix6, SVector};
 
 use super::{
-    branch::{Bifurcation, Branch, Ended, Limits, Special},
-    condition::Condition,
+    branch::{Branch, Ended, Limits, Special},
+    condition::{Bifurcation, Condition},
+    crossings::Part,
     pattern::{Returned, Unknowns, follow},
     periodic::{Periodic, newton},
 };
@@ -19,22 +20,26 @@ use crate::numerics::try_bisection;
 const SHORTEST: f64 = 1e-7;
 /// Cosine of the largest turn of the tangent in a step.
 const STRAIGHT: f64 = 0.98;
-/// Moduli this close to one still count as inside: rounding in conservative motions.
-const ON_CIRCLE: f64 = 1e-7;
-
 /// Part of the longest step with which a branch reaches the one that it joins: near there, the plane at the end of a step meets both.
 const APPROACH: f64 = 1.0 / 256.0;
-/// Fraction of a step to which a bifurcation is located.
+/// Points without a stable motion after which a branch that is not 1:1 ends.
+const UNSTABLE: usize = 100;
+/// Fraction of a step to which the end of a branch is located.
 const FINEST: f64 = 1e-12;
+/// Difference in sigma of a bifurcation that is located twice.
+const SAME: f64 = 1e-9;
 
 struct Curve<'a> {
     scene: &'a Dimensionless,
     start: &'a Periodic,
     condition: Condition,
+    /// Longest step with which a branch joins another.
+    reach: f64,
 }
 
 impl Curve<'_> {
-    fn tangent(&self, x: &Unknowns, towards: &Unknowns) -> Option<Unknowns> {
+    /// The direction of the curve, and the sign of its equations' determinant, which is the same all along the curve.
+    fn tangent(&self, x: &Unknowns, towards: &Unknowns) -> Option<(Unknowns, f64)> {
         let returned = follow(self.scene, &self.start.pattern, x)?;
         let mut matrix = Matrix6::zeros();
         matrix.fixed_rows_mut::<4>(0).copy_from(&returned.by);
@@ -45,9 +50,10 @@ impl Curve<'_> {
         matrix.set_row(5, &towards.transpose());
         let mut right = SVector::<f64, 6>::zeros();
         right[5] = 1.0;
-        let tangent = matrix.lu().solve(&right)?;
+        let lu = matrix.lu();
+        let tangent = lu.solve(&right)?;
         let length = tangent.norm();
-        (length.is_finite() && length > 0.0).then(|| tangent / length)
+        (length.is_finite() && length > 0.0).then(|| (tangent / length, lu.determinant().signum()))
     }
 
     /// The intersection of the curve with the plane at the end of a step along the tangent.
@@ -63,12 +69,24 @@ impl Curve<'_> {
         ((found - ahead).norm() <= step.abs()).then_some(found)
     }
 
-    /// The next point, its tangent and its motion; None where the step must shrink.
-    fn advance(&self, x: &Unknowns, tangent: &Unknowns, step: f64) -> Option<(Unknowns, Unknowns, Periodic)> {
-        let next = self.correct(x, tangent, step)?;
-        let turned = self.tangent(&next, tangent)?;
+    /// The next point, its tangent and its motion after `last`; None where the step must shrink.
+    fn advance(
+        &self,
+        last: &Periodic,
+        (tangent, sign): (&Unknowns, f64),
+        step: f64,
+    ) -> Option<(Unknowns, Unknowns, Periodic)> {
+        let next = self.correct(&last.unknowns(), tangent, step)?;
+        let (turned, now) = self.tangent(&next, tangent)?;
         let motion = self.motion(&next)?;
-        (turned.dot(tangent) >= STRAIGHT).then_some((next, turned, motion))
+        // Where two curves nearly meet, a long step leads from one to the other, on which the sign is the opposite one. Where a branch
+        // passes the motion that it doubles, it changes as well.
+        let same = if joins(last, &motion) {
+            step <= self.reach
+        } else {
+            now == sign
+        };
+        (same && turned.dot(tangent) >= STRAIGHT).then_some((next, turned, motion))
     }
 
     fn motion(&self, x: &Unknowns) -> Option<Periodic> {
@@ -89,9 +107,34 @@ impl Curve<'_> {
                 return true;
             }
             Condition::Bifurcation(_) => {}
-            _ => branch.special.extend(self.located(last, tangent, step)),
+            _ => {
+                let found = self.part(last.unknowns(), tangent * step).crossings(last, motion);
+                branch.special.extend(found);
+                branch.special.extend(self.pairs(&branch.points, motion));
+            }
         }
         false
+    }
+
+    /// The bifurcations that cancel between the point before the last one and `motion`.
+    fn pairs(&self, points: &[Periodic], motion: &Periodic) -> Vec<Special> {
+        let [.., before, last] = points else {
+            return Vec::new();
+        };
+        let from = before.unknowns();
+        self.part(from, motion.unknowns() - from).pairs([before, last, motion])
+    }
+
+    /// The part of the curve beside `chord`.
+    fn part(&self, from: Unknowns, chord: Unknowns) -> Part<impl Fn(f64) -> Option<Periodic>> {
+        let (step, tangent) = (chord.norm(), chord.normalize());
+        Part(move |part: f64| self.motion(&self.correct(&from, &tangent, part * step)?))
+    }
+
+    /// Whether a motion lies in the ranges; that of G does not limit a curve at constant G.
+    fn within(&self, limits: &Limits, sigma: f64, g: f64) -> bool {
+        let free = !matches!(self.condition, Condition::Excitation(_));
+        limits.contain(sigma, if free { g } else { limits.g[0] })
     }
 
     /// Whether the branch is back at its start after a step to `next`.
@@ -102,9 +145,16 @@ impl Curve<'_> {
         if branch.points.len() <= 10 || apart.norm() >= step || turned.dot(first) <= 0.9 {
             return false;
         }
-        if let Some(last) = branch.points.last().filter(|last| outside(last) != outside(self.start)) {
+        if apart.dot(turned) < 0.0 {
             // A little beyond the start, which the plane at the end of the step may miss.
-            branch.special.extend(self.located(last, turned, 1.1 * apart.norm()));
+            let part = self.part(*next, turned * (1.1 * apart.norm()));
+            let found = branch.points.last().map(|last| part.crossings(last, self.start));
+            branch.special.extend(found.into_iter().flatten());
+        } else if let [first, .., last] = &branch.special[..]
+            && (first.motion.sigma - last.motion.sigma).abs() < SAME
+        {
+            // The last step passed the start, and what is beyond it was known.
+            branch.special.pop();
         }
         branch.ended[1] = Ended::Closed;
         true
@@ -118,58 +168,16 @@ impl Curve<'_> {
         let (end, _) = try_bisection(0.0, 1.0, FINEST, before).ok()?;
         at(end)
     }
-
-    /// Where the number of multipliers outside the unit circle changes within a step: close to a double multiplier, more than once.
-    fn located(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Vec<Special> {
-        let x = from.unknowns();
-        let at = |part: f64| self.motion(&self.correct(&x, tangent, part * step)?);
-        let Some(end) = at(1.0) else {
-            return Vec::new();
-        };
-        let (mut found, mut last, mut begin, mut stable) = (Vec::new(), from.clone(), 0.0, from.stable);
-        while outside(&last) != outside(&end) {
-            let like_last = |part: f64| at(part).map(|one| outside(&one) == outside(&last)).ok_or(());
-            let Ok((_, beyond)) = try_bisection(begin, 1.0, FINEST, like_last) else {
-                break;
-            };
-            let Some(motion) = at(beyond) else {
-                break;
-            };
-            let count = outside(&motion);
-            // Close to the circle, rounding decides what is stable.
-            let beyond_stable = if count == outside(&end) { end.stable } else { count == 0 };
-            found.extend(self.special(&motion, stable || beyond_stable));
-            (last, begin, stable) = (motion, beyond, beyond_stable);
-        }
-        found
-    }
-
-    /// The bifurcation at a motion with a multiplier on the unit circle, of a motion that is stable on one side.
-    fn special(&self, motion: &Periodic, of_stable: bool) -> Option<Special> {
-        let [re, im] = motion
-            .multipliers
-            .into_iter()
-            .min_by(|one, other| distance(one).total_cmp(&distance(other)))?;
-        let kind = if im.abs() > 1e-4 {
-            Bifurcation::Torus
-        } else if re > 0.0 {
-            Bifurcation::Fold
-        } else if self.start.pattern.mirrored {
-            Bifurcation::SymmetryBreaking
-        } else {
-            Bifurcation::PeriodDoubling
-        };
-        Some(Special { kind, of_stable, motion: motion.clone() })
-    }
 }
 
-fn distance([re, im]: &[f64; 2]) -> f64 {
-    (re.hypot(*im) - 1.0).abs()
-}
-
-fn outside(motion: &Periodic) -> usize {
-    let moduli = motion.moduli();
-    moduli.iter().filter(|one| **one > 1.0 + ON_CIRCLE).count()
+/// Its motions are not 1:1, and the last ones are unstable.
+fn winds(branch: &Branch) -> bool {
+    let last = branch
+        .points
+        .len()
+        .checked_sub(UNSTABLE)
+        .map(|from| &branch.points[from..]);
+    !branch.points[0].pattern.is_one_to_one() && last.is_some_and(|last| last.iter().all(|one| !one.stable))
 }
 
 /// Between two motions, their branch passes the motion that it doubles.
@@ -189,14 +197,14 @@ pub fn continue_from(
     towards: &Unknowns,
     limits: &Limits,
 ) -> Branch {
-    let curve = Curve { scene, start, condition };
+    let reach = APPROACH * limits.step;
+    let curve = Curve { scene, start, condition, reach };
     let mut branch = Branch {
         points: vec![start.clone()],
         special: Vec::new(),
         ended: [Ended::Graze; 2],
     };
-    let mut x = start.unknowns();
-    let Some(mut tangent) = curve.tangent(&x, towards) else {
+    let Some((mut tangent, sign)) = curve.tangent(&start.unknowns(), towards) else {
         return branch;
     };
     let first_tangent = tangent;
@@ -206,14 +214,11 @@ pub fn continue_from(
             branch.ended[1] = Ended::Points;
             return branch;
         }
-        let Some((next, turned, motion)) = curve.advance(&x, &tangent, step) else {
+        let last = branch.points.last().unwrap_or(start);
+        let Some((next, turned, motion)) = curve.advance(last, (&tangent, sign), step) else {
             step /= 2.0;
             continue;
         };
-        if step > APPROACH * limits.step && joins(branch.points.last().unwrap_or(start), &motion) {
-            step /= 2.0;
-            continue;
-        }
         if curve.ends(&mut branch, &tangent, step, &motion) {
             return branch;
         }
@@ -221,12 +226,20 @@ pub fn continue_from(
         if curve.closes(&mut branch, &next, &turned, step, &first_tangent) {
             return branch;
         }
-        if !limits.contain(next[4], next[5]) {
+        if !curve.within(limits, next[4], next[5]) {
+            let inside = |one: &Special| curve.within(limits, one.motion.sigma, one.motion.g);
+            branch.special.retain(inside);
             branch.ended[1] = Ended::Range;
             return branch;
         }
+        if winds(&branch) {
+            let stable = branch.points.iter().rposition(|one| one.stable);
+            branch.points.truncate(stable.unwrap_or(0) + 2);
+            branch.ended[1] = Ended::Unstable;
+            return branch;
+        }
         let straight = turned.dot(&tangent) > 0.5 * (1.0 + STRAIGHT);
-        (x, tangent) = (next, turned);
+        tangent = turned;
         if straight {
             step = (step * 1.5).min(limits.step);
         }
@@ -268,7 +281,7 @@ pub fn branch_off(scene: &Dimensionless, at: &Special, condition: Condition, lim
     let mut towards = Unknowns::zeros();
     towards.fixed_rows_mut::<4>(0).copy_from(&aside);
     let doubled = Periodic { pattern: from.pattern.doubled(), ..from.clone() };
-    let curve = Curve { scene, start: &doubled, condition };
+    let curve = Curve { scene, start: &doubled, condition, reach: 0.0 };
     let x = curve.correct(&from.unknowns(), &towards, ASIDE)?;
     let start = curve.motion(&x)?;
     let mut branch = continue_from(scene, &start, condition, &towards, limits);

@@ -30,7 +30,13 @@ impl ImpactPattern {
     /// Two impacts per period, half a period apart.
     #[must_use]
     pub fn is_symmetric(&self) -> bool {
-        self.mirrored && self.periods() == 1 && self.impacts() == 2
+        self.mirrored && self.is_one_to_one()
+    }
+
+    /// Two impacts per period.
+    #[must_use]
+    pub fn is_one_to_one(&self) -> bool {
+        self.periods() == 1 && self.impacts() == 2
     }
 
     /// As in a table.

@@ -40,8 +40,9 @@ pub struct Periodic {
     pub(super) durations: Vec<f64>,
 }
 
-/// Size of the last Newton correction.
+/// Size of the last Newton correction, and that from which on a correction that does not shrink is rounding: small isolas are nearly singular.
 const CONVERGED: f64 = 1e-12;
+const ROUNDING: f64 = 1e-10;
 const ROUNDS: usize = 30;
 /// Closing error of a motion that is known in closed form, and is not one with an earlier contact.
 const CLOSED: f64 = 1e-8;
@@ -110,6 +111,12 @@ impl Periodic {
         let half = self.pattern.halved()?;
         let (first, middle) = (&self.bounces[0], &self.bounces[half.walls.len()]);
         Some(first.apart(middle, half.turn(), half.sign()))
+    }
+
+    /// Numbers that a motion shares with its mirror image and with itself one period later.
+    pub(super) fn invariants(&self) -> SVector<f64, 5> {
+        let (sine, cosine) = self.gamma.sin_cos();
+        [self.sigma, self.c * cosine, self.c * sine, self.b, self.g].into()
     }
 
     /// A complex pair of multipliers is on the unit circle.
@@ -185,6 +192,7 @@ pub(super) fn newton(
     mut x: Unknowns,
     conditions: impl Fn(&Unknowns, &Returned) -> [Row; 2],
 ) -> Option<Unknowns> {
+    let mut last = f64::INFINITY;
     for _ in 0..ROUNDS {
         let returned = follow(scene, pattern, &x)?;
         let mut matrix = Matrix6::zeros();
@@ -201,9 +209,10 @@ pub(super) fn newton(
             return None;
         }
         x -= correction;
-        if size < CONVERGED {
+        if size < CONVERGED || size < ROUNDING && size > 0.5 * last {
             return Some(x);
         }
+        last = size;
     }
     None
 }

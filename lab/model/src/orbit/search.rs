@@ -79,6 +79,11 @@ pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
         .collect()
 }
 
+/// The smallest G under which there is a symmetric 1:1 orbit at the detuning `sigma`, if its flights meet no wall.
+pub(super) fn least_excitation(scene: &Dimensionless, sigma: f64) -> f64 {
+    Family::new(scene, 1.0 + scene.epsilon * sigma).map_or(f64::INFINITY, |family| family.least_excitation())
+}
+
 /// Frequencies `1 + epsilon sinh(u)` at equal steps of u.
 fn grid(epsilon: f64) -> Vec<f64> {
     let [low, high] = SEARCHED.map(|omega| ((omega - 1.0) / epsilon).asinh());

@@ -21,7 +21,7 @@ const EXACT: f64 = 1e-8;
 /// Patterns that are tried, from the shortest: after a period doubling, only the second is stable.
 const MULTIPLES: usize = 3;
 /// Longest pattern in the search, impacts.
-const LONGEST: usize = 48;
+pub(super) const LONGEST: usize = 48;
 
 /// The stable periodic motion that `start` = (q1, q1', q2, q2') leads to after `periods` at the detuning `sigma` and
 /// the scene's G; None without a repeating pattern, without impacts, or if the particle sticks.

@@ -1,0 +1,109 @@
+//! Where multipliers cross the unit circle along a branch.
+//!
+//! Each kind of bifurcation has a test function of the multipliers that is zero there, and smooth also where multipliers meet
+//! (docs/theory.md, eq. 27). A change of its sign shows one bifurcation; two of a kind between two points of the branch cancel, and are
+//! found where the function is closest to zero.
+
+use super::{branch::Special, condition::Bifurcation, periodic::Periodic};
+use crate::numerics::{golden_section, try_bisection};
+use nalgebra::Complex;
+
+/// Test functions below this are rounding: in conservative motions, some are zero everywhere.
+const ROUNDING: f64 = 1e-9;
+/// Largest distance of a multiplier from the circle where a crossing is located.
+const LOCATED: f64 = 1e-4;
+/// Fraction of a step to which a bifurcation is located.
+const FINEST: f64 = 1e-12;
+
+/// A part of a branch, from 0 to 1.
+pub(super) struct Part<F: Fn(f64) -> Option<Periodic>>(pub F);
+
+impl<F: Fn(f64) -> Option<Periodic>> Part<F> {
+    /// The bifurcations between two neighbouring points, in order.
+    pub(super) fn crossings(&self, from: &Periodic, to: &Periodic) -> Vec<Special> {
+        let found = kinds(from)
+            .into_iter()
+            .filter_map(|kind| self.crossing(kind, [(0.0, from), (1.0, to)]));
+        let mut found: Vec<_> = found.collect();
+        found.sort_by(|one, other| one.0.total_cmp(&other.0));
+        found.into_iter().map(|one| one.1).collect()
+    }
+
+    /// The bifurcations that cancel around the second of three neighbouring points.
+    pub(super) fn pairs(&self, points: [&Periodic; 3]) -> Vec<Special> {
+        kinds(points[0])
+            .into_iter()
+            .flat_map(|kind| self.pair(kind, points))
+            .collect()
+    }
+
+    fn pair(&self, kind: Bifurcation, points: [&Periodic; 3]) -> Vec<Special> {
+        let sign = test(kind, points[1]).signum();
+        let [before, at, after] = points.map(|one| sign * test(kind, one));
+        // A smooth function does not come nearer to zero than at the points by more than it changes between them.
+        if at >= before || at > after || at >= before.max(after) - at {
+            return Vec::new();
+        }
+        let value = |part: f64| (self.0)(part).map_or(f64::INFINITY, |one| sign * test(kind, &one));
+        let nearest = golden_section(0.0, 1.0, value);
+        let Some(motion) = (self.0)(nearest) else {
+            return Vec::new();
+        };
+        let both = [
+            [(0.0, points[0]), (nearest, &motion)],
+            [(nearest, &motion), (1.0, points[2])],
+        ];
+        both.into_iter()
+            .filter_map(|ends| Some(self.crossing(kind, ends)?.1))
+            .collect()
+    }
+
+    /// The part at which a test function passes zero between two motions, and the motion there; None if it does not, or if only a
+    /// saddle is neutral.
+    fn crossing(&self, kind: Bifurcation, [from, to]: [(f64, &Periodic); 2]) -> Option<(f64, Special)> {
+        let [first, last] = [from, to].map(|one| test(kind, one.1));
+        if first * last >= 0.0 || first.abs().max(last.abs()) < ROUNDING {
+            return None;
+        }
+        let like_first = |part: f64| (self.0)(part).map(|one| test(kind, &one) * first > 0.0).ok_or(());
+        let (_, beyond) = try_bisection(from.0, to.0, FINEST, like_first).ok()?;
+        let motion = (self.0)(beyond)?;
+        let of_stable = motion.bounds_stability();
+        on_circle(kind, &motion).then_some((beyond, Special { kind, of_stable, motion }))
+    }
+}
+
+fn kinds(motion: &Periodic) -> [Bifurcation; 3] {
+    let flip = if motion.pattern.mirrored {
+        Bifurcation::SymmetryBreaking
+    } else {
+        Bifurcation::PeriodDoubling
+    };
+    [Bifurcation::Fold, flip, Bifurcation::Torus]
+}
+
+/// Zero where a multiplier is +1 or -1, or where the product of two is +1.
+fn test(kind: Bifurcation, motion: &Periodic) -> f64 {
+    let multipliers = motion.multipliers.map(|[re, im]| Complex::new(re, im));
+    match kind {
+        Bifurcation::Fold => multipliers.iter().map(|one| one - 1.0).product::<Complex<f64>>().re,
+        Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => {
+            multipliers.iter().map(|one| one + 1.0).product::<Complex<f64>>().re
+        }
+        Bifurcation::Torus => {
+            let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+            let products = pairs.map(|(a, b)| multipliers[a] * multipliers[b] - 1.0);
+            products.iter().product::<Complex<f64>>().re
+        }
+    }
+}
+
+/// Two real multipliers whose product is one are a neutral saddle, not a bifurcation.
+fn on_circle(kind: Bifurcation, motion: &Periodic) -> bool {
+    let complex = kind == Bifurcation::Torus;
+    let mut of_kind = motion
+        .multipliers
+        .iter()
+        .filter(|[_, im]| !complex || im.abs() > LOCATED);
+    of_kind.any(|[re, im]| (re.hypot(*im) - 1.0).abs() < LOCATED)
+}
