@@ -39,9 +39,6 @@ pub enum Address {
 
 impl Address {
     /// The address of `tcp://HOST:PORT` or `udp://HOST:PORT`.
-    ///
-    /// # Errors
-    /// As [`resolve`], and another scheme.
     pub fn parse(text: &str, scope: BindScope) -> Result<Self, LinkError> {
         match text.split_once("://") {
             Some(("tcp", place)) => Ok(Self::Tcp(resolve(place, scope)?)),
@@ -64,9 +61,6 @@ impl Display for Address {
 }
 
 /// The address of `HOST:PORT`. If the name has several, an IPv4 address.
-///
-/// # Errors
-/// Text that is not an address, an unknown name, or an address outside `scope`.
 pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
     let failed = |message: String| LinkError::Address { address: text.into(), message };
     let mut found: Vec<_> = text

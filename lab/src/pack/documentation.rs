@@ -6,9 +6,6 @@ use fmi2_description::{Description, Error, ScalarVariable};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// The files: name inside the FMU, content. A component without a figure gets the page only.
-///
-/// # Errors
-/// A description that cannot be read.
 pub fn documentation(identifier: &str, description: &str) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let material = MATERIAL.iter().find(|one| one.identifier == identifier);
     let page = page(description, material)?;
