@@ -1,4 +1,4 @@
-//! Tests of `address`.
+//! Tests of `resolve`.
 
 use super::*;
 
