@@ -17,7 +17,7 @@ PLATFORMS="linux64, linux32, aarch64-linux, win64, win32, aarch64-windows, darwi
 GLIBC=2.17
 
 # What is in the FMUs.
-LIBRARIES=(-p lovines -p phase-lock-fmu --features lovines/fmu)
+LIBRARIES=(-p lovines-fmu -p phase-lock-fmu)
 
 # The compiler of Debian and the sources of its standard library, unpacked and not installed.
 RUST_WEB=.toolchains/rust-web
@@ -183,7 +183,7 @@ pack_options() {
     echo --only-binaries
     for platform; do
         build_platform "$platform" "$folder" "${LIBRARIES[@]}" >&2 || return
-        for library in lovines phase_lock_fmu; do
+        for library in lovines_fmu phase_lock_fmu; do
             printf -- '--binary\n%s\n' "$platform=$(built_library "$platform" "$folder" "$library")"
         done
     done

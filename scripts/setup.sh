@@ -50,7 +50,7 @@ environment() {
     mkdir -p "$(dirname "$folder")"
     python3 -m venv "$folder" >/dev/null 2>&1 || { rm -rf "$folder"; python3 -m virtualenv -q "$folder" >/dev/null 2>&1; } ||
         fail "python3 cannot create a virtual environment; install python3-venv (name of the Debian package) or virtualenv"
-    if ! "$folder/bin/python" -m pip install --quiet --disable-pip-version-check "${hashes[@]}" "${@:3}" -r "$requirements" >"$folder.log" 2>&1
+    if ! "$folder/bin/python" -m pip install --quiet --disable-pip-version-check --no-compile "${hashes[@]}" "${@:3}" -r "$requirements" >"$folder.log" 2>&1
     then
         rm -rf "$folder"
         return 1
@@ -62,6 +62,12 @@ environment() {
 # The environment of the project's own Python code.
 python_environment() {
     environment .venv scripts/requirements.txt || { cat .venv.log >&2; fail "the packages in scripts/requirements.txt could not be installed"; }
+}
+
+# The environment that builds and tests the Python package.
+package_environment() {
+    environment .venv-python scripts/requirements-python.txt ||
+        { cat .venv-python.log >&2; fail "the packages in scripts/requirements-python.txt could not be installed"; }
 }
 
 # `cargo zigbuild` and the zig linker, for libraries that load on older Linux.
@@ -79,12 +85,12 @@ client_environments() {
 }
 
 # The program `vines` and the libraries of the two FMUs; with the argument `sweep`, the program has the command of that name, whose store
-# is a third of the build. One call for all: cargo would build the plant again for another selection of packages, because the features differ.
+# is a third of the build. One call for all: cargo builds packages again for another selection, because features of dependencies differ.
 build() {
-    local features=lovines/fmu
+    local features=()
     # Scripts that this one calls build the same.
     [ "${1:-}" != sweep ] || export VINES_SWEEPS=1
-    [ -z "${VINES_SWEEPS:-}" ] || features=$features,vines/sweep
+    [ -z "${VINES_SWEEPS:-}" ] || features=(--features vines/sweep)
     stage "Building vines and the FMUs (the first time: some minutes)"
-    progress build --release --locked -p vines -p lovines -p phase-lock-fmu --no-default-features --features "$features"
+    progress build --release --locked -p vines -p lovines-fmu -p phase-lock-fmu --no-default-features "${features[@]}"
 }

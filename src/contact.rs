@@ -72,9 +72,10 @@ pub struct ImpactLaw {
 
 /// The particle at a wall: velocities after an impact, if it approached, and after coming to rest, if it did.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Touch {
-    /// Velocity of the primary mass, m/s, and what was added to it: the sum of many small changes needs all their digits.
+pub struct Touch {
+    /// Velocity of the primary mass, m/s.
     pub primary: f64,
+    /// What was added to it, m/s: the sum of many small changes needs all their digits.
     pub kick: f64,
     /// Velocity of the particle, m/s.
     pub particle: f64,
@@ -90,7 +91,7 @@ pub(crate) struct Touch {
 
 /// What hops can be told from rest.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Resolution {
+pub struct Resolution {
     /// The lowest hop that is followed, m.
     pub lowest_hop: f64,
     /// The longest chatter of lower hops that is skipped, s.
@@ -123,7 +124,7 @@ impl ImpactLaw {
     /// law reverses the relative velocity and reduces it by `r`. If then `rests` holds for the velocity of the primary mass and
     /// the speed away from the wall, both go on as one mass. Momentum is conserved.
     #[inline(always)]
-    pub(crate) fn touch(
+    pub fn touch(
         &self,
         wall: Wall,
         (primary, particle, relative): (f64, f64, f64),
@@ -174,7 +175,7 @@ impl ImpactLaw {
     /// that height for that time, which is of third order in `u` (docs/accuracy.md). With hardly any loss they would last too
     /// long: such a particle stays once its hops are shorter than [`SHORTEST_LIVELY_HOP`]. Without loss they never die out, and
     /// only a particle with no relative velocity at all is at rest.
-    pub(crate) fn rests(&self, speed: f64, (pressing, error): (f64, f64), r: &Resolution) -> bool {
+    pub fn rests(&self, speed: f64, (pressing, error): (f64, f64), r: &Resolution) -> bool {
         if speed == 0.0 {
             return pressing >= -error;
         }

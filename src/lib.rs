@@ -7,8 +7,6 @@ pub mod clearance;
 pub mod contact;
 mod fast;
 pub mod flight;
-#[cfg(feature = "fmu")]
-mod fmu;
 pub mod forcing;
 pub mod oscillator;
 mod overdamped;

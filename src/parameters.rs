@@ -106,7 +106,8 @@ pub struct InvalidValue {
 }
 
 impl InvalidValue {
-    pub(crate) fn unless(
+    /// Refuses a value that is not valid.
+    pub fn unless(
         valid: bool,
         name: &'static str,
         value: f64,

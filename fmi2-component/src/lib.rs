@@ -36,7 +36,7 @@
 //!
 //! A component whose equations a master may integrate by itself says besides what they are ([`ModelExchange`]), and is
 //! exported by `fmi2_component::export!(MyComponent, model_exchange)`. Its description lists states and derivatives
-//! in `ModelStructure`, once; `src/fmu/exchange.rs` of the plant `lovines` is an example.
+//! in `ModelStructure`, once; `exchange.rs` of `lovines-fmu`, the FMU of the plant, is an example.
 //!
 //! The FMU is a zip of the description, as `fmi2_component_build::describe` completes it, and of the library as
 //! `binaries/linux64/<modelIdentifier>.so` (or the platform's equivalent). The example program `pack` of

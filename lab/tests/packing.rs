@@ -17,7 +17,6 @@ fn component() -> Component {
         identifier: "Tiny",
         library: "tiny",
         package: "tiny-fmu",
-        feature: None,
         description: format!("<fmiModelDescription fmiVersion=\"2.0\" modelName=\"Tiny\" guid=\"{GUID}\"/>"),
     }
 }

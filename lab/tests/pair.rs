@@ -4,7 +4,6 @@ use std::{
     fs,
     io::{Read, Write},
     path::{Path, PathBuf},
-    process::Command,
 };
 
 use fmi::fmi2::import::Fmi2Import;
@@ -21,21 +20,9 @@ use vines::scene::{Names, PAPER, Scene};
 const PERIODS: f64 = 140.0;
 const HOLD_PERIODS: f64 = 20.0;
 
-/// The libraries of this build; cargo makes one of the two only where it is asked for. The folder is that of the tests in
-/// `tests/boundary`.
+/// The folder of the libraries of this build: cargo makes them because this package depends on them.
 fn libraries() -> PathBuf {
-    let profile = Path::new(env!("CARGO_BIN_EXE_vines")).parent().unwrap();
-    let target = profile.parent().unwrap().join("libraries");
-    let mut build = Command::new(env!("CARGO"));
-    build.args(["build", "--quiet", "--locked"]);
-    build.args(["--package", "lovines", "--package", "phase-lock-fmu"]);
-    build.args(["--features", "lovines/fmu"]);
-    if profile.ends_with("release") {
-        build.arg("--release");
-    }
-    build.arg("--target-dir").arg(&target);
-    assert!(build.status().expect("cargo runs").success());
-    target.join(profile.file_name().unwrap())
+    Path::new(env!("CARGO_BIN_EXE_vines")).with_file_name("deps")
 }
 
 /// One FMU of the pair.

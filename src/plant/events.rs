@@ -78,7 +78,7 @@ pub struct Totals {
 impl Totals {
     /// Counts an impact, if `touch` is one, and what it dissipated.
     #[inline(always)]
-    pub(crate) fn add(&mut self, touch: &Touch, time: f64) {
+    pub fn add(&mut self, touch: &Touch, time: f64) {
         if let Some(velocity) = touch.impact {
             self.impacts += 1;
             self.impact_time = time;

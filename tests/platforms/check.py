@@ -17,7 +17,7 @@ from pathlib import Path
 ROOT = Path(__file__).parents[2]
 SAMPLES = 40_000
 LARGEST = 1_600_000
-COMPONENTS = {"LoViNes": "lovines", "PhaseLock": "phase_lock_fmu"}
+COMPONENTS = {"LoViNes": "lovines_fmu", "PhaseLock": "phase_lock_fmu"}
 # What every Windows since 8.1, and every Linux of 2012 or later, brings along.
 SYSTEM = {
     "dll": {

@@ -5,7 +5,7 @@ use fmi2_boundary::{Fmu, Interface, Master};
 use crate::method::{Failure, Method};
 use crate::scene::{Scene, Step};
 
-/// The library `lovines`, loaded once.
+/// The library of the plant's FMU, loaded once.
 pub struct Shell {
     rig: Master,
     time: f64,

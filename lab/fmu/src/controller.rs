@@ -79,9 +79,6 @@ impl ResponseLoop {
 
 impl FmuController {
     /// Loads the controller at `path` and initialises it with a configuration.
-    ///
-    /// # Errors
-    /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
     pub fn load(path: &Path, config: &Config, names: &Names) -> Result<Self, FmuError> {
         let known = PARAMETERS.iter().map(|parameter| parameter.name);
         let moves: Vec<String> = moves().collect();

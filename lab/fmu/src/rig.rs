@@ -62,9 +62,6 @@ struct Inside {
 impl FmuRig {
     /// Loads the plant at `path` and initialises it with parameters and a start, under the names of `LoViNes.fmu` or those that `names`
     /// maps them to. It has the sensors of `definition`, for a plant with the parameters `plant`.
-    ///
-    /// # Errors
-    /// An FMU that cannot be loaded, lacks a variable, or refuses a value.
     pub fn load(
         path: &Path,
         values: &[(&str, f64)],

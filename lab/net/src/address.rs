@@ -1,9 +1,8 @@
-//! Addresses. Without permission, only those of this machine are allowed.
+//! Addresses, and which of them are allowed.
 
 use std::fmt::{self, Display, Formatter};
-use std::net::{IpAddr, SocketAddr, ToSocketAddrs};
+use std::net::{IpAddr, SocketAddr};
 
-use super::error::LinkError;
 use super::seal::Key;
 
 /// Which addresses are allowed.
@@ -37,23 +36,6 @@ pub enum Address {
     Udp(SocketAddr),
 }
 
-impl Address {
-    /// The address of `tcp://HOST:PORT` or `udp://HOST:PORT`.
-    ///
-    /// # Errors
-    /// As [`resolve`], and another scheme.
-    pub fn parse(text: &str, scope: BindScope) -> Result<Self, LinkError> {
-        match text.split_once("://") {
-            Some(("tcp", place)) => Ok(Self::Tcp(resolve(place, scope)?)),
-            Some(("udp", place)) => Ok(Self::Udp(resolve(place, scope)?)),
-            _ => Err(LinkError::Address {
-                address: text.into(),
-                message: "expected is tcp://HOST:PORT or udp://HOST:PORT".into(),
-            }),
-        }
-    }
-}
-
 impl Display for Address {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         match self {
@@ -63,58 +45,6 @@ impl Display for Address {
     }
 }
 
-/// The address of `HOST:PORT`. If the name has several, an IPv4 address.
-///
-/// # Errors
-/// Text that is not an address, an unknown name, or an address outside `scope`.
-pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
-    let failed = |message: String| LinkError::Address { address: text.into(), message };
-    let mut found: Vec<_> = text
-        .to_socket_addrs()
-        .map_err(|error| failed(format!("{error}; expected is HOST:PORT")))?
-        .collect();
-    found.sort_by_key(SocketAddr::is_ipv6);
-    let address = *found.first().ok_or_else(|| failed("the name has no address".into()))?;
-    if scope == BindScope::Loopback && !is_loopback(address.ip()) {
-        return Err(LinkError::Remote { address });
-    }
-    Ok(address)
-}
-
 pub(super) fn is_loopback(ip: IpAddr) -> bool {
     ip.to_canonical().is_loopback()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn loopback_is_always_allowed_and_other_addresses_only_with_permission() {
-        for here in ["127.0.0.1:5000", "127.8.8.8:1", "[::1]:9"] {
-            assert!(resolve(here, BindScope::Loopback).is_ok(), "{here}");
-        }
-        for beyond in ["0.0.0.0:5000", "192.0.2.1:5000", "[::]:5000", "[2001:db8::1]:1"] {
-            let refused = resolve(beyond, BindScope::Loopback).unwrap_err();
-            assert!(refused.to_string().contains("--allow-remote"), "{refused}");
-            assert!(resolve(beyond, BindScope::Remote).is_ok(), "{beyond}");
-        }
-    }
-
-    #[test]
-    fn text_that_is_not_an_address_is_named() {
-        for text in [
-            "",
-            "udp://",
-            "tcp://127.0.0.1",
-            "udp://127.0.0.1:99999",
-            "http://127.0.0.1:1",
-            "127.0.0.1:1",
-        ] {
-            let refused = Address::parse(text, BindScope::Remote).unwrap_err().to_string();
-            assert!(refused.contains("HOST:PORT"), "{refused}");
-        }
-        let udp = Address::parse("udp://127.0.0.1:1", BindScope::Loopback).unwrap();
-        assert_eq!(udp.to_string(), "udp://127.0.0.1:1");
-    }
 }

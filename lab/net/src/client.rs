@@ -13,7 +13,7 @@ use super::report::Counters;
 use super::seal::Key;
 
 /// Longest time until the server opens the session.
-pub(super) const CONNECT: Duration = Duration::from_secs(2);
+const CONNECT: Duration = Duration::from_secs(2);
 /// Time without an answer after which the last datagram is sent again: Hello, the first drive, or the farewell. Also the
 /// interval at which a server is asked again that has another client.
 const RESEND: Duration = Duration::from_millis(50);
@@ -48,7 +48,7 @@ impl Client {
     }
 
     fn open(peer: Address, controller: bool, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
-        let unreachable = || LinkError::unreachable(peer, controller);
+        let unreachable = || unreachable(peer, controller);
         let mut hello = Frame::new(Kind::Hello, RandomState::new().build_hasher().finish());
         hello.flags = if controller { flag::CONTROLLER } else { 0 };
         hello.values[0] = sample_time;
@@ -163,4 +163,14 @@ impl Drop for Client {
             log::warn!("{}: {}", self.peer, self.counters);
         }
     }
+}
+
+/// The error for a server that does not answer.
+fn unreachable(peer: Address, controller: bool) -> LinkError {
+    let command = match peer {
+        Address::Tcp(place) if controller => format!("vines controller --listen {place}"),
+        Address::Tcp(place) => format!("vines rig --lock-step --listen {place}"),
+        Address::Udp(place) => format!("vines rig --listen {place}"),
+    };
+    LinkError::Unreachable { peer, command, seconds: CONNECT.as_secs_f64() }
 }

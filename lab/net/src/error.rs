@@ -7,7 +7,6 @@ use thiserror::Error;
 use vines_testbench::rig::{ControllerError, RigError};
 
 use super::address::Address;
-use super::client::CONNECT;
 use super::frame::VERSION;
 use super::handshake::Refusal;
 
@@ -72,18 +71,6 @@ pub enum LinkError {
     /// Error of the network.
     #[error("the network: {0}")]
     System(#[from] io::Error),
-}
-
-impl LinkError {
-    /// The error for a server that does not answer.
-    pub(super) fn unreachable(peer: Address, controller: bool) -> Self {
-        let command = match peer {
-            Address::Tcp(place) if controller => format!("vines controller --listen {place}"),
-            Address::Tcp(place) => format!("vines rig --lock-step --listen {place}"),
-            Address::Udp(place) => format!("vines rig --listen {place}"),
-        };
-        Self::Unreachable { peer, command, seconds: CONNECT.as_secs_f64() }
-    }
 }
 
 impl From<LinkError> for RigError {

@@ -32,19 +32,8 @@ pub struct NetRig {
 }
 
 impl NetRig {
-    /// Opens a session with the rig server at `peer`; `sample_time` in s.
-    ///
-    /// # Errors
-    /// A server that does not answer, refuses, or has another version.
-    pub fn connect(peer: Address, sample_time: f64) -> Result<Self, LinkError> {
-        Self::connect_with(peer, sample_time, None)
-    }
-
-    /// As [`NetRig::connect`], with a shared key.
-    ///
-    /// # Errors
-    /// As there; a server with another key does not answer.
-    pub fn connect_with(peer: Address, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
+    /// Opens a session with the rig server at `peer`; `sample_time` in s. A server with another key does not answer.
+    pub fn connect(peer: Address, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
         Ok(Self {
             client: Client::connect(peer, false, sample_time, key)?,
             now: None,
@@ -55,9 +44,6 @@ impl NetRig {
     }
 
     /// Refuses a rig whose sensors are not those of `expected`.
-    ///
-    /// # Errors
-    /// Other sensors.
     pub fn with_sensors(self, expected: Definition) -> Result<Self, LinkError> {
         let theirs = Definition::all()
             .into_iter()

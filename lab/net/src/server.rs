@@ -25,36 +25,19 @@ pub struct Server {
 }
 
 impl Server {
-    /// Listens on `address`; with port 0 the system chooses a free port.
-    ///
-    /// # Errors
-    /// An address that is not available.
-    pub fn listen(address: Address, service: Service) -> Result<Self, LinkError> {
-        Self::listen_with(address, service, None)
-    }
-
-    /// As [`Server::listen`], for clients with a shared key only.
-    ///
-    /// # Errors
-    /// An address that is not available.
-    pub fn listen_with(address: Address, service: Service, key: Option<Key>) -> Result<Self, LinkError> {
+    /// Listens on `address`; with port 0 the system chooses a free port. With a key, only for clients that have it.
+    pub fn listen(address: Address, service: Service, key: Option<Key>) -> Result<Self, LinkError> {
         let listener = Listener::bind(address, key).map_err(|source| LinkError::Listen { address, source })?;
         Ok(Self { listener, service })
     }
 
     /// Address of the server.
-    ///
-    /// # Errors
-    /// The system's.
     pub fn address(&self) -> io::Result<Address> {
         self.listener.address()
     }
 
     /// Serves sessions until `stop` returns true. `make` creates the rig or controller of a session; `tell` receives its
     /// report.
-    ///
-    /// # Errors
-    /// A rig or controller that fails, or the network.
     pub fn serve(
         &mut self,
         mut make: impl FnMut() -> Result<Served, ServerError>,

@@ -83,7 +83,7 @@ impl Endpoint {
             Self::Fmu(file) => Box::new(fmu(file, scene).map_err(Failure::run)?),
             Self::Network(address) if address.starts_with("helic://") => Box::new(helic(address, scene, scope)?),
             Self::Network(address) => {
-                let rig = NetRig::connect_with(Address::parse(address, scope)?, scene.sample_time(), scope.key())?;
+                let rig = NetRig::connect(Address::parse(address, scope)?, scene.sample_time(), scope.key())?;
                 let rig = rig.with_sensors(scene.resonance)?;
                 pace = rig.pace();
                 timing = rig.timing();
@@ -108,12 +108,7 @@ impl Endpoint {
             Self::BuiltIn => Box::new(BuiltIn::new(config)?),
             Self::Fmu(file) => Box::new(FmuController::load(file, config, names).map_err(Failure::run)?),
             Self::Network(address) => match Address::parse(address, scope)? {
-                Address::Tcp(peer) => Box::new(NetController::connect_with(
-                    peer,
-                    config.sample_time,
-                    pace,
-                    scope.key(),
-                )?),
+                Address::Tcp(peer) => Box::new(NetController::connect(peer, config.sample_time, pace, scope.key())?),
                 Address::Udp(_) => {
                     return Err(Failure::input(format!(
                         "{address}: a controller has an address tcp://HOST:PORT"

@@ -11,9 +11,9 @@ const HELP: &str = "\
 Examples:
   scripts/pack --out fmus                                      builds the libraries first
   scripts/pack --out fmus --portable                           for older Linux (glibc 2.17)
-  vines pack --libraries target/debug --out fmus               libraries of `cargo build --features lovines/fmu`
+  vines pack --libraries target/debug --out fmus               libraries of `cargo build`
   vines pack --out fmus --scene scenes/dimensionless.toml      bench.ssp with other parameters
-  vines pack --out fmus --binary win64=lovines.dll --binary win64=phase_lock_fmu.dll";
+  vines pack --out fmus --binary win64=lovines_fmu.dll --binary win64=phase_lock_fmu.dll";
 
 /// Write LoViNes.fmu (the plant), PhaseLock.fmu (the controller) and bench.ssp (the two coupled)
 #[derive(Debug, Args)]

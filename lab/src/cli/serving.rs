@@ -52,7 +52,7 @@ impl ServingArguments {
         keep: impl Fn(&Session),
     ) -> Result<String, Failure> {
         let scope = self.reach.reach()?;
-        let mut server = Server::listen_with(transport(resolve(&self.listen, scope)?), service, scope.key())?;
+        let mut server = Server::listen(transport(resolve(&self.listen, scope)?), service, scope.key())?;
         let address = server.address().map_err(Failure::run)?;
         self.run(&format!("{what} on {address}"), keep, |stop, tell| {
             server.serve(make, stop, tell)

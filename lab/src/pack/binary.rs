@@ -21,7 +21,7 @@ impl FromStr for Binary {
     fn from_str(argument: &str) -> Result<Self, String> {
         let (folder, path) = argument
             .split_once('=')
-            .ok_or("expected PLATFORM=PATH, for instance win64=lovines.dll")?;
+            .ok_or("expected PLATFORM=PATH, for instance win64=lovines_fmu.dll")?;
         let platform = Platform::of_folder(folder).ok_or_else(|| {
             let known = Platform::folders();
             format!("`{folder}` is no platform; there are {known}")

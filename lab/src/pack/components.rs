@@ -9,8 +9,6 @@ pub struct Component {
     pub library: &'static str,
     /// Cargo's package.
     pub package: &'static str,
-    /// The feature that the library needs, as `package/feature`.
-    pub feature: Option<&'static str>,
     /// The finished `modelDescription.xml`.
     pub description: String,
 }
@@ -18,8 +16,7 @@ pub struct Component {
 impl Component {
     /// Options of `cargo build --release` that build the library.
     pub(super) fn build_options(&self) -> String {
-        let feature = self.feature.map(|name| format!(" --features {name}"));
-        format!("-p {}{}", self.package, feature.unwrap_or_default())
+        format!("-p {}", self.package)
     }
 
     /// The guid in the description, which the library must hold as well.
@@ -43,22 +40,20 @@ pub fn components() -> [Component; 2] {
     [
         Component {
             identifier: "LoViNes",
-            library: "lovines",
-            package: "lovines",
-            feature: Some("lovines/fmu"),
+            library: "lovines_fmu",
+            package: "lovines-fmu",
             description: describe(PLANT),
         },
         Component {
             identifier: "PhaseLock",
             library: "phase_lock_fmu",
             package: "phase-lock-fmu",
-            feature: None,
             description: describe(CONTROLLER),
         },
     ]
 }
 
-const PLANT: &str = include_str!("../../../modelDescription.xml");
+const PLANT: &str = include_str!("../../../fmu/modelDescription.xml");
 const CONTROLLER: &str = include_str!("../../../controller/fmu/modelDescription.xml");
 
 /// Gives the description the guid that the library was built with.

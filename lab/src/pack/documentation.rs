@@ -6,9 +6,6 @@ use fmi2_description::{Description, Error, ScalarVariable};
 use maud::{DOCTYPE, Markup, PreEscaped, html};
 
 /// The files: name inside the FMU, content. A component without a figure gets the page only.
-///
-/// # Errors
-/// A description that cannot be read.
 pub fn documentation(identifier: &str, description: &str) -> Result<Vec<(String, Vec<u8>)>, Error> {
     let material = MATERIAL.iter().find(|one| one.identifier == identifier);
     let page = page(description, material)?;
@@ -130,66 +127,5 @@ fn table(description: &Description, causality: &str, heading: &str) -> Markup {
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::pack::components;
-
-    #[test]
-    fn the_page_has_every_variable_and_the_picture() {
-        for component in components() {
-            let xml = &component.description;
-            let files = documentation(component.identifier, xml).unwrap();
-            let names: Vec<_> = files.iter().map(|(name, _)| name.as_str()).collect();
-            assert_eq!(names, ["documentation/index.html", "model.png"]);
-            let page = std::str::from_utf8(&files[0].1).unwrap();
-            for variable in Description::parse(xml).unwrap().variables {
-                let name = &variable.name;
-                assert!(page.contains(&format!("<code>{name}</code>")), "{name}");
-                let description = html! { (variable.description) }.into_string();
-                assert!(page.contains(&description), "{name}");
-            }
-            assert!(page.contains("<svg") && files[1].1.starts_with(b"\x89PNG"));
-        }
-    }
-
-    #[test]
-    fn every_real_variable_shows_its_unit() {
-        for component in components() {
-            let files = documentation(component.identifier, &component.description).unwrap();
-            let page = std::str::from_utf8(&files[0].1).unwrap();
-            for row in page.lines().filter(|line| line.starts_with("<tr><td>")) {
-                let cells: Vec<_> = row.split("</td><td>").collect();
-                let whole = ["impacts", "contact"].map(|name| format!("<tr><td><code>{name}</code>"));
-                let is_real = component.identifier == "LoViNes" && !whole.contains(&cells[0].into());
-                assert!(!is_real || !cells[2].is_empty(), "{row}");
-            }
-        }
-    }
-
-    #[test]
-    fn numbers_have_at_most_six_digits() {
-        for (exact, shown) in [
-            ("0.0011343573395537938", "0.00113436"),
-            ("9.246125558182298e-05", "9.24613e-5"),
-            ("-1.5707963267948966", "-1.5708"),
-            ("11680", "11680"),
-            ("1e-6", "1e-6"),
-            ("true", "true"),
-            ("", ""),
-        ] {
-            assert_eq!(rounded(exact), shown);
-        }
-    }
-
-    #[test]
-    fn a_component_without_a_picture_gets_a_page() {
-        let files = documentation(
-            "Tiny",
-            "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"a &lt; b\"/>",
-        )
-        .unwrap();
-        assert_eq!(files.len(), 1);
-        let page = String::from_utf8(files[0].1.clone()).unwrap();
-        assert!(page.contains("<h1>a &lt; b</h1>"));
-    }
-}
+#[path = "../../tests/unit/pack_documentation.rs"]
+mod tests;

@@ -32,9 +32,6 @@ pub enum WriteError {
 /// Writes `identification.json`, `backbone.csv`, `backbone.svg` and `sim.svg` into `out` and returns their paths.
 ///
 /// All of it is made before the first file is written, and each file is complete or absent.
-///
-/// # Errors
-/// A folder or file that cannot be written.
 pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
     let files = [
         ("identification.json", json(found)?),
@@ -46,9 +43,6 @@ pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, WriteError>
 }
 
 /// Writes `map.csv`, `map.svg`, `map-dark.svg` and, over sigma and G, `bifurcations.csv` into `out` and returns their paths, as [`write()`] does.
-///
-/// # Errors
-/// As [`write()`].
 pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
     let figure = regimes::svg(map)?;
     let mut files = vec![
@@ -63,9 +57,6 @@ pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
 }
 
 /// Writes `tracked.json`, `tracked.csv` and `tracked.svg` into `out` and returns their paths, as [`write()`] does.
-///
-/// # Errors
-/// As [`write()`].
 pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
     let files = [
         ("tracked.json", json(found)?),
@@ -76,17 +67,11 @@ pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBu
 }
 
 /// Writes `interrupted.csv`: the samples of an experiment that ended early.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>, WriteError> {
     Ok(files::write(out, [("interrupted.csv", table(samples))])?)
 }
 
 /// Writes a histogram to `file`: upper limits of the lateness, s, and numbers of samples.
-///
-/// # Errors
-/// A file that cannot be written.
 pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf>, WriteError> {
     let lines = classes.iter().map(|(limit, count)| format!("{limit:e},{count}\n"));
     let text = String::from("lateness_s,samples\n") + &lines.collect::<String>();
@@ -96,9 +81,6 @@ pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf
 }
 
 /// Writes `coverage.svg` into `out` and returns its path, as [`write()`] does.
-///
-/// # Errors
-/// As [`write()`].
 pub fn write_calibration(found: &Calibration, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
     Ok(files::write(out, [("coverage.svg", coverage::figure(found).svg()?)])?)
 }

@@ -44,9 +44,6 @@ pub struct Report {
 
 /// Writes the report on `subject` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. Sections
 /// of an earlier run are reused unless scene, version or axes have changed, or `fresh` is set.
-///
-/// # Errors
-/// A run that fails, or a file that cannot be written.
 pub fn write_report(
     subject: &Subject,
     out: &Path,

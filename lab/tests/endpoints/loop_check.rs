@@ -41,7 +41,7 @@ fn run(command: &str, wiring: Wiring) -> (Option<i32>, String, f64) {
         sensors: scene.resonance,
     };
     let service = Service { role, sample_time: scene.sample_time(), silence: 30.0 };
-    let mut server = Server::listen(Address::Tcp(([127, 0, 0, 1], 0).into()), service).unwrap();
+    let mut server = Server::listen(Address::Tcp(([127, 0, 0, 1], 0).into()), service, None).unwrap();
     let rig = format!("{}", server.address().unwrap());
     let largest = Arc::new(Mutex::new(0.0));
     let ended = Arc::new(AtomicBool::new(false));

@@ -21,28 +21,9 @@ fn vines(arguments: &[&str]) -> Output {
         .expect("the program runs")
 }
 
-/// The two FMUs, built and packed once. The folder is that of the tests in `tests/boundary`.
+/// The two FMUs, packed once, with the libraries that cargo builds because this package depends on them.
 static FMUS: LazyLock<TempDir> = LazyLock::new(|| {
-    let profile = Path::new(PROGRAM).parent().unwrap();
-    let target = profile.parent().unwrap().join("libraries");
-    let libraries = target.join(profile.file_name().unwrap());
-    let mut build = Command::new(std::env::var_os("CARGO").unwrap_or("cargo".into()));
-    build.args([
-        "build",
-        "--quiet",
-        "--locked",
-        "-p",
-        "lovines",
-        "-p",
-        "phase-lock-fmu",
-        "--features",
-        "lovines/fmu",
-    ]);
-    build.arg("--target-dir").arg(target);
-    if profile.ends_with("release") {
-        build.arg("--release");
-    }
-    assert!(build.status().expect("cargo runs").success());
+    let libraries = Path::new(PROGRAM).with_file_name("deps");
     let folder = tempfile::tempdir().unwrap();
     let (out, libraries) = (folder.path().to_str().unwrap(), libraries.to_str().unwrap());
     let packed = vines(&["pack", "--out", out, "--libraries", libraries]);

@@ -2,15 +2,13 @@
 
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
-use std::process::Command;
-use std::sync::LazyLock;
 
 use libloading::Library;
 
 use crate::functions::Functions;
 
 /// The plant's description.
-pub const PLANT: &str = include_str!("../../../modelDescription.xml");
+pub const PLANT: &str = include_str!("../../../fmu/modelDescription.xml");
 /// The controller's description.
 pub const CONTROLLER: &str = include_str!("../../../controller/fmu/modelDescription.xml");
 
@@ -45,17 +43,13 @@ impl Fmu {
     }
 
     /// Where cargo puts the library of that name.
-    ///
-    /// # Panics
-    /// If it cannot be built.
     #[must_use]
     pub fn path(name: &str) -> PathBuf {
-        let folder = build();
         let library = match name {
-            "LoViNes" => "lovines",
+            "LoViNes" => "lovines_fmu",
             _ => "phase_lock_fmu",
         };
-        folder.join(format!("{DLL_PREFIX}{library}{DLL_SUFFIX}"))
+        folder().join(format!("{DLL_PREFIX}{library}{DLL_SUFFIX}"))
     }
 
     /// Both libraries as an FMU holds them, `LoViNes` and `PhaseLock` with the platform's suffix, from one folder.
@@ -96,39 +90,18 @@ impl Fmu {
     }
 }
 
-/// The folder of this profile, for instance `target/debug`: two above a test in `deps`, one above a program.
+/// The folder of the shared libraries of this profile's dependencies, for instance `target/debug/deps`. Cargo builds the two libraries
+/// there because this package depends on them.
 fn folder() -> PathBuf {
     let program = std::env::current_exe().expect("a program knows where it is");
-    let inside = |path: &Path| path.ends_with("deps") || path.ends_with("examples");
     let folder = program.parent().expect("it is in a folder");
-    let above = folder.parent().filter(|_| inside(folder));
-    above.unwrap_or(folder).to_owned()
-}
-
-/// Cargo builds no shared library for the sake of a test of another package: so it is asked to. It builds in a folder of its own,
-/// `target/libraries`: with the features of these two packages alone it would replace the plant that other tests are linked
-/// with.
-fn build() -> PathBuf {
-    static FOLDER: LazyLock<PathBuf> = LazyLock::new(|| {
-        let profile = folder();
-        let target = profile.parent().expect("a profile is in a folder");
-        let libraries = target.join("libraries");
-        let cargo = std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into());
-        let mut command = Command::new(cargo);
-        command.args(["build", "--quiet", "-p", "lovines", "-p", "phase-lock-fmu"]);
-        command.args(["--features", "lovines/fmu"]);
-        command.arg("--manifest-path");
-        command.arg(concat!(env!("CARGO_MANIFEST_DIR"), "/../../Cargo.toml"));
-        command.arg("--target-dir").arg(&libraries);
-        let name = if profile.ends_with("release") {
-            command.arg("--release");
-            "release"
-        } else {
-            "debug"
-        };
-        let status = command.status().expect("cargo runs");
-        assert!(status.success(), "the libraries could not be built");
-        libraries.join(name)
-    });
-    FOLDER.clone()
+    if folder.ends_with("deps") {
+        return folder.to_owned();
+    }
+    let profile = if folder.ends_with("examples") {
+        folder.parent()
+    } else {
+        None
+    };
+    profile.unwrap_or(folder).join("deps")
 }

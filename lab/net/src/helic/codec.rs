@@ -107,9 +107,6 @@ impl Frame {
     }
 
     /// The frame at the beginning of `bytes` and its length, or None if more bytes are needed.
-    ///
-    /// # Errors
-    /// Bytes that cannot become a frame.
     pub fn decode(bytes: &[u8]) -> Result<Option<(Self, usize)>, Malformed> {
         if !MAGIC.starts_with(&bytes[..bytes.len().min(2)]) {
             return Err(Malformed);
@@ -181,9 +178,6 @@ impl Packet {
     }
 
     /// Reads a datagram.
-    ///
-    /// # Errors
-    /// A datagram that is not a packet.
     pub fn decode(bytes: &[u8]) -> Result<Self, Malformed> {
         let (header, values) = bytes.split_at_checked(PACKET_HEADER).ok_or(Malformed)?;
         let (half, width) = (|at: usize| u16::from_le_bytes([header[at], header[at + 1]]), header[3]);

@@ -69,9 +69,6 @@ pub struct Device {
 
 impl Device {
     /// The rig `rig` as a device, sampled every `sample_time`, s; its output is limited to `max_amplitude`, m.
-    ///
-    /// # Errors
-    /// A rig that cannot be read.
     pub fn new(mut rig: Box<dyn Rig>, sample_time: f64, max_amplitude: f64) -> Result<Self, RigError> {
         let has_reference = rig.sense()?.reference.is_some();
         let sample_rate = 1.0 / sample_time;

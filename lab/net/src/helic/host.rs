@@ -81,9 +81,6 @@ pub struct Host<T> {
 
 impl<T: Transport> Host<T> {
     /// Reads what the device has.
-    ///
-    /// # Errors
-    /// A device that does not answer, or has another version.
     pub fn new(transport: T) -> Result<Self, HostError> {
         let (parameters, sources) = (Vec::new(), Vec::new());
         let mut host = Self {
@@ -123,9 +120,6 @@ impl<T: Transport> Host<T> {
     }
 
     /// Sends a request and returns the payload of the answer; `what` names it in errors.
-    ///
-    /// # Errors
-    /// A device that does not answer, or refuses.
     pub fn request(&mut self, kind: u8, payload: Vec<u8>, what: &str) -> Result<Vec<u8>, HostError> {
         self.sequence = self.sequence.wrapping_add(1);
         let request = Frame { kind, sequence: self.sequence, payload };
@@ -159,9 +153,6 @@ impl<T: Transport> Host<T> {
     }
 
     /// Id of a source.
-    ///
-    /// # Errors
-    /// A name that the device does not have.
     pub fn source(&self, name: &str) -> Result<u8, HostError> {
         let found = self.sources.iter().position(|(known, _)| known == name);
         let known = || {
@@ -175,9 +166,6 @@ impl<T: Transport> Host<T> {
     }
 
     /// Sets a parameter. Real numbers become floats.
-    ///
-    /// # Errors
-    /// A device that has no such parameter, or refuses the value.
     pub fn set(&mut self, name: &str, values: &[f64]) -> Result<(), HostError> {
         let (index, code) = self.index(name)?;
         let mut payload = index.to_le_bytes().to_vec();
@@ -194,9 +182,6 @@ impl<T: Transport> Host<T> {
     }
 
     /// The bytes of a parameter.
-    ///
-    /// # Errors
-    /// A device that has no such parameter.
     pub fn get(&mut self, name: &str) -> Result<Vec<u8>, HostError> {
         let (index, _) = self.index(name)?;
         self.request(message::GET_PAR, index.to_le_bytes().into(), name)
@@ -205,9 +190,6 @@ impl<T: Transport> Host<T> {
 
 impl<T: Transport> Host<T> {
     /// Sets the stream up, and starts it.
-    ///
-    /// # Errors
-    /// A device that refuses.
     pub fn stream(&mut self, sources: &[u8], decimation: u16, count: u32) -> Result<(), HostError> {
         self.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
         let setup = [
@@ -236,9 +218,6 @@ impl<T: Transport> Host<T> {
 
     /// Stops the master oscillator, and returns its cosine and sine: its phase is a state of the device that no parameter sets. The output
     /// must be off.
-    ///
-    /// # Errors
-    /// A device that does not answer, or refuses.
     pub fn stop_oscillator(&mut self) -> Result<[f64; 2], HostError> {
         let forcing = self.source("forcing")?;
         self.set("freq", &[0.0])?;

@@ -65,9 +65,6 @@ pub struct HelicRig<T: Transport> {
 
 impl<T: Transport> HelicRig<T> {
     /// Sets the device up and starts its stream; `sample_time` in s.
-    ///
-    /// # Errors
-    /// A device that does not answer, has another rate, or lacks a source or a parameter.
     pub fn new(transport: T, channels: Channels, sample_time: f64, samples_per_period: f64) -> Result<Self, HostError> {
         let mut host = Host::new(transport)?;
         let ratio = host.sample_rate * sample_time;

@@ -39,9 +39,6 @@ struct Connection {
 impl HelicServer {
     /// Listens on `address` (TCP), and with the next two ports for primers of the stream and for the beacon. With port 0 the system
     /// chooses all ports.
-    ///
-    /// # Errors
-    /// An address that is not available.
     pub fn listen(address: SocketAddr, device: Device, sample_time: f64) -> io::Result<Self> {
         let beside = |offset: u16| match address.port() {
             0 => address,
@@ -64,17 +61,11 @@ impl HelicServer {
     }
 
     /// Address of the control channel.
-    ///
-    /// # Errors
-    /// The system's.
     pub fn address(&self) -> io::Result<SocketAddr> {
         self.control.local_addr()
     }
 
     /// Serves until `stop` returns true. `tell` receives a report when a host has left.
-    ///
-    /// # Errors
-    /// A rig that fails, or the network.
     pub fn serve(&mut self, mut stop: impl FnMut() -> bool, mut tell: impl FnMut(&Session)) -> Result<(), ServerError> {
         let mut clock = RealTimeClock::start(self.sample_time);
         let mut host: Option<Connection> = None;

@@ -13,21 +13,12 @@ const PATIENCE: Duration = Duration::from_secs(2);
 /// The way to a device.
 pub trait Transport {
     /// Sends a request and returns the answer.
-    ///
-    /// # Errors
-    /// A device that does not answer, or not with a frame.
     fn request(&mut self, request: &Frame) -> io::Result<Frame>;
 
     /// The next datagram of the stream.
-    ///
-    /// # Errors
-    /// A device that is silent.
     fn datagram(&mut self) -> io::Result<Vec<u8>>;
 
     /// Port on which the datagrams arrive.
-    ///
-    /// # Errors
-    /// The system's.
     fn port(&self) -> io::Result<u16>;
 }
 
@@ -41,9 +32,6 @@ pub struct Network {
 
 impl Network {
     /// Connects to the control channel at `peer`, and sends the device's stream port the datagram that opens firewalls.
-    ///
-    /// # Errors
-    /// A device that does not answer.
     pub fn connect(peer: SocketAddr) -> io::Result<Self> {
         let control = TcpStream::connect_timeout(&peer, PATIENCE)?;
         control.set_nodelay(true)?;

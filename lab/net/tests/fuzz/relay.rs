@@ -124,7 +124,7 @@ fn with_a_key_forged_and_replayed_datagrams_never_drive_a_rig() {
         if attempt > 1 && finished.load(Ordering::Relaxed) {
             break;
         }
-        let Ok(mut rig) = NetRig::connect_with(address, SAMPLE_TIME, key) else {
+        let Ok(mut rig) = NetRig::connect(address, SAMPLE_TIME, key) else {
             continue;
         };
         sessions += 1;

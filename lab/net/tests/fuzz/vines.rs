@@ -51,7 +51,7 @@ impl Target {
         let role = Role::Rig { max_amplitude: LARGEST, sensors };
         let service = Service { role, sample_time: SAMPLE_TIME, silence: 2.0 };
         let address = address(([127, 0, 0, 1], 0).into());
-        let mut server = Server::listen_with(address, service, key).unwrap();
+        let mut server = Server::listen(address, service, key).unwrap();
         let address = server.address().unwrap();
         let (stop, sent) = (Arc::new(AtomicBool::new(false)), Sent::default());
         let (flag, known) = (Arc::clone(&stop), Arc::clone(&sent));

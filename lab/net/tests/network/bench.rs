@@ -75,7 +75,7 @@ fn serve(
     service: Service,
     mut make: impl FnMut() -> Offered + Send + 'static,
 ) -> Served {
-    let mut server = Server::listen(address(ANYWHERE.into()), service).unwrap();
+    let mut server = Server::listen(address(ANYWHERE.into()), service, None).unwrap();
     let address = server.address().unwrap();
     let (stop, sessions) = (Arc::new(AtomicBool::new(false)), Arc::default());
     let (flag, list) = (Arc::clone(&stop), Arc::<Mutex<Vec<Session>>>::clone(&sessions));

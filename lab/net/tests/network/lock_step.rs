@@ -25,8 +25,8 @@ fn an_experiment_across_the_network_gives_the_same_bits() {
     let controller_server = controller(&scene, 5.0);
     let sample_time = scene.sample_time();
     {
-        let mut rig = NetRig::connect(rig_server.address, sample_time).unwrap();
-        let mut peer = NetController::connect(socket(controller_server.address), sample_time, None).unwrap();
+        let mut rig = NetRig::connect(rig_server.address, sample_time, None).unwrap();
+        let mut peer = NetController::connect(socket(controller_server.address), sample_time, None, None).unwrap();
         assert_eq!(rig.pace(), None);
         assert_eq!(measure(&scene, &mut rig, &mut peer), direct);
     }
@@ -44,13 +44,13 @@ fn held_samples_cross_the_network_with_the_same_bits_and_ramp_to_zero() {
     let plant = Simulated::new(scene.plant, scene.start).unwrap();
     let direct = measure(&scene, chain(Box::new(plant)).as_mut(), &mut controller());
     let (server, log) = lock_step_rig(&scene, 5.0);
-    let rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    let rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     assert_eq!(
         measure(&scene, chain(Box::new(rig)).as_mut(), &mut controller()),
         direct
     );
     server.sessions(1);
-    let mut rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     rig.sense().unwrap();
     rig.hold(1e-3, scene.sample_time()).unwrap();
     rig.sense().unwrap();
@@ -66,7 +66,7 @@ fn held_samples_cross_the_network_with_the_same_bits_and_ramp_to_zero() {
 fn the_drive_of_a_client_that_has_left_ramps_to_zero() {
     let scene = scene(&[]);
     let (server, log) = lock_step_rig(&scene, 5.0);
-    let mut rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     shake(&mut rig, &scene, 20).unwrap();
     drop(rig);
     assert_eq!(server.sessions(1)[0].samples, 20);
@@ -91,7 +91,7 @@ fn a_drive_above_a_limit_is_refused_at_once_with_the_value_and_the_limit() {
         (2, Drive { displacement: -1e3, ..drive(3) }),
     ] {
         let (server, log) = lock_step_rig(&scene, 5.0);
-        let mut rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
+        let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
         shake(&mut rig, &scene, 3).unwrap();
         let start = Instant::now();
         let error = rig
@@ -120,13 +120,13 @@ fn a_drive_above_a_limit_is_refused_at_once_with_the_value_and_the_limit() {
 fn a_silence_ramps_the_drive_down_and_a_client_that_returns_is_informed() {
     let scene = scene(&[]);
     let (server, log) = lock_step_rig(&scene, 0.2);
-    let mut rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     shake(&mut rig, &scene, 20).unwrap();
     assert_eq!(server.sessions(1)[0].ended, Ended::Silence);
     assert_eq!(log.lock().unwrap().last().unwrap().amplitude, 0.0);
     let error = shake(&mut rig, &scene, 2).unwrap_err();
     assert!(matches!(link_error(&error), LinkError::ShutDown { .. }), "{error}");
     // Only another session arms the rig again.
-    let mut next = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    let mut next = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     shake(&mut next, &scene, 20).unwrap();
 }

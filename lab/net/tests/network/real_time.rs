@@ -28,7 +28,7 @@ fn shaken_with_report(
     let scene = scene(&[]);
     let (server, log) = real_time_rig(&scene, PATIENT);
     let proxy = Proxy::before(socket(server.address), fate);
-    let mut rig = NetRig::connect(proxy.address, scene.sample_time()).unwrap();
+    let mut rig = NetRig::connect(proxy.address, scene.sample_time(), None).unwrap();
     shake(&mut rig, &scene, 400).unwrap();
     let (client, timing) = (rig.counters(), rig.timing());
     drop(rig);
@@ -141,7 +141,7 @@ fn a_drive_of_a_future_sample_is_refused() {
 fn a_silence_shuts_the_drive_down_and_a_client_that_returns_is_informed() {
     let scene = scene(&[]);
     let (server, log) = real_time_rig(&scene, 0.3);
-    let mut rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     shake(&mut rig, &scene, 50).unwrap();
     let session = server.sessions(1).remove(0);
     assert_eq!(session.ended, Ended::Silence);
@@ -169,11 +169,11 @@ fn a_silence_shuts_the_drive_down_and_a_client_that_returns_is_informed() {
 fn after_a_shutdown_another_client_may_start_a_session() {
     let scene = scene(&[]);
     let (server, log) = real_time_rig(&scene, 0.3);
-    let mut gone = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    let mut gone = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     shake(&mut gone, &scene, 20).unwrap();
     server.sessions(1);
     log.lock().unwrap().clear();
-    let mut next = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    let mut next = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     shake(&mut next, &scene, 20).unwrap();
     assert_eq!(log.lock().unwrap()[0], drive(0));
     drop(next);
@@ -188,7 +188,7 @@ fn a_rig_that_stops_answering_ends_the_experiment() {
         Kind::Sensors if n >= 50 => Fate::Lose,
         _ => Fate::Pass,
     });
-    let mut rig = NetRig::connect(proxy.address, scene.sample_time()).unwrap();
+    let mut rig = NetRig::connect(proxy.address, scene.sample_time(), None).unwrap();
     let error = shake(&mut rig, &scene, 100).unwrap_err();
     assert!(matches!(error.cause(), Some(LinkError::Silent { .. })), "{error}");
 }
@@ -197,7 +197,7 @@ fn a_rig_that_stops_answering_ends_the_experiment() {
 fn a_client_that_falls_behind_is_shut_down_and_no_drive_older_than_the_silence_is_applied() {
     let (scene, silence) = (scene(&[]), 0.2);
     let (server, log) = real_time_rig(&scene, silence);
-    let mut rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     // Every answer is valid and arrives soon after the one before, but each takes two sample periods.
     let slow = Duration::from_secs_f64(2.0 * scene.sample_time());
     let outcome = (0..2000).try_for_each(|n| {
@@ -241,8 +241,9 @@ fn a_controller_that_stops_answering_ramps_the_drive_of_the_rig_down() {
     let (rig_server, log) = real_time_rig(&scene, PATIENT);
     let stuck = StopsAt(200);
     let controller_server = serve_controller(&scene, 10.0, move || Box::new(stuck));
-    let mut rig = NetRig::connect(rig_server.address, scene.sample_time()).unwrap();
-    let mut peer = NetController::connect(socket(controller_server.address), scene.sample_time(), Some(0.5)).unwrap();
+    let mut rig = NetRig::connect(rig_server.address, scene.sample_time(), None).unwrap();
+    let mut peer =
+        NetController::connect(socket(controller_server.address), scene.sample_time(), Some(0.5), None).unwrap();
     let outcome = experiment::run(&mut rig, &mut peer, &Plan::of(&scene), |_, _, _| {});
     let Err(ExperimentError::Controller(error)) = outcome else {
         panic!("{outcome:?}");

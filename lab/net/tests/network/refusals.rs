@@ -16,15 +16,15 @@ fn a_missing_server_is_reported_with_the_command_that_starts_it() {
     let place = silent.local_addr().unwrap();
     for (error, command) in [
         (
-            NetRig::connect(Address::Udp(place), 1e-3).unwrap_err(),
+            NetRig::connect(Address::Udp(place), 1e-3, None).unwrap_err(),
             "vines rig --listen",
         ),
         (
-            NetRig::connect(Address::Tcp(place), 1e-3).unwrap_err(),
+            NetRig::connect(Address::Tcp(place), 1e-3, None).unwrap_err(),
             "vines rig --lock-step --listen",
         ),
         (
-            NetController::connect(place, 1e-3, None).unwrap_err(),
+            NetController::connect(place, 1e-3, None, None).unwrap_err(),
             "vines controller --listen",
         ),
     ] {
@@ -46,7 +46,7 @@ fn another_version_is_named_with_both_numbers() {
             .send_to(b"VINE\x03\x00 and what follows in version 3", from)
             .unwrap();
     });
-    let error = NetRig::connect(Address::Udp(address), 1e-3).unwrap_err();
+    let error = NetRig::connect(Address::Udp(address), 1e-3, None).unwrap_err();
     newer.join().unwrap();
     assert!(matches!(error, LinkError::Version { theirs: 3, .. }));
     let text = error.to_string();
@@ -82,9 +82,9 @@ fn a_rig_is_not_accepted_as_a_controller_nor_the_reverse() {
     let scene = scene(&[]);
     let ((rig, _), peer) = (lock_step_rig(&scene, 5.0), controller(&scene, 5.0));
     let sample_time = scene.sample_time();
-    let error = NetRig::connect(peer.address, sample_time).unwrap_err();
+    let error = NetRig::connect(peer.address, sample_time, None).unwrap_err();
     assert_eq!(refused(&error), Refusal::Role);
-    let error = NetController::connect(socket(rig.address), sample_time, None).unwrap_err();
+    let error = NetController::connect(socket(rig.address), sample_time, None, None).unwrap_err();
     assert_eq!(refused(&error), Refusal::Role);
 }
 
@@ -92,7 +92,7 @@ fn a_rig_is_not_accepted_as_a_controller_nor_the_reverse() {
 fn another_sample_time_is_refused_with_that_of_the_server() {
     let scene = scene(&[]);
     let (server, _) = lock_step_rig(&scene, 5.0);
-    let error = NetRig::connect(server.address, 2.0 * scene.sample_time()).unwrap_err();
+    let error = NetRig::connect(server.address, 2.0 * scene.sample_time(), None).unwrap_err();
     assert_eq!(refused(&error), Refusal::SampleTime(scene.sample_time()));
     assert!(error.to_string().contains("same scene"), "{error}");
 }
@@ -101,7 +101,7 @@ fn another_sample_time_is_refused_with_that_of_the_server() {
 fn a_rig_with_other_sensors_than_those_of_the_scene_is_refused() {
     let scene = scene(&["resonance.sensor='q1'"]);
     let (server, _) = lock_step_rig(&scene, 5.0);
-    let connect = || NetRig::connect(server.address, scene.sample_time()).unwrap();
+    let connect = || NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     assert!(connect().with_sensors(scene.resonance).is_ok());
     let error = connect().with_sensors(Definition::default()).unwrap_err();
     assert!(
@@ -116,8 +116,8 @@ fn a_rig_with_other_sensors_than_those_of_the_scene_is_refused() {
 fn a_second_client_is_refused_during_the_session_of_the_first() {
     let scene = scene(&[]);
     for (server, _) in [lock_step_rig(&scene, 10.0), real_time_rig(&scene, 10.0)] {
-        let mut first = NetRig::connect(server.address, scene.sample_time()).unwrap();
-        let error = NetRig::connect(server.address, scene.sample_time()).unwrap_err();
+        let mut first = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
+        let error = NetRig::connect(server.address, scene.sample_time(), None).unwrap_err();
         assert_eq!(refused(&error), Refusal::Busy);
         crate::bench::shake(&mut first, &scene, 10).unwrap();
     }
@@ -127,7 +127,7 @@ fn a_second_client_is_refused_during_the_session_of_the_first() {
 fn a_port_in_use_is_named() {
     let scene = scene(&[]);
     let (first, _) = lock_step_rig(&scene, 5.0);
-    let error = Server::listen(first.address, service(&scene, 1.0)).err().unwrap();
+    let error = Server::listen(first.address, service(&scene, 1.0), None).err().unwrap();
     assert!(error.to_string().contains(&first.address.to_string()), "{error}");
     assert!(matches!(error, LinkError::Listen { .. }));
 }
@@ -136,7 +136,7 @@ fn a_port_in_use_is_named() {
 fn a_server_stopped_by_its_owner_reports_the_session_it_had() {
     let scene = scene(&[]);
     let (server, _) = lock_step_rig(&scene, 5.0);
-    let mut rig = NetRig::connect(server.address, scene.sample_time()).unwrap();
+    let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     crate::bench::shake(&mut rig, &scene, 10).unwrap();
     let sessions = server.stop();
     assert_eq!(sessions.len(), 1);

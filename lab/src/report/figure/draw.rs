@@ -28,9 +28,6 @@ const fn at(px: i32) -> i32 {
 
 impl Figure {
     /// The figure as SVG, for white paper.
-    ///
-    /// # Errors
-    /// What plotters reports.
     pub fn svg(&self) -> Result<String, FigureError> {
         let mut text = String::new();
         let drawn = self.draw(&mut text);

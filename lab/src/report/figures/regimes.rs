@@ -17,9 +17,6 @@ const WIDTH: u32 = 770;
 const NARROW: usize = 1;
 
 /// The map as SVG.
-///
-/// # Errors
-/// What the drawing library refuses.
 pub fn svg(map: &Map) -> Result<String, FigureError> {
     // Cells lie side by side without a seam.
     let text = figure(map).svg()?;

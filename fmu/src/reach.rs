@@ -1,7 +1,7 @@
 //! How far displacements may go: where rounding is as wide as the cavity, nothing can be said of contacts any more, and
 //! finding that out takes seconds.
 
-use crate::{Drive, InvalidValue, Parameters, State};
+use lovines::{Drive, InvalidValue, Parameters, State};
 
 /// So many half-widths: there the next number is one half-width away.
 const RESOLUTION: f64 = 1.0 / f64::EPSILON;

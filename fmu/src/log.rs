@@ -1,8 +1,8 @@
 //! Events as lines for the master's log.
 
 use super::category;
-use crate::{Event, Wall};
 use fmi2_component::Log;
+use lovines::{Event, Wall};
 
 /// One line for one event, `time` being when its advance began.
 pub(super) fn tell(log: &Log, time: f64, event: Event) {

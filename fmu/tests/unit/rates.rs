@@ -1,7 +1,7 @@
 //! Tests of `model_exchange/rates`.
 
 use super::*;
-use crate::{Drive, State};
+use lovines::{Drive, State};
 
 #[test]
 fn each_derivative_is_the_difference_quotient_of_the_one_before() {

@@ -91,5 +91,5 @@ impl Scalar for Dual {
 }
 
 #[cfg(test)]
-#[path = "../../../tests/unit/model_exchange_dual.rs"]
+#[path = "../../tests/unit/dual.rs"]
 mod tests;

@@ -4,8 +4,8 @@ use super::outputs::Outputs;
 use super::reach::Reach;
 use super::variables::Real;
 use super::{LoViNes, Progress, Rig, unknown};
-use crate::{InvalidValue, Parameters};
 use fmi2_component::Refusal;
+use lovines::{InvalidValue, Parameters};
 
 impl LoViNes {
     /// A parameter or an input, as it was set.

@@ -3,9 +3,9 @@
 use super::derivatives::of_instant;
 use super::variables::Real;
 use super::{LoViNes, Progress, Rig, log};
-use crate::fmu::model_exchange::hybrid::Hybrid;
-use crate::{Drive, Parameters, State};
+use crate::model_exchange::hybrid::Hybrid;
 use fmi2_component::{Discrete, Log, ModelExchange, Refusal};
+use lovines::{Drive, Parameters, State};
 
 impl LoViNes {
     /// A value that was set, or that follows from the equations' state.

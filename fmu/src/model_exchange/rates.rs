@@ -1,9 +1,9 @@
 //! Time derivatives of everything that moves, at one instant between events: from the second on they follow from the
 //! equation of motion, differentiated again and again.
 
-use crate::base_motion::BaseMotion;
-use crate::parameters::Parameters;
-use crate::plant::Plant;
+use lovines::base_motion::BaseMotion;
+use lovines::parameters::Parameters;
+use lovines::plant::Plant;
 
 /// A quantity and its first four time derivatives.
 pub type Rates = [f64; 5];
@@ -75,5 +75,5 @@ fn rates_of(base: &BaseMotion) -> Rates {
 }
 
 #[cfg(test)]
-#[path = "../../../tests/unit/model_exchange_rates.rs"]
+#[path = "../../tests/unit/rates.rs"]
 mod tests;

@@ -13,7 +13,7 @@
 
 pub use super::dual::{Dual, Scalar};
 
-use crate::contact::Wall;
+use lovines::contact::Wall;
 
 /// Everything that the rig is made of, at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -132,5 +132,5 @@ impl<T: Scalar> Instant<T> {
 }
 
 #[cfg(test)]
-#[path = "../../../tests/unit/model_exchange_equations.rs"]
+#[path = "../../tests/unit/equations.rs"]
 mod tests;

@@ -1,9 +1,9 @@
 //! Which steps are taken, and why one is refused or given up.
 
 use super::LoViNes;
-use crate::Drive;
-use crate::plant::MOST_IMPACTS;
 use fmi2_component::Refusal;
+use lovines::Drive;
+use lovines::plant::MOST_IMPACTS;
 
 /// The longest step that is taken, in radians of the fastest rate: more than a million periods. Even where nothing hits, the
 /// search for the first contact looks at the motion once in every two radians or so, and a call is to end.

@@ -2,10 +2,10 @@
 
 use super::variables::Real;
 use super::{LoViNes, Progress, Rig};
-use crate::Plant;
-use crate::fmu::model_exchange::equations::{Dual, Instant, Scalar};
-use crate::fmu::model_exchange::rates::Movement;
+use crate::model_exchange::equations::{Dual, Instant, Scalar};
+use crate::model_exchange::rates::Movement;
 use fmi2_component::{Causality, Key, Refusal};
+use lovines::Plant;
 
 /// The highest order of output derivatives, as the description says it.
 const MOST: u32 = 3;

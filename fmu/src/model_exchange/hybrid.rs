@@ -1,4 +1,4 @@
-//! The rig as a hybrid system, for whoever integrates it: differential equations ([`crate::fmu::model_exchange::equations`]), functions whose
+//! The rig as a hybrid system, for whoever integrates it: differential equations ([`crate::model_exchange::equations`]), functions whose
 //! zeros are events, and the jumps at events.
 //!
 //! Contact is a matter of rounding for an integrator: it stops a little before or behind a zero. Walls are therefore
@@ -10,13 +10,13 @@
 //! contact at once; what that neglects is of third order in the rebound's speed, 1e-15 here.
 //!
 //! The wall's push depends on the velocity of the base. That of the built-in oscillator is known while its amplitude is
-//! held, that of a signal is not, and is taken for zero; the plant in closed form ([`crate::plant`]) has no such limit.
+//! held, that of a signal is not, and is taken for zero; the plant in closed form ([`lovines::plant`]) has no such limit.
 
-use crate::base_motion::Drive;
-use crate::contact::{ImpactLaw, Resolution, Wall};
-use crate::fmu::model_exchange::equations::Instant;
-use crate::parameters::{InvalidValue, Parameters};
-use crate::plant::{Event, Plant, State, Totals};
+use crate::model_exchange::equations::Instant;
+use lovines::base_motion::Drive;
+use lovines::contact::{ImpactLaw, Resolution, Wall};
+use lovines::parameters::{InvalidValue, Parameters};
+use lovines::plant::{Event, Plant, State, Totals};
 
 /// How far behind a wall a touch is told, as a fraction of the half-width.
 pub const DEPTH: f64 = 1e-12;
@@ -26,8 +26,7 @@ pub const LOWEST_HOP: f64 = 1e-10;
 pub const LONGEST_CHATTER: f64 = 1e-2;
 
 /// What is integrated.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, Default, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct States {
     /// Displacement of the primary mass, m.
     pub q1: f64,
@@ -42,8 +41,7 @@ pub struct States {
 }
 
 /// The rig between two looks of an integrator.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Hybrid {
     parameters: Parameters,
     contact: Option<Wall>,

@@ -1,6 +1,7 @@
 //! The plant as an FMI 2.0 component: which variable is which number of the physics.
 //!
 //! For co-simulation that is the plant in closed form, for model exchange its equations.
+#![forbid(unsafe_code)]
 
 mod derivatives;
 mod exchange;
@@ -11,10 +12,10 @@ mod outputs;
 mod reach;
 mod settings;
 
-use crate::fmu::limits::lost;
-use crate::fmu::model_exchange::hybrid::Hybrid;
-use crate::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
+use crate::limits::lost;
+use crate::model_exchange::hybrid::Hybrid;
 use fmi2_component::{Archive, Component, Key, Log, Refusal};
+use lovines::{Drive, Event, InvalidValue, Outcome, Parameters, Plant, State};
 use outputs::Outputs;
 use reach::Reach;
 use std::cell::Cell;

@@ -3,7 +3,7 @@
 use super::derivatives;
 use super::variables::Real;
 use super::{LoViNes, Progress, Rig};
-use crate::{BaseMotion, Plant};
+use lovines::{BaseMotion, Plant};
 use std::cell::Cell;
 
 /// How many outputs are kept.

@@ -1,0 +1,78 @@
+//! Tests of `frame`.
+
+use super::*;
+use proptest::prelude::*;
+
+fn frames() -> impl Strategy<Value = Frame> {
+    let numbers = prop::array::uniform6(any::<u64>());
+    (1u8..=8, any::<u8>(), any::<u64>(), any::<u64>(), any::<u64>(), numbers).prop_map(
+        |(kind, flags, session, sequence, time, values)| Frame {
+            kind: Kind::from_code(kind).unwrap(),
+            flags,
+            session,
+            sequence,
+            time: f64::from_bits(time),
+            values: values.map(f64::from_bits),
+        },
+    )
+}
+
+proptest! {
+    #[test]
+    fn every_frame_is_decoded_to_the_same_bits(frame in frames()) {
+        let bytes = frame.encode();
+        let back = Frame::decode(&bytes).unwrap();
+        // NaN is not equal to itself; its bits are.
+        prop_assert_eq!(back.encode(), bytes);
+    }
+
+    #[test]
+    fn a_frame_with_up_to_three_inverted_bits_is_refused(frame in frames(), turned in prop::collection::btree_set(0..SIZE * 8, 1..=3)) {
+        let mut bytes = frame.encode();
+        for bit in turned {
+            bytes[bit / 8] ^= 1 << (bit % 8);
+        }
+        prop_assert!(Frame::decode(&bytes).is_err());
+    }
+
+    #[test]
+    fn no_datagram_makes_the_decoder_panic(bytes in prop::collection::vec(any::<u8>(), 0..200)) {
+        prop_assert!(Frame::decode(&bytes).is_err());
+    }
+
+    #[test]
+    fn a_frame_of_another_size_is_refused(frame in frames(), length in 0..2 * SIZE) {
+        prop_assume!(length != SIZE);
+        let mut bytes = frame.encode().to_vec();
+        bytes.resize(length, 0);
+        prop_assert!(Frame::decode(&bytes).is_err());
+    }
+}
+
+#[test]
+fn the_layout_is_the_documented_one() {
+    let frame = Frame {
+        kind: Kind::Drive,
+        flags: flag::SETTLED,
+        session: 0x0102_0304_0506_0708,
+        sequence: 9,
+        time: 0.5,
+        values: [1.0, 2.0, 0.0, 0.0, 0.0, -1.0],
+    };
+    let bytes = frame.encode();
+    assert_eq!(&bytes[..8], b"VINE\x02\x00\x05\x02");
+    assert_eq!(bytes[8..16], [8, 7, 6, 5, 4, 3, 2, 1]);
+    assert_eq!(bytes[16..24], [9, 0, 0, 0, 0, 0, 0, 0]);
+    assert_eq!(bytes[24..32], 0.5f64.to_le_bytes());
+    assert_eq!(bytes[72..80], (-1.0f64).to_le_bytes());
+    // The value of zlib.crc32 in Python.
+    assert_eq!(bytes[80..], 0xe40e_f90du32.to_le_bytes());
+}
+
+#[test]
+fn another_version_is_recognised_in_a_datagram_of_any_size() {
+    let longer = [&b"VINE\x07\x00"[..], &[0; 100]].concat();
+    assert_eq!(Frame::decode(&longer), Err(FrameError::Version(7)));
+    assert_eq!(Frame::decode(b"VINE"), Err(FrameError::Magic));
+    assert_eq!(Frame::decode(b"VINE\x02\x00 short"), Err(FrameError::Size(12)));
+}

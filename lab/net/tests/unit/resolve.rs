@@ -1,0 +1,32 @@
+//! Tests of `resolve`.
+
+use super::*;
+
+#[test]
+fn loopback_is_always_allowed_and_other_addresses_only_with_permission() {
+    for here in ["127.0.0.1:5000", "127.8.8.8:1", "[::1]:9"] {
+        assert!(resolve(here, BindScope::Loopback).is_ok(), "{here}");
+    }
+    for beyond in ["0.0.0.0:5000", "192.0.2.1:5000", "[::]:5000", "[2001:db8::1]:1"] {
+        let refused = resolve(beyond, BindScope::Loopback).unwrap_err();
+        assert!(refused.to_string().contains("--allow-remote"), "{refused}");
+        assert!(resolve(beyond, BindScope::Remote).is_ok(), "{beyond}");
+    }
+}
+
+#[test]
+fn text_that_is_not_an_address_is_named() {
+    for text in [
+        "",
+        "udp://",
+        "tcp://127.0.0.1",
+        "udp://127.0.0.1:99999",
+        "http://127.0.0.1:1",
+        "127.0.0.1:1",
+    ] {
+        let refused = Address::parse(text, BindScope::Remote).unwrap_err().to_string();
+        assert!(refused.contains("HOST:PORT"), "{refused}");
+    }
+    let udp = Address::parse("udp://127.0.0.1:1", BindScope::Loopback).unwrap();
+    assert_eq!(udp.to_string(), "udp://127.0.0.1:1");
+}
