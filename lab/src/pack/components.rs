@@ -53,7 +53,7 @@ pub fn components() -> [Component; 2] {
     ]
 }
 
-const PLANT: &str = include_str!("../../../fmu/modelDescription.xml");
+const PLANT: &str = include_str!("../../../modelDescription.xml");
 const CONTROLLER: &str = include_str!("../../../controller/fmu/modelDescription.xml");
 
 /// Gives the description the guid that the library was built with.

@@ -8,7 +8,7 @@ use libloading::Library;
 use crate::functions::Functions;
 
 /// The plant's description.
-pub const PLANT: &str = include_str!("../../../fmu/modelDescription.xml");
+pub const PLANT: &str = include_str!("../../../modelDescription.xml");
 /// The controller's description.
 pub const CONTROLLER: &str = include_str!("../../../controller/fmu/modelDescription.xml");
 
