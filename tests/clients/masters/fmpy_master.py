@@ -29,15 +29,16 @@ def system_file(bench: Bench) -> Tape:
 def container(bench: Bench) -> Tape:
     path = bench.folder / "container.fmu"
     description = read_model_description(str(path), validate=True)
-    names = {variable.name.split(".")[-1]: variable.name for variable in description.modelVariables}
-    columns = [names[name] for name in ("v", "omega", "impacts")]
+    # What a wire carries is a local variable of the container; `move.omega` is an input of the controller.
+    results = [variable.name for variable in description.modelVariables if variable.causality in ("local", "output")]
+    columns = [next(full for full in results if full.split(".")[-1] == name) for name in ("v", "omega", "impacts")]
     rows = simulate_fmu(
         str(path),
         stop_time=bench.steps * bench.step,
         step_size=bench.step,
         output_interval=bench.step,
         output=columns,
-        start_values={names["active"]: True},
+        start_values={"active": True},
     )
     return tape(bench, rows, *columns)
 
