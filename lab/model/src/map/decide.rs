@@ -108,7 +108,8 @@ impl Run {
             let from = last.time - PI * (most as f64 + 0.5);
             let earlier = self.impacts.iter().rev().take_while(|one| one.time > from);
             let mut found = 0;
-            let counts = earlier.filter(|one| one.time < last.time).filter_map(|one| {
+            let as_strong = |one: &&Impact| (speed(one) - speed(last)).abs() < SIMILAR;
+            let counts = earlier.filter(as_strong).filter_map(|one| {
                 let count = ((last.time - one.time) / PI).round() as usize;
                 (count > 0 && similar(last, one, count)).then_some(count)
             });
@@ -171,10 +172,8 @@ impl Run {
 
     /// An unstable periodic motion was found close by.
     pub(super) fn repelled(&self) -> bool {
-        self.periodic
-            .get()
-            .and_then(Option::as_ref)
-            .is_some_and(|motion| !motion.stable)
+        let found = self.periodic.get().and_then(Option::as_ref);
+        found.is_some_and(|motion| !motion.stable)
     }
 
     /// Repetitions approach each other, and there is a stable periodic motion close by: its multipliers decide.
