@@ -13,14 +13,13 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<plants::Plants>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<experiments::PhaseLock>()?;
+    module.add_class::<sweeps::Sweep>()?;
     for function in [
         wrap_pyfunction!(experiments::identify, module)?,
         wrap_pyfunction!(experiments::backbone, module)?,
         wrap_pyfunction!(experiments::orbits, module)?,
         wrap_pyfunction!(experiments::theory, module)?,
         wrap_pyfunction!(experiments::regime, module)?,
-        wrap_pyfunction!(sweeps::sweep, module)?,
-        wrap_pyfunction!(sweeps::chunks, module)?,
     ] {
         module.add_function(function)?;
     }

@@ -65,53 +65,58 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
     Plan::new(scene.family.clone(), settings).map_err(invalid)
 }
 
-/// Number of cells and of chunks, estimated hours and bytes, and whether these must be confirmed.
-#[pyfunction]
-pub fn chunks(
-    py: Python<'_>,
-    scene: &Scene,
-    axes: &Bound<'_, PyDict>,
-    settings: &Bound<'_, PyDict>,
-) -> PyResult<(u64, u64, f64, f64, bool)> {
-    let plan = plan(scene, axes, settings)?;
-    let stop = AtomicBool::new(false);
-    let cost = wait(py, &stop, |_| Ok(()), || estimate(&plan, &stop))?.map_err(invalid)?;
-    Ok((cost.cells, plan.chunks(), cost.hours, cost.bytes, cost.is_large()))
-}
+/// A checked sweep.
+#[pyclass(frozen)]
+pub struct Sweep(Plan);
 
-/// Computes a part of a sweep; `look` receives the number of cells that are complete. Returns the numbers of cells computed and failed.
-#[pyfunction]
-pub fn sweep(
-    py: Python<'_>,
-    scene: &Scene,
-    axes: &Bound<'_, PyDict>,
-    settings: &Bound<'_, PyDict>,
-    out: PathBuf,
-    shard: (u64, u64),
-    look: Option<Py<PyAny>>,
-) -> PyResult<(u64, u64)> {
-    let plan = plan(scene, axes, settings)?;
-    let (number, of) = shard;
-    if number >= of {
-        return Err(invalid(format!(
-            "shard ({number}, {of}): the number counts from 0 to {of} - 1"
-        )));
+#[pymethods]
+impl Sweep {
+    #[new]
+    fn new(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -> PyResult<Self> {
+        plan(scene, axes, settings).map(Self)
     }
-    let monitor = Monitor::default();
-    let looked = |py: Python<'_>| match &look {
-        Some(look) => {
-            let complete = monitor.found.load(Relaxed) + monitor.computed.load(Relaxed);
-            look.call1(py, (complete,)).map(drop)
+
+    #[getter]
+    fn cells(&self) -> u64 {
+        self.0.cells()
+    }
+
+    #[getter]
+    fn chunks(&self) -> u64 {
+        self.0.chunks()
+    }
+
+    /// Estimated hours and bytes, and whether these must be confirmed.
+    fn estimate(&self, py: Python<'_>) -> PyResult<(f64, f64, bool)> {
+        let stop = AtomicBool::new(false);
+        let cost = wait(py, &stop, |_| Ok(()), || estimate(&self.0, &stop))?.map_err(invalid)?;
+        Ok((cost.hours, cost.bytes, cost.is_large()))
+    }
+
+    /// Computes a part of it; `look` receives the number of cells that are complete. Returns the numbers of cells computed and failed.
+    fn run(&self, py: Python<'_>, out: PathBuf, shard: (u64, u64), look: Option<Py<PyAny>>) -> PyResult<(u64, u64)> {
+        let (number, of) = shard;
+        if number >= of {
+            return Err(invalid(format!(
+                "shard ({number}, {of}): the number counts from 0 to {of} - 1"
+            )));
         }
-        None => Ok(()),
-    };
-    let result = wait(py, &monitor.stop, looked, || {
-        run(&plan, &out, Shard { number, of }, &monitor)
-    })?;
-    result.map_err(|error| match error {
-        StoreError::Write { .. } => PyOSError::new_err(error.to_string()),
-        _ => invalid(error),
-    })?;
-    looked(py)?;
-    Ok((monitor.computed.load(Relaxed), monitor.failed.load(Relaxed)))
+        let monitor = Monitor::default();
+        let looked = |py: Python<'_>| match &look {
+            Some(look) => {
+                let complete = monitor.found.load(Relaxed) + monitor.computed.load(Relaxed);
+                look.call1(py, (complete,)).map(drop)
+            }
+            None => Ok(()),
+        };
+        let result = wait(py, &monitor.stop, looked, || {
+            run(&self.0, &out, Shard { number, of }, &monitor)
+        })?;
+        result.map_err(|error| match error {
+            StoreError::Write { .. } => PyOSError::new_err(error.to_string()),
+            _ => invalid(error),
+        })?;
+        looked(py)?;
+        Ok((monitor.computed.load(Relaxed), monitor.failed.load(Relaxed)))
+    }
 }

@@ -102,20 +102,20 @@ def sweep(
     if adaptive is not None and client is not None:
         raise ValueError("an adaptive sweep runs in one process: leave out adaptive or client")
     axes = {name: _values(values) for name, values in axes.items()}
-    cells, chunks, hours, size, large = _native.chunks(scene._native, axes, settings)
+    plan = _native.Sweep(scene._native, axes, settings)
+    cells = plan.cells
+    hours, size, large = plan.estimate()
     if large and not confirm:
         raise ValueError(
             f"{cells} cells would take about {hours:.1f} h on this machine and {size / 1e9:.1f} GB before compression; "
             "confirm with confirm=True"
         )
     with _bar(cells, progress) as bar:
-        if client is None:
-            look = None if bar is None else lambda complete: bar.update(complete - bar.n)
-            _native.sweep(scene._native, axes, settings, fspath(out), (0, 1), look)
-        else:
-            _distributed(client, (scene, axes, settings, fspath(out)), chunks, cells, bar)
-            # Nothing is left to compute; this removes what a killed worker has left.
-            _native.sweep(scene._native, axes, settings, fspath(out), (0, 1), None)
+        if client is not None:
+            _distributed(client, (scene, axes, settings, fspath(out)), plan.chunks, cells, bar)
+        look = None if bar is None or client is not None else lambda complete: bar.update(complete - bar.n)
+        # After workers nothing is left to compute; this removes what a killed one has left.
+        plan.run(fspath(out), (0, 1), look)
     opened: xarray.Dataset = xarray.open_zarr(out)
     return opened
 
@@ -136,7 +136,7 @@ def _bar(cells: int, progress: bool) -> Any:
 
 def _chunk(part: int, chunks: int, scene: Scene, axes: Any, settings: Any, out: str) -> int:
     """Compute one chunk in a worker; only the number of its cells returns."""
-    return _native.sweep(scene._native, axes, settings, out, (part, chunks), None)[0]
+    return _native.Sweep(scene._native, axes, settings).run(out, (part, chunks), None)[0]
 
 
 def _distributed(client: Any, arguments: Any, chunks: int, cells: int, bar: Any) -> None:

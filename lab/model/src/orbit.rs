@@ -5,6 +5,7 @@
 //! alternating impulses of known size on the oscillator, and their periodic response has a closed form. At a given frequency
 //! one quadratic equation for B remains. There is no first-order approximation.
 
+mod approach;
 mod bifurcations;
 mod bounce;
 mod branch;
@@ -28,6 +29,7 @@ mod settle;
 
 use serde::Serialize;
 
+pub use approach::{Symmetric, alternates};
 pub use bifurcations::{BifurcationCurve, bifurcation_curves};
 pub use bounce::Bounce;
 pub use branch::{Branch, Ended, Limits, Special};
@@ -36,7 +38,7 @@ pub use condition::{Bifurcation, Condition};
 pub use continuation::{branch_off, continue_both_ways, continue_from};
 pub use convergence::{Convergence, Difference, convergence};
 pub use curves::backbone;
-pub use driven::{Driven, Moment};
+pub use driven::{Disturbance, Driven, Moment};
 pub use from_rest::impacts_from_rest;
 pub use impact_map::ImpactMap;
 pub use pattern::{ImpactPattern, Unknowns};

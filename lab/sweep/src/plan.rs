@@ -59,7 +59,12 @@ impl Plan {
             })
             .collect();
         let resonant = || stable_resonant(&scene.dimensionless()).map_or(0.0, |orbit| orbit.sigma);
-        let sigma = settings.sigma.unwrap_or_else(resonant);
+        let detuned = settings.axes.iter().any(|axis| axis.name == SIGMA);
+        let sigma = if detuned {
+            0.0
+        } else {
+            settings.sigma.unwrap_or_else(resonant)
+        };
         Ok(Self {
             family,
             settings,

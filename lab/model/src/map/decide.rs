@@ -4,13 +4,13 @@ use std::f64::consts::PI;
 
 use super::run::{Point, Run};
 use crate::numerics::{mean, standard_deviation};
-use crate::orbit::{Periodic, periodic_near};
+use crate::orbit::{Periodic, Symmetric, alternates, periodic_near};
 use crate::regime::{Impact, Regime, synchrony};
 
 /// Longest repetition in the search, half periods of the base.
 const LONGEST: usize = 192;
 /// Smallest number of half periods over which a motion repeats itself.
-const REPEATED: usize = 64;
+pub(super) const REPEATED: usize = 64;
 /// Among so many of the last impacts, the strongest is looked for in the past, and those that are at least this part as strong; another
 /// one is similar within this velocity over b omega0, and as close to its wall over b at the time of that one.
 const RECENT: usize = 8;
@@ -28,6 +28,8 @@ const SETTLING: f64 = 1e-2;
 const SEVERAL: f64 = 5e-4;
 /// Slowest approach to it, per period, that decides before the limit: a slower one is close to a bifurcation.
 const SLOW: f64 = 0.004;
+/// A motion that approaches the symmetric orbit is decided before the limit if its distance will be below this at the limit.
+const SETTLED: f64 = 5e-3;
 /// A transient ends where the state is this close to that one repetition before.
 const TRANSIENT: f64 = 1e-2;
 /// Share of a motion without repetition that is left out of the averages, and number of blocks that the rest is cut into.
@@ -95,39 +97,40 @@ impl Run {
 
     /// Numbers of half periods after which the motion may repeat itself: the strongest of the last impacts came at the same phase with
     /// about the same velocity, and so did all others of them that were strong.
-    fn repetitions(&self) -> impl Iterator<Item = usize> {
-        let most = LONGEST.min(self.halves() / 4);
-        let recent = &self.impacts[self.impacts.len().saturating_sub(RECENT)..];
-        let speed = |one: &Impact| one.velocity.abs();
-        let last = recent.iter().max_by(|one, other| speed(one).total_cmp(&speed(other)));
-        let mut found = 0;
-        let counts = last.into_iter().flat_map(move |last| {
+    fn repetitions(&self) -> &[usize] {
+        self.repetitions.get_or_init(|| {
+            let most = LONGEST.min(self.halves() / 4);
+            let recent = &self.impacts[self.impacts.len().saturating_sub(RECENT)..];
+            let speed = |one: &Impact| one.velocity.abs();
+            let Some(last) = recent.iter().max_by(|one, other| speed(one).total_cmp(&speed(other))) else {
+                return Vec::new();
+            };
             let from = last.time - PI * (most as f64 + 0.5);
-            let earlier = self.impacts.iter().rev().take_while(move |one| one.time > from);
-            earlier
-                .filter(move |one| (speed(one) - speed(last)).abs() < SIMILAR && one.time < last.time)
-                .map(|one| ((last.time - one.time) / PI).round() as usize)
-        });
-        let candidates = counts.filter(move |count| {
-            let new = *count > found && *count <= most;
-            found = found.max(*count);
-            let strong = |one: &&Impact| speed(one) >= STRONG * last.map_or(0.0, speed);
-            new && recent.iter().filter(strong).all(|one| self.has_similar(one, *count))
-        });
-        candidates.take(CANDIDATES)
+            let earlier = self.impacts.iter().rev().take_while(|one| one.time > from);
+            let mut found = 0;
+            let as_strong = |one: &&Impact| (speed(one) - speed(last)).abs() < SIMILAR;
+            let counts = earlier.filter(as_strong).filter_map(|one| {
+                let count = ((last.time - one.time) / PI).round() as usize;
+                (count > 0 && similar(last, one, count)).then_some(count)
+            });
+            let candidates = counts.filter(|count| {
+                let new = *count > found && *count <= most;
+                found = found.max(*count);
+                let mut strong = recent.iter().filter(|one| speed(one) >= STRONG * speed(last));
+                new && strong.all(|one| self.has_similar(one, *count))
+            });
+            candidates.take(CANDIDATES).collect()
+        })
     }
 
     /// Whether there was an impact like this one, or its mirror image, so many half periods before.
     fn has_similar(&self, one: &Impact, count: usize) -> bool {
-        let sign = if count % 2 == 1 { -1.0 } else { 1.0 };
-        // At the time of the one, the other is this far from its wall.
         let (time, apart) = (one.time - PI * count as f64, SIMILAR / one.velocity.abs());
         let from = self.impacts.partition_point(|other| other.time <= time - apart);
-        let near = self.impacts[from..]
+        let mut near = self.impacts[from..]
             .iter()
             .take_while(|other| other.time < time + apart);
-        near.into_iter()
-            .any(|other| (other.velocity - sign * one.velocity).abs() < SIMILAR)
+        near.any(|other| similar(one, other, count))
     }
 
     /// An exact periodic motion close to the present state.
@@ -138,14 +141,45 @@ impl Run {
         found.as_ref()
     }
 
+    /// The motion certainly approaches the stable symmetric 1:1 orbit, and will have settled there at the limit.
+    pub(super) fn approaching(&self, limit: usize) -> Option<Point> {
+        let n = self.halves();
+        let stable = || Symmetric::stable(&self.scene, self.sigma);
+        let found = alternates(&self.moments).then(|| self.symmetric.get_or_init(stable))?;
+        let symmetric = found.as_ref()?;
+        let approach = symmetric.approach(&self.moments, TRANSIENT)?;
+        let rate = symmetric.orbit.multipliers[3].ln();
+        let left = (2 * limit).saturating_sub(n + REPEATED) as f64;
+        (approach.distance * (rate * left).exp() < SETTLED).then(|| Point {
+            transient: 0.5 * (n as i64 + approach.left).max(0) as f64,
+            recurrence: Some(approach.recurrence),
+            exponent: Some(2.0 * rate),
+            exponent_error: Some(0.0),
+            synchrony: 1.0,
+            impacts_per_period: 2.0,
+            impacts: 2,
+            periods: 1,
+            ..self.point(Regime::Symmetric, n - 2)
+        })
+    }
+
+    /// Number of half periods after which repetitions approach each other.
+    pub(super) fn approached(&self) -> Option<usize> {
+        let approach = |[first, second]: [f64; 2]| second <= first.max(ROUNDING);
+        let mut counts = self.repetitions().iter().copied();
+        counts.find(|count| self.differences(*count, SETTLING).is_some_and(approach))
+    }
+
+    /// An unstable periodic motion was found close by.
+    pub(super) fn repelled(&self) -> bool {
+        let found = self.periodic.get().and_then(Option::as_ref);
+        found.is_some_and(|motion| !motion.stable)
+    }
+
     /// Repetitions approach each other, and there is a stable periodic motion close by: its multipliers decide.
     pub(super) fn settling(&self, early: bool) -> Option<Point> {
         let n = self.halves();
-        let approach = |count| {
-            self.differences(count, SETTLING)
-                .is_some_and(|[first, second]| second <= first.max(ROUNDING))
-        };
-        let count = self.repetitions().find(|count| approach(*count))?;
+        let count = self.approached()?;
         if early && count > 2 && self.distance(n, count) > SEVERAL {
             return None;
         }
@@ -177,7 +211,8 @@ impl Run {
         let n = self.halves();
         let (count, [first, second]) = self
             .repetitions()
-            .find_map(|count| Some((count, self.differences(count, SAME)?)))?;
+            .iter()
+            .find_map(|count| Some((*count, self.differences(*count, SAME)?)))?;
         let impacts = self.counts(n)[0] - self.counts(n - count)[0];
         let other = || self.periodic().is_some_and(|motion| early || !motion.stable);
         if impacts == 0 || second > first.max(ROUNDING) || other() {
@@ -213,8 +248,8 @@ impl Run {
     }
 
     /// Largest Lyapunov exponent per period over the periods from `from` on, and its standard error from the scatter of blocks.
-    pub(super) fn exponent(&self, from: usize) -> (f64, f64) {
-        let growth = &self.growth[from..];
+    pub(super) fn exponent(&mut self, from: usize) -> (f64, f64) {
+        let growth = &self.growth()[from..];
         let length = (growth.len() / BLOCKS).max(1);
         let blocks: Vec<f64> = growth
             .chunks_exact(length)
@@ -227,7 +262,7 @@ impl Run {
     }
 
     /// Nothing repeats: the Lyapunov exponent decides.
-    pub(super) fn irregular(&self) -> Point {
+    pub(super) fn irregular(&mut self) -> Point {
         let n = self.halves();
         let from = (LEFT_OUT * n as f64) as usize;
         let (exponent, error) = self.exponent(from / 2);
@@ -254,4 +289,11 @@ impl Run {
             ..point
         }
     }
+}
+
+/// Whether an impact is like `other` or its mirror image so many half periods before; at its time, the other is as close to its wall.
+fn similar(one: &Impact, other: &Impact, count: usize) -> bool {
+    let sign = if count % 2 == 1 { -1.0 } else { 1.0 };
+    let shift = one.time - PI * count as f64 - other.time;
+    (other.velocity - sign * one.velocity).abs() < SIMILAR && shift.abs() * one.velocity.abs() < SIMILAR
 }

@@ -6,8 +6,9 @@ use std::f64::consts::{PI, TAU};
 use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
 
+use super::decide::REPEATED;
 use crate::Dimensionless;
-use crate::orbit::{Driven, Moment, Periodic};
+use crate::orbit::{Disturbance, Driven, Moment, Periodic, Symmetric};
 use crate::regime::{Impact, Regime};
 
 /// Result at one point.
@@ -40,8 +41,9 @@ pub struct Point {
     pub state: [f64; 4],
 }
 
-/// Periods after which the motion is examined for the first time; from then on whenever their number has grown by [`LATER`].
-const FIRST: usize = 32;
+/// Periods after which the motion is compared with the symmetric orbit for the first time; from then on whenever their number has grown
+/// by [`LATER`].
+const FIRST: usize = 14;
 const LATER: f64 = 1.15;
 /// Periods over which the exponent of a repeating motion is measured.
 const EXPONENT: usize = 256;
@@ -93,7 +95,7 @@ pub fn observe_confirmed(
 
 /// Number of periods at the next examination.
 fn later(periods: usize, last: usize) -> usize {
-    ((periods as f64 * LATER) as usize).min(last)
+    ((periods as f64 * LATER).ceil() as usize).min(last)
 }
 
 /// A simulated motion.
@@ -105,17 +107,24 @@ pub struct Run {
     pub(super) driven: Driven,
     /// Periods so far.
     periods: usize,
-    /// The motion after every event.
-    moments: Vec<Moment>,
+    /// The motion at the start, after every event, and wherever it was examined.
+    pub(super) moments: Vec<Moment>,
     /// States at the beginning of every half period and now, as far as they were needed.
     states: Vec<OnceCell<[f64; 4]>>,
-    /// Growth of a disturbance over each period, as a natural logarithm; a period without impacts may belong to the next one.
-    pub(super) growth: Vec<f64>,
+    /// A disturbance, the number of moments that it has passed, and its growth over each period, as a natural logarithm; a period
+    /// without impacts may belong to the next one.
+    disturbance: Disturbance,
+    passed: usize,
+    growth: Vec<f64>,
     pub(super) impacts: Vec<Impact>,
     /// Phases of the base at which the particle came to rest, rad.
     sticks: Vec<f64>,
     /// The exact motion close to the present state, if it was looked for.
     pub(super) periodic: OnceCell<Option<Periodic>>,
+    /// Numbers of half periods after which the motion may repeat itself, if they were looked for.
+    pub(super) repetitions: OnceCell<Vec<usize>>,
+    /// The stable symmetric 1:1 orbit, if it was looked for.
+    pub(super) symmetric: OnceCell<Option<Symmetric>>,
 }
 
 impl Run {
@@ -125,19 +134,27 @@ impl Run {
     /// Invalid parameters or an invalid start.
     pub fn new(scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<Self, InvalidValue> {
         let drive = scene.drive(sigma);
+        let plant = scene.plant(start)?;
+        let driven = Driven::new(scene, drive.omega);
+        let mut moments = Vec::with_capacity(EXPECTED);
+        moments.push(driven.moment(0.0, plant.state(), plant.contact()));
         Ok(Self {
             scene: *scene,
             sigma,
-            plant: scene.plant(start)?,
+            plant,
             drive,
-            driven: Driven::new(scene, drive.omega),
+            driven,
             periods: 0,
-            moments: Vec::with_capacity(EXPECTED),
+            moments,
             states: vec![OnceCell::from(start)],
+            disturbance: Disturbance::default(),
+            passed: 0,
             growth: Vec::new(),
             impacts: Vec::with_capacity(EXPECTED),
             sticks: Vec::new(),
             periodic: OnceCell::new(),
+            repetitions: OnceCell::new(),
+            symmetric: OnceCell::new(),
         })
     }
 
@@ -147,6 +164,7 @@ impl Run {
     /// As [`Self::new`].
     pub fn decided(&mut self, first: usize, limit: usize) -> Result<Point, InvalidValue> {
         let mut next = FIRST.min(limit);
+        let mut repelled = false;
         loop {
             self.follow(next)?;
             if next < first.min(limit) {
@@ -154,21 +172,23 @@ impl Run {
                 continue;
             }
             let early = next < limit;
-            if let Some(point) = self.without_impacts().or_else(|| self.settling(early)) {
+            if early && let Some(point) = self.approaching(limit) {
                 return Ok(point);
             }
-            if self.repeating(early).is_some() {
-                // Near an unstable motion, recurrence lasts a while: it must last longer, and disturbances must shrink.
-                let settled = self.periods;
-                self.follow(settled + EXPONENT)?;
-                let (exponent, error) = self.exponent(settled);
-                if let Some(point) = self.repeating(early).filter(|_| exponent < 0.0) {
-                    return Ok(Point {
-                        exponent: Some(exponent),
-                        exponent_error: Some(error),
-                        ..point
-                    });
+            if next < (REPEATED / 2).min(limit) {
+                next = later(next, limit);
+                continue;
+            }
+            if let Some(point) = self.without_impacts() {
+                return Ok(point);
+            }
+            // A motion leaves the neighbourhood of an unstable one before it can settle.
+            repelled &= early && self.approached().is_some();
+            if !repelled {
+                if let Some(point) = self.settled(early)? {
+                    return Ok(point);
                 }
+                repelled = self.repelled();
             }
             if next >= limit {
                 let point = self.irregular();
@@ -178,6 +198,24 @@ impl Run {
             }
             next = later(next, if early { limit } else { CONTINUED * limit });
         }
+    }
+
+    /// The motion repeats itself, or will soon.
+    fn settled(&mut self, early: bool) -> Result<Option<Point>, InvalidValue> {
+        let settling = self.settling(early);
+        if settling.is_some() || self.repeating(early).is_none() {
+            return Ok(settling);
+        }
+        // Near an unstable motion, recurrence lasts a while: it must last longer, and disturbances must shrink.
+        let settled = self.periods;
+        self.follow(settled + EXPONENT)?;
+        let (exponent, error) = self.exponent(settled);
+        let point = self.repeating(early).filter(|_| exponent < 0.0);
+        Ok(point.map(|point| Point {
+            exponent: Some(exponent),
+            exponent_error: Some(error),
+            ..point
+        }))
     }
 
     /// Half periods so far.
@@ -210,33 +248,43 @@ impl Run {
         }
         let (start, end) = (TAU * self.periods as f64, TAU * periods as f64);
         let omega = self.drive.omega;
-        self.growth.resize(periods, 0.0);
-        let Self { driven, moments, growth, impacts, sticks, .. } = self;
-        moments.push(driven.begin(start, self.plant.state(), self.plant.contact()));
-        let mut period = self.periods;
+        let Self { driven, moments, impacts, sticks, .. } = self;
+        let mut now = moments[moments.len() - 1];
         self.plant.advance_with(self.drive, (end - start) / omega, |event| {
             let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) = event;
             let phase = start + omega * t;
-            let now = ((phase / TAU) as usize).min(periods - 1);
-            driven.flow(phase);
-            if now > period {
-                growth[period] = driven.growth();
-                period = now;
-            }
-            moments.push(driven.jump(&event));
+            now = driven.after(&now, phase, &event);
+            moments.push(now);
             match event {
                 Event::Impact { velocity, .. } => impacts.push(Impact { time: phase, velocity }),
                 Event::Stuck { .. } => sticks.push(phase),
                 Event::Released { .. } => {}
             }
         })?;
-        driven.flow(end);
-        growth[period] = driven.growth();
+        moments.push(driven.moment(end, self.plant.state(), self.plant.contact()));
         let State { q1, dq1, q2, dq2 } = self.plant.state();
         self.periods = periods;
         self.periodic.take();
+        self.repetitions.take();
         self.states.resize_with(2 * periods, OnceCell::new);
         self.states.push(OnceCell::from([q1, dq1, q2, dq2]));
         Ok(())
+    }
+
+    /// Growth of the disturbance over each period so far.
+    pub(super) fn growth(&mut self) -> &[f64] {
+        self.growth.resize(self.periods, 0.0);
+        let mut period = ((self.moments[self.passed].phase / TAU) as usize).min(self.periods - 1);
+        for pair in self.moments[self.passed..].windows(2) {
+            self.disturbance.flow(&self.driven, &pair[0], &pair[1]);
+            let now = ((pair[1].phase / TAU) as usize).min(self.periods);
+            if now > period {
+                self.growth[period] = self.disturbance.growth();
+                period = now;
+            }
+            self.disturbance.jump(&self.driven, &pair[1]);
+        }
+        self.passed = self.moments.len() - 1;
+        &self.growth
     }
 }

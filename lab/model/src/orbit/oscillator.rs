@@ -41,6 +41,20 @@ impl Oscillator {
         ((slow + fast) / 2.0, (slow - fast) / (2.0 * d))
     }
 
+    /// As [`Self::propagator`], with functions of single precision.
+    pub(super) fn rough_propagator(&self, t: f64) -> Matrix2<f64> {
+        let square = 1.0 - self.zeta * self.zeta;
+        if square < 1e-4 {
+            return self.propagator(t);
+        }
+        let d = square.sqrt();
+        let (sine, cosine) = rough_sin_cos(d * t);
+        let decay = f64::from(((-self.zeta * t) as f32).exp());
+        let (cosine, sine) = (decay * cosine, decay * sine / d);
+        let zeta = self.zeta;
+        Matrix2::new(cosine + zeta * sine, sine, -sine, cosine - zeta * sine)
+    }
+
     /// Response to the force `exp(i omega t)`: `1/(1 - omega^2 + 2 i zeta omega)`.
     pub(super) fn compliance(&self, omega: f64) -> Complex<f64> {
         self.stiffness(omega).inv()
@@ -60,6 +74,12 @@ impl Oscillator {
     pub(super) fn free_acceleration(&self, q: f64, dq: f64) -> f64 {
         -q - 2.0 * self.zeta * dq
     }
+}
+
+/// Sine and cosine in single precision.
+pub(super) fn rough_sin_cos(angle: f64) -> (f64, f64) {
+    let (sine, cosine) = (angle as f32).sin_cos();
+    (f64::from(sine), f64::from(cosine))
 }
 
 #[cfg(test)]
