@@ -18,7 +18,8 @@ def tank(tmp_path_factory):
     folder = tmp_path_factory.mktemp("tank")
     built = ROOT / os.environ.get("CARGO_TARGET_DIR", "target") / "debug"
     library, pack = built / "deps" / "libfmi2_example_tank.so", built / "examples" / "pack"
-    assert library.is_file() and pack.is_file(), "`cargo test --workspace --no-run` builds the example and its packer"
+    for file in (library, pack):
+        assert file.is_file(), f"{file} is missing; `cargo test --workspace --no-run` builds it"
     subprocess.run([pack, EXAMPLE / "modelDescription.xml", library, folder], check=True, cwd=ROOT)
     return folder / "Tank.fmu"
 
