@@ -1,23 +1,19 @@
 //! `vines orbit`: exact orbits at resonance, and their curves.
 
 mod studies;
-
-use std::fmt::Write;
+mod text;
 
 use clap::Args;
 use vines::{
-    numerics::range,
-    orbit::{
-        Branch, Condition, Ended, Exploration, Limits, Orbit, Periodic, Response, backbone, continue_both_ways,
-        phase_resonant, response, settle,
-    },
-    report::{Table, number, summary::parameters},
+    orbit::{Condition, Exploration, Limits, backbone, continue_both_ways, phase_resonant, response, settle},
+    report::summary::parameters,
     scene::Dimensionless,
 };
 
 use studies::{converged, defined};
+use text::{curve, described, listing, searched};
 
-use super::{failure::Failure, scene_arguments::SceneArguments, yes_no};
+use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon sigma:
@@ -147,24 +143,6 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> 
     })
 }
 
-/// What was searched for, and how likely it is that something is missing.
-fn searched(found: &Response) -> String {
-    let Response { starts, settled, found_once, .. } = found;
-    let mut text: String =
-        "Complete: symmetric 1:1 motions and what branches off them. Other patterns: only those that random starts lead to.\n"
-            .into();
-    if *starts > 0 {
-        let percent = 100.0 * (*found_once).max(1) as f64 / *starts as f64;
-        let about = if *found_once == 0 { "below" } else { "about" };
-        let _ = writeln!(
-            text,
-            "{settled} of {starts} random starts settle on these; components found by one start only: {found_once}. A further start leads \
-             to a\nmotion that is missing here with a probability of {about} {percent:.2} %."
-        );
-    }
-    text
-}
-
 /// Parses FIRST:LAST.
 fn detunings(text: &str) -> Result<[f64; 2], String> {
     let form = || {
@@ -214,28 +192,6 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
     })
 }
 
-/// The motion and the states after its impacts.
-fn described(pattern: &str, motion: &Periodic) -> String {
-    let Periodic { sigma, c, b, gamma, .. } = motion;
-    let multipliers = motion.multipliers.map(|[re, im]| format!("{re:.5}{im:+.5}i"));
-    let rows = motion.bounces.iter().map(|one| {
-        let phase = one.phase.to_degrees().rem_euclid(360.0);
-        let mut cells = vec![format!("{:+}", one.wall)];
-        cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
-        cells
-    });
-    let table = Table::new("wall | phase, degrees | q1 | q1' after | q2' after").rows(rows);
-    format!(
-        "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
-        gamma.to_degrees(),
-        multipliers.join(", "),
-        table.text()
-    )
-}
-
-/// Rows of a curve in a text table.
-const ROWS: usize = 24;
-
 fn shown(
     scene: &Dimensionless,
     title: &str,
@@ -246,57 +202,4 @@ fn shown(
     super::output(json, found, || {
         format!("{title}\n  {}\n\n{}", parameters(scene), text())
     })
-}
-
-fn curve(name: &str, branch: &Branch) -> String {
-    let stable = branch.points.iter().filter(|one| one.stable).count();
-    let sigmas = || branch.points.iter().map(|one| one.sigma);
-    let (low, high) = range((f64::MAX, f64::MIN), sigmas());
-    let ends = match branch.ended {
-        [Ended::Closed, _] => "closed".into(),
-        [one, other] => format!("ends: {}; {}", one.name(), other.name()),
-    };
-    let mut text = format!(
-        "{name}: sigma from {low:.4} to {high:.4}, {} orbits, {stable} of them stable; {ends}\n",
-        branch.points.len()
-    );
-    let row = |motion: &Periodic| -> Vec<String> {
-        let largest = motion.moduli()[3];
-        let numbers = [motion.sigma, motion.g, motion.c, motion.gamma.to_degrees(), motion.b];
-        let mut cells: Vec<String> = numbers.map(number).into();
-        cells.extend([number(largest), yes_no(motion.stable)]);
-        cells
-    };
-    let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
-    let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(ROWS));
-    text += &table.rows(thinned.map(row)).text();
-    for special in &branch.special {
-        let what = special.name();
-        let Periodic { sigma, g, c, b, .. } = special.motion;
-        let _ = writeln!(
-            text,
-            "  {what} at sigma = {sigma:.6}, G = {g:.6}, C = {c:.6}, B = {b:.6}"
-        );
-    }
-    text + "\n"
-}
-
-fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
-    if orbits.is_empty() {
-        return if scene.g == 0.0 {
-            "  none: without excitation (G = 0) there is no resonance\n".into()
-        } else {
-            "  none between 0.2 and 3 omega0 at this excitation\n".into()
-        };
-    }
-    let rows = orbits.iter().map(|orbit| {
-        let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.gamma.to_degrees(), orbit.b];
-        let mut row: Vec<String> = numbers.map(number).into();
-        row.extend(orbit.multipliers.map(|one| format!("{one:.4}")));
-        row.push(yes_no(orbit.stable));
-        row
-    });
-    Table::new("sigma | Omega | C | phase, degrees | B | mult1 | mult2 | mult3 | mult4 | stable")
-        .rows(rows)
-        .text()
 }
