@@ -16,12 +16,17 @@ fn scene(g: f64) -> Dimensionless {
     Dimensionless::new(0.0084, 1.43, 0.65, g)
 }
 
-fn followed(g: f64) -> Response {
+/// The response with other patterns searched for from so many random starts.
+fn searched(scene: &Dimensionless, starts: usize) -> Response {
     response(
-        &scene(g),
+        scene,
         &Limits::default(),
-        Exploration { starts: 100, ..Exploration::default() },
+        Exploration { starts, ..Exploration::default() },
     )
+}
+
+fn followed(g: f64) -> Response {
+    searched(&scene(g), 100)
 }
 
 fn list(response: &Response) {
@@ -200,11 +205,7 @@ fn an_isola_between_two_detunings_of_the_search_is_found_with_its_folds() {
     // It begins at G = 0.62167597. Up to 0.6216766, it is narrower than the detunings are apart; its equations are nearly singular.
     for n in 0..20 {
         let g = 0.6216761 + 5e-7 * f64::from(n);
-        let found = response(
-            &scene(g),
-            &Limits::default(),
-            Exploration { starts: 0, ..Exploration::default() },
-        );
+        let found = searched(&scene(g), 0);
         list(&found);
         assert_eq!(found.components.len(), 1);
         let Branch { ended, special, .. } = &found.components[0].branch;
@@ -214,11 +215,7 @@ fn an_isola_between_two_detunings_of_the_search_is_found_with_its_folds() {
 
 #[test]
 fn a_response_is_followed_at_any_excitation() {
-    let found = response(
-        &scene(11.0),
-        &Limits::default(),
-        Exploration { starts: 0, ..Exploration::default() },
-    );
+    let found = searched(&scene(11.0), 0);
     let ended: Vec<_> = found.symmetric().map(|one| one.ended).collect();
     println!("{ended:?}");
     assert!((1..=4).contains(&ended.len()));
@@ -245,11 +242,7 @@ fn continuation_does_not_step_from_one_branch_to_another_one_close_by() {
 #[test]
 fn a_branch_reaches_the_motion_that_it_joins() {
     let scene = Dimensionless::new(0.004, 1.0, 0.5, 1.4982);
-    let found = response(
-        &scene,
-        &Limits::default(),
-        Exploration { starts: 0, ..Exploration::default() },
-    );
+    let found = searched(&scene, 0);
     for one in &found.components {
         let points = &one.branch.points;
         let ends = [&points[0], &points[points.len() - 1]]
@@ -269,9 +262,8 @@ fn a_branch_reaches_the_motion_that_it_joins() {
 
 /// Settles from random starts at random detunings; counts the 1:1 motions, the others, and those of each that no component contains.
 fn missing(scene: &Dimensionless, count: usize, seed: u64) -> [usize; 4] {
-    let default = Exploration::default();
-    let starts = setting("STARTS", default.starts as u64) as usize;
-    let found = response(scene, &Limits::default(), Exploration { starts, ..default });
+    let starts = setting("STARTS", Exploration::default().starts as u64) as usize;
+    let found = searched(scene, starts);
     println!(
         "expected missing: {:.2}",
         (found.found_once * count) as f64 / starts as f64
