@@ -170,22 +170,23 @@ impl Run {
         counts.find(|count| self.differences(*count, SETTLING).is_some_and(approach))
     }
 
-    /// An unstable periodic motion was found close by.
-    pub(super) fn repelled(&self) -> bool {
+    /// A periodic motion was found close by that is unstable, or attracts slowly.
+    pub(super) fn lingers(&self) -> bool {
         let found = self.periodic.get().and_then(Option::as_ref);
-        found.is_some_and(|motion| !motion.stable)
+        found.is_some_and(|motion| !motion.stable || motion.exponent() >= -SLOW)
     }
 
     /// Repetitions approach each other, and there is a stable periodic motion close by: its multipliers decide.
     pub(super) fn settling(&self, early: bool) -> Option<Point> {
         let n = self.halves();
         let count = self.approached()?;
-        if early && count > 2 && self.distance(n, count) > SEVERAL {
+        let one_to_one = count <= 2 && self.counts(n)[0] - self.counts(n - count)[0] == count;
+        if early && !one_to_one && self.distance(n, count) > SEVERAL {
             return None;
         }
         let motion = self.periodic().filter(|motion| motion.stable)?;
         let pattern = &motion.pattern;
-        let exponent = 2.0 * motion.moduli()[3].ln() / f64::from(pattern.half_periods);
+        let exponent = motion.exponent();
         let regime = match (pattern.impacts(), pattern.periods(), pattern.mirrored) {
             (2, 1, true) => Regime::Symmetric,
             (2, 1, false) if pattern.walls[0] != pattern.walls[1] => Regime::Asymmetric,
@@ -249,7 +250,7 @@ impl Run {
 
     /// Largest Lyapunov exponent per period over the periods from `from` on, and its standard error from the scatter of blocks.
     pub(super) fn exponent(&mut self, from: usize) -> (f64, f64) {
-        let growth = &self.growth()[from..];
+        let growth = self.growth(from);
         let length = (growth.len() / BLOCKS).max(1);
         let blocks: Vec<f64> = growth
             .chunks_exact(length)

@@ -44,7 +44,7 @@ pub struct Point {
 /// Periods after which the motion is compared with the symmetric orbit for the first time; from then on whenever their number has grown
 /// by [`LATER`].
 const FIRST: usize = 14;
-const LATER: f64 = 1.15;
+const LATER: f64 = 1.25;
 /// Periods over which the exponent of a repeating motion is measured.
 const EXPONENT: usize = 256;
 
@@ -102,7 +102,8 @@ fn later(periods: usize, last: usize) -> usize {
 pub struct Run {
     pub(super) scene: Dimensionless,
     pub(super) sigma: f64,
-    pub(super) plant: Plant,
+    /// Its caches are large.
+    pub(super) plant: Box<Plant>,
     pub(super) drive: Drive,
     pub(super) driven: Driven,
     /// Periods so far.
@@ -111,9 +112,10 @@ pub struct Run {
     pub(super) moments: Vec<Moment>,
     /// States at the beginning of every half period and now, as far as they were needed.
     states: Vec<OnceCell<[f64; 4]>>,
-    /// A disturbance, the number of moments that it has passed, and its growth over each period, as a natural logarithm; a period
-    /// without impacts may belong to the next one.
+    /// A disturbance, the period in which it begins, the number of moments that it has passed, and its growth over each period, as a
+    /// natural logarithm; a period without impacts may belong to the next one.
     disturbance: Disturbance,
+    begun: usize,
     passed: usize,
     growth: Vec<f64>,
     pub(super) impacts: Vec<Impact>,
@@ -134,7 +136,7 @@ impl Run {
     /// Invalid parameters or an invalid start.
     pub fn new(scene: &Dimensionless, sigma: f64, start: [f64; 4]) -> Result<Self, InvalidValue> {
         let drive = scene.drive(sigma);
-        let plant = scene.plant(start)?;
+        let plant = Box::new(scene.plant(start)?);
         let driven = Driven::new(scene, drive.omega);
         let mut moments = Vec::with_capacity(EXPECTED);
         moments.push(driven.moment(0.0, plant.state(), plant.contact()));
@@ -148,6 +150,7 @@ impl Run {
             moments,
             states: vec![OnceCell::from(start)],
             disturbance: Disturbance::default(),
+            begun: usize::MAX,
             passed: 0,
             growth: Vec::new(),
             impacts: Vec::with_capacity(EXPECTED),
@@ -182,13 +185,13 @@ impl Run {
             if let Some(point) = self.without_impacts() {
                 return Ok(point);
             }
-            // A motion leaves the neighbourhood of an unstable one before it can settle.
+            // A motion leaves the neighbourhood of an unstable one before it can settle, and a slow approach is seen at the limit.
             repelled &= early && self.approached().is_some();
             if !repelled {
                 if let Some(point) = self.settled(early)? {
                     return Ok(point);
                 }
-                repelled = self.repelled();
+                repelled = self.lingers();
             }
             if next >= limit {
                 let point = self.irregular();
@@ -271,8 +274,13 @@ impl Run {
         Ok(())
     }
 
-    /// Growth of the disturbance over each period so far.
-    pub(super) fn growth(&mut self) -> &[f64] {
+    /// Growth of the disturbance over each period from the period `from` on. It begins before that, to find its direction.
+    pub(super) fn growth(&mut self, from: usize) -> &[f64] {
+        if from < self.begun {
+            let phase = TAU * (0.75 * from as f64);
+            self.passed = self.moments.partition_point(|one| one.phase < phase);
+            (self.begun, self.disturbance) = (from, Disturbance::default());
+        }
         self.growth.resize(self.periods, 0.0);
         let mut period = ((self.moments[self.passed].phase / TAU) as usize).min(self.periods - 1);
         for pair in self.moments[self.passed..].windows(2) {
@@ -285,6 +293,6 @@ impl Run {
             self.disturbance.jump(&self.driven, &pair[1]);
         }
         self.passed = self.moments.len() - 1;
-        &self.growth
+        &self.growth[from..]
     }
 }

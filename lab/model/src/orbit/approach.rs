@@ -10,7 +10,7 @@ use super::{
     bounce::Bounce,
     driven::Moment,
     pattern::{ImpactPattern, follow},
-    search::symmetric_orbits,
+    search::stable_symmetric,
 };
 use crate::Dimensionless;
 
@@ -56,7 +56,7 @@ impl Symmetric {
     /// The stable symmetric orbit at the detuning `sigma`, if there is one.
     #[must_use]
     pub fn stable(scene: &Dimensionless, sigma: f64) -> Option<Self> {
-        let orbit = symmetric_orbits(scene, sigma).into_iter().find(|orbit| orbit.stable)?;
+        let orbit = stable_symmetric(scene, sigma)?;
         let map = follow(scene, &ImpactPattern::symmetric(), &orbit.unknowns())?.monodromy;
         Some(Self { orbit, map })
     }

@@ -137,6 +137,11 @@ impl Periodic {
         self.multipliers.map(|[re, im]| re.hypot(im))
     }
 
+    /// Largest Lyapunov exponent per period of the base.
+    pub(crate) fn exponent(&self) -> f64 {
+        2.0 * self.moduli()[3].ln() / f64::from(self.pattern.half_periods)
+    }
+
     /// (tau, q1, q1', q2, q2') at `points` equal steps over one period of the base, from a passage of the base through
     /// zero, upwards; dimensionless. The impacts fall between the points.
     #[must_use]

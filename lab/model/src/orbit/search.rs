@@ -71,12 +71,20 @@ fn peak(scene: &Dimensionless, near: &Orbit, condition: Condition) -> Option<Orb
 /// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.
 #[must_use]
 pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
+    driven(scene, sigma).collect()
+}
+
+/// The stable one of [`symmetric_orbits`], the one with the larger B.
+pub(super) fn stable_symmetric(scene: &Dimensionless, sigma: f64) -> Option<Orbit> {
+    driven(scene, sigma).rev().find(|orbit| orbit.stable)
+}
+
+fn driven(scene: &Dimensionless, sigma: f64) -> impl DoubleEndedIterator<Item = Orbit> {
     Family::new(scene, 1.0 + scene.epsilon * sigma)
         .and_then(|family| family.driven(scene.g))
         .into_iter()
         .flatten()
         .filter_map(|candidate| accept(scene, &candidate))
-        .collect()
 }
 
 /// The smallest G under which there is a symmetric 1:1 orbit at the detuning `sigma`, if its flights meet no wall.
