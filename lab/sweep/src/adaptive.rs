@@ -24,6 +24,9 @@ pub(crate) const ROUNDS: &str = ".rounds";
 /// Code of a cell that is not known yet.
 const UNKNOWN: u8 = 254;
 
+/// Least number of cells of the first grid along a side, roughly.
+const SIDE: usize = 4;
+
 /// Largest number of cells: all their regimes are in memory, two bytes per cell.
 pub(crate) const MOST: u64 = 1_000_000_000;
 
@@ -46,7 +49,8 @@ pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) 
         computed: vec![false; rows * columns],
         failures: BTreeMap::new(),
     };
-    let mut stride = stride;
+    // A small map needs a few cells of the first grid along either side.
+    let mut stride = stride.min((rows.min(columns) / SIDE).max(1).next_power_of_two());
     let mut round = 0;
     let mut next = map.grid(stride);
     let mut doubt = Doubt::new(rows, columns);

@@ -54,6 +54,16 @@ fn an_adaptive_map_computes_borders_infers_the_rest_and_resumes_to_the_same_byte
     assert!(part.unwrap_err().to_string().contains("in parts"));
 }
 
+#[test]
+fn a_tiny_adaptive_map_infers_nothing_from_one_cell() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = settings(&["sigma=-1.6:-0.9:3", "excitation.G=0.8,1.3"]);
+    let plan = plan(Settings { adaptive: Some(8), ..settings }).unwrap();
+    let monitor = Monitor::default();
+    assert!(run(&plan, folder.path(), Shard::ALL, &monitor).unwrap());
+    assert_eq!((monitor.computed.load(Relaxed), monitor.inferred.load(Relaxed)), (6, 0));
+}
+
 /// Number of cells whose regimes differ.
 fn differences(one: &Path, other: &Path) -> usize {
     let codes = |folder: &Path| -> Vec<u8> {

@@ -37,6 +37,14 @@ pub enum SceneError {
         /// What is wrong with it.
         message: String,
     },
+    /// An axis of a sweep that no scene has, or that does not go with the others.
+    #[error("axis `{key}`: {message}")]
+    Axis {
+        /// Its name.
+        key: String,
+        /// What is wrong with it.
+        message: String,
+    },
     /// A number outside its range.
     #[error("{key} = {} {unit}: {allowed}", Number(*value))]
     Value {

@@ -38,15 +38,16 @@ impl Family {
     /// # Errors
     /// A key that no scene has, or that does not go with the others; one whose value is not a number.
     pub fn vary(&mut self, key: &str) -> Result<(), SceneError> {
-        let one: Override = format!("{key} = 1").parse()?;
-        let table = overrides::merge(self.table.clone(), &[one])?;
-        let refused = |message: &str| SceneError::Keys {
-            origin: self.origin.clone(),
-            message: format!("`{key}` {}", message.trim()),
-        };
+        let refused = |message: &str| SceneError::Axis { key: key.into(), message: message.trim().into() };
+        let unknown = "is neither sigma nor section.key of a scene, for instance plant.r";
+        let (section, name) = key.split_once('.').ok_or_else(|| refused(unknown))?;
+        let one: Override = format!("{key} = 1").parse().map_err(|_| refused(unknown))?;
+        let table = overrides::merge(self.table.clone(), &[one]).map_err(|error| match error {
+            SceneError::Override { message, .. } => refused(&message),
+            other => other,
+        })?;
         self.sections = Sections::deserialize(table.clone()).map_err(|error| refused(error.message()))?;
-        let (section, key) = key.split_once('.').ok_or_else(|| refused("is not section.key"))?;
-        self.keys.push([section.trim().into(), key.trim().into()]);
+        self.keys.push([section.trim().into(), name.trim().into()]);
         self.table = table;
         Ok(())
     }
