@@ -89,6 +89,8 @@ def test_a_copy_continues_with_the_same_bits():
         (lambda: vines.Batch(vines.Scene(), {"dq2": [0.1, np.nan]}), ["plant 1", "NaN", "m/s"]),
         (lambda: vines.Plant().advance(1.0, amplitude=np.inf), ["E (amplitude", "inf", "m"]),
         (lambda: vines.Plant().advance(-1.0), ["-1"]),
+        (lambda: vines.Batch(vines.Scene(), {"dq2": [0.1, 0.2], "q1": np.zeros(3)}), ["dq2 (2,)", "q1 (3,)"]),
+        (lambda: vines.Plant().advance([1.0, 2.0]), ["duration of shape (2,)"]),
         (lambda: vines.Batch({"M": 1.0}), ["k (N/m) is missing"]),
         (lambda: vines.Scene(plant={"rr": 1}), ["plant.rr", "unknown field"]),
         (lambda: vines.Scene(controller={"bandwidth": -3.0}), ["controller.bandwidth", "-3"]),

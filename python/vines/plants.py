@@ -93,7 +93,11 @@ class Batch:
         _check("starts", given, _START)
         given = {**values, **given}
         columns = [np.asarray(given[name], dtype=np.float64) for name in (*_PARAMETERS, *_START)]
-        rows = np.stack(np.broadcast_arrays(*np.atleast_1d(*columns)), axis=-1)
+        try:
+            rows = np.stack(np.broadcast_arrays(*np.atleast_1d(*columns)), axis=-1)
+        except ValueError:
+            shapes = ", ".join(f"{name} {np.shape(value)}" for name, value in given.items() if np.ndim(value))
+            raise ValueError(f"arrays of different shapes: {shapes}; numbers and equal lengths are allowed") from None
         if rows.ndim != 2:
             raise ValueError(f"parameters and starts of shape {rows.shape[:-1]}: one-dimensional arrays are allowed")
         self._native = _native.Plants(np.ascontiguousarray(rows[:, :6]), np.ascontiguousarray(rows[:, 6:]))
@@ -128,10 +132,14 @@ class Batch:
             A value that is not allowed. No plant is advanced then.
         """
 
-        def array(given: ArrayLike) -> NDArray[np.float64]:
-            return np.ascontiguousarray(np.broadcast_to(np.asarray(given, dtype=np.float64), (len(self),)))
+        def array(name: str, given: ArrayLike) -> NDArray[np.float64]:
+            values = np.asarray(given, dtype=np.float64)
+            if values.shape not in ((), (1,), (len(self),)):
+                raise ValueError(f"{name} of shape {values.shape}: a number or {len(self)} numbers are allowed")
+            return np.ascontiguousarray(np.broadcast_to(values, (len(self),)))
 
-        found = self._native.advance(array(duration), array(amplitude), array(omega), events)
+        drive = array("duration", duration), array("amplitude", amplitude), array("omega", omega)
+        found = self._native.advance(*drive, events)
         return None if found is None else Events(*found)
 
     def copy(self) -> "Batch":

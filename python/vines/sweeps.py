@@ -101,7 +101,7 @@ def sweep(
     }
     if adaptive is not None and client is not None:
         raise ValueError("an adaptive sweep runs in one process: leave out adaptive or client")
-    axes = {name: _values(values) for name, values in axes.items()}
+    axes = {name: _values(name, values) for name, values in axes.items()}
     plan = _native.Sweep(scene._native, axes, settings)
     cells = plan.cells
     hours, size, large = plan.estimate()
@@ -120,10 +120,15 @@ def sweep(
     return opened
 
 
-def _values(values: Values) -> Values:
+def _values(name: str, values: Values) -> Values:
     if isinstance(values, tuple) and len(values) == 3:
         return values
-    return [float(value) for value in values]
+    try:
+        return [float(value) for value in values]
+    except (TypeError, ValueError):
+        raise ValueError(
+            f"{name} = {values!r}: a list of numbers, (first, last, number) or (sequence, first, last) is allowed"
+        ) from None
 
 
 def _bar(cells: int, progress: bool) -> Any:

@@ -39,7 +39,7 @@ impl Family {
     /// A key that no scene has, or that does not go with the others; one whose value is not a number.
     pub fn vary(&mut self, key: &str) -> Result<(), SceneError> {
         let refused = |message: &str| SceneError::Axis { key: key.into(), message: message.trim().into() };
-        let unknown = "is neither sigma nor section.key of a scene, for instance plant.r";
+        let unknown = "neither sigma nor section.key of a scene, for instance plant.r";
         let (section, name) = key.split_once('.').ok_or_else(|| refused(unknown))?;
         let one: Override = format!("{key} = 1").parse().map_err(|_| refused(unknown))?;
         let table = overrides::merge(self.table.clone(), &[one]).map_err(|error| match error {
