@@ -63,7 +63,7 @@ impl LoViNes {
         let causality = unknown.variable().causality;
         if !matches!(causality, Causality::Output | Causality::Local) {
             return Err(Refusal::error(format!(
-                "{} is no unknown: expected is an output or a derivative",
+                "{} is not an unknown: expected an output or a derivative",
                 unknown.variable().name
             )));
         }
@@ -166,7 +166,7 @@ fn perturbed(now: &Instant<f64>, known: Real, reduced_are_states: bool) -> Resul
             instant
         }),
         _ => Err(Refusal::error(format!(
-            "{} is no known: expected is a parameter, an input or a state",
+            "{} is not a known: expected a parameter, an input or a state",
             known.variable().name
         ))),
     }

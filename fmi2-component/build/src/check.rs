@@ -27,20 +27,20 @@ pub(crate) fn check(description: &Description, table: &Table, faults: &mut Vec<S
 fn identity(description: &Description, table: &Table, faults: &mut Vec<String>) {
     if description.fmi_version != "2.0" {
         let version = &description.fmi_version;
-        faults.push(format!("fmiVersion is {version:?}; expected is \"2.0\""));
+        faults.push(format!("fmiVersion is {version:?}; expected \"2.0\""));
     }
     let identifier_like = |text: &str| identifier(text) == text;
     if description.co_simulation.is_none() {
         faults.push("CoSimulation is missing".into());
     } else if !identifier_like(&table.identifier) {
         let name = &table.identifier;
-        faults.push(format!("modelIdentifier is {name:?}; expected is a C identifier"));
+        faults.push(format!("modelIdentifier is {name:?}; expected a C identifier"));
     }
     if let (Some(exchange), Some(steps)) = (&description.model_exchange, &description.co_simulation)
         && exchange != steps
     {
         faults.push(format!(
-            "ModelExchange has modelIdentifier {:?}; expected is that of CoSimulation, {:?}",
+            "ModelExchange has modelIdentifier {:?}; expected that of CoSimulation, {:?}",
             exchange, steps
         ));
     }

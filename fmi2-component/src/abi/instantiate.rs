@@ -75,7 +75,7 @@ unsafe fn log<C: Component>(functions: &CallbackFunctions, name: &CStr) -> Log {
 
 fn check_name(name: &CStr) -> Result<(), Refusal> {
     if name.is_empty() {
-        return Err(Refusal::error("instanceName is NULL or empty; expected is a name"));
+        return Err(Refusal::error("instanceName is NULL or empty; expected a name"));
     }
     Ok(())
 }

@@ -120,10 +120,10 @@ fn refuse_one<T, U>((first, second): (*const T, *const U), count: usize, what: &
 #[cold]
 fn refuse(null: bool, count: usize, what: &str) -> Refusal {
     Refusal::error(if null {
-        format!("{what} is NULL; expected is an array of {count}")
+        format!("{what} is NULL; expected an array of {count}")
     } else if count > MOST {
         format!("the count of {what} is {count}; allowed are at most {MOST}")
     } else {
-        format!("{what} is not aligned; expected is an array of {count}")
+        format!("{what} is not aligned; expected an array of {count}")
     })
 }

@@ -24,7 +24,7 @@ impl FromStr for Binary {
             .ok_or("expected PLATFORM=PATH, for instance win64=lovines_fmu.dll")?;
         let platform = Platform::of_folder(folder).ok_or_else(|| {
             let known = Platform::folders();
-            format!("`{folder}` is no platform; there are {known}")
+            format!("`{folder}` is not a platform; known are {known}")
         })?;
         Ok(Self { platform, path: path.into() })
     }
@@ -62,7 +62,7 @@ fn fit(binary: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
         return Err(binary.refused(format!("is {found}, but {} needs {}", platform.folder, platform.name)));
     }
     if !exports(&content, "fmi2Instantiate") {
-        return Err(binary.refused("has no function fmi2Instantiate, so it is no FMI 2.0 component"));
+        return Err(binary.refused("has no function fmi2Instantiate, so it is not an FMI 2.0 component"));
     }
     let belongs = |component: &Component| {
         let guid = component.guid();
