@@ -74,7 +74,7 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
     for words in [
         "What was found",
         "symmetric 1:1",
-        "What the numbers are worth",
+        "Error budget",
         "published rig",
     ] {
         assert!(html.contains(words), "{words}");
