@@ -57,7 +57,7 @@
 //!   read after something was set. Outputs that depend on inputs are thus right however often inputs are set.
 //! - [`Component::step`] is called with a positive length that [`Component::accept_step`] has accepted; communication points follow each other within 1e-9 of
 //!   their size.
-//! - A panic goes no further than the call: it is logged, and the instance is then of no use but to be freed.
+//! - A panic does not leave the call: it is logged, and the instance can then only be freed.
 //!
 //! `min` and `max` are told to masters and not enforced: what makes sense is for the component to say.
 //!

@@ -138,7 +138,7 @@ impl Log {
                 None => {
                     known = false;
                     self.warn(format_args!(
-                        "fmi2SetDebugLogging: there is no category {name:?}; there are {}",
+                        "fmi2SetDebugLogging: unknown category {name:?}; known are {}",
                         self.categories.join(", ")
                     ));
                 }

@@ -12,7 +12,7 @@ pub enum Status {
     Discard = 2,
     /// The call was wrong.
     Error = 3,
-    /// The component is of no use any more.
+    /// The component can only be freed.
     Fatal = 4,
     /// The call goes on in the background. This shell never answers so.
     Pending = 5,

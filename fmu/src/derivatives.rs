@@ -96,7 +96,7 @@ impl LoViNes {
     /// The time derivative of an output at the end of the last step.
     pub(super) fn time_derivative(&self, variable: Real, order: u32) -> Result<f64, Refusal> {
         let Rig::Steps(plant) = &self.rig else {
-            return Err(Refusal::error("output derivatives are of co-simulation"));
+            return Err(Refusal::error("output derivatives exist in co-simulation only"));
         };
         if order > MOST {
             return Err(Refusal::error(format!(

@@ -180,7 +180,7 @@ impl Component for LoViNes {
     #[inline]
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
         let Rig::Steps(plant) = &mut self.rig else {
-            return Err(Refusal::error("a step is of co-simulation"));
+            return Err(Refusal::error("steps exist in co-simulation only"));
         };
         plant.set_time(time);
         let outcome = if log.wants(category::logEvents) || log.wants(category::logImpacts) {

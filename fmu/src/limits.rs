@@ -15,12 +15,12 @@ pub(super) fn lost(resolved: bool, time: f64, (step, elapsed): (f64, f64)) -> Re
     Refusal::error(if resolved {
         format!(
             "there are {MOST_IMPACTS} impacts within the first {elapsed} s of the step of {step} s at t = {time} s; expected \
-             are velocities and a half-width of the cavity that make sense together, or a shorter step"
+             velocities and a half-width of the cavity that make sense together, or a shorter step"
         )
     } else {
         format!(
             "displacements have become so large in the step at t = {time} s that their rounding is wider than the cavity; \
-             expected are start values and inputs of a sensible size"
+             expected start values and inputs of a sensible size"
         )
     })
 }
@@ -30,7 +30,7 @@ pub(super) fn lost(resolved: bool, time: f64, (step, elapsed): (f64, f64)) -> Re
 fn too_far(drive: &Drive) -> Refusal {
     Refusal::error(format!(
         "the base would go further than 2^52 half-widths of the cavity, where the rounding of displacements is wider than it \
-         (e = {} m and its derivatives, E = {} m); expected are inputs of a sensible size",
+         (e = {} m and its derivatives, E = {} m); expected inputs of a sensible size",
         drive.signal[0], drive.amplitude
     ))
 }

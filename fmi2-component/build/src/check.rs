@@ -247,7 +247,7 @@ fn in_range(what: &str, place: usize, table: &Table, faults: &mut Vec<String>) {
     let count = table.variables.len();
     if !(1..=count).contains(&place) {
         faults.push(format!(
-            "{what} {place} is no index of a variable; there are 1 to {count}"
+            "{what} {place} is not the index of a variable; allowed are 1 to {count}"
         ));
     }
 }

@@ -97,10 +97,7 @@ fn refuse<C>(instance: &mut Instance<C>, name: &str, refusal: &Refusal) -> Statu
 fn illegal<C>(instance: &Instance<C>, function: Function, name: &str) -> Status {
     let state = instance.session.state;
     let (status, expected) = match (state, function) {
-        (State::Fatal, _) => (
-            Status::Fatal,
-            "nothing but fmi2FreeInstance is of use any more".to_owned(),
-        ),
+        (State::Fatal, _) => (Status::Fatal, "only fmi2FreeInstance is legal now".to_owned()),
         _ => (Status::Error, whereabouts(instance, function)),
     };
     instance.log.reason(
@@ -129,7 +126,7 @@ fn poison<C>(instance: &mut Instance<C>, name: &str, panic: &(dyn Any + Send)) -
     let what = panic_message(panic);
     instance.log.reason(
         Status::Fatal,
-        &format!("{name}: the component has panicked ({what}) and is of no use any more"),
+        &format!("{name}: the component has panicked ({what}) and can only be freed"),
     );
     Status::Fatal
 }

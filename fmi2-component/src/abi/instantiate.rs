@@ -86,7 +86,7 @@ fn interface<C>(fmu_type: c_int, select: Select<C>) -> Result<Select<C>, Refusal
         (CO_SIMULATION, _) => Ok(None),
         (MODEL_EXCHANGE, Some(_)) => Ok(select),
         (_, Some(_)) => Err(Refusal::error(format!(
-            "fmuType = {fmu_type} is refused; there are {MODEL_EXCHANGE} (model exchange) and {CO_SIMULATION} (co-simulation)"
+            "fmuType = {fmu_type} is refused; allowed are {MODEL_EXCHANGE} (model exchange) and {CO_SIMULATION} (co-simulation)"
         ))),
         (_, None) => Err(Refusal::error(format!(
             "fmuType = {fmu_type} is refused; the component is for co-simulation ({CO_SIMULATION}) only"

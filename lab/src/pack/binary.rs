@@ -71,7 +71,7 @@ fn fit(binary: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
     let Some(component) = components.iter().position(belongs) else {
         let names: Vec<_> = components.iter().map(|one| one.identifier).collect();
         return Err(binary.refused(format!(
-            "belongs to none of {} with the variables that they have now: it holds the guid of none; build it anew",
+            "belongs to none of {}: it contains the GUID of none of them, because it was built from other variables; build it again",
             names.join(", ")
         )));
     };
