@@ -1,8 +1,8 @@
-//! An FMI 2.0 shell: write a struct, get an FMU.
+//! An FMI 2.0 shell: it makes an FMU from a Rust struct.
 //!
 //! A component is exported by three files: its `modelDescription.xml`, a `build.rs` of two lines, and
-//! about a hundred lines that say which variable is which number. Everything else that the standard asks for (life
-//! cycle, pointers, value references, logging, FMU states) is here.
+//! about a hundred lines that connect variables to numbers. This crate does everything else that the standard requires (life
+//! cycle, pointers, value references, logging, FMU states).
 //!
 //! # How to export a component
 //!
@@ -34,7 +34,7 @@
 //! `src/lib.rs` implements [`Component`] for a struct and ends with `fmi2_component::export!(MyComponent)`. The repository has a whole
 //! example, a water tank, in `fmi2-component/example/`, with its description.
 //!
-//! A component whose equations a master may integrate by itself says besides what they are ([`ModelExchange`]), and is
+//! A component whose equations a master may integrate also implements [`ModelExchange`], and is
 //! exported by `fmi2_component::export!(MyComponent, model_exchange)`. Its description lists states and derivatives
 //! in `ModelStructure`, once; `exchange.rs` of `lovines-fmu`, the FMU of the plant, is an example.
 //!
@@ -59,7 +59,7 @@
 //!   their size.
 //! - A panic does not leave the call: it is logged, and the instance can then only be freed.
 //!
-//! `min` and `max` are told to masters and not enforced: what makes sense is for the component to say.
+//! Masters read `min` and `max`; the shell does not enforce them: the component decides which values it accepts.
 //!
 //! # What is legal when
 //!
