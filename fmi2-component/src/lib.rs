@@ -64,8 +64,8 @@
 //! # What is legal when
 //!
 //! The life cycle of FMI 2.0, clauses 3.2.3 and 4.2.4, of both interfaces. An illegal call answers `fmi2Error`, logs a
-//! line that says where it would be legal, and changes nothing. *SetDiscrete* stands for the setters of integers, truth
-//! values and text, *GetValues*, *GetStatus* and *FMUstate* for the functions of that family, *GetEquations* for
+//! line that says where it would be legal, and changes nothing. *SetDiscrete* stands for the setters of integers,
+//! Booleans and strings, *GetValues*, *GetStatus* and *FMUstate* for the functions of that family, *GetEquations* for
 //! `fmi2GetContinuousStates`, `fmi2GetDerivatives` and `fmi2GetEventIndicators`.
 //!
 #![doc = include_str!("life_cycle.md")]
