@@ -120,8 +120,8 @@ pub trait Component: Clone + Send + 'static {
     /// Advances from `time` by `step` seconds, which is finite and above 0. Inputs are as set before the step.
     ///
     /// # Errors
-    /// [`Refusal::discard`] where the step cannot be done and the component is as it was before; the master is told
-    /// that the component wants to end. [`Refusal::error`] where the simulation cannot go on but by a reset.
+    /// [`Refusal::discard`] where the step cannot be done and the component is as it was before; the master learns
+    /// that the component wants to end. [`Refusal::error`] where the simulation can continue only after a reset.
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal>;
 
     /// Sets the time derivative of that order (1 or above) of a real input, as it is at the start of the next step.

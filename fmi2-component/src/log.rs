@@ -51,7 +51,7 @@ struct Sink {
 }
 
 impl Log {
-    /// A log that nobody reads, for tests of components.
+    /// A log without a reader, for tests of components.
     pub const fn silent() -> Self {
         Self {
             sink: None,

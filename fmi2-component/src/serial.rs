@@ -1,4 +1,4 @@
-//! FMU states as bytes: a header that tells a foreign or damaged blob, and the session.
+//! FMU states as bytes: a header that identifies foreign or damaged states, and the session.
 
 use crate::archive::Archive;
 use crate::component::Component;

@@ -14,6 +14,6 @@ pub enum Status {
     Error = 3,
     /// The component can only be freed.
     Fatal = 4,
-    /// The call goes on in the background. This shell never answers so.
+    /// The call continues in the background. This shell never returns it.
     Pending = 5,
 }

@@ -118,7 +118,7 @@ impl LoViNes {
             Real::base => base[n],
             Real::phase if n == 1 => plant.base().drive.omega,
             Real::energy => Movement::of(plant).energy(p, n),
-            // The phase turns evenly, and what is told of impacts changes with the next one only.
+            // The phase grows at a constant rate, and the outputs of impacts change at the next impact only.
             _ => 0.0,
         })
     }

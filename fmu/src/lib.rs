@@ -56,9 +56,9 @@ fn unknown() -> Cell<f64> {
     Cell::new(f64::NAN)
 }
 
-/// The rig as the master's choice of interface wants it.
+/// The rig for the interface that the master has chosen.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
-#[allow(clippy::large_enum_variant)] // one of them in an instance, and no way round by a pointer in every step
+#[allow(clippy::large_enum_variant)] // one per instance; a pointer would cost time in every step
 enum Rig {
     Steps(Plant),
     Equations(Hybrid),

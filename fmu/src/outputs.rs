@@ -58,7 +58,7 @@ impl Outputs {
 }
 
 impl LoViNes {
-    /// Keeps what masters read after a step; whether displacements are such that a cavity can be told.
+    /// Keeps what masters read after a step. Returns whether the rounding error of displacements is narrower than the cavity.
     #[inline]
     pub(super) fn keep_outputs(&mut self) -> bool {
         let Rig::Steps(plant) = &self.rig else {

@@ -30,7 +30,7 @@ impl Reach {
         state.q1.abs() <= self.displacement && state.dq1.abs() + state.dq2.abs() <= self.velocity
     }
 
-    /// Whether the base stays within for so many seconds under `drive`.
+    /// Whether the base stays within for `span` seconds under `drive`.
     #[inline]
     pub fn holds_base(&self, drive: &Drive, span: f64) -> bool {
         let [u0, derivatives @ ..] = drive.signal;

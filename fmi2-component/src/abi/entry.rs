@@ -77,9 +77,9 @@ pub(super) unsafe fn free<C>(component: CComponent) {
     if handle.busy.load(Ordering::Relaxed) {
         return;
     }
-    // SAFETY: the pointer came out of a box, and by contract nobody uses it any more.
+    // SAFETY: the pointer came out of a box, and by contract no caller uses it any more.
     let handle = unsafe { Box::from_raw(pointer) };
-    // A component may panic when it is dropped; there is nobody left to tell.
+    // A component may panic when it is dropped; there is no instance left that could log it.
     let _ = catch_unwind(AssertUnwindSafe(|| drop(handle)));
 }
 

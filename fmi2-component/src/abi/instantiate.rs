@@ -80,7 +80,7 @@ fn check_name(name: &CStr) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// What selects the interface that the master wants.
+/// Selects the interface that the master has requested.
 fn interface<C>(fmu_type: c_int, select: Select<C>) -> Result<Select<C>, Refusal> {
     match (fmu_type, select) {
         (CO_SIMULATION, _) => Ok(None),

@@ -1,16 +1,15 @@
-//! The rig as a hybrid system, for whoever integrates it: differential equations ([`crate::model_exchange::equations`]), functions whose
-//! zeros are events, and the jumps at events.
+//! The rig as a hybrid system for an integrator: differential equations ([`crate::model_exchange::equations`]), functions whose zeros
+//! are events, and the jumps at events.
 //!
-//! Contact is a matter of rounding for an integrator: it stops a little before or behind a zero. Walls are therefore
-//! told to be touched [`DEPTH`] half-widths behind where they stand, and a wall to have ceased to push a little below no
-//! push at all. A function that is not of use in the present contact is held above zero.
+//! An integrator stops a little before or behind a zero. A contact is therefore reported [`DEPTH`] half-widths behind the wall, and a release
+//! slightly below a contact force of zero. A function without a meaning in the present contact state is held above zero.
 //!
 //! An integrator cannot follow a chatter to its accumulation point. A rebound that would lift the particle less than
 //! [`LOWEST_HOP`] half-widths off its wall, and whose chatter is over within [`LONGEST_CHATTER`] of the rig's time, ends in
 //! contact at once; what that neglects is of third order in the rebound's speed, 1e-15 here.
 //!
-//! The wall's push depends on the velocity of the base. That of the built-in oscillator is known while its amplitude is
-//! held, that of a signal is not, and is taken for zero; the plant in closed form ([`lovines::plant`]) has no such limit.
+//! The contact force depends on the velocity of the base. That of the built-in oscillator is known while its amplitude is
+//! held; that of a signal is unknown, and taken for zero; the plant in closed form ([`lovines::plant`]) has no such limit.
 
 use crate::model_exchange::equations::Instant;
 use lovines::base_motion::Drive;
@@ -18,7 +17,7 @@ use lovines::contact::{ImpactLaw, Resolution, Wall};
 use lovines::parameters::{InvalidValue, Parameters};
 use lovines::plant::{Event, Plant, State, Totals};
 
-/// How far behind a wall a touch is told, as a fraction of the half-width.
+/// Distance behind a wall at which a contact is reported, as a fraction of the half-width.
 pub const DEPTH: f64 = 1e-12;
 /// The lowest hop that is followed, as a fraction of the half-width.
 pub const LOWEST_HOP: f64 = 1e-10;

@@ -53,7 +53,7 @@ pub(super) fn add(fitted: &mut Vec<Fitted>, others: &[Binary], components: &[Com
     Ok(())
 }
 
-/// A library tells by its guid what it belongs to.
+/// The GUID in a library determines its component.
 fn fit(binary: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
     let content =
         std::fs::read(&binary.path).map_err(|source| PackError::Read { path: binary.path.clone(), source })?;
