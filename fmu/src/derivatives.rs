@@ -33,7 +33,7 @@ pub(super) fn of_instant<T: Scalar>(now: &Instant<T>, variable: Real) -> T {
 }
 
 impl LoViNes {
-    /// The plant as it stands, with the inputs as they are set now.
+    /// The present plant with the present inputs.
     pub(super) fn instant(&self, plant: &Plant) -> Instant<f64> {
         let (p, state) = (&self.parameters, plant.state());
         let base = self.base_motion(plant);
@@ -55,9 +55,9 @@ impl LoViNes {
         }
     }
 
-    /// The partial derivative of `unknown` by `known`, all else being equal; the contact stays as it is.
+    /// The partial derivative of `unknown` with respect to `known`; the contact state does not change.
     ///
-    /// What else there is depends on the interface: in model exchange, once it is under way, the reduced velocities are
+    /// What is held constant depends on the interface: in model exchange, after initialization, the reduced velocities are
     /// states, so that a velocity changes with the base; in co-simulation it does not.
     pub(super) fn slope(&self, unknown: Real, known: Real) -> Result<f64, Refusal> {
         let causality = unknown.variable().causality;
@@ -68,7 +68,7 @@ impl LoViNes {
             )));
         }
         let known = match known {
-            // A start value has its say until Initialization Mode is left.
+            // A start value has an effect until Initialization Mode is left.
             Real::q1_start | Real::der_q1_start | Real::q2_start | Real::der_q2_start
                 if self.progress == Progress::UnderWay =>
             {
@@ -145,7 +145,7 @@ fn perturbed(now: &Instant<f64>, known: Real, reduced_are_states: bool) -> Resul
     };
     let (u1, u2) = now.reduced_velocities();
     match known {
-        // Nothing but the next impact depends on them.
+        // Only the next impact depends on them.
         Real::b | Real::r => Ok(instant),
         Real::M
         | Real::k

@@ -1,4 +1,4 @@
-//! What FMI 2.0 asks of a description beyond its shape, each fault as a line that says what is expected.
+//! What FMI 2.0 requires of a description beyond its schema; each fault is a line that says what is expected.
 
 use std::collections::HashMap;
 
@@ -18,7 +18,7 @@ pub(crate) fn check(description: &Description, table: &Table, faults: &mut Vec<S
         }
     }
     units(description, table, faults);
-    // Places in the list mean nothing while some of it could not be read.
+    // Positions in the list are wrong if a part of it could not be read.
     if table.variables.len() == description.variables.len() {
         structure(description, table, faults);
     }
@@ -198,7 +198,7 @@ fn states(
 }
 
 impl Table {
-    /// Places, counted from 1, of the variables that `wanted` picks.
+    /// Indices, from 1, of the variables that `wanted` selects.
     fn places(&self, wanted: impl Fn(&Variable) -> bool) -> Vec<usize> {
         let numbered = self.variables.iter().zip(1..);
         numbered

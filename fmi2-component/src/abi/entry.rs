@@ -1,4 +1,4 @@
-//! The way in from C: from a pointer to an instance, and from a result or a panic to a status.
+//! Entry from C: from a pointer to an instance, and from a result or a panic to a status.
 
 use std::any::Any;
 use std::cell::UnsafeCell;
@@ -11,7 +11,7 @@ use crate::life_cycle::{Function, State};
 use crate::refusal::{Refusal, Severity};
 use crate::status::Status;
 
-/// What an `fmi2Component` points at.
+/// Target of an `fmi2Component`.
 pub(super) struct Handle<C> {
     /// A call is under way: a logger that calls back into its own instance is refused.
     busy: AtomicBool,

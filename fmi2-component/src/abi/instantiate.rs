@@ -1,4 +1,4 @@
-//! Birth and death (FMI 2.0, clause 2.1.5).
+//! Instantiation and release (FMI 2.0, clause 2.1.5).
 
 use std::ffi::{CStr, c_int};
 use std::panic::{AssertUnwindSafe, catch_unwind};

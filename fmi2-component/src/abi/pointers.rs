@@ -6,7 +6,7 @@ use std::mem::MaybeUninit;
 
 use crate::refusal::Refusal;
 
-/// No call needs more elements; a larger count is a negative number or garbage.
+/// No call needs more elements; a larger count is a negative or uninitialised number.
 const MOST: usize = 1 << 20;
 
 /// The elements of an array that is read.

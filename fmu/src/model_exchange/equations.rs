@@ -15,7 +15,7 @@ pub use super::dual::{Dual, Scalar};
 
 use lovines::contact::Wall;
 
-/// Everything that the rig is made of, at one instant.
+/// Parameters, drive and state of the rig at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Instant<T> {
     /// Primary mass, kg.
@@ -91,7 +91,7 @@ impl<T: Scalar> Instant<T> {
         }
     }
 
-    /// What the base's displacement takes off the velocity of the primary mass, and off that of the particle.
+    /// Contributions of the base displacement to the velocities of the primary mass and of the particle.
     fn reductions(&self) -> (T, T) {
         let passed_on = self.damping / self.moved_mass() * self.base();
         match self.contact {
@@ -124,7 +124,7 @@ impl<T: Scalar> Instant<T> {
         }
     }
 
-    /// Acceleration of the primary mass, or of both, m/s²; the slope of the signal is in it as far as it is known.
+    /// Acceleration of the primary mass, or of both, m/s²; contains the derivative of the signal as far as it is known.
     pub fn acceleration(&self) -> T {
         let passed_on = self.damping / self.moved_mass() * self.base_velocity();
         self.reduced_accelerations().0 + passed_on

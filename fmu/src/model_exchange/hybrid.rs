@@ -39,7 +39,7 @@ pub struct States {
     pub phase: f64,
 }
 
-/// The rig between two looks of an integrator.
+/// The rig between two calls of an integrator.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Hybrid {
     parameters: Parameters,
@@ -54,7 +54,7 @@ pub struct Hybrid {
 }
 
 impl Hybrid {
-    /// The rig at `start`, at rest as to its contact; [`Self::resolve`] finds out what that means.
+    /// The rig at `start`; [`Self::resolve`] determines its contact state.
     ///
     /// # Errors
     /// As for [`Plant::new`].
@@ -72,7 +72,7 @@ impl Hybrid {
         Ok(hybrid)
     }
 
-    /// The rig as it stands.
+    /// The present rig.
     pub fn instant(&self) -> Instant<f64> {
         let p = &self.parameters;
         let States { q1, u1, q2, u2, phase } = self.states;
@@ -129,7 +129,7 @@ impl Hybrid {
         self.event_functions().iter().any(|&value| value <= 0.0)
     }
 
-    /// Says that an event begins: until [`Self::resolve`] the base may jump.
+    /// Begins an event: until [`Self::resolve`] the base may jump.
     pub fn begin_event(&mut self) {
         self.base_before = Some(self.instant().base());
     }
@@ -159,7 +159,7 @@ impl Hybrid {
     /// Takes over other parameters; displacements and velocities stay.
     ///
     /// # Errors
-    /// Parameters that make no sense; the old ones stay.
+    /// Parameters that are not allowed; the old ones stay.
     pub fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         parameters.validate()?;
         let Instant { dq1, dq2, .. } = self.instant();
@@ -224,7 +224,7 @@ impl Hybrid {
         self.set_velocities(touch.primary, touch.particle);
     }
 
-    /// Whether a particle that leaves `wall` at `speed` is in truth at rest on it.
+    /// Whether a particle that leaves `wall` at `speed` counts as at rest on it.
     fn rests(&self, law: &ImpactLaw, wall: Wall, primary: f64, speed: f64) -> bool {
         let (b, fast) = self.scales();
         let now = Instant { dq1: primary, ..self.instant() };
