@@ -55,8 +55,8 @@
 //! - A setter is called only for a variable that may be set in the present state, and a real value is finite.
 //! - [`Component::initialise`] is called before the first step, and in Initialization Mode before a computed value is
 //!   read after something was set. Outputs that depend on inputs are thus right however often inputs are set.
-//! - [`Component::step`] is called with a positive length that [`Component::accept_step`] has accepted; communication points follow each other within 1e-9 of
-//!   their size.
+//! - [`Component::step`] is called with a positive length that [`Component::accept_step`] has accepted; communication points
+//!   follow each other within 1e-9 of their size.
 //! - A panic does not leave the call: it is logged, and the instance can then only be freed.
 //!
 //! Masters read `min` and `max`; the shell does not enforce them: the component decides which values it accepts.

@@ -19,7 +19,8 @@ use crate::status::Status;
 const MODEL_EXCHANGE: c_int = 0;
 const CO_SIMULATION: c_int = 1;
 
-/// `fmi2Instantiate`; `select` is there for a component that has the interface of model exchange too. The resource location is not used, so that every spelling of it is fine.
+/// `fmi2Instantiate`; a component with the interface of model exchange has `select`. The resource location is not used, so that
+/// every notation of it is accepted.
 pub unsafe fn instantiate<C: Component>(
     instance_name: CString,
     fmu_type: c_int,

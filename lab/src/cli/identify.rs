@@ -38,8 +38,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     experiment: ExperimentArguments,
 
-    /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), udp://HOST:PORT or helic://HOST[:PORT] (in real time) [default: this program's plant FMU, packed into the
-    /// folder of the results]
+    /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), udp://HOST:PORT or helic://HOST[:PORT] (in real time)
+    /// [default: this program's plant FMU, packed into the folder of the results]
     #[arg(long, value_name = "ENDPOINT")]
     rig: Option<Endpoint>,
 
