@@ -12,7 +12,7 @@ use vines_model::regime::Regime;
 
 use crate::{
     cell::Cell,
-    doubt::Doubt,
+    doubt::{self, Doubt},
     plan::Plan,
     run::Monitor,
     store::{Store, StoreError, code},
@@ -54,6 +54,7 @@ pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) 
     let mut round = 0;
     let mut next = map.grid(stride);
     let mut doubt = Doubt::new(rows, columns);
+    let mut tests = false;
     loop {
         while !next.is_empty() {
             if !map.compute(plan, store, &mut round, &next, monitor)? {
@@ -65,6 +66,9 @@ pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) 
             // Only a cell that was computed, or one beside it, can differ now.
             let near: Vec<usize> = next.iter().flat_map(|n| map.beside(*n, stride).chain([*n])).collect();
             next = map.differing(near, stride);
+            if tests {
+                next.truncate(doubt::room(&map.computed));
+            }
         }
         if stride > 1 {
             stride /= 2;
@@ -72,6 +76,7 @@ pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) 
             next = map.differing(map.grid(stride), stride);
             continue;
         }
+        tests = true;
         next = doubt.cells(&map.computed);
         if next.is_empty() {
             break;
@@ -85,6 +90,7 @@ pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) 
         }
         let near: Vec<usize> = next.iter().flat_map(|n| map.beside(*n, 1)).collect();
         next = map.differing(near, 1);
+        next.truncate(doubt::room(&map.computed));
     }
     map.write(plan, store, monitor)
 }

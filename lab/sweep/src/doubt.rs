@@ -6,8 +6,9 @@ const BLOCK: usize = 8;
 const PRIOR: f64 = 4.0;
 /// Below this share, cells are not tested.
 const SURE: f64 = 5e-4;
-/// Share of computed cells above which nothing is tested any more; borders found by the last tests are still followed.
+/// Share of computed cells above which nothing is tested any more, and up to which borders that tests found are followed.
 const LARGEST: f64 = 0.149;
+const FOLLOWED: f64 = 0.15;
 /// Share of the cells that are tested in a round, and one in so many of a block.
 const ROUND: f64 = 0.005;
 const ONE_IN: usize = 4;
@@ -110,6 +111,12 @@ impl Doubt {
         let columns = column..(column + BLOCK).min(size);
         rows.flat_map(move |row| columns.clone().map(move |column| row * size + column))
     }
+}
+
+/// Number of cells that may be computed along borders that tests found.
+pub(crate) fn room(computed: &[bool]) -> usize {
+    let done = computed.iter().filter(|one| **one).count() as f64;
+    (FOLLOWED * computed.len() as f64 - done).max(0.0) as usize
 }
 
 /// A number in which all bits depend on those of `n` (the finaliser of SplitMix64).
