@@ -14,11 +14,6 @@ pub struct Component {
 }
 
 impl Component {
-    /// Options of `cargo build --release` that build the library.
-    pub(super) fn build_options(&self) -> String {
-        format!("-p {}", self.package)
-    }
-
     /// The guid in the description, which the library must hold as well.
     pub(super) fn guid(&self) -> Option<&str> {
         let (_, rest) = self.description.split_once("guid=\"")?;
