@@ -13,7 +13,7 @@ mod theme;
 
 pub use figure::FigureError;
 pub use files::{WriteError, write, write_calibration, write_interrupted, write_lateness, write_map, write_tracked};
-pub use section::{Attachment, Block, Budget, Section};
+pub use section::{Block, Section};
 pub use sections::{Maker, SECTIONS, SectionError, Subject};
 pub use study::{Progress, Report, write_report};
 pub use table::{Table, number};

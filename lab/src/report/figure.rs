@@ -38,7 +38,8 @@ pub fn line(colour: RGBColor, tenths: u32) -> ShapeStyle {
 pub struct Figure {
     size: (u32, u32),
     panels: Vec<Panel>,
-    key: Vec<KeyEntry>,
+    /// Names, and what they explain.
+    key: Vec<(&'static str, Mark)>,
 }
 
 /// One panel with its axes.
@@ -79,16 +80,10 @@ enum Kind {
     Text(String, Place, u32, bool),
 }
 
-/// An entry of the key beside a panel.
-pub struct KeyEntry {
-    pub name: &'static str,
-    pub mark: Mark,
-}
-
-/// What an entry explains.
+/// What an entry of the key explains.
 pub enum Mark {
     /// Colour, letter, and colour of the letter.
-    Swatch(RGBColor, &'static str, RGBColor),
+    Swatch((RGBColor, &'static str, RGBColor)),
     Line(RGBColor),
     Dot,
 }
@@ -105,7 +100,7 @@ impl Figure {
     }
 
     /// With a key at the right of the panel.
-    pub fn with_key(self, key: Vec<KeyEntry>) -> Self {
+    pub fn with_key(self, key: Vec<(&'static str, Mark)>) -> Self {
         Self { key, ..self }
     }
 }

@@ -114,8 +114,7 @@ fn rendered(block: &Block, figures: &mut u32) -> Markup {
 }
 
 fn budget(sections: &[Section]) -> Markup {
-    let lines = sections.iter().flat_map(|section| &section.budget);
-    let rows = lines.map(|one| [one.what.clone(), one.size.clone(), one.why.clone()]);
+    let rows = sections.iter().flat_map(|section| section.budget.clone());
     let table = Table::new("what | how far off | why, and from where").rows(rows);
     html! {
         section.budget {

@@ -82,8 +82,7 @@ pub fn write_report(
                 files.push((format!("{name}-dark.svg"), dark(svg)));
             }
         }
-        let attachments = section.attachments.iter();
-        files.extend(attachments.map(|one| (one.name.clone(), one.text.clone())));
+        files.extend(section.attachments.clone());
     }
     Ok(Report {
         written: files::write(out, files).map_err(WriteError::from)?,
