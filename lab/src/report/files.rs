@@ -13,6 +13,7 @@ use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoi
 use crate::experiment::{Sample, table};
 use crate::files::{self, FileError};
 use crate::map::{Cell, Map};
+use crate::orbit::Periodic;
 use crate::regime::Regime;
 
 /// Why the files of a run could not be written.
@@ -89,9 +90,13 @@ pub(super) fn json(found: &impl Serialize) -> Result<String, WriteError> {
     Ok(serde_json::to_string_pretty(found)? + "\n")
 }
 
-/// A table, one row an item.
-pub(super) fn csv<T: Serialize>(rows: impl IntoIterator<Item = T>) -> Result<String, WriteError> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
+/// A table, one row an item, with the names of its fields or, for tuples, these headings.
+pub(super) fn csv<T: Serialize>(headings: &[&str], rows: impl IntoIterator<Item = T>) -> Result<String, WriteError> {
+    let own = headings.is_empty();
+    let mut writer = csv::WriterBuilder::new().has_headers(own).from_writer(Vec::new());
+    if !own {
+        writer.write_record(headings)?;
+    }
     for row in rows {
         writer.serialize(row)?;
     }
@@ -107,10 +112,13 @@ pub(super) fn decay_csv(found: &Comparison) -> Result<String, WriteError> {
         sigma_theory: Option<f64>,
         sigma_exact: Option<f64>,
     }
-    csv(found.decay.iter().map(|one| {
-        let ComparedPoint { point, sigma_theory, sigma_exact } = *one;
-        (point, Theory { sigma_theory, sigma_exact })
-    }))
+    csv(
+        &[],
+        found.decay.iter().map(|one| {
+            let ComparedPoint { point, sigma_theory, sigma_exact } = *one;
+            (point, Theory { sigma_theory, sigma_exact })
+        }),
+    )
 }
 
 /// The points of a tracked backbone.
@@ -122,14 +130,17 @@ pub(super) fn tracked_csv(found: &TrackedComparison) -> Result<String, WriteErro
         #[serde(rename = "G_less_exact")]
         g_less_exact: Option<f64>,
     }
-    csv(found.points.iter().map(|TrackedPoint { point, exact }| {
-        let compared = Compared {
-            distance: exact.map(|exact| exact.nearest),
-            sigma_less_exact: exact.and_then(|exact| exact.sigma),
-            g_less_exact: exact.and_then(|exact| exact.g),
-        };
-        (point, compared)
-    }))
+    csv(
+        &[],
+        found.points.iter().map(|TrackedPoint { point, exact }| {
+            let compared = Compared {
+                distance: exact.map(|exact| exact.nearest),
+                sigma_less_exact: exact.and_then(|exact| exact.sigma),
+                g_less_exact: exact.and_then(|exact| exact.g),
+            };
+            (point, compared)
+        }),
+    )
 }
 
 /// The cells of a map.
@@ -152,34 +163,18 @@ pub(super) fn map_csv(map: &Map) -> Result<String, WriteError> {
         let coexisting = names.join("; ");
         (Row { sigma, g, r }, point, More { theory_stable, coexisting })
     };
-    csv(map.cells.iter().map(row))
+    csv(&[], map.cells.iter().map(row))
 }
 
 /// The points of the bifurcation curves.
 pub(super) fn bifurcations_csv(map: &Map) -> Result<String, WriteError> {
-    #[derive(Serialize)]
-    struct Row {
-        curve: usize,
-        bifurcation: String,
-        sigma: f64,
-        #[serde(rename = "G")]
-        g: f64,
-        #[serde(rename = "C")]
-        c: f64,
-        #[serde(rename = "B")]
-        b: f64,
-        bounds_stability: bool,
-    }
+    let headings = ["curve", "bifurcation", "sigma", "G", "C", "B", "bounds_stability"];
     let rows = map.curves.iter().enumerate().flat_map(|(n, curve)| {
-        curve.branch.points.iter().map(move |one| Row {
-            curve: n + 1,
-            bifurcation: curve.name(),
-            sigma: one.sigma,
-            g: one.g,
-            c: one.c,
-            b: one.b,
-            bounds_stability: one.bounds_stability(),
-        })
+        let row = move |one: &Periodic| {
+            let Periodic { sigma, g, c, b, .. } = *one;
+            (n + 1, curve.name(), sigma, g, c, b, one.bounds_stability())
+        };
+        curve.branch.points.iter().map(row)
     });
-    csv(rows)
+    csv(&headings, rows)
 }

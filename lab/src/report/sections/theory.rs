@@ -56,7 +56,7 @@ pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Sectio
                 Table::new("ε | in σ | in C | in B").rows(rows),
             );
             section.words(section.finding.clone());
-            section.attach("convergence.csv", csv(&study.rows)?);
+            section.attach("convergence.csv", csv(&[], &study.rows)?);
         }
         None => {
             section.found("Theory and exact orbits have no common stable phase-resonant motion here.");
