@@ -194,6 +194,13 @@ impl Fmu {
         self.ask(action, |i| i.set_real(&references, &values)).map(drop)
     }
 
+    /// Value of an integer variable.
+    pub fn integer(&mut self, action: &'static str, reference: Reference) -> Result<i32, FmuError> {
+        let mut value = [0];
+        self.ask(action, |i| i.get_integer(&[reference], &mut value))?;
+        Ok(value[0])
+    }
+
     /// Calls the FMU; `action` completes the message "refused to …".
     pub fn ask<T>(
         &mut self,
@@ -207,6 +214,14 @@ impl Fmu {
             source: error.into(),
         })
     }
+}
+
+/// Refuses names in the scene that are not among `known`, separated by commas.
+pub(super) fn names_are_known(names: &Names, known: &str) -> Result<(), FmuError> {
+    let list: Vec<&str> = known.split(", ").collect();
+    names.unknown(&list).map_or(Ok(()), |name| {
+        Err(FmuError::Name { name: name.into(), known: known.into() })
+    })
 }
 
 /// Unpacks the FMU at `path` and instantiates it for co-simulation, with logging on.

@@ -3,34 +3,15 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use fmi::fmi2::instance::Common;
 use phase_lock::Value;
 use vines_testbench::rig::{Drive, GroundTruth, Measured, Rig, RigError, Sensors};
 use vines_testbench::scene::{Definition, Names, Parameters, Reference as ReferenceSignal, Sensor};
 
-use crate::instance::{Fmu, FmuError, Kind, Named, Reference};
+use crate::instance::{Fmu, FmuError, Kind, Named, Reference, names_are_known};
 
 /// The names of this bench that a scene may map.
-const NAMES: [&str; 18] = [
-    "omega",
-    "E",
-    "e",
-    "response",
-    "base",
-    "impacts",
-    "impact_time",
-    "impact_velocity",
-    "M",
-    "k",
-    "c",
-    "m",
-    "b",
-    "r",
-    "q1",
-    "der(q1)",
-    "q2",
-    "der(q2)",
-];
+const NAMES: &str =
+    "omega, E, e, response, base, impacts, impact_time, impact_velocity, M, k, c, m, b, r, q1, der(q1), q2, der(q2)";
 
 /// A plant FMU, stepped sample by sample.
 ///
@@ -69,9 +50,7 @@ impl FmuRig {
         plant: &Parameters,
         names: &Names,
     ) -> Result<Measured<Self>, FmuError> {
-        if let Some(name) = names.unknown(&NAMES) {
-            return Err(FmuError::Name { name: name.into(), known: NAMES.join(", ") });
-        }
+        names_are_known(names, NAMES)?;
         let mut fmu = Fmu::load(path, "plant")?;
         let oscillator = ["omega", "E"].map(|ours| fmu.named(Kind::Real, names, ours));
         let inputs = match oscillator {
@@ -152,11 +131,9 @@ impl Rig for FmuRig {
         };
         let action = "report its impacts";
         let [impact_time, impact_velocity, particle_velocity] = self.fmu.read(action, inside.reals)?;
-        let mut impacts = [0];
-        self.fmu
-            .ask(action, |i| i.get_integer(&[inside.impacts], &mut impacts))?;
+        let impacts = self.fmu.integer(action, inside.impacts)?;
         Ok(Some(GroundTruth {
-            impacts: i64::from(impacts[0]),
+            impacts: impacts.into(),
             impact_time,
             impact_velocity,
             particle_velocity,
