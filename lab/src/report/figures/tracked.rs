@@ -10,8 +10,11 @@ use crate::report::figure::{Axis, DETUNING, Figure, Panel, SIZE, amplitude, capt
 use crate::report::theme::{DECAY, EXACT, THEORY};
 use crate::theory::{self, SlowFlow};
 
-fn points(tracked: &TrackedComparison) -> impl Iterator<Item = Point> + Clone {
-    tracked.points.iter().map(|one| one.point)
+/// The points, and the top of the axis of their amplitudes.
+fn points(tracked: &TrackedComparison) -> (impl Iterator<Item = Point> + Clone, f64) {
+    let all = tracked.points.iter().map(|one| one.point);
+    let top = all.clone().fold(0.5, |most: f64, one| most.max(1.15 * one.c));
+    (all, top)
 }
 
 /// The points in the plane of amplitude and detuning; points that are not settled are crossed.
@@ -28,8 +31,7 @@ pub fn figure_with_drive(tracked: &TrackedComparison) -> Figure {
 
 fn amplitude_panel(tracked: &TrackedComparison) -> Panel {
     let p = &tracked.parameters;
-    let all = points(tracked);
-    let top = all.clone().fold(0.5, |most: f64, one| most.max(1.15 * one.c));
+    let (all, top) = points(tracked);
     let (low, high) = range((-1.6, 0.6), all.clone().map(|one| one.sigma));
     let x = (low - 0.1 * (high - low), high + 0.1 * (high - low));
     let (least, most) = range((f64::MAX, f64::MIN), all.clone().map(|one| one.g));
@@ -40,22 +42,16 @@ fn amplitude_panel(tracked: &TrackedComparison) -> Panel {
     add_backbones(&mut panel, p, x, (0.0, top));
     let place = |one: Point| (one.sigma, one.c);
     decay_points(&mut panel, all.clone().map(place), "tracked");
-    error_bars(
-        &mut panel,
-        all.clone().map(|one| (place(one), 1.96 * one.u_sigma)),
-        false,
-    );
-    let unsettled: Vec<_> = all.filter(|one| !one.settled).map(place).collect();
-    if !unsettled.is_empty() {
-        panel.crosses(unsettled, line(DECAY, 20), "not settled in time");
-    }
+    let bars = all.clone().map(|one| (place(one), 1.96 * one.u_sigma));
+    error_bars(&mut panel, bars, false);
+    let unsettled = all.filter(|one| !one.settled).map(place).collect();
+    panel.crosses(unsettled, line(DECAY, 20), "not settled in time");
     panel
 }
 
 fn drive_panel(tracked: &TrackedComparison) -> Panel {
     let p = &tracked.parameters;
-    let all = points(tracked);
-    let top = all.clone().fold(0.5, |most: f64, one| most.max(1.15 * one.c));
+    let (all, top) = points(tracked);
     let flow = SlowFlow::new(p.lambda, p.r);
     let theory = theory::backbone(p, flow.manifold.b_min(), 1.3, 600);
     let theory = theory.iter().map(|one| (one.c, one.g));
