@@ -48,17 +48,14 @@ pub struct Panel {
     area: [u32; 4],
     /// Title and caption.
     heading: Option<(String, String)>,
-    x: Axis,
-    y: Axis,
+    ranges: [(f64, f64); 2],
+    labels: [String; 2],
     series: Vec<Series>,
     legend: Option<SeriesLabelPosition>,
 }
 
 /// Range and label of an axis.
-pub struct Axis {
-    range: (f64, f64),
-    label: String,
-}
+pub type Axis<'a> = ((f64, f64), &'a str);
 
 /// Something drawn in a panel; the first of each label is in the legend.
 struct Series {
@@ -105,20 +102,14 @@ impl Figure {
     }
 }
 
-impl Axis {
-    pub fn new(range: (f64, f64), label: &str) -> Self {
-        Self { range, label: label.into() }
-    }
-}
-
 impl Panel {
     /// An empty panel over the whole of a figure of the usual size.
     pub fn new(x: Axis, y: Axis) -> Self {
         Self {
             area: [0, 0, SIZE.0, SIZE.1],
             heading: None,
-            x,
-            y,
+            ranges: [x.0, y.0],
+            labels: [x.1, y.1].map(String::from),
             series: Vec::new(),
             legend: None,
         }

@@ -85,7 +85,7 @@ impl Device {
             settings,
             sample_rate,
             stream: Stream::new(sample_rate),
-            table: Table::new(),
+            table: Table::default(),
             staged: vec![0.0; TABLE],
             committed: false,
             pll: Pll::new(),

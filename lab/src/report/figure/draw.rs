@@ -91,7 +91,7 @@ impl Panel {
     }
 
     fn axes<'a, 'b>(&self, area: &'a Area<'b>) -> Drawn<Chart<'a, 'b>> {
-        let (x, y) = (self.x.range, self.y.range);
+        let [x, y] = self.ranges;
         let top = if self.heading.is_some() { 66 } else { 12 };
         let mut chart = ChartBuilder::on(area)
             .margin_top(px(top))
@@ -103,8 +103,8 @@ impl Panel {
             .build_cartesian_2d(x.0..x.1, y.0..y.1)?;
         chart
             .configure_mesh()
-            .x_desc(&self.x.label)
-            .y_desc(&self.y.label)
+            .x_desc(&self.labels[0])
+            .y_desc(&self.labels[1])
             .axis_desc_style((FONT, px(17)))
             .label_style((FONT, px(14)))
             .light_line_style(WHITE)

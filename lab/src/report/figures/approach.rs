@@ -4,7 +4,7 @@ use plotters::chart::SeriesLabelPosition;
 use plotters::style::Color;
 
 use crate::numerics::equally_spaced;
-use crate::report::figure::{AMPLITUDE_OF_V, Axis, Figure, Marked, Panel, Place, SPEED, caption, line};
+use crate::report::figure::{AMPLITUDE_OF_V, Figure, Marked, Panel, Place, SPEED, caption, line};
 use crate::report::theme::{DECAY, EXACT, LOCK, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
 use crate::theory::{BackbonePoint, SlowFlow, impacts_stable};
@@ -31,7 +31,7 @@ pub fn figure(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
         let all = std::iter::once((c, b)).chain(places);
         all.take_while(inside).collect()
     };
-    let mut panel = Panel::new(Axis::new(x, AMPLITUDE_OF_V), Axis::new(y, SPEED))
+    let mut panel = Panel::new((x, AMPLITUDE_OF_V), (y, SPEED))
         .heading(
             "Approach to the slow invariant manifold, impact by impact",
             &caption(p, lock.g),

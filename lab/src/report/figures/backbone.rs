@@ -6,7 +6,7 @@ use super::{DECAY_LABEL, THINNED, decay_points, error_bars, locked_point};
 use crate::comparison::Comparison;
 use crate::numerics::range;
 use crate::orbit::{self, Limits};
-use crate::report::figure::{Axis, DETUNING, Figure, Marked, Panel, amplitude, caption, clipped, line, thinned};
+use crate::report::figure::{DETUNING, Figure, Marked, Panel, amplitude, caption, clipped, line, thinned};
 use crate::report::theme::{EXACT, FAINT, LOCK, THEORY, UNSTABLE};
 use crate::scene::{Definition, Dimensionless};
 use crate::theory::{self, BranchSide, SlowFlow};
@@ -34,7 +34,7 @@ pub fn figure(found: &Comparison) -> Figure {
         true => "Backbone: phase resonance of the centre of mass".into(),
         false => format!("Backbone: {}", p.definition.name()),
     };
-    let mut panel = Panel::new(Axis::new((low, high), DETUNING), Axis::new((0.0, top), amplitude(p)))
+    let mut panel = Panel::new(((low, high), DETUNING), ((0.0, top), amplitude(p)))
         .heading(&title, &caption(p, found.lock.g))
         .legend(SeriesLabelPosition::UpperRight);
     add_backbones(&mut panel, p, (low, high), (0.0, top));

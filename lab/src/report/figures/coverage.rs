@@ -3,7 +3,7 @@
 use plotters::chart::SeriesLabelPosition;
 
 use crate::calibration::{Calibration, Kind, Outcome};
-use crate::report::figure::{Axis, Figure, Panel, line};
+use crate::report::figure::{Figure, Panel, line};
 use crate::report::theme::{DECAY, EXACT, LOCK, UNSTABLE};
 
 /// Nominal levels, and the half widths of their intervals in standard uncertainties.
@@ -22,7 +22,7 @@ const LEVELS: [(f64, f64); 11] = [
 ];
 
 pub fn figure(found: &Calibration) -> Figure {
-    let axis = |label| Axis::new((0.0, 1.0), label);
+    let axis = |label| ((0.0, 1.0), label);
     let mut panel = Panel::new(
         axis("nominal level of the interval"),
         axis("share that contains the exact value"),

@@ -67,7 +67,7 @@ pub fn figure(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
     ];
     let panels = rows.into_iter().flat_map(|(row, range, label)| {
         let (top, height) = if row == 1 { (0, UPPER) } else { (UPPER, SIZE.1 - UPPER) };
-        let left = data.driven_panel(row, Axis::new(range, label));
+        let left = data.driven_panel(row, (range, label));
         let right = data.decay_panel(row, range);
         [
             left.at([0, top, LEFT, height]),
@@ -81,7 +81,7 @@ impl Data<'_> {
     fn driven_panel(&self, row: usize, y: Axis) -> Panel {
         let Comparison { parameters, lock, exact, theory, .. } = self.found;
         let end = 1.02 * self.driven.last().map_or(1.0, |one| one[0]);
-        let mut panel = Panel::new(Axis::new((0.0, end), "time, in periods of the oscillator alone"), y);
+        let mut panel = Panel::new(((0.0, end), "time, in periods of the oscillator alone"), y);
         if row == 1 {
             let caption = caption(parameters, lock.g);
             panel = panel.heading("Seeking and holding resonance", &caption);
@@ -107,10 +107,7 @@ impl Data<'_> {
     fn decay_panel(&self, row: usize, range: (f64, f64)) -> Panel {
         let last = self.points.last().map_or(1.0, |one| one[0]);
         let end = self.theory.last().map_or(last, |one| last.max(one[0]));
-        let mut panel = Panel::new(
-            Axis::new((0.0, 1.02 * end), "time since the release, likewise"),
-            Axis::new(range, ""),
-        );
+        let mut panel = Panel::new(((0.0, 1.02 * end), "time since the release, likewise"), (range, ""));
         if row == 1 {
             panel = panel.heading("Free decay", "the drive is off from 0 on");
         }

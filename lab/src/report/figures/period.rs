@@ -6,7 +6,7 @@ use plotters::chart::SeriesLabelPosition;
 
 use crate::numerics::range;
 use crate::orbit::Periodic;
-use crate::report::figure::{Axis, Figure, Panel, Place, line, rig};
+use crate::report::figure::{Figure, Panel, Place, line, rig};
 use crate::report::theme::{DECAY, EXACT, LOCK, THEORY};
 use crate::scene::Dimensionless;
 use crate::theory::{BackbonePoint, Waveform};
@@ -50,8 +50,8 @@ fn displacements(p: &Dimensionless, motion: &Periodic, rows: &[[f64; 5]], impact
     let farthest = q1.iter().chain(&q2).map(|(_, value)| value.abs() + 1.0);
     let (_, reach) = range((0.0, 1.0), farthest);
     let mut panel = Panel::new(
-        Axis::new((0.0, 1.0), ""),
-        Axis::new((-1.05 * reach, 1.7 * reach), "displacements, over b"),
+        ((0.0, 1.0), ""),
+        ((-1.05 * reach, 1.7 * reach), "displacements, over b"),
     )
     .heading("One period of the locked motion", &caption)
     .legend(SeriesLabelPosition::UpperRight);
@@ -77,8 +77,8 @@ fn coordinates(
     let v = course(rows, |row| row[1] + p.epsilon * row[3]);
     let (_, high) = range((0.0, 1.0), v.iter().map(|(_, value)| value.abs()));
     let mut panel = Panel::new(
-        Axis::new((0.0, 1.0), "time since the base passed zero upwards, in periods"),
-        Axis::new((-1.15 * high, 1.9 * high), "v and w, over b"),
+        ((0.0, 1.0), "time since the base passed zero upwards, in periods"),
+        ((-1.15 * high, 1.9 * high), "v and w, over b"),
     )
     .legend(SeriesLabelPosition::UpperRight);
     for side in [-1.0, 1.0] {

@@ -2,10 +2,10 @@
 
 use plotters::style::{BLACK, Color, WHITE};
 
-use crate::map::{Axis as MapAxis, Map, Range, outline};
+use crate::map::{Axis, Map, Range, outline};
 use crate::orbit::{BifurcationCurve, Periodic};
 use crate::regime::Regime;
-use crate::report::figure::{Axis, DETUNING, Figure, FigureError, Mark, Marked, Panel, Place, clipped, line, thinned};
+use crate::report::figure::{DETUNING, Figure, FigureError, Mark, Marked, Panel, Place, clipped, line, thinned};
 use crate::report::theme;
 
 /// Size of the figure, px, and how much of its width belongs to the axes; the key stands beside them.
@@ -25,7 +25,7 @@ fn figure(map: &Map) -> Figure {
     let plan = &map.plan;
     let axis = |range: &Range| {
         let half = range.step() / 2.0;
-        Axis::new((range.from - half, range.to + half), label(range.axis))
+        ((range.from - half, range.to + half), label(range.axis))
     };
     let mut panel = Panel::new(axis(&plan.x), axis(&plan.y))
         .at([0, 0, WIDTH, SIZE.1])
@@ -70,7 +70,7 @@ fn key(map: &Map, dotted: bool) -> Vec<(&'static str, Mark)> {
 
 /// Where a motion lies on a map over sigma and G.
 fn place_on(map: &Map) -> impl Fn(&Periodic) -> Place {
-    let swapped = map.plan.x.axis == MapAxis::G;
+    let swapped = map.plan.x.axis == Axis::G;
     move |one| {
         if swapped {
             (one.g, one.sigma)
@@ -106,13 +106,13 @@ fn draw_curve(panel: &mut Panel, map: &Map, curve: &BifurcationCurve) {
 
 fn caption(map: &Map) -> String {
     let plan = &map.plan;
-    let held = [MapAxis::Sigma, MapAxis::G, MapAxis::R]
+    let held = [Axis::Sigma, Axis::G, Axis::R]
         .into_iter()
         .filter(|axis| plan.x.axis != *axis && plan.y.axis != *axis)
         .map(|axis| match axis {
-            MapAxis::Sigma => format!(", σ = {:.4}", plan.sigma),
-            MapAxis::G => format!(", G = {:.3}", plan.scene.g),
-            MapAxis::R => format!(", r = {}", plan.scene.r),
+            Axis::Sigma => format!(", σ = {:.4}", plan.sigma),
+            Axis::G => format!(", G = {:.3}", plan.scene.g),
+            Axis::R => format!(", r = {}", plan.scene.r),
         });
     let dashed = if map.curves.is_empty() {
         ""
@@ -128,11 +128,11 @@ fn caption(map: &Map) -> String {
     )
 }
 
-fn label(axis: MapAxis) -> &'static str {
+fn label(axis: Axis) -> &'static str {
     match axis {
-        MapAxis::Sigma => DETUNING,
-        MapAxis::G => "base amplitude G = E/(b ε)",
-        MapAxis::R => "restitution coefficient r",
+        Axis::Sigma => DETUNING,
+        Axis::G => "base amplitude G = E/(b ε)",
+        Axis::R => "restitution coefficient r",
     }
 }
 

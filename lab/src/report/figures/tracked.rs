@@ -6,7 +6,7 @@ use super::{backbone::add_backbones, decay_points, error_bars};
 use crate::backbone::Point;
 use crate::comparison::TrackedComparison;
 use crate::numerics::range;
-use crate::report::figure::{Axis, DETUNING, Figure, Panel, SIZE, amplitude, caption, line};
+use crate::report::figure::{DETUNING, Figure, Panel, SIZE, amplitude, caption, line};
 use crate::report::theme::{DECAY, EXACT, THEORY};
 use crate::theory::{self, SlowFlow};
 
@@ -36,7 +36,7 @@ fn amplitude_panel(tracked: &TrackedComparison) -> Panel {
     let x = (low - 0.1 * (high - low), high + 0.1 * (high - low));
     let (least, most) = range((f64::MAX, f64::MIN), all.clone().map(|one| one.g));
     let text = caption(p, most).replace(&format!("G = {most:.3}"), &format!("G from {least:.3} to {most:.3}"));
-    let mut panel = Panel::new(Axis::new(x, DETUNING), Axis::new((0.0, top), amplitude(p)))
+    let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
         .heading("Backbone, tracked with the loop closed", &text)
         .legend(SeriesLabelPosition::UpperRight);
     add_backbones(&mut panel, p, x, (0.0, top));
@@ -60,8 +60,8 @@ fn drive_panel(tracked: &TrackedComparison) -> Panel {
     let high = 1.3 * most;
     let inside = |place: &(f64, f64)| place.0 <= top && place.1 <= high;
     let mut panel = Panel::new(
-        Axis::new((0.0, top), amplitude(p)),
-        Axis::new((0.0, high), "drive G, base amplitude over b ε"),
+        ((0.0, top), amplitude(p)),
+        ((0.0, high), "drive G, base amplitude over b ε"),
     )
     .heading("The drive that holds each level", "")
     .legend(SeriesLabelPosition::LowerRight);
