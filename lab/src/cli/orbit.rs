@@ -83,12 +83,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if let Some(sigma) = arguments.sigma {
         return settled(arguments, &scene, sigma, loaded.dimensionless_start());
     }
-    let none = || {
-        Failure::run(format!(
-            "there is no phase-resonant orbit to start from at G = {} (dimensionless); see `vines orbit`",
-            scene.g
-        ))
-    };
     let [lowest, highest] = Limits::default().g;
     let limits = Limits {
         sigma: arguments.range,
@@ -96,7 +90,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         ..Limits::default()
     };
     if arguments.backbone {
-        let branch = backbone(&scene, &limits).ok_or_else(none)?;
+        let branch = backbone(&scene, &limits).ok_or_else(|| {
+            Failure::run(format!(
+                "there is no phase-resonant orbit to start from at G = {} (dimensionless); see `vines orbit`",
+                scene.g
+            ))
+        })?;
         return shown(&scene, "Exact backbone", &branch, arguments.json, || {
             curve("Symmetric 1:1", &branch)
         });

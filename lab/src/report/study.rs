@@ -5,10 +5,10 @@ use std::path::{Path, PathBuf};
 use sha2::{Digest, Sha256};
 
 use super::dark;
-use super::files::WriteError;
+use super::files::ReportError;
 use super::page::page;
 use super::section::{Block, Section};
-use super::sections::{SECTIONS, SectionError, Subject};
+use super::sections::{SECTIONS, Subject};
 use crate::files;
 
 /// Folder of cached sections, inside the folder of the report.
@@ -34,7 +34,7 @@ pub fn write_report(
     fresh: bool,
     work_precision: Option<&str>,
     progress: &(dyn Fn(&str, f64) + Sync),
-) -> Result<Report, SectionError> {
+) -> Result<Report, ReportError> {
     let (mut sections, mut kept) = (Vec::new(), Vec::new());
     for (n, (name, make)) in SECTIONS.into_iter().enumerate() {
         let key = key(subject, name);
@@ -48,8 +48,8 @@ pub fn write_report(
         }
         let section = make(subject, &at)?;
         // With a hash of its input.
-        let text = serde_json::to_string(&(key, &section)).map_err(WriteError::from)?;
-        files::write(&out.join(KEPT), [(file, text)]).map_err(WriteError::from)?;
+        let text = serde_json::to_string(&(key, &section))?;
+        files::write(&out.join(KEPT), [(file, text)])?;
         sections.push(section);
     }
     let mut files = vec![(
@@ -66,7 +66,7 @@ pub fn write_report(
         files.extend(section.attachments.clone());
     }
     Ok(Report {
-        written: files::write(out, files).map_err(WriteError::from)?,
+        written: files::write(out, files)?,
         kept,
         findings: sections.into_iter().map(|one| one.finding).collect(),
     })

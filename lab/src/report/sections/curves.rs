@@ -1,18 +1,18 @@
 //! Exact frequency responses and backbone, and one period of the locked motion.
 
-use super::{SectionError, Subject};
+use super::{ReportError, Subject};
 use crate::orbit::{
     Branch, Component, Condition, Exploration, ImpactPattern, Limits, Periodic, Response, backbone, response,
     stable_resonant,
 };
 use crate::report::figures::{period, responses};
-use crate::report::files::{WriteError, csv};
+use crate::report::files::csv;
 use crate::report::section::Section;
 use crate::report::table::Table;
 use crate::scene::Dimensionless;
 use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 
-pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError> {
     let mut section = Section::new("Exact periodic motions");
     let p = subject.scene.dimensionless();
     let limits = Limits::default();
@@ -122,7 +122,7 @@ fn excitations(p: &Dimensionless) -> Vec<f64> {
 }
 
 /// The orbits of all curves, as CSV.
-fn table(backbone: &Branch, responses: &[Response]) -> Result<String, WriteError> {
+fn table(backbone: &Branch, responses: &[Response]) -> Result<String, ReportError> {
     let headings = ["curve", "sigma", "G", "C", "gamma", "B", "largest_multiplier", "stable"];
     let components = responses.iter().flat_map(|response| {
         let name = |one: &Component| format!("G={:.4}: {}", response.g, one.name);

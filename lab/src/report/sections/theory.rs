@@ -1,6 +1,6 @@
 //! First-order theory: the backbones of several r, activation, and how it approaches the exact orbits.
 
-use super::{SectionError, Subject};
+use super::{ReportError, Subject};
 use crate::orbit::convergence;
 use crate::report::figures::{approach, backbones};
 use crate::report::files::csv;
@@ -12,7 +12,7 @@ use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, resonant};
 /// Halvings of epsilon in the convergence study.
 const HALVINGS: u32 = 6;
 
-pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
+pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError> {
     let mut section = Section::new("First-order theory and its accuracy");
     let p = subject.scene.dimensionless();
     let flow = SlowFlow::new(p.lambda, p.r);
