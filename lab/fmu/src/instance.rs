@@ -20,7 +20,7 @@ use crate::error::{CallError, LoadError};
 pub enum FmuError {
     #[error("cannot load {}: {source}", path.display())]
     Load { path: PathBuf, source: LoadError },
-    #[error("{} has no {kind} variable `{name}`, which the bench needs; [rig.names] and [controller_names] of the scene map names", path.display())]
+    #[error("{} has no {kind:?} variable `{name}`, which the bench needs; [rig.names] and [controller_names] of the scene map names", path.display())]
     Variable { path: PathBuf, kind: Kind, name: String },
     #[error(
         "[rig.names] or [controller_names] of the scene maps `{name}`, which this bench does not have; it has: {known}"
@@ -75,12 +75,6 @@ impl From<Value> for Kind {
             Value::Integer(_) => Self::Integer,
             Value::Boolean(_) => Self::Boolean,
         }
-    }
-}
-
-impl std::fmt::Display for Kind {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        std::fmt::Debug::fmt(self, f)
     }
 }
 

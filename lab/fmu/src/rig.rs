@@ -52,12 +52,8 @@ impl FmuRig {
     ) -> Result<Measured<Self>, FmuError> {
         names_are_known(names, NAMES)?;
         let mut fmu = Fmu::load(path, "plant")?;
-        let oscillator = ["omega", "E"].map(|ours| fmu.named(Kind::Real, names, ours));
-        let inputs = match oscillator {
-            [Ok(Some(omega)), Ok(Some(amplitude))] => Some([omega, amplitude]),
-            [Err(error), _] | [_, Err(error)] => return Err(error),
-            _ => None,
-        };
+        let [omega, amplitude] = ["omega", "E"].map(|ours| fmu.named(Kind::Real, names, ours));
+        let inputs = omega?.zip(amplitude?).map(|(omega, amplitude)| [omega, amplitude]);
         let held = match inputs {
             Some(_) => fmu.named(Kind::Real, names, "e")?,
             None => Some(fmu.need_named(Kind::Real, names, "e")?),
@@ -82,15 +78,12 @@ impl FmuRig {
 
 impl Inside {
     fn of(fmu: &Fmu, names: &Names) -> Result<Option<Self>, FmuError> {
-        let mut reals = [(Reference::default(), 1.0); 3];
-        for (real, ours) in reals.iter_mut().zip(["impact_time", "impact_velocity", "der(q2)"]) {
-            match fmu.named(Kind::Real, names, ours)? {
-                Some(found) => *real = found,
-                None => return Ok(None),
-            }
-        }
-        let impacts = fmu.named(Kind::Integer, names, "impacts")?;
-        Ok(impacts.map(|(impacts, _)| Self { impacts, reals }))
+        let real = |ours| fmu.named(Kind::Real, names, ours);
+        let reals = [real("impact_time")?, real("impact_velocity")?, real("der(q2)")?];
+        let (Some(impacts), [Some(a), Some(b), Some(c)]) = (fmu.switch(Kind::Integer, names, "impacts")?, reals) else {
+            return Ok(None);
+        };
+        Ok(Some(Self { impacts, reals: [a, b, c] }))
     }
 }
 
@@ -98,10 +91,8 @@ impl Rig for FmuRig {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let read = "read its sensors";
         let [response] = self.fmu.read(read, [self.response])?;
-        let reference = match self.reference {
-            Some(reference) => Some(self.fmu.read(read, [reference])?[0]),
-            None => None,
-        };
+        let reference = self.reference.map(|reference| self.fmu.read(read, [reference]));
+        let reference = reference.transpose()?.map(|[value]| value);
         Ok(Sensors { response, reference })
     }
 
