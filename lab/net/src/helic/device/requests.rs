@@ -9,12 +9,15 @@ use super::Device;
 impl Device {
     /// Answers a request. `uptime` in ms.
     pub fn handle(&mut self, request: &Frame, uptime: u32) -> Frame {
-        let Frame { kind, sequence, payload } = request;
-        let answer = match self.answer(*kind, payload, uptime) {
-            Ok(payload) => (*kind, payload),
-            Err(code) => (message::ERROR, vec![code as u8, *kind]),
-        };
-        Frame { kind: answer.0, sequence: *sequence, payload: answer.1 }
+        let Frame { kind, sequence, ref payload } = *request;
+        match self.answer(kind, payload, uptime) {
+            Ok(payload) => Frame { kind, sequence, payload },
+            Err(code) => Frame {
+                kind: message::ERROR,
+                sequence,
+                payload: vec![code as u8, kind],
+            },
+        }
     }
 
     fn answer(&mut self, kind: u8, payload: &[u8], uptime: u32) -> Result<Vec<u8>, ErrorCode> {
