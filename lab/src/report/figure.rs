@@ -3,8 +3,9 @@
 mod draw;
 mod stability;
 
-use plotters::chart::SeriesLabelPosition;
-use plotters::style::{Color, RGBColor, ShapeStyle};
+pub use plotters::chart::SeriesLabelPosition as Legend;
+use plotters::style::ShapeStyle;
+pub use plotters::style::{BLACK, Color, RGBColor, WHITE};
 use thiserror::Error;
 
 use crate::scene::{Dimensionless, Sensor};
@@ -51,7 +52,7 @@ pub struct Panel {
     ranges: [(f64, f64); 2],
     labels: [String; 2],
     series: Vec<Series>,
-    legend: Option<SeriesLabelPosition>,
+    legend: Option<Legend>,
 }
 
 /// Range and label of an axis.
@@ -125,7 +126,7 @@ impl Panel {
         self
     }
 
-    pub fn legend(mut self, position: SeriesLabelPosition) -> Self {
+    pub fn legend(mut self, position: Legend) -> Self {
         self.legend = Some(position);
         self
     }

@@ -1,12 +1,10 @@
 //! The backbone with the decay on it: amplitude over detuning.
 
-use plotters::chart::SeriesLabelPosition;
-
 use super::{DECAY_LABEL, THINNED, decay_points, error_bars, locked_point};
 use crate::comparison::Comparison;
 use crate::numerics::range;
 use crate::orbit::{self, Limits};
-use crate::report::figure::{DETUNING, Figure, Marked, Panel, amplitude, caption, clipped, line, thinned};
+use crate::report::figure::{DETUNING, Figure, Legend, Marked, Panel, amplitude, caption, clipped, line, thinned};
 use crate::report::theme::{EXACT, FAINT, LOCK, THEORY, UNSTABLE};
 use crate::scene::{Definition, Dimensionless};
 use crate::theory::{self, BranchSide, SlowFlow};
@@ -36,7 +34,7 @@ pub fn figure(found: &Comparison) -> Figure {
     };
     let mut panel = Panel::new(((low, high), DETUNING), ((0.0, top), amplitude(p)))
         .heading(&title, &caption(p, found.lock.g))
-        .legend(SeriesLabelPosition::UpperRight);
+        .legend(Legend::UpperRight);
     add_backbones(&mut panel, p, (low, high), (0.0, top));
     let drawn = decay().step_by(THINNED);
     let places = drawn.clone().map(|point| (point.sigma, point.c));

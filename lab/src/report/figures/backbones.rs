@@ -1,8 +1,6 @@
 //! Backbones of first-order theory for several coefficients of restitution.
 
-use plotters::chart::SeriesLabelPosition;
-
-use crate::report::figure::{DETUNING, Figure, Marked, Panel, Place, amplitude, line};
+use crate::report::figure::{DETUNING, Figure, Legend, Marked, Panel, Place, amplitude, line};
 use crate::report::theme::{EXACT, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
 use crate::theory::{self, B_SYMMETRY_BREAKING, SlowFlow};
@@ -25,7 +23,7 @@ pub fn figure(p: &Dimensionless) -> Figure {
     );
     let mut panel = Panel::new((DETUNINGS, DETUNING), ((0.0, TOP), amplitude(p)))
         .heading("Backbones for several coefficients of restitution r", &caption)
-        .legend(SeriesLabelPosition::UpperRight);
+        .legend(Legend::UpperRight);
     for r in values {
         let own = r == p.r;
         let (colour, width, size) = if own { (EXACT, 34, 17) } else { (THEORY, 18, 14) };

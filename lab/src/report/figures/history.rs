@@ -3,13 +3,12 @@
 use std::f64::consts::TAU;
 
 use nalgebra::DVector;
-use plotters::chart::SeriesLabelPosition;
 
 use super::{DECAY_LABEL, THINNED, decay_points};
 use crate::comparison::Comparison;
 use crate::experiment::Record;
 use crate::numerics::{HarmonicBasis, range};
-use crate::report::figure::{Axis, Figure, Panel, Place, amplitude, caption, line};
+use crate::report::figure::{Axis, Figure, Legend, Panel, Place, amplitude, caption, line};
 use crate::report::theme::{DECAY, EXACT, THEORY};
 use crate::scene::Scene;
 use crate::theory::{SlowFlow, backbone_at_level, reading};
@@ -98,9 +97,9 @@ impl Data<'_> {
             panel.dashed(level, line(THEORY, 14), "first-order theory");
         }
         panel.legend(if row == 1 {
-            SeriesLabelPosition::LowerRight
+            Legend::LowerRight
         } else {
-            SeriesLabelPosition::UpperRight
+            Legend::UpperRight
         })
     }
 
@@ -116,7 +115,7 @@ impl Data<'_> {
         let theory = self.theory.iter().map(of).filter(inside).collect();
         panel.dashed(theory, line(THEORY, 16), "first-order theory");
         decay_points(&mut panel, self.points.iter().map(of), DECAY_LABEL);
-        panel.legend(SeriesLabelPosition::UpperRight)
+        panel.legend(Legend::UpperRight)
     }
 }
 

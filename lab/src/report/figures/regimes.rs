@@ -1,11 +1,11 @@
 //! The regime map: coloured cells, a letter on each region, and the theory's stable island.
 
-use plotters::style::{BLACK, Color, WHITE};
-
 use crate::map::{Axis, Map, Range, outline};
 use crate::orbit::{BifurcationCurve, Periodic};
 use crate::regime::Regime;
-use crate::report::figure::{DETUNING, Figure, FigureError, Mark, Marked, Panel, Place, clipped, line, thinned};
+use crate::report::figure::{
+    BLACK, Color, DETUNING, Figure, FigureError, Mark, Marked, Panel, Place, WHITE, clipped, line, thinned,
+};
 use crate::report::theme;
 
 /// Size of the figure, px, and how much of its width belongs to the axes; the key stands beside them.

@@ -1,12 +1,10 @@
 //! The tracked backbone: the points held with the loop closed, on the exact curve and that of theory.
 
-use plotters::chart::SeriesLabelPosition;
-
 use super::{backbone::add_backbones, decay_points, error_bars};
 use crate::backbone::Point;
 use crate::comparison::TrackedComparison;
 use crate::numerics::range;
-use crate::report::figure::{DETUNING, Figure, Panel, SIZE, amplitude, caption, line};
+use crate::report::figure::{DETUNING, Figure, Legend, Panel, SIZE, amplitude, caption, line};
 use crate::report::theme::{DECAY, EXACT, THEORY};
 use crate::theory::{self, SlowFlow};
 
@@ -38,7 +36,7 @@ fn amplitude_panel(tracked: &TrackedComparison) -> Panel {
     let text = caption(p, most).replace(&format!("G = {most:.3}"), &format!("G from {least:.3} to {most:.3}"));
     let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
         .heading("Backbone, tracked with the loop closed", &text)
-        .legend(SeriesLabelPosition::UpperRight);
+        .legend(Legend::UpperRight);
     add_backbones(&mut panel, p, x, (0.0, top));
     let place = |one: Point| (one.sigma, one.c);
     decay_points(&mut panel, all.clone().map(place), "tracked");
@@ -64,7 +62,7 @@ fn drive_panel(tracked: &TrackedComparison) -> Panel {
         ((0.0, high), "drive G, base amplitude over b ε"),
     )
     .heading("The drive that holds each level", "")
-    .legend(SeriesLabelPosition::LowerRight);
+    .legend(Legend::LowerRight);
     let theory = theory.filter(inside).collect();
     panel.dashed(theory, line(THEORY, 20), "first-order theory");
     let exact = exact.filter(inside).collect();

@@ -10,14 +10,11 @@ impl Device {
     /// Answers a request. `uptime` in ms.
     pub fn handle(&mut self, request: &Frame, uptime: u32) -> Frame {
         let Frame { kind, sequence, ref payload } = *request;
-        match self.answer(kind, payload, uptime) {
-            Ok(payload) => Frame { kind, sequence, payload },
-            Err(code) => Frame {
-                kind: message::ERROR,
-                sequence,
-                payload: vec![code as u8, kind],
-            },
-        }
+        let (kind, payload) = match self.answer(kind, payload, uptime) {
+            Ok(payload) => (kind, payload),
+            Err(code) => (message::ERROR, vec![code as u8, kind]),
+        };
+        Frame { kind, sequence, payload }
     }
 
     fn answer(&mut self, kind: u8, payload: &[u8], uptime: u32) -> Result<Vec<u8>, ErrorCode> {
