@@ -116,18 +116,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 
 /// All components of the frequency response.
 fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> Result<String, Failure> {
-    if 1.0 + scene.epsilon * arguments.range[0] <= 0.0 {
+    let [from, to] = arguments.range;
+    if 1.0 + scene.epsilon * from <= 0.0 {
+        let rule = "1 + epsilon sigma must be above 0";
         return Err(Failure::input(format!(
-            "--range from sigma = {} (dimensionless): 1 + epsilon sigma must be above 0",
-            arguments.range[0]
+            "--range from sigma = {from} (dimensionless): {rule}"
         )));
     }
     let exploration = Exploration { starts: arguments.starts, ..Exploration::default() };
     let found = response(scene, limits, exploration);
     if found.components.is_empty() {
         return Err(Failure::run(format!(
-            "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {} to {}; raise excitation.G or --starts",
-            scene.g, limits.sigma[0], limits.sigma[1]
+            "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {from} to {to}; raise excitation.G or --starts",
+            scene.g
         )));
     }
     shown(scene, "Exact frequency response", &found, arguments.json, || {
