@@ -7,7 +7,7 @@ use std::path::PathBuf;
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum PackError {
     #[error(
-        "the library of {identifier} is not there: looked for {}; build it with {build}, or say where it is with --libraries",
+        "the library of {identifier} was not found: {} does not exist; build it with {build}, or name its folder with --libraries",
         path.display()
     )]
     Missing {

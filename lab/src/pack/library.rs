@@ -29,7 +29,7 @@ impl FromStr for Binary {
             .ok_or("expected PLATFORM=PATH, for instance win64=lovines_fmu.dll")?;
         let platform = Platform::of_folder(folder).ok_or_else(|| {
             let known = Platform::folders();
-            format!("`{folder}` is no platform; there are {known}")
+            format!("`{folder}` is not a platform; known are {known}")
         })?;
         Ok(Self { platform, path: path.into() })
     }
@@ -93,14 +93,14 @@ fn own(component: &Component, folder: &Path, platform: &Platform) -> Result<Vec<
     Ok(content)
 }
 
-/// A library for another platform tells by its guid what it belongs to.
+/// The GUID in a library determines its component.
 fn fit(Binary { platform, path }: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
     let content = read(path, platform, platform.folder, "")?;
     let belongs = |component: &Component| component.guid().is_some_and(|guid| mentions(&content, guid));
     let Some(component) = components.iter().position(belongs) else {
         let names: Vec<_> = components.iter().map(|one| one.identifier).collect();
         let problem = format!(
-            "belongs to none of {} with the variables that they have now: it holds the guid of none; build it anew",
+            "belongs to none of {}: it contains the GUID of none of them, because it was built from other variables; build it again",
             names.join(", ")
         );
         return Err(PackError::Library { path: path.clone(), problem });
@@ -114,7 +114,7 @@ fn read(path: &Path, platform: &Platform, place: &str, advice: &str) -> Result<V
     let problem = match platform.check(&content) {
         Err(found) => format!("is {found}, but {place} needs {}{advice}", platform.name),
         Ok(()) if !exports(&content, "fmi2Instantiate") => {
-            format!("has no function fmi2Instantiate, so it is no FMI 2.0 component{advice}")
+            format!("has no function fmi2Instantiate, so it is not an FMI 2.0 component{advice}")
         }
         Ok(()) => return Ok(content),
     };
