@@ -11,7 +11,8 @@ use crate::instance::{Fmu, FmuError, Kind, Named, Reference, names_are_known};
 use crate::judge::Judge;
 
 /// The names of this bench that a scene may map, beside those of the parameters.
-const NAMES: &str = "response, reference, active, omega, E, drive, phase_error, phase_measured, hold_response, settled, locked, state, fault";
+const NAMES: &str = "response, reference, active, omega, E, drive, phase_error, phase_measured, hold_response, \
+                     settled, locked, state, fault";
 
 /// How it is known that the lock has settled.
 enum Settled {
