@@ -10,17 +10,14 @@ use vines_model::{
     orbit::{Bifurcation, BifurcationCurve, Exploration, Limits, Periodic, Special, bifurcation_curves, response},
 };
 
+mod common;
+use common::setting;
+
 const LIMITS: Limits = Limits { sigma: [-5.0, 5.0], g: [0.1, 3.0], points: 2000, step: 0.05 };
 /// Largest distance of a bifurcation from a curve, or from the nearest one of a frequency response.
 const NEAR: f64 = 2e-3;
 /// Random points of the curves of a scene that are compared with the frequency response through them.
 const POINTS: usize = 22;
-
-fn setting(name: &str, default: u64) -> u64 {
-    std::env::var(name).map_or(default, |text| {
-        text.parse().unwrap_or_else(|_| panic!("{name}: a number"))
-    })
-}
 
 /// On the curve a multiplier has its value.
 fn off_circle(curve: &BifurcationCurve, motion: &Periodic) -> f64 {
