@@ -19,7 +19,7 @@ use crate::scene::Scene;
 use vines_model::numerics::{mean, mean_square};
 
 pub use linear::Linear;
-pub use lock_times::{LockTime, LockTimeError, lock_times};
+pub use lock_times::{LockTime, lock_times};
 pub use trials::{Trials, trials};
 pub use verdict::{Channel, Verdict};
 
