@@ -13,7 +13,7 @@ use rayon::prelude::*;
 use vines_model::orbit;
 
 use crate::backbone::track;
-use crate::comparison::{COMPARED_ABOVE, ExactCurve};
+use crate::comparison::{COMPARED_ABOVE, ExactCurve, nearest};
 use crate::experiment::{self, Plan, Record};
 use crate::identification::identify;
 use crate::rig::{BuiltIn, Chain, Drive, GroundTruth, Rig, RigError, Sensors, Simulated};
@@ -189,12 +189,8 @@ fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, R
     let found = identify(&record, scene)?;
     let phase = identify(&with_ideal_sensors(record, &log), scene)?.lock.phase_error_deg;
     let lock = found.lock;
-    let distance = |one: &orbit::Orbit| (one.sigma - lock.sigma).hypot(one.c - lock.c);
     let orbits = orbit::phase_resonant(&scene.dimensionless());
-    let exact = orbits
-        .iter()
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        .ok_or("no exact orbit at this G")?;
+    let exact = nearest(&orbits, &lock).ok_or("no exact orbit at this G")?;
     let epsilon = scene.dimensionless().epsilon;
     let outcome = |kind, quantity, error, uncertainty| Outcome {
         epsilon,

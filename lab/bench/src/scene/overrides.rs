@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::{
-    SceneError,
+    SceneError, SyntaxError,
     plant::{DIMENSIONLESS_KEYS, SI_KEYS},
     sections::Sections,
 };
@@ -18,17 +18,6 @@ pub struct Override {
     section: String,
     key: String,
     value: Value,
-}
-
-/// An argument that is not `section.key=value`.
-#[derive(Debug, thiserror::Error)]
-pub enum SyntaxError {
-    /// Not TOML.
-    #[error("{}; expected section.key=value, for instance plant.r=0.7", .0.message())]
-    Toml(#[from] toml::de::Error),
-    /// TOML, but not one key of one section.
-    #[error("expected one section.key=value, for instance plant.r=0.7")]
-    NotOneKey,
 }
 
 impl FromStr for Override {
