@@ -100,3 +100,15 @@ pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, S
     }
     Ok(table)
 }
+
+/// Reads `text` and merges the overrides into it; with the merged table. `origin` names the text in messages.
+pub(super) fn read(origin: &str, text: &str, overrides: &[Override]) -> Result<(Sections, Table), SceneError> {
+    let syntax = |error: toml::de::Error| SceneError::Syntax {
+        origin: origin.into(),
+        message: error.to_string().trim_end().into(),
+    };
+    // The file is checked on its own first, so that an error can name the line.
+    toml::from_str::<Sections>(text).map_err(syntax)?;
+    let table = merge(toml::from_str(text).map_err(syntax)?, overrides)?;
+    Ok((Sections::deserialize(table.clone()).map_err(syntax)?, table))
+}
