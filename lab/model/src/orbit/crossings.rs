@@ -9,10 +9,11 @@ use crate::numerics::{golden_section, try_bisection};
 
 /// Test functions below this are rounding: in conservative motions, some are zero everywhere.
 const ROUNDING: f64 = 1e-9;
-/// The same for folds where both halves of a motion differ by less than the second number: the function is small there.
-const FOLDS: [f64; 2] = [1e-12, 0.1];
-/// Rounding of a multiplier near 1, times the difference of both halves.
-const MULTIPLIER: f64 = 1e-14;
+/// The same for folds where both halves of a motion differ by less than [`HALVES`], because the function is small there.
+const ROUNDING_OF_FOLDS: f64 = 1e-12;
+const HALVES: f64 = 0.1;
+/// Difference of the halves below which a fold cannot be told from rounding, which grows with its inverse.
+const EQUAL_HALVES: f64 = 5e-4;
 /// Largest distance of a multiplier from the circle where a crossing is located.
 const LOCATED: f64 = 1e-4;
 /// Fraction of a step to which a bifurcation is located.
@@ -91,14 +92,12 @@ fn kinds(motion: &Periodic) -> [Bifurcation; 3] {
 /// Whether a change of sign between two motions is rounding; `largest` is the larger of the two values.
 fn is_rounding(kind: Bifurcation, motions: [&Periodic; 2], largest: f64) -> bool {
     let apart = motions.map(|one| one.halves_apart().map_or(f64::INFINITY, |apart| apart.norm()));
-    if kind != Bifurcation::Fold || apart[0].min(apart[1]) > FOLDS[1] {
-        return largest < ROUNDING;
+    let apart = apart[0].min(apart[1]);
+    if kind == Bifurcation::Fold && apart < HALVES {
+        largest < ROUNDING_OF_FOLDS || apart < EQUAL_HALVES
+    } else {
+        largest < ROUNDING
     }
-    let nearest = |one: &Periodic| {
-        let distances = one.multipliers.map(|[re, im]| (re - 1.0).hypot(im));
-        distances.into_iter().fold(f64::INFINITY, f64::min)
-    };
-    largest < FOLDS[0] || (0..2).any(|n| nearest(motions[n]) * apart[n] < MULTIPLIER)
 }
 
 /// Two real multipliers whose product is one are a neutral saddle, not a bifurcation.
