@@ -34,45 +34,40 @@ pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic
     }
     let middle = 0.5 * (values.len() - 1) as f64;
     let right = DVector::from_column_slice(values);
-    let mut omega = omega;
-    let mut fitted = None;
+    // Half a window, s.
+    let half = middle * sample_time;
+    let (mut omega, mut last) = (omega, None);
     for _ in 0..ROUNDS {
         let phases: Vec<f64> = (0..values.len())
             .map(|n| (n as f64 - middle) * sample_time * omega)
             .collect();
         let basis = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(1)]);
         let fit = basis.fit(&right)?;
-        let (a, drift) = (fit.harmonic(1), fit.drift(1));
+        let a = fit.harmonic(1);
         let square = a.norm_sqr();
         if square == 0.0 || !square.is_finite() {
             return None;
         }
         // The phase of a turns by Im(drift/a) per half window.
-        let half = middle * sample_time;
-        let change = drift * a.conj() / half;
+        let change = fit.drift(1) * a.conj() / half;
         omega += change.im / square;
-        let amplitude = square.sqrt();
-        fitted = Some((
-            basis,
-            fit,
-            Harmonic {
-                amplitude,
-                phase: a.arg(),
-                omega,
-                rate: change.re / amplitude,
-                uncertainties: [0.0; 2],
-            },
-        ));
+        last = Some((basis, fit, a, change.re));
     }
-    let (basis, fit, found) = fitted?;
+    let (basis, fit, a, growth) = last?;
+    let amplitude = a.norm_sqr().sqrt();
     let degrees = (values.len() - basis.terms()) as f64;
     let noise = (basis.residual(&right, &fit).norm_squared() / degrees).sqrt();
     let largest = |degree: usize| basis.variances(1, degree).into_iter().fold(0.0, f64::max).sqrt();
-    let uncertainties = [
-        noise * largest(0),
-        noise * largest(1) / (found.amplitude * middle * sample_time),
-    ];
-    Some(Harmonic { uncertainties, ..found })
+    Some(Harmonic {
+        amplitude,
+        phase: a.arg(),
+        omega,
+        rate: growth / amplitude,
+        uncertainties: [
+            noise * largest(0),
+            noise * largest(1) / (amplitude * middle * sample_time),
+        ],
+    })
 }
 
 #[cfg(test)]
