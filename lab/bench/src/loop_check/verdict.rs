@@ -43,7 +43,7 @@ pub enum Verdict {
     NotAtRest,
     #[error("no sensor answers the drive: check the amplifier of the shaker and the cables")]
     ShakerOff,
-    #[error("the response does not answer the drive, or too little to be seen: check its sensor, cable and factor")]
+    #[error("the response does not answer the drive, or too weakly to be seen: check its sensor, cable and factor")]
     ResponseDead,
     #[error("the base sensor does not answer the drive: check it and its cable")]
     BaseDead,
@@ -55,9 +55,9 @@ pub enum Verdict {
     BaseReversed,
     #[error("both sensors have the opposite sign: the shaker is reversed")]
     BothReversed,
-    #[error("the response has another amplitude: check its unit and factor, and mass, spring and damper of the scene")]
+    #[error("the amplitude of the response is not as expected: check its unit and factor, and mass, spring and damper of the scene")]
     ResponseGain,
-    #[error("the base has another amplitude than the drive: check its unit and factor, and the gain of the shaker")]
+    #[error("the amplitude of the base is not that of the drive: check its unit and factor, and the gain of the shaker")]
     BaseGain,
     #[error("the response is late: check its filter and delay, and the natural frequency of the scene")]
     ResponseLate,
