@@ -55,9 +55,13 @@ pub enum Verdict {
     BaseReversed,
     #[error("both sensors have the opposite sign: the shaker is reversed")]
     BothReversed,
-    #[error("the amplitude of the response is not as expected: check its unit and factor, and mass, spring and damper of the scene")]
+    #[error(
+        "the amplitude of the response is not as expected: check its unit and factor, and mass, spring and damper of the scene"
+    )]
     ResponseGain,
-    #[error("the amplitude of the base is not that of the drive: check its unit and factor, and the gain of the shaker")]
+    #[error(
+        "the amplitude of the base is not that of the drive: check its unit and factor, and the gain of the shaker"
+    )]
     BaseGain,
     #[error("the response is late: check its filter and delay, and the natural frequency of the scene")]
     ResponseLate,
