@@ -90,8 +90,7 @@ impl Endpoint {
                 Box::new(rig)
             }
         };
-        let (d, samples) = (scene.dimensionless(), scene.controller.samples_per_period);
-        let rig = Chain::around(rig, &scene.chain, &d, samples);
+        let rig = Chain::around(rig, scene);
         let rig = Stoppable::around(rig, scene.sample_time(), &stop_flag()?);
         Ok(OpenRig { rig, pace, timing })
     }

@@ -60,8 +60,7 @@ pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
 
 /// The orbit near a phase-resonant one whose amplitude is largest along its frequency response.
 fn peak(scene: &Dimensionless, near: &Orbit, condition: Condition) -> Option<Orbit> {
-    let conditions = [condition, Condition::Peak];
-    let found = Periodic::find(scene, &ImpactPattern::symmetric(), &near.unknowns(), conditions)?;
+    let found = near.periodic(scene, [condition, Condition::Peak])?;
     let scene = Dimensionless { g: found.g, ..*scene };
     symmetric_orbits(&scene, found.sigma)
         .into_iter()
