@@ -20,7 +20,7 @@ export class Pictures {
     const plot = (id, xLabel, yLabel) => new Plot($(id), colour, { xLabel, yLabel });
     this.plots = {
       scope: plot("scope", "time, s", "displacement over b"),
-      history: plot("history", "time, s", "error, °;  σ"),
+      history: plot("history", "time, s", "phase error, °; σ"),
       manifold: plot("manifold", "speed of the particle B", "amplitude C"),
       backbone: plot("backbone", "detuning σ", "amplitude C"),
     };
@@ -138,6 +138,7 @@ export class Pictures {
       list.replaceChildren(...entries.flatMap(() => [document.createElement("dt"), document.createElement("dd")]));
     }
     entries.flat().forEach((text, i) => {
+      text = text.replace(/^-/, "−");
       if (list.children[i].textContent !== text) list.children[i].textContent = text;
     });
   }
