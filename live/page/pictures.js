@@ -123,7 +123,7 @@ export class Pictures {
     const entries = [
       ["Time", `${page.shown.toFixed(3)} s, ${periods.toFixed(1)} natural periods`],
       ["Loop", state],
-      ["Regime", regime],
+      ["Regime", regime.startsWith("unknown") ? "too few impacts yet" : regime],
       ["Detuning σ", status.sigma.toFixed(6)],
       ["Amplitude C", status.C.toFixed(6)],
       ["Particle speed B", status.B.toFixed(6)],
