@@ -86,7 +86,7 @@ impl Periodic {
 
     fn of(pattern: &ImpactPattern, x: &Unknowns, returned: Returned) -> Self {
         let mut multipliers: [Complex<f64>; 4] = returned.monodromy.complex_eigenvalues().into();
-        multipliers.sort_by(|one, other| one.norm().total_cmp(&other.norm()));
+        multipliers.sort_unstable_by(|one, other| one.norm().total_cmp(&other.norm()));
         let total: f64 = returned.durations.iter().sum();
         let travelled: f64 = returned
             .bounces
