@@ -6,8 +6,8 @@
 //!
 //! Several motions may belong to the same drive: above `captured_max` an asymmetric or irregular one, below it one or two symmetric
 //! ones. A [descent](crate::descent) leads the motion below `captured_max`. A response that rises above it later, or whose impacts end,
-//! is captured again, and the repeated descent goes on until the drive that holds the response is its setpoint. Each of the
-//! repetitions is slower.
+//! is captured again, and the repeated descent goes on until the drive that holds the response is its setpoint. Each of
+//! the repetitions is slower.
 
 use crate::real::consts::TAU;
 

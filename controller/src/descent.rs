@@ -15,6 +15,11 @@ use crate::real::{self, Real};
 const BELOW: Real = 0.97;
 /// Periods for which it must have been that small.
 const PERIODS: Real = 5.0;
+/// Response, as a share of the largest wanted one, at which it ends with a larger holding drive than the setpoint: an asymmetric motion
+/// that coexists with the wanted one has ended there.
+const LOW: Real = 0.85;
+/// Largest holding drive at its end, as a multiple of the setpoint: from there, the approach makes no step that the frequency could not follow.
+const EXCESS: Real = 1.25;
 /// Periods in which the response falls by a factor of e on the first descents, if the frequency follows; each repetition is slower.
 const DESCENT: Real = 60.0;
 /// Largest share of the holding drive that may be missing.
@@ -43,6 +48,8 @@ const LOST: Real = 1.15;
 /// Smallest power that the impacts take, as a share of the largest before, of a motion that is not lost: at the lower end of the
 /// symmetric motion it is a third.
 const KEPT: Real = 0.2;
+/// Uncertainty of that power, as a share of the one that the drive supplies.
+const DOUBTFUL: Real = 0.03;
 
 /// Coefficients of the descent.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -169,13 +176,16 @@ impl Descent {
             state.taken = state.taken.max(taken);
         }
         state.below = if is_below { state.below + 1.0 } else { 0.0 };
-        if seen.response > LOST * state.lowest || is_below && taken < KEPT * state.taken {
+        if seen.response > LOST * state.lowest
+            || is_below && taken < KEPT * state.taken - DOUBTFUL * holding * seen.response
+        {
             return Progress::Lost;
         }
         state.missing = self.missing(state, holding, seen);
         state.holding = holding;
         let has_arrived = if seen.repetitions == 0 {
-            state.below >= PERIODS
+            let is_low = seen.response < LOW * self.largest && holding < EXCESS * self.amplitude;
+            state.below >= PERIODS && (is_low || holding < self.amplitude)
         } else {
             self.is_at_orbit(state, holding, seen)
         };
