@@ -43,6 +43,10 @@ const OBSERVED: Real = 1.3;
 const RISEN: Real = 0.01;
 const FALLEN: Real = 0.003;
 const NEAR: Real = 0.97;
+/// Difference of the holding drive that noise does not explain, in units of the scatter of its changes from period to period; and the
+/// periods over which that is averaged.
+const NOISE: Real = 2.0;
+const SCATTER_PERIODS: Real = 20.0;
 /// Growth of the response by which the motion is lost.
 const LOST: Real = 1.15;
 /// Smallest power that the impacts take, as a share of the largest before, of a motion that is not lost: at the lower end of the
@@ -80,6 +84,9 @@ pub struct DescentState {
     sum: Real,
     /// Mean holding drive of the last period, m; 0 before.
     holding: Real,
+    /// Its change in that period, m, and the scatter of the changes.
+    change: Real,
+    scatter: Real,
     /// Drive, m, that is missing to hold the response.
     missing: Real,
     /// Largest product of the response and the drive that the impacts need, m².
@@ -98,6 +105,8 @@ impl DescentState {
             part: 0.0,
             sum: 0.0,
             holding: 0.0,
+            change: 0.0,
+            scatter: 0.0,
             missing: 0.0,
             taken: 0.0,
             below: 0.0,
@@ -182,7 +191,9 @@ impl Descent {
             return Progress::Lost;
         }
         state.missing = self.missing(state, holding, seen);
-        state.holding = holding;
+        let change = holding - state.holding;
+        state.scatter += ((change - state.change).abs() - state.scatter) / SCATTER_PERIODS;
+        (state.holding, state.change) = (holding, change);
         let has_arrived = if seen.repetitions == 0 {
             let is_low = seen.response < LOW * self.largest && holding < EXCESS * self.amplitude;
             state.below >= PERIODS && (is_low || holding < self.amplitude)
@@ -230,7 +241,9 @@ impl Descent {
         }
         let smallest = smallest.min(holding);
         state.extremes = Some([smallest, largest]);
-        let maximum = largest > (NEAR * self.amplitude).max((1.0 + RISEN) * smallest);
-        is_wanted && (maximum || largest > self.amplitude) && holding <= self.amplitude.min((1.0 - FALLEN) * largest)
+        let noise = NOISE * state.scatter;
+        let maximum = largest > (NEAR * self.amplitude).max((1.0 + RISEN) * smallest + noise);
+        let fallen = (1.0 - FALLEN) * largest - noise;
+        is_wanted && (maximum || largest > self.amplitude) && holding <= self.amplitude.min(fallen)
     }
 }
