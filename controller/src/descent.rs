@@ -16,9 +16,9 @@ const BELOW: Real = 0.97;
 /// Periods for which it must have been that small.
 const PERIODS: Real = 5.0;
 /// Response, as a share of the largest wanted one, at which it ends with a larger holding drive than the setpoint: an asymmetric motion
-/// that coexists with the wanted one has ended there.
+/// that coexists with the wanted one has mostly ended there.
 const LOW: Real = 0.85;
-/// Largest holding drive at its end, as a multiple of the setpoint: from there, the approach makes no step that the frequency could not follow.
+/// Largest holding drive at its end, as a multiple of the setpoint: the frequency could not follow a larger step.
 const EXCESS: Real = 1.25;
 /// Periods in which the response falls by a factor of e on the first descents, if the frequency follows; each repetition is slower.
 const DESCENT: Real = 60.0;
@@ -29,7 +29,7 @@ const LEAST: Real = 0.3;
 /// Phase error, rad, at which the descent waits for the frequency: near the fold the resonance frequency changes fast.
 const FOLLOWED: Real = 0.1;
 /// Relative distance of the holding drive from the setpoint from which on a repeated descent becomes slower, down to the share
-/// `SLOWEST` of its rate: the particle follows late, and the stable orbits above the fold span a few percent of the response.
+/// `SLOWEST` of its rate (also the smallest rate of the observer, in bandwidths of the detector): the particle follows late, and the stable orbits above the fold span a few percent of the response.
 const SLOWER: Real = 0.3;
 const SLOWEST: Real = 0.05;
 /// Rate of the observer, in units of the rate at which the setpoint of the drive changes the response. It must be fast compared with
@@ -166,7 +166,8 @@ impl Descent {
 
     /// Rate of the observer, rad/s, at a response amplitude, m.
     pub fn observer_rate(&self, response: Real) -> Real {
-        (OBSERVER_RATE * self.gain * self.amplitude / response).min(self.bandwidth)
+        let rate = OBSERVER_RATE * self.gain * self.amplitude / response;
+        rate.max(SLOWEST * self.bandwidth).min(self.bandwidth)
     }
 
     /// One sample. At the end of a period, decides how the descent goes on.
@@ -211,8 +212,9 @@ impl Descent {
     fn missing(&self, state: &DescentState, holding: Real, seen: &Descending) -> Real {
         let rate = 1.0 / (TAU / seen.omega * DESCENT * self.gain);
         let most = (MISSING * holding.max(0.0)).min(rate * seen.response);
-        let near = if seen.repetitions > 0 && seen.response < BELOW * self.largest {
-            ((holding / self.amplitude - 1.0).abs() / SLOWER).clamp(SLOWEST, 1.0)
+        let (distance, slower) = ((holding - self.amplitude).abs(), SLOWER * self.amplitude);
+        let near = if seen.repetitions > 0 && seen.response < BELOW * self.largest && distance < slower {
+            (distance / slower).max(SLOWEST)
         } else {
             1.0
         };
@@ -247,3 +249,6 @@ impl Descent {
         is_wanted && (maximum || largest > self.amplitude) && holding <= self.amplitude.min(fallen)
     }
 }
+
+#[cfg(all(test, not(feature = "f32")))]
+mod tests;
