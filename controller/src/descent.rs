@@ -45,7 +45,7 @@ const FALLEN: Real = 0.003;
 const NEAR: Real = 0.97;
 /// Difference of the holding drive that noise does not explain, in units of the scatter of its changes from period to period; and the
 /// periods over which that is averaged.
-const NOISE: Real = 2.0;
+const NOISE: Real = 4.0;
 const SCATTER_PERIODS: Real = 20.0;
 /// Growth of the response by which the motion is lost.
 const LOST: Real = 1.15;
