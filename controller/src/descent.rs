@@ -29,7 +29,8 @@ const LEAST: Real = 0.3;
 /// Phase error, rad, at which the descent waits for the frequency: near the fold the resonance frequency changes fast.
 const FOLLOWED: Real = 0.1;
 /// Relative distance of the holding drive from the setpoint from which on a repeated descent becomes slower, down to the share
-/// `SLOWEST` of its rate (also the smallest rate of the observer, in bandwidths of the detector): the particle follows late, and the stable orbits above the fold span a few percent of the response.
+/// `SLOWEST` of its rate: the particle follows late, and the stable orbits above the fold span a few percent of the response.
+/// `SLOWEST` is also the smallest rate of the observer, in bandwidths of the detector.
 const SLOWER: Real = 0.3;
 const SLOWEST: Real = 0.05;
 /// Rate of the observer, in units of the rate at which the setpoint of the drive changes the response. It must be fast compared with
