@@ -38,12 +38,14 @@ pub struct Approach {
     gain: Real,
     /// rad/s
     damping_rate: Real,
-    /// Share of its error that the observer corrects per sample.
-    step: Real,
+    /// Rate of the observer, rad/s.
+    pub rate: Real,
     /// Share of its error that the detector corrects per sample.
     detector_step: Real,
-    /// `w/g`, m of drive per m of response.
-    slope: Real,
+    /// Growth rate of the response per drive, 1/s.
+    response_gain: Real,
+    /// s
+    sample_time: Real,
 }
 
 /// State of the observer.
@@ -53,6 +55,9 @@ pub struct ApproachState {
     /// The drive in phase with the response's velocity, m, with the lag of the detector, and with that of the observer.
     detected: Real,
     drive: Real,
+    /// Present rate of the observer, rad/s, and the share of its error that it corrects per sample.
+    rate: Real,
+    step: Real,
     /// Response amplitude with the lag of the observer, m.
     pub response: Real,
     /// The drive that would hold the response, m.
@@ -72,19 +77,26 @@ impl Approach {
         Self {
             gain: config.approach_gain,
             damping_rate,
-            step: -real::expm1(-rate * config.sample_time),
+            rate,
             detector_step: -real::expm1(-config.bandwidth * config.sample_time),
-            slope: rate / config.response_gain,
+            response_gain: config.response_gain,
+            sample_time: config.sample_time,
         }
     }
 
-    /// Updates the observer with the drive amplitude and the response amplitude, m, and the phase error, rad. Returns the
-    /// drive that would hold the response, m.
-    pub fn observe(&self, state: &mut ApproachState, drive: Real, response: Real, error: Real) -> Real {
+    /// Updates the observer of this rate, rad/s, with the drive amplitude and the response amplitude, m, and the phase error, rad. Returns
+    /// the drive that would hold the response, m.
+    pub fn observe(&self, state: &mut ApproachState, drive: Real, response: Real, error: Real, rate: Real) -> Real {
+        if rate != state.rate {
+            // The estimated growth of the response does not change.
+            state.response = response - (response - state.response) * state.rate / rate;
+            state.rate = rate;
+            state.step = -real::expm1(-rate * self.sample_time);
+        }
         state.detected += self.detector_step * (drive * real::cos(error) - state.detected);
-        state.drive += self.step * (state.detected - state.drive);
-        state.response += self.step * (response - state.response);
-        state.holding = state.drive - self.slope * (response - state.response);
+        state.drive += state.step * (state.detected - state.drive);
+        state.response += state.step * (response - state.response);
+        state.holding = state.drive - rate / self.response_gain * (response - state.response);
         state.holding
     }
 

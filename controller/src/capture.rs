@@ -5,16 +5,16 @@
 //! setpoint, and on this way the impacts synchronise.
 //!
 //! Several motions may belong to the same drive: above `captured_max` an asymmetric or irregular one, below it one or two symmetric
-//! ones. A response that rises above `captured_max`, or whose impacts end, is captured again. A *descent* then leads it down slowly:
-//! the drive stays below the one that would hold the response, so that the motion follows the backbone whatever its stability under
-//! a constant drive. The first repetition ends the descent below `captured_max`; the others go on until the response needs more
-//! than the setpoint of the drive: from there, the setpoint leads it down to the orbit above the fold.
+//! ones. A [descent](crate::descent) leads the motion below `captured_max`. A response that rises above it later, or whose impacts end,
+//! is captured again, and the repeated descent goes on until the drive that holds the response is its setpoint. Each of
+//! the repetitions is slower.
 
 use crate::real::consts::TAU;
 
 use crate::amplitude_loop::{AmplitudeState, Move};
 use crate::config::Config;
-use crate::real::{self, Real};
+use crate::descent::{Descending, Descent, DescentState, Progress};
+use crate::real::Real;
 
 /// Phase error, rad, up to which the loop is near phase resonance.
 const NEAR: Real = 0.35;
@@ -26,21 +26,10 @@ const REACHED: Real = 0.97;
 /// Duration of the rise, periods; a limited drive extends it.
 const RISE: Real = 20.0;
 
-/// Response at which the first descents end, as a share of the largest wanted one.
-const BELOW: Real = 0.97;
 /// Response above which the motion is another one, as a share of the largest wanted one.
 const ABOVE: Real = 1.0005;
-/// Periods in which the response falls by a factor of e on the descent, if the frequency follows.
-const DESCENT: Real = 60.0;
-/// Phase error, rad, at which the descent waits for the frequency: near the fold the resonance frequency changes fast.
-const FOLLOWED: Real = 0.1;
-/// Smallest drive of the descent, as a share of that which holds the response: without a drive the phase is undefined.
-const LEAST: Real = 0.4;
-/// Growth of the response on the descent by which the motion is lost.
-const LOST: Real = 1.15;
-/// Smallest power that the impacts take, as a share of the largest before, of a motion that is not lost: at the lower end of the
-/// symmetric motion it is a third.
-const KEPT: Real = 0.2;
+/// Response below which a motion that has left the wanted one is handed over again, as a share of that at which it was before.
+const LOWER: Real = 0.95;
 /// Largest number of repetitions. The last one accepts any motion.
 const REPETITIONS: u32 = 5;
 
@@ -51,15 +40,8 @@ pub struct Capture {
     /// Response amplitude at which impacts occur, m; `None` without a capture.
     level: Option<Real>,
     /// Largest response amplitude of the wanted motion, m.
-    largest: Real,
-    /// Setpoint of the drive, m.
-    amplitude: Real,
-    /// Largest drive, m.
-    amplitude_max: Real,
-    /// Drive, m, that the damping of the structure needs for a response of 1 m.
-    damping: Real,
-    /// Drive, m, that is missing for a response of 1 m to fall at the rate of the descent.
-    fall: Real,
+    largest: Option<Real>,
+    descent: Descent,
     /// s
     sample_time: Real,
 }
@@ -70,10 +52,9 @@ pub struct Capture {
 pub struct CaptureState {
     /// Periods for which the present condition has held.
     periods: Real,
-    /// Smallest response amplitude on the descent, m.
-    lowest: Option<Real>,
-    /// Largest product of the response and the drive that the impacts need, m².
-    taken: Real,
+    descent: Option<DescentState>,
+    /// Response amplitude at which a repeated descent ended, m.
+    arrived: Option<Real>,
     /// Number of repetitions.
     repetitions: u32,
 }
@@ -81,7 +62,16 @@ pub struct CaptureState {
 impl CaptureState {
     /// Starts again.
     pub fn repeat(&mut self) {
-        *self = Self { repetitions: self.repetitions + 1, ..Self::default() };
+        *self = Self {
+            repetitions: self.repetitions + 1,
+            arrived: self.arrived,
+            ..Self::default()
+        };
+    }
+
+    /// Whether nothing has been repeated.
+    pub fn is_first(&self) -> bool {
+        self.repetitions == 0
     }
 }
 
@@ -105,14 +95,10 @@ pub struct Observation {
 impl Capture {
     /// The capture of a configuration.
     pub fn new(config: &Config) -> Self {
-        let largest = config.captured_max.unwrap_or(Real::INFINITY);
         Self {
             level: config.capture_response,
-            largest,
-            amplitude: config.amplitude,
-            amplitude_max: config.amplitude_limit(),
-            damping: config.damping_rate.unwrap_or(0.0) / config.response_gain,
-            fall: config.omega_start / (TAU * DESCENT * config.response_gain),
+            largest: config.captured_max,
+            descent: Descent::new(config),
             sample_time: config.sample_time,
         }
     }
@@ -124,21 +110,21 @@ impl Capture {
 
     /// Whether the motion of this mean response amplitude, m, is another one, which calls for a repetition.
     pub fn has_escaped(&self, state: &CaptureState, mean: Real) -> bool {
-        self.is_on() && mean > ABOVE * self.largest && state.repetitions < REPETITIONS
+        let is_above = self.largest.is_some_and(|largest| mean > ABOVE * largest);
+        self.is_on() && is_above && state.repetitions < REPETITIONS
     }
 
-    /// The drive, m, of a descent and of the approach after a repetition; `None` before. `holding`, m, would hold the response, m,
-    /// at the phase error, rad.
-    pub fn drive(&self, state: &CaptureState, holding: Real, response: Real, error: Real) -> Option<Real> {
-        let follows = (1.0 - error.abs() / FOLLOWED).max(0.0);
-        let fall = follows * self.fall * response / (state.repetitions.max(2) - 1) as Real;
-        let least = (holding - fall).max(LEAST * holding);
-        let in_phase = match state.lowest {
-            Some(_) => least,
-            None if state.repetitions > 0 => least.max(self.amplitude),
-            None => return None,
-        };
-        Some((in_phase / real::cos(error)).min(self.amplitude_max))
+    /// The drive, m, of a descent; `None` before. `holding`, m, would hold the response at the phase error, rad.
+    pub fn drive(&self, state: &CaptureState, holding: Real, error: Real) -> Option<Real> {
+        Some(self.descent.drive(&state.descent?, holding, error))
+    }
+
+    /// Rate of the observer, rad/s, at the response amplitude, m, if a descent needs another one than `rate`.
+    pub fn observer_rate(&self, state: &CaptureState, response: Real, rate: Real) -> Real {
+        match state.descent {
+            Some(_) => self.descent.observer_rate(response).max(rate),
+            None => rate,
+        }
     }
 
     /// One sample: starts the amplitude loop near phase resonance, then the descent. Returns whether the capture is complete.
@@ -148,9 +134,9 @@ impl Capture {
         amplitude_loop: &mut Option<AmplitudeState>,
         seen: &Observation,
     ) -> bool {
-        match (self.level, state.lowest) {
+        match (self.level, state.descent) {
             (None, _) => true,
-            (Some(_), Some(lowest)) => self.descend(state, lowest.min(seen.mean), seen),
+            (Some(_), Some(descent)) => self.descend(state, descent, seen),
             (Some(level), None) => self.rise(state, amplitude_loop, level, seen),
         }
     }
@@ -175,9 +161,8 @@ impl Capture {
         state.periods = 0.0;
         if is_rising {
             *amplitude_loop = None;
-            let any_motion = self.largest.is_infinite();
-            state.lowest = Some(seen.mean).filter(|_| !any_motion);
-            return any_motion;
+            state.descent = self.largest.map(|_| DescentState::from(seen.response));
+            return self.largest.is_none();
         }
         let rise = Move {
             response: level,
@@ -190,28 +175,30 @@ impl Capture {
         false
     }
 
-    fn descend(&self, state: &mut CaptureState, lowest: Real, seen: &Observation) -> bool {
-        state.lowest = Some(lowest);
-        let is_below = seen.mean < BELOW * self.largest;
-        let taken = (seen.holding - self.damping * seen.mean) * seen.mean;
-        if is_below {
-            state.taken = state.taken.max(taken);
-        }
-        if seen.mean > LOST * lowest || taken < KEPT * state.taken {
-            state.repeat();
-            return state.repetitions > REPETITIONS;
-        }
-        let has_passed = state.repetitions < 2 || seen.holding > self.amplitude;
-        state.periods = if is_below && has_passed {
-            state.periods + self.periods(seen)
-        } else {
-            0.0
+    fn descend(&self, state: &mut CaptureState, mut descent: DescentState, seen: &Observation) -> bool {
+        let descending = Descending {
+            omega: seen.omega,
+            part: self.periods(seen),
+            response: seen.mean,
+            holding: seen.holding,
+            error: seen.error,
+            repetitions: state.repetitions,
+            highest: state.arrived.map_or(Real::INFINITY, |arrived| LOWER * arrived),
         };
-        let complete = state.periods >= PERIODS;
-        if complete {
-            *state = CaptureState { repetitions: state.repetitions, ..CaptureState::default() };
+        let progress = self.descent.advance(&mut descent, &descending);
+        state.descent = Some(descent).filter(|_| progress == Progress::Descends);
+        match progress {
+            Progress::Descends => false,
+            Progress::Arrived => {
+                state.arrived = Some(seen.mean).filter(|_| state.repetitions > 0);
+                true
+            }
+            Progress::Lost => {
+                state.arrived = None;
+                state.repeat();
+                state.repetitions > REPETITIONS
+            }
         }
-        complete
     }
 
     /// Periods per sample.

@@ -54,6 +54,7 @@ mod capture;
 mod check;
 mod config;
 mod controller;
+mod descent;
 mod detector;
 mod drive;
 mod error;

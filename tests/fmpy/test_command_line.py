@@ -101,6 +101,7 @@ def test_identify_says_so_when_something_else_is_locked(call, tmp_path):
     assert done.stderr.startswith("error: ")
     assert "without impacts" in done.stderr
     assert not (tmp_path / "results" / "identification.json").exists()
+    assert (tmp_path / "results" / "interrupted.csv").read_text().startswith("time,response,")
 
 
 def test_orbit_finds_the_reference_orbits(call, figure):

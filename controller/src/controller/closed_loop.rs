@@ -44,9 +44,10 @@ impl PhaseLock {
         let near = measured.valid && measured.error.abs() < PHASE_RANGE;
         let before = state.drive.amplitude;
         let elapsed = state.acquiring as Real * self.config.sample_time;
+        let rate = self.capture.observer_rate(&state.capture, reading, self.approach.rate);
         let holding = self
             .approach
-            .observe(&mut state.approach, before, reading, measured.error);
+            .observe(&mut state.approach, before, reading, measured.error, rate);
         let holding = near.then_some(holding);
         if let Some(amplitude_loop) = &mut state.amplitude_loop {
             let (amplitude, shift) = self
@@ -59,8 +60,11 @@ impl PhaseLock {
             let amplitude = self.config.amplitude;
             let setpoint = match holding {
                 Some(holding) if state.loop_state != LoopState::Locked => {
-                    let captured = self.capture.drive(&state.capture, holding, reading, measured.error);
-                    captured.unwrap_or_else(|| self.approach.shape(&mut state.approach, amplitude, holding, elapsed))
+                    let descent = self.capture.drive(&state.capture, holding, measured.error);
+                    descent.unwrap_or_else(|| match state.capture.is_first() {
+                        true => self.approach.shape(&mut state.approach, amplitude, holding, elapsed),
+                        false => amplitude,
+                    })
                 }
                 _ => amplitude,
             };

@@ -11,7 +11,7 @@ use crate::advice;
 use crate::experiment::{self, ExperimentError, Plan, Record};
 use crate::identification::{self, IdentificationError, Lock};
 use crate::rig::{BuiltIn, Chain, Simulated};
-use crate::scene::{Dimensionless, Override, Scene, SceneError};
+use crate::scene::{Controller, Dimensionless, Override, Scene, SceneError};
 
 /// Largest distance from an exact orbit, in sigma and C, of a correct lock.
 const CORRECT: f64 = 2e-3;
@@ -76,11 +76,13 @@ pub enum RandomRigError {
 }
 
 /// Draws `count` rigs and locks each, on all cores, from the start of the scene, at rest unless `settings` say otherwise: epsilon from 0.001 to 0.05
-/// and lambda from 0.1 to 3 (uniform logarithms), r from 0.2 to 0.97, and G across the range with a stable symmetric orbit.
+/// and lambda from 0.1 to 3 (uniform logarithms), r from 0.2 to 0.97, and G across the range with a stable symmetric orbit. A rig is drawn
+/// again if no stable orbit of its G lies within the limits of the frequency.
 ///
 /// # Errors
 /// Settings that scene or controller refuse.
 pub fn locks(count: usize, seed: u64, settings: &[Override]) -> Result<Vec<Row>, RandomRigError> {
+    let Controller { omega_min, omega_max, .. } = Scene::parse("random rig", SCENE, settings)?.controller;
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let mut uniform = move |low: f64, high: f64| low + (high - low) * (random.next_u64() as f64 / u64::MAX as f64);
     let mut rigs = Vec::with_capacity(count);
@@ -95,7 +97,10 @@ pub fn locks(count: usize, seed: u64, settings: &[Override]) -> Result<Vec<Row>,
         };
         let d = Dimensionless { g: low + share * (high - low), ..d };
         let stable: Vec<Orbit> = phase_resonant(&d).into_iter().filter(|orbit| orbit.stable).collect();
-        if !stable.is_empty() {
+        if stable
+            .iter()
+            .any(|orbit| (omega_min..=omega_max).contains(&orbit.omega))
+        {
             rigs.push((d, stable));
         }
     }

@@ -1,5 +1,6 @@
 //! Random rigs, locked from rest.
 
+use vines_model::orbit::{Orbit, phase_resonant};
 use vines_testbench::experiment::{self, Plan};
 use vines_testbench::identification::{Lock, Regime, identify};
 use vines_testbench::random_rigs::{Outcome, locks};
@@ -55,9 +56,39 @@ fn orbits_just_above_the_fold_and_just_below_symmetry_breaking_are_reached() {
             ],
             0.6817,
         ),
+        // Hardly more drive holds the orbit that is unstable under it.
+        (
+            [
+                "plant.epsilon=0.015225885",
+                "plant.lambda=0.43366104",
+                "plant.r=0.52438008",
+                "excitation.G=0.90622505",
+            ],
+            0.2150,
+        ),
+        // The instability under a constant drive is two fifths as fast as the detector.
+        (
+            [
+                "plant.epsilon=0.048343268",
+                "plant.lambda=0.65313184",
+                "plant.r=0.66169063",
+                "excitation.G=0.85939351",
+            ],
+            0.1304,
+        ),
     ] {
         let lock = lock(settings);
         assert_eq!(lock.regime, Regime::Symmetric);
         assert!((lock.c - c).abs() < 2e-3, "{lock:?}");
+    }
+}
+
+#[test]
+fn rigs_are_drawn_within_the_limits_of_the_frequency() {
+    let limits = ["controller.omega_min=0.995", "controller.omega_max=1.005"].map(|setting| setting.parse().unwrap());
+    for row in locks(3, 9, &limits).unwrap() {
+        let orbits = phase_resonant(&row.parameters);
+        let is_within = |orbit: &Orbit| orbit.stable && (0.995..=1.005).contains(&orbit.omega);
+        assert!(orbits.iter().any(is_within), "{row:?}");
     }
 }

@@ -83,12 +83,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         Ok(record) => record,
         Err(error) => return Err(interrupted(error, &samples, &scene, &experiment.out)),
     };
-    let found = identification::identify(&record, &scene).map_err(|error| match error {
-        IdentificationError::Regime { regime, .. } => {
-            let reason = advice::reason(&scene, Some(regime)).unwrap_or_default();
-            Failure::run(format!("{error}\n{reason}"))
-        }
-        other => Failure::run(other),
+    let found = identification::identify(&record, &scene).map_err(|error| {
+        let reason = match error {
+            IdentificationError::Regime { regime, .. } => advice::reason(&scene, Some(regime)),
+            _ => None,
+        };
+        kept(Failure::run(error), reason, &record.samples, &experiment.out)
     })?;
     let found = Comparison::of(&found, &scene);
     let mut files = report::write(&found, &experiment.out).map_err(Failure::run)?;
@@ -107,7 +107,11 @@ fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &
     )
     .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
     .flatten();
-    let mut failure = Failure::from(error);
+    kept(Failure::from(error), reason, samples, out)
+}
+
+/// The failure with its reason, and what was measured in a file.
+fn kept(mut failure: Failure, reason: Option<String>, samples: &[Sample], out: &Path) -> Failure {
     let kept = match report::write_interrupted(samples, out) {
         Ok(files) => written(&files).trim_end().to_string(),
         Err(error) => error.to_string(),

@@ -75,7 +75,7 @@ pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBu
     Ok(files::write(out, files)?)
 }
 
-/// Writes `interrupted.csv`: the samples of an experiment that ended early.
+/// Writes `interrupted.csv`: the samples of an experiment that ended early, or without a motion that can be identified.
 pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     Ok(files::write(out, [("interrupted.csv", table(samples))])?)
 }

@@ -193,14 +193,14 @@ impl Scene {
         1.0 / (PI * d.epsilon * d.lambda)
     }
 
-    /// Time limit for the lock, natural periods: as set, or at least 2000 and 20 times the relaxation time.
+    /// Time limit for the lock, natural periods: as set, or at least 3000 and 20 times the relaxation time.
     #[must_use]
     pub fn lock_periods(&self) -> f64 {
         let relaxation = PI * self.relaxation_periods();
         let samples_per_period = self.controller.samples_per_period;
         self.record
             .lock_periods
-            .unwrap_or((20.0 * relaxation).max(2000.0).min(1e7 / samples_per_period))
+            .unwrap_or((20.0 * relaxation).max(3000.0).min(1e7 / samples_per_period))
     }
 
     /// Configuration of the controller for tracking: with the largest drive and the bandwidth of `[backbone]`.

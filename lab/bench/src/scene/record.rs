@@ -18,7 +18,7 @@ pub enum Estimator {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct Record {
-    /// Time limit for the lock, natural periods; by default at least 2000, and 20 relaxation times.
+    /// Time limit for the lock, natural periods; by default at least 3000, and 20 relaxation times.
     pub lock_periods: Option<f64>,
     /// How long the settled lock is held and measured, natural periods.
     pub hold_periods: f64,
