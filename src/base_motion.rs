@@ -61,14 +61,23 @@ impl Drive {
         let [u0, u1, u2, u3] = self.signal.map(|u| u * u);
         // The sum is not a number if one of them is not.
         let sum = (u0 + u2) + (u1 + u3) + self.amplitude * self.amplitude;
-        if sum < LARGEST * LARGEST && self.omega * self.omega < FASTEST * FASTEST {
+        if sum < LARGEST * LARGEST {
+            return self.validate_frequency();
+        }
+        self.explain()
+    }
+
+    /// Checks the frequency alone.
+    #[inline(always)]
+    pub(crate) fn validate_frequency(&self) -> Result<(), InvalidValue> {
+        if self.omega * self.omega < FASTEST * FASTEST {
             return Ok(());
         }
         self.explain()
     }
 
     #[cold]
-    fn explain(&self) -> Result<(), InvalidValue> {
+    fn explain(self) -> Result<(), InvalidValue> {
         const NAMES: [(&str, &str); 4] = [
             ("e (base displacement signal)", "m"),
             ("der(e) (slope of the base signal)", "m/s"),

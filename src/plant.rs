@@ -7,7 +7,7 @@ mod advance;
 mod at_wall;
 mod events;
 
-use crate::arithmetic::Sum;
+use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::{BaseMotion, Drive};
 use crate::contact::{Contact, ImpactLaw, Wall};
 use crate::fast::{FastPath, Moving};
@@ -54,10 +54,8 @@ impl From<Parameters> for Rig {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Masses {
-    /// Displacement of the primary mass, m.
-    pub x: Sum,
-    /// Its velocity, m/s.
-    pub v: Sum,
+    /// Displacement of the primary mass, m, and its velocity, m/s.
+    pub primary: Sums,
     /// Relative displacement `w = q1 - q2`, m. It is carried itself: in a narrow gap the difference of two large
     /// displacements would have lost it.
     pub w: Sum,
@@ -110,8 +108,7 @@ impl Plant {
             moving: Moving {
                 rig: Rig::from(parameters),
                 masses: Masses {
-                    x: Sum::from(start.q1),
-                    v: Sum::from(start.dq1),
+                    primary: Sums::from([start.q1, start.dq1]),
                     w: Sum::from(w.clamp(-b, b)),
                     dw: start.dq1 - start.dq2,
                     particle: start.dq2,
@@ -175,13 +172,8 @@ impl Plant {
     #[inline]
     pub fn state(&self) -> State {
         let masses = &self.moving.masses;
-        let q1 = masses.x.value();
-        State {
-            q1,
-            dq1: masses.v.value(),
-            q2: q1 - masses.w.value(),
-            dq2: masses.particle,
-        }
+        let [q1, dq1] = masses.primary.values;
+        State { q1, dq1, q2: q1 - masses.w.value(), dq2: masses.particle }
     }
 
     /// Relative displacement `w = q1 - q2`, m.
@@ -199,7 +191,7 @@ impl Plant {
     /// `v = q1 + epsilon q2`, m: the displacement of the centre of mass times `1 + epsilon`.
     #[inline]
     pub fn centre(&self) -> f64 {
-        let q1 = self.moving.masses.x.value();
+        let q1 = self.moving.masses.primary.values[0];
         q1 + self.moving.rig.mass_ratio * (q1 - self.moving.masses.w.value())
     }
 

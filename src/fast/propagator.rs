@@ -75,15 +75,15 @@ pub(super) fn rotate(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
 
-/// Coefficients `1/(2n)!` and `1/(2n + 1)!` of cosine and sine over angle, in the square of the angle times -1. Up to 1/8 they leave out
-/// less than 1e-19.
+/// Coefficients of cosine and sine over angle, in the square of the angle: with alternating sign `1/(2n)!` and `1/(2n + 1)!`. Up to 1/8 they
+/// leave out less than 1e-19.
 pub(super) const ROTATION: [[f64; 2]; 6] = [
     [1.0, 1.0],
-    [1.0 / 2.0, 1.0 / 6.0],
+    [-1.0 / 2.0, -1.0 / 6.0],
     [1.0 / 24.0, 1.0 / 120.0],
-    [1.0 / 720.0, 1.0 / 5040.0],
+    [-1.0 / 720.0, -1.0 / 5040.0],
     [1.0 / 40_320.0, 1.0 / 362_880.0],
-    [1.0 / 3_628_800.0, 1.0 / 39_916_800.0],
+    [-1.0 / 3_628_800.0, -1.0 / 39_916_800.0],
 ];
 
 /// Polynomials with these coefficients, at `x`.
@@ -96,7 +96,7 @@ pub(super) fn polynomials(coefficients: &[[f64; 2]], x: f64) -> [f64; 2] {
 /// Cosine and sine of a small angle from their Taylor series, up to degree `N + 2`.
 #[inline(always)]
 pub(super) fn rotation<const N: usize>(angle: f64) -> (f64, f64) {
-    let [cos, sin] = polynomials(&ROTATION[..N / 2 + 2], -angle * angle);
+    let [cos, sin] = polynomials(&ROTATION[..N / 2 + 2], angle * angle);
     (cos, angle * sin)
 }
 

@@ -34,7 +34,7 @@ impl Plant {
             elastic: true,
         };
         let velocities = (
-            self.moving.masses.v.value(),
+            self.moving.masses.primary.values[1],
             self.moving.masses.particle,
             self.moving.masses.dw,
         );
@@ -43,7 +43,7 @@ impl Plant {
             !(self.moving.rig.law).certainly_leaves(speed, largest, &resolution)
                 && (self.moving.rig.law).rests(speed, self.pressing(wall, primary), &resolution)
         });
-        self.moving.masses.v = self.moving.masses.v.plus(touch.kick);
+        self.moving.masses.primary = self.moving.masses.primary.plus([0.0, touch.kick]);
         self.moving.masses.particle = touch.particle;
         self.moving.masses.dw = touch.relative;
         let t = step.now();
@@ -61,7 +61,7 @@ impl Plant {
 
     /// Acceleration of `wall` towards the particle while the primary mass moves alone, and its rounding error, m/s².
     fn pressing(&self, wall: Wall, velocity: f64) -> (f64, f64) {
-        let start = (self.moving.masses.x.value(), velocity);
+        let start = (self.moving.masses.primary.values[0], velocity);
         let motion = Segment::new(&self.moving.rig.alone, self.moving.base, start);
         let acceleration = motion.derivatives_at_start()[2];
         (wall.sign() * acceleration, self.acceleration_error(velocity))
@@ -72,7 +72,7 @@ impl Plant {
     fn acceleration_bound(&self, velocity: f64) -> f64 {
         let Oscillator { delta, omega0_squared, .. } = self.moving.rig.alone;
         let drive = &self.moving.base.drive;
-        let position = self.moving.masses.x.value().abs() + drive.signal[0].abs() + drive.amplitude.abs();
+        let position = self.moving.masses.primary.values[0].abs() + drive.signal[0].abs() + drive.amplitude.abs();
         let velocity = velocity.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
         (omega0_squared * position + 2.0 * delta * velocity) * (1.0 + 1e-9)
     }
