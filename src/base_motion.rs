@@ -89,13 +89,11 @@ impl Drive {
         }
         let name = "E (amplitude of the base oscillator)";
         InvalidValue::unless(self.amplitude.abs() <= LARGEST, name, self.amplitude, "m", ALLOWED)?;
-        InvalidValue::unless(
-            self.omega.abs() <= FASTEST,
+        let (name, allowed) = (
             "omega (frequency of the base oscillator)",
-            self.omega,
-            "rad/s",
             "a finite number from -1e50 to 1e50",
-        )
+        );
+        InvalidValue::unless(self.omega.abs() <= FASTEST, name, self.omega, "rad/s", allowed)
     }
 }
 
@@ -110,16 +108,6 @@ pub struct BaseMotion {
 }
 
 impl BaseMotion {
-    /// Base displacement now, m.
-    pub fn displacement(&self) -> f64 {
-        let oscillator = if self.drive.amplitude == 0.0 {
-            0.0
-        } else {
-            self.drive.amplitude * libm::sin(self.phase.0)
-        };
-        self.drive.signal[0] + oscillator
-    }
-
     /// The same motion seen from `t` seconds later.
     pub fn after(&self, t: f64) -> Self {
         Self {
@@ -141,13 +129,7 @@ impl Phase {
     pub fn radians(self) -> f64 {
         let sum = self.0 + self.1;
         // Near 0 and 2π the rounding error may carry the sum out of the range.
-        if sum < 0.0 {
-            0.0
-        } else if sum >= TAU.0 {
-            sum - TAU.0
-        } else {
-            sum
-        }
+        if sum >= TAU.0 { sum - TAU.0 } else { sum.max(0.0) }
     }
 
     /// The phase later by `angle`, from -2π to 2π with its rounding error.

@@ -184,11 +184,7 @@ impl FastPath {
     #[inline(always)]
     fn drift(&mut self, moving: &mut Moving, dx: f64, t: f64) {
         let Moving { rig, masses, .. } = moving;
-        masses.w = masses.w.plus(dx - masses.particle * t);
-        let (w, b) = (masses.w.value(), rig.parameters.half_width);
-        if w.abs() > b {
-            masses.w = Sum::from(b.copysign(w));
-        }
+        masses.drift(dx - masses.particle * t, rig.parameters.half_width);
         self.contact_free.t -= t;
     }
 

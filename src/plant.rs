@@ -20,8 +20,11 @@ pub const MOST_IMPACTS: u64 = 10_000_000;
 
 /// The parameters and what follows from them. The parameters alone are saved.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(from = "Parameters", into = "Parameters"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "Parameters", into = "Parameters")
+)]
 pub(crate) struct Rig {
     pub parameters: Parameters,
     pub mass_ratio: f64,
@@ -65,6 +68,17 @@ pub(crate) struct Masses {
     pub particle: f64,
 }
 
+impl Masses {
+    /// Adds `dw` to the relative displacement, in which no wall is met.
+    #[inline(always)]
+    pub fn drift(&mut self, dw: f64, half_width: f64) {
+        self.w = self.w.plus(dw);
+        if self.w.value().abs() > half_width {
+            self.w = Sum::from(half_width.copysign(self.w.value()));
+        }
+    }
+}
+
 /// The plant: parameters, what follows from them, and the state.
 #[derive(Clone, Copy, Debug)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -97,13 +111,8 @@ impl Plant {
         let w = start.q1 - start.q2;
         // The difference of two displacements carries their rounding; a start on the wall means on the wall.
         let slack = 4.0 * f64::EPSILON * (b + start.q1.abs().max(start.q2.abs()));
-        InvalidValue::unless(
-            w.abs() <= b + slack,
-            "w = q1 - q2 (particle outside its cavity at the start)",
-            w,
-            "m",
-            "a number from -b to b",
-        )?;
+        let name = "w = q1 - q2 (particle outside its cavity at the start)";
+        InvalidValue::unless(w.abs() <= b + slack, name, w, "m", "a number from -b to b")?;
         Ok(Self {
             moving: Moving {
                 rig: Rig::from(parameters),

@@ -41,8 +41,11 @@ impl Increment {
 
 /// The closed form at time `t`; what follows from that is computed when it is needed. By default it is that over no time.
 #[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(from = "f64", into = "f64"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "f64", into = "f64")
+)]
 pub(super) struct Propagator {
     /// The key: time, s.
     pub t: f64,
@@ -91,13 +94,6 @@ pub(super) const ROTATION: [[f64; 2]; 6] = [
 pub(super) fn polynomials(coefficients: &[[f64; 2]], x: f64) -> [f64; 2] {
     let last = coefficients.len() - 1;
     (coefficients[..last].iter().rev()).fold(coefficients[last], |[a, b], c| [c[0] + x * a, c[1] + x * b])
-}
-
-/// Cosine and sine of a small angle from their Taylor series, up to degree `N + 2`.
-#[inline(always)]
-pub(super) fn rotation<const N: usize>(angle: f64) -> (f64, f64) {
-    let [cos, sin] = polynomials(&ROTATION[..N / 2 + 2], angle * angle);
-    (cos, angle * sin)
 }
 
 /// `E Im(z K)` for the phasor `z`.
@@ -207,7 +203,9 @@ impl<const N: usize> Nearby<N> {
     /// The phasor of the base then.
     #[inline(always)]
     pub fn phasor(&self, h: f64) -> (f64, f64) {
-        rotate(self.there.phasor, rotation::<N>(self.omega * h))
+        let angle = self.omega * h;
+        let [cos, sin] = polynomials(&ROTATION[..N / 2 + 2], angle * angle);
+        rotate(self.there.phasor, (cos, angle * sin))
     }
 
     /// What is added to the start, `h` seconds after that instant.

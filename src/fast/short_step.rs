@@ -20,8 +20,11 @@ const MOMENTS: usize = 5;
 
 /// The propagator of one step length; what follows from that is computed when it is needed.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(from = "f64", into = "f64"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "f64", into = "f64")
+)]
 #[repr(C, align(16))]
 pub(super) struct ShortStep {
     /// What the free motion adds: the sum of both.
@@ -86,7 +89,7 @@ impl ShortStep {
         self.held = [moment(oscillator, 0, self.t), oscillator.omega0_squared * per_velocity];
         self.moving = 2.0 * oscillator.delta * per_velocity;
         self.moments = core::array::from_fn(|n| {
-            let sign = if n % 2 == 0 { 1.0 } else { -1.0 };
+            let sign = [1.0, -1.0][n % 2];
             [2 * n + 2, 2 * n + 1].map(|n| sign * moment(oscillator, n, self.t))
         });
     }

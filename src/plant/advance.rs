@@ -94,16 +94,15 @@ impl Plant {
         let before = core::mem::replace(&mut self.moving.base.drive, *drive);
         let sin = self.fast.phasor.1;
         let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
-        let kick = 2.0 * self.moving.rig.alone.delta * jump;
+        let oscillator = &self.moving.rig.alone;
+        let kick = 2.0 * oscillator.delta * jump;
         if jump != 0.0 {
             self.moving.masses.primary = self.moving.masses.primary.plus([0.0, kick]);
             self.moving.masses.dw += kick;
             // The impulse acts on the primary mass alone; contact is decided anew.
             self.contact = Contact::Free;
         }
-        self.fast
-            .contact_free
-            .jump(&self.moving.rig.alone, &before, drive, kick);
+        self.fast.contact_free.jump(oscillator, &before, drive, kick);
     }
 
     /// Follows the motion from event to event to the end of the step.
@@ -162,13 +161,7 @@ impl Plant {
         self.fast.evaluations += landing.evaluations;
         self.moving.masses.primary = masses.primary.plus([landing.moved, landing.gained]);
         self.moving.masses.dw += landing.gained;
-        let w = masses.w.plus(landing.drifted);
-        let outside = w.value().abs() > half_width;
-        self.moving.masses.w = if outside {
-            Sum::from(half_width.copysign(w.value()))
-        } else {
-            w
-        };
+        self.moving.masses.drift(landing.drifted, half_width);
         self.contact = Contact::Free;
         self.base_moves(landing.t);
         step.left = step.left.plus(-landing.t);
@@ -184,8 +177,8 @@ impl Plant {
         let motion = Segment::new(&self.moving.rig.joint, self.moving.base, start.into());
         let stay = until_released(&motion, wall, left, noise);
         self.fast.evaluations += stay.evaluations;
-        self.moving.masses.primary = Sums::from([stay.joint.0, stay.joint.1]);
-        self.moving.masses.particle = stay.joint.1;
+        self.moving.masses.primary = Sums::from(stay.joint);
+        self.moving.masses.particle = stay.joint[1];
         self.moving.masses.dw = 0.0;
         self.base_moves(stay.t);
         step.left = step.left.plus(-stay.t);

@@ -1,7 +1,7 @@
 //! The particle at a wall: impact, then rest if it cannot leave.
 
 use super::advance::Step;
-use super::{Event, Plant};
+use super::{Event, Masses, Plant};
 use crate::arithmetic::Sum;
 use crate::contact::{Contact, Resolution, Wall};
 use crate::oscillator::Oscillator;
@@ -33,11 +33,8 @@ impl Plant {
             fastest: self.moving.rig.alone.fastest,
             elastic: true,
         };
-        let velocities = (
-            self.moving.masses.primary.values[1],
-            self.moving.masses.particle,
-            self.moving.masses.dw,
-        );
+        let Masses { primary, particle, dw, .. } = self.moving.masses;
+        let velocities = (primary.values[1], particle, dw);
         let touch = self.moving.rig.law.touch(wall, velocities, |primary, speed| {
             let largest = self.acceleration_bound(primary);
             !(self.moving.rig.law).certainly_leaves(speed, largest, &resolution)
