@@ -228,7 +228,7 @@ fn per_unit(row: usize, without: bool) -> Result<f64, String> {
 }
 
 fn table() -> Result<(), String> {
-    println!("| skip | unit of work | instructions | without it | saved |\n|---|---|---|---|---|");
+    println!("| shortcut | unit of work | instructions | without it | saved |\n|---|---|---|---|---|");
     for (row, (skip, unit, ..)) in ROWS.iter().enumerate() {
         let (with, without) = (per_unit(row, false)?, per_unit(row, true)?);
         let saved = 100.0 * (1.0 - with / without);

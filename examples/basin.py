@@ -1,6 +1,6 @@
 """Basins of attraction: from which starts of the primary mass, with the particle at rest, impacts begin and persist.
 
-python examples/basin.py [FOLDER]    writes basin.zarr and basin.svg; goes on where it was interrupted
+python examples/basin.py [FOLDER]    writes basin.zarr and basin.svg; continues an interrupted sweep
 """
 
 import sys

@@ -28,7 +28,7 @@ platform_list() {
     IFS=, read -ra names <<<"$1"
     [ ${#names[@]} -gt 0 ] || fail "--platforms needs a list; there are $PLATFORMS"
     for name in "${names[@]}"; do
-        [ -n "${TRIPLES[$name]:-}" ] || fail "\`$name\` is no platform; there are $PLATFORMS"
+        [ -n "${TRIPLES[$name]:-}" ] || fail "\`$name\` is not a platform; known are $PLATFORMS"
         case $seen in *,$name,*) fail "the platform $name was given twice" ;; esac
         seen=$seen$name,
         printf '%s\n' "$name"

@@ -53,7 +53,7 @@ pub struct Move {
     pub amplitude: Real,
     /// Expected change of the frequency, rad/s; 0 if unknown.
     pub omega: Real,
-    /// Growth of the setpoint at the end, m/s, at which it goes on from there; 0 to hold it.
+    /// Growth rate of the setpoint at the end of the move and after it, m/s; 0 to hold it.
     pub growth: Real,
 }
 

@@ -138,7 +138,7 @@ macro_rules! getter {
         Value::Real($place)
     };
     (optional, $place:expr) => {
-        // The number that means "none" is no value of an option, so it must not pass for one.
+        // A value equal to the number for "none" is invalid; it must not read as "none", so that the check refuses it.
         Value::Real($place.map_or(NONE, |value| if value == NONE { 0.0 } else { value }))
     };
     (integer, $place:expr) => {

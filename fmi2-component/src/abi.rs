@@ -3,7 +3,7 @@
 //! All `unsafe` of the shell is here and in the one call of the logger. Every function has the same contract, which
 //! is that of the standard: the instance pointer is NULL or comes from `fmi2Instantiate` of the same component and has
 //! not been freed; no two threads call one instance at the same time; an array has as many elements as its count says.
-//! NULL arrays, absurd counts and misaligned arrays are refused.
+//! NULL arrays, impossible counts and misaligned arrays are refused.
 #![allow(clippy::missing_safety_doc)] // one contract for all, above
 
 mod derivatives;

@@ -26,7 +26,7 @@ impl<'a> Archive<'a> {
         Self(Mode::Read(bytes))
     }
 
-    /// Whether values are being read: what follows from them is to be computed anew afterwards.
+    /// Whether values are being read: values that follow from them must then be computed again.
     pub fn is_reading(&self) -> bool {
         matches!(self.0, Mode::Read(_))
     }
@@ -34,7 +34,7 @@ impl<'a> Archive<'a> {
     /// Writes a whole value, or reads it: the component itself, or one field after the other.
     ///
     /// # Errors
-    /// The bytes have come to their end, or make no such value.
+    /// Too few bytes, or bytes of another value.
     pub fn whole<T: Serialize + DeserializeOwned>(&mut self, value: &mut T) -> Result<(), Refusal> {
         match &mut self.0 {
             Mode::Write(out) => out.extend(postcard::to_stdvec(value)?),

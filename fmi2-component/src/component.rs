@@ -1,4 +1,4 @@
-//! What a component has to say for itself.
+//! The trait that a component implements.
 
 use crate::archive::Archive;
 use crate::log::Log;
@@ -16,16 +16,16 @@ pub type StringOf<C> = <<C as Component>::Model as Model>::String;
 
 /// A component: values to set, values to get, a start and a step. The shell does the rest.
 ///
-/// Life cycle, NULL pointers, value references, NaN and infinity are dealt with before a component is asked anything.
-/// A component that panics ends in the state *fatal*; the panic goes no further.
+/// Life cycle, NULL pointers, value references, NaN and infinity are handled before the component is called.
+/// A component that panics ends in the state *fatal*; the panic does not leave the call.
 ///
 /// Getters and setters of a type that the model has variables of must be written; leaving one out does not compile.
 pub trait Component: Clone + Send + 'static {
     /// The type `Model` that the build step generates.
     type Model: Model;
 
-    /// Whether the setters take every finite value of an input. A component that says so is spared the copy of itself by
-    /// which the shell undoes a call of which a later value is refused; for components in a fast loop.
+    /// Whether the setters take every finite value of an input. The shell then makes no copy of the component, by
+    /// which it undoes a call with a later value that is refused; for components in a fast loop.
     const TAKES_EVERY_INPUT: bool = false;
 
     /// A component without any start value: the shell sets those of the variable table right after, by the setters.
@@ -95,7 +95,7 @@ pub trait Component: Clone + Send + 'static {
         Err(variable.variable().refuse(value, "no value at all"))
     }
 
-    /// Makes the initial state out of the values that have been set, and refuses those that make no sense together.
+    /// Makes the initial state from the values that have been set, and refuses values that do not fit together.
     ///
     /// Called on leaving Initialization Mode, and in it before an output is read after something was set. It may thus
     /// be called many times, and must start each time from the values set, not from where an earlier call has led.
@@ -111,7 +111,7 @@ pub trait Component: Clone + Send + 'static {
     /// Whether a step of that length (finite, above 0) can be done at all. Asked before every step.
     ///
     /// # Errors
-    /// A step that would take for ever. Nothing happens then, and the master may make a shorter one.
+    /// A step that would not end. Nothing changes then, and the master may make a shorter one.
     fn accept_step(&self, step: f64) -> Result<(), Refusal> {
         let _ = step;
         Ok(())
@@ -120,8 +120,8 @@ pub trait Component: Clone + Send + 'static {
     /// Advances from `time` by `step` seconds, which is finite and above 0. Inputs are as set before the step.
     ///
     /// # Errors
-    /// [`Refusal::discard`] where the step cannot be done and the component is as it was before; the master is told
-    /// that the component wants to end. [`Refusal::error`] where the simulation cannot go on but by a reset.
+    /// [`Refusal::discard`] where the step cannot be done and the component is as it was before; the master learns
+    /// that the component wants to end. [`Refusal::error`] where the simulation can continue only after a reset.
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal>;
 
     /// Sets the time derivative of that order (1 or above) of a real input, as it is at the start of the next step.
@@ -170,7 +170,7 @@ pub trait Component: Clone + Send + 'static {
     /// `archive.whole(self)`.
     ///
     /// # Errors
-    /// Contents that make no sense; by default always, since a component need not know serde.
+    /// Invalid contents; by default always, because a component need not use serde.
     fn archive(&mut self, archive: &mut Archive<'_>) -> Result<(), Refusal> {
         let _ = archive;
         Err(Refusal::error("the component cannot be serialised"))

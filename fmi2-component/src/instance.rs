@@ -1,4 +1,4 @@
-//! An instance as safe Rust sees it: what each call means, once its pointers have been checked.
+//! An instance in safe Rust: what each call does after its pointers have been checked.
 
 use std::ffi::CString;
 
@@ -91,7 +91,7 @@ impl<C: Component> Instance<C> {
         Err(not_settable(key.variable(), self.session.state))
     }
 
-    /// Says that values are about to be set: what was initialised from the old ones is out of date.
+    /// Announces that values will be set: what was initialised from the old ones is then invalid.
     #[inline]
     pub fn values_change(&mut self) {
         let start = State::InitializationMode as u8;

@@ -1,8 +1,8 @@
-//! An FMI 2.0 shell: write a struct, get an FMU.
+//! An FMI 2.0 shell: it makes an FMU from a Rust struct.
 //!
 //! A component is exported by three files: its `modelDescription.xml`, a `build.rs` of two lines, and
-//! about a hundred lines that say which variable is which number. Everything else that the standard asks for (life
-//! cycle, pointers, value references, logging, FMU states) is here.
+//! about a hundred lines that connect variables to numbers. This crate does everything else that the standard requires (life
+//! cycle, pointers, value references, logging, FMU states).
 //!
 //! # How to export a component
 //!
@@ -34,7 +34,7 @@
 //! `src/lib.rs` implements [`Component`] for a struct and ends with `fmi2_component::export!(MyComponent)`. The repository has a whole
 //! example, a water tank, in `fmi2-component/example/`, with its description.
 //!
-//! A component whose equations a master may integrate by itself says besides what they are ([`ModelExchange`]), and is
+//! A component whose equations a master may integrate also implements [`ModelExchange`], and is
 //! exported by `fmi2_component::export!(MyComponent, model_exchange)`. Its description lists states and derivatives
 //! in `ModelStructure`, once; `exchange.rs` of `lovines-fmu`, the FMU of the plant, is an example.
 //!
@@ -55,17 +55,17 @@
 //! - A setter is called only for a variable that may be set in the present state, and a real value is finite.
 //! - [`Component::initialise`] is called before the first step, and in Initialization Mode before a computed value is
 //!   read after something was set. Outputs that depend on inputs are thus right however often inputs are set.
-//! - [`Component::step`] is called with a positive length that [`Component::accept_step`] has accepted; communication points follow each other within 1e-9 of
-//!   their size.
-//! - A panic goes no further than the call: it is logged, and the instance is then of no use but to be freed.
+//! - [`Component::step`] is called with a positive length that [`Component::accept_step`] has accepted; communication points
+//!   follow each other within 1e-9 of their size.
+//! - A panic does not leave the call: it is logged, and the instance can then only be freed.
 //!
-//! `min` and `max` are told to masters and not enforced: what makes sense is for the component to say.
+//! Masters read `min` and `max`; the shell does not enforce them: the component decides which values it accepts.
 //!
 //! # What is legal when
 //!
 //! The life cycle of FMI 2.0, clauses 3.2.3 and 4.2.4, of both interfaces. An illegal call answers `fmi2Error`, logs a
-//! line that says where it would be legal, and changes nothing. *SetDiscrete* stands for the setters of integers, truth
-//! values and text, *GetValues*, *GetStatus* and *FMUstate* for the functions of that family, *GetEquations* for
+//! line that says where it would be legal, and changes nothing. *SetDiscrete* stands for the setters of integers,
+//! Booleans and strings, *GetValues*, *GetStatus* and *FMUstate* for the functions of that family, *GetEquations* for
 //! `fmi2GetContinuousStates`, `fmi2GetDerivatives` and `fmi2GetEventIndicators`.
 //!
 #![doc = include_str!("life_cycle.md")]

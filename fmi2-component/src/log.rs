@@ -51,7 +51,7 @@ struct Sink {
 }
 
 impl Log {
-    /// A log that nobody reads, for tests of components.
+    /// A log without a reader, for tests of components.
     pub const fn silent() -> Self {
         Self {
             sink: None,
@@ -138,7 +138,7 @@ impl Log {
                 None => {
                     known = false;
                     self.warn(format_args!(
-                        "fmi2SetDebugLogging: there is no category {name:?}; there are {}",
+                        "fmi2SetDebugLogging: unknown category {name:?}; known are {}",
                         self.categories.join(", ")
                     ));
                 }

@@ -25,16 +25,16 @@ pub trait ModelExchange: Component {
     /// An event after which the equations make no sense.
     fn new_discrete_states(&mut self, time: f64, log: &Log) -> Result<Discrete, Refusal>;
 
-    /// Says what the time is; for equations in which it occurs.
+    /// Sets the time; for equations that contain it.
     fn set_time(&mut self, time: f64) {
         let _ = time;
     }
 
-    /// Says that an event begins: inputs may jump from now on.
+    /// Begins an event: inputs may jump from now on.
     fn enter_event_mode(&mut self) {}
 
-    /// Says that the integrator has completed a step; whether an event is to be handled now, be it that no indicator has
-    /// told of it.
+    /// Called when the integrator has completed a step. Returns whether an event must be handled now, even if no indicator has
+    /// shown it.
     fn completed_step(&mut self) -> bool {
         false
     }

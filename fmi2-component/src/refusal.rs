@@ -11,7 +11,7 @@ pub enum Severity {
     Discard,
     /// The call was wrong; a step that ends so cannot be continued.
     Error,
-    /// The component is of no use any more.
+    /// The component can only be freed.
     Fatal,
 }
 
@@ -35,7 +35,7 @@ impl Refusal {
         Self::new(Severity::Error, message)
     }
 
-    /// The component is of no use any more.
+    /// The component can only be freed.
     pub fn fatal(message: impl Into<String>) -> Self {
         Self::new(Severity::Fatal, message)
     }

@@ -1,4 +1,4 @@
-//! FMU states as bytes: a header that tells a foreign or damaged blob, and the session.
+//! FMU states as bytes: a header that identifies foreign or damaged states, and the session.
 
 use crate::archive::Archive;
 use crate::component::Component;
@@ -27,7 +27,7 @@ pub(crate) fn serialise<C: Component>(session: &Session<C>) -> Result<Vec<u8>, R
 pub(crate) fn deserialise<C: Component>(bytes: &[u8], select: Select<C>) -> Result<Session<C>, Refusal> {
     let Some((header, body)) = bytes.split_at_checked(HEADER) else {
         return Err(Refusal::error(format!(
-            "the serialised state has {} bytes; expected are more than {HEADER}",
+            "the serialised state has {} bytes; expected more than {HEADER}",
             bytes.len()
         )));
     };
@@ -47,7 +47,7 @@ pub(crate) fn deserialise<C: Component>(bytes: &[u8], select: Select<C>) -> Resu
     let expected = identity::<C>();
     if found != expected {
         return Err(Refusal::error(format!(
-            "the serialised state is of another model: its GUID and version are {} {:?}, expected are {} {:?}",
+            "the serialised state is of another model: its GUID and version are {} {:?}, expected {} {:?}",
             found.0, found.1, expected.0, expected.1
         )));
     }

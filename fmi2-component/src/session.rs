@@ -6,7 +6,7 @@ use crate::life_cycle::{Interface, State};
 use crate::model::{Key, Model};
 use crate::refusal::Refusal;
 
-/// What tells a component that it is for model exchange; there for an instance that is.
+/// Selects model exchange in a component; present in instances for model exchange.
 pub(crate) type Select<C> = Option<fn(&mut C)>;
 
 /// A component and where it is in its life.

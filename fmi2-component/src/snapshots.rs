@@ -43,7 +43,7 @@ impl<C: Clone> Snapshots<C> {
 
 fn unknown() -> Refusal {
     Refusal::error(
-        "the FMU state is not one that this instance has given out, or it has been freed; expected is one from \
+        "the FMU state is not one that this instance has given out, or it has been freed; expected one from \
          fmi2GetFMUstate or fmi2DeSerializeFMUstate of the same instance",
     )
 }

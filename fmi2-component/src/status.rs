@@ -12,8 +12,8 @@ pub enum Status {
     Discard = 2,
     /// The call was wrong.
     Error = 3,
-    /// The component is of no use any more.
+    /// The component can only be freed.
     Fatal = 4,
-    /// The call goes on in the background. This shell never answers so.
+    /// The call continues in the background. This shell never returns it.
     Pending = 5,
 }

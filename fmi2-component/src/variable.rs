@@ -28,7 +28,7 @@ pub enum Variability {
     Constant,
     /// Not after initialization.
     Fixed,
-    /// Between steps, where the master wants it.
+    /// Between steps, at any time.
     Tunable,
     /// At events and communication points.
     Discrete,

@@ -219,11 +219,11 @@ fn derivatives_have_orders_and_causalities() {
         assert_eq!(fmi2GetRealOutputDerivatives(c, &LEVEL, 1, &0, &mut value), Error);
         master.heard_one(&["derivative 0 of level is refused"]);
         assert_eq!(fmi2GetRealOutputDerivatives(c, &INFLOW, 1, &1, &mut value), Error);
-        master.heard_one(&["inflow", "expected is an output"]);
+        master.heard_one(&["inflow", "expected an output"]);
         assert_eq!(fmi2SetRealInputDerivatives(c, &INFLOW, 1, &1, &0.0), Error);
         master.heard_one(&["takes no input derivatives"]);
         assert_eq!(fmi2SetRealInputDerivatives(c, &LEVEL, 1, &1, &0.0), Error);
-        master.heard_one(&["level", "expected is an input"]);
+        master.heard_one(&["level", "expected an input"]);
 
         let (unknown, known, along) = ([RATE, LEVEL], [INFLOW, AREA], [4.0, 0.0]);
         let mut answer = [f64::NAN; 2];

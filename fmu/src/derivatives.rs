@@ -33,7 +33,7 @@ pub(super) fn of_instant<T: Scalar>(now: &Instant<T>, variable: Real) -> T {
 }
 
 impl LoViNes {
-    /// The plant as it stands, with the inputs as they are set now.
+    /// The present plant with the present inputs.
     pub(super) fn instant(&self, plant: &Plant) -> Instant<f64> {
         let (p, state) = (&self.parameters, plant.state());
         let base = self.base_motion(plant);
@@ -55,20 +55,20 @@ impl LoViNes {
         }
     }
 
-    /// The partial derivative of `unknown` by `known`, all else being equal; the contact stays as it is.
+    /// The partial derivative of `unknown` with respect to `known`; the contact state does not change.
     ///
-    /// What else there is depends on the interface: in model exchange, once it is under way, the reduced velocities are
+    /// What is held constant depends on the interface: in model exchange, after initialization, the reduced velocities are
     /// states, so that a velocity changes with the base; in co-simulation it does not.
     pub(super) fn slope(&self, unknown: Real, known: Real) -> Result<f64, Refusal> {
         let causality = unknown.variable().causality;
         if !matches!(causality, Causality::Output | Causality::Local) {
             return Err(Refusal::error(format!(
-                "{} is no unknown: expected is an output or a derivative",
+                "{} is not an unknown: expected an output or a derivative",
                 unknown.variable().name
             )));
         }
         let known = match known {
-            // A start value has its say until Initialization Mode is left.
+            // A start value has an effect until Initialization Mode is left.
             Real::q1_start | Real::der_q1_start | Real::q2_start | Real::der_q2_start
                 if self.progress == Progress::UnderWay =>
             {
@@ -96,7 +96,7 @@ impl LoViNes {
     /// The time derivative of an output at the end of the last step.
     pub(super) fn time_derivative(&self, variable: Real, order: u32) -> Result<f64, Refusal> {
         let Rig::Steps(plant) = &self.rig else {
-            return Err(Refusal::error("output derivatives are of co-simulation"));
+            return Err(Refusal::error("output derivatives exist in co-simulation only"));
         };
         if order > MOST {
             return Err(Refusal::error(format!(
@@ -118,7 +118,7 @@ impl LoViNes {
             Real::base => base[n],
             Real::phase if n == 1 => plant.base().drive.omega,
             Real::energy => Movement::of(plant).energy(p, n),
-            // The phase turns evenly, and what is told of impacts changes with the next one only.
+            // The phase grows at a constant rate, and the outputs of impacts change at the next impact only.
             _ => 0.0,
         })
     }
@@ -145,7 +145,7 @@ fn perturbed(now: &Instant<f64>, known: Real, reduced_are_states: bool) -> Resul
     };
     let (u1, u2) = now.reduced_velocities();
     match known {
-        // Nothing but the next impact depends on them.
+        // Only the next impact depends on them.
         Real::b | Real::r => Ok(instant),
         Real::M
         | Real::k
@@ -166,7 +166,7 @@ fn perturbed(now: &Instant<f64>, known: Real, reduced_are_states: bool) -> Resul
             instant
         }),
         _ => Err(Refusal::error(format!(
-            "{} is no known: expected is a parameter, an input or a state",
+            "{} is not a known: expected a parameter, an input or a state",
             known.variable().name
         ))),
     }

@@ -1,4 +1,4 @@
-//! The plant for masters that integrate its equations themselves.
+//! The plant for masters that integrate its equations.
 
 use super::derivatives::of_instant;
 use super::variables::Real;

@@ -1,6 +1,6 @@
-//! The plant as an FMI 2.0 component: which variable is which number of the physics.
+//! The plant as an FMI 2.0 component: connects variables to the numbers of the plant.
 //!
-//! For co-simulation that is the plant in closed form, for model exchange its equations.
+//! Co-simulation uses the plant in closed form, model exchange its equations.
 #![forbid(unsafe_code)]
 
 mod derivatives;
@@ -27,21 +27,21 @@ mod variables {
 
 fmi2_component::export!(LoViNes, model_exchange);
 
-/// What a master has set, and the rig that came of it.
+/// What a master has set, and the rig made from it.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct LoViNes {
     rig: Rig,
     /// What moves the base; the derivatives of its signal hold for one step.
     drive: Drive,
-    /// Whether an input was set since the last step: the base is where they say, not where the step ended.
+    /// Whether an input was set since the last step: the inputs then determine the base, not the end of the step.
     inputs_set: bool,
-    /// How far the rig has come.
+    /// Progress of the rig.
     progress: Progress,
     #[serde(skip)]
     outputs: Outputs,
     /// The mass ratio m/M.
     epsilon: f64,
-    /// The fastest rate of the motion but for that of the drive, rad/s.
+    /// The fastest rate of the motion without that of the drive, rad/s.
     fastest: f64,
     #[serde(skip)]
     reach: Reach,
@@ -56,9 +56,9 @@ fn unknown() -> Cell<f64> {
     Cell::new(f64::NAN)
 }
 
-/// The rig as the master's choice of interface wants it.
+/// The rig for the interface that the master has chosen.
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
-#[allow(clippy::large_enum_variant)] // one of them in an instance, and no way round by a pointer in every step
+#[allow(clippy::large_enum_variant)] // one per instance; a pointer would cost time in every step
 enum Rig {
     Steps(Plant),
     Equations(Hybrid),
@@ -76,9 +76,9 @@ fn logging(plant: &mut Plant, drive: Drive, step: f64, on_event: impl FnMut(Even
 
 #[derive(Clone, Copy, PartialEq, PartialOrd, serde::Serialize, serde::Deserialize)]
 enum Progress {
-    /// It is not yet made of the values set.
+    /// Not yet made from the values set.
     None,
-    /// It stands at its start: the outputs with exact start values are just those.
+    /// At its start: outputs with exact start values have these values.
     Initialised,
     UnderWay,
 }
@@ -163,7 +163,7 @@ impl Component for LoViNes {
     }
 
     fn leave_initialization(&mut self) {
-        // From now on an integrator's states count, not the values that were set.
+        // From now on the states of the integrator count, not the values that were set.
         if matches!(self.rig, Rig::Equations(_)) {
             self.progress = Progress::UnderWay;
         }
@@ -180,7 +180,7 @@ impl Component for LoViNes {
     #[inline]
     fn step(&mut self, time: f64, step: f64, log: &Log) -> Result<(), Refusal> {
         let Rig::Steps(plant) = &mut self.rig else {
-            return Err(Refusal::error("a step is of co-simulation"));
+            return Err(Refusal::error("steps exist in co-simulation only"));
         };
         plant.set_time(time);
         let outcome = if log.wants(category::logEvents) || log.wants(category::logImpacts) {

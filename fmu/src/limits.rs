@@ -1,12 +1,12 @@
-//! Which steps are taken, and why one is refused or given up.
+//! Which steps are accepted, and why one is refused or ended early.
 
 use super::LoViNes;
 use fmi2_component::Refusal;
 use lovines::Drive;
 use lovines::plant::MOST_IMPACTS;
 
-/// The longest step that is taken, in radians of the fastest rate: more than a million periods. Even where nothing hits, the
-/// search for the first contact looks at the motion once in every two radians or so, and a call is to end.
+/// The longest accepted step, in radians of the fastest rate: more than a million periods. Even without impacts, the search for the
+/// first contact evaluates the motion about once in two radians, and every call must end.
 const LONGEST_STEP: f64 = 1e7;
 
 /// Why a step could not be finished.
@@ -15,12 +15,12 @@ pub(super) fn lost(resolved: bool, time: f64, (step, elapsed): (f64, f64)) -> Re
     Refusal::error(if resolved {
         format!(
             "there are {MOST_IMPACTS} impacts within the first {elapsed} s of the step of {step} s at t = {time} s; expected \
-             are velocities and a half-width of the cavity that make sense together, or a shorter step"
+             velocities and a half-width of the cavity that make sense together, or a shorter step"
         )
     } else {
         format!(
             "displacements have become so large in the step at t = {time} s that their rounding is wider than the cavity; \
-             expected are start values and inputs of a sensible size"
+             expected start values and inputs of a sensible size"
         )
     })
 }
@@ -30,7 +30,7 @@ pub(super) fn lost(resolved: bool, time: f64, (step, elapsed): (f64, f64)) -> Re
 fn too_far(drive: &Drive) -> Refusal {
     Refusal::error(format!(
         "the base would go further than 2^52 half-widths of the cavity, where the rounding of displacements is wider than it \
-         (e = {} m and its derivatives, E = {} m); expected are inputs of a sensible size",
+         (e = {} m and its derivatives, E = {} m); expected inputs of a sensible size",
         drive.signal[0], drive.amplitude
     ))
 }
@@ -46,7 +46,7 @@ fn too_long(step: f64, rate: f64) -> Refusal {
 }
 
 impl LoViNes {
-    /// Whether a step can be done at all; steps up to that length need not be looked at again.
+    /// Whether a step can be done; steps up to that length need not be checked again.
     #[inline(never)]
     pub(super) fn judge(&self, step: f64) -> Result<(), Refusal> {
         let rate = self.fastest.max(self.drive.omega.abs());
@@ -54,7 +54,7 @@ impl LoViNes {
         if step * rate > LONGEST_STEP {
             return Err(too_long(step, rate));
         }
-        // However short the step: slopes become forces.
+        // However short the step: derivatives of the base displacement cause forces.
         if !self.reach.holds_base(&self.drive, step.max(1.0 / self.fastest)) {
             return Err(too_far(&self.drive));
         }

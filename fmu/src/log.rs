@@ -29,7 +29,7 @@ pub(super) fn tell(log: &Log, time: f64, event: Event) {
         ),
         Event::Released { t, wall } => log.tell(
             category::logEvents,
-            format_args!("the wall {} let the particle go at t = {} s", side(wall), time + t),
+            format_args!("the wall {} released the particle at t = {} s", side(wall), time + t),
         ),
     }
 }

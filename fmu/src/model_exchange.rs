@@ -1,4 +1,4 @@
-//! The plant for whoever integrates it: differential equations, event functions and jumps, and derivatives of the outputs.
+//! The plant for an integrator: differential equations, event functions and jumps, and derivatives of the outputs.
 
 mod dual;
 pub mod equations;

@@ -1,4 +1,4 @@
-//! What a master reads of the plant: worked out once after a step, and looked up when asked for.
+//! What a master reads of the plant: computed once after a step, and looked up on request.
 
 use super::derivatives;
 use super::variables::Real;
@@ -6,7 +6,7 @@ use super::{LoViNes, Progress, Rig};
 use lovines::{BaseMotion, Plant};
 use std::cell::Cell;
 
-/// How many outputs are kept.
+/// Number of outputs that are kept.
 const KEPT: usize = 11;
 
 /// Where an output is kept, in the order of the variable table, so that this is a subtraction; `KEPT` for what is not.
@@ -30,7 +30,7 @@ const fn place(variable: Real) -> usize {
 
 const BASE: usize = 7;
 
-/// Outputs as they were at the end of the last step; NaN where one is to be worked out.
+/// Outputs as they were at the end of the last step; NaN for one that must be computed.
 #[derive(Clone, Debug)]
 pub(super) struct Outputs([Cell<f64>; KEPT]);
 
@@ -50,7 +50,7 @@ impl Outputs {
         }
     }
 
-    /// The inputs have changed, and with them where the base is.
+    /// The inputs have changed, and with them the base displacement.
     #[inline]
     pub fn forget_base(&self) {
         self.0[BASE].set(f64::NAN);
@@ -58,7 +58,7 @@ impl Outputs {
 }
 
 impl LoViNes {
-    /// Keeps what masters read after a step; whether displacements are such that a cavity can be told.
+    /// Keeps what masters read after a step. Returns whether the rounding error of displacements is narrower than the cavity.
     #[inline]
     pub(super) fn keep_outputs(&mut self) -> bool {
         let Rig::Steps(plant) = &self.rig else {
@@ -122,7 +122,7 @@ impl LoViNes {
         }
     }
 
-    /// The displacement of the base with the inputs as they are set now; worked out once, for there is a sine in it.
+    /// The displacement of the base with the present inputs; computed once, because it contains a sine.
     fn base(&self, plant: &Plant) -> f64 {
         let kept = &self.outputs.0[BASE];
         if kept.get().is_nan() {
@@ -136,7 +136,7 @@ impl LoViNes {
         kept.get()
     }
 
-    /// The base as it stands, with the inputs as they are set now.
+    /// The present base with the present inputs.
     pub(super) fn base_motion(&self, plant: &Plant) -> BaseMotion {
         if self.inputs_set {
             BaseMotion { drive: self.drive, ..plant.base() }

@@ -1,17 +1,17 @@
-//! How far displacements may go: where rounding is as wide as the cavity, nothing can be said of contacts any more, and
-//! finding that out takes seconds.
+//! Limits of displacements: where the rounding error is as wide as the cavity, contacts cannot be found, and the search for them would
+//! take seconds.
 
 use lovines::{Drive, InvalidValue, Parameters, State};
 
-/// So many half-widths: there the next number is one half-width away.
+/// Limit in half-widths: there the spacing of doubles is one half-width.
 const RESOLUTION: f64 = 1.0 / f64::EPSILON;
 
-/// The largest displacements and velocities that make sense with a cavity.
+/// The largest displacements and velocities allowed for a cavity.
 #[derive(Clone, Copy, Default)]
 pub(super) struct Reach {
     /// m.
     displacement: f64,
-    /// m/s: it leads to no more than that displacement.
+    /// m/s: it leads to that displacement at most.
     velocity: f64,
 }
 
@@ -30,7 +30,7 @@ impl Reach {
         state.q1.abs() <= self.displacement && state.dq1.abs() + state.dq2.abs() <= self.velocity
     }
 
-    /// Whether the base stays within for so many seconds under `drive`.
+    /// Whether the base stays within for `span` seconds under `drive`.
     #[inline]
     pub fn holds_base(&self, drive: &Drive, span: f64) -> bool {
         let [u0, derivatives @ ..] = drive.signal;

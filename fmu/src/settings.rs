@@ -29,7 +29,7 @@ impl LoViNes {
         })
     }
 
-    /// Tells the rig of changed inputs.
+    /// Passes changed inputs to the rig.
     #[inline]
     pub(super) fn input(&mut self) {
         self.inputs_set = true;
@@ -66,7 +66,7 @@ impl LoViNes {
         Ok(())
     }
 
-    /// Tells the rig of changed parameters.
+    /// Passes changed parameters to the rig.
     pub(super) fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         if self.progress != Progress::None {
             match &mut self.rig {

@@ -89,7 +89,7 @@ enum Command {
 /// Share of late samples of a rig in real time above which its results are doubtful.
 const TOLERATED: f64 = 0.01;
 
-/// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input, 3 for results of a rig that did not keep its time,
+/// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input, 3 for results of a rig that missed deadlines,
 /// 130 after Ctrl-C.
 pub fn run() -> ExitCode {
     let output = match Cli::parse().command {
@@ -157,7 +157,7 @@ fn log_warnings() {
 }
 
 /// The result of an experiment, as JSON or as a summary with the paths that were written. If a rig in real time was late, stderr
-/// says so; a rig that did not keep its time is a failure.
+/// says so; a rig that missed too many deadlines is a failure.
 fn result(
     as_json: bool,
     found: &impl Serialize,
@@ -169,11 +169,11 @@ fn result(
     match timing {
         Some(timing) if timing.share() > TOLERATED => {
             print(&text)?;
-            let message = format!("the rig did not keep its time, so these results are doubtful: {timing}");
+            let message = format!("the rig missed too many deadlines, so these results are doubtful: {timing}");
             Err(Failure::late(message))
         }
         Some(timing) if timing.share() > 0.0 => {
-            eprintln!("warning: the rig was not always in time: {timing}");
+            eprintln!("warning: the rig missed deadlines: {timing}");
             Ok(text)
         }
         _ => Ok(text),

@@ -120,7 +120,7 @@ fn a_file_that_is_no_library_is_refused() {
 fn a_library_without_fmi_functions_is_refused() {
     let folder = tempfile::tempdir().unwrap();
     build(folder.path(), "something_else", GUID);
-    assert!(complaint(folder.path()).contains("no FMI 2.0 component"));
+    assert!(complaint(folder.path()).contains("not an FMI 2.0 component"));
 }
 
 #[test]

@@ -113,7 +113,11 @@ fn ctrl_c_keeps_complete_chunks_and_the_same_command_goes_on() {
     assert!(begun);
     let output = signalled(child, "INT").unwrap();
     assert_eq!(output.status.code(), Some(130), "{}", text(&output));
-    assert!(text(&output).contains("the same command goes on"), "{}", text(&output));
+    assert!(
+        text(&output).contains("the same command continues"),
+        "{}",
+        text(&output)
+    );
     let chunks = content(&out).keys().filter(|key| key.starts_with("failure/c/")).count();
     println!("{chunks} chunks");
     assert!(chunks > 0);
@@ -141,7 +145,7 @@ fn a_full_disk_and_a_folder_that_cannot_be_written_are_explained() {
     let output = Command::new("sh").args(["-c", &script]).output().unwrap();
     assert_eq!(output.status.code(), Some(1), "{}", text(&output));
     assert!(
-        text(&output).contains("cannot write to") && text(&output).contains("goes on"),
+        text(&output).contains("cannot write to") && text(&output).contains("continues the sweep"),
         "{}",
         text(&output)
     );

@@ -27,11 +27,11 @@ class Output:
     coherence : float
         Power of the response's first harmonic over its sum with the residual power, 0 to 1.
     locked, settled : bool
-        The lock criterion has been met and the lock not been lost since; it is met now.
+        The lock criterion has been met and the lock has not been lost since; the criterion is met now.
     state : str
         Loop state: idle, ramping, acquiring, locked, lock lost, tripped, shut down or capturing.
     fault : int
-        Number of the fault as in docs/firmware.md; 0 for none.
+        Number of the fault, as the output `fault` of PhaseLock.fmu; 0 for none.
     """
 
     omega: float

@@ -104,7 +104,7 @@ class Batch:
     def advance(
         self, duration: ArrayLike, *, amplitude: ArrayLike = 0.0, omega: ArrayLike = 0.0, events: bool = True
     ) -> Events | None:
-        """Advance all plants; the base moves as e = E sin(phase + omega t), and its phase goes on from call to call.
+        """Advance all plants; the base moves as e = E sin(phase + omega t), and its phase continues from call to call.
 
         Parameters
         ----------

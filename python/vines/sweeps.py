@@ -33,7 +33,7 @@ def sweep(
 ) -> "xarray.Dataset":
     """Compute one plant per cell, write the results to a Zarr store as they are computed, and open it.
 
-    The store goes on where it ended, and has the same bytes as that of `vines sweep`; docs/scale.md describes it.
+    An interrupted store is continued. It has the same bytes as that of `vines sweep`; docs/scale.md describes it.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def sweep(
     OSError
         The store cannot be written. Complete chunks stay.
     KeyboardInterrupt
-        Ctrl-C. Complete chunks stay, and the same call goes on.
+        Ctrl-C. Complete chunks stay, and the same call continues.
 
     Examples
     --------

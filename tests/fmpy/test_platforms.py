@@ -52,7 +52,7 @@ def test_without_any_toolchain_the_missing_target_is_named(tmp_path, apt):
 @pytest.mark.parametrize(
     ("platforms", "words"),
     [
-        ("linux64,amiga", "`amiga` is no platform; there are linux64, linux32, aarch64-linux, win64"),
+        ("linux64,amiga", "`amiga` is not a platform; known are linux64, linux32, aarch64-linux, win64"),
         ("win64,win64", "the platform win64 was given twice"),
     ],
 )

@@ -203,7 +203,7 @@ typedef struct PhaseLockMove {
   PhaseLockReal amplitude;
   // Expected change of the frequency, rad/s; 0: none.
   PhaseLockReal omega;
-  // Growth of the setpoint at the end, m/s, at which it goes on from there; 0 to hold it.
+  // Growth rate of the setpoint at the end of the move and after it, m/s; 0 to hold it.
   PhaseLockReal growth;
 } PhaseLockMove;
 

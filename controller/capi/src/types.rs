@@ -220,6 +220,6 @@ pub struct PhaseLockMove {
     pub amplitude: PhaseLockReal,
     /// Expected change of the frequency, rad/s; 0: none.
     pub omega: PhaseLockReal,
-    /// Growth of the setpoint at the end, m/s, at which it goes on from there; 0 to hold it.
+    /// Growth rate of the setpoint at the end of the move and after it, m/s; 0 to hold it.
     pub growth: PhaseLockReal,
 }

@@ -222,7 +222,7 @@ impl Component for Controller {
                     "step",
                     format_args!(
                         "a step of {step} s holds more samples than {name} has values: sample_time = {sample_time} s; \
-                         expected are steps of at most sample_time, or input derivatives"
+                         expected steps of at most sample_time, or input derivatives"
                     ),
                 );
             }

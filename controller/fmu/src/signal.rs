@@ -1,10 +1,10 @@
 //! A sensor channel between communication points.
 //!
 //! A master sets inputs when a step begins, and the samples lie on a grid of their own. Where a sample does not fall on a
-//! communication point, the value set there is up to a step old. A phase detector takes samples of irregular age for a
-//! modulation of the signal, and the lock moves. So the channel is extrapolated to the instant of the sample: by the
+//! communication point, the value set there is up to a step old. A phase detector takes the irregular age of the samples for
+//! a modulation of the signal, and the lock shifts. Therefore the channel is extrapolated to the instant of the sample: by the
 //! derivatives that the master has given, else by the parabola through the last three communication points. (A straight
-//! line shifts the lock as little, but modulates the amplitude by its error of second order, so that no lock is told.)
+//! line shifts the lock as little, but modulates the amplitude by its error of second order, so that no lock is reported.)
 
 /// The highest order of input derivatives that is followed.
 pub(crate) const DERIVATIVES: usize = 3;
@@ -33,12 +33,12 @@ impl Signal {
         self.given = true;
     }
 
-    /// Whether the master has said how the signal goes on.
+    /// Whether the master has given the derivatives of the signal.
     pub fn is_given(&self) -> bool {
         self.given
     }
 
-    /// Prepares a step of `step` s from `time`, s. Where no derivatives were given, the steps before this one tell them; a
+    /// Prepares a step of `step` s from `time`, s. Where no derivatives were given, they follow from the steps before this one; a
     /// value is held where a step is longer than `longest` s.
     pub fn begin(&mut self, time: f64, step: f64, longest: f64) {
         if self.given || step > longest {

@@ -1,4 +1,4 @@
-//! What FMI 2.0 asks of a description beyond its shape, each fault as a line that says what is expected.
+//! What FMI 2.0 requires of a description beyond its schema; each fault is a line that says what is expected.
 
 use std::collections::HashMap;
 
@@ -18,7 +18,7 @@ pub(crate) fn check(description: &Description, table: &Table, faults: &mut Vec<S
         }
     }
     units(description, table, faults);
-    // Places in the list mean nothing while some of it could not be read.
+    // Positions in the list are wrong if a part of it could not be read.
     if table.variables.len() == description.variables.len() {
         structure(description, table, faults);
     }
@@ -27,20 +27,20 @@ pub(crate) fn check(description: &Description, table: &Table, faults: &mut Vec<S
 fn identity(description: &Description, table: &Table, faults: &mut Vec<String>) {
     if description.fmi_version != "2.0" {
         let version = &description.fmi_version;
-        faults.push(format!("fmiVersion is {version:?}; expected is \"2.0\""));
+        faults.push(format!("fmiVersion is {version:?}; expected \"2.0\""));
     }
     let identifier_like = |text: &str| identifier(text) == text;
     if description.co_simulation.is_none() {
         faults.push("CoSimulation is missing".into());
     } else if !identifier_like(&table.identifier) {
         let name = &table.identifier;
-        faults.push(format!("modelIdentifier is {name:?}; expected is a C identifier"));
+        faults.push(format!("modelIdentifier is {name:?}; expected a C identifier"));
     }
     if let (Some(exchange), Some(steps)) = (&description.model_exchange, &description.co_simulation)
         && exchange != steps
     {
         faults.push(format!(
-            "ModelExchange has modelIdentifier {:?}; expected is that of CoSimulation, {:?}",
+            "ModelExchange has modelIdentifier {:?}; expected that of CoSimulation, {:?}",
             exchange, steps
         ));
     }
@@ -198,7 +198,7 @@ fn states(
 }
 
 impl Table {
-    /// Places, counted from 1, of the variables that `wanted` picks.
+    /// Indices, from 1, of the variables that `wanted` selects.
     fn places(&self, wanted: impl Fn(&Variable) -> bool) -> Vec<usize> {
         let numbered = self.variables.iter().zip(1..);
         numbered
@@ -247,7 +247,7 @@ fn in_range(what: &str, place: usize, table: &Table, faults: &mut Vec<String>) {
     let count = table.variables.len();
     if !(1..=count).contains(&place) {
         faults.push(format!(
-            "{what} {place} is no index of a variable; there are 1 to {count}"
+            "{what} {place} is not the index of a variable; allowed are 1 to {count}"
         ));
     }
 }

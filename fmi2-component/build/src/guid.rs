@@ -1,4 +1,4 @@
-//! A GUID that follows from the variable table, so that no library meets a description that it was not built with.
+//! A GUID that follows from the variable table, so that no library is used with another description.
 
 use std::fmt::Write;
 
@@ -10,7 +10,7 @@ use crate::table::Table;
 /// The namespace of these GUIDs: any fixed one will do.
 const NAMESPACE: Uuid = Uuid::from_u128(0x5c1d_1f8e_2f0a_4d5b_9a67_3e1b_7c90_42d1);
 
-/// The GUID of a table. Descriptions do not count: a better word is no other model.
+/// The GUID of a table. Descriptions have no effect on it: other words do not make another model.
 pub(crate) fn guid(table: &Table) -> String {
     let mut text = format!(
         "{}\n{}\n{:?}\n{:?} {}\n",

@@ -1,4 +1,4 @@
-//! Rust identifiers out of structured names (FMI 2.0, clause 2.2.9).
+//! Rust identifiers from structured names (FMI 2.0, clause 2.2.9).
 
 /// The name itself, with every run of other characters than letters, digits and `_` made one `_`, and none at the end:
 /// `der(q1)` becomes `der_q1`. `M` and `m` remain two. A keyword gets a trailing `_`.

@@ -1,4 +1,4 @@
-//! Build-time reader of `modelDescription.xml`: what the description says of a model is written once, there.
+//! Build-time reader of `modelDescription.xml`, so that the facts of a model are written once, in its description.
 //!
 //! `build.rs` of a component has two lines:
 //!
@@ -41,7 +41,7 @@ use table::Table;
 /// Reads the description at `path`, relative to the package, and writes `$OUT_DIR/variables.rs`. For `build.rs`.
 ///
 /// # Panics
-/// If the description is refused or a file cannot be read or written, and that is how a build script says so.
+/// If the description is refused, or a file cannot be read or written: build scripts report errors by a panic.
 pub fn generate(path: impl AsRef<Path>) {
     let path = path.as_ref();
     println!("cargo:rerun-if-changed={}", path.display());

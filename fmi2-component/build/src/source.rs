@@ -125,7 +125,7 @@ impl ::fmi2_component::Key for {kind:?} {{
     )
 }
 
-/// How a variable is found by its value reference: by its place in a table, unless that would be mostly holes.
+/// How a variable is found by its value reference: by its index in a table, unless most entries would be empty.
 fn find(out: &mut String, kind: Kind, variables: &[&Variable], variants: &[String]) -> std::fmt::Result {
     let named = || variables.iter().map(|v| v.value_reference).zip(variants);
     let places = variables.iter().map(|v| v.value_reference as usize + 1);

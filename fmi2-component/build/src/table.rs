@@ -60,7 +60,7 @@ impl Table {
         self.variables.iter().filter(move |v| v.kind == kind)
     }
 
-    /// Fills in defaults; complains about what it cannot make sense of.
+    /// Fills in defaults; reports what it cannot interpret.
     pub fn new(description: &Description, faults: &mut Vec<String>) -> Self {
         let types = &description.types;
         Self {
@@ -83,7 +83,7 @@ impl Table {
     }
 }
 
-/// What `Derivatives` lists, with the states that the derivatives are of; `check` complains about what is missing.
+/// What `Derivatives` lists, with the states of the derivatives; `check` reports what is missing.
 fn states(description: &Description) -> Vec<(usize, usize)> {
     let variables = &description.variables;
     let unknowns = &description.structure.derivatives;

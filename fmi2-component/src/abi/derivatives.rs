@@ -142,7 +142,7 @@ fn check<K: Key>(key: K, order: c_int, causality: Causality, expected: &str) -> 
     let variable = key.variable();
     if variable.causality != causality {
         return Err(Refusal::error(format!(
-            "{} has no such derivative; expected is {expected}",
+            "{} has no such derivative; expected {expected}",
             variable.name
         )));
     }

@@ -1,4 +1,4 @@
-//! The way in from C: from a pointer to an instance, and from a result or a panic to a status.
+//! Entry from C: from a pointer to an instance, and from a result or a panic to a status.
 
 use std::any::Any;
 use std::cell::UnsafeCell;
@@ -11,7 +11,7 @@ use crate::life_cycle::{Function, State};
 use crate::refusal::{Refusal, Severity};
 use crate::status::Status;
 
-/// What an `fmi2Component` points at.
+/// Target of an `fmi2Component`.
 pub(super) struct Handle<C> {
     /// A call is under way: a logger that calls back into its own instance is refused.
     busy: AtomicBool,
@@ -77,9 +77,9 @@ pub(super) unsafe fn free<C>(component: CComponent) {
     if handle.busy.load(Ordering::Relaxed) {
         return;
     }
-    // SAFETY: the pointer came out of a box, and by contract nobody uses it any more.
+    // SAFETY: the pointer came out of a box, and by contract no caller uses it any more.
     let handle = unsafe { Box::from_raw(pointer) };
-    // A component may panic when it is dropped; there is nobody left to tell.
+    // A component may panic when it is dropped; there is no instance left that could log it.
     let _ = catch_unwind(AssertUnwindSafe(|| drop(handle)));
 }
 
@@ -97,10 +97,7 @@ fn refuse<C>(instance: &mut Instance<C>, name: &str, refusal: &Refusal) -> Statu
 fn illegal<C>(instance: &Instance<C>, function: Function, name: &str) -> Status {
     let state = instance.session.state;
     let (status, expected) = match (state, function) {
-        (State::Fatal, _) => (
-            Status::Fatal,
-            "nothing but fmi2FreeInstance is of use any more".to_owned(),
-        ),
+        (State::Fatal, _) => (Status::Fatal, "only fmi2FreeInstance is legal now".to_owned()),
         _ => (Status::Error, whereabouts(instance, function)),
     };
     instance.log.reason(
@@ -129,7 +126,7 @@ fn poison<C>(instance: &mut Instance<C>, name: &str, panic: &(dyn Any + Send)) -
     let what = panic_message(panic);
     instance.log.reason(
         Status::Fatal,
-        &format!("{name}: the component has panicked ({what}) and is of no use any more"),
+        &format!("{name}: the component has panicked ({what}) and can only be freed"),
     );
     Status::Fatal
 }

@@ -65,7 +65,7 @@ pub unsafe fn do_step<C: Component>(component: CComponent, time: f64, step: f64)
     unsafe { enter(component, Function::DoStep, "fmi2DoStep", body) }
 }
 
-/// `fmi2CancelStep`: never legal, since no step goes on in the background.
+/// `fmi2CancelStep`: never legal, since no step continues in the background.
 pub unsafe fn cancel_step<C: Component>(component: CComponent) -> Status {
     let body = |_: &mut Instance<C>| Ok(());
     // SAFETY: the contract is passed on.

@@ -1,4 +1,4 @@
-//! Birth and death (FMI 2.0, clause 2.1.5).
+//! Instantiation and release (FMI 2.0, clause 2.1.5).
 
 use std::ffi::{CStr, c_int};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -19,7 +19,8 @@ use crate::status::Status;
 const MODEL_EXCHANGE: c_int = 0;
 const CO_SIMULATION: c_int = 1;
 
-/// `fmi2Instantiate`; `select` is there for a component that has the interface of model exchange too. The resource location is not used, so that every spelling of it is fine.
+/// `fmi2Instantiate`; a component with the interface of model exchange has `select`. The resource location is not used, so that
+/// every notation of it is accepted.
 pub unsafe fn instantiate<C: Component>(
     instance_name: CString,
     fmu_type: c_int,
@@ -75,18 +76,18 @@ unsafe fn log<C: Component>(functions: &CallbackFunctions, name: &CStr) -> Log {
 
 fn check_name(name: &CStr) -> Result<(), Refusal> {
     if name.is_empty() {
-        return Err(Refusal::error("instanceName is NULL or empty; expected is a name"));
+        return Err(Refusal::error("instanceName is NULL or empty; expected a name"));
     }
     Ok(())
 }
 
-/// What selects the interface that the master wants.
+/// Selects the interface that the master has requested.
 fn interface<C>(fmu_type: c_int, select: Select<C>) -> Result<Select<C>, Refusal> {
     match (fmu_type, select) {
         (CO_SIMULATION, _) => Ok(None),
         (MODEL_EXCHANGE, Some(_)) => Ok(select),
         (_, Some(_)) => Err(Refusal::error(format!(
-            "fmuType = {fmu_type} is refused; there are {MODEL_EXCHANGE} (model exchange) and {CO_SIMULATION} (co-simulation)"
+            "fmuType = {fmu_type} is refused; allowed are {MODEL_EXCHANGE} (model exchange) and {CO_SIMULATION} (co-simulation)"
         ))),
         (_, None) => Err(Refusal::error(format!(
             "fmuType = {fmu_type} is refused; the component is for co-simulation ({CO_SIMULATION}) only"

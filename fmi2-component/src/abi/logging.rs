@@ -1,4 +1,4 @@
-//! Which log lines the master wants (FMI 2.0, clause 2.1.5).
+//! Which log lines the master has requested (FMI 2.0, clause 2.1.5).
 
 use super::entry::enter;
 use super::pointers::{input, text};

@@ -190,6 +190,6 @@ fn counted(name: &str, count: usize, expected: usize) -> Result<(), Refusal> {
         return Ok(());
     }
     Err(Refusal::error(format!(
-        "{name} = {count} is refused; expected is {expected}"
+        "{name} = {count} is refused; expected {expected}"
     )))
 }

@@ -6,7 +6,7 @@ use std::mem::MaybeUninit;
 
 use crate::refusal::Refusal;
 
-/// No call needs more elements; a larger count is a negative number or garbage.
+/// No call needs more elements; a larger count is a negative or uninitialised number.
 const MOST: usize = 1 << 20;
 
 /// The elements of an array that is read.
@@ -120,10 +120,10 @@ fn refuse_one<T, U>((first, second): (*const T, *const U), count: usize, what: &
 #[cold]
 fn refuse(null: bool, count: usize, what: &str) -> Refusal {
     Refusal::error(if null {
-        format!("{what} is NULL; expected is an array of {count}")
+        format!("{what} is NULL; expected an array of {count}")
     } else if count > MOST {
         format!("the count of {what} is {count}; allowed are at most {MOST}")
     } else {
-        format!("{what} is not aligned; expected is an array of {count}")
+        format!("{what} is not aligned; expected an array of {count}")
     })
 }

@@ -42,7 +42,7 @@ pub unsafe fn get_real_status<C: Component>(component: CComponent, kind: c_int, 
     unsafe { answer::<C, _>(component, "fmi2GetRealStatus", kinds, value, |s| s.time) }
 }
 
-/// `fmi2GetIntegerStatus`: there is nothing of that type to be asked.
+/// `fmi2GetIntegerStatus`: no status is of that type.
 pub unsafe fn get_integer_status<C: Component>(component: CComponent, kind: c_int, value: *mut c_int) -> Status {
     let name = "fmi2GetIntegerStatus";
     // SAFETY: the contract is passed on.
@@ -60,7 +60,7 @@ pub unsafe fn get_boolean_status<C: Component>(component: CComponent, kind: c_in
     }
 }
 
-/// `fmi2GetStringStatus`: what is pending, which is nothing.
+/// `fmi2GetStringStatus`: nothing is ever pending.
 pub unsafe fn get_string_status<C: Component>(component: CComponent, kind: c_int, value: *mut CString) -> Status {
     let name = "fmi2GetStringStatus";
     // SAFETY: the contract is passed on.

@@ -55,7 +55,7 @@ pub unsafe fn set_string<C: Component>(
             instance.check_settable(key)?;
             // SAFETY: NULL or a C string, by the standard.
             let value = unsafe { text(value) }
-                .ok_or_else(|| Refusal::error(format!("{} = NULL; expected is text", key.variable().name)))?;
+                .ok_or_else(|| Refusal::error(format!("{} = NULL; expected text", key.variable().name)))?;
             settings.push((key, value));
         }
         instance.change(|component| {

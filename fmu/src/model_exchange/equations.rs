@@ -1,21 +1,21 @@
-//! The rig's differential equations between events, and what follows from its state at one instant: written once, for
-//! numbers and for numbers with a derivative, so that partial derivatives are those of these very lines.
+//! The rig's differential equations between events, and the outputs at one instant: written once, for numbers and for dual
+//! numbers, so that partial derivatives follow from the same lines.
 //!
-//! The damper feels the velocity of the base, and nobody knows the slope of a signal that only comes as values. So the
-//! states are not velocities but *reduced* velocities, from which the share that the damper has passed on is taken off:
+//! The damper force contains the velocity of the base, which is unknown for a signal that is given by values. The states are therefore
+//! *reduced* velocities: velocities less the contribution of the base through the damper:
 //!
 //! ```text
 //! free:   u1 = q1' - (c/M) base       u1' = (k (base - q1) - c q1')/M        u2 = q2'            u2' = 0
 //! stuck:  u1 = q' - c/(M + m) base    u1' = (k (base - q) - c q')/(M + m)    u2, u2' the same
 //! ```
 //!
-//! No slope of the base is needed, and where the base jumps, `u1` does not: the velocity jump `c Δe/M` comes by itself.
+//! No derivative of the base displacement is needed. Where the base jumps, `u1` does not: the velocity jump `c Δe/M` follows.
 
 pub use super::dual::{Dual, Scalar};
 
 use lovines::contact::Wall;
 
-/// Everything that the rig is made of, at one instant.
+/// Parameters, drive and state of the rig at one instant.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Instant<T> {
     /// Primary mass, kg.
@@ -91,7 +91,7 @@ impl<T: Scalar> Instant<T> {
         }
     }
 
-    /// What the base's displacement takes off the velocity of the primary mass, and off that of the particle.
+    /// Contributions of the base displacement to the velocities of the primary mass and of the particle.
     fn reductions(&self) -> (T, T) {
         let passed_on = self.damping / self.moved_mass() * self.base();
         match self.contact {
@@ -124,7 +124,7 @@ impl<T: Scalar> Instant<T> {
         }
     }
 
-    /// Acceleration of the primary mass, or of both, m/s²; the slope of the signal is in it as far as it is known.
+    /// Acceleration of the primary mass, or of both, m/s²; contains the derivative of the signal as far as it is known.
     pub fn acceleration(&self) -> T {
         let passed_on = self.damping / self.moved_mass() * self.base_velocity();
         self.reduced_accelerations().0 + passed_on

@@ -1,16 +1,15 @@
-//! The rig as a hybrid system, for whoever integrates it: differential equations ([`crate::model_exchange::equations`]), functions whose
-//! zeros are events, and the jumps at events.
+//! The rig as a hybrid system for an integrator: differential equations ([`crate::model_exchange::equations`]), functions whose zeros
+//! are events, and the jumps at events.
 //!
-//! Contact is a matter of rounding for an integrator: it stops a little before or behind a zero. Walls are therefore
-//! told to be touched [`DEPTH`] half-widths behind where they stand, and a wall to have ceased to push a little below no
-//! push at all. A function that is not of use in the present contact is held above zero.
+//! An integrator stops a little before or behind a zero. A contact is therefore reported [`DEPTH`] half-widths behind the wall, and a release
+//! slightly below a contact force of zero. A function without a meaning in the present contact state is held above zero.
 //!
 //! An integrator cannot follow a chatter to its accumulation point. A rebound that would lift the particle less than
 //! [`LOWEST_HOP`] half-widths off its wall, and whose chatter is over within [`LONGEST_CHATTER`] of the rig's time, ends in
 //! contact at once; what that neglects is of third order in the rebound's speed, 1e-15 here.
 //!
-//! The wall's push depends on the velocity of the base. That of the built-in oscillator is known while its amplitude is
-//! held, that of a signal is not, and is taken for zero; the plant in closed form ([`lovines::plant`]) has no such limit.
+//! The contact force depends on the velocity of the base. That of the built-in oscillator is known while its amplitude is
+//! held; that of a signal is unknown, and taken for zero; the plant in closed form ([`lovines::plant`]) has no such limit.
 
 use crate::model_exchange::equations::Instant;
 use lovines::base_motion::Drive;
@@ -18,7 +17,7 @@ use lovines::contact::{ImpactLaw, Resolution, Wall};
 use lovines::parameters::{InvalidValue, Parameters};
 use lovines::plant::{Event, Plant, State, Totals};
 
-/// How far behind a wall a touch is told, as a fraction of the half-width.
+/// Distance behind a wall at which a contact is reported, as a fraction of the half-width.
 pub const DEPTH: f64 = 1e-12;
 /// The lowest hop that is followed, as a fraction of the half-width.
 pub const LOWEST_HOP: f64 = 1e-10;
@@ -40,7 +39,7 @@ pub struct States {
     pub phase: f64,
 }
 
-/// The rig between two looks of an integrator.
+/// The rig between two calls of an integrator.
 #[derive(Clone, Copy, Debug, serde::Serialize, serde::Deserialize)]
 pub struct Hybrid {
     parameters: Parameters,
@@ -55,7 +54,7 @@ pub struct Hybrid {
 }
 
 impl Hybrid {
-    /// The rig at `start`, at rest as to its contact; [`Self::resolve`] finds out what that means.
+    /// The rig at `start`; [`Self::resolve`] determines its contact state.
     ///
     /// # Errors
     /// As for [`Plant::new`].
@@ -73,7 +72,7 @@ impl Hybrid {
         Ok(hybrid)
     }
 
-    /// The rig as it stands.
+    /// The present rig.
     pub fn instant(&self) -> Instant<f64> {
         let p = &self.parameters;
         let States { q1, u1, q2, u2, phase } = self.states;
@@ -130,7 +129,7 @@ impl Hybrid {
         self.event_functions().iter().any(|&value| value <= 0.0)
     }
 
-    /// Says that an event begins: until [`Self::resolve`] the base may jump.
+    /// Begins an event: until [`Self::resolve`] the base may jump.
     pub fn begin_event(&mut self) {
         self.base_before = Some(self.instant().base());
     }
@@ -160,7 +159,7 @@ impl Hybrid {
     /// Takes over other parameters; displacements and velocities stay.
     ///
     /// # Errors
-    /// Parameters that make no sense; the old ones stay.
+    /// Parameters that are not allowed; the old ones stay.
     pub fn set_parameters(&mut self, parameters: Parameters) -> Result<(), InvalidValue> {
         parameters.validate()?;
         let Instant { dq1, dq2, .. } = self.instant();
@@ -225,7 +224,7 @@ impl Hybrid {
         self.set_velocities(touch.primary, touch.particle);
     }
 
-    /// Whether a particle that leaves `wall` at `speed` is in truth at rest on it.
+    /// Whether a particle that leaves `wall` at `speed` counts as at rest on it.
     fn rests(&self, law: &ImpactLaw, wall: Wall, primary: f64, speed: f64) -> bool {
         let (b, fast) = self.scales();
         let now = Instant { dq1: primary, ..self.instant() };

@@ -20,7 +20,7 @@ pub struct Movement {
 }
 
 impl Movement {
-    /// The movement of `plant` as it stands at the end of an advance.
+    /// The motion of `plant` at the end of an advance.
     pub fn of(plant: &Plant) -> Self {
         let (p, state) = (plant.parameters(), plant.state());
         let base = rates_of(&plant.base());

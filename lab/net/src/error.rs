@@ -19,7 +19,7 @@ pub enum LinkError {
     Address { address: String, message: String },
     /// An address beyond this machine, without permission.
     #[error(
-        "{address} is not an address of this machine. Use --key on both sides; without it, everyone who can reach the address can drive the \
+        "{address} is not a loopback address. Use --key on both sides; without it, everyone who can reach the address can drive the \
          rig, so use --allow-remote only on a network where everyone may do so"
     )]
     Remote { address: SocketAddr },

@@ -7,7 +7,7 @@ use hdrhistogram::Histogram;
 use serde::ser::SerializeStruct;
 use serde::{Serialize, Serializer};
 
-/// Largest lateness that is told apart, ns.
+/// Largest lateness that the histogram resolves, ns.
 const LONGEST: u64 = 60_000_000_000;
 /// Digits of a lateness.
 const DIGITS: u8 = 3;

@@ -13,7 +13,7 @@ impl Address {
             Some(("udp", place)) => Ok(Self::Udp(resolve(place, scope)?)),
             _ => Err(LinkError::Address {
                 address: text.into(),
-                message: "expected is tcp://HOST:PORT or udp://HOST:PORT".into(),
+                message: "expected tcp://HOST:PORT or udp://HOST:PORT".into(),
             }),
         }
     }
@@ -24,7 +24,7 @@ pub fn resolve(text: &str, scope: BindScope) -> Result<SocketAddr, LinkError> {
     let failed = |message: String| LinkError::Address { address: text.into(), message };
     let mut found: Vec<_> = text
         .to_socket_addrs()
-        .map_err(|error| failed(format!("{error}; expected is HOST:PORT")))?
+        .map_err(|error| failed(format!("{error}; expected HOST:PORT")))?
         .collect();
     found.sort_by_key(SocketAddr::is_ipv6);
     let address = *found.first().ok_or_else(|| failed("the name has no address".into()))?;

@@ -17,7 +17,7 @@ Leads the response from level to level, and measures the drive and the frequency
 With resonance.definition = \"peak\" each level is held at three phases, controller.phase_target and 14 degrees on both sides of it: at a
 constant response, the drive is smallest at the peak. `off target` is then the phase of the peak less controller.phase_target.
 Numbers after ± are standard uncertainties; those of sigma and G hold at the C of the same line. A level that the response does not
-reach, because the drive is at a limit, is named as such.
+reach, because the drive is at a limit, is marked as not reached.
 
 Examples:
   vines backbone                                          29 levels from C = 0.7 down to 0.14
@@ -36,7 +36,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     experiment: ExperimentArguments,
 
-    /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), or udp://HOST:PORT (in real time)
+    /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), udp://HOST:PORT or helic://HOST[:PORT] (in real time)
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     rig: Endpoint,
 

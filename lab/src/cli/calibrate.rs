@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     other_rigs: bool,
 
-    /// Folder for the figure; made if it is not there
+    /// Folder for the figure; created if it does not exist
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
 

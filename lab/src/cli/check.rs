@@ -19,11 +19,11 @@ Drives the rig at a hundredth of the drive for 24 periods with the loop open, an
 those of the scene's linear resonator at rest:
   gain   over the expected one; a wrong unit shows as a power of ten
   phase  less the expected one, degrees; 180 for a reversed sensor
-  delay  the same in samples; of the response it contains what a wrong natural frequency adds
+  delay  the same in samples; that of the response includes the effect of a wrong natural frequency
   noise  RMS of everything else, and the RMS without a drive (floor), m
-Below the table: the linear response as it grew, and the gains that follow from it and from controller.bandwidth, the only tuning
+Below the table: the linear response from its growth, and the gains that follow from it and from controller.bandwidth, the only tuning
 parameter, with their phase margin.
-The exit code is 1 unless all are as expected. `vines identify` and `vines backbone` check every rig that is not a simulation first.
+The exit code is 1 unless all of these are as expected. `vines identify` and `vines backbone` check every rig that is not a simulation first.
 
 Examples:
   vines check --rig udp://127.0.0.1:5510
@@ -36,7 +36,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
 
-    /// The rig: `built-in` (at rest), an FMU, tcp://HOST:PORT or udp://HOST:PORT
+    /// The rig: `built-in` (at rest), an FMU, tcp://HOST:PORT, udp://HOST:PORT or helic://HOST[:PORT]
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     rig: Endpoint,
 

@@ -64,7 +64,7 @@ pub(super) struct OpenRig {
 }
 
 impl OpenRig {
-    /// Ends the session of a rig in real time. Its report tells how it kept its time.
+    /// Ends the session of a rig in real time. Its report has the missed deadlines.
     pub(super) fn close(self) -> Option<Timing> {
         drop(self.rig);
         self.timing.get().copied()

@@ -12,7 +12,7 @@ pub(super) struct ExperimentArguments {
     #[command(flatten)]
     scene: SceneArguments,
 
-    /// Folder for the results; made if it is not there
+    /// Folder for the results; created if it does not exist
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
 

@@ -41,7 +41,7 @@ impl Failure {
         }
     }
 
-    /// A rig in real time did not keep its time: exit code 3.
+    /// A rig in real time missed too many deadlines: exit code 3.
     pub(super) fn late(message: impl Display) -> Self {
         Self { code: 3, message: message.to_string() }
     }

@@ -28,7 +28,8 @@ Examples:
   vines identify --controller mine.fmu             another controller on the same plant
   vines identify --rig udp://127.0.0.1:5510        a rig in real time across the network; see `vines rig`
 
-Without --rig, writes LoViNes.fmu and PhaseLock.fmu and runs the first; then writes identification.json, backbone.csv, backbone.svg and sim.svg.";
+Writes identification.json, backbone.csv, backbone.svg and sim.svg. Without --rig, it first writes LoViNes.fmu and PhaseLock.fmu,
+and runs LoViNes.fmu.";
 
 /// Lock the plant at phase resonance, let it decay, and identify its backbone
 #[derive(Debug, Args)]
@@ -37,8 +38,8 @@ pub(super) struct Arguments {
     #[command(flatten)]
     experiment: ExperimentArguments,
 
-    /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), or udp://HOST:PORT (in real time) [default: this program's plant FMU, packed into the
-    /// folder of the results]
+    /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), udp://HOST:PORT or helic://HOST[:PORT] (in real time)
+    /// [default: this program's plant FMU, packed into the folder of the results]
     #[arg(long, value_name = "ENDPOINT")]
     rig: Option<Endpoint>,
 

@@ -28,9 +28,9 @@ Every cell is one plant, driven at a fixed frequency from the scene's start:
 A cell is followed until it repeats itself, or for --periods; the table has the periods followed, the duration of the transient,
 the recurrence, the exponent with its standard error, the share of captured impacts, and how often the particle sticks to a wall.
 
-Chaos may end, after a time that chance decides: modulated and chaotic cells are so for --periods in all of 1 + --confirmations motions
-(docs/regimes.md says how often it ends later). The column `coexisting` has the regimes of motions that differ.
-Where several regimes are stable the start decides; a particle at rest may stay so where a moving one does not.
+Chaos may end after a random time. A cell is named modulated or chaotic only if all of 1 + --confirmations motions remain so for
+--periods; docs/regimes.md says how often chaos ends later. The column `coexisting` has the regimes of motions that differ.
+Where several regimes are stable, the start decides: a particle at rest may remain at rest where a moving one hits the walls.
 
 Examples:
   vines map                                               sigma and G, in out/
@@ -49,7 +49,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
 
-    /// Horizontal axis: sigma, G or r, its first and last value, and how many
+    /// Horizontal axis: sigma, G or r, its first and last value, and the number of points
     #[arg(long, value_name = "AXIS=FIRST:LAST:POINTS", default_value = "sigma=-5:5:101")]
     x: Range,
 
@@ -69,12 +69,12 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", default_value_t = 1)]
     starts: usize,
 
-    /// Further motions, from starts 1e-9 apart, that must lead to the same regime where chance decides when chaos ends: in chaotic and
-    /// modulated cells, and after transients of more than 500 periods
+    /// Further motions, from starts 1e-9 apart, that must lead to the same regime in chaotic and modulated cells, and
+    /// after transients of more than 500 periods
     #[arg(long, value_name = "N", default_value_t = CONFIRMATIONS)]
     confirmations: usize,
 
-    /// Folder for the results; made if it is not there
+    /// Folder for the results; created if it does not exist
     #[arg(long, value_name = "DIR", default_value = "out")]
     out: PathBuf,
 }

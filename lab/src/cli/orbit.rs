@@ -24,7 +24,7 @@ Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon
 With --backbone or --response, orbits are followed by pseudo-arclength through folds and symmetry breaking, stable and unstable
 ones alike; --json prints all of them. --response lists the components: all of symmetric 1:1 orbits over the whole range, those that
 branch off at symmetry breakings and period doublings, three in a row (mirror images count once), and those of other patterns on
-which random starts settle. Beside those there may be more, as between chaotic motions: the output says how likely that is. A
+which random starts settle. There may be further ones, for instance within chaos: the output says how likely that is. A
 branch that is not 1:1 ends after a hundred unstable orbits in a row.
 
 Examples:
@@ -37,7 +37,7 @@ Examples:
   vines orbit --set excitation.G=1.0 --set plant.r=0.7
   vines orbit --scene scenes/dimensionless.toml --json";
 
-/// All exact symmetric 1:1 orbits (two impacts per period) at phase resonance
+/// Compute all exact symmetric 1:1 orbits (two impacts per period) at phase resonance
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {

@@ -22,7 +22,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
 
-    /// Folder for the files; made if it is not there
+    /// Folder for the files; created if it does not exist
     #[arg(long, value_name = "DIR")]
     out: PathBuf,
 
@@ -30,8 +30,8 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "DIR")]
     libraries: Option<PathBuf>,
 
-    /// Add a library for another platform, such as win64 or aarch64-linux; may be given many times. The guid inside tells
-    /// which FMU it belongs to
+    /// Add a library for another platform, such as win64 or aarch64-linux; may be repeated. The GUID in
+    /// the library determines its FMU
     #[arg(long = "binary", value_name = "PLATFORM=FILE")]
     binaries: Vec<Binary>,
 

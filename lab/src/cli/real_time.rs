@@ -1,4 +1,4 @@
-//! Options of a program that must keep its time: priority, memory and processor.
+//! Options of a program that must meet deadlines: priority, memory and processor.
 
 use clap::Args;
 

@@ -13,7 +13,8 @@ use super::{failure::Failure, progress_bar, scene_arguments::SceneArguments, wri
 
 const HELP: &str = "\
 Runs the experiment, tracks the backbone, follows the exact curves, studies the convergence, maps the regimes, and writes
-report.html: one file that opens offline in any browser and prints well, with text, figures, tables, the scene and an error budget. The figures (SVG, for light and dark backgrounds) and tables are also written as files.
+report.html: one file that opens offline in any browser and prints well, with text, figures, tables, the scene and an error budget.
+The figures (SVG, for light and dark backgrounds) and tables are also written as files.
 
 Sections of an earlier run in the folder are reused if scene, version and axes are the same.
 
@@ -29,7 +30,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     scene: SceneArguments,
 
-    /// Folder for the report; made if it is not there
+    /// Folder for the report; created if it does not exist
     #[arg(long, value_name = "DIR", default_value = "report")]
     out: PathBuf,
 

@@ -51,7 +51,7 @@ pub(super) struct Arguments {
     #[command(flatten)]
     serving: ServingArguments,
 
-    /// Write the histogram of the lateness of each session to this file (CSV; the last session stays)
+    /// Write the histogram of the lateness of each session to this file (CSV); each session overwrites it
     #[arg(long, value_name = "FILE")]
     histogram: Option<PathBuf>,
 
@@ -115,14 +115,16 @@ impl FromStr for Fault {
     type Err = String;
 
     fn from_str(text: &str) -> Result<Self, String> {
-        let (name, seconds) = text.rsplit_once('@').ok_or("expected is NAME@SECONDS")?;
+        let (name, seconds) = text
+            .rsplit_once('@')
+            .ok_or("expected NAME@SECONDS, for instance \"response sensor dead@60\"")?;
         let of_a_rig = |kind| !matches!(kind, Kind::ControllerLost | Kind::ControllerNan | Kind::PeerLost);
         let faults = FAULTS.into_iter().filter(|(_, kind)| of_a_rig(*kind));
         let known = || faults.clone().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
         let seconds = positive(seconds)?;
         match faults.clone().find(|(one, _)| *one == name) {
             Some((_, kind)) => Ok(Self { kind, seconds }),
-            None => Err(format!("no fault has this name; there are: {}", known())),
+            None => Err(format!("unknown fault; known are: {}", known())),
         }
     }
 }

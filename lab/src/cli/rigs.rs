@@ -26,7 +26,7 @@ Examples:
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
-    /// How many rigs
+    /// Number of rigs
     #[arg(long, default_value_t = 300)]
     count: usize,
 

@@ -114,7 +114,7 @@ impl ServingArguments {
 
 /// A number above 0 and at most 1e8, for seconds and metres.
 pub(super) fn positive(text: &str) -> Result<f64, String> {
-    let value: f64 = text.parse().map_err(|_| "expected is a number")?;
+    let value: f64 = text.parse().map_err(|_| "expected a number")?;
     if value > 0.0 && value <= 1e8 {
         Ok(value)
     } else {

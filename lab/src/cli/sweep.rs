@@ -1,4 +1,4 @@
-//! `vines sweep`: any numbers of a scene over grids, lists and random or Sobol designs, to a Zarr store.
+//! `vines sweep`: any parameters of a scene over grids, lists and random or Sobol designs, to a Zarr store.
 
 use std::{
     path::PathBuf,
@@ -14,7 +14,7 @@ use super::{failure::Failure, interrupt::stop_flag, progress_bar, scene_argument
 
 const HELP: &str = "\
 Axes; a key is sigma (the detuning) or section.key of a scene:
-  --axis plant.r=0.3:1:71          first : last : how many
+  --axis plant.r=0.3:1:71          first : last : number of values
   --axis plant.r=0.3,0.5,0.8       a list
   --axis start.dq2=random:-1:1     one random number per sample; with --samples and --seed
   --axis start.dq2=sobol:-1:1      one number of a Sobol sequence per sample; with --samples
@@ -27,7 +27,7 @@ Results; the regime is always computed, as by `vines map`:
   lock       the locked point: the experiment of `vines identify`, without its decay
 
 The store is a Zarr group (version 3) that xarray.open_zarr reads; docs/scale.md describes it. It is written chunk by chunk. The same
-command goes on with a sweep that was interrupted. A cell that fails has its reason in the variable `failure`.
+command continues a sweep that was interrupted. A cell that fails has its reason in the variable `failure`.
 
 Examples:
   vines sweep --axis sigma=-5:5:101 --axis excitation.G=0.1:3:59 --out map.zarr
@@ -36,7 +36,7 @@ Examples:
   vines sweep --axis plant.r=0.3:1:71 --axis plant.b=0.005:0.02:61 --results response,orbits --out gap.zarr
   vines sweep --axis sigma=-5:5:1000 --axis excitation.G=0.1:3:1000 --periods 400 --adaptive --out fine.zarr";
 
-/// Sweep over any numbers of a scene and of its start, to a Zarr store
+/// Sweep any parameters of a scene and of its start, into a Zarr store
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
@@ -75,7 +75,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "8", conflicts_with_all = ["shard", "merge"])]
     adaptive: Option<u64>,
 
-    /// Folder of the store; made if it is not there
+    /// Folder of the store; created if it does not exist
     #[arg(long, value_name = "DIR", default_value = "sweep.zarr")]
     out: PathBuf,
 
@@ -123,7 +123,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         monitor.failed.load(Relaxed),
     );
     let mut text = format!(
-        "{} cells in {} chunks: {found} were there, {computed} computed, {failed} of these failed\n",
+        "{} cells (chunks: {}): {found} already complete, {computed} computed, {failed} of these failed\n",
         plan.cells(),
         plan.chunks()
     );
@@ -139,7 +139,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         return Ok(format!("{text}Written: {}\n", arguments.out.display()));
     }
     Err(Failure::interrupted(format!(
-        "interrupted; {} has the complete chunks, and the same command goes on",
+        "interrupted; {} has the complete chunks, and the same command continues",
         arguments.out.display()
     )))
 }

@@ -11,8 +11,8 @@ use vines::{
 use super::{failure::Failure, output, scene_arguments::SceneArguments, yes_no};
 
 const HELP: &str = "\
-Everything is of first order in epsilon, except the thresholds from rest. Both branches of the slow invariant manifold are one curve over B, the particle's
-speed over b omega0; C is the amplitude of v over b, and sigma the detuning (Omega - 1)/epsilon.
+Everything is of first order in epsilon, except the thresholds from rest. Both branches of the slow invariant manifold
+are one curve over B, the particle's speed over b omega0; C is the amplitude of v over b, and sigma the detuning (Omega - 1)/epsilon.
 
 Examples:
   vines theory
@@ -20,7 +20,7 @@ Examples:
   vines theory --sigma=-1.0                       all equilibria at that detuning
   vines theory --points 500 --json > theory.json";
 
-/// First-order theory: invariant manifold, solutions at phase resonance, backbone
+/// Print first-order theory: invariant manifold, solutions at phase resonance, backbone
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
 pub(super) struct Arguments {

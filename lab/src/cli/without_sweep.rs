@@ -4,7 +4,7 @@ use clap::Args;
 
 use super::failure::Failure;
 
-/// Sweep over any numbers of a scene and of its start, to a Zarr store: run `scripts/sweep`
+/// Sweep any parameters of a scene and of its start, into a Zarr store: run `scripts/sweep`
 #[derive(Debug, Args)]
 #[command(disable_help_flag = true)]
 pub(super) struct Arguments {
@@ -15,7 +15,7 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     Err(Failure::input(format!(
-        "this program was built without sweeps; `scripts/sweep {}` builds it with them and goes on",
+        "this program was built without sweeps; `scripts/sweep {}` builds one with sweeps and runs it",
         arguments.options.join(" ")
     )))
 }

@@ -24,7 +24,7 @@ impl FromStr for Binary {
             .ok_or("expected PLATFORM=PATH, for instance win64=lovines_fmu.dll")?;
         let platform = Platform::of_folder(folder).ok_or_else(|| {
             let known = Platform::folders();
-            format!("`{folder}` is no platform; there are {known}")
+            format!("`{folder}` is not a platform; known are {known}")
         })?;
         Ok(Self { platform, path: path.into() })
     }
@@ -53,7 +53,7 @@ pub(super) fn add(fitted: &mut Vec<Fitted>, others: &[Binary], components: &[Com
     Ok(())
 }
 
-/// A library tells by its guid what it belongs to.
+/// The GUID in a library determines its component.
 fn fit(binary: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
     let content =
         std::fs::read(&binary.path).map_err(|source| PackError::Read { path: binary.path.clone(), source })?;
@@ -62,7 +62,7 @@ fn fit(binary: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
         return Err(binary.refused(format!("is {found}, but {} needs {}", platform.folder, platform.name)));
     }
     if !exports(&content, "fmi2Instantiate") {
-        return Err(binary.refused("has no function fmi2Instantiate, so it is no FMI 2.0 component"));
+        return Err(binary.refused("has no function fmi2Instantiate, so it is not an FMI 2.0 component"));
     }
     let belongs = |component: &Component| {
         let guid = component.guid();
@@ -71,7 +71,7 @@ fn fit(binary: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
     let Some(component) = components.iter().position(belongs) else {
         let names: Vec<_> = components.iter().map(|one| one.identifier).collect();
         return Err(binary.refused(format!(
-            "belongs to none of {} with the variables that they have now: it holds the guid of none; build it anew",
+            "belongs to none of {}: it contains the GUID of none of them, because it was built from other variables; build it again",
             names.join(", ")
         )));
     };

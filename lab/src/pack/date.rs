@@ -9,7 +9,7 @@ use super::PackError;
 /// By convention of reproducible builds, the date of the sources in seconds since 1970.
 const VARIABLE: &str = "SOURCE_DATE_EPOCH";
 
-/// The date of the sources in the format of XML, if the environment tells it.
+/// The date of the sources in the format of XML, if the environment has it.
 pub(super) fn generation() -> Result<Option<String>, PackError> {
     match env::var(VARIABLE) {
         Ok(text) if text.is_empty() => Ok(None),

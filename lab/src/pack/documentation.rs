@@ -78,7 +78,7 @@ fn page(xml: &str, material: Option<&Material>) -> Result<String, Error> {
     Ok(page.into_string())
 }
 
-/// Causalities in the order in which a reader wants them.
+/// Causalities in the order of the page.
 const SECTIONS: [(&str, &str); 5] = [
     ("parameter", "Parameters"),
     ("calculatedParameter", "Calculated parameters"),

@@ -7,8 +7,8 @@ use std::path::PathBuf;
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum PackError {
     #[error(
-        "the library of {identifier} is not there: looked for {}; build it with \
-         `cargo build --release {build_options}`, or say where it is with --libraries", path.display()
+        "the library of {identifier} was not found: {} does not exist; build it with \
+         `cargo build --release {build_options}`, or name its folder with --libraries", path.display()
     )]
     Missing {
         identifier: &'static str,
@@ -28,7 +28,7 @@ pub enum PackError {
         build_options: String,
     },
     #[error(
-        "{} has no function fmi2Instantiate, so it is no FMI 2.0 component; \
+        "{} has no function fmi2Instantiate, so it is not an FMI 2.0 component; \
          build it with `cargo build --release {build_options}`", path.display()
     )]
     NotAComponent { path: PathBuf, build_options: String },

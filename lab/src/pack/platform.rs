@@ -94,7 +94,7 @@ impl Platform {
     /// Checks the header of a library against this platform; the error says what the file is instead.
     pub(super) fn check(&self, file: &[u8]) -> Result<(), String> {
         if FileKind::parse(file).is_err() {
-            return Err("no shared library (unknown header)".into());
+            return Err("not a shared library (unknown header)".into());
         }
         // A universal library for macOS holds several.
         let mut found = Vec::new();

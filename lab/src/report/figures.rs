@@ -14,7 +14,7 @@ pub mod tracked;
 use super::figure::{Panel, Place, line};
 use super::theme::{DECAY, LOCK};
 
-/// Of the points along the decay every so many-th is drawn.
+/// One of this many points along the decay is drawn.
 const THINNED: usize = 4;
 const DECAY_LABEL: &str = "free decay, identified";
 

@@ -116,14 +116,14 @@ fn rendered(block: &Block, figures: &mut u32) -> Markup {
 fn budget(sections: &[Section]) -> Markup {
     let lines = sections.iter().flat_map(|section| &section.budget);
     let rows = lines.map(|one| [one.what.clone(), one.size.clone(), one.why.clone()]);
-    let table = Table::new("what | how far off | why, and from where").rows(rows);
+    let table = Table::new("quantity | difference | cause").rows(rows);
     html! {
         section.budget {
-            h2 { "What the numbers are worth" } "\n"
-            (table.html("The error budget."))
+            h2 { "Error budget" } "\n"
+            (table.html("Differences between results and references, with their causes."))
             p {
                 "M, k, c and m of the default scene are those of a published rig of this kind, because the study that it follows \
-                 takes ε and λ from a reference that could not be opened; b is this project’s choice, on which no dimensionless \
+                 takes ε and λ from a reference that was not available; b is this project’s choice, on which no dimensionless \
                  result depends."
             }
         }

@@ -44,7 +44,7 @@ pub enum StoreError {
     )]
     Part,
     /// Reading or writing failed.
-    #[error("cannot write to {}: {source}. Complete chunks stay; the same command goes on with the sweep", folder.display())]
+    #[error("cannot write to {}: {source}. Complete chunks stay; the same command continues the sweep", folder.display())]
     Write {
         /// The folder.
         folder: PathBuf,

@@ -158,7 +158,7 @@ fn derivatives_and_outputs_by_states_and_inputs() {
 #[test]
 fn what_is_no_unknown_and_no_known_is_refused() {
     let m = Master::ready(&Fmu::plant());
-    for (unknown, known, word) in [(0, 6, "no unknown"), (9, 13, "no known")] {
+    for (unknown, known, word) in [(0, 6, "not an unknown"), (9, 13, "not a known")] {
         let f = m.f.fmi2GetDirectionalDerivative;
         // SAFETY: one element each.
         let status = unsafe { f(m.c, &unknown, 1, &known, 1, &1.0, &mut 0.0) };

@@ -62,7 +62,7 @@ impl TryFrom<Written> for Name {
             (Some(_), Some(_)) => return Err(format!("{name}: give a unit or a factor, not both")),
             (Some(unit), None) => of(&unit).ok_or_else(|| {
                 format!(
-                    "{name}: the unit {unit} is unknown; there are {}, or give a factor",
+                    "{name}: the unit {unit} is unknown; known are {}, or give a factor",
                     known()
                 )
             })?,

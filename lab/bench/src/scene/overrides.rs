@@ -24,7 +24,7 @@ pub struct Override {
 #[derive(Debug, thiserror::Error)]
 pub enum SyntaxError {
     /// Not TOML.
-    #[error("{}; expected section.key=value, for instance plant.r=0.7", .0.message())]
+    #[error("{}; expected section.key=value, for instance plant.r=0.7 or 'resonance.sensor=\"q1\"'", .0.message())]
     Toml(#[from] toml::de::Error),
     /// TOML, but not one key of one section.
     #[error("expected one section.key=value, for instance plant.r=0.7")]

@@ -46,7 +46,7 @@ pub fn figure(p: &Dimensionless) -> Figure {
     Figure::single(panel)
 }
 
-/// Beside the fold, which tells the curves apart; a fold near the axis is named where its curve comes in from the left.
+/// Beside the fold, where the curves are distinct; for a fold near the axis, where its curve enters from the left.
 fn label_place(flow: &SlowFlow, points: &[Marked]) -> Place {
     let fold = flow.backbone_at(flow.manifold.b_min());
     if fold.c > 0.05 {
