@@ -18,8 +18,7 @@ pub(super) const TERMS: usize = 8;
 /// What follows from an oscillator and a frequency.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Coefficients {
-    /// The key, rad/s; none before the first use.
-    key: Option<f64>,
+    /// The key, rad/s; no spacing before the first use.
     pub omega: f64,
     pub forcing: Forcing,
     /// Farthest distance from a propagator's time, s.
@@ -38,7 +37,7 @@ impl Coefficients {
     /// Makes these the coefficients for `omega`, rad/s, 0 or above.
     #[inline(always)]
     pub fn prepare(&mut self, oscillator: &Oscillator, omega: f64) {
-        if self.key != Some(omega) {
+        if self.omega != omega || self.spacing == 0.0 {
             *self = Self::new(oscillator, omega);
         }
     }
@@ -71,7 +70,6 @@ impl Coefficients {
         // Multiples of so few bits are exact.
         let spacing = leading_bits(SPACING / rate, 30);
         Self {
-            key: Some(omega),
             omega,
             forcing: Forcing::new(oscillator, omega),
             near: NEAR / fastest.max(omega),

@@ -89,8 +89,7 @@ impl ShortStep {
         self.held = [moment(oscillator, 0, self.t), oscillator.omega0_squared * per_velocity];
         self.moving = 2.0 * oscillator.delta * per_velocity;
         self.moments = core::array::from_fn(|n| {
-            let sign = [1.0, -1.0][n % 2];
-            [2 * n + 2, 2 * n + 1].map(|n| sign * moment(oscillator, n, self.t))
+            [2 * n + 2, 2 * n + 1].map(|m| [1.0, -1.0][n % 2] * moment(oscillator, m, self.t))
         });
     }
 
