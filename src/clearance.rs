@@ -96,8 +96,7 @@ pub fn first_closure<const N: usize>(
             step = step.min(open);
         }
         if let Some((h, which)) = nearest {
-            let closure = Closure { t, h, which, derivatives };
-            return (Some(closure), looks);
+            return (Some(Closure { t, h, which, derivatives }), looks);
         }
         tiny_steps = if step * fastest < TINY { tiny_steps + 1 } else { 0 };
         let mut least = t * f64::EPSILON;

@@ -18,7 +18,8 @@ pub(super) const TERMS: usize = 8;
 /// What follows from an oscillator and a frequency.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Coefficients {
-    /// The key, rad/s; no spacing before the first use.
+    /// The key, rad/s; none before the first use.
+    key: Option<f64>,
     pub omega: f64,
     pub forcing: Forcing,
     /// Farthest distance from a propagator's time, s.
@@ -37,7 +38,7 @@ impl Coefficients {
     /// Makes these the coefficients for `omega`, rad/s, 0 or above.
     #[inline(always)]
     pub fn prepare(&mut self, oscillator: &Oscillator, omega: f64) {
-        if self.omega != omega || self.spacing == 0.0 {
+        if self.key != Some(omega) {
             *self = Self::new(oscillator, omega);
         }
     }
@@ -70,6 +71,7 @@ impl Coefficients {
         // Multiples of so few bits are exact.
         let spacing = leading_bits(SPACING / rate, 30);
         Self {
+            key: Some(omega),
             omega,
             forcing: Forcing::new(oscillator, omega),
             near: NEAR / fastest.max(omega),
