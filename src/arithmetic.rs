@@ -49,7 +49,7 @@ impl Sum {
 #[repr(C, align(16))]
 pub struct Sums {
     pub(crate) values: [f64; 2],
-    errors: [f64; 2],
+    pub(crate) errors: [f64; 2],
 }
 
 impl Sums {
@@ -63,12 +63,6 @@ impl Sums {
             Sum { value: b, error: f }.plus(numbers[1]),
         ];
         Self { values: [a.value, b.value], errors: [a.error, b.error] }
-    }
-}
-
-impl From<[f64; 2]> for Sums {
-    fn from(values: [f64; 2]) -> Self {
-        Self { values, errors: [0.0; 2] }
     }
 }
 

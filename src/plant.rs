@@ -70,7 +70,7 @@ pub(crate) struct Masses {
 
 impl Masses {
     /// Adds `dw` to the relative displacement, in which no wall is met.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn drift(&mut self, dw: f64, half_width: f64) {
         self.w = self.w.plus(dw);
         if self.w.value().abs() > half_width {
@@ -117,7 +117,7 @@ impl Plant {
             moving: Moving {
                 rig: Rig::from(parameters),
                 masses: Masses {
-                    primary: Sums::from([start.q1, start.dq1]),
+                    primary: Sums { values: [start.q1, start.dq1], errors: [0.0; 2] },
                     w: Sum::from(w.clamp(-b, b)),
                     dw: start.dq1 - start.dq2,
                     particle: start.dq2,

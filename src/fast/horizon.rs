@@ -63,7 +63,7 @@ impl Horizon {
     }
 
     /// The drive changes.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn drive_changed(&mut self, oscillator: &Oscillator, drive: &Drive) {
         if harmonic_forcing(oscillator, drive) > self.forcing {
             self.t = 0.0;
@@ -71,7 +71,7 @@ impl Horizon {
     }
 
     /// The base jumps to another drive, and the velocity of the primary mass changes by `kick`, m/s.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn jump(&mut self, oscillator: &Oscillator, before: &Drive, drive: &Drive, kick: f64) {
         let ([u0, u1, ..], [v0, v1, ..]) = (before.signal, drive.signal);
         self.jumps -= kick.abs() + oscillator.omega0 * (v0 - u0).abs() + (v1 - u1).abs();

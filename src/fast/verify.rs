@@ -29,7 +29,7 @@ pub(super) struct Sample {
 }
 
 /// `|f|` is at most this while the signal is a straight line, m/s².
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(super) fn harmonic_forcing(oscillator: &Oscillator, drive: &Drive) -> f64 {
     drive.amplitude.abs() * (oscillator.omega0_squared + 2.0 * oscillator.delta * drive.omega.abs())
 }

@@ -89,7 +89,7 @@ impl Plant {
     }
 
     /// Makes signal and amplitude those of `drive`: the base may jump.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn jump(&mut self, drive: &Drive) {
         let before = core::mem::replace(&mut self.moving.base.drive, *drive);
         let sin = self.fast.phasor.1;
@@ -177,7 +177,7 @@ impl Plant {
         let motion = Segment::new(&self.moving.rig.joint, self.moving.base, start.into());
         let stay = until_released(&motion, wall, left, noise);
         self.fast.evaluations += stay.evaluations;
-        self.moving.masses.primary = Sums::from(stay.joint);
+        self.moving.masses.primary = Sums { values: stay.joint, errors: [0.0; 2] };
         self.moving.masses.particle = stay.joint[1];
         self.moving.masses.dw = 0.0;
         self.base_moves(stay.t);
@@ -197,7 +197,7 @@ impl Plant {
     }
 }
 
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn check_duration(duration: f64) -> Result<(), InvalidValue> {
     match duration {
         0.0..=1e100 => Ok(()),

@@ -5,8 +5,6 @@ use std::path::PathBuf;
 use lovines::InvalidValue;
 use phase_lock::Number;
 
-use super::SyntaxError;
-
 /// Why a scene cannot be used.
 #[derive(Debug, thiserror::Error)]
 pub enum SceneError {
@@ -63,4 +61,15 @@ pub enum SceneError {
         /// Which keys, and what to do.
         message: String,
     },
+}
+
+/// An argument that is not `section.key=value`.
+#[derive(Debug, thiserror::Error)]
+pub enum SyntaxError {
+    /// Not TOML.
+    #[error("{}; expected section.key=value, for instance plant.r=0.7 or 'resonance.sensor=\"q1\"'", .0.message())]
+    Toml(#[from] toml::de::Error),
+    /// TOML, but not one key of one section.
+    #[error("expected one section.key=value, for instance plant.r=0.7")]
+    NotOneKey,
 }
