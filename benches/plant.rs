@@ -4,11 +4,12 @@
 //! cargo bench --bench plant
 //! ```
 //!
-//! Absolute times depend on the machine and on what else it does; the ratios in the table at the end hardly do. The table has medians
-//! of equal numbers of runs that take turns. CONTRIBUTING.md tells which ratios a change must keep.
+//! Absolute times depend on the machine and on what else it does; the ratios in the table at the end hardly do: plant and baseline take
+//! short turns. The table has medians over the pairs of turns. CONTRIBUTING.md tells which ratios a change must keep.
 
 mod baseline;
 mod scene;
+mod turns;
 
 use std::hint::black_box;
 use std::time::{Duration, Instant};
@@ -158,52 +159,67 @@ fn cases() -> Vec<Case> {
     cases
 }
 
-fn median(mut values: Vec<f64>) -> f64 {
+/// Quartiles: the lower one, the median, the upper one.
+fn quartiles(mut values: Vec<f64>) -> [f64; 3] {
     values.sort_by(f64::total_cmp);
-    values[values.len() / 2]
+    [1, 2, 3].map(|n| values[n * (values.len() - 1) / 4])
 }
 
-/// ns per unit of work; none if the run came to no end.
-fn timed(run: impl Fn() -> Option<u64>) -> Option<f64> {
+/// Nanoseconds and units of work of a run; none if it came to no end.
+fn timed(run: impl Fn() -> Option<u64>) -> Result<(f64, f64), ()> {
     let start = Instant::now();
-    let work = black_box(run())?;
-    Some(start.elapsed().as_nanos() as f64 / work as f64)
+    let work = black_box(run()).ok_or(())?;
+    Ok((start.elapsed().as_nanos() as f64, work as f64))
 }
 
-/// The table: every case takes its turn, and so does the baseline.
+/// The table: every case takes its turn, and in it the plant and the baseline take theirs.
 fn table(cases: &[Case]) {
-    let mut plant = vec![Vec::new(); cases.len()];
-    let mut brent = vec![Vec::new(); cases.len()];
+    let mut pairs = vec![Vec::new(); cases.len()];
     let began = Instant::now();
-    while plant[0].len() < 5 || began.elapsed() < TABLE {
-        for (n, case) in cases.iter().enumerate() {
-            plant[n].extend(timed(|| Some((case.run)())));
-            if let Some(run) = &case.brent {
-                brent[n].extend(timed(run));
-            }
+    for n in 0.. {
+        if n >= 5 && began.elapsed() >= TABLE {
+            break;
+        }
+        for (case, pairs) in cases.iter().zip(&mut pairs) {
+            let mut plant = || timed(|| Some((case.run)()));
+            let brent = case
+                .brent
+                .as_ref()
+                .and_then(|run| turns::pair(n, &mut plant, &mut || timed(run)).ok());
+            pairs.push(brent.unwrap_or_else(|| [turns::turn(&mut plant).unwrap_or(f64::NAN), f64::NAN]));
         }
     }
-    let runs = plant[0].len();
-    let plant: Vec<f64> = plant.into_iter().map(median).collect();
+    let of = |pairs: &[[f64; 2]], value: fn(&[f64; 2]) -> f64| quartiles(pairs.iter().map(value).collect());
     let lock = cases.iter().position(|case| case.name == LOCK);
-    let lock = plant[lock.expect("the case of the lock")];
-    println!("\nMedians of {runs} runs each, taking turns; a lock is the cost of an impact in `{LOCK}`.");
+    let lock = of(&pairs[lock.expect("the case of the lock")], |pair| pair[0])[1];
     println!(
-        "{:70} {:>10} {:>8} {:>10} {:>12}  accepted",
-        "case", "ns", "locks", "Brent ns", "Brent/plant"
+        "\nMedians of {} pairs of turns each; a lock is the cost of an impact in `{LOCK}`.",
+        pairs[0].len()
     );
-    for ((case, ns), brent) in cases.iter().zip(plant).zip(brent) {
-        let (brent, ratio) = if brent.is_empty() {
-            let why = case.brent.as_ref().map_or("-", |_| "stalls");
-            (why.to_owned(), "-".to_owned())
-        } else {
-            let brent = median(brent);
-            (format!("{brent:.1}"), format!("{:.2}", brent / ns))
+    println!(
+        "{:70} {:>10} {:>8} {:>10} {:>12} {:>16}  accepted",
+        "case", "ns", "locks", "Brent ns", "Brent/plant", "quartiles"
+    );
+    for (case, pairs) in cases.iter().zip(&pairs) {
+        let ns = of(pairs, |pair| pair[0])[1];
+        let brent = of(pairs, |pair| pair[1])[1];
+        let [low, ratio, high] = of(pairs, |pair| pair[1] / pair[0]);
+        let compared = match &case.brent {
+            Some(_) if brent.is_nan() => ["stalls".to_owned(), "-".to_owned(), "-".to_owned()],
+            Some(_) => [
+                format!("{brent:.1}"),
+                format!("{ratio:.2}"),
+                format!("{low:.2} to {high:.2}"),
+            ],
+            None => ["-", "-", "-"].map(str::to_owned),
         };
         println!(
-            "{:70} {ns:10.1} {:8.2} {brent:>10} {ratio:>12}  {}",
+            "{:70} {ns:10.1} {:8.2} {:>10} {:>12} {:>16}  {}",
             format!("{}, per {}", case.name, case.unit),
             ns / lock,
+            compared[0],
+            compared[1],
+            compared[2],
             case.target,
         );
     }

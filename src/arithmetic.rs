@@ -43,6 +43,29 @@ impl Sum {
     }
 }
 
+/// Two sums side by side: one instruction adds to both.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[repr(C, align(16))]
+pub struct Sums {
+    pub(crate) values: [f64; 2],
+    pub(crate) errors: [f64; 2],
+}
+
+impl Sums {
+    /// The sums of these and numbers that are not much larger.
+    #[must_use]
+    #[inline(always)]
+    pub fn plus(self, numbers: [f64; 2]) -> Self {
+        let Self { values: [a, b], errors: [e, f] } = self;
+        let [a, b] = [
+            Sum { value: a, error: e }.plus(numbers[0]),
+            Sum { value: b, error: f }.plus(numbers[1]),
+        ];
+        Self { values: [a.value, b.value], errors: [a.error, b.error] }
+    }
+}
+
 impl From<f64> for Sum {
     #[inline(always)]
     fn from(value: f64) -> Self {
@@ -76,7 +99,9 @@ pub(crate) const fn product(a: f64, b: f64) -> (f64, f64) {
 /// The same; the second factor comes with its halves.
 #[inline(always)]
 pub(crate) const fn product_with(a: f64, (b, (b1, b2)): (f64, (f64, f64))) -> (f64, f64) {
-    let (a1, a2) = halves(a);
+    // The leading 26 bits: the rest has 27, and every product below is exact.
+    let a1 = f64::from_bits(a.to_bits() & (u64::MAX << 27));
+    let a2 = a - a1;
     let rounded = a * b;
     (rounded, ((a1 * b1 - rounded) + a1 * b2 + a2 * b1) + a2 * b2)
 }

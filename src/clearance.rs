@@ -53,9 +53,6 @@ pub struct Closure {
     pub derivatives: Derivatives,
 }
 
-/// The result of a search, and how often it evaluated the motion.
-pub type Found = (Option<Closure>, u64);
-
 /// A contact nearer than this fraction of the fastest rate's time is solved on the local Taylor polynomial, whose first
 /// term left out is then below 1e-16/24 of the motion's amplitude.
 const NEAR: f64 = 1e-4;
@@ -67,7 +64,7 @@ const UNDERFLOW: f64 = 1e-290;
 /// So many windows are tried for a bound, each at most three times shorter than the last.
 const MOST_WINDOWS: usize = 40;
 
-/// The first closure of any of `N` gaps in `[from, limit]`.
+/// The first closure of any of `N` gaps in `[from, limit]`, and how often the motion was evaluated.
 ///
 /// `look` returns the gaps at a time and the derivatives of the motion there; `fastest` is the fastest rate of the motion, 1/s;
 /// `resolution` is the rounding error of the gaps.
@@ -76,7 +73,7 @@ pub fn first_closure<const N: usize>(
     (fastest, resolution): (f64, f64),
     look: impl Fn(f64) -> ([Gap; N], Derivatives),
     bounds: impl Bounds,
-) -> Found {
+) -> (Option<Closure>, u64) {
     let mut t = from;
     let mut looks = 0;
     let mut tiny_steps = 0;
@@ -99,8 +96,7 @@ pub fn first_closure<const N: usize>(
             step = step.min(open);
         }
         if let Some((h, which)) = nearest {
-            let closure = Closure { t, h, which, derivatives };
-            return (Some(closure), looks);
+            return (Some(Closure { t, h, which, derivatives }), looks);
         }
         tiny_steps = if step * fastest < TINY { tiny_steps + 1 } else { 0 };
         let mut least = t * f64::EPSILON;

@@ -39,11 +39,6 @@ impl Wall {
     pub fn ahead(w: f64) -> Self {
         if w > 0.0 { Wall::Plus } else { Wall::Minus }
     }
-
-    /// The wall on the other side.
-    pub fn other(self) -> Self {
-        Wall::ahead(-self.sign())
-    }
 }
 
 /// How particle and wall touch.
@@ -71,7 +66,7 @@ pub struct ImpactLaw {
 }
 
 /// The particle at a wall: velocities after an impact, if it approached, and after coming to rest, if it did.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Copy, Debug, Default)]
 pub struct Touch {
     /// Velocity of the primary mass, m/s.
     pub primary: f64,
@@ -130,15 +125,7 @@ impl ImpactLaw {
         (primary, particle, relative): (f64, f64, f64),
         rests: impl FnOnce(f64, f64) -> bool,
     ) -> Touch {
-        let mut touch = Touch {
-            primary,
-            kick: 0.0,
-            particle,
-            relative,
-            impact: None,
-            stuck: false,
-            dissipated: 0.0,
-        };
+        let mut touch = Touch { primary, particle, relative, ..Touch::default() };
         if wall.sign() * relative > 0.0 {
             let (r, (head, tail)) = (self.restitution, self.primary_share);
             touch.impact = Some(relative);

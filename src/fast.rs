@@ -63,7 +63,7 @@ pub(crate) struct Moving {
 pub(crate) struct FastPath {
     pub disabled: bool,
     /// How long there is no contact from now on.
-    contact_free: Horizon,
+    pub contact_free: Horizon,
     /// `e^{i phase}` of the base: cosine and sine.
     pub phasor: (f64, f64),
     /// Rotations since it was computed from the phase.
@@ -90,10 +90,10 @@ impl FastPath {
         self.state_changed(base);
     }
 
-    /// The drive changes, and the velocity of the primary mass by `kick`, m/s.
+    /// The drive changes.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub fn drive_changed(&mut self, oscillator: &Oscillator, before: &Drive, drive: &Drive, kick: f64) {
-        self.contact_free.drive_changed(oscillator, before, drive, kick);
+    pub fn drive_changed(&mut self, oscillator: &Oscillator, drive: &Drive) {
+        self.contact_free.drive_changed(oscillator, drive);
         self.cache.step.drive_changed(drive);
     }
 
@@ -108,25 +108,35 @@ impl FastPath {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn point(&self, moving: &Moving) -> Point {
         let [offset, slope, ..] = moving.base.drive.signal;
-        Point {
-            y: moving.masses.x.value() - offset,
-            dy: moving.masses.v.value() - slope,
-            phasor: self.phasor,
-        }
+        let [x, v] = moving.masses.primary.values;
+        Point { y: x - offset, dy: v - slope, phasor: self.phasor }
     }
 
     /// Takes a step whose propagator is cached, if it meets no contact. Returns whether it was taken.
     #[inline]
     pub fn step(&mut self, moving: &mut Moving, duration: f64) -> bool {
-        let late = duration - self.cache.step.t;
-        if self.disabled || !self.cache.step.serves(&moving.base.drive, late) {
+        if self.disabled {
             return false;
         }
-        if duration >= self.contact_free.t && !self.is_contact_free(moving, duration) {
-            return false;
+        if duration != self.cache.step.t {
+            let late = duration - self.cache.step.t;
+            return self.cache.step.serves(&moving.base.drive, late) && self.late_step(moving, duration, late);
         }
-        self.take_step(moving, late);
-        true
+        let free = duration < self.contact_free.t || self.is_contact_free(moving, duration);
+        if free {
+            self.take_step(moving, 0.0);
+        }
+        free
+    }
+
+    /// The same for a step that is a little longer or shorter than the cached one.
+    #[inline(never)]
+    fn late_step(&mut self, moving: &mut Moving, duration: f64, late: f64) -> bool {
+        let free = duration < self.contact_free.t || self.is_contact_free(moving, duration);
+        if free {
+            self.take_step(moving, late);
+        }
+        free
     }
 
     /// Takes a step that is longer than the cached one by `late` seconds.
@@ -159,8 +169,7 @@ impl FastPath {
             dx += base.drive.signal[1] * t;
             base.drive.signal = shift(base.drive.signal, t);
         }
-        masses.x = masses.x.plus(dx);
-        masses.v = masses.v.plus(increment.dy);
+        masses.primary = masses.primary.plus([dx, increment.dy]);
         masses.dw += increment.dy;
         base.phase = base.phase.rotated(angle);
         self.phasor = increment.phasor;
@@ -175,11 +184,7 @@ impl FastPath {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn drift(&mut self, moving: &mut Moving, dx: f64, t: f64) {
         let Moving { rig, masses, .. } = moving;
-        masses.w = masses.w.plus(dx - masses.particle * t);
-        let (w, b) = (masses.w.value(), rig.parameters.half_width);
-        if w.abs() > b {
-            masses.w = Sum::from(b.copysign(w));
-        }
+        masses.drift(dx - masses.particle * t, rig.parameters.half_width);
         self.contact_free.t -= t;
     }
 
@@ -201,8 +206,7 @@ impl FastPath {
         }
         let increment = if !drive.is_straight() || drive.omega < 0.0 || t * fastest > LONGEST_COAST {
             self.rotations = ROTATIONS;
-            let (x, v) = (moving.masses.x.value(), moving.masses.v.value());
-            let motion = Segment::new(oscillator, moving.base, (x, v));
+            let motion = Segment::new(oscillator, moving.base, moving.masses.primary.values.into());
             let there = motion.at(&motion.series(), t);
             Increment {
                 y: there.moved - drive.signal[1] * t,

@@ -95,7 +95,7 @@ impl Flight {
         let fourth = d[4].abs() + window * self.motion.fifth_derivative_bound(&d, window);
         let opening = (-wall.sign() * d[3]).max(0.0);
         let fourth = fourth.max(f64::MIN_POSITIVE);
-        let other = self.gap(wall.other(), (0.0, 0.0), &d);
+        let other = self.gap(Wall::ahead(-wall.sign()), (0.0, 0.0), &d);
         let jerk = |h| self.motion.third_derivative_bound(&d, h);
         (2.0 * opening / fourth).min(other.certainly_open(window, jerk))
     }

@@ -65,13 +65,9 @@ impl Forcing {
         let strength = Complex64::new(omega0_squared, 2.0 * delta * omega);
         let (square, error) = product(omega, omega);
         let detuned = Complex64::new((omega0_squared - square) - error, strength.im);
-        let light = match oscillator.regime {
-            Regime::Oscillating { omega_d } => Some(omega_d),
-            Regime::Overdamped { .. } => None,
-        };
         let limit = LARGEST_STEADY * LARGEST_STEADY * detuned.norm_sqr();
-        let form = match light {
-            Some(omega_d) if strength.norm_sqr() > limit => Form::DividedDifferences {
+        let form = match oscillator.regime {
+            Regime::Oscillating { omega_d } if strength.norm_sqr() > limit => Form::DividedDifferences {
                 gain: strength / Complex64::new(0.0, 2.0 * omega_d),
                 near: Complex64::new(delta, (omega - omega_d) - oscillator.omega_d_error),
                 far: Complex64::new(delta, omega + omega_d).inv(),

@@ -67,22 +67,12 @@ impl Parameters {
         };
         positive("M (primary mass)", self.primary_mass, "kg")?;
         positive("k (stiffness)", self.stiffness, "N/m")?;
-        InvalidValue::unless(
-            (0.0..=1e100).contains(&self.damping),
-            "c (damping)",
-            self.damping,
-            "N.s/m",
-            "a number from 0 to 1e100",
-        )?;
+        let (c, allowed) = (self.damping, "a number from 0 to 1e100");
+        InvalidValue::unless((0.0..=1e100).contains(&c), "c (damping)", c, "N.s/m", allowed)?;
         positive("m (particle mass)", self.particle_mass, "kg")?;
         positive("b (half-width of the cavity)", self.half_width, "m")?;
-        InvalidValue::unless(
-            self.restitution > 0.0 && self.restitution <= 1.0,
-            "r (coefficient of restitution)",
-            self.restitution,
-            "",
-            "a number above 0 and at most 1",
-        )?;
+        let (r, allowed) = (self.restitution, "a number above 0 and at most 1");
+        InvalidValue::unless(r > 0.0 && r <= 1.0, "r (coefficient of restitution)", r, "", allowed)?;
         let rate = |name, value: f64| {
             let allowed = "at most 1e50 rad/s";
             InvalidValue::unless(value <= FASTEST, name, value, "rad/s", allowed)

@@ -7,7 +7,7 @@ mod advance;
 mod at_wall;
 mod events;
 
-use crate::arithmetic::Sum;
+use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::{BaseMotion, Drive};
 use crate::contact::{Contact, ImpactLaw, Wall};
 use crate::fast::{FastPath, Moving};
@@ -20,8 +20,11 @@ pub const MOST_IMPACTS: u64 = 10_000_000;
 
 /// The parameters and what follows from them. The parameters alone are saved.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(from = "Parameters", into = "Parameters"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "Parameters", into = "Parameters")
+)]
 pub(crate) struct Rig {
     pub parameters: Parameters,
     pub mass_ratio: f64,
@@ -54,10 +57,8 @@ impl From<Parameters> for Rig {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Masses {
-    /// Displacement of the primary mass, m.
-    pub x: Sum,
-    /// Its velocity, m/s.
-    pub v: Sum,
+    /// Displacement of the primary mass, m, and its velocity, m/s.
+    pub primary: Sums,
     /// Relative displacement `w = q1 - q2`, m. It is carried itself: in a narrow gap the difference of two large
     /// displacements would have lost it.
     pub w: Sum,
@@ -65,6 +66,17 @@ pub(crate) struct Masses {
     pub dw: f64,
     /// Velocity of the particle, m/s.
     pub particle: f64,
+}
+
+impl Masses {
+    /// Adds `dw` to the relative displacement, in which no wall is met.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub fn drift(&mut self, dw: f64, half_width: f64) {
+        self.w = self.w.plus(dw);
+        if self.w.value().abs() > half_width {
+            self.w = Sum::from(half_width.copysign(self.w.value()));
+        }
+    }
 }
 
 /// The plant: parameters, what follows from them, and the state.
@@ -99,19 +111,13 @@ impl Plant {
         let w = start.q1 - start.q2;
         // The difference of two displacements carries their rounding; a start on the wall means on the wall.
         let slack = 4.0 * f64::EPSILON * (b + start.q1.abs().max(start.q2.abs()));
-        InvalidValue::unless(
-            w.abs() <= b + slack,
-            "w = q1 - q2 (particle outside its cavity at the start)",
-            w,
-            "m",
-            "a number from -b to b",
-        )?;
+        let name = "w = q1 - q2 (particle outside its cavity at the start)";
+        InvalidValue::unless(w.abs() <= b + slack, name, w, "m", "a number from -b to b")?;
         Ok(Self {
             moving: Moving {
                 rig: Rig::from(parameters),
                 masses: Masses {
-                    x: Sum::from(start.q1),
-                    v: Sum::from(start.dq1),
+                    primary: Sums { values: [start.q1, start.dq1], errors: [0.0; 2] },
                     w: Sum::from(w.clamp(-b, b)),
                     dw: start.dq1 - start.dq2,
                     particle: start.dq2,
@@ -175,13 +181,8 @@ impl Plant {
     #[inline]
     pub fn state(&self) -> State {
         let masses = &self.moving.masses;
-        let q1 = masses.x.value();
-        State {
-            q1,
-            dq1: masses.v.value(),
-            q2: q1 - masses.w.value(),
-            dq2: masses.particle,
-        }
+        let [q1, dq1] = masses.primary.values;
+        State { q1, dq1, q2: q1 - masses.w.value(), dq2: masses.particle }
     }
 
     /// Relative displacement `w = q1 - q2`, m.
@@ -199,7 +200,7 @@ impl Plant {
     /// `v = q1 + epsilon q2`, m: the displacement of the centre of mass times `1 + epsilon`.
     #[inline]
     pub fn centre(&self) -> f64 {
-        let q1 = self.moving.masses.x.value();
+        let q1 = self.moving.masses.primary.values[0];
         q1 + self.moving.rig.mass_ratio * (q1 - self.moving.masses.w.value())
     }
 

@@ -12,7 +12,7 @@ pub struct Parting {
     /// Whether the wall ceased to push; else the time limit was reached.
     pub released: bool,
     /// Position (m) and velocity (m/s) of the joint mass.
-    pub joint: (f64, f64),
+    pub joint: [f64; 2],
     /// Evaluations of the motion.
     pub evaluations: u64,
 }
@@ -37,23 +37,13 @@ pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> P
     };
     let scale = (motion.fastest(), noise);
     let (closure, evaluations) = first_closure((0.0, limit), scale, look, motion);
-    match closure {
-        Some(Closure { t, h, derivatives: d, .. }) => Parting {
-            t: t + h,
-            released: true,
-            joint: (d[0] + position_change(&d, h), d[1] + velocity_change(&d, h)),
-            evaluations,
-        },
-        None => {
-            let [x, v, ..] = motion.at(&series, limit).derivatives;
-            Parting {
-                t: limit,
-                released: false,
-                joint: (x, v),
-                evaluations: evaluations + 1,
-            }
-        }
+    if let Some(Closure { t, h, derivatives: d, .. }) = closure {
+        let joint = [d[0] + position_change(&d, h), d[1] + velocity_change(&d, h)];
+        return Parting { t: t + h, released: true, joint, evaluations };
     }
+    let [x, v, ..] = motion.at(&series, limit).derivatives;
+    let (joint, evaluations) = ([x, v], evaluations + 1);
+    Parting { t: limit, released: false, joint, evaluations }
 }
 
 /// Bounds of the push, which is the second derivative of the motion.

@@ -3,7 +3,7 @@
 import statistics
 from math import log
 
-from tables import NONE, number
+from tables import NONE, compared, number
 
 UNITS = {"periods": "period", "impacts": "impact", "samples per period": "sample"}
 
@@ -56,6 +56,5 @@ def samples(bench):
     count = bench.scenes["loop"]["steps"]
     table = []
     for method, row in best.items():
-        compared = number(row.median / plant.median) if plant else NONE
-        table.append([method, number(row.median / count), compared, f"{row.error:.0e}"])
-    return ["method", "ns per sample", "time/plant", "error"], table
+        table.append([method, number(row.median / count), *compared(row, plant), f"{row.error:.0e}"])
+    return ["method", "ns per sample", "time/plant", "quartiles", "error"], table

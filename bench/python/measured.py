@@ -54,6 +54,7 @@ class Row:
     name: str
     setting: float
     times: list = field(default_factory=list)  # A median per round.
+    ratios: list = field(default_factory=list)  # Over the plant's time, a pair of turns each.
     error: float | None = None
     impacts: int = 0
     failure: str | None = None
@@ -69,6 +70,12 @@ class Row:
             return None
         low, _, high = statistics.quantiles(self.times, n=4, method="inclusive")
         return 0.5 * (high - low) / self.median
+
+    def over(self, plant):
+        """Time over the plant's: median of the pairs between their quartiles; else the ratio of the medians alone."""
+        if len(self.ratios) > 1:
+            return statistics.quantiles(self.ratios, n=4, method="inclusive")
+        return None, self.median / plant.median, None
 
     def given_up(self):
         """Whether it failed in the first round: it is not tried again."""

@@ -19,6 +19,14 @@ def ratio(x):
     return f"{float(f'{x:.2g}'):.0f}" if x < 10000 else f"{x:.0e}".replace("e+0", "e")
 
 
+def compared(row, plant):
+    """Time of a row over the plant's, and the quartiles of that ratio."""
+    if plant is None:
+        return NONE, NONE
+    low, middle, high = row.over(plant)
+    return number(middle), NONE if low is None else f"{number(low)} to {number(high)}"
+
+
 def text_table(head, rows):
     widths = [max(len(row[n]) for row in [head, *rows]) for n in range(len(head))]
     lines = []

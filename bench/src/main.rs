@@ -19,6 +19,8 @@ mod method;
 mod methods;
 mod profile;
 mod scene;
+#[path = "../../benches/turns/mod.rs"]
+mod turns;
 
 use std::io::{BufRead, Write};
 use std::path::Path;

@@ -4,7 +4,9 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
+use crate::methods::AsAsked;
 use crate::scene::{Scene, Step};
+use crate::turns;
 
 /// How a method failed.
 #[derive(Clone, Debug)]
@@ -30,11 +32,6 @@ pub trait Method: Sized {
     /// Impacts so far, as this method counts them.
     fn impacts(&self) -> u64;
 
-    /// How many of the scene's rigs go at once: what a run costs is shared among them.
-    fn at_once() -> usize {
-        1
-    }
-
     /// Makes of the scene's steps those that this method takes.
     fn steps(steps: &[Step]) -> Vec<Step> {
         steps.to_vec()
@@ -44,8 +41,10 @@ pub trait Method: Sized {
 /// What came of a few runs of one method on one scene.
 #[derive(Debug, Default, Serialize)]
 pub struct Answer {
-    /// Wall times, ns, without the setting up; of one rig where several go at once.
+    /// Wall times of a run, ns, without the setting up: the median of each turn.
     pub ns: Vec<f64>,
+    /// The same of the plant, which takes turns with this method.
+    pub plant_ns: Vec<f64>,
     /// States after the steps that were asked for.
     pub states: Vec<[f64; 4]>,
     /// Impacts in the whole run.
@@ -54,25 +53,33 @@ pub struct Answer {
     pub failure: Option<String>,
 }
 
-/// Runs the scene for about `budget`, once at least; a run that lasts longer than `limit` is given up. `checks` are the steps,
-/// counted from 1, after which the state is kept.
+/// Runs the scene in turns with the plant for about `budget`, one turn at least; a run that lasts longer than `limit` is given up.
+/// `checks` are the steps, counted from 1, after which the state is kept.
 pub fn measure<M: Method>(scene: &Scene, setting: f64, checks: &[usize], budget: Duration, limit: Duration) -> Answer {
     let mut answer = Answer::default();
     let began = Instant::now();
-    while answer.ns.is_empty() || (began.elapsed() < budget && answer.ns.len() < 1000) {
+    let mut plant = || run::<AsAsked>(scene, 0.0, checks, limit, &mut Vec::new()).map(|(ns, _)| (ns, 1.0));
+    let (mut ns, mut plant_ns) = (Vec::new(), Vec::new());
+    let mut method = || {
         answer.states.clear();
-        match run::<M>(scene, setting, checks, limit, &mut answer.states) {
-            Ok((ns, impacts)) => {
-                answer.ns.push(ns);
-                answer.impacts = impacts;
+        let (ns, impacts) = run::<M>(scene, setting, checks, limit, &mut answer.states)?;
+        answer.impacts = impacts;
+        Ok((ns, 1.0))
+    };
+    let mut failure = None;
+    while ns.is_empty() || began.elapsed() < budget {
+        match turns::pair(ns.len(), &mut plant, &mut method) {
+            Ok(pair) => {
+                plant_ns.push(pair[0]);
+                ns.push(pair[1]);
             }
             Err(Failure(how)) => {
-                answer.failure = Some(how);
+                failure = Some(how);
                 break;
             }
         }
     }
-    answer
+    Answer { ns, plant_ns, failure, ..answer }
 }
 
 fn run<M: Method>(
@@ -109,7 +116,7 @@ fn run<M: Method>(
             )));
         }
     }
-    let ns = began.elapsed().as_nanos() as f64 / M::at_once() as f64;
+    let ns = began.elapsed().as_nanos() as f64;
     if states.is_empty() {
         states.push(method.state());
     }

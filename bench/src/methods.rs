@@ -10,7 +10,7 @@ mod plant;
 mod rk4;
 
 pub use brent::Baseline as BrentBaseline;
-pub use plant::begin;
+pub use plant::{AsAsked, begin};
 
 use std::time::Duration;
 

@@ -127,7 +127,8 @@ impl LoViNes {
         let kept = &self.outputs.0[BASE];
         if kept.get().is_nan() {
             kept.set(if self.inputs_set {
-                self.base_motion(plant).displacement()
+                let BaseMotion { drive, phase } = self.base_motion(plant);
+                drive.signal[0] + drive.amplitude * libm::sin(phase.radians())
             } else {
                 plant.base_displacement()
             });

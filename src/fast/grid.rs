@@ -127,7 +127,6 @@ impl FastPath {
         self.rotations += 1;
         let propagator = (self.cache.grid).over(&start.rig.alone, &self.coefficients, n);
         let increment = propagator.increment(start.base.drive.amplitude, &from.point);
-        let t = from.t + propagator.t;
-        start.mark(&self.coefficients, increment.to(&from.point), t)
+        start.mark(&self.coefficients, increment.to(&from.point), from.t + propagator.t)
     }
 }

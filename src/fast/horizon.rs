@@ -6,7 +6,7 @@
 
 use super::Moving;
 use super::propagator::Point;
-use super::verify::{ROUNDING, forcing, speed_squared};
+use super::verify::{ROUNDING, forcing, harmonic_forcing, speed_squared};
 use crate::base_motion::Drive;
 use crate::oscillator::Oscillator;
 
@@ -34,7 +34,7 @@ impl Horizon {
     }
 
     /// What a bound from the start alone shows: no contact for `t` seconds or more, or nothing.
-    pub fn ahead(moving: &Moving, start: &Point, t: f64) -> Self {
+    pub(super) fn ahead(moving: &Moving, start: &Point, t: f64) -> Self {
         let Oscillator { delta, omega0, .. } = moving.rig.alone;
         let (b, w, dw) = (
             moving.rig.parameters.half_width,
@@ -56,17 +56,26 @@ impl Horizon {
         let end = 2.0 * gap / (closing + (closing * closing + 2.0 * acceleration * gap).sqrt());
         let far = reach.min(end * (1.0 - 1e-6));
         match [far, t].into_iter().find(|&one| one >= t && open(one)) {
+            Some(t) if !moving.base.drive.is_straight() => Self::unchanged(t),
             Some(t) => Self { t, forcing, jumps },
             None => Self::default(),
         }
     }
 
-    /// The drive changes, and the velocity of the primary mass by `kick`, m/s.
+    /// The drive changes.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub fn drive_changed(&mut self, oscillator: &Oscillator, before: &Drive, drive: &Drive, kick: f64) {
+    pub fn drive_changed(&mut self, oscillator: &Oscillator, drive: &Drive) {
+        if harmonic_forcing(oscillator, drive) > self.forcing {
+            self.t = 0.0;
+        }
+    }
+
+    /// The base jumps to another drive, and the velocity of the primary mass changes by `kick`, m/s.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub fn jump(&mut self, oscillator: &Oscillator, before: &Drive, drive: &Drive, kick: f64) {
         let ([u0, u1, ..], [v0, v1, ..]) = (before.signal, drive.signal);
         self.jumps -= kick.abs() + oscillator.omega0 * (v0 - u0).abs() + (v1 - u1).abs();
-        if !drive.is_straight() || self.jumps < 0.0 || forcing(oscillator, drive, 0.0) > self.forcing {
+        if self.jumps < 0.0 || !drive.is_straight() {
             self.t = 0.0;
         }
     }

@@ -41,8 +41,11 @@ impl Increment {
 
 /// The closed form at time `t`; what follows from that is computed when it is needed. By default it is that over no time.
 #[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(from = "f64", into = "f64"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "f64", into = "f64")
+)]
 pub(super) struct Propagator {
     /// The key: time, s.
     pub t: f64,
@@ -75,15 +78,15 @@ pub(super) fn rotate(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
 
-/// Coefficients `1/(2n)!` and `1/(2n + 1)!` of cosine and sine over angle, in the square of the angle times -1. Up to 1/8 they leave out
-/// less than 1e-19.
+/// Coefficients of cosine and sine over angle, in the square of the angle: with alternating sign `1/(2n)!` and `1/(2n + 1)!`. Up to 1/8 they
+/// leave out less than 1e-19.
 pub(super) const ROTATION: [[f64; 2]; 6] = [
     [1.0, 1.0],
-    [1.0 / 2.0, 1.0 / 6.0],
+    [-1.0 / 2.0, -1.0 / 6.0],
     [1.0 / 24.0, 1.0 / 120.0],
-    [1.0 / 720.0, 1.0 / 5040.0],
+    [-1.0 / 720.0, -1.0 / 5040.0],
     [1.0 / 40_320.0, 1.0 / 362_880.0],
-    [1.0 / 3_628_800.0, 1.0 / 39_916_800.0],
+    [-1.0 / 3_628_800.0, -1.0 / 39_916_800.0],
 ];
 
 /// Polynomials with these coefficients, at `x`.
@@ -91,13 +94,6 @@ pub(super) const ROTATION: [[f64; 2]; 6] = [
 pub(super) fn polynomials(coefficients: &[[f64; 2]], x: f64) -> [f64; 2] {
     let last = coefficients.len() - 1;
     (coefficients[..last].iter().rev()).fold(coefficients[last], |[a, b], c| [c[0] + x * a, c[1] + x * b])
-}
-
-/// Cosine and sine of a small angle from their Taylor series, up to degree `N + 2`.
-#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-pub(super) fn rotation<const N: usize>(angle: f64) -> (f64, f64) {
-    let [cos, sin] = polynomials(&ROTATION[..N / 2 + 2], -angle * angle);
-    (cos, angle * sin)
 }
 
 /// `E Im(z K)` for the phasor `z`.
@@ -207,7 +203,9 @@ impl<const N: usize> Nearby<N> {
     /// The phasor of the base then.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn phasor(&self, h: f64) -> (f64, f64) {
-        rotate(self.there.phasor, rotation::<N>(self.omega * h))
+        let angle = self.omega * h;
+        let [cos, sin] = polynomials(&ROTATION[..N / 2 + 2], angle * angle);
+        rotate(self.there.phasor, (cos, angle * sin))
     }
 
     /// What is added to the start, `h` seconds after that instant.

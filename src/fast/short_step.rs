@@ -15,23 +15,29 @@ use num_complex::Complex64;
 pub(super) const LONGEST: f64 = 1.0 / 8.0;
 /// Steps whose lengths differ by less, relative, are the same but for a correction of first order; the second order is below 1e-20.
 pub(super) const SAME: f64 = 1e-9;
-/// Half the number of the `G_n`.
+/// Half the number of the `G_n` beside `G_0`.
 const MOMENTS: usize = 5;
 
 /// The propagator of one step length; what follows from that is computed when it is needed.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-#[cfg_attr(feature = "serde", serde(from = "f64", into = "f64"))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "f64", into = "f64")
+)]
+#[repr(C, align(16))]
 pub(super) struct ShortStep {
-    /// The key: length of the step, s; NaN where there is none.
-    pub t: f64,
-    halves: (f64, f64),
     /// What the free motion adds: the sum of both.
     free: (Transition, Transition),
-    /// Velocity per base displacement and, over the frequency, per base velocity: `omega0² xv` and `2 delta xv`.
-    pushed: (f64, f64),
-    /// `G_n`, in the unit of `t^n`, two at a time.
+    /// `G_n`, in the unit of `t^n`, two at a time with alternating sign: `[G_2, G_1]`, `[-G_4, -G_3]` and so on.
     moments: [[f64; 2]; MOMENTS],
+    /// `G_0`, and velocity per base displacement: `omega0² xv`.
+    held: [f64; 2],
+    /// Velocity per base velocity over the frequency: `2 delta xv`.
+    moving: f64,
+    halves: (f64, f64),
+    /// The key: length of the step, s; NaN where there is none.
+    pub t: f64,
     response: Response,
 }
 
@@ -61,8 +67,9 @@ impl From<f64> for ShortStep {
             t,
             halves: halves(t),
             free: Default::default(),
-            pushed: Default::default(),
             moments: Default::default(),
+            held: Default::default(),
+            moving: 0.0,
             response: Response { omega: f64::NAN, ..Response::default() },
         }
     }
@@ -79,11 +86,11 @@ impl ShortStep {
     fn complete(&mut self, oscillator: &Oscillator) {
         self.free = oscillator.split(&oscillator.increment(self.t));
         let per_velocity = self.free.0.xv + self.free.1.xv;
-        self.pushed = (
-            oscillator.omega0_squared * per_velocity,
-            2.0 * oscillator.delta * per_velocity,
-        );
-        self.moments = core::array::from_fn(|n| [2 * n, 2 * n + 1].map(|n| moment(oscillator, n, self.t)));
+        self.held = [moment(oscillator, 0, self.t), oscillator.omega0_squared * per_velocity];
+        self.moving = 2.0 * oscillator.delta * per_velocity;
+        self.moments = core::array::from_fn(|n| {
+            [2 * n + 2, 2 * n + 1].map(|m| [1.0, -1.0][n % 2] * moment(oscillator, m, self.t))
+        });
     }
 
     /// Whether a step of `t` seconds can have such a propagator.
@@ -114,18 +121,18 @@ impl ShortStep {
         if self.response.omega.is_nan() {
             self.complete(oscillator);
         }
-        let square = -omega * omega;
-        // `K = even + i omega odd` and `K' = i omega K + F xv`.
-        let [even, odd] = polynomials(&self.moments, square);
-        let (steady, moving) = self.pushed;
+        let square = omega * omega;
+        // `K = even + i omega odd` and `K' = i omega K + F xv`, with `even = G_0 - omega² rest`.
+        let [rest, odd] = polynomials(&self.moments, square);
+        let displacement = (self.held[0] - square * rest, self.held[1] - square * odd);
         let (value, error) = product_with(omega, (self.t, self.halves));
         // A copy is returned: what was just stored is slow to load.
         let response = Response {
             omega,
             angle: Sum { value, error },
-            rotation: polynomials(&ROTATION, -value * value),
-            displacement: (even, steady + square * odd),
-            slope: (odd, moving + even),
+            rotation: polynomials(&ROTATION, value * value),
+            displacement,
+            slope: (odd, self.moving + displacement.0),
         };
         self.response = response;
         response
@@ -153,8 +160,8 @@ impl Increment {
     /// Adds what the curvature and jerk of the signal add in one step.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn bend(&mut self, [.., u2, u3]: [f64; 4], step: &ShortStep) {
-        let [[_, g1], [g2, g3], ..] = step.moments;
-        self.y += 2.0 * u2 * g2 + 6.0 * u3 * g3;
+        let [[g2, g1], [_, g3], ..] = step.moments;
+        self.y += 2.0 * u2 * g2 - 6.0 * u3 * g3;
         self.dy += 2.0 * u2 * g1 + 6.0 * u3 * g2;
     }
 

@@ -28,14 +28,20 @@ pub(super) struct Sample {
     pub ddw: f64,
 }
 
+/// `|f|` is at most this while the signal is a straight line, m/s².
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+pub(super) fn harmonic_forcing(oscillator: &Oscillator, drive: &Drive) -> f64 {
+    drive.amplitude.abs() * (oscillator.omega0_squared + 2.0 * oscillator.delta * drive.omega.abs())
+}
+
 /// `|f|` is at most this over the next `t` seconds, m/s².
 #[inline(always)]
 pub(super) fn forcing(oscillator: &Oscillator, drive: &Drive, t: f64) -> f64 {
-    let damping = 2.0 * oscillator.delta;
-    let forcing = drive.amplitude.abs() * (oscillator.omega0_squared + damping * drive.omega.abs());
+    let forcing = harmonic_forcing(oscillator, drive);
     if drive.is_straight() {
         return forcing;
     }
+    let damping = 2.0 * oscillator.delta;
     let [_, _, u2, u3] = drive.signal;
     let (u2, u3) = (u2.abs(), u3.abs() * t);
     forcing

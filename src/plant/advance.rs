@@ -1,7 +1,7 @@
 //! The loop over events.
 
 use super::{Event, MOST_IMPACTS, Outcome, Plant};
-use crate::arithmetic::Sum;
+use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::Drive;
 use crate::contact::{Contact, Wall};
 use crate::fast::Next;
@@ -61,53 +61,48 @@ impl Plant {
         duration: f64,
         on_event: impl FnMut(Event),
     ) -> Result<Outcome, InvalidValue> {
-        if drive != self.moving.base.drive || !self.begun {
+        if !self.begun {
+            check_duration(duration)?;
+            self.begin(drive)?;
+        }
+        let before = &self.moving.base.drive;
+        if drive.signal != before.signal || drive.amplitude != before.amplitude {
             drive.validate()?;
-            self.check_duration(duration)?;
-            self.set_drive(drive);
+            check_duration(duration)?;
+            self.jump(&drive);
+            self.fast.drive_changed(&self.moving.rig.alone, &self.moving.base.drive);
+        } else if drive.omega != before.omega {
+            drive.validate_frequency()?;
+            check_duration(duration)?;
+            self.moving.base.drive.omega = drive.omega;
+            self.fast.drive_changed(&self.moving.rig.alone, &self.moving.base.drive);
         }
         if self.contact == Contact::Free && self.fast.step(&mut self.moving, duration) {
             self.time += duration;
             self.fast.evaluations += 1;
             return Ok(Outcome { elapsed: duration, evaluations: 1, ..Outcome::default() });
         }
-        self.check_duration(duration)?;
+        check_duration(duration)?;
         let outcome = self.follow(duration, on_event);
         self.time += outcome.elapsed;
         Ok(outcome)
     }
 
-    #[inline]
-    fn check_duration(&self, duration: f64) -> Result<(), InvalidValue> {
-        InvalidValue::unless(
-            (0.0..=1e100).contains(&duration),
-            "duration (length of the step)",
-            duration,
-            "s",
-            "a number from 0 to 1e100",
-        )
-    }
-
-    /// Makes `drive` the current one; the base may jump.
+    /// Makes signal and amplitude those of `drive`: the base may jump.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    fn set_drive(&mut self, drive: Drive) {
-        let before = self.moving.base.drive;
-        self.moving.base.drive = drive;
-        if !self.begun {
-            self.begun = true;
-            self.fast.state_changed(&self.moving.base);
-            return;
-        }
+    fn jump(&mut self, drive: &Drive) {
+        let before = core::mem::replace(&mut self.moving.base.drive, *drive);
         let sin = self.fast.phasor.1;
         let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
-        let kick = 2.0 * self.moving.rig.alone.delta * jump;
+        let oscillator = &self.moving.rig.alone;
+        let kick = 2.0 * oscillator.delta * jump;
         if jump != 0.0 {
-            self.moving.masses.v = self.moving.masses.v.plus(kick);
+            self.moving.masses.primary = self.moving.masses.primary.plus([0.0, kick]);
             self.moving.masses.dw += kick;
             // The impulse acts on the primary mass alone; contact is decided anew.
             self.contact = Contact::Free;
         }
-        self.fast.drive_changed(&self.moving.rig.alone, &before, &drive, kick);
+        self.fast.contact_free.jump(oscillator, &before, drive, kick);
     }
 
     /// Follows the motion from event to event to the end of the step.
@@ -159,22 +154,14 @@ impl Plant {
             _ => None,
         };
         let masses = self.moving.masses;
-        let start = (masses.x.value(), masses.v.value());
-        let motion = Segment::new(&self.moving.rig.alone, self.moving.base, start);
+        let motion = Segment::new(&self.moving.rig.alone, self.moving.base, masses.primary.values.into());
         let half_width = self.moving.rig.parameters.half_width;
         let flight = Flight::new(motion, (masses.w.value(), masses.dw), half_width);
         let landing = flight.first_contact(limit, released);
         self.fast.evaluations += landing.evaluations;
-        self.moving.masses.x = masses.x.plus(landing.moved);
-        self.moving.masses.v = masses.v.plus(landing.gained);
+        self.moving.masses.primary = masses.primary.plus([landing.moved, landing.gained]);
         self.moving.masses.dw += landing.gained;
-        let w = masses.w.plus(landing.drifted);
-        let outside = w.value().abs() > half_width;
-        self.moving.masses.w = if outside {
-            Sum::from(half_width.copysign(w.value()))
-        } else {
-            w
-        };
+        self.moving.masses.drift(landing.drifted, half_width);
         self.contact = Contact::Free;
         self.base_moves(landing.t);
         step.left = step.left.plus(-landing.t);
@@ -185,14 +172,13 @@ impl Plant {
 
     /// Both masses move as one for at most `left` seconds, until the wall ceases to push.
     fn stay(&mut self, wall: Wall, left: f64, step: &mut Step<impl FnMut(Event)>) {
-        let noise = self.acceleration_error(self.moving.masses.v.value());
-        let start = (self.moving.masses.x.value(), self.moving.masses.v.value());
-        let motion = Segment::new(&self.moving.rig.joint, self.moving.base, start);
+        let start = self.moving.masses.primary.values;
+        let noise = self.acceleration_error(start[1]);
+        let motion = Segment::new(&self.moving.rig.joint, self.moving.base, start.into());
         let stay = until_released(&motion, wall, left, noise);
         self.fast.evaluations += stay.evaluations;
-        self.moving.masses.x = Sum::from(stay.joint.0);
-        self.moving.masses.v = Sum::from(stay.joint.1);
-        self.moving.masses.particle = stay.joint.1;
+        self.moving.masses.primary = Sums { values: stay.joint, errors: [0.0; 2] };
+        self.moving.masses.particle = stay.joint[1];
         self.moving.masses.dw = 0.0;
         self.base_moves(stay.t);
         step.left = step.left.plus(-stay.t);
@@ -209,4 +195,18 @@ impl Plant {
         self.moving.base = self.moving.base.after(t);
         self.fast.state_changed(&self.moving.base);
     }
+}
+
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+fn check_duration(duration: f64) -> Result<(), InvalidValue> {
+    match duration {
+        0.0..=1e100 => Ok(()),
+        _ => refuse_duration(duration),
+    }
+}
+
+#[cold]
+fn refuse_duration(duration: f64) -> Result<(), InvalidValue> {
+    let name = "duration (length of the step)";
+    InvalidValue::unless(false, name, duration, "s", "a number from 0 to 1e100")
 }

@@ -1,7 +1,7 @@
 //! The particle at a wall: impact, then rest if it cannot leave.
 
 use super::advance::Step;
-use super::{Event, Plant};
+use super::{Event, Masses, Plant};
 use crate::arithmetic::Sum;
 use crate::contact::{Contact, Resolution, Wall};
 use crate::oscillator::Oscillator;
@@ -33,17 +33,14 @@ impl Plant {
             fastest: self.moving.rig.alone.fastest,
             elastic: true,
         };
-        let velocities = (
-            self.moving.masses.v.value(),
-            self.moving.masses.particle,
-            self.moving.masses.dw,
-        );
+        let Masses { primary, particle, dw, .. } = self.moving.masses;
+        let velocities = (primary.values[1], particle, dw);
         let touch = self.moving.rig.law.touch(wall, velocities, |primary, speed| {
             let largest = self.acceleration_bound(primary);
             !(self.moving.rig.law).certainly_leaves(speed, largest, &resolution)
                 && (self.moving.rig.law).rests(speed, self.pressing(wall, primary), &resolution)
         });
-        self.moving.masses.v = self.moving.masses.v.plus(touch.kick);
+        self.moving.masses.primary = self.moving.masses.primary.plus([0.0, touch.kick]);
         self.moving.masses.particle = touch.particle;
         self.moving.masses.dw = touch.relative;
         let t = step.now();
@@ -61,7 +58,7 @@ impl Plant {
 
     /// Acceleration of `wall` towards the particle while the primary mass moves alone, and its rounding error, m/s².
     fn pressing(&self, wall: Wall, velocity: f64) -> (f64, f64) {
-        let start = (self.moving.masses.x.value(), velocity);
+        let start = (self.moving.masses.primary.values[0], velocity);
         let motion = Segment::new(&self.moving.rig.alone, self.moving.base, start);
         let acceleration = motion.derivatives_at_start()[2];
         (wall.sign() * acceleration, self.acceleration_error(velocity))
@@ -72,7 +69,7 @@ impl Plant {
     fn acceleration_bound(&self, velocity: f64) -> f64 {
         let Oscillator { delta, omega0_squared, .. } = self.moving.rig.alone;
         let drive = &self.moving.base.drive;
-        let position = self.moving.masses.x.value().abs() + drive.signal[0].abs() + drive.amplitude.abs();
+        let position = self.moving.masses.primary.values[0].abs() + drive.signal[0].abs() + drive.amplitude.abs();
         let velocity = velocity.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
         (omega0_squared * position + 2.0 * delta * velocity) * (1.0 + 1e-9)
     }
