@@ -86,17 +86,18 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn parse(origin: &str, text: &str, overrides: &[Override]) -> Result<Self, SceneError> {
-        let syntax = |error: toml::de::Error| SceneError::Syntax {
-            origin: origin.into(),
-            message: error.to_string().trim_end().into(),
-        };
+        let syntax = |error| SceneError::syntax(origin, &error);
         // The file is checked on its own first, so that an error can name the line.
         let sections: Sections = toml::from_str(text).map_err(syntax)?;
-        if overrides.is_empty() {
-            return sections.resolve(origin);
-        }
-        let table = overrides::merge(toml::from_str(text).map_err(syntax)?, overrides)?;
-        Sections::deserialize(table).map_err(syntax)?.resolve(origin)
+        let sections = if overrides.is_empty() {
+            sections
+        } else {
+            let table = overrides::merge(toml::from_str(text).map_err(syntax)?, overrides)?;
+            Sections::deserialize(table).map_err(syntax)?
+        };
+        let scene = sections.resolve(origin)?;
+        scene.controller_config().build()?;
+        Ok(scene)
     }
 
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.

@@ -3,9 +3,9 @@
 use std::path::PathBuf;
 
 use lovines::InvalidValue;
-use phase_lock::Number;
+use phase_lock::{ConfigError, Number};
 
-use super::SyntaxError;
+use super::{SyntaxError, refusal};
 
 /// Why a scene cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -55,6 +55,9 @@ pub enum SceneError {
     /// A drive that the plant does not take.
     #[error("[excitation] or [controller]: {0}")]
     Drive(InvalidValue),
+    /// The controller refuses its configuration.
+    #[error("{}", refusal(.0))]
+    Controller(#[from] ConfigError),
     /// Keys that are missing or do not go together.
     #[error("{origin}: {message}")]
     Keys {
@@ -63,4 +66,25 @@ pub enum SceneError {
         /// Which keys, and what to do.
         message: String,
     },
+}
+
+impl SceneError {
+    /// A file that cannot be read as a scene.
+    pub(super) fn syntax(origin: &str, error: &toml::de::Error) -> Self {
+        Self::Syntax { origin: origin.into(), message: plain(&error.to_string()) }
+    }
+}
+
+/// A message of the TOML reader, without types of Rust.
+pub(super) fn plain(message: &str) -> String {
+    let words = [
+        ("expected f64", "expected a number"),
+        ("expected u32", "expected a whole number from 0"),
+        ("expected u64", "expected a whole number from 0"),
+        ("expected a boolean", "expected true or false"),
+        ("unit variant, expected string only", "expected a word in quotes"),
+        ("expected a map", "expected a table"),
+    ];
+    let replace = |text: String, (from, to)| text.replace(from, to);
+    words.into_iter().fold(message.trim().to_string(), replace)
 }

@@ -1,4 +1,4 @@
-//! `--set section.key=value`: one value of a scene replaced from the command line, written as in TOML.
+//! `--set section.key=value`: one value of a scene replaced from the command line, written as in TOML; text needs no quotes.
 
 use std::str::FromStr;
 
@@ -7,6 +7,7 @@ use toml::{Table, Value};
 
 use super::{
     SceneError,
+    error::plain,
     plant::{DIMENSIONLESS_KEYS, SI_KEYS},
     sections::Sections,
 };
@@ -24,7 +25,7 @@ pub struct Override {
 #[derive(Debug, thiserror::Error)]
 pub enum SyntaxError {
     /// Not TOML.
-    #[error("{}; expected section.key=value, for instance plant.r=0.7 or 'resonance.sensor=\"q1\"'", .0.message())]
+    #[error("{}; expected section.key=value, for instance plant.r=0.7 or resonance.sensor=q1", .0.message())]
     Toml(#[from] toml::de::Error),
     /// TOML, but not one key of one section.
     #[error("expected one section.key=value, for instance plant.r=0.7")]
@@ -35,7 +36,12 @@ impl FromStr for Override {
     type Err = SyntaxError;
 
     fn from_str(argument: &str) -> Result<Self, SyntaxError> {
-        let table: Table = argument.parse()?;
+        // What is not TOML is text: the shell takes quotes away.
+        let text = || {
+            let (key, word) = argument.split_once('=')?;
+            format!("{key}={:?}", word.trim()).parse().ok()
+        };
+        let table: Table = argument.parse().or_else(|error| text().ok_or(error))?;
         let single = |table: Table| {
             let mut entries = table.into_iter();
             entries.next().filter(|_| entries.next().is_none())
@@ -54,8 +60,16 @@ impl Override {
         SceneError::Override { argument: self.argument.clone(), message: message.into() }
     }
 
-    fn is(&self, section: &str, key: &str) -> bool {
+    /// Whether this sets `section.key`.
+    #[must_use]
+    pub fn is(&self, section: &str, key: &str) -> bool {
         self.section == section && self.key == key
+    }
+
+    /// The section.
+    #[must_use]
+    pub fn section(&self) -> &str {
+        &self.section
     }
 
     /// A plant is given in one set of units; a key of the other would silently mean something else.
@@ -107,7 +121,14 @@ pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, S
     }
     for one in overrides {
         one.merge_into(&mut table)?;
-        Sections::deserialize(table.clone()).map_err(|error| one.error(error.message().trim()))?;
+        if let Err(error) = Sections::deserialize(table.clone()) {
+            // What is refused for a word that is not known lists those that are.
+            let text = one.argument.split_once('=').map_or("", |(_, text)| text.trim());
+            let word = Override { value: text.into(), ..one.clone() };
+            let listed = error.message().contains("unit variant") && word.merge_into(&mut table).is_ok();
+            let error = Sections::deserialize(table).err().filter(|_| listed).unwrap_or(error);
+            return Err(one.error(plain(error.message())));
+        }
     }
     Ok(table)
 }
