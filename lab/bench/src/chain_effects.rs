@@ -10,7 +10,7 @@ use vines_model::numerics::{mean, standard_deviation};
 
 use crate::experiment::Sample;
 use crate::identification::Cycle;
-use crate::rig::{BuiltIn, Chain, Controller, ControllerError, Rig, RigError, Simulated};
+use crate::rig::{BuiltIn, Chain, Controller, ControllerError, Fault, Rig, RigError, Simulated};
 use crate::scene::{Override, Scene, SceneError, SyntaxError};
 
 /// The stages and combinations under study: a name, and settings of `[chain]`.
@@ -61,6 +61,8 @@ pub struct Effect {
     pub wander: f64,
     /// Time of one sample, plant, chain and controller together, s: the fastest of several runs.
     pub sample_seconds: f64,
+    /// Why the controller switched the drive off; the other values then are those of no motion.
+    pub fault: Option<&'static str>,
 }
 
 /// Why the effect of a stage could not be determined.
@@ -175,10 +177,11 @@ pub fn effect(name: &'static str, scene: &Scene) -> Result<Effect, ChainEffectEr
         fastest = fastest.min(taken.as_secs_f64() / (settle / TIMINGS) as f64);
     }
     let mut cycles = Vec::new();
-    let (mut turns, mut samples) = (0.0, Vec::new());
+    let (mut turns, mut samples, mut fault) = (0.0, Vec::new(), None);
     while cycles.len() < LOOK {
         let sample = bench.sample()?;
         samples.push(sample);
+        fault = sample.command.fault.map(Fault::text);
         turns += sample.command.drive.omega * bench.sample_time / std::f64::consts::TAU;
         if turns >= 1.0 {
             turns -= 1.0;
@@ -193,5 +196,6 @@ pub fn effect(name: &'static str, scene: &Scene) -> Result<Effect, ChainEffectEr
         c: mean(cycles.iter().map(|cycle| cycle.response[0].norm())) / d.b,
         wander: standard_deviation(&omegas) / d.omega_change(1.0),
         sample_seconds: fastest,
+        fault,
     })
 }
