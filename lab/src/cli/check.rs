@@ -12,6 +12,7 @@ use super::{
     failure::Failure,
     log_warnings, output,
     scene_arguments::SceneArguments,
+    serving::count,
 };
 
 const HELP: &str = "\
@@ -44,7 +45,7 @@ pub(super) struct Arguments {
     reach: ReachArguments,
 
     /// Check this many random healthy rigs, and as many with random faults
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count::<usize>)]
     trials: Option<usize>,
 
     /// Print how fast the phase locks over the bandwidth, in a simulation of the scene, beside published times
