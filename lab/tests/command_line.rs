@@ -127,6 +127,11 @@ fn settings_that_random_rigs_draw_are_refused() {
     ] {
         fails(&["rigs", "--count", "1", "--set", setting], 2, "drawn at random");
     }
+    fails(
+        &["check", "--trials", "1", "--set", "plant.c=0"],
+        2,
+        "random rigs draw plant.epsilon",
+    );
 }
 
 #[test]
@@ -138,6 +143,27 @@ fn a_stage_of_the_chain_that_trips_the_controller_says_so_and_has_no_effect() {
         "{text}"
     );
     assert!(!row("ADC 16 bits").contains('–'), "{text}");
+}
+
+#[test]
+fn a_plant_without_damping_locks_on_its_exact_orbit() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = ["plant.c=0", "plant.r=0.3", "excitation.G=0.8"].map(|one| format!("--set={one}"));
+    let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
+    let out = folder.path().to_str().unwrap();
+    let found = json(
+        &[
+            &["identify", "--rig", "built-in", "--json", "--out", out][..],
+            &settings,
+        ]
+        .concat(),
+    );
+    let orbits = json(&[&["orbit", "--json"][..], &settings].concat());
+    let stable = orbits.as_array().unwrap().iter().find(|orbit| orbit["stable"] == true);
+    for key in ["sigma", "C"] {
+        let difference = found["lock"][key].as_f64().unwrap() - stable.unwrap()[key].as_f64().unwrap();
+        assert!(difference.abs() < 1e-4, "{key}: {difference}");
+    }
 }
 
 #[test]

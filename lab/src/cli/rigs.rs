@@ -44,15 +44,11 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let drawn = |one: &&Override| {
-        ["plant", "excitation", "resonance"].contains(&one.section()) || one.is("controller", "phase_target")
-    };
-    if let Some(one) = arguments.set.iter().find(drawn) {
-        return Err(Failure::input(format!(
-            "--set of [{}]: plant.epsilon, plant.lambda, plant.r and excitation.G are drawn at random, and the exact orbits are those of the \
-             default [resonance] and controller.phase_target; set other keys, such as start.dq2, or use `vines identify`",
-            one.section()
-        )));
+    let fixed = ["plant", "excitation", "resonance", "controller.phase_target"];
+    if let Some(one) = arguments.set.iter().find(|one| one.is_one_of(&fixed)) {
+        let message = "plant.epsilon, plant.lambda, plant.r and excitation.G are drawn at random, and the exact orbits are those of the \
+                       default [resonance] and controller.phase_target; set other keys, such as start.dq2, or use `vines identify`";
+        return Err(one.error(message).into());
     }
     let rows = random_rigs::locks(arguments.count, arguments.seed, &arguments.set).map_err(Failure::input)?;
     output(arguments.json, &rows, || {

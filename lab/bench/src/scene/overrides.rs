@@ -56,20 +56,21 @@ impl FromStr for Override {
 }
 
 impl Override {
-    fn error(&self, message: impl Into<String>) -> SceneError {
+    /// A refusal of this setting.
+    #[must_use]
+    pub fn error(&self, message: impl Into<String>) -> SceneError {
         SceneError::Override { argument: self.argument.clone(), message: message.into() }
     }
 
-    /// Whether this sets `section.key`.
+    /// Whether this sets one of these sections and `section.key`s.
     #[must_use]
-    pub fn is(&self, section: &str, key: &str) -> bool {
-        self.section == section && self.key == key
+    pub fn is_one_of(&self, keys: &[&str]) -> bool {
+        let name = format!("{}.{}", self.section, self.key);
+        keys.iter().any(|key| *key == name || *key == self.section)
     }
 
-    /// The section.
-    #[must_use]
-    pub fn section(&self) -> &str {
-        &self.section
+    fn is(&self, section: &str, key: &str) -> bool {
+        self.section == section && self.key == key
     }
 
     /// A plant is given in one set of units; a key of the other would silently mean something else.
