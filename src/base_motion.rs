@@ -39,14 +39,14 @@ impl Drive {
     }
 
     /// Whether the signal is a straight line.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(crate) fn is_straight(&self) -> bool {
         let [.., u2, u3] = self.signal.map(f64::to_bits);
         (u2 | u3) << 1 == 0
     }
 
     /// Whether the signal is constant.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(crate) fn is_held(&self) -> bool {
         let [_, u1, u2, u3] = self.signal.map(f64::to_bits);
         (u1 | u2 | u3) << 1 == 0
@@ -132,17 +132,11 @@ impl Phase {
     pub fn radians(self) -> f64 {
         let sum = self.0 + self.1;
         // Near 0 and 2π the rounding error may carry the sum out of the range.
-        if sum < 0.0 {
-            0.0
-        } else if sum >= TAU.0 {
-            sum - TAU.0
-        } else {
-            sum
-        }
+        if sum >= TAU.0 { sum - TAU.0 } else { sum.max(0.0) }
     }
 
     /// The phase later by `angle`, from -2π to 2π with its rounding error.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(crate) fn rotated(self, angle: Sum) -> Self {
         let (sum, error) = plus((self.0, self.1), (angle.value, angle.error));
         if sum < 0.0 {
@@ -157,9 +151,15 @@ impl Phase {
     /// The phase `t` seconds later at `omega`, without losing digits to the number of turns.
     pub fn advanced(self, omega: f64, t: f64) -> Self {
         let (angle, error) = product(omega, t);
-        let rest = libm::fmod(angle, TAU.0);
-        let turns = libm::round((angle - rest) / TAU.0);
-        self.rotated(Sum { value: rest, error: error - turns * TAU.1 })
+        let turns = libm::trunc(angle / TAU.0);
+        let (turned, rounding) = product(turns, TAU.0);
+        let rest = (angle - turned) - rounding;
+        // The quotient may have been rounded to the next whole number.
+        let surplus = if rest * angle < 0.0 { angle.signum() } else { 0.0 };
+        self.rotated(Sum {
+            value: rest + surplus * TAU.0,
+            error: error - (turns - surplus) * TAU.1,
+        })
     }
 }
 

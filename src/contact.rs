@@ -26,7 +26,7 @@ impl Wall {
     pub const BOTH: [Wall; 2] = [Wall::Plus, Wall::Minus];
 
     /// +1 or -1.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn sign(self) -> f64 {
         match self {
             Wall::Plus => 1.0,
@@ -35,7 +35,7 @@ impl Wall {
     }
 
     /// The wall that `w` approaches with this velocity, or lies beyond.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn ahead(w: f64) -> Self {
         if w > 0.0 { Wall::Plus } else { Wall::Minus }
     }
@@ -123,7 +123,7 @@ impl ImpactLaw {
     /// The particle is at `wall` with velocities of primary mass and particle and a relative velocity. If it approaches, Newton's
     /// law reverses the relative velocity and reduces it by `r`. If then `rests` holds for the velocity of the primary mass and
     /// the speed away from the wall, both go on as one mass. Momentum is conserved.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn touch(
         &self,
         wall: Wall,
@@ -161,7 +161,7 @@ impl ImpactLaw {
     }
 
     /// Whether a rebound at `speed` is certainly not at rest, whatever the acceleration up to `largest`.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(crate) fn certainly_leaves(&self, speed: f64, largest: f64, r: &Resolution) -> bool {
         speed * speed > 2.0 * r.lowest_hop * largest
             && (self.restitution <= LIVELY || 2.0 * speed * r.fastest > SHORTEST_LIVELY_HOP * largest)

@@ -91,7 +91,7 @@ impl FastPath {
     }
 
     /// The drive changes, and the velocity of the primary mass by `kick`, m/s.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn drive_changed(&mut self, oscillator: &Oscillator, before: &Drive, drive: &Drive, kick: f64) {
         self.contact_free.drive_changed(oscillator, before, drive, kick);
         self.cache.step.drive_changed(drive);
@@ -105,7 +105,7 @@ impl FastPath {
     }
 
     /// Where the motion stands, relative to the line that follows the base signal.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn point(&self, moving: &Moving) -> Point {
         let [offset, slope, ..] = moving.base.drive.signal;
         Point {
@@ -130,7 +130,7 @@ impl FastPath {
     }
 
     /// Takes a step that is longer than the cached one by `late` seconds.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn take_step(&mut self, moving: &mut Moving, late: f64) {
         let drive = &moving.base.drive;
         let response = self.cache.step.response(&moving.rig.alone, drive.omega);
@@ -151,7 +151,7 @@ impl FastPath {
     }
 
     /// Adds an increment to velocities, base and displacement of the primary mass; returns what is added to that.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn apply(&mut self, moving: &mut Moving, increment: &Increment, angle: Sum, t: f64) -> f64 {
         let Moving { masses, base, .. } = moving;
         let mut dx = increment.y;
@@ -172,7 +172,7 @@ impl FastPath {
     }
 
     /// Adds `dx` to the relative displacement, and what the particle flies in `t` seconds: no wall is met.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn drift(&mut self, moving: &mut Moving, dx: f64, t: f64) {
         let Moving { rig, masses, .. } = moving;
         masses.w = masses.w.plus(dx - masses.particle * t);

@@ -75,7 +75,7 @@ const PER_FACTORIAL: [(f64, f64); 18] = {
 
 impl Transition {
     /// Position and velocity after it.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn of(&self, x: f64, v: f64) -> (f64, f64) {
         (self.xx * x + self.xv * v, self.vx * x + self.vv * v)
     }
@@ -183,7 +183,7 @@ impl Oscillator {
     }
 
     /// What two times, one after the other, add.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(crate) fn both(&self, a: &Increment, b: &Increment) -> Increment {
         let (damping, spring) = self.rates();
         let square = times(a.s, b.s);

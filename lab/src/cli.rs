@@ -86,8 +86,9 @@ enum Command {
     Controller(controller::Arguments),
 }
 
-/// Share of late samples of a rig in real time above which its results are doubtful.
+/// Share of late samples of a rig in real time above which its results are doubtful, and the exit code that says so.
 const TOLERATED: f64 = 0.01;
+const LATE: u8 = 3;
 
 /// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input, 3 for results of a rig that missed deadlines,
 /// 130 after Ctrl-C.
@@ -113,8 +114,8 @@ pub fn run() -> ExitCode {
     match output.and_then(|text| print(&text)) {
         Ok(()) => ExitCode::SUCCESS,
         Err(failure) => {
-            eprintln!("error: {failure}");
-            ExitCode::from(failure.code())
+            eprintln!("error: {}", failure.message);
+            failure.code.into()
         }
     }
 }
@@ -170,7 +171,7 @@ fn result(
         Some(timing) if timing.share() > TOLERATED => {
             print(&text)?;
             let message = format!("the rig missed too many deadlines, so these results are doubtful: {timing}");
-            Err(Failure::late(message))
+            Err(Failure::new(LATE, message))
         }
         Some(timing) if timing.share() > 0.0 => {
             eprintln!("warning: the rig missed deadlines: {timing}");

@@ -1,7 +1,6 @@
 //! Packing: a description and shared libraries become an FMU, two FMUs and a scene a coupled system.
 
 mod archive;
-mod binary;
 mod components;
 mod date;
 mod documentation;
@@ -14,10 +13,10 @@ mod system;
 
 use std::path::{Path, PathBuf};
 
-pub use binary::Binary;
 pub use components::{Component, components};
 pub use documentation::documentation;
 pub use error::PackError;
+pub use library::Binary;
 pub use platform::Platform;
 
 use crate::{files, scene::Scene};
@@ -39,11 +38,8 @@ impl From<&Path> for Libraries {
     }
 }
 
-/// A file to be.
-struct File {
-    name: String,
-    content: Vec<u8>,
-}
+/// Name and content of a file to be.
+type File = (String, Vec<u8>);
 
 /// Packs the components into `out`, one `<identifier>.fmu` each, and returns their paths.
 ///
@@ -53,7 +49,7 @@ struct File {
 /// A library that is missing, for another platform, of another version or not an FMI 2.0 component, and failures of the
 /// file system.
 pub fn pack(components: &[Component], libraries: &Libraries, out: &Path) -> Result<Vec<PathBuf>, PackError> {
-    keep(out, fmu::all(components, libraries)?)
+    Ok(files::write(out, fmu::all(components, libraries)?)?)
 }
 
 /// Packs plant and controller into `out`, and the two of them coupled as `bench.ssp` with the parameters of the scene.
@@ -63,12 +59,5 @@ pub fn pack(components: &[Component], libraries: &Libraries, out: &Path) -> Resu
 pub fn pack_bench(scene: &Scene, libraries: &Libraries, out: &Path) -> Result<Vec<PathBuf>, PackError> {
     let mut files = fmu::all(&components(), libraries)?;
     files.push(system::file(scene, &files)?);
-    keep(out, files)
-}
-
-fn keep(out: &Path, files: Vec<File>) -> Result<Vec<PathBuf>, PackError> {
-    Ok(files::write(
-        out,
-        files.into_iter().map(|file| (file.name, file.content)),
-    )?)
+    Ok(files::write(out, files)?)
 }

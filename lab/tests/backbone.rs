@@ -21,9 +21,7 @@ fn tracked(settings: &[&str]) -> TrackedComparison {
                 .unwrap()
                 .with_sensors(scene.resonance),
         ),
-        &scene.chain,
-        &scene.dimensionless(),
-        scene.controller.samples_per_period,
+        &scene,
     );
     let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
     let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();

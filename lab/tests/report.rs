@@ -23,7 +23,7 @@ fn subject(settings: &[&str]) -> Subject {
 fn write(subject: &Subject, out: &Path) -> Report {
     let precision =
         "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 9 9\"><rect width=\"9\" height=\"9\"/></svg>";
-    write_report(subject, out, false, Some(precision), &|_| {}).unwrap()
+    write_report(subject, out, false, Some(precision), &|_, _| {}).unwrap()
 }
 
 /// Debian's Chromium, if it is here, on a page: what it says on the console, and what it makes of the page.

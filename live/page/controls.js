@@ -18,6 +18,7 @@ export function control(page, { key, symbol, name, unit, min, max, step, help })
   const input = document.createElement("input");
   box.title = help;
   input.id = key;
+  input.setAttribute("aria-description", help);
   label.htmlFor = key;
   if (unit === "bool") {
     box.className = "check";
@@ -29,7 +30,7 @@ export function control(page, { key, symbol, name, unit, min, max, step, help })
   }
   box.className = "setting";
   label.innerHTML = symbol ? `${name} <i>${symbol}</i>` : name;
-  if (unit) label.append(Object.assign(document.createElement("span"), { className: "unit", textContent: ` ${unit}` }));
+  if (unit) label.append(Object.assign(document.createElement("span"), { className: "unit", textContent: ` (${unit})` }));
   Object.assign(input, { type: "number", min, max, step: "any" });
   const slider = Object.assign(document.createElement("input"), { type: "range", min, max, step });
   slider.setAttribute("aria-label", name);

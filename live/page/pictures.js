@@ -20,7 +20,7 @@ export class Pictures {
     const plot = (id, xLabel, yLabel) => new Plot($(id), colour, { xLabel, yLabel });
     this.plots = {
       scope: plot("scope", "time, s", "displacement over b"),
-      history: plot("history", "time, s", "error, °;  σ"),
+      history: plot("history", "time, s", "phase error, °; σ"),
       manifold: plot("manifold", "speed of the particle B", "amplitude C"),
       backbone: plot("backbone", "detuning σ", "amplitude C"),
     };
@@ -123,7 +123,7 @@ export class Pictures {
     const entries = [
       ["Time", `${page.shown.toFixed(3)} s, ${periods.toFixed(1)} natural periods`],
       ["Loop", state],
-      ["Regime", regime],
+      ["Regime", regime.startsWith("unknown") ? "too few impacts yet" : regime],
       ["Detuning σ", status.sigma.toFixed(6)],
       ["Amplitude C", status.C.toFixed(6)],
       ["Particle speed B", status.B.toFixed(6)],
@@ -138,6 +138,7 @@ export class Pictures {
       list.replaceChildren(...entries.flatMap(() => [document.createElement("dt"), document.createElement("dd")]));
     }
     entries.flat().forEach((text, i) => {
+      text = text.replace(/^-/, "−");
       if (list.children[i].textContent !== text) list.children[i].textContent = text;
     });
   }

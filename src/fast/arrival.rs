@@ -86,7 +86,7 @@ fn reversed(c: &[f64], first: f64, slowness: f64) -> f64 {
 impl FastPath {
     /// The contact at `wall` about `t` seconds after the start and within the grid's reach after a mark: the reversed series leads from
     /// one point of the grid to a nearer one.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn arrive_after(&mut self, start: &Start, from: &Mark, mut t: f64, wall: Wall) -> Option<Arrival> {
         let ahead = wall.sign() * start.rig.parameters.half_width - from.sample.w;
         for _ in 0..MOST_POINTS {
@@ -108,7 +108,7 @@ impl FastPath {
     }
 
     /// The contact about `h` seconds after the time `at`, when there is a `gap` to the wall: by Newton's method on the Taylor polynomial.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn polish<const N: usize>(
         &self,
         start: &Start,

@@ -34,7 +34,7 @@ pub(super) struct Cache {
 
 impl Cache {
     /// Whether a whole step without contact can be taken with [`Self::step`]: it is short, and has been taken before.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn repeats(&mut self, oscillator: &Oscillator, drive: &Drive, duration: f64) -> bool {
         if self.step.serves(drive, duration - self.step.t) {
             return true;
@@ -48,7 +48,7 @@ impl Cache {
     }
 
     /// The propagator that followed the last one before, if flights have been regular.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn expected(&mut self, oscillator: &Oscillator, coefficients: &Coefficients) -> Option<&Propagator> {
         if !self.regular {
             return None;
@@ -65,7 +65,7 @@ impl Cache {
     }
 
     /// A flight to a contact, or what was left of a step, took `t` seconds.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn learn(&mut self, coefficients: &Coefficients, t: f64) {
         // Nearer than an unused propagator, which has a time of 0.
         let is_near = |n: u8| (self.flights[usize::from(n) % FLIGHTS].t - t).abs() < coefficients.near.min(t);

@@ -36,7 +36,7 @@ pub(super) struct Coefficients {
 
 impl Coefficients {
     /// Makes these the coefficients for `omega`, rad/s, 0 or above.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn prepare(&mut self, oscillator: &Oscillator, omega: f64) {
         if self.key != Some(omega) {
             *self = Self::new(oscillator, omega);
@@ -84,7 +84,7 @@ impl Coefficients {
     }
 
     /// Forcing and its rate of change at a phasor, per unit amplitude.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn forcing_at(&self, (cos, sin): (f64, f64)) -> (f64, f64) {
         let strength = self.forcing.strength;
         (

@@ -61,7 +61,7 @@ impl FastPath {
     }
 
     /// Does what was found.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn take(&mut self, moving: &mut Moving, point: &Point, found: &Found, left: f64, duration: f64) -> Next {
         match found {
             Found::Contact(arrival) => self.meet(moving, point, arrival, left, duration),
@@ -74,7 +74,7 @@ impl FastPath {
     }
 
     /// Moves on to a verified contact, or to the end of the step before it.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn meet(&mut self, moving: &mut Moving, point: &Point, arrival: &Arrival, left: f64, duration: f64) -> Next {
         let t = arrival.t.value();
         if t > left {
@@ -88,7 +88,7 @@ impl FastPath {
     }
 
     /// The flight that followed the last one before, or the end of a step that did, if it lies ahead again.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn as_before(&mut self, moving: &mut Moving, point: &Point, left: f64, duration: f64) -> Option<Next> {
         let propagator = (self.cache).expected(&moving.rig.alone, &self.coefficients)?;
         self.evaluations += 1;
@@ -119,7 +119,7 @@ impl FastPath {
 }
 
 /// Whether the motion is such that bounds can verify anything, and displacements such that `w` has all its digits.
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
     let oscillator = &rig.alone;
     let [offset, slope, ..] = base.drive.signal;
@@ -135,7 +135,7 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
 /// How long the particle stays where the primary mass, at its largest displacement, cannot reach it with a wall, s.
 ///
 /// That displacement is at most the amplitude of the steady response and that of the free motion, which never grows.
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn out_of_reach(coefficients: &Coefficients, start: &Start) -> Option<f64> {
     let amplitude = start.base.drive.amplitude;
     let steady = coefficients.forcing.steady()? * amplitude;

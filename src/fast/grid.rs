@@ -62,7 +62,7 @@ impl Grid {
     }
 
     /// The propagator over `n` times the spacing, n from 1 to [`POINTS`].
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn over(&mut self, oscillator: &Oscillator, coefficients: &Coefficients, n: usize) -> &Propagator {
         let propagator = &self.0[(n - 1) % POINTS];
         if propagator.t != n as f64 * coefficients.spacing || propagator.omega != coefficients.omega {
@@ -83,7 +83,7 @@ pub(super) struct Mark {
 
 impl FastPath {
     /// The time of a point of the grid after a mark, and the motion near it: the point is the nearest one to the time `t`.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn near_point(&mut self, start: &Start, from: &Mark, t: f64) -> (f64, Nearby<TERMS>) {
         self.evaluations += 1;
         let (coefficients, amplitude) = (&self.coefficients, start.base.drive.amplitude);
@@ -121,7 +121,7 @@ impl FastPath {
     }
 
     /// The motion `n` points after a mark.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn mark(&mut self, start: &Start, from: &Mark, n: usize) -> Mark {
         self.evaluations += 1;
         self.rotations += 1;

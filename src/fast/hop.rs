@@ -14,7 +14,7 @@ const LONGEST: f64 = 1.0 / 20.0;
 
 impl FastPath {
     /// The return to the wall that the particle has just left, if it is a short hop that ends within `left` seconds.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub(super) fn hop(&mut self, start: &Start, left: f64) -> Option<Arrival> {
         let (here, b) = (&start.here.sample, start.rig.parameters.half_width);
         if here.w.abs() != b {

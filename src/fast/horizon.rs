@@ -62,7 +62,7 @@ impl Horizon {
     }
 
     /// The drive changes, and the velocity of the primary mass by `kick`, m/s.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn drive_changed(&mut self, oscillator: &Oscillator, before: &Drive, drive: &Drive, kick: f64) {
         let ([u0, u1, ..], [v0, v1, ..]) = (before.signal, drive.signal);
         self.jumps -= kick.abs() + oscillator.omega0 * (v0 - u0).abs() + (v1 - u1).abs();

@@ -80,7 +80,7 @@ impl FastPath {
     }
 
     /// The contact after a mark, if it is near and the particle certainly drifts towards it all the time.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn rest(&mut self, start: &Start, from: &Mark) -> Option<Arrival> {
         let wall = Wall::ahead(start.drift);
         // If the primary mass stood still.
@@ -94,7 +94,7 @@ impl FastPath {
 }
 
 /// What happens between two marks.
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn stretch(start: &Start, from: &Mark, to: &Mark) -> Stretch {
     let (b, t) = (start.rig.parameters.half_width, to.t - from.t);
     if to.sample.w.abs() < b {

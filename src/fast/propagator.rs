@@ -29,7 +29,7 @@ pub(super) struct Increment {
 
 impl Increment {
     /// Where it leads.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn to(&self, start: &Point) -> Point {
         Point {
             y: start.y + self.y,
@@ -70,7 +70,7 @@ impl From<f64> for Propagator {
 }
 
 /// The product of two complex numbers.
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(super) fn rotate(a: (f64, f64), b: (f64, f64)) -> (f64, f64) {
     (a.0 * b.0 - a.1 * b.1, a.0 * b.1 + a.1 * b.0)
 }
@@ -87,27 +87,27 @@ pub(super) const ROTATION: [[f64; 2]; 6] = [
 ];
 
 /// Polynomials with these coefficients, at `x`.
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(super) fn polynomials(coefficients: &[[f64; 2]], x: f64) -> [f64; 2] {
     let last = coefficients.len() - 1;
     (coefficients[..last].iter().rev()).fold(coefficients[last], |[a, b], c| [c[0] + x * a, c[1] + x * b])
 }
 
 /// Cosine and sine of a small angle from their Taylor series, up to degree `N + 2`.
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(super) fn rotation<const N: usize>(angle: f64) -> (f64, f64) {
     let [cos, sin] = polynomials(&ROTATION[..N / 2 + 2], -angle * angle);
     (cos, angle * sin)
 }
 
 /// `E Im(z K)` for the phasor `z`.
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(super) fn forced(amplitude: f64, (cos, sin): (f64, f64), k: Complex64) -> f64 {
     amplitude * (k.re * sin + k.im * cos)
 }
 
 /// `omega t` from -2π to 2π.
-#[inline(always)]
+#[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 pub(super) fn angle(omega: f64, t: f64) -> Sum {
     let (mut value, mut error) = product(omega, t);
     if value.abs() >= TAU {
@@ -118,7 +118,7 @@ pub(super) fn angle(omega: f64, t: f64) -> Sum {
 
 impl Propagator {
     /// Makes it the propagator over `t` seconds.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn reset(&mut self, t: f64) {
         (self.t, self.omega) = (t, f64::NAN);
     }
@@ -150,7 +150,7 @@ impl Propagator {
     }
 
     /// What the propagator adds to `start`.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn increment(&self, amplitude: f64, start: &Point) -> Increment {
         let (head, tail) = &self.free;
         let (y, dy) = head.of(start.y, start.dy);
@@ -176,7 +176,7 @@ pub(super) struct Nearby<const N: usize> {
 }
 
 impl<const N: usize> Nearby<N> {
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn new(coefficients: &Coefficients, amplitude: f64, start: &Point, there: &Increment) -> Self {
         let (f, df) = coefficients.forcing_at(there.phasor);
         let (f, df) = (amplitude * f, amplitude * df);
@@ -190,7 +190,7 @@ impl<const N: usize> Nearby<N> {
     }
 
     /// What `h` seconds add to the displacement beyond uniform motion, m, and to the velocity, m/s.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn change(&self, h: f64) -> (f64, f64) {
         let c = &self.c;
         let (mut bent, mut quickened) = (0.0, 0.0);
@@ -205,13 +205,13 @@ impl<const N: usize> Nearby<N> {
     }
 
     /// The phasor of the base then.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn phasor(&self, h: f64) -> (f64, f64) {
         rotate(self.there.phasor, rotation::<N>(self.omega * h))
     }
 
     /// What is added to the start, `h` seconds after that instant.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn at(&self, h: f64) -> Increment {
         let (bent, quickened) = self.change(h);
         Increment {

@@ -92,13 +92,13 @@ impl ShortStep {
     }
 
     /// Whether it serves for a step that is longer by `late` seconds: masters compute equal steps with rounding errors.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn serves(&self, drive: &Drive, late: f64) -> bool {
         late == 0.0 || (late.abs() <= SAME * self.t && drive.is_straight())
     }
 
     /// Forgets the step if it is not short against the drive.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn drive_changed(&mut self, drive: &Drive) {
         if drive.omega.abs() * self.t > LONGEST {
             *self = Self::default();
@@ -106,7 +106,7 @@ impl ShortStep {
     }
 
     /// The response at a frequency, kept for the next step.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn response(&mut self, oscillator: &Oscillator, omega: f64) -> Response {
         if self.response.omega == omega {
             return self.response;
@@ -132,7 +132,7 @@ impl ShortStep {
     }
 
     /// What one step adds to `start` while the signal is a straight line.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn increment(&self, response: &Response, amplitude: f64, start: &Point) -> Increment {
         let (head, tail) = &self.free;
         let (y, dy) = head.of(start.y, start.dy);
@@ -151,7 +151,7 @@ impl ShortStep {
 
 impl Increment {
     /// Adds what the curvature and jerk of the signal add in one step.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn bend(&mut self, [.., u2, u3]: [f64; 4], step: &ShortStep) {
         let [[_, g1], [g2, g3], ..] = step.moments;
         self.y += 2.0 * u2 * g2 + 6.0 * u3 * g3;

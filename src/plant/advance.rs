@@ -89,7 +89,7 @@ impl Plant {
     }
 
     /// Makes `drive` the current one; the base may jump.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn set_drive(&mut self, drive: Drive) {
         let before = self.moving.base.drive;
         self.moving.base.drive = drive;

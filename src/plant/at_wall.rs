@@ -68,7 +68,7 @@ impl Plant {
     }
 
     /// An upper bound of the acceleration's magnitude, m/s²: the sum of its terms.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn acceleration_bound(&self, velocity: f64) -> f64 {
         let Oscillator { delta, omega0_squared, .. } = self.moving.rig.alone;
         let drive = &self.moving.base.drive;

@@ -77,7 +77,7 @@ pub struct Totals {
 
 impl Totals {
     /// Counts an impact, if `touch` is one, and what it dissipated.
-    #[inline(always)]
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn add(&mut self, touch: &Touch, time: f64) {
         if let Some(velocity) = touch.impact {
             self.impacts += 1;

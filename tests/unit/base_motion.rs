@@ -27,6 +27,25 @@ fn a_million_turns_in_one_step_and_in_a_million_agree() {
 }
 
 #[test]
+fn the_phase_after_turns_is_the_remainder_of_a_division_by_one_turn() {
+    for turns in 1..3000 {
+        for beside in [-1, 0, 1] {
+            let angle = f64::from_bits((f64::from(turns) * TAU.0).to_bits().wrapping_add_signed(beside));
+            for omega in [-1.0, 1.0] {
+                let rest = libm::fmod(omega * angle, TAU.0);
+                let whole = libm::round((omega * angle - rest) / TAU.0);
+                let expected = Phase(0.5, 0.0).rotated(Sum { value: rest, error: -whole * TAU.1 });
+                assert_eq!(
+                    Phase(0.5, 0.0).advanced(omega, angle),
+                    expected,
+                    "{turns} {beside} {omega}"
+                );
+            }
+        }
+    }
+}
+
+#[test]
 fn the_signal_seen_later_is_the_same_signal() {
     let base = BaseMotion {
         drive: Drive { signal: [1.0, -2.0, 0.5, 0.25], ..Drive::default() },

@@ -18,10 +18,12 @@ const FINER: i32 = 20;
 pub fn stable_orbits(d: &Dimensionless) -> Vec<Orbit> {
     let steps = ((SEARCHED[1] - SEARCHED[0]) / STEP) as i32;
     let omega = |n: i32| 1.0 + d.epsilon * (SEARCHED[0] + STEP * f64::from(n));
-    (0..=steps)
-        .flat_map(|n| exact_backbone(d, omega(n)))
-        .filter(|orbit| orbit.stable)
-        .collect()
+    let mut orbits = Vec::new();
+    for n in 0..=steps {
+        orbits.extend(exact_backbone(d, omega(n)));
+    }
+    orbits.retain(|orbit| orbit.stable);
+    orbits
 }
 
 /// The largest response amplitude over b of these orbits, by falling steps from the largest that was found.

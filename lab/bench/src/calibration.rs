@@ -4,7 +4,6 @@
 //! uncertainty should be normally distributed: 95 % of them within ±1.96.
 
 mod outcome;
-mod rigs;
 
 use std::cell::RefCell;
 use std::rc::Rc;
@@ -14,19 +13,31 @@ use rayon::prelude::*;
 use vines_model::orbit;
 
 use crate::backbone::track;
-use crate::comparison::{COMPARED_ABOVE, ExactCurve};
+use crate::comparison::{COMPARED_ABOVE, ExactCurve, nearest};
 use crate::experiment::{self, Plan, Record};
 use crate::identification::identify;
 use crate::rig::{BuiltIn, Chain, Drive, GroundTruth, Rig, RigError, Sensors, Simulated};
 use crate::scene::{Override, Scene, SceneError};
 
 pub use outcome::{Coverage, HALF_WIDTH, Kind, Outcome};
-pub use rigs::{OTHER_RIGS, RIGS, RigSettings};
 
+/// epsilon, lambda, r and G of the rigs: the default one, one with lighter particle and harder walls, one with a heavy particle.
+pub const RIGS: [[f64; 4]; 3] = [
+    [0.0084, 1.43, 0.65, 1.1],
+    [0.0042, 1.0, 0.8, 0.75],
+    [0.02, 1.43, 0.6, 1.2],
+];
+/// Rigs that were not used while the estimators were written.
+pub const OTHER_RIGS: [[f64; 4]; 3] = [[0.006, 2.0, 0.7, 1.4], [0.012, 0.8, 0.5, 1.1], [0.03, 1.2, 0.75, 0.9]];
 /// Signal-to-noise ratios, dB.
 pub const RATIOS: [f64; 3] = [40.0, 30.0, 20.0];
-/// The levels that are tracked.
-const LEVELS: [&str; 3] = ["backbone.C_from=0.6", "backbone.C_to=0.3", "backbone.points=5"];
+/// Further settings: the levels that are tracked, and the reference of the ratios.
+const SETTINGS: [&str; 4] = [
+    "backbone.C_from=0.6",
+    "backbone.C_to=0.3",
+    "backbone.points=5",
+    "chain.snr_of=\"signal\"",
+];
 
 /// All outcomes, and what failed.
 #[derive(Debug, Clone, Default, PartialEq)]
@@ -92,19 +103,21 @@ impl Rig for Logged {
 /// A scene that is refused.
 pub fn calibrate(
     load: impl Fn(&[Override]) -> Result<Scene, SceneError>,
-    rigs: &[RigSettings],
+    rigs: &[[f64; 4]],
     seeds: std::ops::Range<u64>,
     progress: impl Fn(u64) + Sync,
 ) -> Result<Calibration, SceneError> {
     let mut scenes = Vec::new();
-    for rig in rigs {
+    for [epsilon, lambda, r, g] in rigs {
         for ratio in RATIOS {
-            let noise = format!("chain.snr={ratio:?}");
-            let settings = rig
-                .iter()
-                .chain(&LEVELS)
-                .copied()
-                .chain([noise.as_str(), "chain.snr_of=\"signal\""]);
+            let rig = [
+                format!("plant.epsilon={epsilon:?}"),
+                format!("plant.lambda={lambda:?}"),
+                format!("plant.r={r:?}"),
+                format!("excitation.G={g:?}"),
+                format!("chain.snr={ratio:?}"),
+            ];
+            let settings = rig.iter().map(String::as_str).chain(SETTINGS);
             let overrides = settings.map(str::parse).collect::<Result<Vec<Override>, _>>()?;
             scenes.push((ratio, load(&overrides)?));
         }
@@ -160,9 +173,8 @@ type RunError = Box<dyn std::error::Error>;
 
 fn chained(scene: &Scene, log: &Log) -> Result<Chain, RunError> {
     let plant = Simulated::new(scene.plant, scene.start)?;
-    let samples = scene.controller.samples_per_period;
     let rig = Logged { plant, log: Rc::clone(log) };
-    Ok(Chain::new(Box::new(rig), &scene.chain, &scene.dimensionless(), samples))
+    Ok(Chain::new(Box::new(rig), scene))
 }
 
 fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, RunError> {
@@ -177,12 +189,8 @@ fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, R
     let found = identify(&record, scene)?;
     let phase = identify(&with_ideal_sensors(record, &log), scene)?.lock.phase_error_deg;
     let lock = found.lock;
-    let distance = |one: &orbit::Orbit| (one.sigma - lock.sigma).hypot(one.c - lock.c);
     let orbits = orbit::phase_resonant(&scene.dimensionless());
-    let exact = orbits
-        .iter()
-        .min_by(|a, b| distance(a).total_cmp(&distance(b)))
-        .ok_or("no exact orbit at this G")?;
+    let exact = nearest(&orbits, &lock).ok_or("no exact orbit at this G")?;
     let epsilon = scene.dimensionless().epsilon;
     let outcome = |kind, quantity, error, uncertainty| Outcome {
         epsilon,

@@ -1,16 +1,14 @@
 //! The effect of each stage of the measurement chain on the locked point, and its run time.
 
-use std::time::{Duration, Instant};
+use std::f64::consts::TAU;
+use std::time::Instant;
 
-use lovines::InvalidValue;
-use phase_lock::ConfigError;
 use serde::Serialize;
-use thiserror::Error;
 use vines_model::numerics::{mean, standard_deviation};
 
-use crate::experiment::Sample;
+use crate::experiment::{ExperimentError, Sample};
 use crate::identification::Cycle;
-use crate::rig::{BuiltIn, Chain, Controller, ControllerError, Fault, Rig, RigError, Simulated};
+use crate::rig::{BuiltIn, Chain, Controller, ControllerError, Fault, RigError, Simulated};
 use crate::scene::{Override, Scene, SceneError, SyntaxError};
 
 /// The stages and combinations under study: a name, and settings of `[chain]`.
@@ -65,26 +63,6 @@ pub struct Effect {
     pub fault: Option<&'static str>,
 }
 
-/// Why the effect of a stage could not be determined.
-#[derive(Debug, Error)]
-pub enum ChainEffectError {
-    /// The plant refuses a parameter or the start.
-    #[error(transparent)]
-    Plant(#[from] InvalidValue),
-    /// The controller refuses a setting.
-    #[error(transparent)]
-    Configuration(#[from] ConfigError),
-    /// The scene refuses a setting.
-    #[error(transparent)]
-    Scene(#[from] SceneError),
-    /// The rig failed.
-    #[error(transparent)]
-    Rig(#[from] RigError),
-    /// The controller failed.
-    #[error(transparent)]
-    Controller(#[from] ControllerError),
-}
-
 /// Periods before the measurement, periods measured, and number of timings.
 const SETTLE: f64 = 600.0;
 const LOOK: usize = 200;
@@ -103,99 +81,65 @@ const OFF: [&str; 9] = [
     "compensate=true",
 ];
 
-/// The effect of every stage of [`STAGES`] alone on the scene that `load` reads with further settings, and that of the scene's own chain.
+/// The scenes of every stage of [`STAGES`] alone, which `load` reads with further settings, and the scene itself if its chain is on.
 ///
 /// # Errors
-/// A scene that is refused, or one that the plant or the controller refuses.
-pub fn effects(
+/// A scene that is refused.
+pub fn scenes(
     mut load: impl FnMut(&[Override]) -> Result<Scene, SceneError>,
-) -> Result<Vec<Effect>, ChainEffectError> {
+) -> Result<Vec<(&'static str, Scene)>, SceneError> {
     let mut scenes = Vec::new();
     for (name, settings) in STAGES {
-        let overrides = OFF
+        let settings = OFF
             .iter()
             .chain(settings)
-            .map(|setting| format!("chain.{setting}").parse())
-            .collect::<Result<Vec<Override>, SyntaxError>>()
-            .map_err(SceneError::from)?;
-        scenes.push((name, load(&overrides)?));
+            .map(|setting| format!("chain.{setting}").parse());
+        scenes.push((name, load(&settings.collect::<Result<Vec<Override>, SyntaxError>>()?)?));
     }
     let own = load(&[])?;
     if own.chain.is_on() {
         scenes.push(("the scene's chain", own));
     }
-    scenes.iter().map(|(name, scene)| effect(name, scene)).collect()
-}
-
-/// The plant and the controller of a scene, with the chain between them where it is on.
-struct Bench {
-    rig: Box<dyn Rig>,
-    controller: BuiltIn,
-    sample_time: f64,
-}
-
-impl Bench {
-    fn new(scene: &Scene) -> Result<Self, ChainEffectError> {
-        let plant = Simulated::new(scene.plant, scene.start)?;
-        let (d, samples) = (scene.dimensionless(), scene.controller.samples_per_period);
-        let rig = Chain::around(Box::new(plant), &scene.chain, &d, samples);
-        Ok(Self {
-            rig,
-            controller: BuiltIn::new(&scene.controller_config())?,
-            sample_time: scene.sample_time(),
-        })
-    }
-
-    fn sample(&mut self) -> Result<Sample, ChainEffectError> {
-        let sensors = self.rig.sense()?;
-        let command = self.controller.sample(sensors, true)?;
-        self.rig.advance(command.drive, self.sample_time)?;
-        Ok(Sample { time: 0.0, sensors, command, ground_truth: None })
-    }
-
-    /// Runs for a number of samples and returns the time it takes.
-    fn run(&mut self, samples: usize) -> Result<Duration, ChainEffectError> {
-        let begin = Instant::now();
-        for _ in 0..samples {
-            self.sample()?;
-        }
-        Ok(begin.elapsed())
-    }
+    Ok(scenes)
 }
 
 /// The effect of the chain of the scene.
 ///
 /// # Errors
-/// As [`effects`].
-pub fn effect(name: &'static str, scene: &Scene) -> Result<Effect, ChainEffectError> {
-    let d = scene.dimensionless();
-    let mut bench = Bench::new(scene)?;
-    let settle = (SETTLE * scene.controller.samples_per_period) as usize;
+/// Settings that plant or controller refuse, or a failure of either.
+pub fn effect(name: &'static str, scene: &Scene) -> Result<Effect, ExperimentError> {
+    let (d, step) = (scene.dimensionless(), scene.sample_time());
+    let plant = Simulated::new(scene.plant, scene.start).map_err(RigError::from)?;
+    let mut rig = Chain::around(Box::new(plant), scene);
+    let mut controller = BuiltIn::new(&scene.controller_config()).map_err(ControllerError::from)?;
+    let mut sample = || -> Result<Sample, ExperimentError> {
+        let sensors = rig.sense()?;
+        let command = controller.sample(sensors, true)?;
+        rig.advance(command.drive, step)?;
+        Ok(Sample { time: 0.0, sensors, command, ground_truth: None })
+    };
+    let timed = (SETTLE * scene.controller.samples_per_period) as usize / TIMINGS;
     let mut fastest = f64::INFINITY;
     for _ in 0..TIMINGS {
-        let taken = bench.run(settle / TIMINGS)?;
-        fastest = fastest.min(taken.as_secs_f64() / (settle / TIMINGS) as f64);
-    }
-    let mut cycles = Vec::new();
-    let (mut turns, mut samples, mut fault) = (0.0, Vec::new(), None);
-    while cycles.len() < LOOK {
-        let sample = bench.sample()?;
-        samples.push(sample);
-        fault = sample.command.fault.map(Fault::text);
-        turns += sample.command.drive.omega * bench.sample_time / std::f64::consts::TAU;
-        if turns >= 1.0 {
-            turns -= 1.0;
-            cycles.extend(Cycle::of(&samples, bench.sample_time, 0.0, 0.0));
-            samples.clear();
+        let begin = Instant::now();
+        for _ in 0..timed {
+            sample()?;
         }
+        fastest = fastest.min(begin.elapsed().as_secs_f64() / timed as f64);
     }
+    let (mut turns, mut samples) = (0.0, Vec::new());
+    while turns < LOOK as f64 + 0.5 {
+        samples.push(sample()?);
+        turns += samples[samples.len() - 1].command.drive.omega * step / TAU;
+    }
+    let cycles = &Cycle::all(&samples, step, 0.0)[..LOOK];
     let omegas: Vec<f64> = cycles.iter().map(|cycle| cycle.omega).collect();
     Ok(Effect {
         name,
         sigma: d.sigma(mean(omegas.iter().copied())),
-        c: mean(cycles.iter().map(|cycle| cycle.response[0].norm())) / d.b,
+        c: mean(cycles.iter().map(Cycle::amplitude)) / d.b,
         wander: standard_deviation(&omegas) / d.omega_change(1.0),
         sample_seconds: fastest,
-        fault,
+        fault: samples.last().and_then(|sample| sample.command.fault).map(Fault::text),
     })
 }

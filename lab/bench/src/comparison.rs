@@ -10,7 +10,7 @@ use vines_model::orbit::{self, Orbit};
 use vines_model::theory::{BackbonePoint, free_sigma, resonant};
 
 use crate::identification::{DecayEnd, DecayPoint, Identification, Lock};
-use crate::scene::{PhaseTarget, Resonance, Scene};
+use crate::scene::{PhaseTarget, Scene};
 
 pub use exact_curve::{Distance, ExactCurve};
 pub use tracked::{TrackedComparison, TrackedPoint, Worst};
@@ -66,8 +66,7 @@ impl Comparison {
     #[must_use]
     pub fn of(found: &Identification, scene: &Scene) -> Self {
         let (parameters, lock) = (found.parameters, found.lock);
-        let peak = scene.resonance.resonance == Resonance::Peak;
-        let at_resonance = peak || scene.controller.is_at_phase_resonance();
+        let at_resonance = scene.is_at_resonance();
         let distance = |sigma: f64, c: f64| (sigma - lock.sigma).hypot(c - lock.c);
         let theory = resonant(&parameters)
             .into_iter()
@@ -77,10 +76,7 @@ impl Comparison {
             .into_iter()
             .filter(|_| at_resonance)
             .collect();
-        let exact = orbits
-            .iter()
-            .copied()
-            .min_by(|a, b| distance(a.sigma, a.c).total_cmp(&distance(b.sigma, b.c)));
+        let exact = nearest(&orbits, &lock);
         let curve = ExactCurve::of(&parameters);
         let decay: Vec<ComparedPoint> = found
             .decay
@@ -114,6 +110,15 @@ impl Comparison {
             .iter()
             .filter(|orbit| orbit.stable && self.exact.as_ref() != Some(*orbit))
     }
+}
+
+/// The orbit that is nearest to a lock.
+pub(crate) fn nearest(orbits: &[Orbit], lock: &Lock) -> Option<Orbit> {
+    let distance = |one: &Orbit| (one.sigma - lock.sigma).hypot(one.c - lock.c);
+    orbits
+        .iter()
+        .copied()
+        .min_by(|one, other| distance(one).total_cmp(&distance(other)))
 }
 
 /// RMS of an error over the points above [`COMPARED_ABOVE`]; `None` where there is none.

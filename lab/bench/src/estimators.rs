@@ -4,15 +4,12 @@
 //! digits by advancing a copy of the plant in closed form. The time between every second crossing is the mean period between
 //! them. This reference uses no samples, no window and no model.
 
-use lovines::InvalidValue;
-use phase_lock::ConfigError;
 use serde::Serialize;
-use thiserror::Error;
 
 use crate::comparison::COMPARED_ABOVE;
 use crate::experiment::{self, ExperimentError, Plan, Record, Sample};
 use crate::identification::decay_points;
-use crate::rig::{BuiltIn, Command, Drive, NormalDistribution, Rig, RigError, Simulated};
+use crate::rig::{BuiltIn, Command, ControllerError, Drive, NormalDistribution, Rig, RigError, Simulated};
 use crate::scene::{Estimator, Scene};
 use vines_model::numerics::{mean, mean_square, try_bisection};
 
@@ -40,23 +37,6 @@ pub struct Quality {
     pub points: usize,
 }
 
-/// Why the estimators could not be evaluated.
-#[derive(Debug, Error)]
-pub enum EstimatorError {
-    /// The plant refuses a parameter or the start.
-    #[error(transparent)]
-    Plant(#[from] InvalidValue),
-    /// The controller refuses a setting.
-    #[error(transparent)]
-    Configuration(#[from] ConfigError),
-    /// No lock to decay from.
-    #[error(transparent)]
-    Experiment(#[from] ExperimentError),
-    /// The rig failed.
-    #[error(transparent)]
-    Rig(#[from] RigError),
-}
-
 /// Steps per period in the search for crossings.
 const FINE: f64 = 200.0;
 /// Seeds over which noise is averaged.
@@ -74,9 +54,9 @@ impl Decay {
     ///
     /// # Errors
     /// Settings that are refused, or no lock.
-    pub fn of(scene: &Scene) -> Result<Self, EstimatorError> {
-        let mut rig = Simulated::new(scene.plant, scene.start)?;
-        let mut controller = BuiltIn::new(&scene.controller_config())?;
+    pub fn of(scene: &Scene) -> Result<Self, ExperimentError> {
+        let mut rig = Simulated::new(scene.plant, scene.start).map_err(RigError::from)?;
+        let mut controller = BuiltIn::new(&scene.controller_config()).map_err(ControllerError::from)?;
         let plan = Plan::of(scene);
         let held = Plan { decay: 0, ..plan };
         let mut record = experiment::run(&mut rig, &mut controller, &held, |_, _, _| {})?;
@@ -180,7 +160,7 @@ const NOISE: [Option<f64>; 4] = [None, Some(60.0), Some(50.0), Some(40.0)];
 ///
 /// # Errors
 /// As [`Decay::of`].
-pub fn qualities(scene: &Scene) -> Result<Vec<Quality>, EstimatorError> {
+pub fn qualities(scene: &Scene) -> Result<Vec<Quality>, ExperimentError> {
     let decay = Decay::of(scene)?;
     let fits = WINDOWS.map(|window| (Estimator::Fit, window));
     let all = fits.into_iter().chain([(Estimator::Crossings, 1.0)]);

@@ -128,9 +128,9 @@ fn failing(scene: &Scene, kind: Kind, log: &Log) -> Box<dyn Rig> {
         let rig = Simulated::new(plant, scene.start).expect("a checked scene");
         Box::new(rig.with_sensors(scene.resonance))
     };
-    let (d, stiffness) = (scene.dimensionless(), scene.plant.stiffness);
-    let rig = FaultyRig::new(rig(stiffness), rig(1.21 * stiffness), kind, log, d.b);
-    Chain::around(Box::new(rig), &scene.chain, &d, scene.controller.samples_per_period)
+    let (stiffness, half_width) = (scene.plant.stiffness, scene.plant.half_width);
+    let rig = FaultyRig::new(rig(stiffness), rig(1.21 * stiffness), kind, log, half_width);
+    Chain::around(Box::new(rig), scene)
 }
 
 /// The bench of the faults.

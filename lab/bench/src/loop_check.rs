@@ -16,35 +16,20 @@ use serde::Serialize;
 
 use crate::rig::{Rig, RigError};
 use crate::scene::Scene;
+use vines_model::numerics::{mean, mean_square};
 
 pub use linear::Linear;
-pub use lock_times::{LockTime, LockTimeError, lock_times};
+pub use lock_times::{LockTime, lock_times};
 pub use trials::{Trials, trials};
-pub use verdict::Verdict;
+pub use verdict::{Channel, Verdict};
 
-use open_loop::{DECAY, OpenLoop};
-use verdict::verdict;
+use open_loop::{DECAY, OpenLoop, scatter};
+use verdict::{NOISE, verdict};
 
 /// Drive, as a share of that of the scene.
 const SHARE: f64 = 0.01;
 /// Periods without a drive, with it, and at their end those that are evaluated.
 const PERIODS: [usize; 3] = [2, 24, 4];
-/// Largest RMS of what is not the drive's frequency, as a share of the amplitude.
-const NOISE: f64 = 0.15;
-/// A channel.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Channel {
-    /// Amplitude at the frequency of the drive over the expected one.
-    pub gain: f64,
-    /// Phase less the expected one, degrees; a delay is negative.
-    pub phase: f64,
-    /// The same as a delay, samples.
-    pub delay: f64,
-    /// RMS of everything else, m.
-    pub noise: f64,
-    /// RMS without a drive, m.
-    pub floor: f64,
-}
 
 /// Result of the check.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -134,17 +119,6 @@ fn expected(scene: &Scene) -> [Complex64; 2] {
     [growth * amplitude * stated, stated * amplitude]
 }
 
-/// RMS of a reading about its mean: a sensor has an offset, and so has the centre of mass of a rig whose particle does not lie in the middle.
-fn scatter(readings: &[[f64; 3]], of: usize) -> f64 {
-    let mean = readings.iter().map(|reading| reading[of]).sum::<f64>() / readings.len() as f64;
-    rms(readings.iter().map(|reading| reading[of] - mean))
-}
-
-fn rms(values: impl Iterator<Item = f64>) -> f64 {
-    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value * value, count + 1.0));
-    f64::sqrt(sum / f64::max(count, 1.0))
-}
-
 /// A signal at the frequency of the drive, m, and the rest of it, RMS.
 struct Seen {
     phasor: Complex64,
@@ -154,12 +128,12 @@ struct Seen {
 impl Seen {
     fn of(readings: &[[f64; 3]], channel: usize) -> Self {
         let n = readings.len() as f64;
-        let mean = readings.iter().map(|reading| reading[channel]).sum::<f64>() / n;
+        let mean = mean(readings.iter().map(|reading| reading[channel]));
         let phasor: Complex64 = readings
             .iter()
             .map(|reading| (reading[channel] - mean) * Complex64::new(reading[0].sin(), reading[0].cos()) * 2.0 / n)
             .sum();
         let rest = |reading: &[f64; 3]| reading[channel] - mean - (phasor * Complex64::cis(reading[0])).im;
-        Self { phasor, noise: rms(readings.iter().map(rest)) }
+        Self { phasor, noise: mean_square(readings.iter().map(rest)).sqrt() }
     }
 }

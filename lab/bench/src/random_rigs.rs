@@ -117,7 +117,7 @@ fn lock(d: &Dimensionless, stable: &[Orbit], settings: &[Override]) -> Result<Ro
     let settings = [drawn.map_err(SceneError::from)?, settings.to_vec()].concat();
     let scene = Scene::parse("random rig", SCENE, &settings)?;
     let rig = Simulated::new(scene.plant, scene.start)?;
-    let mut rig = Chain::around(Box::new(rig), &scene.chain, d, scene.controller.samples_per_period);
+    let mut rig = Chain::around(Box::new(rig), &scene);
     let mut controller = BuiltIn::new(&scene.controller_config())?;
     let mut samples = Vec::new();
     let outcome = experiment::run_into(

@@ -19,21 +19,19 @@ use std::path::Path;
 
 pub use lovines::Parameters;
 use lovines::State;
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 pub use backbone::{Backbone, Predictor};
 pub use chain::{Chain, RatioOf};
 pub use configuration::{PhaseOrigin, PhaseTarget};
 pub use controller::Controller;
-pub use error::SceneError;
+pub use error::{SceneError, SyntaxError};
 pub use family::Family;
 pub use names::{Name, Names};
-pub use overrides::{Override, SyntaxError};
+pub use overrides::Override;
 pub use phase_lock::{KEYS, PhaseLock, refusal};
 pub use record::{Estimator, Record};
 pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
-
-use sections::Sections;
 
 /// The default scene, embedded so that the program works from any folder.
 pub const PAPER: &str = include_str!("../../../scenes/paper.toml");
@@ -86,16 +84,7 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn parse(origin: &str, text: &str, overrides: &[Override]) -> Result<Self, SceneError> {
-        let syntax = |error| SceneError::syntax(origin, &error);
-        // The file is checked on its own first, so that an error can name the line.
-        let sections: Sections = toml::from_str(text).map_err(syntax)?;
-        let sections = if overrides.is_empty() {
-            sections
-        } else {
-            let table = overrides::merge(toml::from_str(text).map_err(syntax)?, overrides)?;
-            Sections::deserialize(table).map_err(syntax)?
-        };
-        let scene = sections.resolve(origin)?;
+        let scene = overrides::read(origin, text, overrides)?.0.resolve(origin)?;
         scene.controller_config().build()?;
         Ok(scene)
     }

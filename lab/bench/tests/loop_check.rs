@@ -98,7 +98,7 @@ fn the_check_measures_the_linear_response_and_states_gains_with_a_phase_margin()
         let scene = Scene::parse("paper.toml", PAPER, &overrides).unwrap();
         let d = scene.dimensionless();
         let plant = Simulated::new(scene.plant, scene.start).unwrap();
-        let mut rig = Chain::around(Box::new(plant), &scene.chain, &d, scene.controller.samples_per_period);
+        let mut rig = Chain::around(Box::new(plant), &scene);
         let found = check(&mut *rig, &scene).unwrap().linear.unwrap();
         println!("{found:?}");
         let damping = 0.5 * d.epsilon * d.lambda * d.omega0;

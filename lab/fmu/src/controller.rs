@@ -3,29 +3,16 @@
 use std::path::Path;
 
 use fmi::fmi2::instance::Common;
-use phase_lock::{Config, MOVE, PARAMETERS, Value};
+use phase_lock::{Config, MOVE, PARAMETERS};
 use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Sensors};
 use vines_testbench::scene::Names;
 
-use crate::instance::{Fmu, FmuError, Kind, Named, Reference};
+use crate::instance::{Fmu, FmuError, Kind, Named, Reference, names_are_known};
 use crate::judge::Judge;
 
 /// The names of this bench that a scene may map, beside those of the parameters.
-const NAMES: [&str; 13] = [
-    "response",
-    "reference",
-    "active",
-    "omega",
-    "E",
-    "drive",
-    "phase_error",
-    "phase_measured",
-    "hold_response",
-    "settled",
-    "locked",
-    "state",
-    "fault",
-];
+const NAMES: &str = "response, reference, active, omega, E, drive, phase_error, phase_measured, hold_response, \
+                     settled, locked, state, fault";
 
 /// How it is known that the lock has settled.
 enum Settled {
@@ -80,16 +67,12 @@ impl ResponseLoop {
 impl FmuController {
     /// Loads the controller at `path` and initialises it with a configuration.
     pub fn load(path: &Path, config: &Config, names: &Names) -> Result<Self, FmuError> {
-        let known = PARAMETERS.iter().map(|parameter| parameter.name);
-        let moves: Vec<String> = moves().collect();
-        let known: Vec<&str> = NAMES
-            .into_iter()
-            .chain(known)
-            .chain(moves.iter().map(String::as_str))
+        let parameters = PARAMETERS.iter().map(|one| one.name.to_owned());
+        let known: Vec<String> = std::iter::once(NAMES.to_owned())
+            .chain(parameters)
+            .chain(moves())
             .collect();
-        if let Some(name) = names.unknown(&known) {
-            return Err(FmuError::Name { name: name.into(), known: known.join(", ") });
-        }
+        names_are_known(names, &known.join(", "))?;
         let mut fmu = Fmu::load(path, "controller")?;
         let mut sensors = vec![fmu.need_named(Kind::Real, names, "response")?];
         sensors.extend(fmu.named(Kind::Real, names, "reference")?);
@@ -117,7 +100,8 @@ impl FmuController {
         let displacement = fmu.named(Kind::Real, names, "drive")?;
         let phase_measured = switch("phase_measured")?;
         let response_loop = ResponseLoop::of(&fmu, names)?;
-        fmu.start(names, &parameters(config))?;
+        let values: Vec<_> = PARAMETERS.iter().map(|one| (one.name, one.get(config))).collect();
+        fmu.start(names, &values)?;
         Ok(Self {
             sample_time: config.sample_time,
             sensors,
@@ -146,13 +130,8 @@ impl FmuController {
     }
 
     fn integer(&mut self, reference: Option<Reference>) -> Result<Option<i32>, FmuError> {
-        let Some(reference) = reference else {
-            return Ok(None);
-        };
-        let mut value = [0];
-        self.fmu
-            .ask("give its outputs", |i| i.get_integer(&[reference], &mut value))?;
-        Ok(Some(value[0]))
+        let value = reference.map(|one| self.fmu.integer("give its outputs", one));
+        value.transpose()
     }
 
     fn exchange(&mut self, sensors: Sensors, active: bool) -> Result<Command, FmuError> {
@@ -213,12 +192,4 @@ impl Controller for FmuController {
 /// The inputs of a move.
 fn moves() -> impl Iterator<Item = String> {
     MOVE.iter().map(|(name, _)| format!("move.{name}"))
-}
-
-/// The configuration under the names of the FMU's parameters.
-fn parameters(config: &Config) -> Vec<(&'static str, Value)> {
-    PARAMETERS
-        .iter()
-        .map(|parameter| (parameter.name, parameter.get(config)))
-        .collect()
 }

@@ -20,7 +20,7 @@ use crate::error::{CallError, LoadError};
 pub enum FmuError {
     #[error("cannot load {}: {source}", path.display())]
     Load { path: PathBuf, source: LoadError },
-    #[error("{} has no {kind} variable `{name}`, which the bench needs; [rig.names] and [controller_names] of the scene map names", path.display())]
+    #[error("{} has no {kind:?} variable `{name}`, which the bench needs; [rig.names] and [controller_names] of the scene map names", path.display())]
     Variable { path: PathBuf, kind: Kind, name: String },
     #[error(
         "[rig.names] or [controller_names] of the scene maps `{name}`, which this bench does not have; it has: {known}"
@@ -75,12 +75,6 @@ impl From<Value> for Kind {
             Value::Integer(_) => Self::Integer,
             Value::Boolean(_) => Self::Boolean,
         }
-    }
-}
-
-impl std::fmt::Display for Kind {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        std::fmt::Debug::fmt(self, f)
     }
 }
 
@@ -194,6 +188,13 @@ impl Fmu {
         self.ask(action, |i| i.set_real(&references, &values)).map(drop)
     }
 
+    /// Value of an integer variable.
+    pub fn integer(&mut self, action: &'static str, reference: Reference) -> Result<i32, FmuError> {
+        let mut value = [0];
+        self.ask(action, |i| i.get_integer(&[reference], &mut value))?;
+        Ok(value[0])
+    }
+
     /// Calls the FMU; `action` completes the message "refused to …".
     pub fn ask<T>(
         &mut self,
@@ -207,6 +208,14 @@ impl Fmu {
             source: error.into(),
         })
     }
+}
+
+/// Refuses names in the scene that are not among `known`, separated by commas.
+pub(super) fn names_are_known(names: &Names, known: &str) -> Result<(), FmuError> {
+    let list: Vec<&str> = known.split(", ").collect();
+    names.unknown(&list).map_or(Ok(()), |name| {
+        Err(FmuError::Name { name: name.into(), known: known.into() })
+    })
 }
 
 /// Unpacks the FMU at `path` and instantiates it for co-simulation, with logging on.

@@ -3,34 +3,15 @@
 use std::f64::consts::TAU;
 use std::path::Path;
 
-use fmi::fmi2::instance::Common;
 use phase_lock::Value;
 use vines_testbench::rig::{Drive, GroundTruth, Measured, Rig, RigError, Sensors};
 use vines_testbench::scene::{Definition, Names, Parameters, Reference as ReferenceSignal, Sensor};
 
-use crate::instance::{Fmu, FmuError, Kind, Named, Reference};
+use crate::instance::{Fmu, FmuError, Kind, Named, Reference, names_are_known};
 
 /// The names of this bench that a scene may map.
-const NAMES: [&str; 18] = [
-    "omega",
-    "E",
-    "e",
-    "response",
-    "base",
-    "impacts",
-    "impact_time",
-    "impact_velocity",
-    "M",
-    "k",
-    "c",
-    "m",
-    "b",
-    "r",
-    "q1",
-    "der(q1)",
-    "q2",
-    "der(q2)",
-];
+const NAMES: &str =
+    "omega, E, e, response, base, impacts, impact_time, impact_velocity, M, k, c, m, b, r, q1, der(q1), q2, der(q2)";
 
 /// A plant FMU, stepped sample by sample.
 ///
@@ -69,16 +50,10 @@ impl FmuRig {
         plant: &Parameters,
         names: &Names,
     ) -> Result<Measured<Self>, FmuError> {
-        if let Some(name) = names.unknown(&NAMES) {
-            return Err(FmuError::Name { name: name.into(), known: NAMES.join(", ") });
-        }
+        names_are_known(names, NAMES)?;
         let mut fmu = Fmu::load(path, "plant")?;
-        let oscillator = ["omega", "E"].map(|ours| fmu.named(Kind::Real, names, ours));
-        let inputs = match oscillator {
-            [Ok(Some(omega)), Ok(Some(amplitude))] => Some([omega, amplitude]),
-            [Err(error), _] | [_, Err(error)] => return Err(error),
-            _ => None,
-        };
+        let [omega, amplitude] = ["omega", "E"].map(|ours| fmu.named(Kind::Real, names, ours));
+        let inputs = omega?.zip(amplitude?).map(|(omega, amplitude)| [omega, amplitude]);
         let held = match inputs {
             Some(_) => fmu.named(Kind::Real, names, "e")?,
             None => Some(fmu.need_named(Kind::Real, names, "e")?),
@@ -103,15 +78,12 @@ impl FmuRig {
 
 impl Inside {
     fn of(fmu: &Fmu, names: &Names) -> Result<Option<Self>, FmuError> {
-        let mut reals = [(Reference::default(), 1.0); 3];
-        for (real, ours) in reals.iter_mut().zip(["impact_time", "impact_velocity", "der(q2)"]) {
-            match fmu.named(Kind::Real, names, ours)? {
-                Some(found) => *real = found,
-                None => return Ok(None),
-            }
-        }
-        let impacts = fmu.named(Kind::Integer, names, "impacts")?;
-        Ok(impacts.map(|(impacts, _)| Self { impacts, reals }))
+        let real = |ours| fmu.named(Kind::Real, names, ours);
+        let reals = [real("impact_time")?, real("impact_velocity")?, real("der(q2)")?];
+        let (Some(impacts), [Some(a), Some(b), Some(c)]) = (fmu.switch(Kind::Integer, names, "impacts")?, reals) else {
+            return Ok(None);
+        };
+        Ok(Some(Self { impacts, reals: [a, b, c] }))
     }
 }
 
@@ -119,10 +91,8 @@ impl Rig for FmuRig {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let read = "read its sensors";
         let [response] = self.fmu.read(read, [self.response])?;
-        let reference = match self.reference {
-            Some(reference) => Some(self.fmu.read(read, [reference])?[0]),
-            None => None,
-        };
+        let reference = self.reference.map(|reference| self.fmu.read(read, [reference]));
+        let reference = reference.transpose()?.map(|[value]| value);
         Ok(Sensors { response, reference })
     }
 
@@ -152,11 +122,9 @@ impl Rig for FmuRig {
         };
         let action = "report its impacts";
         let [impact_time, impact_velocity, particle_velocity] = self.fmu.read(action, inside.reals)?;
-        let mut impacts = [0];
-        self.fmu
-            .ask(action, |i| i.get_integer(&[inside.impacts], &mut impacts))?;
+        let impacts = self.fmu.integer(action, inside.impacts)?;
         Ok(Some(GroundTruth {
-            impacts: i64::from(impacts[0]),
+            impacts: impacts.into(),
             impact_time,
             impact_velocity,
             particle_velocity,

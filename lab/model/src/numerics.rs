@@ -8,4 +8,4 @@ mod statistics;
 pub use estimate::{Estimate, Prior, Regression, student_factor};
 pub use least_squares::{HarmonicBasis, HarmonicFit};
 pub use roots::{bisection, golden_section, quadratic, try_bisection};
-pub use statistics::{Line, equally_spaced, mean, mean_square, noise, range, standard_deviation};
+pub use statistics::{equally_spaced, mean, mean_square, noise, range, slope, standard_deviation};

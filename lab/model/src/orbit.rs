@@ -27,6 +27,7 @@ mod periodic;
 mod search;
 mod settle;
 
+use crate::Dimensionless;
 use serde::Serialize;
 
 pub use approach::{Symmetric, alternates};
@@ -97,5 +98,11 @@ impl Orbit {
     pub fn unknowns(&self) -> Unknowns {
         let AfterImpact { phase, q1, dq1, dq2, .. } = self.start;
         Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
+    }
+
+    /// The symmetric motion near this one that satisfies both conditions.
+    #[must_use]
+    pub fn periodic(&self, scene: &Dimensionless, conditions: [Condition; 2]) -> Option<Periodic> {
+        Periodic::find(scene, &ImpactPattern::symmetric(), &self.unknowns(), conditions)
     }
 }

@@ -19,12 +19,8 @@ use vines_model::{
     regime::{Impact, Regime, synchrony},
 };
 
-/// A number from the environment.
-fn setting(name: &str, default: u64) -> u64 {
-    std::env::var(name).map_or(default, |text| {
-        text.parse().unwrap_or_else(|_| panic!("{name}: a number"))
-    })
-}
+mod common;
+use common::setting;
 
 /// A map: its parameters without G, its start, and its ranges of sigma and G.
 struct Case {

@@ -7,20 +7,19 @@ use rand_chacha::{
 };
 use vines_model::{
     Dimensionless,
-    orbit::{Bifurcation, BifurcationCurve, Exploration, Limits, Periodic, Special, bifurcation_curves, response},
+    orbit::{
+        Bifurcation, BifurcationCurve, Ended, Exploration, Limits, Periodic, Special, bifurcation_curves, response,
+    },
 };
+
+mod common;
+use common::setting;
 
 const LIMITS: Limits = Limits { sigma: [-5.0, 5.0], g: [0.1, 3.0], points: 2000, step: 0.05 };
 /// Largest distance of a bifurcation from a curve, or from the nearest one of a frequency response.
 const NEAR: f64 = 2e-3;
 /// Random points of the curves of a scene that are compared with the frequency response through them.
 const POINTS: usize = 22;
-
-fn setting(name: &str, default: u64) -> u64 {
-    std::env::var(name).map_or(default, |text| {
-        text.parse().unwrap_or_else(|_| panic!("{name}: a number"))
-    })
-}
 
 /// On the curve a multiplier has its value.
 fn off_circle(curve: &BifurcationCurve, motion: &Periodic) -> f64 {
@@ -148,4 +147,20 @@ fn two_bifurcations_of_a_kind_within_a_step_are_both_found() {
     found.sort_by(f64::total_cmp);
     println!("{found:?}");
     assert!(matches!(found[..], [first, second] if (first + 0.6139).abs() < 1e-3 && (second + 0.5910).abs() < 1e-3));
+}
+
+#[test]
+fn a_curve_of_asymmetric_folds_reaches_the_symmetry_breaking_where_it_ends() {
+    // It ends at sigma = -0.854134, G = 0.535646, where the equations are singular, and at sigma = -0.050283, G = 1.347293.
+    let scene = Dimensionless::new(0.01868089571475754, 0.45669401694636375, 0.8115318618163199, 0.535649);
+    let curves = bifurcation_curves(&scene, &LIMITS);
+    let folds = curves
+        .iter()
+        .find(|one| one.name() == "fold of asymmetric 1:1")
+        .unwrap();
+    assert_eq!(folds.branch.ended, [Ended::Joins; 2]);
+    // 3e-6 above the end, both halves of the motion differ by 3e-3.
+    let found = bifurcations(&scene);
+    let fold = |one: &&Special| one.kind == Bifurcation::Fold && (one.motion.sigma + 0.854126).abs() < 1e-5;
+    assert!(found.iter().any(|one| fold(&one)), "{found:?}");
 }

@@ -6,11 +6,15 @@ use rand_chacha::{
 };
 use vines_model::{
     Dimensionless,
+    numerics::range,
     orbit::{
         Bifurcation, Branch, Ended, Exploration, Limits, Periodic, Response, random_state, response, settle,
         symmetric_orbits,
     },
 };
+
+mod common;
+use common::setting;
 
 fn scene(g: f64) -> Dimensionless {
     Dimensionless::new(0.0084, 1.43, 0.65, g)
@@ -31,24 +35,19 @@ fn followed(g: f64) -> Response {
 
 fn list(response: &Response) {
     for one in &response.components {
-        let range = one
-            .branch
-            .points
-            .iter()
-            .fold((f64::MAX, f64::MIN), |(low, high), motion| {
-                (low.min(motion.sigma), high.max(motion.sigma))
-            });
-        let special: Vec<_> = one
-            .branch
-            .special
-            .iter()
-            .map(|one| (one.name(), one.motion.sigma))
-            .collect();
+        let Branch { points, special, ended } = &one.branch;
+        let sigmas = range((f64::MAX, f64::MIN), points.iter().map(|one| one.sigma));
+        let special: Vec<_> = special.iter().map(|one| (one.name(), one.motion.sigma)).collect();
         println!(
-            "G = {}: {}, sigma {range:.3?}, ended {:?}, {special:.4?}",
-            response.g, one.name, one.branch.ended
+            "G = {}: {}, sigma {sigmas:.3?}, ended {ended:?}, {special:.4?}",
+            response.g, one.name
         );
     }
+}
+
+/// How much the first flight of a 1:1 motion is longer than half a period, rad.
+fn asymmetry(motion: &Periodic) -> f64 {
+    motion.bounces[1].phase - motion.bounces[0].phase - std::f64::consts::PI
 }
 
 #[test]
@@ -110,11 +109,7 @@ fn mirror_images_of_an_asymmetric_branch_are_one_branch() {
     assert!(!asymmetric.is_empty());
     for one in &asymmetric {
         // Between its ends no motion is symmetric again.
-        let intervals = one
-            .branch
-            .points
-            .iter()
-            .map(|one| one.bounces[1].phase - one.bounces[0].phase - std::f64::consts::PI);
+        let intervals = one.branch.points.iter().map(asymmetry);
         let signs: Vec<_> = intervals.filter(|one| one.abs() > 1e-6).map(f64::signum).collect();
         assert!(signs.windows(2).all(|pair| pair[0] == pair[1]), "{}", one.name);
     }
@@ -151,12 +146,6 @@ fn a_torus_is_reported_as_modulation_only_where_the_motion_was_stable() {
             }
         }
     }
-}
-
-fn setting(name: &str, default: u64) -> u64 {
-    std::env::var(name).map_or(default, |text| {
-        text.parse().unwrap_or_else(|_| panic!("{name}: a number"))
-    })
 }
 
 #[test]
@@ -249,13 +238,7 @@ fn a_branch_reaches_the_motion_that_it_joins() {
             .into_iter()
             .zip(one.branch.ended);
         for (end, _) in ends.filter(|(_, ended)| *ended == Ended::Joins) {
-            let asymmetry = end.bounces[1].phase - end.bounces[0].phase - std::f64::consts::PI;
-            assert!(
-                asymmetry.abs() < 0.01,
-                "{}: {asymmetry} at sigma = {}",
-                one.name,
-                end.sigma
-            );
+            assert!(asymmetry(end).abs() < 0.01, "{}: sigma = {}", one.name, end.sigma);
         }
     }
 }

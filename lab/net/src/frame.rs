@@ -81,27 +81,21 @@ pub struct Frame {
 }
 
 /// Reason why a datagram is not a frame.
+#[expect(missing_docs, reason = "the messages explain the variants")]
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 pub enum FrameError {
-    /// It does not begin with [`MAGIC`].
     #[error("not a frame of this protocol")]
     Magic,
-    /// It has another version.
     #[error("version {0} of the protocol")]
     Version(u16),
-    /// It is too long or too short.
     #[error("{0} bytes instead of {SIZE}")]
     Size(usize),
-    /// The checksum does not match the content.
     #[error("wrong checksum")]
     Checksum,
-    /// It has no valid authentication code.
     #[error("not authenticated with the key")]
     Tag,
-    /// There will be no more frames.
     #[error("the connection is closed")]
     Closed,
-    /// Its kind is unknown.
     #[error("unknown kind {0}")]
     Kind(u8),
 }

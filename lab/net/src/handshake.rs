@@ -38,19 +38,17 @@ pub struct Service {
 impl Service {
     /// The answer to Hello.
     pub(super) fn welcome(&self, hello: &Frame) -> Result<Frame, Refusal> {
-        let controller = self.role == Role::Controller;
-        if hello.has(flag::CONTROLLER) != controller {
+        let (flags, channels) = match self.role {
+            Role::Rig { sensors, .. } => (0, sensors.channels()),
+            Role::Controller => (flag::CONTROLLER, 0),
+        };
+        if hello.flags & flag::CONTROLLER != flags {
             return Err(Refusal::Role);
         }
         if (hello.values[0] / self.sample_time - 1.0).abs() > SAME_TIME {
             return Err(Refusal::SampleTime(self.sample_time));
         }
-        let mut welcome = Frame::new(Kind::Welcome, hello.session);
-        welcome.flags = if controller { flag::CONTROLLER } else { 0 };
-        let channels = match self.role {
-            Role::Rig { sensors, .. } => sensors.channels(),
-            Role::Controller => 0,
-        };
+        let mut welcome = Frame { flags, ..Frame::new(Kind::Welcome, hello.session) };
         welcome.values[..3].copy_from_slice(&[self.sample_time, self.silence, channels.into()]);
         Ok(welcome)
     }

@@ -2,7 +2,7 @@
 
 use std::hint;
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::{Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
+use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -49,15 +49,12 @@ impl Link {
             )?),
             Address::Udp(to) => {
                 // Bound to loopback if the peer is on loopback.
-                let socket = UdpSocket::bind(SocketAddr::new(
-                    match (to, is_loopback(to.ip())) {
-                        (SocketAddr::V4(_), true) => Ipv4Addr::LOCALHOST.into(),
-                        (SocketAddr::V4(_), false) => Ipv4Addr::UNSPECIFIED.into(),
-                        (SocketAddr::V6(_), true) => Ipv6Addr::LOCALHOST.into(),
-                        (SocketAddr::V6(_), false) => Ipv6Addr::UNSPECIFIED.into(),
-                    },
-                    0,
-                ))?;
+                let own = match to.ip() {
+                    ip if is_loopback(ip) => ip,
+                    IpAddr::V4(_) => Ipv4Addr::UNSPECIFIED.into(),
+                    IpAddr::V6(_) => Ipv6Addr::UNSPECIFIED.into(),
+                };
+                let socket = UdpSocket::bind((own, 0))?;
                 // Datagrams of other senders do not arrive from now on.
                 socket.connect(to)?;
                 LinkSocket::Udp(socket)

@@ -19,8 +19,8 @@ const QUANTILES: [(&str, f64); 3] = [("p50", 0.5), ("p99", 0.99), ("p99_99", 0.9
 /// Statistics of the lateness of the samples.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Punctuality {
-    /// Lateness, ns; None before the first sample.
-    histogram: Option<Histogram<u64>>,
+    /// Lateness, ns.
+    histogram: Histogram<u64>,
     /// Number of samples that were late by a whole period or more.
     pub missed: u64,
     /// Largest lateness, s.
@@ -29,8 +29,7 @@ pub struct Punctuality {
 
 impl Default for Punctuality {
     fn default() -> Self {
-        // The bounds are valid.
-        let histogram = Histogram::new_with_bounds(1, LONGEST, DIGITS).ok();
+        let histogram = Histogram::new_with_bounds(1, LONGEST, DIGITS).expect("the bounds are valid");
         Self { histogram, missed: 0, worst: 0.0 }
     }
 }
@@ -38,9 +37,7 @@ impl Default for Punctuality {
 impl Punctuality {
     /// Counts a sample that was late by `lateness`, s, of a sample period, s.
     pub fn record(&mut self, lateness: f64, period: f64) {
-        if let Some(histogram) = &mut self.histogram {
-            histogram.saturating_record((lateness / NANO) as u64);
-        }
+        self.histogram.saturating_record((lateness / NANO) as u64);
         self.missed += u64::from(lateness >= period);
         self.worst = self.worst.max(lateness);
     }
@@ -48,22 +45,21 @@ impl Punctuality {
     /// Number of samples.
     #[must_use]
     pub fn samples(&self) -> u64 {
-        self.histogram.as_ref().map_or(0, Histogram::len)
+        self.histogram.len()
     }
 
     /// Lateness, s, that this share of the samples does not exceed.
     #[must_use]
     pub fn quantile(&self, share: f64) -> f64 {
-        let nanoseconds = self.histogram.as_ref().map_or(0, |all| all.value_at_quantile(share));
         // The upper limit of a class may be above the largest value in it.
-        (nanoseconds as f64 * NANO).min(self.worst)
+        (self.histogram.value_at_quantile(share) as f64 * NANO).min(self.worst)
     }
 
     /// The classes that samples are in: upper limit of the lateness, s, and number of samples.
     #[must_use]
     pub fn classes(&self) -> Vec<(f64, u64)> {
-        let recorded = self.histogram.iter().flat_map(Histogram::iter_recorded);
-        recorded
+        self.histogram
+            .iter_recorded()
             .map(|one| (one.value_iterated_to() as f64 * NANO, one.count_at_value()))
             .collect()
     }

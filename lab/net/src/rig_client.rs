@@ -45,17 +45,14 @@ impl NetRig {
 
     /// Refuses a rig whose sensors are not those of `expected`.
     pub fn with_sensors(self, expected: Definition) -> Result<Self, LinkError> {
-        let theirs = Definition::all()
-            .into_iter()
-            .find(|one| one.channels() == self.client.channels);
-        match expected.channels() == self.client.channels {
-            true => Ok(self),
-            false => Err(LinkError::Sensors {
-                peer: self.client.peer,
-                theirs: theirs.map_or("unknown".into(), |one| one.channel_names()),
-                ours: expected.channel_names(),
-            }),
+        let is_theirs = |one: &Definition| one.channels() == self.client.channels;
+        if is_theirs(&expected) {
+            return Ok(self);
         }
+        let theirs = Definition::all().into_iter().find(is_theirs);
+        let theirs = theirs.map_or("unknown".into(), |one| one.channel_names());
+        let (peer, ours) = (self.client.peer, expected.channel_names());
+        Err(LinkError::Sensors { peer, theirs, ours })
     }
 
     /// The longest silence, s, of a rig in real time; None for a rig in lock-step.

@@ -9,7 +9,7 @@ use super::handshake::{Refusal, Service};
 use super::link::Listener;
 use super::payload::{Reading, read_move, read_reading, write_command, write_reading};
 use super::ramp::Ramp;
-use super::real_time_clock::RealTimeClock;
+use super::real_time_clock::{Punctuality, RealTimeClock};
 use super::report::{Counters, Ended, Session, Timing};
 use vines_testbench::rig::{Controller, Rig};
 
@@ -207,13 +207,14 @@ impl Run {
     }
 
     fn timing(&self) -> Timing {
-        let punctuality = self.clock.as_ref().map(|clock| &clock.punctuality);
+        let none = Punctuality::default();
+        let all = self.clock.as_ref().map_or(&none, |clock| &clock.punctuality);
         Timing {
             samples: self.at,
-            missed: punctuality.map_or(0, |all| all.missed),
-            worst: punctuality.map_or(0.0, |all| all.worst),
+            missed: all.missed,
+            worst: all.worst,
             held: self.counters.held,
-            quantiles: punctuality.map_or([0.0; 2], |all| [0.99, 0.9999].map(|share| all.quantile(share))),
+            quantiles: [0.99, 0.9999].map(|share| all.quantile(share)),
         }
     }
 

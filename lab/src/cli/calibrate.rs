@@ -4,7 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::calibration::{self, Calibration, Coverage, Kind, OTHER_RIGS, Part, RATIOS, RIGS};
+use vines::calibration::{self, Calibration, Coverage, Kind, Missing, OTHER_RIGS, Part, RATIOS, RIGS};
 use vines::report::{self, Table};
 use vines::scene::Scene;
 
@@ -98,19 +98,10 @@ const QUANTITIES: [(Kind, &str, &str); 8] = [
 /// Number of results without a value, for each ratio.
 fn missing(found: &Calibration) -> Table {
     let rows = RATIOS.map(|snr| {
-        let count = |what| {
-            let missing = found.missing.iter();
-            missing
-                .filter(|one| one.snr == snr && one.what == what)
-                .count()
-                .to_string()
-        };
-        [
-            format!("{snr} dB"),
-            count(Part::Lock),
-            count(Part::Levels),
-            count(Part::Settled),
-        ]
+        let is_one = |what| move |one: &&Missing| one.snr == snr && one.what == what;
+        let count = |what| found.missing.iter().filter(is_one(what)).count().to_string();
+        let [lock, levels, settled] = [Part::Lock, Part::Levels, Part::Settled].map(count);
+        [format!("{snr} dB"), lock, levels, settled]
     });
     Table::new("noise | no lock | tracking ended early | points not settled").rows(rows)
 }

@@ -30,8 +30,9 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let effects = chain_effects::effects(|further| arguments.scene.load_with(further));
-    let effects = effects.map_err(Failure::input)?;
+    let scenes = chain_effects::scenes(|further| arguments.scene.load_with(further)).map_err(Failure::input)?;
+    let effects = scenes.iter().map(|(name, scene)| chain_effects::effect(name, scene));
+    let effects = effects.collect::<Result<Vec<_>, _>>().map_err(Failure::input)?;
     output(arguments.json, &effects, || table(&effects).markdown())
 }
 

@@ -90,8 +90,7 @@ impl Endpoint {
                 Box::new(rig)
             }
         };
-        let (d, samples) = (scene.dimensionless(), scene.controller.samples_per_period);
-        let rig = Chain::around(rig, &scene.chain, &d, samples);
+        let rig = Chain::around(rig, scene);
         let rig = Stoppable::around(rig, scene.sample_time(), &stop_flag()?);
         Ok(OpenRig { rig, pace, timing })
     }
@@ -142,9 +141,10 @@ fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Netw
     } else {
         format!("{place}:{DEFAULT_PORT}")
     };
-    let network = Network::connect(resolve(&place, scope)?);
-    let network =
-        network.map_err(|error| Failure::run(format!("no answer from {address}: {error}; {HELIC_ADVICE}")))?;
+    let network = Network::connect(resolve(&place, scope)?).map_err(|error| {
+        let advice = "is `vines rig --protocol helic` or a device running there?";
+        Failure::run(format!("no answer from {address}: {error}; {advice}"))
+    })?;
     let samples = scene.controller.samples_per_period;
     HelicRig::new(network, channels(&scene.rig_names)?, scene.sample_time(), samples).map_err(Failure::run)
 }
@@ -176,8 +176,6 @@ pub(super) fn no_key(scope: BindScope) -> Result<(), Failure> {
                    drive the rig";
     scope.key().map_or(Ok(()), |_| Err(Failure::input(message)))
 }
-
-const HELIC_ADVICE: &str = "is `vines rig --protocol helic` or a device running there?";
 
 /// Options of every command that may use a network.
 #[derive(Debug, Args)]

@@ -1,6 +1,6 @@
 //! The failure of a command: one message and an exit code.
 
-use std::fmt::{self, Display, Formatter};
+use std::fmt::Display;
 
 use phase_lock::ConfigError;
 use vines::{
@@ -17,54 +17,23 @@ pub(super) const INTERRUPTED: u8 = 130;
 /// A message and an exit code.
 #[derive(Debug)]
 pub(super) struct Failure {
-    code: u8,
-    message: String,
+    pub code: u8,
+    pub message: String,
 }
 
 impl Failure {
-    /// Bad usage or input: exit code 2.
+    pub(super) fn new(code: u8, message: impl Display) -> Self {
+        Self { code, message: message.to_string() }
+    }
+
+    /// Bad usage or input.
     pub(super) fn input(message: impl Display) -> Self {
-        Self { code: 2, message: message.to_string() }
+        Self::new(2, message)
     }
 
-    /// A failure at run time: exit code 1.
+    /// A failure at run time.
     pub(super) fn run(message: impl Display) -> Self {
-        Self { code: 1, message: message.to_string() }
-    }
-
-    /// A failure of the rig. A drive that the plant refuses comes from the scene.
-    fn of_rig(cause: &RigError, message: &impl Display) -> Self {
-        match cause {
-            RigError::Refused(_) => Self::input(message),
-            _ if cause.cause::<Interrupted>().is_some() => Self { code: INTERRUPTED, message: message.to_string() },
-            _ => Self::run(message),
-        }
-    }
-
-    /// A rig in real time missed too many deadlines: exit code 3.
-    pub(super) fn late(message: impl Display) -> Self {
-        Self { code: 3, message: message.to_string() }
-    }
-
-    /// Ended by a signal: exit code 130.
-    #[cfg(feature = "sweep")]
-    pub(super) fn interrupted(message: impl Display) -> Self {
-        Self { code: INTERRUPTED, message: message.to_string() }
-    }
-
-    /// The same exit code with another message.
-    pub(super) fn with_message(self, message: String) -> Self {
-        Self { message, ..self }
-    }
-
-    pub(super) fn code(&self) -> u8 {
-        self.code
-    }
-}
-
-impl Display for Failure {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.message)
+        Self::new(1, message)
     }
 }
 
@@ -83,7 +52,9 @@ impl From<ConfigError> for Failure {
 impl From<ExperimentError> for Failure {
     fn from(error: ExperimentError) -> Self {
         match &error {
-            ExperimentError::Rig(cause) => Self::of_rig(cause, &error),
+            // The plant refuses a drive that comes from the scene.
+            ExperimentError::Rig(RigError::Refused(_)) => Self::input(error),
+            ExperimentError::Rig(cause) if cause.cause::<Interrupted>().is_some() => Self::new(INTERRUPTED, error),
             _ => Self::run(error),
         }
     }

@@ -4,7 +4,6 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::ProgressBar;
-use tempfile::TempDir;
 use vines::{
     advice,
     comparison::Comparison,
@@ -17,7 +16,7 @@ use vines::{
 
 use super::{
     endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, pack::beside_this_program, progress_bar,
-    result, written,
+    result, writable, written,
 };
 
 const HELP: &str = "\
@@ -53,11 +52,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let (mut scene, reach) = experiment.begin()?;
     // Invalid settings are refused before anything is written or driven.
     BuiltIn::new(&scene.controller_config())?;
-    let (mut open, fmus) = match &arguments.rig {
-        Some(endpoint) => (endpoint.rig(&scene, reach)?, Packed::at(&experiment.out)?),
+    writable(&experiment.out)?;
+    let mut open = match &arguments.rig {
+        Some(endpoint) => endpoint.rig(&scene, reach)?,
         None => {
-            let fmus = Packed::at(&experiment.out)?;
-            (Endpoint::Fmu(fmus.plant()?).rig(&scene, reach)?, fmus)
+            // The folder of the results gets the FMUs if the run succeeds.
+            let folder = tempfile::tempdir().map_err(Failure::run)?;
+            Endpoint::Fmu(fmus(folder.path())?.swap_remove(0)).rig(&scene, reach)?
         }
     };
     experiment.check_loop(&mut open.rig, &mut scene)?;
@@ -91,7 +92,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     })?;
     let found = Comparison::of(&found, &scene);
     let mut files = report::write(&found, &experiment.out).map_err(Failure::run)?;
-    files.extend(fmus.keep()?);
+    if arguments.rig.is_none() {
+        files.extend(fmus(&experiment.out)?);
+    }
     let summary = report::summary::identification(&found);
     result(experiment.json, &found, &summary, &files, timing)
 }
@@ -104,50 +107,21 @@ fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &
     )
     .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
     .flatten();
-    let failure = Failure::from(error);
+    let mut failure = Failure::from(error);
     let kept = match report::write_interrupted(samples, out) {
         Ok(files) => written(&files).trim_end().to_string(),
         Err(error) => error.to_string(),
     };
-    let lines = [Some(failure.to_string()), reason, (!samples.is_empty()).then_some(kept)];
-    failure.with_message(lines.into_iter().flatten().collect::<Vec<_>>().join("\n"))
+    for line in [reason, (!samples.is_empty()).then_some(kept)].into_iter().flatten() {
+        failure.message += &format!("\n{line}");
+    }
+    failure
 }
 
-/// This program's FMUs: packed into a temporary folder inside the folder of the results, and kept if the run succeeds.
-struct Packed {
-    folder: TempDir,
-    out: PathBuf,
-}
-
-impl Packed {
-    /// A folder for them inside `out`, which is created if it does not exist.
-    fn at(out: &Path) -> Result<Self, Failure> {
-        let refused = |error| Failure::input(format!("cannot write to {}: {error}", out.display()));
-        std::fs::create_dir_all(out).map_err(refused)?;
-        let folder = tempfile::Builder::new().prefix(".vines-").tempdir_in(out);
-        Ok(Self { folder: folder.map_err(refused)?, out: out.into() })
-    }
-
-    /// The plant.
-    fn plant(&self) -> Result<PathBuf, Failure> {
-        let libraries = beside_this_program()?.as_path().into();
-        Ok(pack::pack(&pack::components(), &libraries, self.folder.path())?.swap_remove(0))
-    }
-
-    /// Moves them to the results.
-    fn keep(self) -> Result<Vec<PathBuf>, Failure> {
-        let mut kept = Vec::new();
-        for component in pack::components() {
-            let name = format!("{}.fmu", component.identifier);
-            let (from, to) = (self.folder.path().join(&name), self.out.join(&name));
-            if from.is_file() {
-                std::fs::rename(from, &to)
-                    .map_err(|error| Failure::run(format!("cannot write {}: {error}", to.display())))?;
-                kept.push(to);
-            }
-        }
-        Ok(kept)
-    }
+/// Packs this program's FMUs into a folder; the plant is the first.
+fn fmus(out: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let libraries = beside_this_program()?.as_path().into();
+    Ok(pack::pack(&pack::components(), &libraries, out)?)
 }
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {

@@ -83,12 +83,6 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if let Some(sigma) = arguments.sigma {
         return settled(arguments, &scene, sigma, loaded.dimensionless_start());
     }
-    let none = || {
-        Failure::run(format!(
-            "there is no phase-resonant orbit to start from at G = {} (dimensionless); see `vines orbit`",
-            scene.g
-        ))
-    };
     let [lowest, highest] = Limits::default().g;
     let limits = Limits {
         sigma: arguments.range,
@@ -96,7 +90,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         ..Limits::default()
     };
     if arguments.backbone {
-        let branch = backbone(&scene, &limits).ok_or_else(none)?;
+        let branch = backbone(&scene, &limits).ok_or_else(|| {
+            Failure::run(format!(
+                "there is no phase-resonant orbit to start from at G = {} (dimensionless); see `vines orbit`",
+                scene.g
+            ))
+        })?;
         return shown(&scene, "Exact backbone", &branch, arguments.json, || {
             curve("Symmetric 1:1", &branch)
         });
@@ -117,18 +116,19 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 
 /// All components of the frequency response.
 fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> Result<String, Failure> {
-    if 1.0 + scene.epsilon * arguments.range[0] <= 0.0 {
+    let [from, to] = arguments.range;
+    if 1.0 + scene.epsilon * from <= 0.0 {
+        let rule = "1 + epsilon sigma must be above 0";
         return Err(Failure::input(format!(
-            "--range from sigma = {} (dimensionless): 1 + epsilon sigma must be above 0",
-            arguments.range[0]
+            "--range from sigma = {from} (dimensionless): {rule}"
         )));
     }
     let exploration = Exploration { starts: arguments.starts, ..Exploration::default() };
     let found = response(scene, limits, exploration);
     if found.components.is_empty() {
         return Err(Failure::run(format!(
-            "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {} to {}; raise excitation.G or --starts",
-            scene.g, limits.sigma[0], limits.sigma[1]
+            "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {from} to {to}; raise excitation.G or --starts",
+            scene.g
         )));
     }
     shown(scene, "Exact frequency response", &found, arguments.json, || {

@@ -23,25 +23,23 @@ impl RealTimeArguments {
     /// Asks the system for what the user wants.
     pub(super) fn apply(&self) -> Result<(), Failure> {
         if let Some(priority) = self.priority {
-            system::priority(priority).map_err(|error| {
-                let help = "allow it with `ulimit -r 99`, rtprio in /etc/security/limits.conf, or CAP_SYS_NICE";
-                Failure::run(format!("--priority {priority}: the system refuses: {error}; {help}"))
-            })?;
+            let help = "allow it with `ulimit -r 99`, rtprio in /etc/security/limits.conf, or CAP_SYS_NICE";
+            asked(&format!("--priority {priority}"), system::priority(priority), help)?;
         }
         if self.lock_memory {
-            system::lock_memory().map_err(|error| {
-                let help = "allow it with `ulimit -l unlimited`, memlock in /etc/security/limits.conf, or CAP_IPC_LOCK";
-                Failure::run(format!("--lock-memory: the system refuses: {error}; {help}"))
-            })?;
+            let help = "allow it with `ulimit -l unlimited`, memlock in /etc/security/limits.conf, or CAP_IPC_LOCK";
+            asked("--lock-memory", system::lock_memory(), help)?;
         }
         if let Some(cpu) = self.cpu {
-            system::processor(cpu).map_err(|error| {
-                let help = "`nproc` prints how many processors there are; the first is 0";
-                Failure::run(format!("--cpu {cpu}: the system refuses: {error}; {help}"))
-            })?;
+            let help = "`nproc` prints how many processors there are; the first is 0";
+            asked(&format!("--cpu {cpu}"), system::processor(cpu), help)?;
         }
         Ok(())
     }
+}
+
+fn asked(option: &str, answer: Result<(), String>, help: &str) -> Result<(), Failure> {
+    answer.map_err(|error| Failure::run(format!("{option}: the system refuses: {error}; {help}")))
 }
 
 #[cfg(target_os = "linux")]
@@ -75,17 +73,12 @@ mod system {
 
 #[cfg(not(target_os = "linux"))]
 mod system {
-    const ABSENT: &str = "this option exists on Linux only";
-
-    pub fn priority(_: u8) -> Result<(), &'static str> {
-        Err(ABSENT)
+    pub fn priority<T>(_: T) -> Result<(), String> {
+        Err("this option exists on Linux only".into())
     }
+    pub use priority as processor;
 
-    pub fn lock_memory() -> Result<(), &'static str> {
-        Err(ABSENT)
-    }
-
-    pub fn processor(_: usize) -> Result<(), &'static str> {
-        Err(ABSENT)
+    pub fn lock_memory() -> Result<(), String> {
+        priority(())
     }
 }

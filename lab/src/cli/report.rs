@@ -70,11 +70,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         &arguments.out,
         arguments.fresh,
         precision.as_deref(),
-        &|progress| {
-            if bar.message() != progress.section {
-                bar.set_message(progress.section.to_string());
+        &|section, done| {
+            if bar.message() != section {
+                bar.set_message(section.to_string());
             }
-            bar.set_position((1000.0 * progress.done) as u64);
+            bar.set_position((1000.0 * done) as u64);
         },
     )
     .map_err(Failure::run)?;

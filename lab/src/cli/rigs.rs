@@ -66,28 +66,26 @@ fn summary(rows: &[Row]) -> Table {
         ("failed", Outcome::Failed),
     ];
     let headings = "outcome | rigs | periods: median | 90 % | most | distance: median | largest";
-    Table::new(headings).rows(outcomes.iter().map(|(name, outcome)| {
-        let of = |value: fn(&Row) -> Option<f64>| {
-            let mut values: Vec<f64> = rows
-                .iter()
-                .filter(|row| row.outcome == *outcome)
-                .filter_map(value)
-                .collect();
+    Table::new(headings).rows(outcomes.map(|(name, outcome)| {
+        let these = || rows.iter().filter(|row| row.outcome == outcome);
+        let sorted = |value: fn(&Row) -> Option<f64>| {
+            let mut values: Vec<f64> = these().filter_map(value).collect();
             values.sort_by(f64::total_cmp);
             values
         };
-        let (periods, distances) = (of(|row| row.periods), of(|row| row.distance));
+        let (periods, distances) = (sorted(|row| row.periods), sorted(|row| row.distance));
         let at = |values: &[f64], share: f64| values.get(((values.len().max(1) - 1) as f64 * share) as usize).copied();
-        let whole = |value: Option<f64>| value.map_or("–".into(), |value| format!("{value:.0}"));
-        let small = |value: Option<f64>| value.map_or("–".into(), |value| format!("{value:.1e}"));
+        let whole = |share| at(&periods, share).map_or("–".into(), |value| format!("{value:.0}"));
+        let small = |share| at(&distances, share).map_or("–".into(), |value| format!("{value:.1e}"));
+        let count = these().count().to_string();
         [
-            (*name).to_string(),
-            rows.iter().filter(|row| row.outcome == *outcome).count().to_string(),
-            whole(at(&periods, 0.5)),
-            whole(at(&periods, 0.9)),
-            whole(at(&periods, 1.0)),
-            small(at(&distances, 0.5)),
-            small(at(&distances, 1.0)),
+            name.to_string(),
+            count,
+            whole(0.5),
+            whole(0.9),
+            whole(1.0),
+            small(0.5),
+            small(1.0),
         ]
     }))
 }

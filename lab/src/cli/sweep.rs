@@ -10,7 +10,12 @@ use std::{
 use clap::Args;
 use vines::sweep::{self, Axis, Estimate, Monitor, Plan, Results, Settings, Shard};
 
-use super::{failure::Failure, interrupt::stop_flag, progress_bar, scene_arguments::SceneArguments};
+use super::{
+    failure::{Failure, INTERRUPTED},
+    interrupt::stop_flag,
+    progress_bar,
+    scene_arguments::SceneArguments,
+};
 
 const HELP: &str = "\
 Axes; a key is sigma (the detuning) or section.key of a scene:
@@ -138,10 +143,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if complete {
         return Ok(format!("{text}Written: {}\n", arguments.out.display()));
     }
-    Err(Failure::interrupted(format!(
-        "interrupted; {} has the complete chunks, and the same command continues",
-        arguments.out.display()
-    )))
+    let out = arguments.out.display();
+    let message = format!("interrupted; {out} has the complete chunks, and the same command continues");
+    Err(Failure::new(INTERRUPTED, message))
 }
 
 /// The part `I/N` of a sweep.

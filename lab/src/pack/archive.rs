@@ -10,7 +10,7 @@ use crate::files::FileError;
 /// The archive of `entries`, (name inside, content), as a file.
 pub(super) fn file(name: String, entries: &[(&str, &[u8])]) -> Result<File, PackError> {
     match zip(entries) {
-        Ok(content) => Ok(File { name, content }),
+        Ok(content) => Ok((name, content)),
         Err(source) => Err(FileError { path: name.into(), source }.into()),
     }
 }

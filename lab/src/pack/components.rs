@@ -14,11 +14,6 @@ pub struct Component {
 }
 
 impl Component {
-    /// Options of `cargo build --release` that build the library.
-    pub(super) fn build_options(&self) -> String {
-        format!("-p {}", self.package)
-    }
-
     /// The guid in the description, which the library must hold as well.
     pub(super) fn guid(&self) -> Option<&str> {
         let (_, rest) = self.description.split_once("guid=\"")?;
@@ -42,19 +37,16 @@ pub fn components() -> [Component; 2] {
             identifier: "LoViNes",
             library: "lovines_fmu",
             package: "lovines-fmu",
-            description: describe(PLANT),
+            description: describe(include_str!("../../../modelDescription.xml")),
         },
         Component {
             identifier: "PhaseLock",
             library: "phase_lock_fmu",
             package: "phase-lock-fmu",
-            description: describe(CONTROLLER),
+            description: describe(include_str!("../../../controller/fmu/modelDescription.xml")),
         },
     ]
 }
-
-const PLANT: &str = include_str!("../../../modelDescription.xml");
-const CONTROLLER: &str = include_str!("../../../controller/fmu/modelDescription.xml");
 
 /// Gives the description the guid that the library was built with.
 fn describe(xml: &str) -> String {

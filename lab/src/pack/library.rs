@@ -1,38 +1,122 @@
-//! Finding and checking the shared library of a component.
+//! Libraries: found, checked, and given to the components that they belong to.
 
 use std::{
     env::consts::{DLL_PREFIX, DLL_SUFFIX},
     io::ErrorKind,
-    path::Path,
+    path::{Path, PathBuf},
+    str::FromStr,
 };
 
 use super::{
-    Component, PackError,
+    Component, Libraries, PackError,
     platform::Platform,
     symbols::{exports, mentions},
 };
 
-/// The bytes of the component's library in `folder`, if it is one for `platform` and belongs to the description.
-pub(super) fn read(component: &Component, folder: &Path, platform: &Platform) -> Result<Vec<u8>, PackError> {
-    let build_options = component.build_options();
+/// A library for the platform of a folder under `binaries/`; parse it from `win64=PATH`.
+#[derive(Debug, Clone)]
+pub struct Binary {
+    platform: Platform,
+    path: PathBuf,
+}
+
+impl FromStr for Binary {
+    type Err = String;
+
+    fn from_str(argument: &str) -> Result<Self, String> {
+        let (folder, path) = argument
+            .split_once('=')
+            .ok_or("expected PLATFORM=PATH, for instance win64=lovines_fmu.dll")?;
+        let platform = Platform::of_folder(folder).ok_or_else(|| {
+            let known = Platform::folders();
+            format!("`{folder}` is not a platform; known are {known}")
+        })?;
+        Ok(Self { platform, path: path.into() })
+    }
+}
+
+/// A library that has its place.
+pub(super) struct Fitted {
+    /// Index of the component that it belongs to.
+    pub component: usize,
+    pub platform: Platform,
+    pub content: Vec<u8>,
+}
+
+/// The libraries of the components, each with its place.
+pub(super) fn fitted(components: &[Component], libraries: &Libraries) -> Result<Vec<Fitted>, PackError> {
+    let mut fitted: Vec<Fitted> = Vec::new();
+    if libraries.own {
+        let platform = Platform::running();
+        // Where masters look into two folders for them, they go into both, unless another library is given for the second.
+        let given = |folder| libraries.others.iter().any(|other| other.platform.folder == folder);
+        let second = platform.also().filter(|also| !given(also.folder));
+        for (component, one) in components.iter().enumerate() {
+            let content = own(one, &libraries.folder, &platform)?;
+            fitted.extend(second.map(|platform| Fitted { component, platform, content: content.clone() }));
+            fitted.push(Fitted { component, platform, content });
+        }
+    }
+    for other in &libraries.others {
+        let new = fit(other, components)?;
+        let place = |one: &Fitted| (one.component, one.platform.folder);
+        if fitted.iter().any(|one| place(one) == place(&new)) {
+            let identifier = components[new.component].identifier;
+            let problem = format!("would be the second {} library of {identifier}", new.platform.folder);
+            return Err(PackError::Library { path: other.path.clone(), problem });
+        }
+        fitted.push(new);
+    }
+    Ok(fitted)
+}
+
+/// The component's library for this platform, from `folder`.
+fn own(component: &Component, folder: &Path, platform: &Platform) -> Result<Vec<u8>, PackError> {
+    let identifier = component.identifier;
+    let build = format!("`cargo build --release -p {}`", component.package);
     let path = folder.join(format!("{DLL_PREFIX}{}{DLL_SUFFIX}", component.library));
-    let bytes = std::fs::read(&path).map_err(|source| match source.kind() {
-        ErrorKind::NotFound => PackError::Missing {
-            identifier: component.identifier,
-            path: path.clone(),
-            build_options: build_options.clone(),
-        },
-        _ => PackError::Read { path: path.clone(), source },
-    })?;
-    if let Err(found) = platform.check(&bytes) {
-        return Err(PackError::Platform { path, found, needed: platform.name, build_options });
+    let content = match read(
+        &path,
+        platform,
+        "this platform",
+        &format!("; build it here with {build}"),
+    ) {
+        Err(PackError::Read { source, .. }) if source.kind() == ErrorKind::NotFound => {
+            return Err(PackError::Missing { identifier, path, build });
+        }
+        read => read?,
+    };
+    if component.guid().is_some_and(|guid| !mentions(&content, guid)) {
+        let problem = format!("was built from other variables than {identifier} has now: build it anew with {build}");
+        return Err(PackError::Library { path, problem });
     }
-    if !exports(&bytes, "fmi2Instantiate") {
-        return Err(PackError::NotAComponent { path, build_options });
-    }
-    if component.guid().is_some_and(|guid| !mentions(&bytes, guid)) {
-        let identifier = component.identifier;
-        return Err(PackError::Stale { path, identifier, build_options });
-    }
-    Ok(bytes)
+    Ok(content)
+}
+
+/// The GUID in a library determines its component.
+fn fit(Binary { platform, path }: &Binary, components: &[Component]) -> Result<Fitted, PackError> {
+    let content = read(path, platform, platform.folder, "")?;
+    let belongs = |component: &Component| component.guid().is_some_and(|guid| mentions(&content, guid));
+    let Some(component) = components.iter().position(belongs) else {
+        let names: Vec<_> = components.iter().map(|one| one.identifier).collect();
+        let problem = format!(
+            "belongs to none of {}: it contains the GUID of none of them, because it was built from other variables; build it again",
+            names.join(", ")
+        );
+        return Err(PackError::Library { path: path.clone(), problem });
+    };
+    Ok(Fitted { component, platform: *platform, content })
+}
+
+/// Reads an FMI 2.0 component for `platform`; `place` and `advice` are for the message.
+fn read(path: &Path, platform: &Platform, place: &str, advice: &str) -> Result<Vec<u8>, PackError> {
+    let content = std::fs::read(path).map_err(|source| PackError::Read { path: path.into(), source })?;
+    let problem = match platform.check(&content) {
+        Err(found) => format!("is {found}, but {place} needs {}{advice}", platform.name),
+        Ok(()) if !exports(&content, "fmi2Instantiate") => {
+            format!("has no function fmi2Instantiate, so it is not an FMI 2.0 component{advice}")
+        }
+        Ok(()) => return Ok(content),
+    };
+    Err(PackError::Library { path: path.into(), problem })
 }

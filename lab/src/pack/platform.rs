@@ -25,30 +25,32 @@ use BinaryFormat::{Elf, MachO, Pe};
 /// FMI 2.0 names no folder for 64-bit ARM: its libraries go where FMI 3.0 has them. On Apple silicon some masters look there,
 /// others into `darwin64`.
 const KNOWN: [Platform; 9] = [
-    linux("linux64", "a 64-bit Linux library (ELF, x86-64)", X86_64),
-    linux("linux32", "a 32-bit Linux library (ELF, x86)", I386),
-    linux("aarch64-linux", "a 64-bit Linux library (ELF, ARM)", Aarch64),
-    windows("win64", "a 64-bit Windows library (PE, x86-64)", X86_64),
-    windows("win32", "a 32-bit Windows library (PE, x86)", I386),
-    windows("aarch64-windows", "a 64-bit Windows library (PE, ARM)", Aarch64),
-    macos(DARWIN, "a macOS library (Mach-O, x86-64)", X86_64),
-    macos("aarch64-darwin", "a macOS library (Mach-O, ARM)", Aarch64),
-    macos(DARWIN, "a macOS library (Mach-O, ARM)", Aarch64),
+    platform("linux64", "a 64-bit Linux library (ELF, x86-64)", Elf, X86_64),
+    platform("linux32", "a 32-bit Linux library (ELF, x86)", Elf, I386),
+    platform("aarch64-linux", "a 64-bit Linux library (ELF, ARM)", Elf, Aarch64),
+    platform("win64", "a 64-bit Windows library (PE, x86-64)", Pe, X86_64),
+    platform("win32", "a 32-bit Windows library (PE, x86)", Pe, I386),
+    platform("aarch64-windows", "a 64-bit Windows library (PE, ARM)", Pe, Aarch64),
+    platform(DARWIN, "a macOS library (Mach-O, x86-64)", MachO, X86_64),
+    platform("aarch64-darwin", "a macOS library (Mach-O, ARM)", MachO, Aarch64),
+    platform(DARWIN, "a macOS library (Mach-O, ARM)", MachO, Aarch64),
 ];
 
 /// The folder of FMI 2.0 for macOS, whatever the processor.
 const DARWIN: &str = "darwin64";
 
-const fn linux(folder: &'static str, name: &'static str, architecture: Architecture) -> Platform {
-    Platform { folder, name, suffix: ".so", format: Elf, architecture }
-}
-
-const fn windows(folder: &'static str, name: &'static str, architecture: Architecture) -> Platform {
-    Platform { folder, name, suffix: ".dll", format: Pe, architecture }
-}
-
-const fn macos(folder: &'static str, name: &'static str, architecture: Architecture) -> Platform {
-    Platform { folder, name, suffix: ".dylib", format: MachO, architecture }
+const fn platform(
+    folder: &'static str,
+    name: &'static str,
+    format: BinaryFormat,
+    architecture: Architecture,
+) -> Platform {
+    let suffix = match format {
+        Pe => ".dll",
+        MachO => ".dylib",
+        _ => ".so",
+    };
+    Platform { folder, name, suffix, format, architecture }
 }
 
 impl Platform {

@@ -1,7 +1,7 @@
 //! The symbols of a library.
 
 use object::{
-    FileKind, NameOrOrdinal, Object,
+    Export, FileKind, NameOrOrdinal, Object,
     read::macho::{FatArch, MachOFatFile32, MachOFatFile64},
 };
 
@@ -11,34 +11,26 @@ pub(super) fn images(file: &[u8]) -> Vec<&[u8]> {
         let data = arches.iter().map(|arch| arch.data(file));
         data.filter_map(Result::ok).collect()
     }
-    match FileKind::parse(file) {
-        Ok(FileKind::MachOFat32) => {
-            MachOFatFile32::parse(file).map_or_else(|_| Vec::new(), |fat| of(fat.arches(), file))
-        }
-        Ok(FileKind::MachOFat64) => {
-            MachOFatFile64::parse(file).map_or_else(|_| Vec::new(), |fat| of(fat.arches(), file))
-        }
-        _ => vec![file],
-    }
+    let images = match FileKind::parse(file) {
+        Ok(FileKind::MachOFat32) => MachOFatFile32::parse(file).map(|fat| of(fat.arches(), file)),
+        Ok(FileKind::MachOFat64) => MachOFatFile64::parse(file).map(|fat| of(fat.arches(), file)),
+        _ => Ok(vec![file]),
+    };
+    images.unwrap_or_default()
 }
 
 /// Whether the library exports `function`, for every processor that it serves; Mach-O puts an underscore before it.
 pub(super) fn exports(file: &[u8], function: &str) -> bool {
+    let is_function = |export: Export| match export.name() {
+        NameOrOrdinal::Name(name) => name.strip_prefix(b"_").unwrap_or(name) == function.as_bytes(),
+        NameOrOrdinal::Ordinal(_) => false,
+    };
+    let has_function = |image: &&[u8]| -> object::Result<bool> {
+        let parsed = object::File::parse(*image)?;
+        Ok(parsed.exports()?.any(|export| export.is_ok_and(is_function)))
+    };
     let images = images(file);
-    !images.is_empty() && images.iter().all(|image| one_exports(image, function))
-}
-
-fn one_exports(image: &[u8], function: &str) -> bool {
-    let Ok(parsed) = object::File::parse(image) else {
-        return false;
-    };
-    let Ok(mut exports) = parsed.exports() else {
-        return false;
-    };
-    exports.any(|export| match export.as_ref().map(object::Export::name) {
-        Ok(NameOrOrdinal::Name(name)) => name.strip_prefix(b"_").unwrap_or(name) == function.as_bytes(),
-        _ => false,
-    })
+    !images.is_empty() && images.iter().all(|image| has_function(image).unwrap_or(false))
 }
 
 /// Whether `text` stands anywhere in the library.

@@ -17,29 +17,28 @@ const PERIODS: f64 = 400.0;
 pub(super) fn file(scene: &Scene, fmus: &[File]) -> Result<File, PackError> {
     let plant = parameter_set("plant", &parameters::plant(scene));
     let controller = parameter_set("controller", &parameters::controller(scene)?);
-    let step = parameters::step(scene);
+    // The communication step is the controller's.
+    let step = scene.sample_time().to_string();
     let date = date::generation()?;
     let mut structure = STRUCTURE.to_owned();
+    let stop = PERIODS * scene.dimensionless().natural_period();
     for (attribute, value) in [
-        (
-            "stopTime",
-            Some((PERIODS * scene.dimensionless().natural_period()).to_string()),
-        ),
-        ("stepSize", Some(step.to_string())),
-        ("baseStepSize", Some(step.to_string())),
+        ("stopTime", Some(stop.to_string())),
+        ("stepSize", Some(step.clone())),
+        ("baseStepSize", Some(step)),
         ("generationDateAndTime", date),
     ] {
         let filled = value.map_or(String::new(), |value| format!(" {attribute}=\"{value}\""));
         structure = structure.replace(&format!(" {attribute}=\"derived\""), &filled);
     }
 
-    let inside: Vec<String> = fmus.iter().map(|fmu| format!("resources/{}", fmu.name)).collect();
+    let inside: Vec<String> = fmus.iter().map(|(name, _)| format!("resources/{name}")).collect();
     let mut entries = vec![
         ("SystemStructure.ssd", structure.as_bytes()),
         ("resources/plant.ssv", plant.as_bytes()),
         ("resources/controller.ssv", controller.as_bytes()),
     ];
     let fmus = inside.iter().zip(fmus);
-    entries.extend(fmus.map(|(name, fmu)| (name.as_str(), fmu.content.as_slice())));
+    entries.extend(fmus.map(|(name, (_, content))| (name.as_str(), content.as_slice())));
     archive::file("bench.ssp".into(), &entries)
 }

@@ -3,8 +3,9 @@
 mod draw;
 mod stability;
 
-use plotters::chart::SeriesLabelPosition;
-use plotters::style::{Color, RGBColor, ShapeStyle};
+pub use plotters::chart::SeriesLabelPosition as Legend;
+use plotters::style::ShapeStyle;
+pub use plotters::style::{BLACK, Color, RGBColor, WHITE};
 use thiserror::Error;
 
 use crate::scene::{Dimensionless, Sensor};
@@ -38,7 +39,8 @@ pub fn line(colour: RGBColor, tenths: u32) -> ShapeStyle {
 pub struct Figure {
     size: (u32, u32),
     panels: Vec<Panel>,
-    key: Vec<KeyEntry>,
+    /// Names, and what they explain.
+    key: Vec<(&'static str, Mark)>,
 }
 
 /// One panel with its axes.
@@ -47,17 +49,14 @@ pub struct Panel {
     area: [u32; 4],
     /// Title and caption.
     heading: Option<(String, String)>,
-    x: Axis,
-    y: Axis,
+    ranges: [(f64, f64); 2],
+    labels: [String; 2],
     series: Vec<Series>,
-    legend: Option<SeriesLabelPosition>,
+    legend: Option<Legend>,
 }
 
 /// Range and label of an axis.
-pub struct Axis {
-    range: (f64, f64),
-    label: String,
-}
+pub type Axis<'a> = ((f64, f64), &'a str);
 
 /// Something drawn in a panel; the first of each label is in the legend.
 struct Series {
@@ -79,16 +78,10 @@ enum Kind {
     Text(String, Place, u32, bool),
 }
 
-/// An entry of the key beside a panel.
-pub struct KeyEntry {
-    pub name: &'static str,
-    pub mark: Mark,
-}
-
-/// What an entry explains.
+/// What an entry of the key explains.
 pub enum Mark {
     /// Colour, letter, and colour of the letter.
-    Swatch(RGBColor, &'static str, RGBColor),
+    Swatch((RGBColor, &'static str, RGBColor)),
     Line(RGBColor),
     Dot,
 }
@@ -105,14 +98,8 @@ impl Figure {
     }
 
     /// With a key at the right of the panel.
-    pub fn with_key(self, key: Vec<KeyEntry>) -> Self {
+    pub fn with_key(self, key: Vec<(&'static str, Mark)>) -> Self {
         Self { key, ..self }
-    }
-}
-
-impl Axis {
-    pub fn new(range: (f64, f64), label: &str) -> Self {
-        Self { range, label: label.into() }
     }
 }
 
@@ -122,8 +109,8 @@ impl Panel {
         Self {
             area: [0, 0, SIZE.0, SIZE.1],
             heading: None,
-            x,
-            y,
+            ranges: [x.0, y.0],
+            labels: [x.1, y.1].map(String::from),
             series: Vec::new(),
             legend: None,
         }
@@ -139,7 +126,7 @@ impl Panel {
         self
     }
 
-    pub fn legend(mut self, position: SeriesLabelPosition) -> Self {
+    pub fn legend(mut self, position: Legend) -> Self {
         self.legend = Some(position);
         self
     }

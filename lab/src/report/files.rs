@@ -2,6 +2,8 @@
 
 use std::path::{Path, PathBuf};
 
+use lovines::InvalidValue;
+use phase_lock::ConfigError;
 use serde::Serialize;
 use thiserror::Error;
 
@@ -12,13 +14,20 @@ use crate::calibration::Calibration;
 use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
 use crate::experiment::{Sample, table};
 use crate::files::{self, FileError};
-use crate::map::{Cell, Map};
+use crate::map::{Cell, Map, MapError};
+use crate::orbit::Periodic;
 use crate::regime::Regime;
 
-/// Why the files of a run could not be written.
+/// Why a report could not be computed, or the files of a run could not be written.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
-pub enum WriteError {
+pub enum ReportError {
+    #[error(transparent)]
+    Plant(#[from] InvalidValue),
+    #[error(transparent)]
+    Controller(#[from] ConfigError),
+    #[error(transparent)]
+    Map(#[from] MapError),
     #[error(transparent)]
     File(#[from] FileError),
     #[error(transparent)]
@@ -32,7 +41,7 @@ pub enum WriteError {
 /// Writes `identification.json`, `backbone.csv`, `backbone.svg` and `sim.svg` into `out` and returns their paths.
 ///
 /// All of it is made before the first file is written, and each file is complete or absent.
-pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let files = [
         ("identification.json", json(found)?),
         ("backbone.csv", decay_csv(found)?),
@@ -43,7 +52,7 @@ pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, WriteError>
 }
 
 /// Writes `map.csv`, `map.svg`, `map-dark.svg` and, over sigma and G, `bifurcations.csv` into `out` and returns their paths, as [`write()`] does.
-pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let figure = regimes::svg(map)?;
     let mut files = vec![
         ("map.csv", map_csv(map)?),
@@ -57,7 +66,7 @@ pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
 }
 
 /// Writes `tracked.json`, `tracked.csv` and `tracked.svg` into `out` and returns their paths, as [`write()`] does.
-pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let files = [
         ("tracked.json", json(found)?),
         ("tracked.csv", tracked_csv(found)?),
@@ -67,12 +76,12 @@ pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBu
 }
 
 /// Writes `interrupted.csv`: the samples of an experiment that ended early.
-pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+pub fn write_interrupted(samples: &[Sample], out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     Ok(files::write(out, [("interrupted.csv", table(samples))])?)
 }
 
 /// Writes a histogram to `file`: upper limits of the lateness, s, and numbers of samples.
-pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf>, WriteError> {
+pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let lines = classes.iter().map(|(limit, count)| format!("{limit:e},{count}\n"));
     let text = String::from("lateness_s,samples\n") + &lines.collect::<String>();
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
@@ -81,17 +90,21 @@ pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf
 }
 
 /// Writes `coverage.svg` into `out` and returns its path, as [`write()`] does.
-pub fn write_calibration(found: &Calibration, out: &Path) -> Result<Vec<PathBuf>, WriteError> {
+pub fn write_calibration(found: &Calibration, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     Ok(files::write(out, [("coverage.svg", coverage::figure(found).svg()?)])?)
 }
 
-pub(super) fn json(found: &impl Serialize) -> Result<String, WriteError> {
+pub(super) fn json(found: &impl Serialize) -> Result<String, ReportError> {
     Ok(serde_json::to_string_pretty(found)? + "\n")
 }
 
-/// A table, one row an item.
-pub(super) fn csv<T: Serialize>(rows: impl IntoIterator<Item = T>) -> Result<String, WriteError> {
-    let mut writer = csv::Writer::from_writer(Vec::new());
+/// A table, one row an item, with the names of its fields or, for tuples, these headings.
+pub(super) fn csv<T: Serialize>(headings: &[&str], rows: impl IntoIterator<Item = T>) -> Result<String, ReportError> {
+    let own = headings.is_empty();
+    let mut writer = csv::WriterBuilder::new().has_headers(own).from_writer(Vec::new());
+    if !own {
+        writer.write_record(headings)?;
+    }
     for row in rows {
         writer.serialize(row)?;
     }
@@ -101,20 +114,23 @@ pub(super) fn csv<T: Serialize>(rows: impl IntoIterator<Item = T>) -> Result<Str
 }
 
 /// The points along a decay.
-pub(super) fn decay_csv(found: &Comparison) -> Result<String, WriteError> {
+pub(super) fn decay_csv(found: &Comparison) -> Result<String, ReportError> {
     #[derive(Serialize)]
     struct Theory {
         sigma_theory: Option<f64>,
         sigma_exact: Option<f64>,
     }
-    csv(found.decay.iter().map(|one| {
-        let ComparedPoint { point, sigma_theory, sigma_exact } = *one;
-        (point, Theory { sigma_theory, sigma_exact })
-    }))
+    csv(
+        &[],
+        found.decay.iter().map(|one| {
+            let ComparedPoint { point, sigma_theory, sigma_exact } = *one;
+            (point, Theory { sigma_theory, sigma_exact })
+        }),
+    )
 }
 
 /// The points of a tracked backbone.
-pub(super) fn tracked_csv(found: &TrackedComparison) -> Result<String, WriteError> {
+pub(super) fn tracked_csv(found: &TrackedComparison) -> Result<String, ReportError> {
     #[derive(Serialize)]
     struct Compared {
         distance: Option<f64>,
@@ -122,18 +138,21 @@ pub(super) fn tracked_csv(found: &TrackedComparison) -> Result<String, WriteErro
         #[serde(rename = "G_less_exact")]
         g_less_exact: Option<f64>,
     }
-    csv(found.points.iter().map(|TrackedPoint { point, exact }| {
-        let compared = Compared {
-            distance: exact.map(|exact| exact.nearest),
-            sigma_less_exact: exact.and_then(|exact| exact.sigma),
-            g_less_exact: exact.and_then(|exact| exact.g),
-        };
-        (point, compared)
-    }))
+    csv(
+        &[],
+        found.points.iter().map(|TrackedPoint { point, exact }| {
+            let compared = Compared {
+                distance: exact.map(|exact| exact.nearest),
+                sigma_less_exact: exact.and_then(|exact| exact.sigma),
+                g_less_exact: exact.and_then(|exact| exact.g),
+            };
+            (point, compared)
+        }),
+    )
 }
 
 /// The cells of a map.
-pub(super) fn map_csv(map: &Map) -> Result<String, WriteError> {
+pub(super) fn map_csv(map: &Map) -> Result<String, ReportError> {
     #[derive(Serialize)]
     struct Row {
         sigma: f64,
@@ -152,34 +171,18 @@ pub(super) fn map_csv(map: &Map) -> Result<String, WriteError> {
         let coexisting = names.join("; ");
         (Row { sigma, g, r }, point, More { theory_stable, coexisting })
     };
-    csv(map.cells.iter().map(row))
+    csv(&[], map.cells.iter().map(row))
 }
 
 /// The points of the bifurcation curves.
-pub(super) fn bifurcations_csv(map: &Map) -> Result<String, WriteError> {
-    #[derive(Serialize)]
-    struct Row {
-        curve: usize,
-        bifurcation: String,
-        sigma: f64,
-        #[serde(rename = "G")]
-        g: f64,
-        #[serde(rename = "C")]
-        c: f64,
-        #[serde(rename = "B")]
-        b: f64,
-        bounds_stability: bool,
-    }
+pub(super) fn bifurcations_csv(map: &Map) -> Result<String, ReportError> {
+    let headings = ["curve", "bifurcation", "sigma", "G", "C", "B", "bounds_stability"];
     let rows = map.curves.iter().enumerate().flat_map(|(n, curve)| {
-        curve.branch.points.iter().map(move |one| Row {
-            curve: n + 1,
-            bifurcation: curve.name(),
-            sigma: one.sigma,
-            g: one.g,
-            c: one.c,
-            b: one.b,
-            bounds_stability: one.bounds_stability(),
-        })
+        let row = move |one: &Periodic| {
+            let Periodic { sigma, g, c, b, .. } = *one;
+            (n + 1, curve.name(), sigma, g, c, b, one.bounds_stability())
+        };
+        curve.branch.points.iter().map(row)
     });
-    csv(rows)
+    csv(&headings, rows)
 }

@@ -1,8 +1,7 @@
 //! The page: one file of HTML that needs nothing else.
 
-use std::fmt::Write;
-
 use maud::{DOCTYPE, Markup, PreEscaped, html};
+use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 
 use super::section::{Block, Section};
 use super::table::Table;
@@ -10,6 +9,8 @@ use super::theme;
 use crate::scene::Scene;
 
 const STYLE: &str = include_str!("page.css");
+/// All characters but those that an address may contain (RFC 3986, section 2.3).
+const UNRESERVED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'_').remove(b'.').remove(b'~');
 
 /// Puts the sections together. `work_precision` is a figure of run time against error, as SVG, where there is one.
 #[must_use]
@@ -68,7 +69,7 @@ fn body(scene: &Scene, sections: &[Section], work_precision: Option<&str>) -> Ma
             section {
                 h2 { "Run time against error" } "\n"
                 figure {
-                    img alt="Run time against error" src=(format!("data:image/svg+xml,{}", percent_encoded(svg)));
+                    img alt="Run time against error" src=(format!("data:image/svg+xml,{}", utf8_percent_encode(svg, UNRESERVED)));
                     figcaption {
                         "Figure " (figures + 1) ". Run time against error, measured by the project's benchmark on its own machine; \
                          not part of this run."
@@ -114,8 +115,7 @@ fn rendered(block: &Block, figures: &mut u32) -> Markup {
 }
 
 fn budget(sections: &[Section]) -> Markup {
-    let lines = sections.iter().flat_map(|section| &section.budget);
-    let rows = lines.map(|one| [one.what.clone(), one.size.clone(), one.why.clone()]);
+    let rows = sections.iter().flat_map(|section| section.budget.clone());
     let table = Table::new("quantity | difference | cause").rows(rows);
     html! {
         section.budget {
@@ -129,17 +129,6 @@ fn budget(sections: &[Section]) -> Markup {
         }
         "\n"
     }
-}
-
-fn percent_encoded(text: &str) -> String {
-    text.bytes().fold(String::new(), |mut sum, byte| {
-        if byte.is_ascii_alphanumeric() || b"-_.~".contains(&byte) {
-            sum.push(char::from(byte));
-        } else {
-            let _ = write!(sum, "%{byte:02X}");
-        }
-        sum
-    })
 }
 
 #[cfg(test)]

@@ -13,32 +13,17 @@ pub enum Block {
     Table { caption: String, table: Table },
 }
 
-/// A file beside the page.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[expect(missing_docs, reason = "the names say it")]
-pub struct Attachment {
-    pub name: String,
-    pub text: String,
-}
-
-/// One line of the error budget: what is uncertain, by how much, and where that number comes from.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[expect(missing_docs, reason = "the names say it")]
-pub struct Budget {
-    pub what: String,
-    pub size: String,
-    pub why: String,
-}
-
-/// A section, with what was found in a sentence or two. The attachments are tables for programs.
+/// A section, with what was found in a sentence or two.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 #[expect(missing_docs, reason = "the names say it")]
 pub struct Section {
     pub title: String,
     pub finding: String,
     pub blocks: Vec<Block>,
-    pub budget: Vec<Budget>,
-    pub attachments: Vec<Attachment>,
+    /// Lines of the error budget: what is uncertain, by how much, and where that number comes from.
+    pub budget: Vec<[String; 3]>,
+    /// Tables for programs: name and content of a file.
+    pub attachments: Vec<(String, String)>,
 }
 
 impl Section {
@@ -66,10 +51,10 @@ impl Section {
     }
 
     pub(super) fn budget(&mut self, what: &str, size: String, why: &str) {
-        self.budget.push(Budget { what: what.into(), size, why: why.into() });
+        self.budget.push([what.into(), size, why.into()]);
     }
 
     pub(super) fn attach(&mut self, name: &str, text: String) {
-        self.attachments.push(Attachment { name: name.into(), text });
+        self.attachments.push((name.into(), text));
     }
 }

@@ -6,14 +6,9 @@ mod regimes;
 mod theory;
 mod tracking;
 
-use lovines::InvalidValue;
-use phase_lock::ConfigError;
-use thiserror::Error;
-
-use super::figure::FigureError;
-use super::files::WriteError;
+use super::files::ReportError;
 use super::section::Section;
-use crate::map::{MapError, Range};
+use crate::map::Range;
 use crate::scene::Scene;
 
 /// The subject of a report.
@@ -25,25 +20,8 @@ pub struct Subject {
     pub map: [Range; 2],
 }
 
-/// Why a section could not be made.
-#[derive(Debug, Error)]
-#[error(transparent)]
-#[expect(missing_docs, reason = "each is named by what it contains")]
-pub enum SectionError {
-    Plant(#[from] InvalidValue),
-    Controller(#[from] ConfigError),
-    Map(#[from] MapError),
-    Write(#[from] WriteError),
-}
-
-impl From<FigureError> for SectionError {
-    fn from(error: FigureError) -> Self {
-        Self::Write(error.into())
-    }
-}
-
 /// Computes one section; calls the callback with the fraction done, from 0 to 1.
-pub type Maker = fn(&Subject, &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError>;
+pub type Maker = fn(&Subject, &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError>;
 
 /// All sections in order, each with the name under which it is cached.
 pub const SECTIONS: [(&str, Maker); 5] = [

@@ -2,34 +2,17 @@
 
 use std::path::{Path, PathBuf};
 
-use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::dark;
-use super::files::WriteError;
+use super::files::ReportError;
 use super::page::page;
 use super::section::{Block, Section};
-use super::sections::{SECTIONS, SectionError, Subject};
+use super::sections::{SECTIONS, Subject};
 use crate::files;
 
 /// Folder of cached sections, inside the folder of the report.
 const KEPT: &str = ".vines";
-
-/// A cached section, with a hash of its input.
-#[derive(Serialize, Deserialize)]
-struct Kept {
-    key: String,
-    section: Section,
-}
-
-/// Progress of the report.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Progress<'a> {
-    /// The section being made.
-    pub section: &'a str,
-    /// Fraction of all sections, from 0 to 1.
-    pub done: f64,
-}
 
 /// The finished report.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,33 +26,31 @@ pub struct Report {
 }
 
 /// Writes the report on `subject` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. Sections
-/// of an earlier run are reused unless scene, version or axes have changed, or `fresh` is set.
+/// of an earlier run are reused unless scene, version or axes have changed, or `fresh` is set. `progress` gets the name of the section being
+/// made, and the fraction of all sections that is done, from 0 to 1.
 pub fn write_report(
     subject: &Subject,
     out: &Path,
     fresh: bool,
     work_precision: Option<&str>,
-    progress: &(dyn Fn(Progress) + Sync),
-) -> Result<Report, SectionError> {
+    progress: &(dyn Fn(&str, f64) + Sync),
+) -> Result<Report, ReportError> {
     let (mut sections, mut kept) = (Vec::new(), Vec::new());
     for (n, (name, make)) in SECTIONS.into_iter().enumerate() {
         let key = key(subject, name);
-        let at = |part: f64| Progress {
-            section: name,
-            done: (n as f64 + part) / SECTIONS.len() as f64,
-        };
-        progress(at(0.0));
+        let at = |part: f64| progress(name, (n as f64 + part) / SECTIONS.len() as f64);
+        at(0.0);
         let file = format!("{name}.json");
         if let Some(section) = found(&out.join(KEPT).join(&file), &key).filter(|_| !fresh) {
             kept.push(name);
             sections.push(section);
             continue;
         }
-        let section = make(subject, &|part| progress(at(part)))?;
-        let entry = Kept { key, section };
-        let text = serde_json::to_string(&entry).map_err(WriteError::from)?;
-        files::write(&out.join(KEPT), [(file, text)]).map_err(WriteError::from)?;
-        sections.push(entry.section);
+        let section = make(subject, &at)?;
+        // With a hash of its input.
+        let text = serde_json::to_string(&(key, &section))?;
+        files::write(&out.join(KEPT), [(file, text)])?;
+        sections.push(section);
     }
     let mut files = vec![(
         "report.html".to_string(),
@@ -82,11 +63,10 @@ pub fn write_report(
                 files.push((format!("{name}-dark.svg"), dark(svg)));
             }
         }
-        let attachments = section.attachments.iter();
-        files.extend(attachments.map(|one| (one.name.clone(), one.text.clone())));
+        files.extend(section.attachments.clone());
     }
     Ok(Report {
-        written: files::write(out, files).map_err(WriteError::from)?,
+        written: files::write(out, files)?,
         kept,
         findings: sections.into_iter().map(|one| one.finding).collect(),
     })
@@ -95,8 +75,8 @@ pub fn write_report(
 /// The section cached in a file, if its input is the same.
 fn found(file: &Path, key: &str) -> Option<Section> {
     let text = std::fs::read_to_string(file).ok()?;
-    let kept: Kept = serde_json::from_str(&text).ok()?;
-    (kept.key == key).then_some(kept.section)
+    let (made_from, section): (String, Section) = serde_json::from_str(&text).ok()?;
+    (made_from == key).then_some(section)
 }
 
 /// A hash of everything that a section depends on.

@@ -15,41 +15,32 @@ pub const FAINT: RGBColor = RGBColor(120, 170, 210);
 pub const DECAY: RGBColor = RGBColor(213, 94, 0);
 pub const LOCK: RGBColor = RGBColor(0, 0, 0);
 
-/// The colour of a regime in the map: the darker, the less orderly its impacts.
-pub fn regime(regime: Regime) -> RGBColor {
+/// A regime in the map: its colour (the darker, the less orderly its impacts), its letter, and the colour of the letter. Where the cell
+/// colour is the same on dark screens, so is that of the letter.
+pub fn regime(regime: Regime) -> (RGBColor, &'static str, RGBColor) {
+    const DARK: RGBColor = RGBColor(10, 10, 10);
+    const LIGHT: RGBColor = RGBColor(254, 254, 254);
     match regime {
-        Regime::NoImpacts => RGBColor(246, 246, 244),
-        Regime::Symmetric => RGBColor(178, 217, 241),
-        Regime::Asymmetric => RGBColor(240, 180, 70),
-        Regime::Several => RGBColor(90, 174, 110),
-        Regime::QuasiPeriodic => RGBColor(60, 130, 160),
-        Regime::Modulated => RGBColor(190, 70, 45),
-        Regime::Chaotic => RGBColor(106, 52, 128),
-        Regime::Undecided => RGBColor(30, 32, 40),
+        Regime::NoImpacts => (RGBColor(246, 246, 244), "O", RGBColor(0, 0, 0)),
+        Regime::Symmetric => (RGBColor(178, 217, 241), "S", DARK),
+        Regime::Asymmetric => (RGBColor(240, 180, 70), "A", DARK),
+        Regime::Several => (RGBColor(90, 174, 110), "n", DARK),
+        Regime::QuasiPeriodic => (RGBColor(60, 130, 160), "Q", LIGHT),
+        Regime::Modulated => (RGBColor(190, 70, 45), "M", LIGHT),
+        Regime::Chaotic => (RGBColor(106, 52, 128), "C", LIGHT),
+        Regime::Undecided => (RGBColor(30, 32, 40), "U", RGBColor(255, 255, 255)),
         // The map shows none of these.
-        Regime::Other | Regime::Unresolved | Regime::Unknown => UNSTABLE,
+        Regime::Other | Regime::Unresolved | Regime::Unknown => (UNSTABLE, "?", DARK),
     }
 }
 
-/// The colour of a bifurcation curve on the map.
-pub fn bifurcation(kind: Bifurcation) -> RGBColor {
-    match kind {
-        Bifurcation::Fold => RGBColor(20, 60, 160),
-        Bifurcation::SymmetryBreaking => RGBColor(170, 90, 0),
-        Bifurcation::PeriodDoubling => RGBColor(0, 95, 50),
-        Bifurcation::Torus => RGBColor(200, 0, 60),
-    }
-}
-
-/// The colour of a letter on it. Where the cell colour is the same on dark screens, so is that of the letter.
-pub fn on_regime(regime: Regime) -> RGBColor {
-    match regime {
-        Regime::NoImpacts => RGBColor(0, 0, 0),
-        Regime::Undecided => RGBColor(255, 255, 255),
-        Regime::QuasiPeriodic | Regime::Modulated | Regime::Chaotic => RGBColor(254, 254, 254),
-        _ => RGBColor(10, 10, 10),
-    }
-}
+/// The colours of the bifurcation curves on the map.
+pub const BIFURCATIONS: [(Bifurcation, RGBColor); 4] = [
+    (Bifurcation::Fold, RGBColor(20, 60, 160)),
+    (Bifurcation::SymmetryBreaking, RGBColor(170, 90, 0)),
+    (Bifurcation::PeriodDoubling, RGBColor(0, 95, 50)),
+    (Bifurcation::Torus, RGBColor(200, 0, 60)),
+];
 
 /// Colours on white paper, and on a dark screen.
 const DARK: [(&str, &str); 9] = [

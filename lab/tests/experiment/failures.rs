@@ -54,12 +54,7 @@ fn a_sensor_of_two_bits_has_no_phase_rather_than_a_phase_error_of_zero() {
         "record.lock_periods=5",
     ]);
     let plant = Simulated::new(scene.plant, scene.start).unwrap();
-    let mut rig = Chain::around(
-        Box::new(plant),
-        &scene.chain,
-        &scene.dimensionless(),
-        scene.controller.samples_per_period,
-    );
+    let mut rig = Chain::around(Box::new(plant), &scene);
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let outcome = experiment::run(&mut *rig, &mut controller, &plan(&scene), |_, _, _| {});
     let message = outcome.unwrap_err().to_string();

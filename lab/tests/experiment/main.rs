@@ -285,7 +285,7 @@ fn a_decay_too_short_for_points_keeps_the_lock_and_says_that_the_record_ended() 
 fn a_lock_through_30_db_takes_less_than_twice_the_periods_and_states_how_far_off_it_is() {
     let scene = scene(&["chain.snr=30"]);
     let plant = Box::new(Simulated::new(scene.plant, scene.start).unwrap());
-    let mut rig = Chain::new(plant, &scene.chain, &scene.dimensionless(), 100.0);
+    let mut rig = Chain::new(plant, &scene);
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let record = experiment::run(&mut rig, &mut controller, &plan(&scene), |_, _, _| {}).unwrap();
     let found = Comparison::of(&identify(&record, &scene).unwrap(), &scene);

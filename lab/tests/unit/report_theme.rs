@@ -7,7 +7,7 @@ fn regimes_differ_in_lightness() {
     let mut lightness: Vec<f64> = Regime::SIMULATED
         .iter()
         .map(|one| {
-            let RGBColor(r, g, b) = regime(*one);
+            let (RGBColor(r, g, b), ..) = regime(*one);
             0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
         })
         .collect();

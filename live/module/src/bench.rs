@@ -11,7 +11,7 @@ use vines_testbench::scene::Scene;
 use crate::message::Message;
 use crate::rig::NoisyRig;
 use crate::settings::{COUNT, Settings, changed, default_scene, index, settings_of};
-use crate::tracking::Tracking;
+use crate::tracking::{Tracking, track};
 
 /// One sample of the record.
 #[derive(Debug, Clone, Copy)]
@@ -55,7 +55,7 @@ pub struct Bench {
     pub phase: f64,
     /// The tracking of the backbone, while it runs.
     pub tracking: Option<Tracking>,
-    pub(crate) rig: NoisyRig,
+    rig: NoisyRig,
     /// The plant at the last sample, and the drive from there on.
     before: (Plant, Drive),
 }
@@ -115,6 +115,18 @@ impl Bench {
     pub fn drive(&mut self, on: bool) {
         self.active = on;
         self.tracking = None;
+    }
+
+    /// Tracks the backbone from here on.
+    ///
+    /// # Errors
+    /// The message of a lab's error, such as no lock; then the bench runs on as before.
+    pub fn track(&mut self) -> Result<(), Message> {
+        let lock = self.scene.backbone_config().build()?;
+        self.tracking = Some(track(&self.scene, &self.rig, lock, self.state, self.samples)?);
+        self.lock = lock;
+        self.active = true;
+        Ok(())
     }
 
     /// Takes `samples` samples and hands the rows of the record to `on_row`.

@@ -4,11 +4,12 @@
 use std::cell::Cell;
 
 use phase_lock::{Input, Move, PhaseLock, State};
-use vines_testbench::backbone::track;
+use vines_testbench::backbone;
 use vines_testbench::rig::{Command, Controller, ControllerError, Sensors};
+use vines_testbench::scene::Scene;
 
-use crate::bench::Bench;
 use crate::message::Message;
+use crate::rig::NoisyRig;
 
 /// A point of the tracked backbone, dimensionless.
 #[derive(Debug, Clone, Copy)]
@@ -72,32 +73,25 @@ impl Controller for Ahead<'_> {
     }
 }
 
-impl Bench {
-    /// Tracks the backbone from here on.
-    ///
-    /// # Errors
-    /// The message of a lab's error, such as no lock; then the bench runs on as before.
-    pub fn track(&mut self) -> Result<(), Message> {
-        let lock = self.scene.backbone_config().build()?;
-        let last = Cell::new((self.samples, 0.0));
-        let mut controller = Ahead { lock, state: self.state, last: &last, moves: Vec::new() };
-        let mut rig = self.rig.clone();
-        let mut begun = Vec::new();
-        let tracked = track(&mut rig, &mut controller, &self.scene, |_, _| begun.push(last.get()))?;
-        let ends = begun.into_iter().skip(1).chain([last.get()]);
-        let points = tracked.points.iter().zip(ends);
-        let points = points.map(|(point, (sample, omega))| Point {
-            sample,
-            omega,
-            sigma: point.sigma,
-            c: point.c,
-            g: point.g,
-            settled: point.settled,
-        });
-        controller.moves.reverse();
-        self.tracking = Some(Tracking { moves: controller.moves, points: points.collect() });
-        self.lock = lock;
-        self.active = true;
-        Ok(())
-    }
+/// Tracks the backbone with `lock`, from its state before the sample `sample` on, on a copy of the rig.
+///
+/// # Errors
+/// The message of a lab's error, such as no lock.
+pub fn track(scene: &Scene, rig: &NoisyRig, lock: PhaseLock, state: State, sample: u64) -> Result<Tracking, Message> {
+    let last = Cell::new((sample, 0.0));
+    let mut controller = Ahead { lock, state, last: &last, moves: Vec::new() };
+    let mut begun = Vec::new();
+    let tracked = backbone::track(&mut rig.clone(), &mut controller, scene, |_, _| begun.push(last.get()))?;
+    let ends = begun.into_iter().skip(1).chain([last.get()]);
+    let points = tracked.points.iter().zip(ends);
+    let points = points.map(|(point, (sample, omega))| Point {
+        sample,
+        omega,
+        sigma: point.sigma,
+        c: point.c,
+        g: point.g,
+        settled: point.settled,
+    });
+    controller.moves.reverse();
+    Ok(Tracking { moves: controller.moves, points: points.collect() })
 }

@@ -6,11 +6,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use super::bench::Bench;
+use super::bench::{Bench, Order};
 use super::point::Point;
 use super::predictor;
 use super::settle::{BENT, Criterion, Found};
-use super::track::{Order, Taken, criterion, is_reached, point};
 use crate::experiment::ExperimentError;
 use crate::identification::{Cycle, PARABOLA, Regime};
 use crate::rig::{Controller, Move, Rig};
@@ -50,6 +49,86 @@ pub(super) struct Sweep {
 }
 
 impl Sweep {
+    /// Periods in which the level after the point `last` can be crossed, if `after` is the one that follows; `None` where a hold is better:
+    /// towards the fold, for distant levels, and at much noise. `cycle` is the last period.
+    pub fn periods(
+        &self,
+        scene: &Scene,
+        cycle: &Cycle,
+        order: &Order,
+        last: &Point,
+        after: Option<f64>,
+    ) -> Option<f64> {
+        let precision = precision(scene);
+        let crossable = |order: &Order, before: f64| slowest(scene, order, before).filter(|[slow, _]| *slow <= MOST);
+        let [slow, bent] = crossable(order, last.level).filter(|_| last.reached)?;
+        let next = |level: f64| Order { level, ..order.clone() };
+        let follows = after.is_some_and(|after| crossable(&next(after), order.level).is_some());
+        let by_noise =
+            (1..=MOST_BY_NOISE).find(|n| predicted(scene, order, cycle, f64::from(*n)) <= PARTS[1] * precision)?;
+        // Two neighbours lend the half of their periods, where the backbone is straight enough for twice the distance.
+        let lent = follows && !self.crossed.is_empty() && 4.0 * bent <= STRAIGHT * precision;
+        let d = scene.dimensionless();
+        let from_fold = order.level - SlowFlow::new(d.lambda, d.r).manifold.c_min();
+        if f64::from(by_noise) > slow && (order.level - last.level).abs() > FOLD * from_fold {
+            return None;
+        }
+        Some(slow.max(if lent { 0.5 } else { 1.0 } * f64::from(by_noise)).ceil())
+    }
+
+    /// Crosses the level of `order` in `periods`: from half the distance of the levels before it to half of it behind.
+    ///
+    /// # Errors
+    /// As those of a hold.
+    pub fn cross<R: Rig + ?Sized, C: Controller + ?Sized>(
+        &mut self,
+        bench: &mut Bench<R, C>,
+        order: &Order,
+        (last, periods): (&Point, f64),
+    ) -> Result<Point, ExperimentError> {
+        let (scene, d) = (bench.scene, bench.scene.dimensionless());
+        let width = order.level - last.level;
+        let (start, target) = (bench.run.periods, bench.target + order.phase);
+        let period = bench.last.map_or(d.natural_period(), |cycle| TAU / cycle.omega);
+        bench.run.samples.clear();
+        let predicted = |c: f64| predictor::change(scene.backbone.predictor, &order.known, c, &d);
+        let before = order.level - 0.5 * width;
+        let crossing = (before, order.level + 0.5 * width, periods);
+        let legs = [(last.level, before, (LEAD * periods).max(SHORTEST)), crossing];
+        let mut cycles = Vec::new();
+        for &(from, to, taken) in &legs[usize::from(!self.cycles.is_empty())..] {
+            let ((g_from, sigma_from), (g, sigma)) = (predicted(from), predicted(to));
+            let leg = Move {
+                response: to * d.b,
+                duration: taken * period,
+                amplitude: d.amplitude(g - g_from),
+                omega: d.omega_change(sigma - sigma_from),
+                growth: width * d.b / (periods * period),
+            };
+            bench.run.controller.hold_response(leg, target)?;
+            cycles.clear();
+            for _ in 0..taken.round() as usize {
+                cycles.push(bench.cycle()?);
+            }
+        }
+        self.cycles.extend(&cycles);
+        self.crossed.push((order.clone(), cycles.len()));
+        let criterion = of_crossing(scene, order);
+        // The rate may change in the first period.
+        let said = criterion
+            .best_of([&cycles[..], &cycles[1..]])
+            .unwrap_or_else(|| Found::unsettled(&cycles));
+        // All periods lie evenly about the level.
+        let response = Estimate {
+            value: mean(cycles.iter().map(Cycle::amplitude)),
+            ..said.response
+        };
+        Ok(Point {
+            reached: order.is_reached(scene, response),
+            ..bench.point(order, start, &said, &cycles, &criterion)
+        })
+    }
+
     /// Estimates the last level but one again, from its own periods and from half of those of both neighbours: the uncertainty of a
     /// slope falls with the duration to the power of 3/2.
     pub fn refine(&self, scene: &Scene, point: &mut Point) {
@@ -60,8 +139,7 @@ impl Sweep {
         let criterion = of_crossing(scene, order);
         let shared = before.min(after) / 2;
         let windows = [&self.cycles[begin..end], &self.cycles[begin - shared..end + shared]];
-        let precision = scene.backbone.precision * scene.dimensionless().omega_change(1.0);
-        let is_noise = predicted(scene, order, &self.cycles[begin], *own as f64) > 0.5 * precision;
+        let is_noise = predicted(scene, order, &self.cycles[begin], *own as f64) > 0.5 * precision(scene);
         let Some(found) = criterion.best_of(windows).filter(|_| is_noise) else {
             return;
         };
@@ -76,30 +154,9 @@ impl Sweep {
     }
 }
 
-/// Periods in which the level after the point `last` can be crossed, if `after` is the one that follows; `None` where a hold is better:
-/// towards the fold, for distant levels, and at much noise.
-pub fn periods<R: Rig + ?Sized, C: Controller + ?Sized>(
-    bench: &Bench<R, C>,
-    scene: &Scene,
-    order: &Order,
-    (last, after): (&Point, Option<f64>),
-) -> Option<f64> {
-    let cycle = bench.last?;
-    let precision = scene.backbone.precision * scene.dimensionless().omega_change(1.0);
-    let crossable = |order: &Order, before: f64| slowest(scene, order, before).filter(|[slow, _]| *slow <= MOST);
-    let [slow, bent] = crossable(order, last.level).filter(|_| last.reached)?;
-    let next = |level: f64| Order { level, ..order.clone() };
-    let follows = after.is_some_and(|after| crossable(&next(after), order.level).is_some());
-    let by_noise =
-        (1..=MOST_BY_NOISE).find(|n| predicted(scene, order, &cycle, f64::from(*n)) <= PARTS[1] * precision)?;
-    // Two neighbours lend the half of their periods, where the backbone is straight enough for twice the distance.
-    let lent = follows && !bench.sweep.crossed.is_empty() && 4.0 * bent <= STRAIGHT * precision;
-    let d = scene.dimensionless();
-    let from_fold = order.level - SlowFlow::new(d.lambda, d.r).manifold.c_min();
-    if f64::from(by_noise) > slow && (order.level - last.level).abs() > FOLD * from_fold {
-        return None;
-    }
-    Some(slow.max(if lent { 0.5 } else { 1.0 } * f64::from(by_noise)).ceil())
+/// Largest standard uncertainty of the frequency, rad/s, that the scene allows.
+fn precision(scene: &Scene) -> f64 {
+    scene.backbone.precision * scene.dimensionless().omega_change(1.0)
 }
 
 /// Standard uncertainty of the frequency, rad/s, or of the drive in terms of it, by the noise of `n` such periods.
@@ -121,74 +178,18 @@ fn slowest(scene: &Scene, order: &Order, before: f64) -> Option<[f64; 2]> {
     let d = scene.dimensionless();
     let width = (order.level - before).abs();
     let slopes = order.slopes(scene);
-    let precision = scene.backbone.precision * d.omega_change(1.0);
     let bent = BENT * slopes.curvature[1].abs() * (width * d.b).powi(2) / 40.0;
-    if !(width > 0.0 && width <= WIDEST * order.level && bent <= precision) {
+    if !(width > 0.0 && width <= WIDEST * order.level && bent <= precision(scene)) {
         return None;
     }
     let by_drive = width / (SHARE * d.epsilon * PI * order.known.last()?.g);
-    let by_drift = LATE * slopes.drift[1].abs() * width * d.b * d.omega0 / (TAU * PARTS[0] * precision);
+    let by_drift = LATE * slopes.drift[1].abs() * width * d.b * d.omega0 / (TAU * PARTS[0] * precision(scene));
     Some([by_drive.max(by_drift).max(FEWEST), bent])
-}
-
-/// Crosses the level of `order` in `periods`: from half the distance of the levels before it to half of it behind.
-///
-/// # Errors
-/// As those of a hold.
-pub fn cross<R: Rig + ?Sized, C: Controller + ?Sized>(
-    bench: &mut Bench<R, C>,
-    scene: &Scene,
-    order: &Order,
-    (last, periods): (&Point, f64),
-) -> Result<Point, ExperimentError> {
-    let d = scene.dimensionless();
-    let width = order.level - last.level;
-    let (start, target) = (bench.periods, bench.target + order.phase);
-    let period = bench.last.map_or(d.natural_period(), |cycle| TAU / cycle.omega);
-    bench.samples.clear();
-    let predicted = |c: f64| predictor::change(scene.backbone.predictor, &order.known, c, &d);
-    let before = order.level - 0.5 * width;
-    let crossing = (before, order.level + 0.5 * width, periods);
-    let legs = [(last.level, before, (LEAD * periods).max(SHORTEST)), crossing];
-    let mut cycles = Vec::new();
-    for &(from, to, taken) in &legs[usize::from(!bench.sweep.cycles.is_empty())..] {
-        let ((g_from, sigma_from), (g, sigma)) = (predicted(from), predicted(to));
-        let leg = Move {
-            response: to * d.b,
-            duration: taken * period,
-            amplitude: d.amplitude(g - g_from),
-            omega: d.omega_change(sigma - sigma_from),
-            growth: width * d.b / (periods * period),
-        };
-        bench.controller.hold_response(leg, target)?;
-        cycles.clear();
-        for _ in 0..taken.round() as usize {
-            cycles.push(bench.cycle()?);
-        }
-    }
-    bench.sweep.cycles.extend(&cycles);
-    bench.sweep.crossed.push((order.clone(), cycles.len()));
-    let criterion = of_crossing(scene, order);
-    // The rate may change in the first period.
-    let said = criterion
-        .best_of([&cycles[..], &cycles[1..]])
-        .unwrap_or_else(|| Found::unsettled(&cycles));
-    // All periods lie evenly about the level.
-    let response = Estimate {
-        value: mean(cycles.iter().map(Cycle::amplitude)),
-        ..said.response
-    };
-    let taken = Taken {
-        periods: bench.periods - start,
-        settled: said.steady || criterion.is_met(&said),
-        reached: is_reached(scene, order.level, &Found { response, ..said }),
-    };
-    Ok(point(bench, scene, order.level, &said, &cycles, &taken))
 }
 
 /// The criterion for a level that is crossed.
 fn of_crossing(scene: &Scene, order: &Order) -> Criterion {
-    let mut criterion = criterion(scene, order);
+    let mut criterion = order.criterion(scene);
     (criterion.spread, criterion.slopes.late) = (f64::INFINITY, LATE);
     criterion.tolerance = criterion.precision;
     criterion

@@ -5,7 +5,7 @@ use vines_model::Dimensionless;
 
 use super::exact_curve::{Distance, ExactCurve};
 use crate::backbone::{Point, Tracked};
-use crate::scene::{Resonance, Scene};
+use crate::scene::Scene;
 
 /// A tracked backbone beside the exact one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -39,13 +39,10 @@ impl TrackedComparison {
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
         let parameters = scene.dimensionless();
         let curve = ExactCurve::of(&parameters);
-        let peak = scene.resonance.resonance == Resonance::Peak;
-        let at_resonance = peak || scene.controller.is_at_phase_resonance();
+        let exact = |point: &Point| curve.distance(point.c, point.sigma, point.g);
         let compare = |point: &Point| TrackedPoint {
             point: *point,
-            exact: at_resonance
-                .then(|| curve.distance(point.c, point.sigma, point.g))
-                .flatten(),
+            exact: Some(point).filter(|_| scene.is_at_resonance()).and_then(exact),
         };
         Self {
             points: tracked.points.iter().map(compare).collect(),

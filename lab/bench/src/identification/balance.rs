@@ -17,7 +17,7 @@
 //! lines. docs/estimators.md derives the uncertainties.
 
 use nalgebra::Complex;
-use vines_model::numerics::{Estimate, Line, Prior, Regression, mean};
+use vines_model::numerics::{Estimate, Prior, Regression, mean, slope};
 
 use super::motion::{Motion, motion};
 use super::{Cycle, Slopes};
@@ -25,16 +25,12 @@ use super::{Cycle, Slopes};
 /// The two lines, fitted to some periods.
 #[derive(Debug, Clone)]
 pub struct Balance {
-    /// Number of periods.
-    pub periods: usize,
     /// Mean amplitude of the response, m.
     pub response: Estimate,
     /// Standard uncertainty of the amplitude, m, that drive and frequency belong to: its noise within the integrals.
     pub u_level: f64,
     /// Mean phase error, rad.
     pub phase_error: Estimate,
-    /// Mean amplitude of the base, m.
-    pub base: Estimate,
     /// Largest scatter of the residuals over the noise of the sensors.
     pub excess: f64,
     /// g.
@@ -102,11 +98,9 @@ impl Balance {
         let excess = drive.excess.max(turning.excess);
         let of = |value, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
         Some(Self {
-            periods: cycles.len(),
             response: of(response, noise),
             u_level: noise * (PARABOLA / n).sqrt(),
             phase_error: of(phase_error, phase_noise),
-            base: of(base, base_noise),
             excess,
             gain,
             bend,
@@ -174,7 +168,7 @@ impl Balance {
 /// Sizes of the terms beyond those of the second order and beyond the drift: a share of them.
 fn remainders(cycles: &[Cycle], drives: &[Drive], [inertia, gain, response]: [f64; 3], slopes: &Slopes) -> [f64; 2] {
     let duration = cycles[cycles.len() - 1].time - cycles[0].time;
-    let slope = |values: Vec<f64>| Line::fit(&values).slope * cycles.len() as f64 / duration;
+    let slope = |values: Vec<f64>| slope(&values) * cycles.len() as f64 / duration;
     let inertial = REMAINDER * inertia * slope(drives.iter().map(|drive| drive.force.re).collect());
     let drift = slopes.late * slope(cycles.iter().map(Cycle::amplitude).collect());
     let aside = mean(drives.iter().map(|drive| slopes.beyond(drive.force)));

@@ -34,73 +34,42 @@ pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic
     }
     let middle = 0.5 * (values.len() - 1) as f64;
     let right = DVector::from_column_slice(values);
-    let mut omega = omega;
-    let mut fitted = None;
+    // Half a window, s.
+    let half = middle * sample_time;
+    let (mut omega, mut last) = (omega, None);
     for _ in 0..ROUNDS {
         let phases: Vec<f64> = (0..values.len())
             .map(|n| (n as f64 - middle) * sample_time * omega)
             .collect();
         let basis = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(1)]);
         let fit = basis.fit(&right)?;
-        let (a, drift) = (fit.harmonic(1), fit.drift(1));
+        let a = fit.harmonic(1);
         let square = a.norm_sqr();
         if square == 0.0 || !square.is_finite() {
             return None;
         }
         // The phase of a turns by Im(drift/a) per half window.
-        let half = middle * sample_time;
-        let change = drift * a.conj() / half;
+        let change = fit.drift(1) * a.conj() / half;
         omega += change.im / square;
-        let amplitude = square.sqrt();
-        fitted = Some((
-            basis,
-            fit,
-            Harmonic {
-                amplitude,
-                phase: a.arg(),
-                omega,
-                rate: change.re / amplitude,
-                uncertainties: [0.0; 2],
-            },
-        ));
+        last = Some((basis, fit, a, change.re));
     }
-    let (basis, fit, found) = fitted?;
+    let (basis, fit, a, growth) = last?;
+    let amplitude = a.norm_sqr().sqrt();
     let degrees = (values.len() - basis.terms()) as f64;
     let noise = (basis.residual(&right, &fit).norm_squared() / degrees).sqrt();
     let largest = |degree: usize| basis.variances(1, degree).into_iter().fold(0.0, f64::max).sqrt();
-    let uncertainties = [
-        noise * largest(0),
-        noise * largest(1) / (found.amplitude * middle * sample_time),
-    ];
-    Some(Harmonic { uncertainties, ..found })
+    Some(Harmonic {
+        amplitude,
+        phase: a.arg(),
+        omega,
+        rate: growth / amplitude,
+        uncertainties: [
+            noise * largest(0),
+            noise * largest(1) / (amplitude * middle * sample_time),
+        ],
+    })
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-    use proptest::prelude::*;
-
-    proptest! {
-        #[test]
-        fn a_drifting_harmonic_is_found_from_a_poor_guess(
-            amplitude in 0.1..2.0f64, phase in -3.0..3.0f64, decay in 0.0..0.02f64, guess in 0.98..1.02f64,
-        ) {
-            let (dt, n) = (0.063, 151);
-            let middle = 75.0;
-            let values: Vec<f64> = (0..n).map(|i| {
-                let t = (f64::from(i) - middle) * dt;
-                let theta = phase + t;
-                amplitude * (1.0 - decay * t) * theta.sin() + 0.02 * (3.0 * theta + 0.3).sin() + 0.01
-            }).collect();
-            let fit = harmonic(&values, dt, guess).unwrap();
-            prop_assert!((fit.omega - 1.0).abs() < 1e-9, "{fit:?}");
-            prop_assert!((fit.amplitude - amplitude).abs() < 1e-9);
-            prop_assert!((fit.phase - phase).abs() < 1e-9);
-        }
-    }
-
-    #[test]
-    fn silence_has_no_harmonic() {
-        assert_eq!(harmonic(&[0.0; 100], 0.1, 1.0), None);
-    }
-}
+#[path = "../../tests/unit/fit.rs"]
+mod tests;

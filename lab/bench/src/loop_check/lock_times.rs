@@ -2,8 +2,9 @@
 
 use serde::Serialize;
 
+use crate::experiment::ExperimentError;
 use crate::rig::{BuiltIn, Controller, ControllerError, Rig, RigError, Simulated};
-use crate::scene::{Scene, SceneError};
+use crate::scene::Scene;
 
 /// Bandwidths, in units of omega0, and the periods to a phase lock that are reported for this rule of gains on such a plant, twenty of
 /// them dwell. The tolerance of the phase and the start are not reported.
@@ -26,21 +27,11 @@ pub struct LockTime {
     pub reported: f64,
 }
 
-/// Why there are no times.
-#[derive(Debug, thiserror::Error)]
-#[error(transparent)]
-#[expect(missing_docs, reason = "each holds its cause")]
-pub enum LockTimeError {
-    Scene(#[from] SceneError),
-    Rig(#[from] RigError),
-    Controller(#[from] ControllerError),
-}
-
 /// The times of a scene with a simulated rig, for a lock of the phase whatever the amplitude does.
 ///
 /// # Errors
 /// A scene that the plant or the controller refuses.
-pub fn lock_times(scene: &Scene) -> Result<Vec<LockTime>, LockTimeError> {
+pub fn lock_times(scene: &Scene) -> Result<Vec<LockTime>, ExperimentError> {
     let mut scene = scene.clone();
     let settings = &mut scene.controller;
     (settings.phase_tolerance, settings.dwell_periods) = (2.0, 20);
@@ -48,7 +39,7 @@ pub fn lock_times(scene: &Scene) -> Result<Vec<LockTime>, LockTimeError> {
     settings.approach_gain = Some(0.0);
     // The largest bandwidth needs more than a hundred samples per period.
     settings.samples_per_period = settings.samples_per_period.max(200.0);
-    let start = Simulated::new(scene.plant, scene.start).map_err(SceneError::Plant)?;
+    let start = Simulated::new(scene.plant, scene.start).map_err(RigError::from)?;
     let mut motion = start.clone();
     run(&mut motion, &scene, STEADY, |_| false)?;
     let times = REPORTED.map(|(bandwidth, reported)| {
@@ -70,7 +61,7 @@ fn run(
     scene: &Scene,
     longest: f64,
     ends: impl Fn(bool) -> bool,
-) -> Result<Option<f64>, LockTimeError> {
+) -> Result<Option<f64>, ExperimentError> {
     let mut controller = BuiltIn::new(&scene.controller_config()).map_err(ControllerError::from)?;
     let (step, mut periods) = (scene.sample_time(), 0.0);
     while periods < longest {

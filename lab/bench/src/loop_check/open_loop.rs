@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use super::scatter;
 use crate::rig::{Drive, Rig, RigError};
+use vines_model::numerics::standard_deviation;
 
 /// Periods between looks at a response that falls, how often, and the share of it that is left at most.
 pub(super) const DECAY: usize = 10;
@@ -66,4 +66,9 @@ impl<R: Rig + ?Sized> OpenLoop<'_, R> {
         }
         Ok(())
     }
+}
+
+/// RMS of a reading about its mean: a sensor has an offset, and so has the centre of mass of a rig whose particle does not lie in the middle.
+pub(super) fn scatter(readings: &[[f64; 3]], of: usize) -> f64 {
+    standard_deviation(&readings.iter().map(|reading| reading[of]).collect::<Vec<f64>>())
 }

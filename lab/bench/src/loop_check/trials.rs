@@ -101,17 +101,9 @@ fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Box<dyn Rig>, 
     plant.damping *= random.between(0.8, 1.2);
     let simulated = |plant| Simulated::new(plant, scene.start).map_err(SceneError::Plant);
     let log = Log::new(0, scene.sample_time());
-    let d = scene.dimensionless();
-    let faulty = FaultyRig::new(
-        Box::new(simulated(plant)?),
-        Box::new(simulated(plant)?),
-        kind,
-        &log,
-        d.b,
-    );
-    let samples = scene.controller.samples_per_period;
-    let rig = Chain::around(Box::new(faulty), &scene.chain, &d, samples);
-    Ok((rig, plant))
+    let [rig, changed] = [Box::new(simulated(plant)?), Box::new(simulated(plant)?)];
+    let faulty = FaultyRig::new(rig, changed, kind, &log, scene.plant.half_width);
+    Ok((Chain::around(Box::new(faulty), scene), plant))
 }
 
 /// Checks `count` healthy rigs, and as many with a random fault.

@@ -1,12 +1,11 @@
 //! What the check of a loop says of its channels.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
-use std::fmt;
 
 use serde::Serialize;
 
-use super::{Channel, NOISE};
-
+/// Largest RMS of what is not the drive's frequency, as a share of the amplitude.
+pub(super) const NOISE: f64 = 0.15;
 /// Share of the expected amplitude below which a sensor is dead.
 const DEAD: f64 = 0.01;
 /// Factor by which an amplitude may differ from the expected one, or its inverse: the damping is known roughly.
@@ -16,65 +15,62 @@ const AT_REST: f64 = 3.0;
 /// Deviation of the phase, rad, up to which a channel is in time, and from which it is reversed.
 const IN_TIME: f64 = 0.7;
 
-/// What the check found.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum Verdict {
-    /// Signs, gains, delays and noise are as expected.
-    Healthy,
-    /// A sensor reads no number.
-    NotANumber,
-    /// The response moves before there is a drive.
-    NotAtRest,
-    /// Neither channel answers the drive: the shaker is off.
-    ShakerOff,
-    /// A channel does not answer the drive.
-    ResponseDead,
-    /// As above.
-    BaseDead,
-    /// Response and base are exchanged.
-    Swapped,
-    /// A channel has the opposite sign.
-    ResponseReversed,
-    /// As above.
-    BaseReversed,
-    /// Both have: the shaker is reversed.
-    BothReversed,
-    /// A channel has another amplitude: a wrong unit or factor.
-    ResponseGain,
-    /// As above.
-    BaseGain,
-    /// A channel is late.
-    ResponseLate,
-    /// As above.
-    BaseLate,
-    /// A channel is noisy.
-    ResponseNoisy,
-    /// As above.
-    BaseNoisy,
+/// A channel.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Channel {
+    /// Amplitude at the frequency of the drive over the expected one.
+    pub gain: f64,
+    /// Phase less the expected one, degrees; a delay is negative.
+    pub phase: f64,
+    /// The same as a delay, samples.
+    pub delay: f64,
+    /// RMS of everything else, m.
+    pub noise: f64,
+    /// RMS without a drive, m.
+    pub floor: f64,
 }
 
-impl fmt::Display for Verdict {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Healthy => "signs, gains, delays and noise are as expected",
-            Self::NotANumber => "a sensor reads no number: check its converter",
-            Self::NotAtRest => "the response moves without a drive: wait until the rig is at rest",
-            Self::ShakerOff => "no sensor answers the drive: check the amplifier of the shaker and the cables",
-            Self::ResponseDead => "the response does not answer the drive, or too weakly to be seen: check its sensor, cable and factor",
-            Self::BaseDead => "the base sensor does not answer the drive: check it and its cable",
-            Self::Swapped => "response and base are exchanged: swap the two channels",
-            Self::ResponseReversed => "the response has the opposite sign: reverse its sensor, or its factor",
-            Self::BaseReversed => "the base sensor has the opposite sign: reverse it, or its factor",
-            Self::BothReversed => "both sensors have the opposite sign: the shaker is reversed",
-            Self::ResponseGain => "the amplitude of the response is not as expected: check its unit and factor, and mass, spring and damper of the scene",
-            Self::BaseGain => "the amplitude of the base is not that of the drive: check its unit and factor, and the gain of the shaker",
-            Self::ResponseLate => "the response is late: check its filter and delay, and the natural frequency of the scene",
-            Self::BaseLate => "the base sensor is late: check its filter and delay, and that of the shaker",
-            Self::ResponseNoisy => "the response is noisy: check its shield and range",
-            Self::BaseNoisy => "the base sensor is noisy: check its shield and range",
-        })
-    }
+/// What the check found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, thiserror::Error)]
+#[serde(rename_all = "kebab-case")]
+#[expect(missing_docs, reason = "the messages say what each means")]
+pub enum Verdict {
+    #[error("signs, gains, delays and noise are as expected")]
+    Healthy,
+    #[error("a sensor reads no number: check its converter")]
+    NotANumber,
+    #[error("the response moves without a drive: wait until the rig is at rest")]
+    NotAtRest,
+    #[error("no sensor answers the drive: check the amplifier of the shaker and the cables")]
+    ShakerOff,
+    #[error("the response does not answer the drive, or too weakly to be seen: check its sensor, cable and factor")]
+    ResponseDead,
+    #[error("the base sensor does not answer the drive: check it and its cable")]
+    BaseDead,
+    #[error("response and base are exchanged: swap the two channels")]
+    Swapped,
+    #[error("the response has the opposite sign: reverse its sensor, or its factor")]
+    ResponseReversed,
+    #[error("the base sensor has the opposite sign: reverse it, or its factor")]
+    BaseReversed,
+    #[error("both sensors have the opposite sign: the shaker is reversed")]
+    BothReversed,
+    #[error(
+        "the amplitude of the response is not as expected: check its unit and factor, and mass, spring and damper of the scene"
+    )]
+    ResponseGain,
+    #[error(
+        "the amplitude of the base is not that of the drive: check its unit and factor, and the gain of the shaker"
+    )]
+    BaseGain,
+    #[error("the response is late: check its filter and delay, and the natural frequency of the scene")]
+    ResponseLate,
+    #[error("the base sensor is late: check its filter and delay, and that of the shaker")]
+    BaseLate,
+    #[error("the response is noisy: check its shield and range")]
+    ResponseNoisy,
+    #[error("the base sensor is noisy: check its shield and range")]
+    BaseNoisy,
 }
 
 /// Judges response and base, whose expected amplitudes are `expected`, m.

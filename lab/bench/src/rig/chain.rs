@@ -16,7 +16,7 @@ pub(crate) use noise::NormalDistribution;
 use noise::Sensor;
 
 use super::{Drive, GroundTruth, Rig, RigError, Sensors};
-use crate::scene::{Chain as Settings, Dimensionless};
+use crate::scene::Scene;
 
 /// Largest deviation of a sampling instant, in standard deviations.
 const JITTER_MAX: f64 = 4.0;
@@ -68,22 +68,23 @@ fn converted(converter: Option<&Converter>, value: f64) -> f64 {
 impl Chain {
     /// The rig behind its chain, or the rig itself where the chain is off.
     #[must_use]
-    pub fn around(rig: Box<dyn Rig>, settings: &Settings, d: &Dimensionless, samples_per_period: f64) -> Box<dyn Rig> {
-        if settings.is_on() {
-            Box::new(Self::new(rig, settings, d, samples_per_period))
+    pub fn around(rig: Box<dyn Rig>, scene: &Scene) -> Box<dyn Rig> {
+        if scene.chain.is_on() {
+            Box::new(Self::new(rig, scene))
         } else {
             rig
         }
     }
 
-    /// The chain around `rig`; `d` has the units of its settings.
+    /// The chain of a scene around `rig`.
     #[must_use]
-    pub fn new(rig: Box<dyn Rig>, settings: &Settings, d: &Dimensionless, samples_per_period: f64) -> Self {
+    pub fn new(rig: Box<dyn Rig>, scene: &Scene) -> Self {
+        let (settings, d) = (&scene.chain, scene.dimensionless());
         // The power of a signal is averaged over about one period.
         let channel = |range: f64| Channel {
             sensor: settings
                 .snr
-                .map(|snr| Sensor::new(snr, settings.snr_of, range, samples_per_period)),
+                .map(|snr| Sensor::new(snr, settings.snr_of, range, scene.controller.samples_per_period)),
             filter: settings.filter.map(|cut_off| LowPass::new(cut_off * d.omega0)),
             converter: settings.adc_bits.map(|bits| Converter::new(bits, range)),
         };
@@ -102,9 +103,7 @@ impl Chain {
             elapsed: 0.0,
         }
     }
-}
 
-impl Chain {
     /// Duration of a sample period of `step` seconds, whose end is not where it should be.
     fn taken(&mut self, step: f64) -> f64 {
         let late = if self.jitter > 0.0 {

@@ -30,13 +30,7 @@ impl Simulated {
     /// An invalid parameter or start.
     pub fn of(scene: &Scene) -> Result<Box<dyn Rig>, InvalidValue> {
         let plant = Self::new(scene.plant, scene.start)?.with_sensors(scene.resonance);
-        let samples = scene.controller.samples_per_period;
-        Ok(Chain::around(
-            Box::new(plant),
-            &scene.chain,
-            &scene.dimensionless(),
-            samples,
-        ))
+        Ok(Chain::around(Box::new(plant), scene))
     }
 
     /// The same with the sensors of a definition.

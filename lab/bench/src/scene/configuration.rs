@@ -8,7 +8,7 @@ use serde::Serialize;
 use vines_model::orbit::phase_resonant;
 use vines_model::theory::backbone_at_level;
 
-use super::{Scene, Sensor, plant::symbols};
+use super::{Resonance, Scene, Sensor, plant::symbols};
 use crate::advice;
 
 /// The phase of the response relative to the reference that a lock holds.
@@ -52,6 +52,12 @@ impl Scene {
         let State { q1, dq1, q2, dq2 } = self.start;
         let [q1, dq1] = [("q1", q1), ("der(q1)", dq1)];
         [mass, k, c, m, b, r, q1, dq1, ("q2", q2), ("der(q2)", dq2)]
+    }
+
+    /// Whether the loop holds resonance by the scene's definition, for which theory and exact orbits hold.
+    #[must_use]
+    pub fn is_at_resonance(&self) -> bool {
+        self.resonance.resonance == Resonance::Peak || self.controller.is_at_phase_resonance()
     }
 
     /// The phase that a lock at the scene's drive holds. At the peak of the response it depends on the drive: unless the scene states

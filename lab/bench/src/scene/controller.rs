@@ -134,11 +134,10 @@ impl Controller {
             self.bandwidth > 0.0 && self.bandwidth <= widest,
             format!("must be above 0 and at most {widest:.3} with {samples} samples per period"),
         )?;
-        Quantity::new("controller.omega_min", self.omega_min, "(omega0)").positive()?;
-        let (low, high) = (self.omega_min, self.omega_max);
+        let (low, high, start) = (self.omega_min, self.omega_max, self.omega_start);
+        Quantity::new("controller.omega_min", low, "(omega0)").positive()?;
         Quantity::new("controller.omega_max", high, "(omega0)")
             .check(high > low, format!("must be above omega_min = {low}"))?;
-        let start = self.omega_start;
         Quantity::new("controller.omega_start", start, "(omega0)").check(
             (low..=high).contains(&start),
             format!("must lie between omega_min = {low} and omega_max = {high}"),
@@ -146,52 +145,37 @@ impl Controller {
         let target = self.phase_target;
         Quantity::new("controller.phase_target", target, "degrees")
             .check(target.abs() <= 180.0, "must lie between -180 and 180 degrees")?;
-        let tolerance = self.phase_tolerance;
-        Quantity::new("controller.phase_tolerance", tolerance, "degrees").positive()?;
-        let tolerance = self.frequency_tolerance;
-        Quantity::new("controller.frequency_tolerance", tolerance, "(detuning)").positive()?;
-        let tolerance = self.amplitude_tolerance;
-        Quantity::new("controller.amplitude_tolerance", tolerance, "(relative)").positive()?;
+        for (key, value, unit) in [
+            ("controller.phase_tolerance", self.phase_tolerance, "degrees"),
+            ("controller.frequency_tolerance", self.frequency_tolerance, "(detuning)"),
+            ("controller.amplitude_tolerance", self.amplitude_tolerance, "(relative)"),
+        ] {
+            Quantity::new(key, value, unit).positive()?;
+        }
         let dwell = self.dwell_periods;
         Quantity::new("controller.dwell_periods", dwell.into(), "(periods)")
             .check((4..=400).contains(&dwell), "must be from 4 to 400")
     }
 
     fn check_limits(&self) -> Result<(), SceneError> {
+        let periods = "(natural periods)";
+        let (ramp, approach_gain) = (self.ramp_periods.unwrap_or(0.0), self.approach_gain.unwrap_or(0.0));
         for (key, value, unit) in [
-            (
-                "controller.ramp_periods",
-                self.ramp_periods.unwrap_or(0.0),
-                "(natural periods)",
-            ),
-            ("controller.release_periods", self.release_periods, "(natural periods)"),
-            (
-                "controller.approach_gain",
-                self.approach_gain.unwrap_or(0.0),
-                "(relative)",
-            ),
+            ("controller.ramp_periods", ramp, periods),
+            ("controller.release_periods", self.release_periods, periods),
+            ("controller.approach_gain", approach_gain, "(relative)"),
             ("controller.delay", self.delay, "samples"),
         ] {
             Quantity::new(key, value, unit).not_negative()?;
         }
+        let given = |option: Option<f64>| option.unwrap_or(1.0);
+        let (rate, residual) = (given(self.omega_rate.flatten()), given(self.residual_max.flatten()));
         for (key, value, unit) in [
-            ("controller.G_max", self.g_max.unwrap_or(1.0), "(over b epsilon)"),
-            ("controller.C_max", self.c_max.unwrap_or(1.0), "(over b)"),
-            (
-                "controller.omega_rate",
-                self.omega_rate.flatten().unwrap_or(1.0),
-                "(omega0 per natural period)",
-            ),
-            (
-                "controller.silence_periods",
-                self.silence_periods.unwrap_or(1.0),
-                "(natural periods)",
-            ),
-            (
-                "controller.residual_max",
-                self.residual_max.flatten().unwrap_or(1.0),
-                "(of the amplitude)",
-            ),
+            ("controller.G_max", given(self.g_max), "(over b epsilon)"),
+            ("controller.C_max", given(self.c_max), "(over b)"),
+            ("controller.omega_rate", rate, "(omega0 per natural period)"),
+            ("controller.silence_periods", given(self.silence_periods), periods),
+            ("controller.residual_max", residual, "(of the amplitude)"),
         ] {
             Quantity::new(key, value, unit).positive()?;
         }

@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use lovines::InvalidValue;
 use phase_lock::{ConfigError, Number};
 
-use super::{SyntaxError, refusal};
+use super::refusal;
 
 /// Why a scene cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -68,11 +68,15 @@ pub enum SceneError {
     },
 }
 
-impl SceneError {
-    /// A file that cannot be read as a scene.
-    pub(super) fn syntax(origin: &str, error: &toml::de::Error) -> Self {
-        Self::Syntax { origin: origin.into(), message: plain(&error.to_string()) }
-    }
+/// An argument that is not `section.key=value`.
+#[derive(Debug, thiserror::Error)]
+pub enum SyntaxError {
+    /// Not TOML.
+    #[error("{}; expected section.key=value, for instance plant.r=0.7 or resonance.sensor=q1", .0.message())]
+    Toml(#[from] toml::de::Error),
+    /// TOML, but not one key of one section.
+    #[error("expected one section.key=value, for instance plant.r=0.7")]
+    NotOneKey,
 }
 
 /// A message of the TOML reader, without types of Rust.

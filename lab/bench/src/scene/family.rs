@@ -23,10 +23,8 @@ impl Family {
     /// As [`Scene::parse`].
     pub fn parse(origin: &str, text: Option<&str>, overrides: &[Override]) -> Result<Self, SceneError> {
         let (origin, text) = text.map_or(("paper.toml (the default scene)", PAPER), |text| (origin, text));
-        Scene::parse(origin, text, overrides)?;
-        let syntax = |error| SceneError::syntax(origin, &error);
-        let table = overrides::merge(toml::from_str(text).map_err(syntax)?, overrides)?;
-        let sections = Sections::deserialize(table.clone()).map_err(syntax)?;
+        let (sections, table) = overrides::read(origin, text, overrides)?;
+        sections.clone().resolve(origin)?.controller_config().build()?;
         Ok(Self { origin: origin.into(), sections, table, keys: Vec::new() })
     }
 

@@ -6,7 +6,7 @@ use serde::Deserialize;
 use toml::{Table, Value};
 
 use super::{
-    SceneError,
+    SceneError, SyntaxError,
     error::plain,
     plant::{DIMENSIONLESS_KEYS, SI_KEYS},
     sections::Sections,
@@ -19,17 +19,6 @@ pub struct Override {
     section: String,
     key: String,
     value: Value,
-}
-
-/// An argument that is not `section.key=value`.
-#[derive(Debug, thiserror::Error)]
-pub enum SyntaxError {
-    /// Not TOML.
-    #[error("{}; expected section.key=value, for instance plant.r=0.7 or resonance.sensor=q1", .0.message())]
-    Toml(#[from] toml::de::Error),
-    /// TOML, but not one key of one section.
-    #[error("expected one section.key=value, for instance plant.r=0.7")]
-    NotOneKey,
 }
 
 impl FromStr for Override {
@@ -132,4 +121,14 @@ pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, S
         }
     }
     Ok(table)
+}
+
+/// Reads `text` and merges the overrides into it; with the merged table. `origin` names the text in messages.
+pub(super) fn read(origin: &str, text: &str, overrides: &[Override]) -> Result<(Sections, Table), SceneError> {
+    let syntax =
+        |error: toml::de::Error| SceneError::Syntax { origin: origin.into(), message: plain(&error.to_string()) };
+    // The file is checked on its own first, so that an error can name the line.
+    toml::from_str::<Sections>(text).map_err(syntax)?;
+    let table = merge(toml::from_str(text).map_err(syntax)?, overrides)?;
+    Ok((Sections::deserialize(table.clone()).map_err(syntax)?, table))
 }

@@ -46,36 +46,15 @@ pub fn noise(values: &[f64]) -> f64 {
     (mean_square(differences) / 20.0).sqrt()
 }
 
-/// The straight line that fits equally spaced values best.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Line {
-    /// Change from a value to the next.
-    pub slope: f64,
-    /// Standard error of the slope.
-    pub slope_error: f64,
-    /// Standard deviation of the residuals, for n - 2 degrees of freedom.
-    pub residual: f64,
-}
-
-impl Line {
-    /// Fits at least three values.
-    #[must_use]
-    pub fn fit(values: &[f64]) -> Self {
-        let n = values.len() as f64;
-        let middle = 0.5 * (n - 1.0);
-        let mean = mean(values.iter().copied());
-        let spread = n * (n * n - 1.0) / 12.0;
-        let place = |i: usize| i as f64 - middle;
-        let moment = |(i, value): (usize, &f64)| place(i) * (value - mean);
-        let slope = values.iter().enumerate().map(moment).sum::<f64>() / spread;
-        let square = |(i, value): (usize, &f64)| (value - mean - slope * place(i)).powi(2);
-        let variance = values.iter().enumerate().map(square).sum::<f64>() / (n - 2.0);
-        Self {
-            slope,
-            slope_error: (variance / spread).sqrt(),
-            residual: variance.sqrt(),
-        }
-    }
+/// Slope of the straight line that fits equally spaced values best, from a value to the next.
+#[must_use]
+pub fn slope(values: &[f64]) -> f64 {
+    let n = values.len() as f64;
+    let middle = 0.5 * (n - 1.0);
+    let mean = mean(values.iter().copied());
+    let spread = n * (n * n - 1.0) / 12.0;
+    let moment = |(i, value): (usize, &f64)| (i as f64 - middle) * (value - mean);
+    values.iter().enumerate().map(moment).sum::<f64>() / spread
 }
 
 #[cfg(test)]

@@ -77,6 +77,8 @@ pub struct Branch {
     pub ended: [Ended; 2],
 }
 
+/// Points without a stable motion after which a branch that is not 1:1 ends.
+const UNSTABLE: usize = 100;
 /// Largest distance of a motion of a branch from the lines between those that are serialised, in sigma, G, B and both parts of C.
 const DRAWN: f64 = 1e-4;
 
@@ -146,6 +148,12 @@ impl Branch {
         }
         drawn.extend(points[1..].last());
         drawn
+    }
+
+    /// Its motions are not 1:1, and the last ones are unstable.
+    pub(super) fn winds(&self) -> bool {
+        let last = self.points.len().checked_sub(UNSTABLE).map(|from| &self.points[from..]);
+        !self.points[0].pattern.is_one_to_one() && last.is_some_and(|last| last.iter().all(|one| !one.stable))
     }
 }
 

@@ -106,9 +106,7 @@ pub fn response(scene: &Dimensionless, limits: &Limits, exploration: Exploration
     let narrow = narrow.map(|near| golden_section(near[0], near[2], least));
     for sigma in grid.iter().copied().chain(narrow) {
         for orbit in symmetric_orbits(scene, sigma) {
-            let conditions = [Condition::Sigma(sigma), condition];
-            let pattern = ImpactPattern::symmetric();
-            if let Some(motion) = Periodic::find(scene, &pattern, &orbit.unknowns(), conditions) {
+            if let Some(motion) = orbit.periodic(scene, [Condition::Sigma(sigma), condition]) {
                 search.add(&motion, None);
             }
         }

@@ -55,6 +55,32 @@ impl Bifurcation {
             Bifurcation::Torus => "Neimark-Sacker",
         }
     }
+
+    /// The one at which a multiplier of a pattern's map is -1.
+    pub(super) fn flip(pattern: &ImpactPattern) -> Self {
+        if pattern.mirrored {
+            Bifurcation::SymmetryBreaking
+        } else {
+            Bifurcation::PeriodDoubling
+        }
+    }
+
+    /// Zero where the multipliers of a map are on the unit circle as the bifurcation says, and smooth also where multipliers meet.
+    pub(super) fn test(self, map: &Matrix4<f64>) -> f64 {
+        match self {
+            Bifurcation::Fold => (map - Matrix4::identity()).determinant(),
+            Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => (map + Matrix4::identity()).determinant(),
+            // The products of two multipliers are the eigenvalues of the second compound matrix.
+            Bifurcation::Torus => {
+                let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
+                let minor = |(a, b): (usize, usize), (c, d): (usize, usize)| {
+                    map[(a, c)] * map[(b, d)] - map[(a, d)] * map[(b, c)]
+                };
+                let compound = Matrix6::from_fn(|row, column| minor(pairs[row], pairs[column]));
+                (compound - Matrix6::identity()).determinant()
+            }
+        }
+    }
 }
 
 impl Condition {
@@ -86,7 +112,7 @@ impl Condition {
             }
             Condition::PhaseResonance => (returned.s.re, returned.s_by[0]),
             Condition::Peak => by_differences(scene, pattern, x, returned, slope_of_amplitude),
-            Condition::Bifurcation(kind) => by_differences(scene, pattern, x, returned, |at| on_circle(kind, at)),
+            Condition::Bifurcation(kind) => by_differences(scene, pattern, x, returned, |at| kind.test(&at.monodromy)),
         }
     }
 }
@@ -120,21 +146,4 @@ fn slope_of_amplitude(returned: &Returned) -> f64 {
             sign * minor.determinant() * change
         })
         .sum()
-}
-
-/// Zero where the multipliers of the map are on the unit circle as the bifurcation says.
-fn on_circle(kind: Bifurcation, returned: &Returned) -> f64 {
-    let map = &returned.monodromy;
-    match kind {
-        Bifurcation::Fold => (map - Matrix4::identity()).determinant(),
-        Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => (map + Matrix4::identity()).determinant(),
-        // The products of two multipliers are the eigenvalues of the second compound matrix.
-        Bifurcation::Torus => {
-            let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-            let minor =
-                |(a, b): (usize, usize), (c, d): (usize, usize)| map[(a, c)] * map[(b, d)] - map[(a, d)] * map[(b, c)];
-            let compound = Matrix6::from_fn(|row, column| minor(pairs[row], pairs[column]));
-            (compound - Matrix6::identity()).determinant()
-        }
-    }
 }

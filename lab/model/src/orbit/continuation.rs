@@ -22,10 +22,10 @@ const SHORTEST: f64 = 1e-7;
 const STRAIGHT: f64 = 0.98;
 /// Part of the longest step with which a branch reaches the one that it joins: near there, the plane at the end of a step meets both.
 const APPROACH: f64 = 1.0 / 256.0;
-/// Points without a stable motion after which a branch that is not 1:1 ends.
-const UNSTABLE: usize = 100;
 /// Fraction of a step to which the end of a branch is located.
 const FINEST: f64 = 1e-12;
+/// Largest distance from the joint at which a curve that cannot reach it ends.
+const NEXT: f64 = 0.05;
 /// Difference in sigma of a bifurcation that is located twice.
 const SAME: f64 = 1e-9;
 
@@ -160,6 +160,18 @@ impl Curve<'_> {
         true
     }
 
+    /// Whether a motion that is the double of a bifurcating one is next to `last`. The equations of bifurcations are singular there: rounding,
+    /// over the square of the difference of both halves, ends the curve before it passes.
+    fn stops_at_joint(&self, last: &Periodic) -> bool {
+        let (Condition::Bifurcation(_), Some(half)) = (self.condition, last.pattern.halved()) else {
+            return false;
+        };
+        let from = last.unknowns();
+        let flip = Condition::Bifurcation(Bifurcation::flip(&half));
+        let found = Periodic::find(self.scene, &half, &from, [flip, Condition::Sigma(last.sigma)]);
+        found.is_some_and(|one| (one.unknowns() - from).norm() < NEXT)
+    }
+
     /// The last motion within a step before the one that the branch doubles.
     fn joint(&self, from: &Periodic, tangent: &Unknowns, step: f64) -> Option<Periodic> {
         let x = from.unknowns();
@@ -168,16 +180,6 @@ impl Curve<'_> {
         let (end, _) = try_bisection(0.0, 1.0, FINEST, before).ok()?;
         at(end)
     }
-}
-
-/// Its motions are not 1:1, and the last ones are unstable.
-fn winds(branch: &Branch) -> bool {
-    let last = branch
-        .points
-        .len()
-        .checked_sub(UNSTABLE)
-        .map(|from| &branch.points[from..]);
-    !branch.points[0].pattern.is_one_to_one() && last.is_some_and(|last| last.iter().all(|one| !one.stable))
 }
 
 /// Between two motions, their branch passes the motion that it doubles.
@@ -232,7 +234,7 @@ pub fn continue_from(
             branch.ended[1] = Ended::Range;
             return branch;
         }
-        if winds(&branch) {
+        if branch.winds() {
             let stable = branch.points.iter().rposition(|one| one.stable);
             branch.points.truncate(stable.unwrap_or(0) + 2);
             branch.ended[1] = Ended::Unstable;
@@ -243,6 +245,9 @@ pub fn continue_from(
         if straight {
             step = (step * 1.5).min(limits.step);
         }
+    }
+    if curve.stops_at_joint(branch.points.last().unwrap_or(start)) {
+        branch.ended[1] = Ended::Joins;
     }
     branch
 }

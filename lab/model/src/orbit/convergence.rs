@@ -5,7 +5,7 @@ use std::f64::consts::LN_2;
 use serde::Serialize;
 
 use super::phase_resonant;
-use crate::{Dimensionless, numerics::Line, theory::resonant};
+use crate::{Dimensionless, numerics::slope, theory::resonant};
 
 /// Theory minus exact orbit at one mass ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -56,10 +56,10 @@ pub fn convergence(scene: &Dimensionless, halvings: u32) -> Option<Convergence> 
         })
         .collect::<Option<_>>()?;
     // From row to row ln(epsilon) changes by -ln 2.
-    let slope = |of: fn(&Difference) -> f64| {
+    let exponent = |of: fn(&Difference) -> f64| {
         let logs: Vec<f64> = rows.iter().map(|row| of(row).abs().ln()).collect();
-        -Line::fit(&logs).slope / LN_2
+        -slope(&logs) / LN_2
     };
-    let slopes = [slope(|row| row.sigma), slope(|row| row.c), slope(|row| row.b)];
+    let slopes = [exponent(|row| row.sigma), exponent(|row| row.c), exponent(|row| row.b)];
     (halvings > 0).then_some(Convergence { rows, slopes })
 }

@@ -6,10 +6,14 @@
 
 use super::{branch::Special, condition::Bifurcation, periodic::Periodic};
 use crate::numerics::{golden_section, try_bisection};
-use nalgebra::Complex;
 
 /// Test functions below this are rounding: in conservative motions, some are zero everywhere.
 const ROUNDING: f64 = 1e-9;
+/// The same for folds where both halves of a motion differ by less than [`HALVES`], because the function is small there.
+const ROUNDING_OF_FOLDS: f64 = 1e-12;
+const HALVES: f64 = 0.1;
+/// Difference of the halves below which a fold cannot be told from rounding, which grows with its inverse.
+const EQUAL_HALVES: f64 = 5e-4;
 /// Largest distance of a multiplier from the circle where a crossing is located.
 const LOCATED: f64 = 1e-4;
 /// Fraction of a step to which a bifurcation is located.
@@ -38,13 +42,13 @@ impl<F: Fn(f64) -> Option<Periodic>> Part<F> {
     }
 
     fn pair(&self, kind: Bifurcation, points: [&Periodic; 3]) -> Vec<Special> {
-        let sign = test(kind, points[1]).signum();
-        let [before, at, after] = points.map(|one| sign * test(kind, one));
+        let sign = kind.test(&points[1].monodromy).signum();
+        let [before, at, after] = points.map(|one| sign * kind.test(&one.monodromy));
         // A smooth function does not come nearer to zero than at the points by more than it changes between them.
         if at >= before || at > after || at >= before.max(after) - at {
             return Vec::new();
         }
-        let value = |part: f64| (self.0)(part).map_or(f64::INFINITY, |one| sign * test(kind, &one));
+        let value = |part: f64| (self.0)(part).map_or(f64::INFINITY, |one| sign * kind.test(&one.monodromy));
         let nearest = golden_section(0.0, 1.0, value);
         let Some(motion) = (self.0)(nearest) else {
             return Vec::new();
@@ -61,11 +65,15 @@ impl<F: Fn(f64) -> Option<Periodic>> Part<F> {
     /// The part at which a test function passes zero between two motions, and the motion there; None if it does not, or if only a
     /// saddle is neutral.
     fn crossing(&self, kind: Bifurcation, [from, to]: [(f64, &Periodic); 2]) -> Option<(f64, Special)> {
-        let [first, last] = [from, to].map(|one| test(kind, one.1));
-        if first * last >= 0.0 || first.abs().max(last.abs()) < ROUNDING {
+        let [first, last] = [from, to].map(|one| kind.test(&one.1.monodromy));
+        if first * last >= 0.0 || is_rounding(kind, [from.1, to.1], first.abs().max(last.abs())) {
             return None;
         }
-        let like_first = |part: f64| (self.0)(part).map(|one| test(kind, &one) * first > 0.0).ok_or(());
+        let like_first = |part: f64| {
+            (self.0)(part)
+                .map(|one| kind.test(&one.monodromy) * first > 0.0)
+                .ok_or(())
+        };
         let (_, beyond) = try_bisection(from.0, to.0, FINEST, like_first).ok()?;
         let motion = (self.0)(beyond)?;
         let of_stable = motion.bounds_stability();
@@ -74,27 +82,21 @@ impl<F: Fn(f64) -> Option<Periodic>> Part<F> {
 }
 
 fn kinds(motion: &Periodic) -> [Bifurcation; 3] {
-    let flip = if motion.pattern.mirrored {
-        Bifurcation::SymmetryBreaking
-    } else {
-        Bifurcation::PeriodDoubling
-    };
-    [Bifurcation::Fold, flip, Bifurcation::Torus]
+    [
+        Bifurcation::Fold,
+        Bifurcation::flip(&motion.pattern),
+        Bifurcation::Torus,
+    ]
 }
 
-/// Zero where a multiplier is +1 or -1, or where the product of two is +1.
-fn test(kind: Bifurcation, motion: &Periodic) -> f64 {
-    let multipliers = motion.multipliers.map(|[re, im]| Complex::new(re, im));
-    match kind {
-        Bifurcation::Fold => multipliers.iter().map(|one| one - 1.0).product::<Complex<f64>>().re,
-        Bifurcation::SymmetryBreaking | Bifurcation::PeriodDoubling => {
-            multipliers.iter().map(|one| one + 1.0).product::<Complex<f64>>().re
-        }
-        Bifurcation::Torus => {
-            let pairs = [(0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3)];
-            let products = pairs.map(|(a, b)| multipliers[a] * multipliers[b] - 1.0);
-            products.iter().product::<Complex<f64>>().re
-        }
+/// Whether a change of sign between two motions is rounding; `largest` is the larger of the two values.
+fn is_rounding(kind: Bifurcation, motions: [&Periodic; 2], largest: f64) -> bool {
+    let apart = motions.map(|one| one.halves_apart().map_or(f64::INFINITY, |apart| apart.norm()));
+    let apart = apart[0].min(apart[1]);
+    if kind == Bifurcation::Fold && apart < HALVES {
+        largest < ROUNDING_OF_FOLDS || apart < EQUAL_HALVES
+    } else {
+        largest < ROUNDING
     }
 }
 

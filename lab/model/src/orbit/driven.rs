@@ -153,25 +153,12 @@ impl Driven {
             Event::Stuck { wall, .. } => {
                 let [q1, dq1, q2, dq2] = self.state(from, phase);
                 let both = (dq1 + self.epsilon * dq2) / (1.0 + self.epsilon);
-                Moment {
-                    phase,
-                    primary: Vector2::new(q1, both),
-                    particle: Vector2::new(q2, both),
-                    wall: wall.sign(),
-                    velocity: 0.0,
-                    rested: true,
-                }
+                self.moment(phase, State { q1, dq1: both, q2, dq2: both }, Some(wall))
             }
             Event::Released { .. } => {
                 let [q1, dq1, q2, dq2] = self.state(from, phase);
-                Moment {
-                    phase,
-                    primary: Vector2::new(q1, dq1),
-                    particle: Vector2::new(q2, dq2),
-                    wall: 0.0,
-                    velocity: 0.0,
-                    rested: true,
-                }
+                let moment = self.moment(phase, State { q1, dq1, q2, dq2 }, None);
+                Moment { rested: true, ..moment }
             }
         }
     }

@@ -1,6 +1,6 @@
 //! A periodic motion of any pattern, its stability, and the Newton iteration that finds it.
 
-use nalgebra::{Complex, Matrix6, SVector, Vector4};
+use nalgebra::{Complex, Matrix4, Matrix6, SVector, Vector4};
 use serde::Serialize;
 
 use super::{
@@ -38,6 +38,9 @@ pub struct Periodic {
     pub stable: bool,
     #[serde(skip)]
     pub(super) durations: Vec<f64>,
+    /// Derivative of the map by the state.
+    #[serde(skip)]
+    pub(super) monodromy: Matrix4<f64>,
 }
 
 /// Size of the last Newton correction, and that from which on a correction that does not shrink is rounding: small isolas are nearly singular.
@@ -83,7 +86,7 @@ impl Periodic {
 
     fn of(pattern: &ImpactPattern, x: &Unknowns, returned: Returned) -> Self {
         let mut multipliers: [Complex<f64>; 4] = returned.monodromy.complex_eigenvalues().into();
-        multipliers.sort_by(|one, other| one.norm().total_cmp(&other.norm()));
+        multipliers.sort_unstable_by(|one, other| one.norm().total_cmp(&other.norm()));
         let total: f64 = returned.durations.iter().sum();
         let travelled: f64 = returned
             .bounces
@@ -100,6 +103,7 @@ impl Periodic {
             pattern: pattern.clone(),
             bounces: returned.bounces,
             durations: returned.durations,
+            monodromy: returned.monodromy,
             stable: multipliers[3].norm() < 1.0,
             multipliers: multipliers.map(|one| [one.re, one.im]),
         }

@@ -19,16 +19,15 @@ const POINTS: usize = 30_000;
 #[must_use]
 pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
     let grid = grid(scene.epsilon);
-    let mut orbits: Vec<Orbit> = (0..2)
-        .flat_map(|branch| Branch { scene, branch }.frequencies(&grid))
-        .filter(resonates)
-        .filter_map(|candidate| accept(scene, &candidate))
-        .collect();
+    let candidates = [0, 1]
+        .map(|branch| Branch { scene, branch }.frequencies(&grid))
+        .concat();
+    let mut orbits = resonant(scene, &candidates);
     if scene.definition.is_peak() {
         let peak = |orbit: &Orbit| peak(scene, orbit, Condition::Excitation(scene.g));
         orbits = orbits.iter().filter_map(peak).collect();
     }
-    orbits.sort_by(|one, other| one.c.total_cmp(&other.c));
+    orbits.sort_unstable_by(|one, other| one.c.total_cmp(&other.c));
     orbits.dedup_by(|one, other| (one.sigma - other.sigma).abs() < 1e-9 && (one.b - other.b).abs() < 1e-9);
     orbits
 }
@@ -44,24 +43,18 @@ pub fn stable_resonant(scene: &Dimensionless) -> Option<Orbit> {
 /// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.
 #[must_use]
 pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
-    let orbits = Family::new(scene, omega)
-        .and_then(|family| family.phase_resonant())
-        .into_iter()
-        .flatten()
-        .filter(resonates)
-        .filter_map(|candidate| accept(scene, &candidate));
+    let candidates = Family::new(scene, omega).and_then(|family| family.phase_resonant());
+    let orbits = resonant(scene, candidates.as_slice().as_flattened());
     if scene.definition.is_peak() {
-        let peak = |orbit: Orbit| peak(scene, &orbit, Condition::Sigma(orbit.sigma));
-        orbits.filter_map(peak).collect()
-    } else {
-        orbits.collect()
+        let peak = |orbit: &Orbit| peak(scene, orbit, Condition::Sigma(orbit.sigma));
+        return orbits.iter().filter_map(peak).collect();
     }
+    orbits
 }
 
 /// The orbit near a phase-resonant one whose amplitude is largest along its frequency response.
 fn peak(scene: &Dimensionless, near: &Orbit, condition: Condition) -> Option<Orbit> {
-    let conditions = [condition, Condition::Peak];
-    let found = Periodic::find(scene, &ImpactPattern::symmetric(), &near.unknowns(), conditions)?;
+    let found = near.periodic(scene, [condition, Condition::Peak])?;
     let scene = Dimensionless { g: found.g, ..*scene };
     symmetric_orbits(&scene, found.sigma)
         .into_iter()
@@ -93,9 +86,11 @@ fn grid(epsilon: f64) -> Vec<f64> {
         .collect()
 }
 
-/// The response lags the base; without dissipation no base motion is needed, and no phase lag is defined.
-fn resonates(candidate: &Candidate) -> bool {
-    candidate.lags || candidate.g < 1e-12
+/// The orbits of those candidates whose response lags the base; without dissipation no base motion is needed, and no phase lag is defined.
+fn resonant(scene: &Dimensionless, candidates: &[Candidate]) -> Vec<Orbit> {
+    let resonates = |candidate: &&Candidate| candidate.lags || candidate.g < 1e-12;
+    let orbits = candidates.iter().filter(resonates);
+    orbits.filter_map(|candidate| accept(scene, candidate)).collect()
 }
 
 /// Keeps what is physical: the particle moves, and its next contact is that of the candidate, half a period later.

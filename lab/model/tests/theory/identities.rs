@@ -37,16 +37,35 @@ fn the_slope_of_the_manifold_is_its_difference_quotient() {
     close(manifold.slope(b), 2.0 * h / squares, 1e-8);
 }
 
+/// k1 to k6 of the study: `-G C sin gamma = k1 C~ ± k2 s + k3` and `G C cos gamma = k4 C~ ± k5 s + k6` at an equilibrium, with `C~ = C^2` and
+/// `s = sqrt(C~ - Cmin^2)` (docs/theory.md, eq. 13).
+fn published(flow: &SlowFlow, sigma: f64) -> [f64; 6] {
+    let (r, b_min, fold) = (
+        flow.manifold.dissipation,
+        flow.manifold.b_min(),
+        flow.manifold.c_min().powi(2),
+    );
+    let root = (2.0 / PI * b_min).sqrt();
+    [
+        flow.lambda + 8.0 / (PI * PI) * r * b_min,
+        8.0 / PI * r * b_min * root,
+        4.0 / PI * r * b_min * (b_min - 2.0 / PI * fold),
+        -4.0 / PI * b_min - 2.0 * sigma,
+        4.0 / PI * root * (1.0 - PI * b_min),
+        4.0 / PI * b_min * (1.0 - PI / 2.0 * b_min + fold),
+    ]
+}
+
 #[test]
 fn the_backbone_agrees_with_its_form_in_k5_and_k6() {
     let (flow, manifold) = (flow(), Manifold::new(R));
-    let k = flow.coefficients(0.0);
+    let [k1, k2, k3, _, k5, k6] = published(&flow, 0.0);
     for b in [0.2, 0.5, 0.7, 0.9, 1.3] {
         let square = manifold.c(b).powi(2);
         let root = (b - manifold.b_min()).signum() * (square - manifold.c_min().powi(2)).sqrt();
-        let sigma = (k.k5 * root + k.k6) / (2.0 * square) - 2.0 / PI * manifold.b_min();
+        let sigma = (k5 * root + k6) / (2.0 * square) - 2.0 / PI * manifold.b_min();
         close(flow.free_detuning(b), sigma, 1e-12);
-        close(flow.loss(b), k.k1 * square + k.k2 * root + k.k3, 1e-13);
+        close(flow.loss(b), k1 * square + k2 * root + k3, 1e-13);
     }
 }
 
@@ -55,7 +74,7 @@ fn equilibria_rest_on_the_manifold_and_satisfy_k1_to_k6() {
     let (flow, manifold) = (flow(), Manifold::new(R));
     let mut seen = 0;
     for (g, sigma) in [(1.1, -1.0), (1.1, -1.5), (1.3, 0.2), (1.6, -0.8), (0.9, -1.2)] {
-        let k = flow.coefficients(sigma);
+        let [k1, k2, k3, k4, k5, k6] = published(&flow, sigma);
         for one in flow.equilibria(g, sigma) {
             seen += 1;
             let [amplitude, phase] = flow.rates(g, sigma, one.b, one.gamma);
@@ -65,8 +84,8 @@ fn equilibria_rest_on_the_manifold_and_satisfy_k1_to_k6() {
             let sign = if one.branch == BranchSide::Right { 1.0 } else { -1.0 };
             let root = sign * (square - manifold.c_min().powi(2)).max(0.0).sqrt();
             let (sine, cosine) = one.gamma.sin_cos();
-            close(-g * one.c * sine, k.k1 * square + k.k2 * root + k.k3, 1e-9);
-            close(g * one.c * cosine, k.k4 * square + k.k5 * root + k.k6, 1e-9);
+            close(-g * one.c * sine, k1 * square + k2 * root + k3, 1e-9);
+            close(g * one.c * cosine, k4 * square + k5 * root + k6, 1e-9);
         }
     }
     assert!(seen >= 8, "only {seen} equilibria");
@@ -123,14 +142,14 @@ fn the_slope_of_the_excitation_is_its_difference_quotient() {
 fn the_extended_periodic_motion_concept_gives_the_same_backbone() {
     let flow = flow();
     for b in [0.3, 0.7, 0.9, 1.05] {
-        let (held, driven) = (flow.epmc(b), flow.backbone_at(b));
-        // The same amplitude without drive but with the negative damping rests.
-        let undamped = SlowFlow::new(LAMBDA - 2.0 * held.delta, R);
+        let driven = flow.backbone_at(b);
+        // Half of the negative damping at which the loss vanishes: the same amplitude rests without drive (docs/theory.md, eq. 23).
+        let delta = flow.loss(b) / (2.0 * driven.c * driven.c);
+        let undamped = SlowFlow::new(LAMBDA - 2.0 * delta, R);
         let [amplitude, phase] = undamped.rates(0.0, driven.sigma, b, 0.0);
         close(amplitude, 0.0, 1e-14);
         close(phase, 0.0, 1e-14);
-        close(driven.g, 2.0 * held.delta * held.c, 1e-14);
-        close(driven.sigma, held.sigma, 1e-15);
+        close(driven.g, 2.0 * delta * driven.c, 1e-14);
     }
 }
 

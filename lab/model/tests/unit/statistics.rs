@@ -32,10 +32,7 @@ fn third_differences_see_noise_and_no_cubic() {
 }
 
 #[test]
-fn a_line_has_its_slope_and_no_residual() {
-    let line = Line::fit(&[1.0, 1.5, 2.0, 2.5]);
-    assert!((line.slope - 0.5).abs() < 1e-15 && line.residual < 1e-15);
-    let bent = Line::fit(&[0.0, 1.0, 0.0]);
-    assert!((bent.residual - (2f64 / 3.0).sqrt()).abs() < 1e-15);
-    assert!((bent.slope_error - (1f64 / 3.0).sqrt()).abs() < 1e-15);
+fn a_line_has_its_slope() {
+    assert!((slope(&[1.0, 1.5, 2.0, 2.5]) - 0.5).abs() < 1e-15);
+    assert_eq!(slope(&[0.0, 1.0, 0.0]), 0.0);
 }

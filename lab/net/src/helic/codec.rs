@@ -39,26 +39,20 @@ pub mod message {
 /// Why a device refuses a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
 #[repr(u8)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum ErrorCode {
-    /// Not a frame.
     #[error("bad frame")]
     BadFrame = 1,
-    /// The type of the request is unknown.
     #[error("unknown type of request")]
     UnknownType = 2,
-    /// There is no such parameter.
     #[error("bad index of a parameter")]
     BadIndex = 3,
-    /// The payload has another length.
     #[error("bad length")]
     BadLength = 4,
-    /// The parameter cannot be written.
     #[error("the parameter is read-only")]
     ReadOnly = 5,
-    /// The value is not allowed.
     #[error("bad value")]
     BadValue = 6,
-    /// Not now.
     #[error("the device is busy")]
     Busy = 7,
 }

@@ -85,7 +85,7 @@ impl Device {
             settings,
             sample_rate,
             stream: Stream::new(sample_rate),
-            table: Table::new(),
+            table: Table::default(),
             staged: vec![0.0; TABLE],
             committed: false,
             pll: Pll::new(),
@@ -143,10 +143,7 @@ impl Device {
         } else {
             self.settings.frequency
         };
-        let mut readings = [forcing, response / MILLI];
-        if let Some(reference) = reference {
-            readings[0] = reference / MILLI;
-        }
+        let readings = [reference.map_or(forcing, |base| base / MILLI), response / MILLI];
         if locking {
             self.pll.update(&self.settings.pll, turns(self.phase), readings, step);
             // Quiet at once, and from now on.

@@ -69,8 +69,9 @@ pub struct TableSettings {
 }
 
 /// A one-shot.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 enum Shot {
+    #[default]
     Idle,
     /// Waits for the beginning of a master period.
     Armed,
@@ -78,7 +79,7 @@ enum Shot {
 }
 
 /// The table and where it is played.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, Default)]
 pub struct Table {
     pub values: Vec<f32>,
     /// Phase of the free modes, or what a locked one-shot has played.
@@ -87,10 +88,6 @@ pub struct Table {
 }
 
 impl Table {
-    pub fn new() -> Self {
-        Self { values: Vec::new(), phase: 0, shot: Shot::Idle }
-    }
-
     /// Starts a one-shot.
     pub fn trigger(&mut self, settings: &TableSettings) {
         self.phase = 0;

@@ -14,48 +14,27 @@ const PROBE: f64 = 0.01;
 
 /// Why a device cannot be used.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum HostError {
-    /// The network failed, or the device is silent.
     #[error("the helic device: {0}; is `vines rig --protocol helic` or the device running, with no other host?")]
     System(#[from] io::Error),
-    /// Not an answer.
     #[error("the helic device sent an answer that does not match the request: is it another version?")]
     Malformed(#[from] Malformed),
-    /// Another version.
     #[error("the helic device has version {0} of the protocol, this program has version {VERSION}")]
     Version(u8),
-    /// The device refuses a request.
     #[error("the helic device refuses {what}: {code}")]
-    Refused {
-        /// The request.
-        what: String,
-        /// Its reason.
-        code: ErrorCode,
-    },
-    /// The device does not have what is needed.
+    Refused { what: String, code: ErrorCode },
     #[error("the helic device has no {what} \"{name}\"; it has: {known}; [rig.names] of the scene maps names")]
     Missing {
-        /// Parameter or source.
         what: &'static str,
-        /// Its name.
         name: String,
-        /// What there is.
         known: String,
     },
-    /// The device has another rate.
     #[error(
         "the helic device takes {device} samples per second, which is not a multiple of the scene's {scene}: set \
          controller.samples_per_period to {suggestion} (or that over an integer)"
     )]
-    Rate {
-        /// 1/s
-        device: f64,
-        /// 1/s
-        scene: f64,
-        /// Samples per natural period at the rate of the device.
-        suggestion: f64,
-    },
-    /// The output of the device has tripped.
+    Rate { device: f64, scene: f64, suggestion: f64 },
     #[error("the output of the helic device is off (safety = {0}): it has tripped, or was disarmed; the drive is zero")]
     Tripped(u32),
 }
@@ -140,29 +119,17 @@ impl<T: Transport> Host<T> {
 
     fn index(&self, name: &str) -> Result<(u16, u8), HostError> {
         let found = self.parameters.iter().position(|(known, _)| known == name);
-        let known = || {
-            self.parameters
-                .iter()
-                .map(|(name, _)| name.as_str())
-                .collect::<Vec<_>>()
-                .join(", ")
-        };
-        let missing = || HostError::Missing { what: "parameter", name: name.into(), known: known() };
-        let index = found.ok_or_else(missing)?;
+        let known = || self.parameters.iter().map(|(name, _)| name.clone());
+        let index = found.ok_or_else(|| missing("parameter", name, known()))?;
         Ok((index as u16, self.parameters[index].1))
     }
 
     /// Id of a source.
     pub fn source(&self, name: &str) -> Result<u8, HostError> {
         let found = self.sources.iter().position(|(known, _)| known == name);
-        let known = || {
-            self.sources
-                .iter()
-                .map(|(name, unit)| format!("{name} [{unit}]"))
-                .collect::<Vec<_>>()
-        };
-        let missing = || HostError::Missing { what: "source", name: name.into(), known: known().join(", ") };
-        found.map(|index| index as u8).ok_or_else(missing)
+        let known = || self.sources.iter().map(|(name, unit)| format!("{name} [{unit}]"));
+        let index = found.ok_or_else(|| missing("source", name, known()))?;
+        Ok(index as u8)
     }
 
     /// Sets a parameter. Real numbers become floats.
@@ -186,9 +153,7 @@ impl<T: Transport> Host<T> {
         let (index, _) = self.index(name)?;
         self.request(message::GET_PAR, index.to_le_bytes().into(), name)
     }
-}
 
-impl<T: Transport> Host<T> {
     /// Sets the stream up, and starts it.
     pub fn stream(&mut self, sources: &[u8], decimation: u16, count: u32) -> Result<(), HostError> {
         self.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
@@ -231,6 +196,11 @@ impl<T: Transport> Host<T> {
         self.set("forcing_coeffs", &[0.0; COEFFICIENTS])?;
         Ok(parts)
     }
+}
+
+fn missing(what: &'static str, name: &str, known: impl Iterator<Item = String>) -> HostError {
+    let known = known.collect::<Vec<_>>().join(", ");
+    HostError::Missing { what, name: name.into(), known }
 }
 
 /// Names and types of the parameters of a page.

@@ -199,7 +199,7 @@ impl Registry {
     }
 
     /// Sets the bytes of a parameter; names are those of the table above.
-    fn put(&mut self, name: &str, bytes: &[u8]) {
+    pub fn put(&mut self, name: &str, bytes: &[u8]) {
         if let Some(parameter) = self.0.iter_mut().find(|parameter| parameter.name == name) {
             parameter.value = bytes.to_vec();
         }
@@ -212,11 +212,6 @@ impl Registry {
 
     /// Sets an integer of four bytes.
     pub fn put_number(&mut self, name: &str, value: u32) {
-        self.put(name, &value.to_le_bytes());
-    }
-
-    /// Sets an integer of two bytes.
-    pub fn put_short(&mut self, name: &str, value: u16) {
         self.put(name, &value.to_le_bytes());
     }
 

@@ -39,7 +39,7 @@ fn an_experiment_across_the_network_gives_the_same_bits() {
 #[test]
 fn held_samples_cross_the_network_with_the_same_bits_and_ramp_to_zero() {
     let scene = scene(&["chain.hold=true", "chain.dac_bits=12", "record.decay_periods=150"]);
-    let chain = |rig: Box<dyn Rig>| Chain::around(rig, &scene.chain, &scene.dimensionless(), 100.0);
+    let chain = |rig: Box<dyn Rig>| Chain::around(rig, &scene);
     let controller = || BuiltIn::new(&scene.controller_config()).unwrap();
     let plant = Simulated::new(scene.plant, scene.start).unwrap();
     let direct = measure(&scene, chain(Box::new(plant)).as_mut(), &mut controller());

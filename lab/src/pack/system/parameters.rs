@@ -28,11 +28,6 @@ pub(super) fn plant(scene: &Scene) -> Vec<Named> {
         .to_vec()
 }
 
-/// The communication step: the controller's sample time, s.
-pub(super) fn step(scene: &Scene) -> f64 {
-    scene.sample_time()
-}
-
 /// Parameters of the controller, which is armed from the start.
 pub(super) fn controller(scene: &Scene) -> Result<Vec<Named>, PackError> {
     let config = scene.controller_config();

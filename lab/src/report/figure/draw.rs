@@ -7,7 +7,7 @@ use plotters::coord::{Shift, types::RangedCoordf64};
 use plotters::prelude::*;
 use plotters::style::text_anchor::{HPos, Pos, VPos};
 
-use super::{FINE, Figure, FigureError, KeyEntry, Kind, Mark, Panel, Place, Series, line};
+use super::{FINE, Figure, FigureError, Kind, Mark, Panel, Place, Series, line};
 
 type Area<'a> = DrawingArea<SVGBackend<'a>, Shift>;
 type Chart<'a, 'b> = ChartContext<'a, SVGBackend<'b>, Cartesian2d<RangedCoordf64, RangedCoordf64>>;
@@ -91,7 +91,7 @@ impl Panel {
     }
 
     fn axes<'a, 'b>(&self, area: &'a Area<'b>) -> Drawn<Chart<'a, 'b>> {
-        let (x, y) = (self.x.range, self.y.range);
+        let [x, y] = self.ranges;
         let top = if self.heading.is_some() { 66 } else { 12 };
         let mut chart = ChartBuilder::on(area)
             .margin_top(px(top))
@@ -103,8 +103,8 @@ impl Panel {
             .build_cartesian_2d(x.0..x.1, y.0..y.1)?;
         chart
             .configure_mesh()
-            .x_desc(&self.x.label)
-            .y_desc(&self.y.label)
+            .x_desc(&self.labels[0])
+            .y_desc(&self.labels[1])
             .axis_desc_style((FONT, px(17)))
             .label_style((FONT, px(14)))
             .light_line_style(WHITE)
@@ -191,12 +191,12 @@ impl Series {
 }
 
 /// Swatches with letters and names, one below the other.
-fn draw_key(area: &Area, entries: &[KeyEntry]) -> Drawn {
+fn draw_key(area: &Area, entries: &[(&str, Mark)]) -> Drawn {
     let mut y = at(80);
-    let name = (FONT, px(15)).into_text_style(area);
-    for entry in entries {
-        match entry.mark {
-            Mark::Swatch(colour, letter, ink) => {
+    let font = (FONT, px(15)).into_text_style(area);
+    for (name, mark) in entries {
+        match *mark {
+            Mark::Swatch((colour, letter, ink)) => {
                 let corners = [(at(6), y), (at(36), y + at(18))];
                 area.draw(&Rectangle::new(corners, colour.filled()))?;
                 area.draw(&Rectangle::new(corners, line(BLACK, 10)))?;
@@ -209,7 +209,7 @@ fn draw_key(area: &Area, entries: &[KeyEntry]) -> Drawn {
             }
             Mark::Dot => area.draw(&Circle::new((at(21), y + at(9)), px(2), BLACK.filled()))?,
         }
-        area.draw_text(entry.name, &name, (at(46), y + at(2)))?;
+        area.draw_text(name, &font, (at(46), y + at(2)))?;
         y += at(27);
     }
     Ok(())

@@ -1,10 +1,7 @@
 //! The approach to the slow invariant manifold, and the motion along it: the modulation of first-order theory, impact by impact.
 
-use plotters::chart::SeriesLabelPosition;
-use plotters::style::Color;
-
 use crate::numerics::equally_spaced;
-use crate::report::figure::{AMPLITUDE_OF_V, Axis, Figure, Marked, Panel, Place, SPEED, caption, line};
+use crate::report::figure::{AMPLITUDE_OF_V, Color, Figure, Legend, Marked, Panel, Place, SPEED, caption, line};
 use crate::report::theme::{DECAY, EXACT, LOCK, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
 use crate::theory::{BackbonePoint, SlowFlow, impacts_stable};
@@ -31,12 +28,12 @@ pub fn figure(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
         let all = std::iter::once((c, b)).chain(places);
         all.take_while(inside).collect()
     };
-    let mut panel = Panel::new(Axis::new(x, AMPLITUDE_OF_V), Axis::new(y, SPEED))
+    let mut panel = Panel::new((x, AMPLITUDE_OF_V), (y, SPEED))
         .heading(
             "Approach to the slow invariant manifold, impact by impact",
             &caption(p, lock.g),
         )
-        .legend(SeriesLabelPosition::UpperLeft);
+        .legend(Legend::UpperLeft);
     let manifold: Vec<Marked> = equally_spaced(0.0, y.1, POINTS + 1)
         .map(|b| ((flow.manifold.c(b), b), impacts_stable(&flow.manifold, b)))
         .filter(|(place, _)| inside(place))

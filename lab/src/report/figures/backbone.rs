@@ -1,12 +1,10 @@
 //! The backbone with the decay on it: amplitude over detuning.
 
-use plotters::chart::SeriesLabelPosition;
-
 use super::{DECAY_LABEL, THINNED, decay_points, error_bars, locked_point};
 use crate::comparison::Comparison;
 use crate::numerics::range;
 use crate::orbit::{self, Limits};
-use crate::report::figure::{Axis, DETUNING, Figure, Marked, Panel, amplitude, caption, clipped, line, thinned};
+use crate::report::figure::{DETUNING, Figure, Legend, Marked, Panel, amplitude, caption, clipped, line, thinned};
 use crate::report::theme::{EXACT, FAINT, LOCK, THEORY, UNSTABLE};
 use crate::scene::{Definition, Dimensionless};
 use crate::theory::{self, BranchSide, SlowFlow};
@@ -23,9 +21,9 @@ pub fn figure(found: &Comparison) -> Figure {
     let theory = theory::backbone(p, slow_flow.manifold.b_min(), reach, 400);
     // Below the fold there is no backbone, and the frequency of the remaining motion is arbitrary.
     let fold = slow_flow.manifold.c_min();
-    let above = found.decay.iter().map(|one| one.point);
+    let decay = || found.decay.iter().map(|one| one.point);
     let sigmas = theory.iter().map(|point| point.sigma);
-    let sigmas = sigmas.chain(above.filter(|point| point.c >= fold).map(|point| point.sigma));
+    let sigmas = sigmas.chain(decay().filter(|point| point.c >= fold).map(|point| point.sigma));
     let (low, high) = range((f64::MAX, f64::MIN), sigmas);
     let margin = 0.06 * (high - low);
     let (low, high) = (low - margin, high + margin);
@@ -34,20 +32,15 @@ pub fn figure(found: &Comparison) -> Figure {
         true => "Backbone: phase resonance of the centre of mass".into(),
         false => format!("Backbone: {}", p.definition.name()),
     };
-    let mut panel = Panel::new(Axis::new((low, high), DETUNING), Axis::new((0.0, top), amplitude(p)))
+    let mut panel = Panel::new(((low, high), DETUNING), ((0.0, top), amplitude(p)))
         .heading(&title, &caption(p, found.lock.g))
-        .legend(SeriesLabelPosition::UpperRight);
+        .legend(Legend::UpperRight);
     add_backbones(&mut panel, p, (low, high), (0.0, top));
-    let decay = found.decay.iter().map(|one| one.point).step_by(THINNED);
-    let decay = decay.map(|point| (point.sigma, point.c));
-    let inside = decay.filter(|(sigma, _)| (low..=high).contains(sigma));
+    let drawn = decay().step_by(THINNED);
+    let places = drawn.clone().map(|point| (point.sigma, point.c));
+    let inside = places.filter(|(sigma, _)| (low..=high).contains(sigma));
     decay_points(&mut panel, inside, DECAY_LABEL);
-    let steady = found
-        .decay
-        .iter()
-        .map(|one| one.point)
-        .step_by(THINNED)
-        .filter(|point| point.c > fold);
+    let steady = drawn.filter(|point| point.c > fold);
     let steady = steady.filter_map(|point| Some(((point.sigma_steady?, point.c), 1.96 * point.u_sigma_steady?)));
     let steady: Vec<_> = steady
         .filter(|((sigma, _), half)| sigma - half >= low && sigma + half <= high)
@@ -58,18 +51,11 @@ pub fn figure(found: &Comparison) -> Figure {
         "free decay, corrected for the drift",
     );
     error_bars(&mut panel, steady.into_iter(), false);
-    let lock = &found.lock;
-    error_bars(
-        &mut panel,
-        std::iter::once(((lock.sigma, lock.c), 1.96 * lock.u_sigma)),
-        false,
-    );
-    error_bars(
-        &mut panel,
-        std::iter::once(((lock.sigma, lock.c), 1.96 * lock.u_c)),
-        true,
-    );
-    locked_point(&mut panel, (found.lock.sigma, found.lock.c));
+    let place = (found.lock.sigma, found.lock.c);
+    for (u, upright) in [(found.lock.u_sigma, false), (found.lock.u_c, true)] {
+        error_bars(&mut panel, std::iter::once((place, 1.96 * u)), upright);
+    }
+    locked_point(&mut panel, place);
     Figure::single(panel)
 }
 

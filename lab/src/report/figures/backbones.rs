@@ -1,8 +1,6 @@
 //! Backbones of first-order theory for several coefficients of restitution.
 
-use plotters::chart::SeriesLabelPosition;
-
-use crate::report::figure::{Axis, DETUNING, Figure, Marked, Panel, Place, amplitude, line};
+use crate::report::figure::{DETUNING, Figure, Legend, Marked, Panel, Place, amplitude, line};
 use crate::report::theme::{EXACT, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
 use crate::theory::{self, B_SYMMETRY_BREAKING, SlowFlow};
@@ -23,9 +21,9 @@ pub fn figure(p: &Dimensionless) -> Figure {
         p.lambda,
         p.definition.name()
     );
-    let mut panel = Panel::new(Axis::new(DETUNINGS, DETUNING), Axis::new((0.0, TOP), amplitude(p)))
+    let mut panel = Panel::new((DETUNINGS, DETUNING), ((0.0, TOP), amplitude(p)))
         .heading("Backbones for several coefficients of restitution r", &caption)
-        .legend(SeriesLabelPosition::UpperRight);
+        .legend(Legend::UpperRight);
     for r in values {
         let own = r == p.r;
         let (colour, width, size) = if own { (EXACT, 34, 17) } else { (THEORY, 18, 14) };

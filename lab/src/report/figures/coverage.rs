@@ -1,9 +1,7 @@
 //! Coverage of the uncertainties: the share of the intervals that contain the exact value, over their nominal level.
 
-use plotters::chart::SeriesLabelPosition;
-
 use crate::calibration::{Calibration, Kind, Outcome};
-use crate::report::figure::{Axis, Figure, Panel, line};
+use crate::report::figure::{Figure, Legend, Panel, line};
 use crate::report::theme::{DECAY, EXACT, LOCK, UNSTABLE};
 
 /// Nominal levels, and the half widths of their intervals in standard uncertainties.
@@ -22,7 +20,7 @@ const LEVELS: [(f64, f64); 11] = [
 ];
 
 pub fn figure(found: &Calibration) -> Figure {
-    let axis = |label| Axis::new((0.0, 1.0), label);
+    let axis = |label| ((0.0, 1.0), label);
     let mut panel = Panel::new(
         axis("nominal level of the interval"),
         axis("share that contains the exact value"),
@@ -31,7 +29,7 @@ pub fn figure(found: &Calibration) -> Figure {
         "Coverage of the uncertainties",
         &format!("{} runs at 40, 30 and 20 dB, three rigs", found.runs),
     )
-    .legend(SeriesLabelPosition::LowerRight);
+    .legend(Legend::LowerRight);
     panel.dashed(vec![(0.0, 0.0), (1.0, 1.0)], line(UNSTABLE, 12), "exact coverage");
     for (kind, colour, label) in [
         (Kind::Lock, LOCK, "lock"),

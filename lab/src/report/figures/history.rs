@@ -3,13 +3,12 @@
 use std::f64::consts::TAU;
 
 use nalgebra::DVector;
-use plotters::chart::SeriesLabelPosition;
 
 use super::{DECAY_LABEL, THINNED, decay_points};
 use crate::comparison::Comparison;
 use crate::experiment::Record;
 use crate::numerics::{HarmonicBasis, range};
-use crate::report::figure::{Axis, Figure, Panel, Place, amplitude, caption, line};
+use crate::report::figure::{Axis, Figure, Legend, Panel, Place, amplitude, caption, line};
 use crate::report::theme::{DECAY, EXACT, THEORY};
 use crate::scene::Scene;
 use crate::theory::{SlowFlow, backbone_at_level, reading};
@@ -67,7 +66,7 @@ pub fn figure(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
     ];
     let panels = rows.into_iter().flat_map(|(row, range, label)| {
         let (top, height) = if row == 1 { (0, UPPER) } else { (UPPER, SIZE.1 - UPPER) };
-        let left = data.driven_panel(row, Axis::new(range, label));
+        let left = data.driven_panel(row, (range, label));
         let right = data.decay_panel(row, range);
         [
             left.at([0, top, LEFT, height]),
@@ -81,7 +80,7 @@ impl Data<'_> {
     fn driven_panel(&self, row: usize, y: Axis) -> Panel {
         let Comparison { parameters, lock, exact, theory, .. } = self.found;
         let end = 1.02 * self.driven.last().map_or(1.0, |one| one[0]);
-        let mut panel = Panel::new(Axis::new((0.0, end), "time, in periods of the oscillator alone"), y);
+        let mut panel = Panel::new(((0.0, end), "time, in periods of the oscillator alone"), y);
         if row == 1 {
             let caption = caption(parameters, lock.g);
             panel = panel.heading("Seeking and holding resonance", &caption);
@@ -98,19 +97,16 @@ impl Data<'_> {
             panel.dashed(level, line(THEORY, 14), "first-order theory");
         }
         panel.legend(if row == 1 {
-            SeriesLabelPosition::LowerRight
+            Legend::LowerRight
         } else {
-            SeriesLabelPosition::UpperRight
+            Legend::UpperRight
         })
     }
 
     fn decay_panel(&self, row: usize, range: (f64, f64)) -> Panel {
         let last = self.points.last().map_or(1.0, |one| one[0]);
         let end = self.theory.last().map_or(last, |one| last.max(one[0]));
-        let mut panel = Panel::new(
-            Axis::new((0.0, 1.02 * end), "time since the release, likewise"),
-            Axis::new(range, ""),
-        );
+        let mut panel = Panel::new(((0.0, 1.02 * end), "time since the release, likewise"), (range, ""));
         if row == 1 {
             panel = panel.heading("Free decay", "the drive is off from 0 on");
         }
@@ -119,7 +115,7 @@ impl Data<'_> {
         let theory = self.theory.iter().map(of).filter(inside).collect();
         panel.dashed(theory, line(THEORY, 16), "first-order theory");
         decay_points(&mut panel, self.points.iter().map(of), DECAY_LABEL);
-        panel.legend(SeriesLabelPosition::UpperRight)
+        panel.legend(Legend::UpperRight)
     }
 }
 

@@ -1,11 +1,9 @@
 //! The slow invariant manifold with the decay on it: particle speed over amplitude.
 
-use plotters::chart::SeriesLabelPosition;
-
 use super::{DECAY_LABEL, THINNED, decay_points, locked_point};
 use crate::comparison::Comparison;
 use crate::numerics::equally_spaced;
-use crate::report::figure::{Axis, Figure, Panel, Place, SPEED, amplitude, caption, line};
+use crate::report::figure::{Figure, Legend, Panel, Place, SPEED, amplitude, caption, line};
 use crate::report::theme::{THEORY, UNSTABLE};
 use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, reading};
 
@@ -24,12 +22,12 @@ pub fn figure(found: &Comparison) -> Figure {
             .filter(|(c, _)| *c <= right)
             .collect()
     };
-    let mut panel = Panel::new(Axis::new((0.0, right), amplitude(p)), Axis::new((0.0, TOP), SPEED))
+    let mut panel = Panel::new(((0.0, right), amplitude(p)), ((0.0, TOP), SPEED))
         .heading(
             "Slow invariant manifold and the free decay on it",
             &caption(&found.parameters, found.lock.g),
         )
-        .legend(SeriesLabelPosition::UpperLeft);
+        .legend(Legend::UpperLeft);
     let stable = between(manifold.b_min(), B_SYMMETRY_BREAKING);
     panel.curve(stable, line(THEORY, 20), "manifold, 1:1 impacts stable");
     for unstable in [between(0.0, manifold.b_min()), between(B_SYMMETRY_BREAKING, TOP)] {

@@ -2,11 +2,9 @@
 
 use std::f64::consts::{FRAC_PI_2, TAU};
 
-use plotters::chart::SeriesLabelPosition;
-
 use crate::numerics::range;
 use crate::orbit::Periodic;
-use crate::report::figure::{Axis, Figure, Panel, Place, line, rig};
+use crate::report::figure::{Figure, Legend, Panel, Place, line, rig};
 use crate::report::theme::{DECAY, EXACT, LOCK, THEORY};
 use crate::scene::Dimensionless;
 use crate::theory::{BackbonePoint, Waveform};
@@ -50,11 +48,11 @@ fn displacements(p: &Dimensionless, motion: &Periodic, rows: &[[f64; 5]], impact
     let farthest = q1.iter().chain(&q2).map(|(_, value)| value.abs() + 1.0);
     let (_, reach) = range((0.0, 1.0), farthest);
     let mut panel = Panel::new(
-        Axis::new((0.0, 1.0), ""),
-        Axis::new((-1.05 * reach, 1.7 * reach), "displacements, over b"),
+        ((0.0, 1.0), ""),
+        ((-1.05 * reach, 1.7 * reach), "displacements, over b"),
     )
     .heading("One period of the locked motion", &caption)
-    .legend(SeriesLabelPosition::UpperRight);
+    .legend(Legend::UpperRight);
     for side in [1.0, -1.0] {
         let wall = course(rows, |row| row[1] + side);
         panel.curve(wall, line(LOCK, 24), "walls, q₁ ± 1");
@@ -77,10 +75,10 @@ fn coordinates(
     let v = course(rows, |row| row[1] + p.epsilon * row[3]);
     let (_, high) = range((0.0, 1.0), v.iter().map(|(_, value)| value.abs()));
     let mut panel = Panel::new(
-        Axis::new((0.0, 1.0), "time since the base passed zero upwards, in periods"),
-        Axis::new((-1.15 * high, 1.9 * high), "v and w, over b"),
+        ((0.0, 1.0), "time since the base passed zero upwards, in periods"),
+        ((-1.15 * high, 1.9 * high), "v and w, over b"),
     )
-    .legend(SeriesLabelPosition::UpperRight);
+    .legend(Legend::UpperRight);
     for side in [-1.0, 1.0] {
         panel.curve(vec![(0.0, side), (1.0, side)], line(LOCK, 10), "");
     }

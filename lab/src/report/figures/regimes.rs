@@ -1,12 +1,10 @@
 //! The regime map: coloured cells, a letter on each region, and the theory's stable island.
 
-use plotters::style::{BLACK, Color, WHITE};
-
-use crate::map::{Axis as MapAxis, Map, Range, outline};
-use crate::orbit::{Bifurcation, BifurcationCurve, Periodic};
+use crate::map::{Axis, Map, Range, outline};
+use crate::orbit::{BifurcationCurve, Periodic};
 use crate::regime::Regime;
 use crate::report::figure::{
-    Axis, DETUNING, Figure, FigureError, KeyEntry, Mark, Marked, Panel, Place, clipped, line, thinned,
+    BLACK, Color, DETUNING, Figure, FigureError, Mark, Marked, Panel, Place, WHITE, clipped, line, thinned,
 };
 use crate::report::theme;
 
@@ -27,13 +25,13 @@ fn figure(map: &Map) -> Figure {
     let plan = &map.plan;
     let axis = |range: &Range| {
         let half = range.step() / 2.0;
-        Axis::new((range.from - half, range.to + half), label(range.axis))
+        ((range.from - half, range.to + half), label(range.axis))
     };
     let mut panel = Panel::new(axis(&plan.x), axis(&plan.y))
         .at([0, 0, WIDTH, SIZE.1])
         .heading("Regimes of the driven response", &caption(map));
     for regime in Regime::SIMULATED {
-        panel.rectangles(stripes(map, regime), theme::regime(regime));
+        panel.rectangles(stripes(map, regime), theme::regime(regime).0);
     }
     let segments = outline(plan);
     panel.segments(segments.clone(), line(WHITE, 50));
@@ -41,57 +39,38 @@ fn figure(map: &Map) -> Figure {
     for curve in &map.curves {
         draw_curve(&mut panel, map, curve);
     }
-    let several = map
-        .cells
-        .iter()
-        .enumerate()
-        .filter(|(_, cell)| !cell.coexisting.is_empty());
+    let cells = map.cells.iter().enumerate();
+    let several = cells.filter(|(_, cell)| !cell.coexisting.is_empty());
     let dots: Vec<Place> = several
         .map(|(n, _)| (plan.x.at(n % plan.x.points), plan.y.at(n / plan.x.points)))
         .collect();
     let dotted = !dots.is_empty();
     panel.circles(dots, 1, BLACK.filled(), "");
     for (regime, place) in letters(map) {
-        let ink = theme::on_regime(regime);
-        panel.centred_text(letter(regime).into(), place, 17, ink);
+        let (_, letter, ink) = theme::regime(regime);
+        panel.centred_text(letter.into(), place, 17, ink);
     }
     Figure::new(SIZE, vec![panel]).with_key(key(map, dotted))
 }
 
-fn key(map: &Map, dotted: bool) -> Vec<KeyEntry> {
-    let shown = Regime::SIMULATED.into_iter();
-    let shown = shown.filter(|one| map.count(*one).0 > 0);
-    let mut key: Vec<KeyEntry> = shown
-        .map(|one| KeyEntry {
-            name: one.name(),
-            mark: Mark::Swatch(theme::regime(one), letter(one), theme::on_regime(one)),
-        })
+fn key(map: &Map, dotted: bool) -> Vec<(&'static str, Mark)> {
+    let shown = Regime::SIMULATED.into_iter().filter(|one| map.count(*one).0 > 0);
+    let mut key: Vec<_> = shown
+        .map(|one| (one.name(), Mark::Swatch(theme::regime(one))))
         .collect();
-    key.push(KeyEntry { name: "stable 1:1, theory", mark: Mark::Line(BLACK) });
-    let kinds = [
-        Bifurcation::Fold,
-        Bifurcation::SymmetryBreaking,
-        Bifurcation::PeriodDoubling,
-        Bifurcation::Torus,
-    ];
-    for kind in kinds
-        .into_iter()
-        .filter(|kind| map.curves.iter().any(|curve| curve.kind == *kind))
-    {
-        key.push(KeyEntry {
-            name: kind.name(),
-            mark: Mark::Line(theme::bifurcation(kind)),
-        });
-    }
+    key.push(("stable 1:1, theory", Mark::Line(BLACK)));
+    let drawn = |kind| map.curves.iter().any(|curve| curve.kind == kind);
+    let curves = theme::BIFURCATIONS.into_iter().filter(|(kind, _)| drawn(*kind));
+    key.extend(curves.map(|(kind, colour)| (kind.name(), Mark::Line(colour))));
     if dotted {
-        key.push(KeyEntry { name: "several regimes", mark: Mark::Dot });
+        key.push(("several regimes", Mark::Dot));
     }
     key
 }
 
 /// Where a motion lies on a map over sigma and G.
 fn place_on(map: &Map) -> impl Fn(&Periodic) -> Place {
-    let swapped = map.plan.x.axis == MapAxis::G;
+    let swapped = map.plan.x.axis == Axis::G;
     move |one| {
         if swapped {
             (one.g, one.sigma)
@@ -111,7 +90,10 @@ fn draw_curve(panel: &mut Panel, map: &Map, curve: &BifurcationCurve) {
         .map(|one| (place(one), one.bounds_stability()))
         .collect();
     let (x, y) = (map.plan.x, map.plan.y);
-    let colour = theme::bifurcation(curve.kind);
+    let mut colours = theme::BIFURCATIONS.into_iter();
+    let colour = colours
+        .find(|(kind, _)| *kind == curve.kind)
+        .map_or(BLACK, |(_, colour)| colour);
     for piece in clipped(&points, (x.from, x.to), (y.from, y.to)) {
         panel.curve(piece.iter().map(|one| one.0).collect(), line(WHITE, 36), "");
         panel.pieces(
@@ -124,13 +106,13 @@ fn draw_curve(panel: &mut Panel, map: &Map, curve: &BifurcationCurve) {
 
 fn caption(map: &Map) -> String {
     let plan = &map.plan;
-    let held = [MapAxis::Sigma, MapAxis::G, MapAxis::R]
+    let held = [Axis::Sigma, Axis::G, Axis::R]
         .into_iter()
         .filter(|axis| plan.x.axis != *axis && plan.y.axis != *axis)
         .map(|axis| match axis {
-            MapAxis::Sigma => format!(", σ = {:.4}", plan.sigma),
-            MapAxis::G => format!(", G = {:.3}", plan.scene.g),
-            MapAxis::R => format!(", r = {}", plan.scene.r),
+            Axis::Sigma => format!(", σ = {:.4}", plan.sigma),
+            Axis::G => format!(", G = {:.3}", plan.scene.g),
+            Axis::R => format!(", r = {}", plan.scene.r),
         });
     let dashed = if map.curves.is_empty() {
         ""
@@ -146,25 +128,11 @@ fn caption(map: &Map) -> String {
     )
 }
 
-fn label(axis: MapAxis) -> &'static str {
+fn label(axis: Axis) -> &'static str {
     match axis {
-        MapAxis::Sigma => DETUNING,
-        MapAxis::G => "base amplitude G = E/(b ε)",
-        MapAxis::R => "restitution coefficient r",
-    }
-}
-
-fn letter(regime: Regime) -> &'static str {
-    match regime {
-        Regime::NoImpacts => "O",
-        Regime::Symmetric => "S",
-        Regime::Asymmetric => "A",
-        Regime::Several => "n",
-        Regime::QuasiPeriodic => "Q",
-        Regime::Modulated => "M",
-        Regime::Chaotic => "C",
-        Regime::Undecided => "U",
-        Regime::Other | Regime::Unresolved | Regime::Unknown => "?",
+        Axis::Sigma => DETUNING,
+        Axis::G => "base amplitude G = E/(b ε)",
+        Axis::R => "restitution coefficient r",
     }
 }
 

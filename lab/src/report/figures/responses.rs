@@ -1,10 +1,9 @@
 //! Frequency responses at several excitations, exact and first-order, with the backbone near their maxima.
 
-use plotters::chart::SeriesLabelPosition;
-use plotters::style::BLACK;
-
 use crate::orbit::{Branch, Response};
-use crate::report::figure::{Axis, DETUNING, Figure, Marked, Panel, Place, amplitude, clipped, line, rig, thinned};
+use crate::report::figure::{
+    BLACK, DETUNING, Figure, Legend, Marked, Panel, Place, amplitude, clipped, line, rig, thinned,
+};
 use crate::report::theme::{EXACT, FAINT, THEORY, UNSTABLE};
 use crate::scene::Dimensionless;
 use crate::theory::{self, B_SYMMETRY_BREAKING, ResponsePoint, SlowFlow};
@@ -24,9 +23,9 @@ pub fn figure(p: &Dimensionless, responses: &[Response]) -> Figure {
     let (x, y) = (DETUNINGS, (0.0, top));
     let list: Vec<String> = responses.iter().map(|one| format!("{:.3}", one.g)).collect();
     let caption = format!("{}; G = {}; amplitudes over b", rig(p), list.join(", "));
-    let mut panel = Panel::new(Axis::new(x, DETUNING), Axis::new(y, amplitude(p)))
+    let mut panel = Panel::new((x, DETUNING), (y, amplitude(p)))
         .heading("Frequency responses and backbone", &caption)
-        .legend(SeriesLabelPosition::UpperRight);
+        .legend(Legend::UpperRight);
     for response in responses {
         add_response(&mut panel, p, response, (x, y));
         // The label is beside the left end of the curve, or above its end at the axis.

@@ -1,17 +1,18 @@
 //! The tracked backbone: the points held with the loop closed, on the exact curve and that of theory.
 
-use plotters::chart::SeriesLabelPosition;
-
 use super::{backbone::add_backbones, decay_points, error_bars};
 use crate::backbone::Point;
 use crate::comparison::TrackedComparison;
 use crate::numerics::range;
-use crate::report::figure::{Axis, DETUNING, Figure, Panel, SIZE, amplitude, caption, line};
+use crate::report::figure::{DETUNING, Figure, Legend, Panel, SIZE, amplitude, caption, line};
 use crate::report::theme::{DECAY, EXACT, THEORY};
 use crate::theory::{self, SlowFlow};
 
-fn points(tracked: &TrackedComparison) -> impl Iterator<Item = Point> + Clone {
-    tracked.points.iter().map(|one| one.point)
+/// The points, and the top of the axis of their amplitudes.
+fn points(tracked: &TrackedComparison) -> (impl Iterator<Item = Point> + Clone, f64) {
+    let all = tracked.points.iter().map(|one| one.point);
+    let top = all.clone().fold(0.5, |most: f64, one| most.max(1.15 * one.c));
+    (all, top)
 }
 
 /// The points in the plane of amplitude and detuning; points that are not settled are crossed.
@@ -28,34 +29,27 @@ pub fn figure_with_drive(tracked: &TrackedComparison) -> Figure {
 
 fn amplitude_panel(tracked: &TrackedComparison) -> Panel {
     let p = &tracked.parameters;
-    let all = points(tracked);
-    let top = all.clone().fold(0.5, |most: f64, one| most.max(1.15 * one.c));
+    let (all, top) = points(tracked);
     let (low, high) = range((-1.6, 0.6), all.clone().map(|one| one.sigma));
     let x = (low - 0.1 * (high - low), high + 0.1 * (high - low));
     let (least, most) = range((f64::MAX, f64::MIN), all.clone().map(|one| one.g));
     let text = caption(p, most).replace(&format!("G = {most:.3}"), &format!("G from {least:.3} to {most:.3}"));
-    let mut panel = Panel::new(Axis::new(x, DETUNING), Axis::new((0.0, top), amplitude(p)))
+    let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
         .heading("Backbone, tracked with the loop closed", &text)
-        .legend(SeriesLabelPosition::UpperRight);
+        .legend(Legend::UpperRight);
     add_backbones(&mut panel, p, x, (0.0, top));
     let place = |one: Point| (one.sigma, one.c);
     decay_points(&mut panel, all.clone().map(place), "tracked");
-    error_bars(
-        &mut panel,
-        all.clone().map(|one| (place(one), 1.96 * one.u_sigma)),
-        false,
-    );
-    let unsettled: Vec<_> = all.filter(|one| !one.settled).map(place).collect();
-    if !unsettled.is_empty() {
-        panel.crosses(unsettled, line(DECAY, 20), "not settled in time");
-    }
+    let bars = all.clone().map(|one| (place(one), 1.96 * one.u_sigma));
+    error_bars(&mut panel, bars, false);
+    let unsettled = all.filter(|one| !one.settled).map(place).collect();
+    panel.crosses(unsettled, line(DECAY, 20), "not settled in time");
     panel
 }
 
 fn drive_panel(tracked: &TrackedComparison) -> Panel {
     let p = &tracked.parameters;
-    let all = points(tracked);
-    let top = all.clone().fold(0.5, |most: f64, one| most.max(1.15 * one.c));
+    let (all, top) = points(tracked);
     let flow = SlowFlow::new(p.lambda, p.r);
     let theory = theory::backbone(p, flow.manifold.b_min(), 1.3, 600);
     let theory = theory.iter().map(|one| (one.c, one.g));
@@ -64,11 +58,11 @@ fn drive_panel(tracked: &TrackedComparison) -> Panel {
     let high = 1.3 * most;
     let inside = |place: &(f64, f64)| place.0 <= top && place.1 <= high;
     let mut panel = Panel::new(
-        Axis::new((0.0, top), amplitude(p)),
-        Axis::new((0.0, high), "drive G, base amplitude over b ε"),
+        ((0.0, top), amplitude(p)),
+        ((0.0, high), "drive G, base amplitude over b ε"),
     )
     .heading("The drive that holds each level", "")
-    .legend(SeriesLabelPosition::LowerRight);
+    .legend(Legend::LowerRight);
     let theory = theory.filter(inside).collect();
     panel.dashed(theory, line(THEORY, 20), "first-order theory");
     let exact = exact.filter(inside).collect();

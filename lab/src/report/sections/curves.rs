@@ -1,10 +1,9 @@
 //! Exact frequency responses and backbone, and one period of the locked motion.
 
-use serde::Serialize;
-
-use super::{SectionError, Subject};
+use super::{ReportError, Subject};
 use crate::orbit::{
-    Branch, Condition, Exploration, ImpactPattern, Limits, Periodic, Response, backbone, response, stable_resonant,
+    Branch, Component, Condition, Exploration, ImpactPattern, Limits, Periodic, Response, backbone, response,
+    stable_resonant,
 };
 use crate::report::figures::{period, responses};
 use crate::report::files::csv;
@@ -13,23 +12,7 @@ use crate::report::table::Table;
 use crate::scene::Dimensionless;
 use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 
-/// One row of the table of curves.
-#[derive(Serialize)]
-struct Row {
-    curve: String,
-    sigma: f64,
-    #[serde(rename = "G")]
-    g: f64,
-    #[serde(rename = "C")]
-    c: f64,
-    gamma: f64,
-    #[serde(rename = "B")]
-    b: f64,
-    largest_multiplier: f64,
-    stable: bool,
-}
-
-pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError> {
     let mut section = Section::new("Exact periodic motions");
     let p = subject.scene.dimensionless();
     let limits = Limits::default();
@@ -70,7 +53,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
             period::figure(&p, &motion, theory).svg()?,
         );
     }
-    section.attach("curves.csv", csv(table(&curve, &found))?);
+    section.attach("curves.csv", table(&curve, &found)?);
     Ok(section)
 }
 
@@ -138,25 +121,20 @@ fn excitations(p: &Dimensionless) -> Vec<f64> {
     list
 }
 
-fn table(backbone: &Branch, responses: &[Response]) -> Vec<Row> {
-    let rows = |curve: String, branch: &Branch| -> Vec<Row> {
-        let row = |one: &Periodic| Row {
-            curve: curve.clone(),
-            sigma: one.sigma,
-            g: one.g,
-            c: one.c,
-            gamma: one.gamma,
-            b: one.b,
-            largest_multiplier: one.moduli()[3],
-            stable: one.stable,
+/// The orbits of all curves, as CSV.
+fn table(backbone: &Branch, responses: &[Response]) -> Result<String, ReportError> {
+    let headings = ["curve", "sigma", "G", "C", "gamma", "B", "largest_multiplier", "stable"];
+    let components = responses.iter().flat_map(|response| {
+        let name = |one: &Component| format!("G={:.4}: {}", response.g, one.name);
+        response.components.iter().map(move |one| (name(one), &one.branch))
+    });
+    let curves = std::iter::once(("backbone".to_string(), backbone)).chain(components);
+    let rows = curves.flat_map(|(curve, branch)| {
+        let row = move |one: &Periodic| {
+            let Periodic { sigma, g, c, gamma, b, stable, .. } = *one;
+            (curve.clone(), sigma, g, c, gamma, b, one.moduli()[3], stable)
         };
-        branch.points.iter().map(row).collect()
-    };
-    let mut all = rows("backbone".into(), backbone);
-    for response in responses {
-        for one in &response.components {
-            all.extend(rows(format!("G={:.4}: {}", response.g, one.name), &one.branch));
-        }
-    }
-    all
+        branch.points.iter().map(row)
+    });
+    csv(&headings, rows)
 }

@@ -3,7 +3,7 @@
 use std::cell::Cell;
 use std::error::Error;
 
-use super::{SectionError, Subject};
+use super::{ReportError, Subject};
 use crate::comparison::{COMPARED_ABOVE, Comparison};
 use crate::experiment::{self, ExperimentError, Plan, Record, Stage};
 use crate::identification::{DecayEnd, identify};
@@ -13,7 +13,7 @@ use crate::report::section::Section;
 use crate::report::table::{Table, number};
 use crate::rig::{BuiltIn, Rig, Simulated};
 
-pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError> {
     let mut section = Section::new("The experiment");
     let scene = &subject.scene;
     let mut rig = Simulated::of(scene)?;

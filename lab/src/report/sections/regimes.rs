@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::{SectionError, Subject};
+use super::{ReportError, Subject};
 use crate::map::{LIMIT, Map, Plan};
 use crate::regime::Regime;
 use crate::report::figures::regimes;
@@ -10,7 +10,7 @@ use crate::report::files::{bifurcations_csv, map_csv};
 use crate::report::section::Section;
 use crate::report::summary;
 
-pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError> {
     let mut section = Section::new("Regimes of the driven response");
     let (scene, [x, y]) = (&subject.scene, subject.map);
     let plan = Plan::new(scene.dimensionless(), scene.dimensionless_start(), x, y);

@@ -1,6 +1,6 @@
 //! First-order theory: the backbones of several r, activation, and how it approaches the exact orbits.
 
-use super::{SectionError, Subject};
+use super::{ReportError, Subject};
 use crate::orbit::convergence;
 use crate::report::figures::{approach, backbones};
 use crate::report::files::csv;
@@ -12,7 +12,7 @@ use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, resonant};
 /// Halvings of epsilon in the convergence study.
 const HALVINGS: u32 = 6;
 
-pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
+pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError> {
     let mut section = Section::new("First-order theory and its accuracy");
     let p = subject.scene.dimensionless();
     let flow = SlowFlow::new(p.lambda, p.r);
@@ -56,7 +56,7 @@ pub(super) fn make(subject: &Subject, _: &(dyn Fn(f64) + Sync)) -> Result<Sectio
                 Table::new("ε | in σ | in C | in B").rows(rows),
             );
             section.words(section.finding.clone());
-            section.attach("convergence.csv", csv(&study.rows)?);
+            section.attach("convergence.csv", csv(&[], &study.rows)?);
         }
         None => {
             section.found("Theory and exact orbits have no common stable phase-resonant motion here.");

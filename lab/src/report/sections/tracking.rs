@@ -1,6 +1,6 @@
 //! The backbone tracked with the loop closed, level by level.
 
-use super::{SectionError, Subject};
+use super::{ReportError, Subject};
 use crate::backbone::track;
 use crate::comparison::{TrackedComparison, TrackedPoint};
 use crate::identification::Regime;
@@ -9,7 +9,7 @@ use crate::report::files::tracked_csv;
 use crate::report::section::Section;
 use crate::rig::{BuiltIn, Simulated};
 
-pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, SectionError> {
+pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError> {
     let mut section = Section::new("The backbone, tracked with the loop closed");
     let scene = &subject.scene;
     let mut controller = BuiltIn::new(&scene.backbone_config())?;

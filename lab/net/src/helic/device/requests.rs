@@ -9,12 +9,12 @@ use super::Device;
 impl Device {
     /// Answers a request. `uptime` in ms.
     pub fn handle(&mut self, request: &Frame, uptime: u32) -> Frame {
-        let Frame { kind, sequence, payload } = request;
-        let answer = match self.answer(*kind, payload, uptime) {
-            Ok(payload) => (*kind, payload),
-            Err(code) => (message::ERROR, vec![code as u8, *kind]),
+        let Frame { kind, sequence, ref payload } = *request;
+        let (kind, payload) = match self.answer(kind, payload, uptime) {
+            Ok(payload) => (kind, payload),
+            Err(code) => (message::ERROR, vec![code as u8, kind]),
         };
-        Frame { kind: answer.0, sequence: *sequence, payload: answer.1 }
+        Frame { kind, sequence, payload }
     }
 
     fn answer(&mut self, kind: u8, payload: &[u8], uptime: u32) -> Result<Vec<u8>, ErrorCode> {
@@ -97,16 +97,8 @@ impl Device {
             "pll_target_phase" if settings.pll.target != self.settings.pll.target => self.pll.reacquire(),
             "table_trigger" => self.table.trigger(&settings.table),
             "diag_reset" => {
-                for name in [
-                    "loop_time_max",
-                    "clock_jitter",
-                    "overruns",
-                    "tick_timeouts",
-                    "records_dropped",
-                    "t_rest_max",
-                ] {
-                    self.registry.put_number(name, 0);
-                }
+                let counters = "loop_time_max clock_jitter overruns tick_timeouts records_dropped t_rest_max";
+                counters.split(' ').for_each(|name| self.registry.put_number(name, 0));
             }
             _ => {}
         }
@@ -154,7 +146,7 @@ impl Device {
             return Err(ErrorCode::Busy);
         }
         self.table.values = self.staged[..length].to_vec();
-        self.registry.put_short("table_len", length as u16);
+        self.registry.put("table_len", &(length as u16).to_le_bytes());
         self.committed = true;
         self.commands += 1;
         Ok(())
