@@ -1,6 +1,11 @@
 # Sourced by the other scripts: changes to the project's root and provides functions that set up tools and build.
-# Needs cargo, a C compiler and Python 3.11 or newer; no root.
+# For --help it prints the comment at the top of the script and ends. Needs cargo, a C compiler and Python 3.11 or newer; no root.
 set -euo pipefail
+for option in "$@"; do
+    case $option in
+        -h | --help) sed -n '2,/^[^#]/s/^# \{0,1\}//p' "${BASH_SOURCE[-1]}"; exit ;;
+    esac
+done
 called_from=$PWD
 cd "$(dirname "${BASH_SOURCE[0]}")/.."
 

@@ -114,8 +114,8 @@ impl InvalidValue {
 
 impl fmt::Display for InvalidValue {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let Self { name, value, unit, allowed } = self;
-        let space = if unit.is_empty() { "" } else { " " };
+        let (Self { name, unit, allowed, .. }, value) = (self, format!("{:?}", self.value));
+        let (space, value) = (if unit.is_empty() { "" } else { " " }, value.trim_end_matches(".0"));
         write!(f, "{name} = {value}{space}{unit} is refused; allowed is {allowed}")
     }
 }

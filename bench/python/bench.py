@@ -31,7 +31,7 @@ METHODS = [
     ("plant, Rust", "rust", "plant", (0,), (0,)),
     ("plant, one step in all", "rust", "plant-one-step", (0,), (0,)),
     ("plant, 100 times the steps", "rust", "plant-100", (0,), ()),
-    ("plant, general search only", "rust", "plant-general", (0,), (0,)),
+    ("plant, plain solver only", "rust", "plant-general", (0,), (0,)),
     ("plant, C interface", "rust", "c-interface", (0,), (0,)),
     ("plant, FMPy", "python", "fmpy", (0,), (0,)),
     ("closed form + Brent", "rust", "brent", TOLERANCES, (1e-9, 1e-12)),
@@ -257,7 +257,7 @@ def main():
         help="renew docs/performance.*, docs/work-precision.svg, docs/run-time-map.* and the ratios in docs/plant.md",
     )
     parser.add_argument(
-        "--out", type=Path, default=Path("out/bench"), help="folder for tables and picture (default %(default)s)"
+        "--out", type=Path, default=Path("out/bench"), help="folder for tables and figure (default %(default)s)"
     )
     parser.add_argument("--seconds", type=float, help="about how long to measure; there are three rounds at least")
     parser.add_argument("--map", action="store_true", help="only the map of run time: figure, CSV and table per regime")
@@ -281,12 +281,12 @@ def main():
     rows, lock = run_time_map.measure(bench.rust, bench.map_points(), bench.progress)
     for worker in set(bench.workers.values()):
         worker.end()
-    import picture  # Here, so that --help needs nothing installed.
+    import figure  # Here, so that --help needs nothing installed.
 
     options.out.mkdir(parents=True, exist_ok=True)
     run_time_map.write(rows, lock, options.out)
     text = report.write(bench, growth, loop, profiles, (rows, lock), options.out)
-    picture.write(bench, options.out / "work-precision.svg")
+    figure.write(bench, options.out / "work-precision.svg")
     if options.keep:
         report.renew(HERE.parent / "docs/plant.md", bench)
     print(text)

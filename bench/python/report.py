@@ -76,11 +76,11 @@ def skipped(profile, general):
     if general is not None:
         if general > 1.5:
             words.append(
-                "the general search: a particle faster than the primary mass can be meets the wall ahead once, and "
+                "the plain solver: a particle faster than the primary mass can be meets the wall ahead once, and "
                 "what is known of a drive that stays is kept"
             )
         else:
-            words.append("little of the general search, which meets most contacts here")
+            words.append("little of the plain solver, which meets most contacts here")
     empty = profile["empty"] / profile["steps"]
     if empty > 0.01:
         words.append(f"a search within {100 * empty:.3g} % of the steps, in which nothing is met")
@@ -98,7 +98,7 @@ GROWTH_NOTE = (
     "are medians of three rounds."
 )
 SAVINGS_NOTE = (
-    "Measured, as ratios of run times. By its search: every contact by the general search, over the plant as it is. By "
+    "Measured, as ratios of run times. By its search: every contact by the plain solver, over the plant as it is. By "
     "not stopping: the plant as asked, over everything in one step."
 )
 
@@ -217,7 +217,7 @@ def write(bench, growth, loop, profiles, run_times, folder):
         text += [note, ""]
         mark += [note, ""]
     mark += [
-        "`scripts/bench --keep` writes this page; the picture's numbers are in [performance.csv](performance.csv).",
+        "`scripts/bench --keep` writes this page; the figure's numbers are in [performance.csv](performance.csv).",
         "",
     ]
     mark += ["![Error against time, scene by scene](work-precision.svg)", ""]

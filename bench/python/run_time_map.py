@@ -97,14 +97,14 @@ def as_text(rows, lock):
 
 
 def as_markdown(rows, lock):
-    picture = "![ns per impact over detuning and base amplitude](run-time-map.svg)"
+    figure = "![ns per impact over detuning and base amplitude](run-time-map.svg)"
     numbers = "The cells are in [run-time-map.csv](run-time-map.csv)."
     return [
         "## Map of run time",
         "",
         NOTE,
         "",
-        picture,
+        figure,
         "",
         lock_line(lock),
         numbers,

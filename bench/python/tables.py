@@ -46,10 +46,10 @@ def markdown_table(head, rows):
 
 
 def wrapped(text):
-    """Markdown with prose in lines of at most 150 characters."""
+    """Markdown with prose in lines of at most 140 characters."""
     kept = ("|", "!", "#")
-    fill = textwrap.TextWrapper(150, break_long_words=False, break_on_hyphens=False).fill
-    return "\n".join(fill(line) if len(line) > 150 and not line.startswith(kept) else line for line in text.split("\n"))
+    fill = textwrap.TextWrapper(140, break_long_words=False, break_on_hyphens=False).fill
+    return "\n".join(fill(line) if len(line) > 140 and not line.startswith(kept) else line for line in text.split("\n"))
 
 
 def replace(file, text):

@@ -102,6 +102,71 @@ fn bad_input_ends_with_code_two_and_one_message() {
 }
 
 #[test]
+fn counts_of_zero_are_refused_with_the_allowed_range() {
+    for arguments in [
+        ["calibrate", "--seeds"],
+        ["check", "--trials"],
+        ["rigs", "--count"],
+        ["faults", "--instants"],
+        ["map", "--starts"],
+    ] {
+        fails(&[&arguments[..], &["0"]].concat(), 2, "from 1 to 1000000000");
+    }
+    for server in ["rig", "controller"] {
+        fails(&[server, "--listen", "127.0.0.1:0", "--sessions", "0"], 2, "from 1 to");
+    }
+}
+
+#[test]
+fn settings_that_random_rigs_draw_are_refused() {
+    for setting in [
+        "plant.r=0.5",
+        "excitation.G=1",
+        "resonance.sensor=q1",
+        "controller.phase_target=-80",
+    ] {
+        fails(&["rigs", "--count", "1", "--set", setting], 2, "drawn at random");
+    }
+    fails(
+        &["check", "--trials", "1", "--set", "plant.c=0"],
+        2,
+        "random rigs draw plant.epsilon",
+    );
+}
+
+#[test]
+fn a_stage_of_the_chain_that_trips_the_controller_says_so_and_has_no_effect() {
+    let text = String::from_utf8(vines(&["chain"]).stdout).unwrap();
+    let row = |stage: &str| text.lines().find(|line| line.contains(stage)).unwrap();
+    assert!(
+        row("ADC 8 bits").contains("switched off: ") && row("ADC 8 bits").contains("| – |"),
+        "{text}"
+    );
+    assert!(!row("ADC 16 bits").contains('–'), "{text}");
+}
+
+#[test]
+fn a_plant_without_damping_locks_on_its_exact_orbit() {
+    let folder = tempfile::tempdir().unwrap();
+    let settings = ["plant.c=0", "plant.r=0.3", "excitation.G=0.8"].map(|one| format!("--set={one}"));
+    let settings: Vec<&str> = settings.iter().map(String::as_str).collect();
+    let out = folder.path().to_str().unwrap();
+    let found = json(
+        &[
+            &["identify", "--rig", "built-in", "--json", "--out", out][..],
+            &settings,
+        ]
+        .concat(),
+    );
+    let orbits = json(&[&["orbit", "--json"][..], &settings].concat());
+    let stable = orbits.as_array().unwrap().iter().find(|orbit| orbit["stable"] == true);
+    for key in ["sigma", "C"] {
+        let difference = found["lock"][key].as_f64().unwrap() - stable.unwrap()[key].as_f64().unwrap();
+        assert!(difference.abs() < 1e-4, "{key}: {difference}");
+    }
+}
+
+#[test]
 fn packing_without_libraries_says_what_is_missing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().to_str().unwrap();

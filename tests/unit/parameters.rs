@@ -15,6 +15,8 @@ fn an_invalid_value_is_named_with_its_unit_and_what_is_allowed() {
         message,
         "m (particle mass) = -0.5 kg is refused; allowed is a number from 1e-100 to 1e100"
     );
+    assert!(refused(|p| p.damping = 1e300).starts_with("c (damping) = 1e300 N.s/m is"));
+    assert!(refused(|p| p.primary_mass = 0.0).starts_with("M (primary mass) = 0 kg is"));
     assert!(refused(|p| p.restitution = 1.5).contains("at most 1"));
     assert!(refused(|p| p.damping = -1e-9).contains("N.s/m"));
 }

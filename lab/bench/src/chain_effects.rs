@@ -8,7 +8,7 @@ use vines_model::numerics::{mean, standard_deviation};
 
 use crate::experiment::{ExperimentError, Sample};
 use crate::identification::Cycle;
-use crate::rig::{BuiltIn, Chain, Controller, ControllerError, RigError, Simulated};
+use crate::rig::{BuiltIn, Chain, Controller, ControllerError, Fault, RigError, Simulated};
 use crate::scene::{Override, Scene, SceneError, SyntaxError};
 
 /// The stages and combinations under study: a name, and settings of `[chain]`.
@@ -59,6 +59,8 @@ pub struct Effect {
     pub wander: f64,
     /// Time of one sample, plant, chain and controller together, s: the fastest of several runs.
     pub sample_seconds: f64,
+    /// Why the controller switched the drive off; the other values then are those of no motion.
+    pub fault: Option<&'static str>,
 }
 
 /// Periods before the measurement, periods measured, and number of timings.
@@ -138,5 +140,6 @@ pub fn effect(name: &'static str, scene: &Scene) -> Result<Effect, ExperimentErr
         c: mean(cycles.iter().map(Cycle::amplitude)) / d.b,
         wander: standard_deviation(&omegas) / d.omega_change(1.0),
         sample_seconds: fastest,
+        fault: samples.last().and_then(|sample| sample.command.fault).map(Fault::text),
     })
 }

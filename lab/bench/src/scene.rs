@@ -84,7 +84,9 @@ impl Scene {
     /// # Errors
     /// As [`Scene::load`].
     pub fn parse(origin: &str, text: &str, overrides: &[Override]) -> Result<Self, SceneError> {
-        overrides::read(origin, text, overrides)?.0.resolve(origin)
+        let scene = overrides::read(origin, text, overrides)?.0.resolve(origin)?;
+        scene.controller_config().build()?;
+        Ok(scene)
     }
 
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.

@@ -8,7 +8,7 @@ use vines::calibration::{self, Calibration, Coverage, Kind, Missing, OTHER_RIGS,
 use vines::report::{self, Table};
 use vines::scene::Scene;
 
-use super::{failure::Failure, output, writable, written};
+use super::{failure::Failure, output, serving::count, writable, written};
 
 /// The scene whose settings the rigs change.
 const SCENE: &str = include_str!("../../../scenes/dimensionless.toml");
@@ -27,11 +27,11 @@ Examples:
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
     /// Number of seeds; each is run on three rigs at three ratios
-    #[arg(long, default_value_t = 56)]
+    #[arg(long, default_value_t = 56, value_parser = count::<u64>)]
     seeds: u64,
 
     /// First seed
-    #[arg(long, default_value_t = 1)]
+    #[arg(long, default_value_t = 1, value_parser = clap::value_parser!(u64).range(..=1_000_000_000))]
     first_seed: u64,
 
     /// Use the second set of rigs, which was not used to write the estimators

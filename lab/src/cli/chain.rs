@@ -10,6 +10,7 @@ const HELP: &str = "\
 Locks the plant with each stage of [chain] alone and with some combinations, and prints a Markdown table:
   moves    difference from the ideal chain, mean over 200 periods after 600
   wanders  standard deviation of the drive's frequency from period to period
+  –        the controller switched the drive off in this run, or with the ideal chain; the reason follows the stage
   time     of a sample of plant, chain and controller, relative to the ideal chain
 
 Examples:
@@ -40,11 +41,22 @@ fn table(effects: &[Effect]) -> Table {
     let ideal = effects[0];
     Table::new("stage | sigma moves by | C moves by | sigma wanders by | time of a sample").rows(effects.iter().map(
         |effect| {
+            let [sigma, c, wander] = match effect.fault.or(ideal.fault) {
+                Some(_) => ["–"; 3].map(String::from),
+                None => [
+                    format!("{:+.1e}", effect.sigma - ideal.sigma),
+                    format!("{:+.1e}", effect.c - ideal.c),
+                    format!("{:.0e}", effect.wander),
+                ],
+            };
+            let off = effect
+                .fault
+                .map_or(String::new(), |fault| format!(" (switched off: {fault})"));
             [
-                effect.name.to_string(),
-                format!("{:+.1e}", effect.sigma - ideal.sigma),
-                format!("{:+.1e}", effect.c - ideal.c),
-                format!("{:.0e}", effect.wander),
+                format!("{}{off}", effect.name),
+                sigma,
+                c,
+                wander,
                 format!("× {:.2}", effect.sample_seconds / ideal.sample_seconds),
             ]
         },

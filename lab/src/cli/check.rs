@@ -12,6 +12,7 @@ use super::{
     failure::Failure,
     log_warnings, output,
     scene_arguments::SceneArguments,
+    serving::count,
 };
 
 const HELP: &str = "\
@@ -29,6 +30,22 @@ Examples:
   vines check --rig udp://127.0.0.1:5510
   vines check --trials 1000          random rigs, healthy and with random faults: how many are named correctly";
 
+/// What a random rig of `--trials` draws itself.
+const DRAWN: [&str; 12] = [
+    "plant.epsilon",
+    "plant.lambda",
+    "plant.m",
+    "plant.c",
+    "plant.r",
+    "start",
+    "excitation",
+    "chain.snr",
+    "chain.filter",
+    "chain.adc_bits",
+    "chain.delay",
+    "chain.seed",
+];
+
 /// Check signs, gains, delays and noise of a rig at a hundredth of the drive
 #[derive(Debug, Args)]
 #[command(after_help = HELP)]
@@ -44,7 +61,7 @@ pub(super) struct Arguments {
     reach: ReachArguments,
 
     /// Check this many random healthy rigs, and as many with random faults
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count::<usize>)]
     trials: Option<usize>,
 
     /// Print how fast the phase locks over the bandwidth, in a simulation of the scene, beside published times
@@ -64,6 +81,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
     log_warnings();
     if let Some(count) = arguments.trials {
+        if let Some(one) = arguments.scene.one_of(&DRAWN) {
+            return Err(one
+                .error(format!(
+                    "random rigs draw {} themselves; set other keys",
+                    DRAWN.join(", ")
+                ))
+                .into());
+        }
         let found = trials(&scene, count, arguments.seed)?;
         return output(arguments.json, &found, || counted(&found));
     }

@@ -9,7 +9,7 @@ use vines::{
     rig::{Rig, Stoppable},
 };
 
-use super::{failure::Failure, interrupt::stop_flag, output, scene_arguments::SceneArguments};
+use super::{failure::Failure, interrupt::stop_flag, output, scene_arguments::SceneArguments, serving::count};
 
 const HELP: &str = "\
 Injects faults into runs on the built-in plant, at several instants while the loop locks, holds, tracks and releases, and prints the worst
@@ -30,7 +30,7 @@ pub(super) struct Arguments {
     scene: SceneArguments,
 
     /// Instants at which each fault begins in each stage
-    #[arg(long, default_value_t = 16)]
+    #[arg(long, default_value_t = 16, value_parser = count::<usize>)]
     instants: usize,
 
     /// Print a JSON array instead of a table

@@ -14,7 +14,7 @@ use vines::{
     scene::Scene,
 };
 
-use super::{failure::Failure, progress_bar, scene_arguments::SceneArguments, writable, written};
+use super::{failure::Failure, progress_bar, scene_arguments::SceneArguments, serving::count, writable, written};
 
 const HELP: &str = "\
 Every cell is one plant, driven at a fixed frequency from the scene's start:
@@ -66,7 +66,7 @@ pub(super) struct Arguments {
     periods: usize,
 
     /// Starts per cell: that of the scene, and random ones that show where regimes coexist
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = count::<usize>)]
     starts: usize,
 
     /// Further motions, from starts 1e-9 apart, that must lead to the same regime in chaotic and modulated cells, and

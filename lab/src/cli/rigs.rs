@@ -5,7 +5,7 @@ use vines::random_rigs::{self, Outcome, Row};
 use vines::report::Table;
 use vines::scene::Override;
 
-use super::{failure::Failure, output};
+use super::{failure::Failure, output, serving::count};
 
 const HELP: &str = "\
 Draws rigs at random, each with a drive at which a stable symmetric 1:1 orbit exists: epsilon from 0.001 to 0.05, lambda from
@@ -27,7 +27,7 @@ Examples:
 #[command(after_help = HELP)]
 pub(super) struct Arguments {
     /// Number of rigs
-    #[arg(long, default_value_t = 300)]
+    #[arg(long, default_value_t = 300, value_parser = count::<usize>)]
     count: usize,
 
     /// Seed of the random numbers
@@ -44,6 +44,12 @@ pub(super) struct Arguments {
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+    let fixed = ["plant", "excitation", "resonance", "controller.phase_target"];
+    if let Some(one) = arguments.set.iter().find(|one| one.is_one_of(&fixed)) {
+        let message = "plant.epsilon, plant.lambda, plant.r and excitation.G are drawn at random, and the exact orbits are those of the \
+                       default [resonance] and controller.phase_target; set other keys, such as start.dq2, or use `vines identify`";
+        return Err(one.error(message).into());
+    }
     let rows = random_rigs::locks(arguments.count, arguments.seed, &arguments.set).map_err(Failure::input)?;
     output(arguments.json, &rows, || {
         format!("{}\n{}", summary(&rows).markdown(), exceptions(&rows).markdown())

@@ -33,6 +33,11 @@ impl SceneArguments {
         Family::parse(&path.display().to_string(), Some(&text), &self.set)
     }
 
+    /// The first replaced value among these sections and keys.
+    pub(super) fn one_of(&self, keys: &[&str]) -> Option<&Override> {
+        self.set.iter().find(|one| one.is_one_of(keys))
+    }
+
     /// The scene with further values replaced.
     pub(super) fn load_with(&self, further: &[Override]) -> Result<Scene, SceneError> {
         let set = [&self.set, further].concat();

@@ -33,7 +33,7 @@ pub(super) struct ServingArguments {
     duration: Option<f64>,
 
     /// End after this many sessions
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = count::<u64>)]
     sessions: Option<u64>,
 
     /// Print a line of JSON per session instead of text
@@ -120,4 +120,11 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
     } else {
         Err("must be above 0 and at most 1e8".into())
     }
+}
+
+/// A number of runs, seeds or the like.
+pub(super) fn count<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
+    let value = text.parse().ok().filter(|count| (1..=1_000_000_000).contains(count));
+    let value = value.and_then(|count: u64| count.try_into().ok());
+    value.ok_or_else(|| "expected a whole number from 1 to 1000000000".into())
 }

@@ -162,22 +162,22 @@ fn limits_of_a_scene_reach_the_controller() {
     let run = |settings: &[&str]| {
         let scene = scene(settings);
         let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
-        let mut controller = BuiltIn::new(&scene.controller_config())?;
+        let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
         let mut drives = Vec::new();
         for _ in 0..4000 {
             let command = controller.sample(rig.sense().unwrap(), true).unwrap();
             drives.push(command.drive.amplitude);
             rig.advance(command.drive, scene.sample_time()).unwrap();
         }
-        Ok::<_, phase_lock::ConfigError>((scene.amplitude, drives))
+        (scene.amplitude, drives)
     };
-    let (amplitude, drives) = run(&["controller.ramp_periods=10"]).unwrap();
+    let (amplitude, drives) = run(&["controller.ramp_periods=10"]);
     assert!((drives[500] / amplitude - 0.5).abs() < 0.01);
     // A response too large takes the drive away for good.
-    let (_, drives) = run(&["controller.C_max=0.2"]).unwrap();
+    let (_, drives) = run(&["controller.C_max=0.2"]);
     assert!(drives[0] > 0.0 && drives[3999] == 0.0);
-    let (_, drives) = run(&["record.lock_periods=20"]).unwrap();
+    let (_, drives) = run(&["record.lock_periods=20"]);
     assert!(drives[1900] > 0.0 && drives[3999] == 0.0);
-    let refused = run(&["controller.G_max=1.0"]).unwrap_err().to_string();
-    assert!(refused.starts_with("amplitude"), "{refused}");
+    let refused = vines::scene::Scene::load(None, &["controller.G_max=1.0".parse().unwrap()]).unwrap_err();
+    assert!(refused.to_string().starts_with("excitation.G: amplitude"), "{refused}");
 }

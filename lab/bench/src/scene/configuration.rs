@@ -132,7 +132,7 @@ impl Scene {
     fn lock_criterion(&self, approach_gain: f64) -> LockCriterion {
         let d = self.dimensionless();
         let c = &self.controller;
-        let approached = PI * d.epsilon * d.lambda * (1.0 + approach_gain);
+        let approached = PI * d.epsilon * d.lambda.max(LAMBDA_MIN) * (1.0 + approach_gain);
         let defaults = LockCriterion::default();
         LockCriterion {
             phase_tolerance: c.phase_tolerance.to_radians(),
@@ -161,7 +161,7 @@ impl Scene {
     #[must_use]
     pub fn g_max(&self) -> f64 {
         let d = self.dimensionless();
-        let needed = d.g.max(self.impact_drive());
+        let needed = d.g.max(self.impact_drive()).max(LAMBDA_MIN);
         self.controller.g_max.unwrap_or(4.0 * needed)
     }
 
@@ -231,6 +231,8 @@ impl Scene {
 
 /// That bandwidth over the cube root of epsilon G/C, where a crossing takes away three quarters of the drive.
 const COUPLED: f64 = 0.9;
+/// Lowest damping lambda that counts for the lock criterion and the largest drive: with less, most of the energy is lost in impacts.
+const LAMBDA_MIN: f64 = 0.01;
 /// Share of the amplitude by which a reading may differ from its prediction: a resonant response changes slowly.
 const RESIDUAL: f64 = 0.3;
 /// Response amplitude over b at which impacts certainly occur: a particle at rest in the middle is hit at 1.

@@ -3,7 +3,9 @@
 use std::path::PathBuf;
 
 use lovines::InvalidValue;
-use phase_lock::Number;
+use phase_lock::{ConfigError, Number};
+
+use super::refusal;
 
 /// Why a scene cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -35,14 +37,6 @@ pub enum SceneError {
         /// What is wrong with it.
         message: String,
     },
-    /// An axis of a sweep that no scene has, or that does not go with the others.
-    #[error("axis `{key}`: {message}")]
-    Axis {
-        /// Its name.
-        key: String,
-        /// What is wrong with it.
-        message: String,
-    },
     /// A number outside its range.
     #[error("{key} = {} {unit}: {allowed}", Number(*value))]
     Value {
@@ -61,6 +55,9 @@ pub enum SceneError {
     /// A drive that the plant does not take.
     #[error("[excitation] or [controller]: {0}")]
     Drive(InvalidValue),
+    /// The controller refuses its configuration.
+    #[error("{}", refusal(.0))]
+    Controller(#[from] ConfigError),
     /// Keys that are missing or do not go together.
     #[error("{origin}: {message}")]
     Keys {
@@ -75,9 +72,23 @@ pub enum SceneError {
 #[derive(Debug, thiserror::Error)]
 pub enum SyntaxError {
     /// Not TOML.
-    #[error("{}; expected section.key=value, for instance plant.r=0.7 or 'resonance.sensor=\"q1\"'", .0.message())]
+    #[error("{}; expected section.key=value, for instance plant.r=0.7 or resonance.sensor=q1", .0.message())]
     Toml(#[from] toml::de::Error),
     /// TOML, but not one key of one section.
     #[error("expected one section.key=value, for instance plant.r=0.7")]
     NotOneKey,
+}
+
+/// A message of the TOML reader, without types of Rust.
+pub(super) fn plain(message: &str) -> String {
+    let words = [
+        ("expected f64", "expected a number"),
+        ("expected u32", "expected a whole number from 0"),
+        ("expected u64", "expected a whole number from 0"),
+        ("expected a boolean", "expected true or false"),
+        ("unit variant, expected string only", "expected a word in quotes"),
+        ("expected a map", "expected a table"),
+    ];
+    let replace = |text: String, (from, to)| text.replace(from, to);
+    words.into_iter().fold(message.trim().to_string(), replace)
 }

@@ -3,7 +3,7 @@
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::{Override, PAPER, Scene, SceneError, overrides, sections::Sections};
+use super::{Override, PAPER, Scene, SceneError, error::plain, overrides, sections::Sections};
 
 /// A scene in which the numbers under some keys vary; the other values are read once.
 #[derive(Debug, Clone)]
@@ -24,7 +24,7 @@ impl Family {
     pub fn parse(origin: &str, text: Option<&str>, overrides: &[Override]) -> Result<Self, SceneError> {
         let (origin, text) = text.map_or(("paper.toml (the default scene)", PAPER), |text| (origin, text));
         let (sections, table) = overrides::read(origin, text, overrides)?;
-        sections.clone().resolve(origin)?;
+        sections.clone().resolve(origin)?.controller_config().build()?;
         Ok(Self { origin: origin.into(), sections, table, keys: Vec::new() })
     }
 
@@ -33,16 +33,16 @@ impl Family {
     /// # Errors
     /// A key that no scene has, or that does not go with the others; one whose value is not a number.
     pub fn vary(&mut self, key: &str) -> Result<(), SceneError> {
-        let refused = |message: &str| SceneError::Axis { key: key.into(), message: message.trim().into() };
-        let unknown = "neither sigma nor section.key of a scene, for instance plant.r";
-        let (section, name) = key.split_once('.').ok_or_else(|| refused(unknown))?;
-        let one: Override = format!("{key} = 1").parse().map_err(|_| refused(unknown))?;
+        let refused = |message: &str| SceneError::Keys { origin: format!("axis {key}"), message: message.into() };
+        let form = || refused("expected sigma or section.key, for instance plant.r");
+        let one: Override = format!("{key} = 1").parse().map_err(|_| form())?;
         let table = overrides::merge(self.table.clone(), &[one]).map_err(|error| match error {
             SceneError::Override { message, .. } => refused(&message),
-            other => other,
+            error => error,
         })?;
-        self.sections = Sections::deserialize(table.clone()).map_err(|error| refused(error.message()))?;
-        self.keys.push([section.trim().into(), name.trim().into()]);
+        self.sections = Sections::deserialize(table.clone()).map_err(|error| refused(&plain(error.message())))?;
+        let (section, key) = key.split_once('.').ok_or_else(form)?;
+        self.keys.push([section.trim().into(), key.trim().into()]);
         self.table = table;
         Ok(())
     }
@@ -66,7 +66,7 @@ impl Family {
             }
             sections.replace(section, table).map_err(|error| SceneError::Keys {
                 origin: self.origin.clone(),
-                message: format!("[{section}] {}", error.message().trim()),
+                message: format!("[{section}] {}", plain(error.message())),
             })?;
         }
         sections.resolve(&self.origin)

@@ -1,4 +1,4 @@
-//! `--set section.key=value`: one value of a scene replaced from the command line, written as in TOML.
+//! `--set section.key=value`: one value of a scene replaced from the command line, written as in TOML; text needs no quotes.
 
 use std::str::FromStr;
 
@@ -7,6 +7,7 @@ use toml::{Table, Value};
 
 use super::{
     SceneError, SyntaxError,
+    error::plain,
     plant::{DIMENSIONLESS_KEYS, SI_KEYS},
     sections::Sections,
 };
@@ -24,7 +25,12 @@ impl FromStr for Override {
     type Err = SyntaxError;
 
     fn from_str(argument: &str) -> Result<Self, SyntaxError> {
-        let table: Table = argument.parse()?;
+        // What is not TOML is text: the shell takes quotes away.
+        let text = || {
+            let (key, word) = argument.split_once('=')?;
+            format!("{key}={:?}", word.trim()).parse().ok()
+        };
+        let table: Table = argument.parse().or_else(|error| text().ok_or(error))?;
         let single = |table: Table| {
             let mut entries = table.into_iter();
             entries.next().filter(|_| entries.next().is_none())
@@ -39,8 +45,17 @@ impl FromStr for Override {
 }
 
 impl Override {
-    fn error(&self, message: impl Into<String>) -> SceneError {
+    /// A refusal of this setting.
+    #[must_use]
+    pub fn error(&self, message: impl Into<String>) -> SceneError {
         SceneError::Override { argument: self.argument.clone(), message: message.into() }
+    }
+
+    /// Whether this sets one of these sections and `section.key`s.
+    #[must_use]
+    pub fn is_one_of(&self, keys: &[&str]) -> bool {
+        let name = format!("{}.{}", self.section, self.key);
+        keys.iter().any(|key| *key == name || *key == self.section)
     }
 
     fn is(&self, section: &str, key: &str) -> bool {
@@ -96,17 +111,22 @@ pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, S
     }
     for one in overrides {
         one.merge_into(&mut table)?;
-        Sections::deserialize(table.clone()).map_err(|error| one.error(error.message().trim()))?;
+        if let Err(error) = Sections::deserialize(table.clone()) {
+            // What is refused for a word that is not known lists those that are.
+            let text = one.argument.split_once('=').map_or("", |(_, text)| text.trim());
+            let word = Override { value: text.into(), ..one.clone() };
+            let listed = error.message().contains("unit variant") && word.merge_into(&mut table).is_ok();
+            let error = Sections::deserialize(table).err().filter(|_| listed).unwrap_or(error);
+            return Err(one.error(plain(error.message())));
+        }
     }
     Ok(table)
 }
 
 /// Reads `text` and merges the overrides into it; with the merged table. `origin` names the text in messages.
 pub(super) fn read(origin: &str, text: &str, overrides: &[Override]) -> Result<(Sections, Table), SceneError> {
-    let syntax = |error: toml::de::Error| SceneError::Syntax {
-        origin: origin.into(),
-        message: error.to_string().trim_end().into(),
-    };
+    let syntax =
+        |error: toml::de::Error| SceneError::Syntax { origin: origin.into(), message: plain(&error.to_string()) };
     // The file is checked on its own first, so that an error can name the line.
     toml::from_str::<Sections>(text).map_err(syntax)?;
     let table = merge(toml::from_str(text).map_err(syntax)?, overrides)?;

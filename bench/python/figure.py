@@ -1,4 +1,4 @@
-"""The work-precision picture: a panel per scene, error against time, a line per method."""
+"""The work-precision figure: a panel per scene, error against time, a line per method."""
 
 import matplotlib as mpl
 
