@@ -23,8 +23,9 @@ const DRIVE_RANGE: [Real; 2] = [0.25, 3.0];
 
 /// A difference between setpoint and holding drive, relative to the setpoint, that changes its sign is a swing if it exceeds this.
 const LARGE_SWING: Real = 0.1;
-/// Factor of the gain for each swing. Swings that persist mean that the response changes faster than the observer follows.
-const SWING_FACTOR: Real = 0.7;
+/// Fall of the logarithm of the gain for each swing, to 70 %. Swings that persist mean that the response changes faster than the
+/// observer follows.
+const SWING: Real = 0.357;
 
 /// An approach that takes this long swings, in time constants of the structure; from then on the gain falls.
 const LATE: Real = 20.0;
@@ -105,8 +106,8 @@ impl Approach {
         let [low, high] = DRIVE_RANGE.map(|share| share * setpoint);
         let missing = setpoint - holding;
         let late = (self.damping_rate * elapsed - LATE).max(0.0);
-        let patience = real::exp(-late / PATIENCE);
-        let gain = patience * self.gain * real::pow(SWING_FACTOR, state.swings as Real);
+        let patience = real::exp(-late / PATIENCE - SWING * state.swings as Real);
+        let gain = patience * self.gain;
         if missing * state.swing < 0.0 {
             state.swings += i32::from(state.swing.abs() > LARGE_SWING * setpoint);
             state.swing = 0.0;

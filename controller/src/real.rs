@@ -8,7 +8,7 @@ pub use precision::*;
 mod precision {
     pub use core::f64::consts;
 
-    pub use libm::{atan2, ceil, cos, exp, expm1, hypot, pow, rint, sin, sincos, sqrt};
+    pub use libm::{atan2, ceil, cos, exp, expm1, hypot, rint, sin, sincos, sqrt};
 
     /// The floating-point type.
     pub type Real = f64;
@@ -43,9 +43,7 @@ mod precision {
 mod precision {
     pub use core::f32::consts;
 
-    pub use libm::{
-        atan2f as atan2, ceilf as ceil, expf as exp, expm1f as expm1, powf as pow, rintf as rint, sqrtf as sqrt,
-    };
+    pub use libm::{atan2f as atan2, ceilf as ceil, expf as exp, expm1f as expm1, rintf as rint, sqrtf as sqrt};
 
     /// The floating-point type.
     pub type Real = f32;

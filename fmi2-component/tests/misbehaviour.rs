@@ -144,7 +144,7 @@ fn assert_fatal(master: &Master) {
     let c = master.c;
     for call in [fmi2Reset, fmi2Terminate, fmi2EnterInitializationMode] {
         assert_eq!(unsafe { call(c) }, Status::Fatal);
-        master.heard_one(&["nothing but fmi2FreeInstance"]);
+        master.heard_one(&["only fmi2FreeInstance"]);
     }
     assert_eq!(unsafe { fmi2GetInteger(c, &0, 1, &mut 0) }, Status::Fatal);
 }

@@ -5,6 +5,7 @@ use std::f64::consts::PI;
 use lovines::State;
 use phase_lock::{Config, LockCriterion};
 use serde::Serialize;
+use vines_model::numerics::bisection;
 use vines_model::orbit::phase_resonant;
 use vines_model::theory::backbone_at_level;
 
@@ -224,7 +225,8 @@ impl Scene {
         let d = self.dimensionless();
         let c = self.backbone.c_from.max(self.backbone.c_to);
         backbone_at_level(&d, c).map_or(f64::INFINITY, |point| {
-            COUPLED * (d.epsilon * point.g / c).powf(1.0 / 3.0)
+            let cube = d.epsilon * point.g / c;
+            COUPLED * bisection(0.0, cube.max(1.0), |root| root.powi(3) < cube).0
         })
     }
 }

@@ -9,8 +9,8 @@ use crate::numerics::{bisection, golden_section};
 
 /// Frequencies searched, over omega0.
 const SEARCHED: [f64; 2] = [0.2, 3.0];
-/// Points of the search; they are dense around omega0, where the detuning is of order one.
-const POINTS: usize = 30_000;
+/// Growth of e from one frequency to the next: equal steps around omega0, where the detuning is of order one, and equal ratios beyond.
+const GROWTH: f64 = 1.0004;
 
 /// All exact symmetric 1:1 orbits at resonance at the scene's G, by rising C; empty where there are none.
 ///
@@ -85,12 +85,16 @@ pub(super) fn least_excitation(scene: &Dimensionless, sigma: f64) -> f64 {
     Family::new(scene, 1.0 + scene.epsilon * sigma).map_or(f64::INFINITY, |family| family.least_excitation())
 }
 
-/// Frequencies `1 + epsilon sinh(u)` at equal steps of u.
+/// Frequencies `1 + epsilon (e - 1/e) / 2` for growing e.
 fn grid(epsilon: f64) -> Vec<f64> {
-    let [low, high] = SEARCHED.map(|omega| ((omega - 1.0) / epsilon).asinh());
-    (0..=POINTS)
-        .map(|i| low + (high - low) * i as f64 / POINTS as f64)
-        .map(|u| 1.0 + epsilon * u.sinh())
+    let [low, high] = SEARCHED.map(|omega| {
+        let x = (omega - 1.0) / epsilon;
+        (x.abs() + (x * x + 1.0).sqrt()).powi(if x < 0.0 { -1 } else { 1 })
+    });
+    std::iter::successors(Some(low), |e| Some(e * GROWTH))
+        .take_while(|e| *e < high)
+        .chain([high])
+        .map(|e| 1.0 + 0.5 * epsilon * (e - 1.0 / e))
         .collect()
 }
 
