@@ -27,8 +27,8 @@ Examples:
   vines identify --controller mine.fmu             another controller on the same plant
   vines identify --rig udp://127.0.0.1:5510        a rig in real time across the network; see `vines rig`
 
-Writes identification.json, backbone.csv, backbone.svg and sim.svg. Without --rig, it first writes LoViNes.fmu and PhaseLock.fmu,
-and runs LoViNes.fmu.";
+Writes identification.json, backbone.csv, backbone.svg and sim.svg. Without --rig, the rig is this program's LoViNes.fmu; it is
+written as well, with PhaseLock.fmu.";
 
 /// Lock the plant at phase resonance, let it decay, and identify its backbone
 #[derive(Debug, Args)]
@@ -38,7 +38,7 @@ pub(super) struct Arguments {
     experiment: ExperimentArguments,
 
     /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), udp://HOST:PORT or helic://HOST[:PORT] (in real time)
-    /// [default: this program's plant FMU, packed into the folder of the results]
+    /// [default: this program's plant FMU]
     #[arg(long, value_name = "ENDPOINT")]
     rig: Option<Endpoint>,
 
@@ -52,15 +52,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let (mut scene, reach) = experiment.begin()?;
     // Invalid settings are refused before anything is written or driven.
     BuiltIn::new(&scene.controller_config())?;
-    writable(&experiment.out)?;
     let mut open = match &arguments.rig {
+        // A rig that is refused leaves no folder.
         Some(endpoint) => endpoint.rig(&scene, reach)?,
         None => {
+            writable(&experiment.out)?;
             // The folder of the results gets the FMUs if the run succeeds.
             let folder = tempfile::tempdir().map_err(Failure::run)?;
             Endpoint::Fmu(fmus(folder.path())?.swap_remove(0)).rig(&scene, reach)?
         }
     };
+    writable(&experiment.out)?;
     experiment.check_loop(&mut open.rig, &mut scene)?;
     let mut controller =
         arguments
