@@ -62,8 +62,7 @@ pub struct Parameter {
     pub unit: &'static str,
     /// Range.
     pub range: Range,
-    get: fn(&Config) -> Value,
-    set: fn(&mut Config, Value),
+    field: Field,
 }
 
 impl Parameter {
@@ -76,7 +75,7 @@ impl Parameter {
     /// The value in a configuration.
     #[must_use]
     pub fn get(&self, config: &Config) -> Value {
-        (self.get)(config)
+        self.field.get(config)
     }
 
     /// Sets the value. A real number out of range is stored, because ranges may depend on values that are set later;
@@ -95,7 +94,7 @@ impl Parameter {
         if !same_type {
             return Err(self.refuse(value.number()));
         }
-        (self.set)(config, value);
+        self.field.set(config, value);
         Ok(())
     }
 
@@ -176,14 +175,28 @@ macro_rules! setter {
 
 macro_rules! table {
     ($($group:ident $field:ident: $type:ident, $unit:literal, $range:ident;)*) => {
+        /// The field of a parameter. (One function for all fields is smaller than one for each.)
+        #[allow(non_camel_case_types)]
+        #[derive(Clone, Copy, Debug)]
+        enum Field { $($field),* }
+
+        impl Field {
+            fn get(self, config: &Config) -> Value {
+                match self { $(Self::$field => getter!($type, place!(config, $group, $field)),)* }
+            }
+
+            fn set(self, config: &mut Config, value: Value) {
+                match self { $(Self::$field => setter!($type, place!(config, $group, $field), value),)* }
+            }
+        }
+
         /// All parameters.
         pub static PARAMETERS: [Parameter; [$(stringify!($field)),*].len()] = [$(
             Parameter {
                 name: name!($group, $field),
                 unit: $unit,
                 range: Range::$range,
-                get: |config| getter!($type, place!(config, $group, $field)),
-                set: |config, value| setter!($type, place!(config, $group, $field), value),
+                field: Field::$field,
             },
         )*];
     };
