@@ -55,6 +55,9 @@ impl TryFrom<Table> for PhaseLock {
     type Error = String;
 
     fn try_from(table: Table) -> Result<Self, String> {
+        if !table.is_empty() && !cfg!(feature = "parameters") {
+            return Err("the section [phase_lock] needs the feature `parameters`".into());
+        }
         let mut flat = Table::new();
         for (name, value) in table {
             match value {
@@ -82,9 +85,10 @@ impl Serialize for PhaseLock {
 }
 
 impl PhaseLock {
-    /// The configuration with these values.
+    /// The configuration with these values. Without the feature `parameters` there are none, and nothing that sets them is compiled.
     pub(super) fn apply(&self, mut config: Config) -> Config {
-        for (name, setting) in &self.0 {
+        let settings = if cfg!(feature = "parameters") { &self.0[..] } else { &[] };
+        for (name, setting) in settings {
             // Names, types and whole numbers were checked when the scene was read; `Config::build` checks the rest.
             let _ = Parameter::find(name).map(|parameter| parameter.set(&mut config, *setting));
         }
