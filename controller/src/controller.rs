@@ -15,7 +15,7 @@ use crate::real::Real;
 use crate::sensing::{Measurement, PresentDrive, Sensing};
 use crate::signals::{Input, Output};
 use crate::state::State;
-use crate::stationarity::{Dwell, Reading, Stationarity};
+use crate::stationarity::{Reading, Stationarity};
 use crate::supervisor::{Conditions, Fault, LoopState};
 
 /// A checked configuration and its coefficients; only [`PhaseLock::retune`] changes it.
@@ -116,7 +116,7 @@ impl PhaseLock {
             .amplitude_loop
             .get_or_insert(AmplitudeState::constant(reading, drive))
             .start(to, self.amplitude_loop.sample_time());
-        state.dwell = Dwell::default();
+        state.dwell.restart();
         Ok(())
     }
 
@@ -177,7 +177,7 @@ impl PhaseLock {
         if next == LoopState::Locked && state.tuning.1 != self.config.phase_target {
             // A new phase target: the distance from it does not mean that the lock is lost.
             state.loop_state = LoopState::Acquiring;
-            state.dwell = Dwell::default();
+            state.dwell.restart();
         }
         if fault.is_some() || (next == LoopState::Ramping && before != LoopState::Ramping) {
             state.fault = fault;
@@ -228,7 +228,7 @@ impl PhaseLock {
     fn judge(&self, state: &mut State, measured: &Measurement, period_ends: bool) {
         let tuning = self.tuning();
         if !state.loop_state.is_closed() || state.tuning != tuning || !state.ready {
-            state.dwell = Dwell::default();
+            state.dwell.restart();
         }
         state.tuning = tuning;
         state.lost = false;

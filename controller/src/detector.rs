@@ -2,7 +2,7 @@
 
 use crate::angle::Complex;
 use crate::config::{Config, Detector};
-use crate::harmonics::{Coefficients, Harmonics};
+use crate::harmonics::{Coefficients, Harmonics, MAX_HARMONICS, Rotors};
 use crate::real::{self, Real};
 
 /// Coefficients of a phase detector. Both methods are of first order and have the same bandwidth.
@@ -21,6 +21,8 @@ pub struct Estimate {
     coefficients: Coefficients,
     /// Mean square of the residual, m².
     residual_power: Real,
+    /// Amplitude of the fundamental, m: many need it, and it takes a root.
+    amplitude: Real,
 }
 
 impl Estimate {
@@ -28,14 +30,16 @@ impl Estimate {
         self.coefficients.harmonic[0]
     }
 
-    /// Sum of the amplitudes of the harmonics above the fundamental, m.
-    pub fn harmonics(&self) -> Real {
-        self.coefficients.harmonic[1..].iter().map(|one| one.magnitude()).sum()
+    /// Whether the sum of the amplitudes of the harmonics above the fundamental is at most this, m.
+    pub fn harmonics_within(&self, limit: Real) -> bool {
+        let sum = |size: fn(&Complex) -> Real| self.coefficients.harmonic[1..].iter().map(size).sum::<Real>();
+        // A bound without roots decides almost always.
+        sum(|one| one.re.abs() + one.im.abs()) <= limit || sum(|one| one.magnitude()) <= limit
     }
 
     /// Amplitude of the fundamental, m.
     pub fn amplitude(&self) -> Real {
-        self.fundamental().magnitude()
+        self.amplitude
     }
 
     /// Phase of `sin` relative to the oscillator's sine, rad.
@@ -91,16 +95,23 @@ impl PhaseDetector {
         }
     }
 
-    /// Updates the estimate with a sample, m. `rotor` is `exp(i phase)` of the oscillator. Returns the difference between the sample and
-    /// its prediction, m.
-    pub fn update(&self, estimate: &mut Estimate, sample: Real, rotor: Complex) -> Real {
+    /// The rotors of a sample, for all channels; `rotor` is `exp(i phase)` of the oscillator.
+    pub fn rotors(&self, rotor: Complex) -> Rotors {
+        match self {
+            Self::Adaptive(harmonics) => harmonics.rotors(rotor),
+            Self::Demodulator { .. } => [rotor; MAX_HARMONICS],
+        }
+    }
+
+    /// Updates the estimate with a sample, m. Returns the difference between the sample and its prediction, m.
+    pub fn update(&self, estimate: &mut Estimate, sample: Real, rotors: &Rotors) -> Real {
         let (residual, step) = match self {
             Self::Adaptive(harmonics) => {
-                let residual = harmonics.update(&mut estimate.coefficients, sample, rotor);
+                let residual = harmonics.update(&mut estimate.coefficients, sample, rotors);
                 (residual, harmonics.step)
             }
             Self::Demodulator { step } => {
-                let low_pass = &mut estimate.coefficients.harmonic[0];
+                let (low_pass, rotor) = (&mut estimate.coefficients.harmonic[0], rotors[0]);
                 let residual = sample - (low_pass.re * rotor.re - low_pass.im * rotor.im);
                 low_pass.re += step * (2.0 * sample * rotor.re - low_pass.re);
                 low_pass.im -= step * (2.0 * sample * rotor.im + low_pass.im);
@@ -108,6 +119,7 @@ impl PhaseDetector {
             }
         };
         estimate.residual_power += step * (residual * residual - estimate.residual_power);
+        estimate.amplitude = estimate.fundamental().magnitude();
         residual
     }
 }
@@ -130,7 +142,8 @@ mod tests {
         let mut oscillator = Oscillator::default();
         let mut worst = 0.0_f64;
         for n in 0..10_000 {
-            detector.update(&mut estimate, signal(oscillator.phase()), oscillator.rotor());
+            let rotors = detector.rotors(oscillator.rotor());
+            detector.update(&mut estimate, signal(oscillator.phase()), &rotors);
             oscillator.advance(omega, sample_time);
             if n >= 9_900 {
                 let (amplitude, phase) = (estimate.amplitude(), estimate.argument());
@@ -170,7 +183,7 @@ mod tests {
         let mut oscillator = Oscillator::default();
         for _ in 0..5_000 {
             let rotor = oscillator.rotor();
-            detector.update(&mut estimate, rotor.im, rotor);
+            detector.update(&mut estimate, rotor.im, &detector.rotors(rotor));
             oscillator.advance(1.0, 0.06);
         }
         assert!(estimate.coherence() > 1.0 - 1e-12);

@@ -6,6 +6,9 @@ use crate::real::Real;
 /// Largest number of harmonics of the adaptive filter.
 pub const MAX_HARMONICS: usize = 8;
 
+/// Rotors of the harmonics in a sample. The first entry belongs to the fundamental.
+pub type Rotors = [Complex; MAX_HARMONICS];
+
 /// Coefficients of the adaptive filter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -44,24 +47,30 @@ impl Harmonics {
         self.step * self.coefficients() as Real
     }
 
-    /// Updates the coefficients with a sample; `rotor` is `exp(i phase)` of the oscillator. Returns the residual.
+    /// `exp(i h phase)` of every harmonic `h`; `rotor` is `exp(i phase)` of the oscillator.
+    pub fn rotors(&self, rotor: Complex) -> Rotors {
+        let stride = if self.odd_only { rotor.times(rotor) } else { rotor };
+        let (mut rotors, mut next) = ([rotor; MAX_HARMONICS], rotor);
+        for kept in rotors.iter_mut().take(self.count) {
+            *kept = next;
+            next = next.times(stride);
+        }
+        rotors
+    }
+
+    /// Updates the coefficients with a sample. Returns the residual.
     ///
     /// Least mean squares (LMS): every coefficient moves down the gradient of the squared residual. All harmonics and the
     /// offset share one residual, so that no component causes ripple in another.
-    pub fn update(&self, c: &mut Coefficients, sample: Real, rotor: Complex) -> Real {
-        let stride = if self.odd_only { rotor.times(rotor) } else { rotor };
-        let mut rotors = [Complex::default(); MAX_HARMONICS];
-        let mut next = rotor;
+    pub fn update(&self, c: &mut Coefficients, sample: Real, rotors: &Rotors) -> Real {
         let mut estimate = c.offset;
-        for (harmonic, kept) in c.harmonic.iter().zip(&mut rotors).take(self.count) {
-            *kept = next;
-            estimate += harmonic.re * next.re - harmonic.im * next.im;
-            next = next.times(stride);
+        for (harmonic, rotor) in c.harmonic.iter().zip(rotors).take(self.count) {
+            estimate += harmonic.re * rotor.re - harmonic.im * rotor.im;
         }
         let residual = sample - estimate;
         c.offset += self.step * residual;
         let gain = 2.0 * self.step * residual;
-        for (harmonic, rotor) in c.harmonic.iter_mut().zip(&rotors).take(self.count) {
+        for (harmonic, rotor) in c.harmonic.iter_mut().zip(rotors).take(self.count) {
             harmonic.re += gain * rotor.re;
             harmonic.im -= gain * rotor.im;
         }

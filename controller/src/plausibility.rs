@@ -92,7 +92,7 @@ impl Plausibility {
                 let [steady, distorted] = [&mut state.steady[n], &mut state.distorted[n]];
                 *steady = if fast { 0.0 } else { *steady + turn };
                 let settled = *steady > SETTLES * TAU;
-                let clear = !settled || estimate.harmonics() <= DISTORTION * limit * amplitude;
+                let clear = !settled || estimate.harmonics_within(DISTORTION * limit * amplitude);
                 *distorted = if clear { 0.0 } else { *distorted + turn };
                 let slack = if settled { 0.0 } else { SLACK * change.max(1.0) };
                 let expected = (share * limit * change + slack) * amplitude + normal;

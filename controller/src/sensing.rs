@@ -172,10 +172,11 @@ impl Sensing {
 
     /// Updates the detectors, and compares the readings with what they predicted.
     fn predict(&self, state: &mut Channels, response: Real, reference: Option<Real>, drive: PresentDrive) {
-        let difference = self.detector.update(&mut state.response, response, drive.rotor);
+        let rotors = self.detector.rotors(drive.rotor);
+        let difference = self.detector.update(&mut state.response, response, &rotors);
         let (mut differences, mut change) = ([difference, 0.0], 1.0);
         if let Some(reading) = reference {
-            let predicted = reading - self.detector.update(&mut state.reference, reading, drive.rotor);
+            let predicted = reading - self.detector.update(&mut state.reference, reading, &rotors);
             // The base follows the drive at once, the detector does not.
             change = if state.drive > 0.0 {
                 drive.amplitude / state.drive

@@ -116,10 +116,17 @@ pub struct Dwell {
     complete: usize,
     period: Sums,
     block: Block,
+    means: Option<(Real, Real)>,
     settled: bool,
 }
 
 impl Dwell {
+    /// Forgets all blocks. (A call: its code is long.)
+    #[inline(never)]
+    pub fn restart(&mut self) {
+        *self = Self::default();
+    }
+
     /// Whether the criterion is met.
     pub fn settled(&self) -> bool {
         self.settled
@@ -127,9 +134,7 @@ impl Dwell {
 
     /// Means over the complete blocks of the last dwell: frequency, rad/s, and response amplitude, m.
     pub fn means(&self) -> Option<(Real, Real)> {
-        let complete = self.last(self.complete.min(DWELL));
-        let mean = |value: fn(&Block) -> Real| mean(complete, value);
-        (self.complete > 0).then(|| (mean(|block| block.omega), mean(|block| block.amplitude.mean)))
+        self.means
     }
 
     fn last(&self, count: usize) -> &[Block] {
@@ -165,7 +170,7 @@ impl Stationarity {
         let error = (period.error.get() / period.samples as Real).abs();
         let lost = period.invalid > 0 || error > self.unlock_tolerance;
         if lost {
-            *dwell = Dwell::default();
+            dwell.restart();
         } else {
             self.end_period(dwell, &period);
         }
@@ -180,6 +185,9 @@ impl Stationarity {
         dwell.blocks.rotate_left(1);
         dwell.blocks[BLOCKS - 1] = core::mem::take(&mut dwell.block);
         dwell.complete = (dwell.complete + 1).min(BLOCKS);
+        let last = dwell.last(dwell.complete.min(DWELL));
+        let omega = mean(last, |block| block.omega);
+        dwell.means = Some((omega, mean(last, |block| block.amplitude.mean)));
         dwell.settled = dwell.complete >= DWELL && self.is_smooth(dwell.last(DWELL))
             || dwell.complete == BLOCKS && self.is_noise(&dwell.blocks);
     }
