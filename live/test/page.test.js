@@ -3,7 +3,7 @@
 
 import assert from "node:assert/strict";
 import { createServer } from "node:http";
-import { mkdir, readFile } from "node:fs/promises";
+import { mkdir, readFile, stat } from "node:fs/promises";
 import { extname, join } from "node:path";
 import { after, before, describe, test } from "node:test";
 import puppeteer from "puppeteer-core";
@@ -33,6 +33,12 @@ before(async () => {
   address = `http://127.0.0.1:${server.address().port}/`;
 });
 after(() => server.close());
+
+test("the module has at most 150 KB", async () => {
+  const { size } = await stat(join(FOLDER, "vines_live.wasm"));
+  console.log(`the module has ${size} bytes`);
+  assert.ok(size <= 150 * 1024, `${size} bytes`);
+});
 
 for (const { name, options } of BROWSERS) {
   describe(name, () => {

@@ -135,7 +135,8 @@ impl Bench {
     /// The message for a drive that the plant refuses.
     pub fn run(&mut self, samples: usize, mut on_row: impl FnMut(&Row)) -> Result<(), Message> {
         for left in (0..samples).rev() {
-            // Only the last sample can be looked into. A plant is large: copies of it would take a third of the time.
+            // Only the last sample can be looked into. A plant is large: copies of it would take a third of the time. WebAssembly
+            // copies the output in a call, too.
             on_row(&self.sample(left == 0)?);
         }
         Ok(())
@@ -154,18 +155,19 @@ impl Bench {
             reference: sensors.reference,
             active: self.active,
         };
-        self.output = self.lock.process(&mut self.state, input);
-        let drive = self.requested();
+        let output = self.lock.process(&mut self.state, input);
+        let drive = self.requested(&output);
         let row = Row {
             time,
             base: sensors.reference.unwrap_or_default(),
             response: sensors.response,
             relative: self.rig.plant.relative_displacement(),
-            output: self.output,
+            output,
             drive,
         };
         if is_last {
             self.before = (self.rig.plant, drive);
+            self.output = output;
         }
         self.step(drive)?;
         self.samples += 1;
@@ -173,9 +175,9 @@ impl Bench {
     }
 
     /// What the controller asks for, or the constant drive of the open loop.
-    fn requested(&self) -> Drive {
+    fn requested(&self, output: &Output) -> Drive {
         if self.settings[index::CLOSED] != 0.0 {
-            return Command::from(self.output).drive;
+            return Command::from(*output).drive;
         }
         let omega = self.scene.dimensionless().omega(self.settings[index::DETUNING]);
         let amplitude = if self.active { self.scene.amplitude } else { 0.0 };
