@@ -16,30 +16,10 @@ use std::path::{Path, PathBuf};
 pub use components::{Component, components};
 pub use documentation::documentation;
 pub use error::PackError;
-pub use library::Binary;
+pub use library::{Binary, Libraries};
 pub use platform::Platform;
 
 use crate::{files, scene::Scene};
-
-/// Where the libraries come from.
-#[derive(Debug, Clone)]
-pub struct Libraries {
-    /// Folder with those for this platform, under the names that cargo gives them.
-    pub folder: PathBuf,
-    /// Whether those for this platform are packed at all.
-    pub own: bool,
-    /// Those for other platforms.
-    pub others: Vec<Binary>,
-}
-
-impl From<&Path> for Libraries {
-    fn from(folder: &Path) -> Self {
-        Self { folder: folder.into(), own: true, others: Vec::new() }
-    }
-}
-
-/// Name and content of a file to be.
-type File = (String, Vec<u8>);
 
 /// Packs the components into `out`, one `<identifier>.fmu` each, and returns their paths.
 ///

@@ -4,7 +4,12 @@ use clap::Args;
 use indicatif::ProgressBar;
 use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
-use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, result, writable, written};
+use super::{
+    endpoint::Endpoint,
+    experiment::ExperimentArguments,
+    failure::Failure,
+    output::{result, writable, written},
+};
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:

@@ -10,7 +10,7 @@ use vines::{
 use super::{
     endpoint::{Endpoint, ReachArguments},
     failure::Failure,
-    log_warnings, output,
+    output::{log_warnings, output, print},
     scene_arguments::SceneArguments,
     serving::count,
 };
@@ -104,7 +104,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if found.verdict == Verdict::Healthy {
         return Ok(text);
     }
-    super::print(&text)?;
+    print(&text)?;
     Err(Failure::run(format!("the loop check failed: {}", found.verdict)))
 }
 

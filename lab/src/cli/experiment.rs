@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 use vines::{experiment::ExperimentError, loop_check, net::BindScope, rig::Rig, scene::Scene};
 
-use super::{check, endpoint::ReachArguments, failure::Failure, log_warnings, scene_arguments::SceneArguments};
+use super::{check, endpoint::ReachArguments, failure::Failure, output::log_warnings, scene_arguments::SceneArguments};
 
 #[derive(Debug, Args)]
 pub(super) struct ExperimentArguments {

@@ -15,8 +15,11 @@ use vines::{
 };
 
 use super::{
-    endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, pack::beside_this_program, progress_bar,
-    result, writable, written,
+    endpoint::Endpoint,
+    experiment::ExperimentArguments,
+    failure::Failure,
+    output::{progress_bar, result, writable, written},
+    pack::beside_this_program,
 };
 
 const HELP: &str = "\

@@ -14,7 +14,12 @@ use vines::{
     scene::Scene,
 };
 
-use super::{failure::Failure, progress_bar, scene_arguments::SceneArguments, serving::count, writable, written};
+use super::{
+    failure::Failure,
+    output::{progress_bar, writable, written},
+    scene_arguments::SceneArguments,
+    serving::count,
+};
 
 const HELP: &str = "\
 Every cell is one plant, driven at a fixed frequency from the scene's start:

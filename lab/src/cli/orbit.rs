@@ -6,12 +6,11 @@ mod text;
 use clap::Args;
 use vines::{
     orbit::{Condition, Exploration, Limits, backbone, continue_both_ways, phase_resonant, response, settle},
-    report::summary::parameters,
     scene::Dimensionless,
 };
 
 use studies::{converged, defined};
-use text::{curve, described, listing, searched};
+use text::{curve, described, listing, searched, shown};
 
 use super::{failure::Failure, scene_arguments::SceneArguments};
 
@@ -189,17 +188,5 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
     }
     shown(scene, "Exact orbit", &motion, arguments.json, || {
         described(&pattern, &motion)
-    })
-}
-
-fn shown(
-    scene: &Dimensionless,
-    title: &str,
-    found: &impl serde::Serialize,
-    json: bool,
-    text: impl FnOnce() -> String,
-) -> Result<String, Failure> {
-    super::output(json, found, || {
-        format!("{title}\n  {}\n\n{}", parameters(scene), text())
     })
 }

@@ -9,7 +9,11 @@ use vines::{
     rig::BuiltIn,
 };
 
-use super::{failure::Failure, progress_bar, scene_arguments::SceneArguments, writable};
+use super::{
+    failure::Failure,
+    output::{progress_bar, writable},
+    scene_arguments::SceneArguments,
+};
 
 const HELP: &str = "\
 Runs the experiment, tracks the backbone, follows the exact curves, studies the convergence, maps the regimes, and writes

@@ -12,7 +12,7 @@ use vines::scene::Scene;
 use super::{
     endpoint::{Endpoint, fmu},
     failure::Failure,
-    print,
+    output::print,
     scene_arguments::SceneArguments,
     serving::{ServingArguments, positive},
 };

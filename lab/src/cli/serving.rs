@@ -16,7 +16,7 @@ use super::{
     endpoint::{ReachArguments, no_key},
     failure::Failure,
     interrupt::stop_flag,
-    print,
+    output::print,
 };
 
 #[derive(Debug, Args)]

@@ -13,7 +13,7 @@ use vines::sweep::{self, Axis, Estimate, Monitor, Plan, Results, Settings, Shard
 use super::{
     failure::{Failure, INTERRUPTED},
     interrupt::stop_flag,
-    progress_bar,
+    output::progress_bar,
     scene_arguments::SceneArguments,
 };
 

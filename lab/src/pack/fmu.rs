@@ -1,7 +1,9 @@
 //! One FMU: its description and its libraries, one for each platform.
 
 use super::{
-    Component, File, Libraries, PackError, archive, date, documentation,
+    Component, Libraries, PackError,
+    archive::{self, File},
+    date, documentation,
     library::{Fitted, fitted},
     platform::Platform,
 };

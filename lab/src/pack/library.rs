@@ -8,7 +8,7 @@ use std::{
 };
 
 use super::{
-    Component, Libraries, PackError,
+    Component, PackError,
     platform::Platform,
     symbols::{exports, mentions},
 };
@@ -32,6 +32,23 @@ impl FromStr for Binary {
             format!("`{folder}` is not a platform; known are {known}")
         })?;
         Ok(Self { platform, path: path.into() })
+    }
+}
+
+/// Where the libraries come from.
+#[derive(Debug, Clone)]
+pub struct Libraries {
+    /// Folder with those for this platform, under the names that cargo gives them.
+    pub folder: PathBuf,
+    /// Whether those for this platform are packed at all.
+    pub own: bool,
+    /// Those for other platforms.
+    pub others: Vec<Binary>,
+}
+
+impl From<&Path> for Libraries {
+    fn from(folder: &Path) -> Self {
+        Self { folder: folder.into(), own: true, others: Vec::new() }
     }
 }
 

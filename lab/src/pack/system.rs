@@ -2,7 +2,11 @@
 
 mod parameters;
 
-use super::{File, PackError, archive, date};
+use super::{
+    PackError,
+    archive::{self, File},
+    date,
+};
 use crate::scene::Scene;
 
 use parameters::parameter_set;

@@ -3,7 +3,6 @@
 use vines_testbench::scene::SceneError;
 
 use crate::{
-    adaptive,
     axis::{Axis, SIGMA},
     cell::Results,
     sobol,
@@ -91,11 +90,11 @@ impl Settings {
         }
         if points[0]
             .checked_mul(points[1])
-            .is_none_or(|cells| cells > adaptive::MOST)
+            .is_none_or(|cells| cells > ADAPTIVE)
         {
             return refused(format!(
                 "adaptive refinement of more than {} cells, which must be in memory",
-                adaptive::MOST
+                ADAPTIVE
             ));
         }
         if self.results != Results::default() {
@@ -116,6 +115,8 @@ pub enum PlanError {
     Setting(String),
 }
 
+/// Most cells of an adaptive sweep: all their regimes are in memory, two bytes per cell.
+const ADAPTIVE: u64 = 1_000_000_000;
 /// Most cells: their number must be countable in the metadata of the store.
 const MOST: u64 = 1 << 53;
 /// Number of points of a Sobol sequence.

@@ -6,7 +6,8 @@ use vines::{
     scene::{Definition, Dimensionless},
 };
 
-use super::{Failure, shown};
+use super::text::shown;
+use crate::cli::failure::Failure;
 
 /// The convergence of the theory towards the exact orbits.
 pub(super) fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
