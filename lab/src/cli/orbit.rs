@@ -5,6 +5,7 @@ mod text;
 
 use clap::Args;
 use vines::{
+    ArgumentError,
     orbit::{Condition, Exploration, Limits, backbone, continue_both_ways, phase_resonant, response, settle},
     scene::Dimensionless,
 };
@@ -143,16 +144,12 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> 
 }
 
 /// Parses FIRST:LAST.
-fn detunings(text: &str) -> Result<[f64; 2], String> {
-    let form = || {
-        format!(
-            "`{text}`: expected FIRST:LAST, two detunings (dimensionless), the first below the last, for instance -6:6"
-        )
-    };
-    let (from, to) = text.split_once(':').ok_or_else(form)?;
+fn detunings(text: &str) -> Result<[f64; 2], ArgumentError> {
+    let form = "expected FIRST:LAST, two detunings (dimensionless), the first below the last, for instance -6:6";
+    let (from, to) = text.split_once(':').ok_or(form)?;
     match (from.trim().parse::<f64>(), to.trim().parse::<f64>()) {
         (Ok(from), Ok(to)) if from < to && from.is_finite() && to.is_finite() => Ok([from, to]),
-        _ => Err(form()),
+        _ => Err(form.into()),
     }
 }
 

@@ -6,6 +6,7 @@ use std::{
 };
 
 use clap::Args;
+use vines::ArgumentError;
 use vines::net::{
     Address, LinkError, Served, Server, ServerError, Service, Session,
     helic::{Device, HelicServer},
@@ -113,7 +114,7 @@ impl ServingArguments {
 }
 
 /// A number above 0 and at most 1e8, for seconds and metres.
-pub(super) fn positive(text: &str) -> Result<f64, String> {
+pub(super) fn positive(text: &str) -> Result<f64, ArgumentError> {
     let value: f64 = text.parse().map_err(|_| "expected a number")?;
     if value > 0.0 && value <= 1e8 {
         Ok(value)
@@ -123,7 +124,7 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// A number of runs, seeds or the like.
-pub(super) fn count<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
+pub(super) fn count<T: TryFrom<u64>>(text: &str) -> Result<T, ArgumentError> {
     let value = text.parse().ok().filter(|count| (1..=1_000_000_000).contains(count));
     let value = value.and_then(|count: u64| count.try_into().ok());
     value.ok_or_else(|| "expected a whole number from 1 to 1000000000".into())

@@ -8,6 +8,7 @@ use std::{
 };
 
 use clap::Args;
+use vines::ArgumentError;
 use vines::sweep::{self, Axis, Estimate, Monitor, Plan, Results, Settings, Shard};
 
 use super::{
@@ -149,7 +150,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 }
 
 /// The part `I/N` of a sweep.
-fn shard(text: &str) -> Result<Shard, String> {
+fn shard(text: &str) -> Result<Shard, ArgumentError> {
     let parts = text
         .split_once('/')
         .and_then(|(one, of)| Some((one.parse::<u64>().ok()?, of.parse().ok()?)));

@@ -7,6 +7,8 @@ use std::{
     str::FromStr,
 };
 
+use vines_model::ArgumentError;
+
 use super::{
     Component, PackError,
     platform::Platform,
@@ -21,9 +23,9 @@ pub struct Binary {
 }
 
 impl FromStr for Binary {
-    type Err = String;
+    type Err = ArgumentError;
 
-    fn from_str(argument: &str) -> Result<Self, String> {
+    fn from_str(argument: &str) -> Result<Self, ArgumentError> {
         let (folder, path) = argument
             .split_once('=')
             .ok_or("expected PLATFORM=PATH, for instance win64=lovines_fmu.dll")?;
@@ -128,12 +130,12 @@ fn fit(Binary { platform, path }: &Binary, components: &[Component]) -> Result<F
 /// Reads an FMI 2.0 component for `platform`; `place` and `advice` are for the message.
 fn read(path: &Path, platform: &Platform, place: &str, advice: &str) -> Result<Vec<u8>, PackError> {
     let content = std::fs::read(path).map_err(|source| PackError::Read { path: path.into(), source })?;
-    let problem = match platform.check(&content) {
-        Err(found) => format!("is {found}, but {place} needs {}{advice}", platform.name),
-        Ok(()) if !exports(&content, "fmi2Instantiate") => {
+    let problem = match platform.mismatch(&content) {
+        Some(found) => format!("is {found}, but {place} needs {}{advice}", platform.name),
+        None if !exports(&content, "fmi2Instantiate") => {
             format!("has no function fmi2Instantiate, so it is not an FMI 2.0 component{advice}")
         }
-        Ok(()) => return Ok(content),
+        None => return Ok(content),
     };
     Err(PackError::Library { path: path.into(), problem })
 }

@@ -22,7 +22,7 @@ pub use axis::{Axis, SIGMA, Values};
 pub use cell::Results;
 pub use monitor::Monitor;
 pub use plan::Plan;
-pub use run::{Estimate, Shard, estimate, merge, run};
+pub use run::{Estimate, EstimateError, Shard, estimate, merge, run};
 pub use settings::{PlanError, Settings};
 pub use store::StoreError;
 pub use variables::ABSENT;

@@ -161,6 +161,14 @@ impl Estimate {
     }
 }
 
+/// All cells that were tried fail; the reason is that of the first.
+#[derive(Debug, thiserror::Error)]
+#[error("all of {tried} cells that were tried fail: {reason}")]
+pub struct EstimateError {
+    tried: usize,
+    reason: String,
+}
+
 /// Largest number of cells, and duration, of the trial behind an estimate.
 const TRIED: usize = 64;
 const TRIAL: Duration = Duration::from_secs(1);
@@ -169,7 +177,7 @@ const TRIAL: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// If all of them fail: the reason of the first.
-pub fn estimate(plan: &Plan, stop: &AtomicBool) -> Result<Estimate, String> {
+pub fn estimate(plan: &Plan, stop: &AtomicBool) -> Result<Estimate, EstimateError> {
     let start = Instant::now();
     // Positions that do not follow a regular grid: the golden ratio.
     let tried: Vec<Cell> = (0..TRIED)
@@ -178,8 +186,8 @@ pub fn estimate(plan: &Plan, stop: &AtomicBool) -> Result<Estimate, String> {
         .map(|position| plan.cell_near(position))
         .collect();
     if tried.iter().all(|cell| !cell.failure.is_empty()) {
-        let reason = tried.first().map_or("", |cell| &cell.failure);
-        return Err(format!("all of {} cells that were tried fail: {reason}", tried.len()));
+        let reason = tried.first().map_or(String::new(), |cell| cell.failure.clone());
+        return Err(EstimateError { tried: tried.len(), reason });
     }
     let cell = start.elapsed().as_secs_f64() / tried.len() as f64;
     let threads = rayon::current_num_threads() as f64;

@@ -88,10 +88,7 @@ impl Settings {
         if points.len() != 2 || self.axes.len() != 2 {
             return refused("adaptive refinement needs exactly two axes, each a grid or a list".into());
         }
-        if points[0]
-            .checked_mul(points[1])
-            .is_none_or(|cells| cells > ADAPTIVE)
-        {
+        if points[0].checked_mul(points[1]).is_none_or(|cells| cells > ADAPTIVE) {
             return refused(format!(
                 "adaptive refinement of more than {} cells, which must be in memory",
                 ADAPTIVE
