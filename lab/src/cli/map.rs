@@ -5,7 +5,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 use vines::{
-    map::{CONFIRMATIONS, LIMIT, Map, Plan, Range},
+    map::{Axis, CONFIRMATIONS, LIMIT, Map, Plan, Range},
     orbit::Branch,
     report::{
         self,
@@ -100,6 +100,11 @@ fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
         return Err(Failure::input(format!(
             "--sigma = {sigma} (dimensionless) is not a finite number"
         )));
+    }
+    if arguments.sigma.is_some() && [arguments.x.axis, arguments.y.axis].contains(&Axis::Sigma) {
+        return Err(Failure::input(
+            "--sigma: sigma is on an axis already, by default on that of --x; leave --sigma out, or take --x r=0.3:1:71",
+        ));
     }
     let plan = Plan::new(
         scene.dimensionless(),
