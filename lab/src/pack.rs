@@ -24,18 +24,11 @@ use crate::{files, scene::Scene};
 /// Packs the components into `out`, one `<identifier>.fmu` each, and returns their paths.
 ///
 /// Nothing is written unless all of them can be; a file is complete or absent.
-///
-/// # Errors
-/// A library that is missing, for another platform, of another version or not an FMI 2.0 component, and failures of the
-/// file system.
 pub fn pack(components: &[Component], libraries: &Libraries, out: &Path) -> Result<Vec<PathBuf>, PackError> {
     Ok(files::write(out, fmu::all(components, libraries)?)?)
 }
 
 /// Packs plant and controller into `out`, and the two of them coupled as `bench.ssp` with the parameters of the scene.
-///
-/// # Errors
-/// As [`pack`], and a scene whose controller settings make no sense.
 pub fn pack_bench(scene: &Scene, libraries: &Libraries, out: &Path) -> Result<Vec<PathBuf>, PackError> {
     let mut files = fmu::all(&components(), libraries)?;
     files.push(system::file(scene, &files)?);

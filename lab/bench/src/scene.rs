@@ -67,7 +67,6 @@ pub struct Scene {
 
 impl Scene {
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.
-    #[must_use]
     pub fn dimensionless(&self) -> Dimensionless {
         Dimensionless {
             definition: self.resonance,
@@ -76,13 +75,11 @@ impl Scene {
     }
 
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
-    #[must_use]
     pub fn dimensionless_start(&self) -> [f64; 4] {
         self.dimensionless().state(&self.start)
     }
 
     /// The controller's sample time, s.
-    #[must_use]
     pub fn sample_time(&self) -> f64 {
         self.dimensionless().natural_period() / self.controller.samples_per_period
     }

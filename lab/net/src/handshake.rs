@@ -101,7 +101,6 @@ pub enum Refusal {
 }
 
 impl Refusal {
-    /// The frame that answers `cause`.
     pub(super) fn answer(self, cause: &Frame) -> Frame {
         let values = match self {
             Self::Busy => [1.0, 0.0, 0.0, 0.0],

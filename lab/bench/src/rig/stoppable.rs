@@ -23,7 +23,6 @@ pub struct Stoppable {
 
 impl Stoppable {
     /// `sample_time` in s.
-    #[must_use]
     pub fn around(rig: Box<dyn Rig>, sample_time: f64, stop: &Arc<AtomicBool>) -> Self {
         Self { rig, sample_time, stop: Arc::clone(stop) }
     }

@@ -96,13 +96,11 @@ impl Default for Controller {
 
 impl Controller {
     /// The phase target in radians.
-    #[must_use]
     pub fn phase_target_radians(&self) -> f64 {
         self.phase_target.to_radians()
     }
 
     /// Whether the target is phase resonance, for which theory and exact orbits hold.
-    #[must_use]
     pub fn is_at_phase_resonance(&self) -> bool {
         self.phase_target == -90.0
     }

@@ -6,9 +6,6 @@ use super::{Override, PAPER, Scene, SceneError, overrides};
 
 impl Scene {
     /// Reads the scene file at `path`, or the default scene without one, with the overrides applied in order.
-    ///
-    /// # Errors
-    /// An unreadable file, an unknown or missing key, or a value that is not allowed, each named.
     pub fn load(path: Option<&Path>, overrides: &[Override]) -> Result<Self, SceneError> {
         let Some(path) = path else {
             return Self::parse("paper.toml (the default scene)", PAPER, overrides);
@@ -18,9 +15,6 @@ impl Scene {
     }
 
     /// Reads a scene from `text`; `origin` names it in messages.
-    ///
-    /// # Errors
-    /// As [`Scene::load`].
     pub fn parse(origin: &str, text: &str, overrides: &[Override]) -> Result<Self, SceneError> {
         let scene = overrides::read(origin, text, overrides)?.0.resolve(origin)?;
         scene.controller_config().build()?;

@@ -41,7 +41,6 @@ pub struct Approach {
 }
 
 /// Whether the last impacts alternate between the walls, so that a symmetric orbit may be close by.
-#[must_use]
 pub fn alternates(moments: &[Moment]) -> bool {
     let mut last = moments.iter().rev().filter_map(Moment::bounce).take(COMPARED + 1);
     let Some(mut one) = last.next() else { return false };
@@ -54,7 +53,6 @@ pub fn alternates(moments: &[Moment]) -> bool {
 
 impl Symmetric {
     /// The stable symmetric orbit at the detuning `sigma`, if there is one.
-    #[must_use]
     pub fn stable(scene: &Dimensionless, sigma: f64) -> Option<Self> {
         let orbit = stable_symmetric(scene, sigma)?;
         let map = follow(scene, &ImpactPattern::symmetric(), &orbit.unknowns())?.monodromy;
@@ -62,7 +60,6 @@ impl Symmetric {
     }
 
     /// How a motion approaches the orbit, if it certainly does; `tolerance` bounds its recurrence at the end.
-    #[must_use]
     pub fn approach(&self, moments: &[Moment], tolerance: f64) -> Option<Approach> {
         let bounces = moments.iter().rev().filter_map(Moment::bounce);
         let apart = bounces.map(|one| self.apart(&one));

@@ -86,7 +86,6 @@ pub fn random_state(random: &mut impl Rng) -> [f64; 4] {
 }
 
 /// The exact frequency response at the scene's G over the range of sigma in `limits`.
-#[must_use]
 pub fn response(scene: &Dimensionless, limits: &Limits, exploration: Exploration) -> Response {
     let condition = Condition::Excitation(scene.g);
     let mut search = Search {
@@ -215,7 +214,6 @@ impl Response {
     }
 
     /// A motion of the scene lies on one of the components.
-    #[must_use]
     pub fn contains(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
         self.components.iter().any(|one| one.branch.passes(scene, motion))
     }
@@ -234,7 +232,6 @@ impl Branch {
     }
 
     /// Whether this branch of a frequency response passes a motion or its mirror image.
-    #[must_use]
     pub fn passes(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
         let pattern = |one: &Periodic| (one.pattern.impacts(), one.pattern.periods(), one.pattern.mirrored);
         if pattern(&self.points[0]) != pattern(motion) {

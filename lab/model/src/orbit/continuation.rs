@@ -191,7 +191,6 @@ fn joins(from: &Periodic, to: &Periodic) -> bool {
 }
 
 /// Follows the curve of `condition` from `start` towards `towards`, a direction in the space of the unknowns.
-#[must_use]
 pub fn continue_from(
     scene: &Dimensionless,
     start: &Periodic,
@@ -253,7 +252,6 @@ pub fn continue_from(
 }
 
 /// Follows the curve of `condition` through `start` in both directions, from falling to rising sigma.
-#[must_use]
 pub fn continue_both_ways(scene: &Dimensionless, start: &Periodic, condition: Condition, limits: &Limits) -> Branch {
     let mut towards = Unknowns::zeros();
     towards[4] = 1.0;
@@ -275,7 +273,6 @@ const ASIDE: f64 = 1e-3;
 
 /// The branch of motions that leaves a symmetry breaking or a period doubling, along the curve of `condition`. Its mirror image, or
 /// itself one repetition later, leaves in the opposite direction and counts as the same branch.
-#[must_use]
 pub fn branch_off(scene: &Dimensionless, at: &Special, condition: Condition, limits: &Limits) -> Option<Branch> {
     let from = &at.motion;
     let returned = follow(scene, &from.pattern, &from.unknowns())?;
