@@ -4,12 +4,8 @@ use clap::Args;
 use indicatif::ProgressBar;
 use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
-use super::{
-    endpoint::Endpoint,
-    experiment::ExperimentArguments,
-    failure::Failure,
-    output::{result, writable, written},
-};
+use super::output::{result, writable, written};
+use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure};
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:

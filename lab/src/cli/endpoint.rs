@@ -1,24 +1,17 @@
 //! `--rig` and `--controller`: the implementations of the two sides of the bench.
 
-use std::{
-    path::{Path, PathBuf},
-    str::FromStr,
-    sync::{Arc, OnceLock},
-};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::sync::{Arc, OnceLock};
 
 use clap::Args;
 use phase_lock::Config;
-use vines::{
-    ArgumentError,
-    fmu::{FmuController, FmuError, FmuRig},
-    net::{
-        Address, BindScope, Key, NetController, NetRig, Timing,
-        helic::{Channels, DEFAULT_PORT, HelicRig, Network},
-        resolve,
-    },
-    rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable},
-    scene::{Name, Names, Scene},
-};
+use vines::ArgumentError;
+use vines::fmu::{FmuController, FmuError, FmuRig};
+use vines::net::helic::{Channels, DEFAULT_PORT, HelicRig, Network};
+use vines::net::{Address, BindScope, Key, NetController, NetRig, Timing, resolve};
+use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
+use vines::scene::{Name, Names, Scene};
 
 use super::{failure::Failure, interrupt::stop_flag, real_time::RealTimeArguments};
 

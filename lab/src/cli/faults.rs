@@ -3,19 +3,12 @@
 use std::{panic, process, sync::atomic::Ordering, thread, time::Duration};
 
 use clap::Args;
-use vines::{
-    faults::{During, FAULTS, Faults, Kind, Row, Worst},
-    report::Table,
-    rig::{Rig, Stoppable},
-};
+use vines::faults::{During, FAULTS, Faults, Kind, Row, Worst};
+use vines::report::Table;
+use vines::rig::{Rig, Stoppable};
 
-use super::{
-    failure::Failure,
-    interrupt::stop_flag,
-    output::{output, print},
-    scene_arguments::SceneArguments,
-    serving::count,
-};
+use super::output::{output, print};
+use super::{failure::Failure, interrupt::stop_flag, scene_arguments::SceneArguments, serving::count};
 
 const HELP: &str = "\
 Injects faults into runs on the built-in plant, at several instants while the loop locks, holds, tracks and releases, and prints the worst

@@ -4,23 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::{
-    advice,
-    comparison::Comparison,
-    experiment::{ExperimentError, Plan, Sample, Stage, run_into},
-    identification::{self, IdentificationError},
-    pack, report,
-    rig::BuiltIn,
-    scene::Scene,
-};
+use vines::experiment::{ExperimentError, Plan, Sample, Stage, run_into};
+use vines::identification::{self, IdentificationError};
+use vines::{advice, comparison::Comparison, pack, report, rig::BuiltIn, scene::Scene};
 
-use super::{
-    endpoint::Endpoint,
-    experiment::ExperimentArguments,
-    failure::Failure,
-    output::{progress_bar, result, writable, written},
-    pack::beside_this_program,
-};
+use super::output::{progress_bar, result, writable, written};
+use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, pack::beside_this_program};
 
 const HELP: &str = "\
 Examples:

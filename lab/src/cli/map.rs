@@ -4,22 +4,13 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::{
-    map::{Axis, CONFIRMATIONS, LIMIT, Map, Plan, Range},
-    orbit::Branch,
-    report::{
-        self,
-        summary::{parameters, regimes},
-    },
-    scene::Scene,
-};
+use vines::map::{Axis, CONFIRMATIONS, LIMIT, Map, Plan, Range};
+use vines::report;
+use vines::report::summary::{parameters, regimes};
+use vines::{orbit::Branch, scene::Scene};
 
-use super::{
-    failure::Failure,
-    output::{progress_bar, writable, written},
-    scene_arguments::SceneArguments,
-    serving::count,
-};
+use super::output::{progress_bar, writable, written};
+use super::{failure::Failure, scene_arguments::SceneArguments, serving::count};
 
 const HELP: &str = "\
 Every cell is one plant, driven at a fixed frequency from the scene's start:

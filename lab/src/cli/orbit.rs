@@ -4,11 +4,8 @@ mod studies;
 mod text;
 
 use clap::Args;
-use vines::{
-    ArgumentError,
-    orbit::{Condition, Exploration, Limits, backbone, continue_both_ways, phase_resonant, response, settle},
-    scene::Dimensionless,
-};
+use vines::orbit::{Condition, Exploration, Limits, backbone, continue_both_ways, phase_resonant, response, settle};
+use vines::{ArgumentError, scene::Dimensionless};
 
 use studies::{converged, defined};
 use text::{curve, described, listing, searched, shown};

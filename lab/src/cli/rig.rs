@@ -10,13 +10,9 @@ use vines::report;
 use vines::rig::{Rig, RigError, Simulated};
 use vines::scene::Scene;
 
-use super::{
-    endpoint::{Endpoint, fmu},
-    failure::Failure,
-    output::print,
-    scene_arguments::SceneArguments,
-    serving::{ServingArguments, positive},
-};
+use super::endpoint::{Endpoint, fmu};
+use super::serving::{ServingArguments, positive};
+use super::{failure::Failure, output::print, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Examples:

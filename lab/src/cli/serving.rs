@@ -1,24 +1,15 @@
 //! Common options of the two servers: address, end, output.
 
-use std::{
-    sync::{Arc, atomic::Ordering},
-    time::{Duration, Instant},
-};
+use std::sync::{Arc, atomic::Ordering};
+use std::time::{Duration, Instant};
 
 use clap::Args;
 use vines::ArgumentError;
-use vines::net::{
-    Address, LinkError, Served, Server, ServerError, Service, Session,
-    helic::{Device, HelicServer},
-    resolve,
-};
+use vines::net::helic::{Device, HelicServer};
+use vines::net::{Address, LinkError, Served, Server, ServerError, Service, Session, resolve};
 
-use super::{
-    endpoint::{ReachArguments, no_key},
-    failure::Failure,
-    interrupt::stop_flag,
-    output::print,
-};
+use super::endpoint::{ReachArguments, no_key};
+use super::{failure::Failure, interrupt::stop_flag, output::print};
 
 #[derive(Debug, Args)]
 pub(super) struct ServingArguments {

@@ -1,19 +1,13 @@
 //! Libraries: found, checked, and given to the components that they belong to.
 
-use std::{
-    env::consts::{DLL_PREFIX, DLL_SUFFIX},
-    io::ErrorKind,
-    path::{Path, PathBuf},
-    str::FromStr,
-};
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::path::{Path, PathBuf};
+use std::{io::ErrorKind, str::FromStr};
 
 use vines_model::ArgumentError;
 
-use super::{
-    Component, PackError,
-    platform::Platform,
-    symbols::{exports, mentions},
-};
+use super::symbols::{exports, mentions};
+use super::{Component, PackError, platform::Platform};
 
 /// A library for the platform of a folder under `binaries/`; parse it from `win64=PATH`.
 #[derive(Debug, Clone)]

@@ -2,11 +2,8 @@
 
 mod parameters;
 
-use super::{
-    PackError,
-    archive::{self, File},
-    date,
-};
+use super::archive::{self, File};
+use super::{PackError, date};
 use crate::scene::Scene;
 
 use parameters::parameter_set;

@@ -1,9 +1,7 @@
 //! A rig that stops on a flag, which a signal or another thread sets.
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, Ordering},
-};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use thiserror::Error;
 

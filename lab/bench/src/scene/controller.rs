@@ -5,11 +5,8 @@ use std::f64::consts::TAU;
 use phase_lock::Config;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    SceneError,
-    option::{given, option},
-    validate::Quantity,
-};
+use super::option::{given, option};
+use super::{SceneError, validate::Quantity};
 
 /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]

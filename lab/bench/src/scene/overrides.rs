@@ -5,12 +5,8 @@ use std::str::FromStr;
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::{
-    SceneError, SyntaxError,
-    error::plain,
-    plant::{DIMENSIONLESS_KEYS, SI_KEYS},
-    sections::Sections,
-};
+use super::plant::{DIMENSIONLESS_KEYS, SI_KEYS};
+use super::{SceneError, SyntaxError, error::plain, sections::Sections};
 
 /// One replaced value.
 #[derive(Debug, Clone)]

@@ -5,13 +5,8 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix4, Vector4};
 
-use super::{
-    Orbit,
-    bounce::Bounce,
-    driven::Moment,
-    pattern::{ImpactPattern, follow},
-    search::stable_symmetric,
-};
+use super::pattern::{ImpactPattern, follow};
+use super::{Orbit, bounce::Bounce, driven::Moment, search::stable_symmetric};
 use crate::Dimensionless;
 
 /// Impacts over which the motion is compared with the linearised map.

@@ -6,17 +6,14 @@
 
 use std::f64::consts::TAU;
 
-use rand_chacha::{
-    ChaCha8Rng,
-    rand_core::{Rng, SeedableRng},
-};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::Serialize;
 
+use super::settle::{LONGEST, settle};
 use super::{
     Bifurcation, Branch, Condition, ImpactPattern, Limits, Periodic, branch_off, continue_both_ways,
-    search::least_excitation,
-    settle::{LONGEST, settle},
-    symmetric_orbits,
+    search::least_excitation, symmetric_orbits,
 };
 use crate::Dimensionless;
 use crate::numerics::{equally_spaced, golden_section};

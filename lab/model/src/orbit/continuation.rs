@@ -6,13 +6,11 @@
 
 use nalgebra::{Matrix4, Matrix6, SVector};
 
-use super::{
-    branch::{Branch, Ended, Limits, Special},
-    condition::{Bifurcation, Condition},
-    crossings::Part,
-    pattern::{Returned, Unknowns, follow},
-    periodic::{Periodic, newton},
-};
+use super::branch::{Branch, Ended, Limits, Special};
+use super::condition::{Bifurcation, Condition};
+use super::crossings::Part;
+use super::pattern::{Returned, Unknowns, follow};
+use super::periodic::{Periodic, newton};
 use crate::Dimensionless;
 use crate::numerics::try_bisection;
 

@@ -10,10 +10,8 @@ use std::f64::consts::TAU;
 use lovines::{Event, State, Wall};
 use nalgebra::{Complex, Matrix2, Vector2};
 
-use super::{
-    bounce::Bounce,
-    oscillator::{Oscillator, rough_sin_cos},
-};
+use super::bounce::Bounce;
+use super::oscillator::{Oscillator, rough_sin_cos};
 use crate::Dimensionless;
 
 /// The primary mass, alone or with the particle on its wall, and its steady response to the base.

@@ -3,12 +3,9 @@
 use nalgebra::{Complex, Matrix4, Matrix6, SVector, Vector4};
 use serde::Serialize;
 
-use super::{
-    bounce::Bounce,
-    condition::{Condition, Row},
-    impact_map::ImpactMap,
-    pattern::{ImpactPattern, Returned, Unknowns, follow, wrapped},
-};
+use super::condition::{Condition, Row};
+use super::pattern::{ImpactPattern, Returned, Unknowns, follow, wrapped};
+use super::{bounce::Bounce, impact_map::ImpactMap};
 use crate::Dimensionless;
 
 /// An exact periodic motion.

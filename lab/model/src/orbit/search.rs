@@ -1,9 +1,7 @@
 //! Search for all phase-resonant orbits of a scene, over frequency.
 
-use super::{
-    Condition, ImpactPattern, Orbit, Periodic, Unknowns,
-    candidate::{Candidate, Family},
-};
+use super::candidate::{Candidate, Family};
+use super::{Condition, ImpactPattern, Orbit, Periodic, Unknowns};
 use crate::Dimensionless;
 use crate::numerics::{bisection, golden_section};
 

@@ -5,13 +5,8 @@ use std::f64::consts::TAU;
 
 use lovines::{InvalidValue, State};
 
-use super::{
-    bounce::Bounce,
-    condition::Condition,
-    impact_map::ImpactMap,
-    pattern::{ImpactPattern, Unknowns},
-    periodic::Periodic,
-};
+use super::pattern::{ImpactPattern, Unknowns};
+use super::{bounce::Bounce, condition::Condition, impact_map::ImpactMap, periodic::Periodic};
 use crate::Dimensionless;
 
 /// States after one repetition that are closer than this belong to a motion that settles, if there is a stable one near.

@@ -5,10 +5,8 @@ use serde::Serialize;
 use crate::numerics::{bisection, golden_section};
 use crate::orbit::impacts_from_rest;
 
-use super::{
-    slow_flow::SlowFlow,
-    stability::{B_SYMMETRY_BREAKING, impacts_stable},
-};
+use super::slow_flow::SlowFlow;
+use super::stability::{B_SYMMETRY_BREAKING, impacts_stable};
 
 /// Smallest base amplitudes G, over `b epsilon`, at one detuning (docs/theory.md, eq. 19).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

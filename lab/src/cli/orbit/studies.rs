@@ -1,10 +1,8 @@
 //! `vines orbit --convergence` and `--definitions`: theory minus exact orbit as epsilon shrinks.
 
-use vines::{
-    orbit::{Convergence, convergence},
-    report::{Table, number},
-    scene::{Definition, Dimensionless},
-};
+use vines::orbit::{Convergence, convergence};
+use vines::report::{Table, number};
+use vines::scene::{Definition, Dimensionless};
 
 use super::text::shown;
 use crate::cli::failure::Failure;

@@ -2,17 +2,12 @@
 
 use std::fmt::Write;
 
-use vines::{
-    numerics::range,
-    orbit::{Branch, Ended, Orbit, Periodic, Response},
-    report::{Table, number, summary::parameters},
-    scene::Dimensionless,
-};
+use vines::orbit::{Branch, Ended, Orbit, Periodic, Response};
+use vines::report::{Table, number, summary::parameters};
+use vines::{numerics::range, scene::Dimensionless};
 
-use crate::cli::{
-    failure::Failure,
-    output::{output, yes_no},
-};
+use crate::cli::failure::Failure;
+use crate::cli::output::{output, yes_no};
 
 /// What was found as JSON, or as text under a title and the parameters of the scene.
 pub(super) fn shown(
