@@ -163,7 +163,5 @@ def test_the_page_shows_the_unit_of_every_real_variable(fmus):
         for variable in fmu.description.modelVariables:
             if variable.type == "Real":
                 assert rows[variable.name] == variable.unit, f"{name}: {variable.name}"
-    assert (
-        "<tr><td>r</td><td>0.65</td><td>1</td>"
-        in (fmus["LoViNes"].folder / "documentation" / "index.html").read_text()
-    )
+    page = (fmus["LoViNes"].folder / "documentation" / "index.html").read_text()
+    assert re.search(r"<tr><td>r</td><td.*?>0.65</td><td.*?>1</td>", page)
