@@ -16,6 +16,15 @@ const NOISE_RANGE: Real = 5.0;
 /// Smallest sum of the squared differences from period to period over that of the squared deviations from the mean that counts as
 /// noise. A drift over five periods has 0.4, noise about 1.
 const RANDOM: Real = 0.5;
+/// Largest correlation of the residual with itself a few samples before that counts as noise; and the smallest that noise does not explain,
+/// in standard deviations.
+const CORRELATED: Real = 0.5;
+const SIGNIFICANT: Real = 5.0;
+/// Smallest ratio of the residuals of two successive dwells in a motion that does not decay.
+const LASTS: Real = 0.95;
+/// Smallest amplitude of a component that is no harmonic of the symmetric motion, in sums of the amplitudes of its harmonics: a subharmonic
+/// of order three has from ten to sixty of them.
+const OTHER: Real = 3.0;
 /// Largest scatter of the periods, relative, that counts as noise.
 const NOISE_MAX: Real = 0.03;
 
@@ -46,6 +55,10 @@ pub struct Reading {
     pub omega: Real,
     /// Response amplitude, m.
     pub amplitude: Real,
+    /// Sum of the amplitudes of its harmonics, m.
+    pub harmonics: Real,
+    /// Differences of two readings, a few samples apart, from their predictions, m.
+    pub residuals: [Real; 2],
     /// Whether these values are valid.
     pub valid: bool,
 }
@@ -58,6 +71,8 @@ struct Sums {
     integral: Sum,
     omega: Sum,
     amplitude: Sum,
+    power: Real,
+    common: Real,
     samples: u64,
     invalid: u64,
 }
@@ -93,6 +108,9 @@ struct Block {
     periods: u32,
     error: Real,
     omega: Real,
+    /// Residual: mean square, and mean product of samples a few apart, m².
+    power: Real,
+    common: Real,
     integral: Scatter,
     amplitude: Scatter,
 }
@@ -103,6 +121,8 @@ impl Block {
         let (n, samples) = (self.periods as Real, period.samples as Real);
         self.error += (period.error.get() / samples - self.error) / n;
         self.omega += (period.omega.get() / samples - self.omega) / n;
+        self.power += (period.power / samples - self.power) / n;
+        self.common += (period.common / samples - self.common) / n;
         self.integral.add(period.integral.get() / samples, n);
         self.amplitude.add(period.amplitude.get() / samples, n);
     }
@@ -117,9 +137,15 @@ pub struct Dwell {
     period: Sums,
     block: Block,
     settled: bool,
+    other_motion: bool,
 }
 
 impl Dwell {
+    /// Whether it is met by a motion with components that are no harmonics of the symmetric one, such as a subharmonic.
+    pub fn is_other_motion(&self) -> bool {
+        self.other_motion
+    }
+
     /// Whether the criterion is met.
     pub fn settled(&self) -> bool {
         self.settled
@@ -156,6 +182,9 @@ impl Stationarity {
         period.integral.add(reading.integral);
         period.omega.add(reading.omega);
         period.amplitude.add(reading.amplitude);
+        let [now, before] = reading.residuals;
+        period.power += now * now;
+        period.common += now * before;
         period.samples += 1;
         period.invalid += u64::from(!reading.valid);
         if !period_ends {
@@ -167,12 +196,12 @@ impl Stationarity {
         if lost {
             *dwell = Dwell::default();
         } else {
-            self.end_period(dwell, &period);
+            self.end_period(dwell, &period, reading.harmonics);
         }
         lost
     }
 
-    fn end_period(&self, dwell: &mut Dwell, period: &Sums) {
+    fn end_period(&self, dwell: &mut Dwell, period: &Sums, harmonics: Real) {
         dwell.block.add(period);
         if dwell.block.periods < self.block {
             return;
@@ -180,8 +209,17 @@ impl Stationarity {
         dwell.blocks.rotate_left(1);
         dwell.blocks[BLOCKS - 1] = core::mem::take(&mut dwell.block);
         dwell.complete = (dwell.complete + 1).min(BLOCKS);
-        dwell.settled = dwell.complete >= DWELL && self.is_smooth(dwell.last(DWELL))
-            || dwell.complete == BLOCKS && self.is_noise(&dwell.blocks);
+        let is_smooth = dwell.complete >= DWELL && self.is_smooth(dwell.last(DWELL));
+        let is_noise = dwell.complete == BLOCKS && self.is_noise(&dwell.blocks);
+        let common = |blocks: &[Block]| mean(blocks, |block| block.common);
+        let (before, last) = dwell.blocks.split_at(DWELL);
+        let is_random = common(&dwell.blocks) <= CORRELATED * mean(&dwell.blocks, |block| block.power);
+        let lasts = is_random || common(last) >= LASTS * common(before);
+        let blocks = if is_smooth { last } else { &dwell.blocks };
+        let samples = period.samples as Real * (self.block as usize * blocks.len()) as Real;
+        let is_other_motion = is_other_motion(blocks, samples, harmonics);
+        dwell.settled = is_smooth || is_noise && is_random;
+        dwell.other_motion = (is_smooth || is_noise && lasts) && is_other_motion;
     }
 
     fn is_smooth(&self, blocks: &[Block]) -> bool {
@@ -208,6 +246,14 @@ impl Stationarity {
             && is_constant(|block| block.integral, self.frequency_drift)
             && is_constant(|block| block.amplitude, self.amplitude_drift)
     }
+}
+
+/// Whether the residual of these samples has components that neither noise nor the harmonics above the estimated ones explain.
+fn is_other_motion(blocks: &[Block], samples: Real, harmonics: Real) -> bool {
+    let by_noise = SIGNIFICANT * mean(blocks, |block| block.power) / real::sqrt(samples);
+    let least = 0.5 * (OTHER * harmonics) * (OTHER * harmonics);
+    // A detector without harmonics leaves those of any motion.
+    harmonics > 0.0 && mean(blocks, |block| block.common) > by_noise.max(least)
 }
 
 fn mean(blocks: &[Block], value: impl Fn(&Block) -> Real) -> Real {

@@ -84,6 +84,34 @@ fn orbits_just_above_the_fold_and_just_below_symmetry_breaking_are_reached() {
 }
 
 #[test]
+fn subharmonic_motions_of_the_same_drive_are_left_for_the_symmetric_one() {
+    for (settings, c) in [
+        (
+            [
+                "plant.epsilon=0.014429842",
+                "plant.lambda=0.80932254",
+                "plant.r=0.76757213",
+                "excitation.G=0.75737775",
+            ],
+            0.6190,
+        ),
+        (
+            [
+                "plant.epsilon=0.0048763899",
+                "plant.lambda=2.4297409",
+                "plant.r=0.94889327",
+                "excitation.G=1.1322403",
+            ],
+            0.4485,
+        ),
+    ] {
+        let lock = lock(settings);
+        assert_eq!(lock.regime, Regime::Symmetric);
+        assert!((lock.c - c).abs() < 2e-3, "{lock:?}");
+    }
+}
+
+#[test]
 fn rigs_are_drawn_within_the_limits_of_the_frequency() {
     let limits = ["controller.omega_min=0.995", "controller.omega_max=1.005"].map(|setting| setting.parse().unwrap());
     for row in locks(3, 9, &limits).unwrap() {
