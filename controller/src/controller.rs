@@ -165,9 +165,11 @@ impl PhaseLock {
             ready: state.ready,
             capture: self.capture.is_on(),
             escaped: state.amplitude_loop.is_none()
-                && self
-                    .capture
-                    .has_escaped(&state.capture, state.approach.response, state.dwell.is_other_motion()),
+                && self.capture.has_escaped(
+                    &state.capture,
+                    state.approach.response,
+                    state.dwell.is_other_motion() || state.approach.has_lost_motion(),
+                ),
             settled: state.dwell.settled(),
             lost: state.lost,
             timed_out: timeout.is_some_and(|timeout| elapsed >= timeout),
