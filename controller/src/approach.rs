@@ -64,8 +64,8 @@ pub struct ApproachState {
     step: Real,
     /// Response amplitude with the lag of the observer, m.
     pub response: Real,
-    /// Its smallest value on the way to the setpoint of the drive, m.
-    pub lowest: Option<Real>,
+    /// Its smallest value on the way to the setpoint of the drive, m; 0 without a capture.
+    pub lowest: Real,
     /// The drive that would hold the response, m.
     pub holding: Real,
     /// Largest relative difference between the setpoint and the holding drive since it last changed its sign.
@@ -77,7 +77,7 @@ pub struct ApproachState {
 impl ApproachState {
     /// Whether the response has risen so far above its smallest value that the motion must have been lost and found again.
     pub fn has_lost_motion(&self) -> bool {
-        self.lowest.is_some_and(|lowest| self.response > LOST * lowest)
+        self.response > LOST * self.lowest
     }
 }
 
@@ -116,7 +116,7 @@ impl Approach {
     /// The drive, m, on the way to `setpoint`, m, where `holding`, m, would hold the response.
     pub fn shape(&self, state: &mut ApproachState, setpoint: Real, holding: Real, elapsed: Real) -> Real {
         let [low, high] = DRIVE_RANGE.map(|share| share * setpoint);
-        state.lowest = Some(state.lowest.map_or(state.response, |lowest| lowest.min(state.response)));
+        state.lowest = state.lowest.min(state.response);
         let missing = setpoint - holding;
         let late = (self.damping_rate * elapsed - LATE).max(0.0);
         let patience = real::exp(-late / PATIENCE - SWING * state.swings as Real);

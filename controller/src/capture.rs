@@ -8,6 +8,10 @@
 //! ones. A [descent](crate::descent) leads the motion below `captured_max`. A response that rises above it later, or whose impacts end,
 //! is captured again, and the repeated descent goes on until the drive that holds the response is its setpoint. Each of
 //! the repetitions is slower.
+//!
+//! A motion of another kind may also have a response below `captured_max`: mostly a subharmonic of order three. It ends at a drive that is
+//! a few percent lower. Where the residual of the detector shows it, the descent begins at once, and the drive returns to its
+//! setpoint from below.
 
 use crate::real::consts::TAU;
 
@@ -112,7 +116,8 @@ impl Capture {
         self.level.is_some()
     }
 
-    /// Whether the motion of this mean response amplitude, m, is another one, which calls for a repetition; `other_motion`: its residual shows it.
+    /// Whether the motion of this mean response amplitude, m, is another one, which calls for a repetition: it is too large, or
+    /// `other_motion` says so.
     pub fn has_escaped(&self, state: &CaptureState, mean: Real, other_motion: bool) -> bool {
         let is_other = |largest: Real| other_motion || mean > ABOVE * largest;
         self.is_on() && self.largest.is_some_and(is_other) && state.repetitions < REPETITIONS

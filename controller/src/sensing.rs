@@ -186,8 +186,8 @@ impl Sensing {
     /// Updates the detectors, and compares the readings with what they predicted.
     fn predict(&self, state: &mut Channels, response: Real, reference: Option<Real>, drive: PresentDrive) {
         let difference = self.detector.update(&mut state.response, response, drive.rotor);
-        state.residuals.rotate_right(1);
-        state.residuals[0] = difference;
+        let [a, b, c, d, e, _] = state.residuals;
+        state.residuals = [difference, a, b, c, d, e];
         let (mut differences, mut change) = ([difference, 0.0], 1.0);
         if let Some(reading) = reference {
             let predicted = reading - self.detector.update(&mut state.reference, reading, drive.rotor);

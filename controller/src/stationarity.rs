@@ -3,6 +3,10 @@
 //! A motion is stationary if the means over a quarter of the dwell differ by no more than the drift tolerances. Where noise hides so
 //! small a drift, the differences of means over half a dwell are compared with the scatter of the periods within the blocks instead:
 //! a drift makes the range of four consecutive means ten times as large as the scatter, noise about twice.
+//!
+//! The detector's residual, the difference between readings and their prediction by the odd harmonics, tells noise from motion: noise has
+//! no correlation with itself a few samples before. What is correlated is no noise; if it is also large compared with the harmonics and
+//! does not decay, the motion has even harmonics or subharmonics.
 
 use crate::config::LockCriterion;
 use crate::real::{self, Real, Sum};
@@ -108,7 +112,7 @@ struct Block {
     periods: u32,
     error: Real,
     omega: Real,
-    /// Residual: mean square, and mean product of samples a few apart, m².
+    /// Sums over the residual: of its squares, and of the products of samples a few apart, m².
     power: Real,
     common: Real,
     integral: Scatter,
@@ -121,8 +125,8 @@ impl Block {
         let (n, samples) = (self.periods as Real, period.samples as Real);
         self.error += (period.error.get() / samples - self.error) / n;
         self.omega += (period.omega.get() / samples - self.omega) / n;
-        self.power += (period.power / samples - self.power) / n;
-        self.common += (period.common / samples - self.common) / n;
+        self.power += period.power;
+        self.common += period.common;
         self.integral.add(period.integral.get() / samples, n);
         self.amplitude.add(period.amplitude.get() / samples, n);
     }
@@ -211,15 +215,17 @@ impl Stationarity {
         dwell.complete = (dwell.complete + 1).min(BLOCKS);
         let is_smooth = dwell.complete >= DWELL && self.is_smooth(dwell.last(DWELL));
         let is_noise = dwell.complete == BLOCKS && self.is_noise(&dwell.blocks);
-        let common = |blocks: &[Block]| mean(blocks, |block| block.common);
         let (before, last) = dwell.blocks.split_at(DWELL);
-        let is_random = common(&dwell.blocks) <= CORRELATED * mean(&dwell.blocks, |block| block.power);
-        let lasts = is_random || common(last) >= LASTS * common(before);
-        let blocks = if is_smooth { last } else { &dwell.blocks };
-        let samples = period.samples as Real * (self.block as usize * blocks.len()) as Real;
-        let is_other_motion = is_other_motion(blocks, samples, harmonics);
+        let [[_, before], [power, common]] = [before, last].map(residual);
+        let is_random = common <= CORRELATED * power;
+        let lasts = is_random || common >= LASTS * before;
+        let samples = period.samples as Real * (self.block as usize * DWELL) as Real;
+        let by_noise = SIGNIFICANT * power / real::sqrt(samples);
+        let component = OTHER * harmonics;
+        // A detector without harmonics leaves those of any motion in its residual.
+        let is_other = component > 0.0 && common > by_noise.max(0.5 * component * component * samples);
         dwell.settled = is_smooth || is_noise && is_random;
-        dwell.other_motion = (is_smooth || is_noise && lasts) && is_other_motion;
+        dwell.other_motion = (is_smooth || is_noise && lasts) && is_other;
     }
 
     fn is_smooth(&self, blocks: &[Block]) -> bool {
@@ -248,12 +254,11 @@ impl Stationarity {
     }
 }
 
-/// Whether the residual of these samples has components that neither noise nor the harmonics above the estimated ones explain.
-fn is_other_motion(blocks: &[Block], samples: Real, harmonics: Real) -> bool {
-    let by_noise = SIGNIFICANT * mean(blocks, |block| block.power) / real::sqrt(samples);
-    let least = 0.5 * (OTHER * harmonics) * (OTHER * harmonics);
-    // A detector without harmonics leaves those of any motion.
-    harmonics > 0.0 && mean(blocks, |block| block.common) > by_noise.max(least)
+/// Sums over the residual: of its squares, and of the products.
+fn residual(blocks: &[Block]) -> [Real; 2] {
+    blocks.iter().fold([0.0; 2], |[power, common], block| {
+        [power + block.power, common + block.common]
+    })
 }
 
 fn mean(blocks: &[Block], value: impl Fn(&Block) -> Real) -> Real {

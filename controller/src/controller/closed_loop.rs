@@ -26,7 +26,7 @@ impl PhaseLock {
             },
         );
         self.close_loop(state, measured);
-        state.approach.lowest = None;
+        state.approach.lowest = Real::MAX;
         state.ready = complete;
         if complete {
             state.amplitude_loop = None;

@@ -76,6 +76,26 @@ fn orbits_just_above_the_fold_and_just_below_symmetry_breaking_are_reached() {
             ],
             0.1304,
         ),
+        // The first descent ends far above the orbit, and the response falls past it.
+        (
+            [
+                "plant.epsilon=0.044486103",
+                "plant.lambda=0.29395524",
+                "plant.r=0.46215017",
+                "excitation.G=0.81962723",
+            ],
+            0.2295,
+        ),
+        // A modulation that decays over 540 periods resembles noise.
+        (
+            [
+                "plant.epsilon=0.046079366",
+                "plant.lambda=0.68301824",
+                "plant.r=0.27802309",
+                "excitation.G=0.89886111",
+            ],
+            0.3386,
+        ),
     ] {
         let lock = lock(settings);
         assert_eq!(lock.regime, Regime::Symmetric);
