@@ -27,6 +27,9 @@ const LARGE_SWING: Real = 0.1;
 /// observer follows.
 const SWING: Real = 0.357;
 
+/// Growth of the response from its smallest value that means that the motion was lost.
+const LOST: Real = 2.0;
+
 /// An approach that takes this long swings, in time constants of the structure; from then on the gain falls.
 const LATE: Real = 20.0;
 /// Time constant with which it falls, in those of the structure.
@@ -61,12 +64,21 @@ pub struct ApproachState {
     step: Real,
     /// Response amplitude with the lag of the observer, m.
     pub response: Real,
+    /// Its smallest value on the way to the setpoint of the drive, m; 0 without a capture.
+    pub lowest: Real,
     /// The drive that would hold the response, m.
     pub holding: Real,
     /// Largest relative difference between the setpoint and the holding drive since it last changed its sign.
     swing: Real,
     /// Number of large swings.
     swings: i32,
+}
+
+impl ApproachState {
+    /// Whether the response has risen so far above its smallest value that the motion must have been lost and found again.
+    pub fn has_lost_motion(&self) -> bool {
+        self.response > LOST * self.lowest
+    }
 }
 
 impl Approach {
@@ -104,6 +116,7 @@ impl Approach {
     /// The drive, m, on the way to `setpoint`, m, where `holding`, m, would hold the response.
     pub fn shape(&self, state: &mut ApproachState, setpoint: Real, holding: Real, elapsed: Real) -> Real {
         let [low, high] = DRIVE_RANGE.map(|share| share * setpoint);
+        state.lowest = state.lowest.min(state.response);
         let missing = setpoint - holding;
         let late = (self.damping_rate * elapsed - LATE).max(0.0);
         let patience = real::exp(-late / PATIENCE - SWING * state.swings as Real);

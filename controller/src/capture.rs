@@ -8,6 +8,10 @@
 //! ones. A [descent](crate::descent) leads the motion below `captured_max`. A response that rises above it later, or whose impacts end,
 //! is captured again, and the repeated descent goes on until the drive that holds the response is its setpoint. Each of
 //! the repetitions is slower.
+//!
+//! A motion of another kind may also have a response below `captured_max`: mostly a subharmonic of order three. It ends at a drive that is
+//! a few percent lower. Where the residual of the detector shows it, the descent begins at once, and the drive returns to its
+//! setpoint from below.
 
 use crate::real::consts::TAU;
 
@@ -28,6 +32,8 @@ const RISE: Real = 20.0;
 
 /// Response above which the motion is another one, as a share of the largest wanted one.
 const ABOVE: Real = 1.0005;
+/// Share of the response of another periodic motion from which that of a descent begins to be handed over, before `LOWER`.
+const CLEAR: Real = 0.9;
 /// Response below which a motion that has left the wanted one is handed over again, as a share of that at which it was before.
 const LOWER: Real = 0.95;
 /// Largest number of repetitions. The last one accepts any motion.
@@ -60,11 +66,13 @@ pub struct CaptureState {
 }
 
 impl CaptureState {
-    /// Starts again.
-    pub fn repeat(&mut self) {
+    /// Starts again. From the response `periodic`, m, of another periodic motion, it descends at once.
+    pub fn repeat(&mut self, periodic: Option<Real>) {
+        let below = |response: Real| self.arrived.unwrap_or(Real::INFINITY).min(CLEAR * response);
         *self = Self {
             repetitions: self.repetitions + 1,
-            arrived: self.arrived,
+            arrived: periodic.map_or(self.arrived, |response| Some(below(response))),
+            descent: periodic.map(DescentState::below_setpoint),
             ..Self::default()
         };
     }
@@ -108,10 +116,11 @@ impl Capture {
         self.level.is_some()
     }
 
-    /// Whether the motion of this mean response amplitude, m, is another one, which calls for a repetition.
-    pub fn has_escaped(&self, state: &CaptureState, mean: Real) -> bool {
-        let is_above = self.largest.is_some_and(|largest| mean > ABOVE * largest);
-        self.is_on() && is_above && state.repetitions < REPETITIONS
+    /// Whether the motion of this mean response amplitude, m, is another one, which calls for a repetition: it is too large, or
+    /// `other_motion` says so.
+    pub fn has_escaped(&self, state: &CaptureState, mean: Real, other_motion: bool) -> bool {
+        let is_other = |largest: Real| other_motion || mean > ABOVE * largest;
+        self.is_on() && self.largest.is_some_and(is_other) && state.repetitions < REPETITIONS
     }
 
     /// The drive, m, of a descent; `None` before. `holding`, m, would hold the response at the phase error, rad.
@@ -195,7 +204,7 @@ impl Capture {
             }
             Progress::Lost => {
                 state.arrived = None;
-                state.repeat();
+                state.repeat(None);
                 state.repetitions > REPETITIONS
             }
         }

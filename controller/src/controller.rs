@@ -165,13 +165,19 @@ impl PhaseLock {
             ready: state.ready,
             capture: self.capture.is_on(),
             escaped: state.amplitude_loop.is_none()
-                && self.capture.has_escaped(&state.capture, state.approach.response),
+                && self.capture.has_escaped(
+                    &state.capture,
+                    state.approach.response,
+                    state.dwell.is_other_motion() || state.approach.has_lost_motion(),
+                ),
             settled: state.dwell.settled(),
             lost: state.lost,
             timed_out: timeout.is_some_and(|timeout| elapsed >= timeout),
         });
         if before == LoopState::Acquiring && next == LoopState::Capturing {
-            state.capture.repeat();
+            let other_motion = state.dwell.is_other_motion().then_some(state.approach.response);
+            state.capture.repeat(other_motion);
+            state.dwell.restart();
         }
         state.loop_state = next;
         if next == LoopState::Locked && state.tuning.1 != self.config.phase_target {
@@ -238,6 +244,12 @@ impl PhaseLock {
                 integral: state.frequency.integral.get(),
                 omega: state.frequency.omega,
                 amplitude: state.channels.response.amplitude(),
+                harmonics: if period_ends {
+                    state.channels.response.harmonics()
+                } else {
+                    0.0
+                },
+                residuals: state.channels.residuals(),
                 valid: measured.valid,
             };
             state.lost = self.stationarity.update(&mut state.dwell, &reading, period_ends);

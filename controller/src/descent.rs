@@ -114,6 +114,12 @@ impl DescentState {
             extremes: None,
         }
     }
+
+    /// The start of a descent from this response amplitude, m, of a motion that the setpoint of the drive holds: the drive that holds the
+    /// response is to be smaller at its end.
+    pub fn below_setpoint(response: Real) -> Self {
+        Self { extremes: Some([0.0, Real::MAX]), ..Self::from(response) }
+    }
 }
 
 /// Measurements that a descent uses.

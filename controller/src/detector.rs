@@ -30,11 +30,19 @@ impl Estimate {
         self.coefficients.harmonic[0]
     }
 
+    /// Sum of the amplitudes of the harmonics above the fundamental, m.
+    pub fn harmonics(&self) -> Real {
+        self.coefficients.harmonic[1..].iter().map(|one| one.magnitude()).sum()
+    }
+
     /// Whether the sum of the amplitudes of the harmonics above the fundamental is at most this, m.
     pub fn harmonics_within(&self, limit: Real) -> bool {
-        let sum = |size: fn(&Complex) -> Real| self.coefficients.harmonic[1..].iter().map(size).sum::<Real>();
-        // A bound without roots decides almost always.
-        sum(|one| one.re.abs() + one.im.abs()) <= limit || sum(|one| one.magnitude()) <= limit
+        let bound: Real = self.coefficients.harmonic[1..]
+            .iter()
+            .map(|one| one.re.abs() + one.im.abs())
+            .sum();
+        // The bound without roots decides almost always.
+        bound <= limit || self.harmonics() <= limit
     }
 
     /// Amplitude of the fundamental, m.

@@ -15,6 +15,10 @@ const UNCHANGED: Real = FRAC_PI_3;
 /// Smallest valid amplitude of the reference, as a share of the drive amplitude.
 const REFERENCE_SHARE: Real = 0.1;
 
+/// Samples after which noise has no correlation any more, not even behind an anti-alias filter at ten times the frequency, if there are a
+/// hundred in a period.
+const LAG: usize = 5;
+
 /// Coefficients of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -47,6 +51,8 @@ pub struct Channels {
     /// Estimate of the response.
     pub response: Estimate,
     reference: Estimate,
+    /// Differences of the last readings of the response from their predictions, m; the present one first.
+    residuals: [Real; LAG + 1],
     /// The drive with the lag of the detector, m.
     drive: Real,
     differences: Differences,
@@ -96,6 +102,13 @@ struct Reference {
     /// m
     amplitude: Real,
     valid: bool,
+}
+
+impl Channels {
+    /// Difference of the last reading of the response from its prediction, m, and that of an earlier one.
+    pub fn residuals(&self) -> [Real; 2] {
+        [self.residuals[0], self.residuals[LAG]]
+    }
 }
 
 impl Sensing {
@@ -174,6 +187,8 @@ impl Sensing {
     fn predict(&self, state: &mut Channels, response: Real, reference: Option<Real>, drive: PresentDrive) {
         let rotors = self.detector.rotors(drive.rotor);
         let difference = self.detector.update(&mut state.response, response, &rotors);
+        let [a, b, c, d, e, _] = state.residuals;
+        state.residuals = [difference, a, b, c, d, e];
         let (mut differences, mut change) = ([difference, 0.0], 1.0);
         if let Some(reading) = reference {
             let predicted = reading - self.detector.update(&mut state.reference, reading, &rotors);

@@ -3,6 +3,10 @@
 //! A motion is stationary if the means over a quarter of the dwell differ by no more than the drift tolerances. Where noise hides so
 //! small a drift, the differences of means over half a dwell are compared with the scatter of the periods within the blocks instead:
 //! a drift makes the range of four consecutive means ten times as large as the scatter, noise about twice.
+//!
+//! The detector's residual, the difference between readings and their prediction by the odd harmonics, tells noise from motion: noise has
+//! no correlation with itself a few samples before. What is correlated is no noise; if it is also large compared with the harmonics and
+//! does not decay, the motion has even harmonics or subharmonics.
 
 use crate::config::LockCriterion;
 use crate::real::{self, Real, Sum};
@@ -16,6 +20,15 @@ const NOISE_RANGE: Real = 5.0;
 /// Smallest sum of the squared differences from period to period over that of the squared deviations from the mean that counts as
 /// noise. A drift over five periods has 0.4, noise about 1.
 const RANDOM: Real = 0.5;
+/// Largest correlation of the residual with itself a few samples before that counts as noise; and the smallest that noise does not explain,
+/// in standard deviations.
+const CORRELATED: Real = 0.5;
+const SIGNIFICANT: Real = 5.0;
+/// Smallest ratio of the residuals of two successive dwells in a motion that does not decay.
+const LASTS: Real = 0.95;
+/// Smallest amplitude of a component that is no harmonic of the symmetric motion, in sums of the amplitudes of its harmonics: a subharmonic
+/// of order three has from ten to sixty of them.
+const OTHER: Real = 3.0;
 /// Largest scatter of the periods, relative, that counts as noise.
 const NOISE_MAX: Real = 0.03;
 
@@ -46,6 +59,10 @@ pub struct Reading {
     pub omega: Real,
     /// Response amplitude, m.
     pub amplitude: Real,
+    /// Sum of the amplitudes of its harmonics, m; used only where a period ends.
+    pub harmonics: Real,
+    /// Differences of two readings, a few samples apart, from their predictions, m.
+    pub residuals: [Real; 2],
     /// Whether these values are valid.
     pub valid: bool,
 }
@@ -58,6 +75,8 @@ struct Sums {
     integral: Sum,
     omega: Sum,
     amplitude: Sum,
+    power: Real,
+    common: Real,
     samples: u64,
     invalid: u64,
 }
@@ -93,6 +112,9 @@ struct Block {
     periods: u32,
     error: Real,
     omega: Real,
+    /// Sums over the residual: of its squares, and of the products of samples a few apart, m².
+    power: Real,
+    common: Real,
     integral: Scatter,
     amplitude: Scatter,
 }
@@ -103,6 +125,8 @@ impl Block {
         let (n, samples) = (self.periods as Real, period.samples as Real);
         self.error += (period.error.get() / samples - self.error) / n;
         self.omega += (period.omega.get() / samples - self.omega) / n;
+        self.power += period.power;
+        self.common += period.common;
         self.integral.add(period.integral.get() / samples, n);
         self.amplitude.add(period.amplitude.get() / samples, n);
     }
@@ -118,6 +142,7 @@ pub struct Dwell {
     block: Block,
     means: Option<(Real, Real)>,
     settled: bool,
+    other_motion: bool,
 }
 
 impl Dwell {
@@ -125,6 +150,11 @@ impl Dwell {
     #[inline(never)]
     pub fn restart(&mut self) {
         *self = Self::default();
+    }
+
+    /// Whether it is met by a motion with components that are no harmonics of the symmetric one, such as a subharmonic.
+    pub fn is_other_motion(&self) -> bool {
+        self.other_motion
     }
 
     /// Whether the criterion is met.
@@ -161,6 +191,9 @@ impl Stationarity {
         period.integral.add(reading.integral);
         period.omega.add(reading.omega);
         period.amplitude.add(reading.amplitude);
+        let [now, before] = reading.residuals;
+        period.power += now * now;
+        period.common += now * before;
         period.samples += 1;
         period.invalid += u64::from(!reading.valid);
         if !period_ends {
@@ -172,12 +205,12 @@ impl Stationarity {
         if lost {
             dwell.restart();
         } else {
-            self.end_period(dwell, &period);
+            self.end_period(dwell, &period, reading.harmonics);
         }
         lost
     }
 
-    fn end_period(&self, dwell: &mut Dwell, period: &Sums) {
+    fn end_period(&self, dwell: &mut Dwell, period: &Sums, harmonics: Real) {
         dwell.block.add(period);
         if dwell.block.periods < self.block {
             return;
@@ -188,8 +221,19 @@ impl Stationarity {
         let last = dwell.last(dwell.complete.min(DWELL));
         let omega = mean(last, |block| block.omega);
         dwell.means = Some((omega, mean(last, |block| block.amplitude.mean)));
-        dwell.settled = dwell.complete >= DWELL && self.is_smooth(dwell.last(DWELL))
-            || dwell.complete == BLOCKS && self.is_noise(&dwell.blocks);
+        let is_smooth = dwell.complete >= DWELL && self.is_smooth(dwell.last(DWELL));
+        let is_noise = dwell.complete == BLOCKS && self.is_noise(&dwell.blocks);
+        let (before, last) = dwell.blocks.split_at(DWELL);
+        let [[_, before], [power, common]] = [before, last].map(residual);
+        let is_random = common <= CORRELATED * power;
+        let lasts = is_random || common >= LASTS * before;
+        let samples = period.samples as Real * (self.block as usize * DWELL) as Real;
+        let by_noise = SIGNIFICANT * power / real::sqrt(samples);
+        let component = OTHER * harmonics;
+        // A detector without harmonics leaves those of any motion in its residual.
+        let is_other = component > 0.0 && common > by_noise.max(0.5 * component * component * samples);
+        dwell.settled = is_smooth || is_noise && is_random;
+        dwell.other_motion = (is_smooth || is_noise && lasts) && is_other;
     }
 
     fn is_smooth(&self, blocks: &[Block]) -> bool {
@@ -216,6 +260,13 @@ impl Stationarity {
             && is_constant(|block| block.integral, self.frequency_drift)
             && is_constant(|block| block.amplitude, self.amplitude_drift)
     }
+}
+
+/// Sums over the residual: of its squares, and of the products.
+fn residual(blocks: &[Block]) -> [Real; 2] {
+    blocks.iter().fold([0.0; 2], |[power, common], block| {
+        [power + block.power, common + block.common]
+    })
 }
 
 fn mean(blocks: &[Block], value: impl Fn(&Block) -> Real) -> Real {

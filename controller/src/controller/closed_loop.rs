@@ -26,6 +26,7 @@ impl PhaseLock {
             },
         );
         self.close_loop(state, measured);
+        state.approach.lowest = Real::MAX;
         state.ready = complete;
         if complete {
             state.amplitude_loop = None;

@@ -76,6 +76,54 @@ fn orbits_just_above_the_fold_and_just_below_symmetry_breaking_are_reached() {
             ],
             0.1304,
         ),
+        // The first descent ends far above the orbit, and the response falls past it.
+        (
+            [
+                "plant.epsilon=0.044486103",
+                "plant.lambda=0.29395524",
+                "plant.r=0.46215017",
+                "excitation.G=0.81962723",
+            ],
+            0.2295,
+        ),
+        // A modulation that decays over 540 periods resembles noise.
+        (
+            [
+                "plant.epsilon=0.046079366",
+                "plant.lambda=0.68301824",
+                "plant.r=0.27802309",
+                "excitation.G=0.89886111",
+            ],
+            0.3386,
+        ),
+    ] {
+        let lock = lock(settings);
+        assert_eq!(lock.regime, Regime::Symmetric);
+        assert!((lock.c - c).abs() < 2e-3, "{lock:?}");
+    }
+}
+
+#[test]
+fn subharmonic_motions_of_the_same_drive_are_left_for_the_symmetric_one() {
+    for (settings, c) in [
+        (
+            [
+                "plant.epsilon=0.014429842",
+                "plant.lambda=0.80932254",
+                "plant.r=0.76757213",
+                "excitation.G=0.75737775",
+            ],
+            0.6190,
+        ),
+        (
+            [
+                "plant.epsilon=0.0048763899",
+                "plant.lambda=2.4297409",
+                "plant.r=0.94889327",
+                "excitation.G=1.1322403",
+            ],
+            0.4485,
+        ),
     ] {
         let lock = lock(settings);
         assert_eq!(lock.regime, Regime::Symmetric);
