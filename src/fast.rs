@@ -12,6 +12,7 @@ mod arrival;
 mod cache;
 mod coefficients;
 mod flight;
+mod free_increment;
 mod grid;
 mod hop;
 mod horizon;
@@ -23,8 +24,8 @@ mod verify;
 use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
+use crate::moving::Moving;
 use crate::oscillator::Oscillator;
-use crate::plant::{Masses, Rig};
 use crate::segment::Segment;
 use cache::Cache;
 use coefficients::Coefficients;
@@ -46,15 +47,6 @@ pub(crate) enum Next {
     Contact(Sum, Wall),
     /// Unknown: the plain solver has to search, for so long at most, s.
     Search(f64),
-}
-
-/// The parts of a plant that move, and the rig.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Moving {
-    pub rig: Rig,
-    pub masses: Masses,
-    pub base: BaseMotion,
 }
 
 /// Predictions, and what they are made from.

@@ -2,9 +2,8 @@
 
 use super::FastPath;
 use super::coefficients::{Coefficients, NEAR};
-use super::grid::Mark;
 use super::propagator::{Increment, Nearby, Point, Propagator, angle};
-use super::verify::{Sample, Start};
+use super::verify::{Mark, Sample, Start};
 use crate::arithmetic::Sum;
 use crate::contact::Wall;
 

@@ -5,9 +5,9 @@ use super::coefficients::Coefficients;
 use super::horizon::Horizon;
 use super::propagator::{Nearby, Point};
 use super::verify::Start;
-use super::{FastPath, Moving, Next};
+use super::{FastPath, Next};
 use crate::base_motion::BaseMotion;
-use crate::plant::Rig;
+use crate::moving::{Moving, Rig};
 
 /// Largest displacements, in half-widths: the digits of `w` are those of `q1`.
 const WIDEST: f64 = 64.0;
@@ -137,20 +137,17 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
 /// That displacement is at most the amplitude of the steady response and that of the free motion, which never grows.
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn out_of_reach(coefficients: &Coefficients, start: &Start) -> Option<f64> {
-    let amplitude = start.base.drive.amplitude;
-    let steady = coefficients.forcing.steady()? * amplitude;
-    let (b, particle) = (
-        start.rig.parameters.half_width,
-        start.here.point.y - start.here.sample.w,
-    );
+    let (b, here) = (start.rig.parameters.half_width, &start.here);
+    let steady = coefficients.forcing.steady()? * start.base.drive.amplitude;
+    let particle = here.point.y - here.sample.w;
     let room = b * (1.0 - 1e-9) - particle.abs() - steady.l1_norm();
     if room <= 0.0 || start.base.drive.signal[1] != 0.0 {
         return None;
     }
-    let Point { y, dy, phasor: (cos, sin) } = start.here.point;
+    let Point { y, dy, phasor: (cos, sin) } = here.point;
     let y = y - (steady.re * sin + steady.im * cos);
     let dy = dy - coefficients.omega * (steady.re * cos - steady.im * sin);
     let omega0 = start.rig.alone.omega0;
     let room = room - (y * y + (dy / omega0) * (dy / omega0)).sqrt();
-    (room > 0.0).then(|| room / start.masses.particle.abs())
+    (room > 0.0).then(|| room / start.drift.abs())
 }

@@ -8,13 +8,11 @@
 //!
 //! Taylor's theorem with Lagrange's remainder then bounds each gap from below (R. E. Moore, "Interval Analysis", Prentice-Hall 1966).
 
-use super::Moving;
 use super::coefficients::Coefficients;
-use super::grid::Mark;
 use super::propagator::Point;
 use crate::base_motion::{BaseMotion, Drive};
+use crate::moving::{Moving, Rig};
 use crate::oscillator::Oscillator;
-use crate::plant::{Masses, Rig};
 
 /// Rounding error of a gap, in half-widths, and of a bound, relative.
 pub(super) const ROUNDING: f64 = 1e-14;
@@ -75,12 +73,20 @@ impl Sample {
     }
 }
 
+/// An instant of a flight at which the motion is known.
+#[derive(Clone, Copy)]
+pub(super) struct Mark {
+    /// Time since the start of the flight, s: an exact multiple of the spacing.
+    pub t: f64,
+    pub point: Point,
+    pub sample: Sample,
+}
+
 /// The start of a flight.
 #[derive(Clone, Copy)]
 pub(super) struct Start<'a> {
     pub rig: &'a Rig,
     pub base: &'a BaseMotion,
-    pub masses: &'a Masses,
     pub here: Mark,
     /// Velocity of the base's line less that of the particle, m/s.
     pub drift: f64,
@@ -94,7 +100,6 @@ impl<'a> Start<'a> {
         Self {
             rig,
             base,
-            masses,
             here: Mark { t: 0.0, point, sample },
             drift: base.drive.signal[1] - masses.particle,
         }

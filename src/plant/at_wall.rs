@@ -1,9 +1,10 @@
 //! The particle at a wall: impact, then rest if it cannot leave.
 
 use super::advance::Step;
-use super::{Event, Masses, Plant};
+use super::{Event, Plant};
 use crate::arithmetic::Sum;
 use crate::contact::{Contact, Resolution, Wall};
+use crate::moving::Masses;
 use crate::oscillator::Oscillator;
 use crate::segment::Segment;
 
