@@ -10,7 +10,7 @@ use vines::{
     experiment::{ExperimentError, Plan, Sample, Stage, run_into},
     identification::{self, IdentificationError},
     pack, report,
-    rig::BuiltIn,
+    rig::{BuiltIn, Fault},
     scene::Scene,
 };
 
@@ -105,7 +105,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &Path) -> Failure {
     let reason = matches!(
         error,
-        ExperimentError::NoLock { .. } | ExperimentError::Irregular { .. }
+        ExperimentError::NoLock { .. }
+            | ExperimentError::Irregular { .. }
+            | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. }
     )
     .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
     .flatten();
