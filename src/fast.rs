@@ -65,7 +65,7 @@ pub(crate) struct FastPath {
     cache: Cache,
     /// What comes next could not be verified: the plain solver is to search for so long, s.
     to_search: f64,
-    /// Evaluations of the motion, by the plain solver too.
+    /// Evaluations of the motion in the present step, by the plain solver too.
     pub evaluations: u64,
 }
 

@@ -55,8 +55,8 @@ impl Flight {
         let scale = (self.motion.fastest(), RESOLUTION * self.half_width);
         let (closure, looks) = first_closure((from, limit), scale, look, self);
         match closure {
-            Some(closure) => self.landing((closure.t, closure.h), Some(Wall::BOTH[closure.which]), looks),
-            None => self.landing((limit, 0.0), None, looks + 1),
+            Ok(closure) => self.landing((closure.t, closure.h), Some(Wall::BOTH[closure.which]), looks),
+            Err(t) => self.landing((t, 0.0), None, looks + 1),
         }
     }
 

@@ -104,11 +104,7 @@ impl InvalidValue {
         unit: &'static str,
         allowed: &'static str,
     ) -> Result<(), Self> {
-        if valid {
-            Ok(())
-        } else {
-            Err(Self { name, value, unit, allowed })
-        }
+        valid.then_some(()).ok_or(Self { name, value, unit, allowed })
     }
 }
 

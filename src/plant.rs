@@ -15,8 +15,10 @@ use crate::moving::{Masses, Moving, Rig};
 use crate::parameters::{InvalidValue, Parameters};
 pub use events::{Event, Outcome, State, Totals};
 
-/// Largest number of impacts per step. Bounds the work of any input.
+/// Largest number of impacts per step.
 pub const MOST_IMPACTS: u64 = 10_000_000;
+/// Largest number of evaluations of the motion per step: bounds the work of any input. [`MOST_IMPACTS`] impacts need fewer.
+pub const MOST_EVALUATIONS: u64 = 500_000_000;
 
 /// The plant: parameters, what follows from them, and the state.
 #[derive(Clone, Copy, Debug)]

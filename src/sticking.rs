@@ -37,13 +37,13 @@ pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> P
     };
     let scale = (motion.fastest(), noise);
     let (closure, evaluations) = first_closure((0.0, limit), scale, look, motion);
-    if let Some(Closure { t, h, derivatives: d, .. }) = closure {
-        let joint = [d[0] + position_change(&d, h), d[1] + velocity_change(&d, h)];
-        return Parting { t: t + h, released: true, joint, evaluations };
-    }
-    let [x, v, ..] = motion.at(&series, limit).derivatives;
-    let (joint, evaluations) = ([x, v], evaluations + 1);
-    Parting { t: limit, released: false, joint, evaluations }
+    let (released, evaluations) = (closure.is_ok(), evaluations + u64::from(closure.is_err()));
+    let (t, h, d) = match closure {
+        Ok(Closure { t, h, derivatives, .. }) => (t, h, derivatives),
+        Err(t) => (t, 0.0, motion.at(&series, t).derivatives),
+    };
+    let joint = [d[0] + position_change(&d, h), d[1] + velocity_change(&d, h)];
+    Parting { t: t + h, released, joint, evaluations }
 }
 
 /// Bounds of the push, which is the second derivative of the motion.

@@ -1,6 +1,6 @@
 //! The loop over events.
 
-use super::{Event, MOST_IMPACTS, Outcome, Plant};
+use super::{Event, MOST_EVALUATIONS, MOST_IMPACTS, Outcome, Plant};
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::Drive;
 use crate::contact::{Contact, Wall};
@@ -32,8 +32,7 @@ impl<F: FnMut(Event)> Step<F> {
 
     /// Whether time is left and the step is not to be cut short.
     fn goes_on(&self) -> bool {
-        let done = &self.outcome;
-        self.left.value() > 0.0 && done.impacts < MOST_IMPACTS && done.released < MOST_RELEASES
+        self.left.value() > 0.0 && self.outcome.impacts < MOST_IMPACTS && !self.outcome.cut_short
     }
 }
 
@@ -79,7 +78,6 @@ impl Plant {
         }
         if self.contact == Contact::Free && self.fast.step(&mut self.moving, duration) {
             self.time += duration;
-            self.fast.evaluations += 1;
             return Ok(Outcome { elapsed: duration, evaluations: 1, ..Outcome::default() });
         }
         check_duration(duration)?;
@@ -107,7 +105,7 @@ impl Plant {
 
     /// Follows the motion from event to event to the end of the step.
     fn follow(&mut self, duration: f64, on_event: impl FnMut(Event)) -> Outcome {
-        let evaluations = self.fast.evaluations;
+        self.fast.evaluations = 0;
         let mut step = Step {
             duration,
             left: Sum::from(duration),
@@ -121,10 +119,6 @@ impl Plant {
         }
         while step.goes_on() {
             let left = step.left.value();
-            if let Contact::Stuck(wall) = self.contact {
-                self.stay(wall, left, &mut step);
-                continue;
-            }
             let next = match self.contact {
                 Contact::Free => self.fast.next(&mut self.moving, left, duration),
                 _ => Next::Search(left),
@@ -135,14 +129,20 @@ impl Plant {
                 Next::Contact(t, wall) => {
                     step.left = step.left.minus(t);
                     self.touch(wall, &mut step);
+                    continue;
                 }
-                Next::Search(limit) => self.search(limit, &mut step),
+                Next::Search(limit) => match self.contact {
+                    Contact::Stuck(wall) => self.stay(wall, limit, &mut step),
+                    _ => self.search(limit, &mut step),
+                },
             }
+            step.outcome.cut_short =
+                self.fast.evaluations >= MOST_EVALUATIONS || step.outcome.released >= MOST_RELEASES;
         }
         let left = step.left.value();
         step.outcome.cut_short = left > 0.0;
         step.outcome.elapsed = if left > 0.0 { step.now() } else { duration };
-        step.outcome.evaluations = self.fast.evaluations - evaluations;
+        step.outcome.evaluations = self.fast.evaluations;
         step.outcome
     }
 
