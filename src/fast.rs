@@ -135,13 +135,13 @@ impl FastPath {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn take_step(&mut self, moving: &mut Moving, late: f64) {
         let drive = &moving.base.drive;
-        let response = self.cache.step.response(&moving.rig.alone, drive.omega);
+        let response = self.cache.step.response(&moving.rig.free, drive.omega);
         let start = self.point(moving);
         let step = &self.cache.step;
         let mut increment = step.increment(&response, drive.amplitude, &start);
         let (mut angle, mut t) = (response.angle, step.t);
         if late != 0.0 {
-            increment = increment.later(&moving.rig.alone, drive, (start.y, start.dy), late);
+            increment = increment.later(&moving.rig.free, drive, (start.y, start.dy), late);
             angle = angle.plus(drive.omega * late);
             t += late;
         }
@@ -189,7 +189,7 @@ impl FastPath {
 
     /// Moves on by `t` seconds, in which no wall is met; `duration` is the length of the whole step.
     fn coast(&mut self, moving: &mut Moving, start: &Point, t: f64, duration: f64) -> Next {
-        let (oscillator, drive) = (&moving.rig.alone, moving.base.drive);
+        let (oscillator, drive) = (&moving.rig.free, moving.base.drive);
         let fastest = oscillator.fastest.max(drive.omega.abs());
         self.evaluations += 1;
         if t == duration && self.cache.repeats(oscillator, &drive, duration) {

@@ -17,9 +17,9 @@ pub(crate) struct Rig {
     pub parameters: Parameters,
     pub mass_ratio: f64,
     pub law: ImpactLaw,
-    /// The primary mass alone, and with the particle stuck to it.
-    pub alone: Oscillator,
-    pub joint: Oscillator,
+    /// The primary mass while the particle is free, and both masses while it is stuck.
+    pub free: Oscillator,
+    pub stuck: Oscillator,
 }
 
 impl From<Rig> for Parameters {
@@ -30,13 +30,13 @@ impl From<Rig> for Parameters {
 
 impl From<Parameters> for Rig {
     fn from(p: Parameters) -> Self {
-        let joint = p.primary_mass + p.particle_mass;
+        let total = p.primary_mass + p.particle_mass;
         Self {
             parameters: p,
             mass_ratio: p.mass_ratio(),
             law: ImpactLaw::new(&p),
-            alone: Oscillator::new(p.primary_mass, p.stiffness, p.damping),
-            joint: Oscillator::new(joint, p.stiffness, p.damping),
+            free: Oscillator::new(p.primary_mass, p.stiffness, p.damping),
+            stuck: Oscillator::new(total, p.stiffness, p.damping),
         }
     }
 }

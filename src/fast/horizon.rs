@@ -38,10 +38,10 @@ impl Horizon {
         let Moving { rig, masses, base } = moving;
         let (b, w, dw) = (rig.parameters.half_width, masses.w.value(), masses.dw);
         let reach = AHEAD * t;
-        let forcing = forcing(&rig.alone, &base.drive, reach) * (1.0 + MARGIN);
-        let speed = speed_squared(&rig.alone, start).sqrt() + forcing * reach;
+        let forcing = forcing(&rig.free, &base.drive, reach) * (1.0 + MARGIN);
+        let speed = speed_squared(&rig.free, start).sqrt() + forcing * reach;
         let jumps = MARGIN * speed;
-        let acceleration = (rig.alone.omega0 + 2.0 * rig.alone.delta) * (speed + jumps) + forcing;
+        let acceleration = (rig.free.omega0 + 2.0 * rig.free.delta) * (speed + jumps) + forcing;
         // The bound of the gap to either wall is concave: it is above 0 in between if it is at the end.
         let open = |t: f64| {
             let (moved, lost) = (dw * t, t * (jumps + 0.5 * acceleration * t));

@@ -108,7 +108,7 @@ impl FastPath {
         let increment = match n {
             0 => Increment { y: 0.0, dy: 0.0, phasor: from.point.phasor },
             _ => (self.cache.grid)
-                .over(&start.rig.alone, coefficients, n)
+                .over(&start.rig.free, coefficients, n)
                 .increment(amplitude, &from.point),
         };
         (
@@ -138,7 +138,7 @@ impl FastPath {
     pub(super) fn mark(&mut self, start: &Start, from: &Mark, n: usize) -> Mark {
         self.evaluations += 1;
         self.rotations += 1;
-        let propagator = (self.cache.grid).over(&start.rig.alone, &self.coefficients, n);
+        let propagator = (self.cache.grid).over(&start.rig.free, &self.coefficients, n);
         let increment = propagator.increment(start.base.drive.amplitude, &from.point);
         start.mark(&self.coefficients, increment.to(&from.point), from.t + propagator.t)
     }

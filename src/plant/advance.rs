@@ -69,12 +69,12 @@ impl Plant {
             drive.validate()?;
             check_duration(duration)?;
             self.jump(&drive);
-            self.fast.drive_changed(&self.moving.rig.alone, &self.moving.base.drive);
+            self.fast.drive_changed(&self.moving.rig.free, &self.moving.base.drive);
         } else if drive.omega != before.omega {
             drive.validate_frequency()?;
             check_duration(duration)?;
             self.moving.base.drive.omega = drive.omega;
-            self.fast.drive_changed(&self.moving.rig.alone, &self.moving.base.drive);
+            self.fast.drive_changed(&self.moving.rig.free, &self.moving.base.drive);
         }
         if self.contact == Contact::Free && self.fast.step(&mut self.moving, duration) {
             self.time += duration;
@@ -92,7 +92,7 @@ impl Plant {
         let before = core::mem::replace(&mut self.moving.base.drive, *drive);
         let sin = self.fast.phasor.1;
         let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
-        let oscillator = &self.moving.rig.alone;
+        let oscillator = &self.moving.rig.free;
         let kick = 2.0 * oscillator.delta * jump;
         if jump != 0.0 {
             self.moving.masses.primary = self.moving.masses.primary.plus([0.0, kick]);
@@ -154,18 +154,18 @@ impl Plant {
             _ => None,
         };
         let masses = self.moving.masses;
-        let motion = Segment::new(&self.moving.rig.alone, self.moving.base, masses.primary.values.into());
+        let motion = Segment::new(&self.moving.rig.free, self.moving.base, masses.primary.values.into());
         let half_width = self.moving.rig.parameters.half_width;
         let flight = Flight::new(motion, (masses.w.value(), masses.dw), half_width);
-        let landing = flight.first_contact(limit, released);
-        self.fast.evaluations += landing.evaluations;
-        self.moving.masses.primary = masses.primary.plus([landing.moved, landing.gained]);
-        self.moving.masses.dw += landing.gained;
-        self.moving.masses.drift(landing.drifted, half_width);
+        let end = flight.first_contact(limit, released);
+        self.fast.evaluations += end.evaluations;
+        self.moving.masses.primary = masses.primary.plus([end.moved, end.gained]);
+        self.moving.masses.dw += end.gained;
+        self.moving.masses.drift(end.drifted, half_width);
         self.contact = Contact::Free;
-        self.base_moves(landing.t);
-        step.left = step.left.plus(-landing.t);
-        if let Some(wall) = landing.wall {
+        self.base_moves(end.t);
+        step.left = step.left.plus(-end.t);
+        if let Some(wall) = end.wall {
             self.touch(wall, step);
         }
     }
@@ -174,11 +174,11 @@ impl Plant {
     fn stay(&mut self, wall: Wall, left: f64, step: &mut Step<impl FnMut(Event)>) {
         let start = self.moving.masses.primary.values;
         let noise = self.acceleration_error(start[1]);
-        let motion = Segment::new(&self.moving.rig.joint, self.moving.base, start.into());
+        let motion = Segment::new(&self.moving.rig.stuck, self.moving.base, start.into());
         let stay = until_released(&motion, wall, left, noise);
         self.fast.evaluations += stay.evaluations;
-        self.moving.masses.primary = Sums { values: stay.joint, errors: [0.0; 2] };
-        self.moving.masses.particle = stay.joint[1];
+        self.moving.masses.primary = Sums { values: stay.state, errors: [0.0; 2] };
+        self.moving.masses.particle = stay.state[1];
         self.moving.masses.dw = 0.0;
         self.base_moves(stay.t);
         step.left = step.left.plus(-stay.t);
