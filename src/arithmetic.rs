@@ -57,11 +57,7 @@ impl Sums {
     #[must_use]
     #[inline(always)]
     pub fn plus(self, numbers: [f64; 2]) -> Self {
-        let Self { values: [a, b], errors: [e, f] } = self;
-        let [a, b] = [
-            Sum { value: a, error: e }.plus(numbers[0]),
-            Sum { value: b, error: f }.plus(numbers[1]),
-        ];
+        let [a, b] = [0, 1].map(|n| Sum { value: self.values[n], error: self.errors[n] }.plus(numbers[n]));
         Self { values: [a.value, b.value], errors: [a.error, b.error] }
     }
 }

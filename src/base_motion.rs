@@ -89,10 +89,8 @@ impl Drive {
         }
         let name = "E (amplitude of the base oscillator)";
         InvalidValue::unless(self.amplitude.abs() <= LARGEST, name, self.amplitude, "m", ALLOWED)?;
-        let (name, allowed) = (
-            "omega (frequency of the base oscillator)",
-            "a finite number from -1e50 to 1e50",
-        );
+        let name = "omega (frequency of the base oscillator)";
+        let allowed = "a finite number from -1e12 to 1e12";
         InvalidValue::unless(self.omega.abs() <= FASTEST, name, self.omega, "rad/s", allowed)
     }
 }

@@ -61,10 +61,12 @@ const MOST_TINY_STEPS: usize = 20;
 const TINY: f64 = 1e-9;
 /// Below this a sum of squares has lost digits.
 const UNDERFLOW: f64 = 1e-290;
+/// Largest number of looks in one search.
+const MOST_LOOKS: u64 = 100_000_000;
 /// So many windows are tried for a bound, each at most three times shorter than the last.
 const MOST_WINDOWS: usize = 40;
 
-/// The first closure of any of `N` gaps in `[from, limit]`, and how often the motion was evaluated.
+/// The first closure of any of `N` gaps in `[from, limit]`, or until when there is none, and how often the motion was evaluated.
 ///
 /// `look` returns the gaps at a time and the derivatives of the motion there; `fastest` is the fastest rate of the motion, 1/s;
 /// `resolution` is the rounding error of the gaps.
@@ -73,11 +75,11 @@ pub fn first_closure<const N: usize>(
     (fastest, resolution): (f64, f64),
     look: impl Fn(f64) -> ([Gap; N], Derivatives),
     bounds: impl Bounds,
-) -> (Option<Closure>, u64) {
+) -> (Result<Closure, f64>, u64) {
     let mut t = from;
     let mut looks = 0;
     let mut tiny_steps = 0;
-    while t < limit {
+    while t < limit && looks < MOST_LOOKS {
         looks += 1;
         let (gaps, derivatives) = look(t);
         let left = limit - t;
@@ -96,7 +98,7 @@ pub fn first_closure<const N: usize>(
             step = step.min(open);
         }
         if let Some((h, which)) = nearest {
-            return (Some(Closure { t, h, which, derivatives }), looks);
+            return (Ok(Closure { t, h, which, derivatives }), looks);
         }
         tiny_steps = if step * fastest < TINY { tiny_steps + 1 } else { 0 };
         let mut least = t * f64::EPSILON;
@@ -111,7 +113,7 @@ pub fn first_closure<const N: usize>(
         }
         t += step.max(least);
     }
-    (None, looks)
+    (Err(t.min(limit)), looks)
 }
 
 impl Gap {

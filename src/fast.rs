@@ -12,6 +12,7 @@ mod arrival;
 mod cache;
 mod coefficients;
 mod flight;
+mod free_increment;
 mod grid;
 mod hop;
 mod horizon;
@@ -23,8 +24,8 @@ mod verify;
 use crate::arithmetic::Sum;
 use crate::base_motion::{BaseMotion, Drive, Phase, shift};
 use crate::contact::Wall;
+use crate::moving::Moving;
 use crate::oscillator::Oscillator;
-use crate::plant::{Masses, Rig};
 use crate::segment::Segment;
 use cache::Cache;
 use coefficients::Coefficients;
@@ -48,15 +49,6 @@ pub(crate) enum Next {
     Search(f64),
 }
 
-/// The parts of a plant that move, and the rig.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Moving {
-    pub rig: Rig,
-    pub masses: Masses,
-    pub base: BaseMotion,
-}
-
 /// Predictions, and what they are made from.
 #[derive(Clone, Copy, Debug, Default)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -73,7 +65,7 @@ pub(crate) struct FastPath {
     cache: Cache,
     /// What comes next could not be verified: the plain solver is to search for so long, s.
     to_search: f64,
-    /// Evaluations of the motion, by the plain solver too.
+    /// Evaluations of the motion in the present step, by the plain solver too.
     pub evaluations: u64,
 }
 
@@ -143,13 +135,13 @@ impl FastPath {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn take_step(&mut self, moving: &mut Moving, late: f64) {
         let drive = &moving.base.drive;
-        let response = self.cache.step.response(&moving.rig.alone, drive.omega);
+        let response = self.cache.step.response(&moving.rig.free, drive.omega);
         let start = self.point(moving);
         let step = &self.cache.step;
         let mut increment = step.increment(&response, drive.amplitude, &start);
         let (mut angle, mut t) = (response.angle, step.t);
         if late != 0.0 {
-            increment = increment.later(&moving.rig.alone, drive, (start.y, start.dy), late);
+            increment = increment.later(&moving.rig.free, drive, (start.y, start.dy), late);
             angle = angle.plus(drive.omega * late);
             t += late;
         }
@@ -197,7 +189,7 @@ impl FastPath {
 
     /// Moves on by `t` seconds, in which no wall is met; `duration` is the length of the whole step.
     fn coast(&mut self, moving: &mut Moving, start: &Point, t: f64, duration: f64) -> Next {
-        let (oscillator, drive) = (&moving.rig.alone, moving.base.drive);
+        let (oscillator, drive) = (&moving.rig.free, moving.base.drive);
         let fastest = oscillator.fastest.max(drive.omega.abs());
         self.evaluations += 1;
         if t == duration && self.cache.repeats(oscillator, &drive, duration) {

@@ -19,7 +19,7 @@ pub struct Flight {
 
 /// How a flight ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Landing {
+pub struct FlightEnd {
     /// Seconds since the start of the flight.
     pub t: f64,
     /// The wall touched; `None` where the flight reached the time limit.
@@ -43,7 +43,7 @@ impl Flight {
     /// Follows the flight to its first contact, or for `limit` seconds if there is none.
     ///
     /// `released` names the wall that has just ceased to push, if the flight begins so.
-    pub fn first_contact(&self, limit: f64, released: Option<Wall>) -> Landing {
+    pub fn first_contact(&self, limit: f64, released: Option<Wall>) -> FlightEnd {
         let from = released.map_or(0.0, |wall| self.clear_of(wall).min(limit));
         let look = |t: f64| {
             let Instant { departure: (dx, dv), derivatives: d, .. } = self.motion.at(&self.series, t);
@@ -55,15 +55,15 @@ impl Flight {
         let scale = (self.motion.fastest(), RESOLUTION * self.half_width);
         let (closure, looks) = first_closure((from, limit), scale, look, self);
         match closure {
-            Some(closure) => self.landing((closure.t, closure.h), Some(Wall::BOTH[closure.which]), looks),
-            None => self.landing((limit, 0.0), None, looks + 1),
+            Ok(closure) => self.end((closure.t, closure.h), Some(Wall::BOTH[closure.which]), looks),
+            Err(t) => self.end((t, 0.0), None, looks + 1),
         }
     }
 
     /// The state `h` seconds after the instant `t`.
-    fn landing(&self, (t, h): (f64, f64), wall: Option<Wall>, evaluations: u64) -> Landing {
+    fn end(&self, (t, h): (f64, f64), wall: Option<Wall>, evaluations: u64) -> FlightEnd {
         let Instant { moved, departure: (dx, dv), derivatives: d } = self.motion.at(&self.series, t);
-        Landing {
+        FlightEnd {
             t: t + h,
             wall,
             moved: moved + position_change(&d, h),

@@ -8,6 +8,7 @@ pub mod contact;
 mod fast;
 pub mod flight;
 pub mod forcing;
+mod moving;
 pub mod oscillator;
 mod overdamped;
 pub mod parameters;

@@ -2,8 +2,8 @@
 
 use core::fmt;
 
-/// Fastest rate that is accepted, rad/s: bounds of the motion contain its powers.
-pub(crate) const FASTEST: f64 = 1e50;
+/// Fastest rate that is accepted, rad/s: the series of the motion contain its powers, up to the fifteenth.
+pub(crate) const FASTEST: f64 = 1e12;
 
 /// The physical parameters of the linear oscillator and its vibro-impact particle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -73,12 +73,17 @@ impl Parameters {
         positive("b (half-width of the cavity)", self.half_width, "m")?;
         let (r, allowed) = (self.restitution, "a number above 0 and at most 1");
         InvalidValue::unless(r > 0.0 && r <= 1.0, "r (coefficient of restitution)", r, "", allowed)?;
-        let rate = |name, value: f64| {
-            let allowed = "at most 1e50 rad/s";
-            InvalidValue::unless(value <= FASTEST, name, value, "rad/s", allowed)
+        let rate = |name, value: f64, least, allowed| {
+            InvalidValue::unless((least..=FASTEST).contains(&value), name, value, "rad/s", allowed)
         };
-        rate("sqrt(k/M) (natural frequency)", self.natural_frequency())?;
-        rate("c/M (decay rate)", self.damping / self.primary_mass)
+        let name = "sqrt(k/M) (natural frequency)";
+        rate(name, self.natural_frequency(), 1e-12, "a number from 1e-12 to 1e12")?;
+        rate(
+            "c/M (decay rate)",
+            self.damping / self.primary_mass,
+            0.0,
+            "at most 1e12 rad/s",
+        )
     }
 }
 
@@ -104,11 +109,7 @@ impl InvalidValue {
         unit: &'static str,
         allowed: &'static str,
     ) -> Result<(), Self> {
-        if valid {
-            Ok(())
-        } else {
-            Err(Self { name, value, unit, allowed })
-        }
+        valid.then_some(()).ok_or(Self { name, value, unit, allowed })
     }
 }
 

@@ -9,75 +9,16 @@ mod events;
 
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::{BaseMotion, Drive};
-use crate::contact::{Contact, ImpactLaw, Wall};
-use crate::fast::{FastPath, Moving};
-use crate::oscillator::Oscillator;
+use crate::contact::{Contact, Wall};
+use crate::fast::FastPath;
+use crate::moving::{Masses, Moving, Rig};
 use crate::parameters::{InvalidValue, Parameters};
 pub use events::{Event, Outcome, State, Totals};
 
-/// Largest number of impacts per step. Bounds the work of any input.
+/// Largest number of impacts per step.
 pub const MOST_IMPACTS: u64 = 10_000_000;
-
-/// The parameters and what follows from them. The parameters alone are saved.
-#[derive(Clone, Copy, Debug)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(from = "Parameters", into = "Parameters")
-)]
-pub(crate) struct Rig {
-    pub parameters: Parameters,
-    pub mass_ratio: f64,
-    pub law: ImpactLaw,
-    /// The primary mass alone, and with the particle stuck to it.
-    pub alone: Oscillator,
-    pub joint: Oscillator,
-}
-
-impl From<Rig> for Parameters {
-    fn from(rig: Rig) -> Self {
-        rig.parameters
-    }
-}
-
-impl From<Parameters> for Rig {
-    fn from(p: Parameters) -> Self {
-        let joint = p.primary_mass + p.particle_mass;
-        Self {
-            parameters: p,
-            mass_ratio: p.mass_ratio(),
-            law: ImpactLaw::new(&p),
-            alone: Oscillator::new(p.primary_mass, p.stiffness, p.damping),
-            joint: Oscillator::new(joint, p.stiffness, p.damping),
-        }
-    }
-}
-
-/// Displacements and velocities of both masses.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) struct Masses {
-    /// Displacement of the primary mass, m, and its velocity, m/s.
-    pub primary: Sums,
-    /// Relative displacement `w = q1 - q2`, m. It is carried itself: in a narrow gap the difference of two large
-    /// displacements would have lost it.
-    pub w: Sum,
-    /// Relative velocity `w'`, m/s. After an impact it has more digits than the difference of two large velocities.
-    pub dw: f64,
-    /// Velocity of the particle, m/s.
-    pub particle: f64,
-}
-
-impl Masses {
-    /// Adds `dw` to the relative displacement, in which no wall is met.
-    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
-    pub fn drift(&mut self, dw: f64, half_width: f64) {
-        self.w = self.w.plus(dw);
-        if self.w.value().abs() > half_width {
-            self.w = Sum::from(half_width.copysign(self.w.value()));
-        }
-    }
-}
+/// Largest number of evaluations of the motion per step: bounds the work of any input. [`MOST_IMPACTS`] impacts need fewer.
+pub const MOST_EVALUATIONS: u64 = 500_000_000;
 
 /// The plant: parameters, what follows from them, and the state.
 #[derive(Clone, Copy, Debug)]

@@ -6,13 +6,13 @@ use crate::segment::{Derivatives, Segment, position_change, velocity_change};
 
 /// How a stretch of sticking ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Parting {
+pub struct Sticking {
     /// Seconds since the start of the stretch.
     pub t: f64,
     /// Whether the wall ceased to push; else the time limit was reached.
     pub released: bool,
-    /// Position (m) and velocity (m/s) of the joint mass.
-    pub joint: [f64; 2],
+    /// Position (m) and velocity (m/s) of both masses.
+    pub state: [f64; 2],
     /// Evaluations of the motion.
     pub evaluations: u64,
 }
@@ -22,7 +22,7 @@ pub struct Parting {
 /// The wall at `w = +b` pushes while the joint acceleration is positive, that at `w = -b` while it is negative.
 /// `noise` (m/s²) is the rounding of that acceleration: a push is said to have ceased only below `-noise`, so that two
 /// masses at rest do not part over a last digit.
-pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> Parting {
+pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> Sticking {
     let s = wall.sign();
     let series = motion.series();
     let look = |t: f64| {
@@ -37,13 +37,13 @@ pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> P
     };
     let scale = (motion.fastest(), noise);
     let (closure, evaluations) = first_closure((0.0, limit), scale, look, motion);
-    if let Some(Closure { t, h, derivatives: d, .. }) = closure {
-        let joint = [d[0] + position_change(&d, h), d[1] + velocity_change(&d, h)];
-        return Parting { t: t + h, released: true, joint, evaluations };
-    }
-    let [x, v, ..] = motion.at(&series, limit).derivatives;
-    let (joint, evaluations) = ([x, v], evaluations + 1);
-    Parting { t: limit, released: false, joint, evaluations }
+    let (released, evaluations) = (closure.is_ok(), evaluations + u64::from(closure.is_err()));
+    let (t, h, d) = match closure {
+        Ok(Closure { t, h, derivatives, .. }) => (t, h, derivatives),
+        Err(t) => (t, 0.0, motion.at(&series, t).derivatives),
+    };
+    let state = [d[0] + position_change(&d, h), d[1] + velocity_change(&d, h)];
+    Sticking { t: t + h, released, state, evaluations }
 }
 
 /// Bounds of the push, which is the second derivative of the motion.

@@ -78,6 +78,49 @@ fn an_invalid_drive_or_step_is_refused_and_changes_nothing() {
 }
 
 #[test]
+fn the_motion_is_the_same_in_any_units() {
+    // Powers of two: every number is scaled without rounding.
+    let run = |time: f64, length: f64, damping: f64, fast: bool| {
+        let rate = 1.0 / time;
+        let parameters = Parameters {
+            stiffness: rate * rate,
+            damping: damping * rate,
+            half_width: length,
+            ..Parameters::dimensionless(0.0084, 0.0, 0.65)
+        };
+        let (q1, q2, v) = (-0.42 * length, -0.99 * length, -0.86 * length * rate);
+        let mut plant = Plant::new(parameters, State { q1, q2, dq2: v, dq1: 0.0 }).unwrap();
+        plant.set_fast_path(fast);
+        for n in 0..400 {
+            let drive = Drive::harmonic(0.02 * length, 0.99 * rate);
+            plant
+                .advance(drive, if n % 2 == 0 { 0.0625 } else { 1.5 } * time)
+                .unwrap();
+        }
+        let State { q1, dq1, q2, dq2 } = plant.state();
+        [q1 / length, dq1 / length * time, q2 / length, dq2 / length * time]
+    };
+    for (damping, fast) in [0.012, 2.0, 20.0]
+        .into_iter()
+        .flat_map(|damping| [(damping, false), (damping, true)])
+    {
+        let (small, large) = (2f64.powi(-35), 2f64.powi(290));
+        for (time, length) in [
+            (small, large),
+            (small, 1.0 / large),
+            (1.0 / small, large),
+            (1.0 / small, 1.0 / large),
+        ] {
+            let (one, other) = (run(1.0, 1.0, damping, fast), run(time, length, damping, fast));
+            assert_eq!(
+                one, other,
+                "time {time:e}, length {length:e}, damping {damping}, fast path {fast}"
+            );
+        }
+    }
+}
+
+#[test]
 fn steps_that_differ_in_their_last_digits_end_where_equal_ones_do() {
     let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
     let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };

@@ -167,6 +167,22 @@ fn a_plant_without_damping_locks_on_its_exact_orbit() {
 }
 
 #[test]
+fn a_response_that_exceeds_its_limit_is_told_at_which_drives_an_orbit_is_stable() {
+    let folder = tempfile::tempdir().unwrap();
+    let undamped = ["--set=plant.c=0", "--set=start.dq2=0.1"];
+    let run = [
+        "identify",
+        "--rig",
+        "built-in",
+        "--out",
+        folder.path().to_str().unwrap(),
+    ];
+    let part =
+        "its limit\nthere is no stable symmetric 1:1 orbit at G = 1.1000; it is stable for G from 0.788 to 0.811";
+    fails(&[&run[..], &undamped].concat(), 1, part);
+}
+
+#[test]
 fn packing_without_libraries_says_what_is_missing() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().to_str().unwrap();

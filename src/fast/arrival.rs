@@ -2,9 +2,8 @@
 
 use super::FastPath;
 use super::coefficients::{Coefficients, NEAR};
-use super::grid::Mark;
 use super::propagator::{Increment, Nearby, Point, Propagator, angle};
-use super::verify::{Sample, Start};
+use super::verify::{Mark, Sample, Start};
 use crate::arithmetic::Sum;
 use crate::contact::Wall;
 
@@ -120,9 +119,9 @@ impl FastPath {
         let there = &nearby.there;
         let speed = from.sample.dw + there.dy;
         for _ in 0..MOST_ITERATIONS {
-            let (bent, quickened) = nearby.change(h);
-            let slowness = 1.0 / (speed + quickened);
-            let step = ((gap - h * speed) - bent) * slowness;
+            let (deviation, gained) = nearby.change(h);
+            let slowness = 1.0 / (speed + gained);
+            let step = ((gap - h * speed) - deviation) * slowness;
             let within = (h + step).abs() <= self.coefficients.reach;
             if !within {
                 break;
@@ -131,12 +130,12 @@ impl FastPath {
             let error = (nearby.c[0] * slowness * (step * step)).abs();
             if error <= ENOUGH * (at - from.t + h) && step.abs() <= SHORT * self.coefficients.reach {
                 let phasor = nearby.phasor(h + step);
-                let (y, dy) = (there.y + (h * nearby.dy + bent), nearby.dy + quickened);
+                let (y, dy) = (there.y + (h * nearby.dy + deviation), nearby.dy + gained);
                 let ddw = start.acceleration(&self.coefficients, &Point { y: from.point.y + y, dy, phasor });
                 let added = Increment {
                     y: (from.point.y - start.here.point.y) + (y + step * (dy + 0.5 * step * ddw)),
                     dy: (from.point.dy - start.here.point.dy)
-                        + (there.dy + (quickened + step * (ddw + 3.0 * step * nearby.c[1]))),
+                        + (there.dy + (gained + step * (ddw + 3.0 * step * nearby.c[1]))),
                     phasor,
                 };
                 h += step;

@@ -1,6 +1,5 @@
 //! Coefficients of the motion at one frequency of the base.
 
-use super::grid::{POINTS, STRETCH};
 use crate::forcing::Forcing;
 use crate::oscillator::Oscillator;
 
@@ -12,6 +11,10 @@ pub(super) const NEAR: f64 = 1.0 / 2048.0;
 const SPACING: f64 = 0.0958;
 /// Farthest distance of an instant from its point, in distances between points.
 const REACH: f64 = 0.7;
+/// Points of the grid: its span is a little more than half a period of the fastest rate.
+pub(super) const POINTS: usize = 36;
+/// Points in a stretch of a march.
+pub(super) const STRETCH: usize = 24;
 /// Number of Taylor coefficients: of degrees 2 to 9.
 pub(super) const TERMS: usize = 8;
 

@@ -5,9 +5,9 @@ use super::coefficients::Coefficients;
 use super::horizon::Horizon;
 use super::propagator::{Nearby, Point};
 use super::verify::Start;
-use super::{FastPath, Moving, Next};
+use super::{FastPath, Next};
 use crate::base_motion::BaseMotion;
-use crate::plant::Rig;
+use crate::moving::{Moving, Rig};
 
 /// Largest displacements, in half-widths: the digits of `w` are those of `q1`.
 const WIDEST: f64 = 64.0;
@@ -37,14 +37,14 @@ impl FastPath {
         }
         let point = self.point(moving);
         let (rig, base) = (&moving.rig, &moving.base);
-        let soon = left * rig.alone.fastest.max(base.drive.omega.abs()) <= 1.0;
+        let soon = left * rig.free.fastest.max(base.drive.omega.abs()) <= 1.0;
         if left < self.contact_free.t || (soon && self.is_contact_free(moving, left)) {
             return self.coast(moving, &point, left, duration);
         }
         if !applies(rig, base, &point) {
             return Next::Search(left);
         }
-        self.coefficients.prepare(&rig.alone, base.drive.omega);
+        self.coefficients.prepare(&rig.free, base.drive.omega);
         if let Some(next) = self.as_before(moving, &point, left, duration) {
             return next;
         }
@@ -90,7 +90,7 @@ impl FastPath {
     /// The flight that followed the last one before, or the end of a step that did, if it lies ahead again.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn as_before(&mut self, moving: &mut Moving, point: &Point, left: f64, duration: f64) -> Option<Next> {
-        let propagator = (self.cache).expected(&moving.rig.alone, &self.coefficients)?;
+        let propagator = (self.cache).expected(&moving.rig.free, &self.coefficients)?;
         self.evaluations += 1;
         let mut start = Start::new(moving, *point);
         let drive = &start.base.drive;
@@ -121,7 +121,7 @@ impl FastPath {
 /// Whether the motion is such that bounds can verify anything, and displacements such that `w` has all its digits.
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
-    let oscillator = &rig.alone;
+    let oscillator = &rig.free;
     let [offset, slope, ..] = base.drive.signal;
     let widest = WIDEST * rig.parameters.half_width;
     let fastest = widest * oscillator.omega0;
@@ -137,20 +137,17 @@ fn applies(rig: &Rig, base: &BaseMotion, point: &Point) -> bool {
 /// That displacement is at most the amplitude of the steady response and that of the free motion, which never grows.
 #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
 fn out_of_reach(coefficients: &Coefficients, start: &Start) -> Option<f64> {
-    let amplitude = start.base.drive.amplitude;
-    let steady = coefficients.forcing.steady()? * amplitude;
-    let (b, particle) = (
-        start.rig.parameters.half_width,
-        start.here.point.y - start.here.sample.w,
-    );
+    let (b, here) = (start.rig.parameters.half_width, &start.here);
+    let steady = coefficients.forcing.steady()? * start.base.drive.amplitude;
+    let particle = here.point.y - here.sample.w;
     let room = b * (1.0 - 1e-9) - particle.abs() - steady.l1_norm();
     if room <= 0.0 || start.base.drive.signal[1] != 0.0 {
         return None;
     }
-    let Point { y, dy, phasor: (cos, sin) } = start.here.point;
+    let Point { y, dy, phasor: (cos, sin) } = here.point;
     let y = y - (steady.re * sin + steady.im * cos);
     let dy = dy - coefficients.omega * (steady.re * cos - steady.im * sin);
-    let omega0 = start.rig.alone.omega0;
+    let omega0 = start.rig.free.omega0;
     let room = room - (y * y + (dy / omega0) * (dy / omega0)).sqrt();
-    (room > 0.0).then(|| room / start.masses.particle.abs())
+    (room > 0.0).then(|| room / start.drift.abs())
 }

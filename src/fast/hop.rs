@@ -23,7 +23,7 @@ impl FastPath {
         let s = 1f64.copysign(here.w);
         let (speed, pressing) = (-s * here.dw, s * here.ddw);
         let about = 2.0 * speed / pressing;
-        let fastest = (start.rig.alone.fastest).max(start.base.drive.omega.abs());
+        let fastest = (start.rig.free.fastest).max(start.base.drive.omega.abs());
         let short = speed > 0.0
             && pressing > 0.0
             && about * fastest <= LONGEST

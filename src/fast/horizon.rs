@@ -4,10 +4,10 @@
 //! do. A bound with a margin for both remains true until the margin is used up. A drive that changes at every sample, as a phase-locked
 //! loop changes it, therefore asks for no new bound.
 
-use super::Moving;
 use super::propagator::Point;
 use super::verify::{ROUNDING, forcing, harmonic_forcing, speed_squared};
 use crate::base_motion::Drive;
+use crate::moving::Moving;
 use crate::oscillator::Oscillator;
 
 /// Contact is looked for so many steps ahead.
@@ -35,17 +35,13 @@ impl Horizon {
 
     /// What a bound from the start alone shows: no contact for `t` seconds or more, or nothing.
     pub(super) fn ahead(moving: &Moving, start: &Point, t: f64) -> Self {
-        let Oscillator { delta, omega0, .. } = moving.rig.alone;
-        let (b, w, dw) = (
-            moving.rig.parameters.half_width,
-            moving.masses.w.value(),
-            moving.masses.dw,
-        );
+        let Moving { rig, masses, base } = moving;
+        let (b, w, dw) = (rig.parameters.half_width, masses.w.value(), masses.dw);
         let reach = AHEAD * t;
-        let forcing = forcing(&moving.rig.alone, &moving.base.drive, reach) * (1.0 + MARGIN);
-        let speed = speed_squared(&moving.rig.alone, start).sqrt() + forcing * reach;
+        let forcing = forcing(&rig.free, &base.drive, reach) * (1.0 + MARGIN);
+        let speed = speed_squared(&rig.free, start).sqrt() + forcing * reach;
         let jumps = MARGIN * speed;
-        let acceleration = (omega0 + 2.0 * delta) * (speed + jumps) + forcing;
+        let acceleration = (rig.free.omega0 + 2.0 * rig.free.delta) * (speed + jumps) + forcing;
         // The bound of the gap to either wall is concave: it is above 0 in between if it is at the end.
         let open = |t: f64| {
             let (moved, lost) = (dw * t, t * (jumps + 0.5 * acceleration * t));
@@ -56,7 +52,7 @@ impl Horizon {
         let end = 2.0 * gap / (closing + (closing * closing + 2.0 * acceleration * gap).sqrt());
         let far = reach.min(end * (1.0 - 1e-6));
         match [far, t].into_iter().find(|&one| one >= t && open(one)) {
-            Some(t) if !moving.base.drive.is_straight() => Self::unchanged(t),
+            Some(t) if !base.drive.is_straight() => Self::unchanged(t),
             Some(t) => Self { t, forcing, jumps },
             None => Self::default(),
         }

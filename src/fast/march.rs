@@ -2,9 +2,10 @@
 
 use super::FastPath;
 use super::arrival::Arrival;
+use super::coefficients::{POINTS, STRETCH, TERMS};
 use super::flight::Found;
-use super::grid::{Mark, STRETCH};
-use super::verify::{Sample, Start};
+use super::propagator::{Increment, Nearby};
+use super::verify::{Mark, Sample, Start};
 use crate::contact::Wall;
 
 /// Longest flight that is marched over, in stretches.
@@ -15,6 +16,8 @@ const SHORTEST: usize = 3;
 const MOST_DIVIDED: u32 = 16;
 /// Longest stretch before a predicted contact that one bound can verify, in stretches.
 const LONGEST_STRETCH: f64 = 2.0;
+/// Up to here after a mark, in distances between points, it serves as its own point.
+const ITSELF: f64 = 0.65;
 /// Steps of Newton's method for a rough crossing.
 const ROUGHLY: u32 = 2;
 
@@ -90,6 +93,54 @@ impl FastPath {
         }
         let arrival = self.arrive_after(start, from, from.t + t, wall)?;
         start.is_monotone(from, arrival.t.value()).then_some(arrival)
+    }
+
+    /// The time of a point of the grid after a mark, and the motion near it: the point is the nearest one to the time `t`.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub(super) fn near_point(&mut self, start: &Start, from: &Mark, t: f64) -> (f64, Nearby<TERMS>) {
+        self.evaluations += 1;
+        let (coefficients, amplitude) = (&self.coefficients, start.base.drive.amplitude);
+        // Near the mark the mark itself: it needs no propagator.
+        let n = match (t - from.t) / coefficients.spacing {
+            part if part < ITSELF => 0,
+            part => ((part + 0.5) as usize).min(POINTS),
+        };
+        let increment = match n {
+            0 => Increment { y: 0.0, dy: 0.0, phasor: from.point.phasor },
+            _ => (self.cache.grid)
+                .over(&start.rig.free, coefficients, n)
+                .increment(amplitude, &from.point),
+        };
+        (
+            from.t + n as f64 * coefficients.spacing,
+            Nearby::new(coefficients, amplitude, &from.point, &increment),
+        )
+    }
+
+    /// What the motion adds in `t` seconds after the start.
+    pub(super) fn after(&mut self, start: &Start, t: f64) -> Increment {
+        let here = start.here.point;
+        let mut mark = start.here;
+        while t - mark.t > self.coefficients.span {
+            mark = self.mark(start, &mark, POINTS);
+        }
+        let (at, nearby) = self.near_point(start, &mark, t);
+        let Increment { y, dy, phasor } = nearby.at(t - at);
+        Increment {
+            y: (mark.point.y - here.y) + y,
+            dy: (mark.point.dy - here.dy) + dy,
+            phasor,
+        }
+    }
+
+    /// The motion `n` points after a mark.
+    #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
+    pub(super) fn mark(&mut self, start: &Start, from: &Mark, n: usize) -> Mark {
+        self.evaluations += 1;
+        self.rotations += 1;
+        let propagator = (self.cache.grid).over(&start.rig.free, &self.coefficients, n);
+        let increment = propagator.increment(start.base.drive.amplitude, &from.point);
+        start.mark(&self.coefficients, increment.to(&from.point), from.t + propagator.t)
     }
 }
 

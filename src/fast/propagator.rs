@@ -189,15 +189,15 @@ impl<const N: usize> Nearby<N> {
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn change(&self, h: f64) -> (f64, f64) {
         let c = &self.c;
-        let (mut bent, mut quickened) = (0.0, 0.0);
+        let (mut deviation, mut gained) = (0.0, 0.0);
         let square = h * h;
         for n in (0..N).step_by(2).rev() {
             let (c0, c1) = (c[n], c[n + 1]);
             let k = (n + 2) as f64;
-            bent = (c0 + h * c1) + square * bent;
-            quickened = (k * c0 + h * ((k + 1.0) * c1)) + square * quickened;
+            deviation = (c0 + h * c1) + square * deviation;
+            gained = (k * c0 + h * ((k + 1.0) * c1)) + square * gained;
         }
-        (square * bent, h * quickened)
+        (square * deviation, h * gained)
     }
 
     /// The phasor of the base then.
@@ -211,10 +211,10 @@ impl<const N: usize> Nearby<N> {
     /// What is added to the start, `h` seconds after that instant.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     pub fn at(&self, h: f64) -> Increment {
-        let (bent, quickened) = self.change(h);
+        let (deviation, gained) = self.change(h);
         Increment {
-            y: self.there.y + (h * self.dy + bent),
-            dy: self.there.dy + quickened,
+            y: self.there.y + (h * self.dy + deviation),
+            dy: self.there.dy + gained,
             phasor: self.phasor(h),
         }
     }

@@ -8,13 +8,11 @@
 //!
 //! Taylor's theorem with Lagrange's remainder then bounds each gap from below (R. E. Moore, "Interval Analysis", Prentice-Hall 1966).
 
-use super::Moving;
 use super::coefficients::Coefficients;
-use super::grid::Mark;
 use super::propagator::Point;
 use crate::base_motion::{BaseMotion, Drive};
+use crate::moving::{Moving, Rig};
 use crate::oscillator::Oscillator;
-use crate::plant::{Masses, Rig};
 
 /// Rounding error of a gap, in half-widths, and of a bound, relative.
 pub(super) const ROUNDING: f64 = 1e-14;
@@ -75,12 +73,20 @@ impl Sample {
     }
 }
 
+/// An instant of a flight at which the motion is known.
+#[derive(Clone, Copy)]
+pub(super) struct Mark {
+    /// Time since the start of the flight, s: an exact multiple of the spacing.
+    pub t: f64,
+    pub point: Point,
+    pub sample: Sample,
+}
+
 /// The start of a flight.
 #[derive(Clone, Copy)]
 pub(super) struct Start<'a> {
     pub rig: &'a Rig,
     pub base: &'a BaseMotion,
-    pub masses: &'a Masses,
     pub here: Mark,
     /// Velocity of the base's line less that of the particle, m/s.
     pub drift: f64,
@@ -94,7 +100,6 @@ impl<'a> Start<'a> {
         Self {
             rig,
             base,
-            masses,
             here: Mark { t: 0.0, point, sample },
             drift: base.drive.signal[1] - masses.particle,
         }
@@ -115,7 +120,7 @@ impl<'a> Start<'a> {
     /// Relative acceleration at a point of the flight, m/s².
     #[inline(always)]
     pub fn acceleration(&self, coefficients: &Coefficients, point: &Point) -> f64 {
-        let oscillator = &self.rig.alone;
+        let oscillator = &self.rig.free;
         let (f, _) = coefficients.forcing_at(point.phasor);
         self.base.drive.amplitude * f - (oscillator.omega0_squared * point.y + 2.0 * oscillator.delta * point.dy)
     }
@@ -124,7 +129,7 @@ impl<'a> Start<'a> {
     /// Then the wall ahead is met once, and the other one is left behind.
     #[inline(always)]
     pub fn is_monotone(&self, from: &Mark, t: f64) -> bool {
-        let (oscillator, drive, t) = (&self.rig.alone, &self.base.drive, t - from.t);
+        let (oscillator, drive, t) = (&self.rig.free, &self.base.drive, t - from.t);
         let spare = self.drift.abs() - forcing(oscillator, drive, t) * t;
         spare > 0.0 && spare * spare * (1.0 - 1e-9) > speed_squared(oscillator, &from.point)
     }
@@ -132,10 +137,10 @@ impl<'a> Start<'a> {
     /// `|w'''|` is at most this for `t` seconds after a mark, m/s³.
     #[inline(always)]
     pub fn jerk(&self, from: &Mark, t: f64) -> f64 {
-        let Oscillator { delta, omega0_squared, omega0, .. } = self.rig.alone;
+        let Oscillator { delta, omega0_squared, omega0, .. } = self.rig.free;
         let damping = 2.0 * delta;
-        let forcing = forcing(&self.rig.alone, &self.base.drive, t);
-        let speed = speed_squared(&self.rig.alone, &from.point).sqrt() + forcing * t;
+        let forcing = forcing(&self.rig.free, &self.base.drive, t);
+        let speed = speed_squared(&self.rig.free, &from.point).sqrt() + forcing * t;
         let acceleration = (omega0 + damping) * speed + forcing;
         damping * acceleration + omega0_squared * speed + self.base.drive.omega.abs() * forcing
     }

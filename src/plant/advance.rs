@@ -1,6 +1,6 @@
 //! The loop over events.
 
-use super::{Event, MOST_IMPACTS, Outcome, Plant};
+use super::{Event, MOST_EVALUATIONS, MOST_IMPACTS, Outcome, Plant};
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::Drive;
 use crate::contact::{Contact, Wall};
@@ -32,8 +32,7 @@ impl<F: FnMut(Event)> Step<F> {
 
     /// Whether time is left and the step is not to be cut short.
     fn goes_on(&self) -> bool {
-        let done = &self.outcome;
-        self.left.value() > 0.0 && done.impacts < MOST_IMPACTS && done.released < MOST_RELEASES
+        self.left.value() > 0.0 && self.outcome.impacts < MOST_IMPACTS && !self.outcome.cut_short
     }
 }
 
@@ -70,16 +69,15 @@ impl Plant {
             drive.validate()?;
             check_duration(duration)?;
             self.jump(&drive);
-            self.fast.drive_changed(&self.moving.rig.alone, &self.moving.base.drive);
+            self.fast.drive_changed(&self.moving.rig.free, &self.moving.base.drive);
         } else if drive.omega != before.omega {
             drive.validate_frequency()?;
             check_duration(duration)?;
             self.moving.base.drive.omega = drive.omega;
-            self.fast.drive_changed(&self.moving.rig.alone, &self.moving.base.drive);
+            self.fast.drive_changed(&self.moving.rig.free, &self.moving.base.drive);
         }
         if self.contact == Contact::Free && self.fast.step(&mut self.moving, duration) {
             self.time += duration;
-            self.fast.evaluations += 1;
             return Ok(Outcome { elapsed: duration, evaluations: 1, ..Outcome::default() });
         }
         check_duration(duration)?;
@@ -94,7 +92,7 @@ impl Plant {
         let before = core::mem::replace(&mut self.moving.base.drive, *drive);
         let sin = self.fast.phasor.1;
         let jump = (drive.signal[0] - before.signal[0]) + (drive.amplitude - before.amplitude) * sin;
-        let oscillator = &self.moving.rig.alone;
+        let oscillator = &self.moving.rig.free;
         let kick = 2.0 * oscillator.delta * jump;
         if jump != 0.0 {
             self.moving.masses.primary = self.moving.masses.primary.plus([0.0, kick]);
@@ -107,7 +105,7 @@ impl Plant {
 
     /// Follows the motion from event to event to the end of the step.
     fn follow(&mut self, duration: f64, on_event: impl FnMut(Event)) -> Outcome {
-        let evaluations = self.fast.evaluations;
+        self.fast.evaluations = 0;
         let mut step = Step {
             duration,
             left: Sum::from(duration),
@@ -121,10 +119,6 @@ impl Plant {
         }
         while step.goes_on() {
             let left = step.left.value();
-            if let Contact::Stuck(wall) = self.contact {
-                self.stay(wall, left, &mut step);
-                continue;
-            }
             let next = match self.contact {
                 Contact::Free => self.fast.next(&mut self.moving, left, duration),
                 _ => Next::Search(left),
@@ -135,14 +129,20 @@ impl Plant {
                 Next::Contact(t, wall) => {
                     step.left = step.left.minus(t);
                     self.touch(wall, &mut step);
+                    continue;
                 }
-                Next::Search(limit) => self.search(limit, &mut step),
+                Next::Search(limit) => match self.contact {
+                    Contact::Stuck(wall) => self.stay(wall, limit, &mut step),
+                    _ => self.search(limit, &mut step),
+                },
             }
+            step.outcome.cut_short =
+                self.fast.evaluations >= MOST_EVALUATIONS || step.outcome.released >= MOST_RELEASES;
         }
         let left = step.left.value();
         step.outcome.cut_short = left > 0.0;
         step.outcome.elapsed = if left > 0.0 { step.now() } else { duration };
-        step.outcome.evaluations = self.fast.evaluations - evaluations;
+        step.outcome.evaluations = self.fast.evaluations;
         step.outcome
     }
 
@@ -154,18 +154,18 @@ impl Plant {
             _ => None,
         };
         let masses = self.moving.masses;
-        let motion = Segment::new(&self.moving.rig.alone, self.moving.base, masses.primary.values.into());
+        let motion = Segment::new(&self.moving.rig.free, self.moving.base, masses.primary.values.into());
         let half_width = self.moving.rig.parameters.half_width;
         let flight = Flight::new(motion, (masses.w.value(), masses.dw), half_width);
-        let landing = flight.first_contact(limit, released);
-        self.fast.evaluations += landing.evaluations;
-        self.moving.masses.primary = masses.primary.plus([landing.moved, landing.gained]);
-        self.moving.masses.dw += landing.gained;
-        self.moving.masses.drift(landing.drifted, half_width);
+        let end = flight.first_contact(limit, released);
+        self.fast.evaluations += end.evaluations;
+        self.moving.masses.primary = masses.primary.plus([end.moved, end.gained]);
+        self.moving.masses.dw += end.gained;
+        self.moving.masses.drift(end.drifted, half_width);
         self.contact = Contact::Free;
-        self.base_moves(landing.t);
-        step.left = step.left.plus(-landing.t);
-        if let Some(wall) = landing.wall {
+        self.base_moves(end.t);
+        step.left = step.left.plus(-end.t);
+        if let Some(wall) = end.wall {
             self.touch(wall, step);
         }
     }
@@ -174,11 +174,11 @@ impl Plant {
     fn stay(&mut self, wall: Wall, left: f64, step: &mut Step<impl FnMut(Event)>) {
         let start = self.moving.masses.primary.values;
         let noise = self.acceleration_error(start[1]);
-        let motion = Segment::new(&self.moving.rig.joint, self.moving.base, start.into());
+        let motion = Segment::new(&self.moving.rig.stuck, self.moving.base, start.into());
         let stay = until_released(&motion, wall, left, noise);
         self.fast.evaluations += stay.evaluations;
-        self.moving.masses.primary = Sums { values: stay.joint, errors: [0.0; 2] };
-        self.moving.masses.particle = stay.joint[1];
+        self.moving.masses.primary = Sums { values: stay.state, errors: [0.0; 2] };
+        self.moving.masses.particle = stay.state[1];
         self.moving.masses.dw = 0.0;
         self.base_moves(stay.t);
         step.left = step.left.plus(-stay.t);

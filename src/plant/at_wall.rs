@@ -1,9 +1,10 @@
 //! The particle at a wall: impact, then rest if it cannot leave.
 
 use super::advance::Step;
-use super::{Event, Masses, Plant};
+use super::{Event, Plant};
 use crate::arithmetic::Sum;
 use crate::contact::{Contact, Resolution, Wall};
+use crate::moving::Masses;
 use crate::oscillator::Oscillator;
 use crate::segment::Segment;
 
@@ -30,7 +31,7 @@ impl Plant {
         let resolution = Resolution {
             lowest_hop: LOWEST_HOP * half_width,
             longest_chatter: step.left.value(),
-            fastest: self.moving.rig.alone.fastest,
+            fastest: self.moving.rig.free.fastest,
             elastic: true,
         };
         let Masses { primary, particle, dw, .. } = self.moving.masses;
@@ -59,7 +60,7 @@ impl Plant {
     /// Acceleration of `wall` towards the particle while the primary mass moves alone, and its rounding error, m/s².
     fn pressing(&self, wall: Wall, velocity: f64) -> (f64, f64) {
         let start = (self.moving.masses.primary.values[0], velocity);
-        let motion = Segment::new(&self.moving.rig.alone, self.moving.base, start);
+        let motion = Segment::new(&self.moving.rig.free, self.moving.base, start);
         let acceleration = motion.derivatives_at_start()[2];
         (wall.sign() * acceleration, self.acceleration_error(velocity))
     }
@@ -67,7 +68,7 @@ impl Plant {
     /// An upper bound of the acceleration's magnitude, m/s²: the sum of its terms.
     #[cfg_attr(not(target_arch = "wasm32"), inline(always))]
     fn acceleration_bound(&self, velocity: f64) -> f64 {
-        let Oscillator { delta, omega0_squared, .. } = self.moving.rig.alone;
+        let Oscillator { delta, omega0_squared, .. } = self.moving.rig.free;
         let drive = &self.moving.base.drive;
         let position = self.moving.masses.primary.values[0].abs() + drive.signal[0].abs() + drive.amplitude.abs();
         let velocity = velocity.abs() + drive.signal[1].abs() + (drive.amplitude * drive.omega).abs();
@@ -76,7 +77,7 @@ impl Plant {
 
     /// Rounding error of the acceleration, m/s².
     pub(super) fn acceleration_error(&self, velocity: f64) -> f64 {
-        let nothing = NOTHING * self.moving.rig.parameters.half_width * self.moving.rig.alone.omega0_squared;
+        let nothing = NOTHING * self.moving.rig.parameters.half_width * self.moving.rig.free.omega0_squared;
         ROUNDING * self.acceleration_bound(velocity) + nothing
     }
 }

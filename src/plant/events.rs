@@ -55,7 +55,7 @@ pub struct Outcome {
     pub released: u64,
     /// Time by which the plant advanced, s: less than the step where it was cut short.
     pub elapsed: f64,
-    /// Whether the step ended early, at [`super::MOST_IMPACTS`] or as many releases.
+    /// Whether the step ended early, at the largest number of impacts, releases or evaluations.
     pub cut_short: bool,
     /// Evaluations of the motion (closed form, propagator or series).
     pub evaluations: u64,

@@ -32,6 +32,7 @@ fn hard_scenes_are_survived() {
     steps::long(&mut table);
     if n > 10_000 {
         steps::chatter(&mut table);
+        steps::endless(&mut table);
     }
     steps::short(&mut table);
     simple::steps(&mut table);

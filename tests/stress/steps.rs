@@ -1,7 +1,7 @@
 //! One step of a million periods, and steps of a billionth of one.
 
 use crate::table::Table;
-use lovines::plant::MOST_IMPACTS;
+use lovines::plant::{MOST_EVALUATIONS, MOST_IMPACTS};
 use lovines::{Drive, Parameters, Plant, State};
 use std::f64::consts::TAU;
 
@@ -42,6 +42,22 @@ pub fn chatter(table: &mut Table) {
         MOST_IMPACTS as f64,
     );
     table.progress("a million periods with chatter");
+}
+
+/// A primary mass that never quite reaches the particle: it would be searched for contacts without end.
+pub fn endless(table: &mut Table) {
+    let (g, sigma) = (1.64, 0.715);
+    let mut plant = Plant::new(Parameters::dimensionless(0.0084, 1.43, 0.65), State::default()).unwrap();
+    let drive = Drive::harmonic(0.0084 * g, 1.0 + 0.0084 * sigma);
+    let outcome = plant.advance(drive, 1e100).unwrap();
+    assert!(outcome.cut_short && outcome.elapsed > 1e6 && outcome.elapsed == plant.time());
+    table.row(
+        "one step of 10^100 s without contact: evaluations, at most",
+        "cut short, and says so",
+        outcome.evaluations as f64,
+        MOST_EVALUATIONS as f64 + 1e3,
+    );
+    table.progress("a step without end");
 }
 
 /// Short steps against one long one: rounding errors do not add up.

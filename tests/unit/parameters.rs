@@ -26,7 +26,9 @@ fn rates_beyond_double_precision_are_refused() {
     assert!(refused(|p| p.damping = 1e300).contains("c (damping)"));
     assert!(refused(|p| p.damping = 1e99).contains("decay rate"));
     assert!(refused(|p| p.primary_mass = 1e-300).contains("primary mass"));
+    assert!(refused(|p| p.damping = 2e12).contains("decay rate"));
     assert!(refused(|p| (p.primary_mass, p.stiffness) = (1e-100, 1e100)).contains("natural frequency"));
+    assert!(refused(|p| p.stiffness = 1e-30).contains("natural frequency"));
 }
 
 #[test]

@@ -6,7 +6,13 @@ use clap::Args;
 use indicatif::ProgressBar;
 use vines::experiment::{ExperimentError, Plan, Sample, Stage, run_into};
 use vines::identification::{self, IdentificationError};
-use vines::{advice, comparison::Comparison, pack, report, rig::BuiltIn, scene::Scene};
+use vines::{
+    advice,
+    comparison::Comparison,
+    pack, report,
+    rig::{BuiltIn, Fault},
+    scene::Scene,
+};
 
 use super::output::{progress_bar, result, writable, written};
 use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, pack::beside_this_program};
@@ -91,7 +97,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &Path) -> Failure {
     let reason = matches!(
         error,
-        ExperimentError::NoLock { .. } | ExperimentError::Irregular { .. }
+        ExperimentError::NoLock { .. }
+            | ExperimentError::Irregular { .. }
+            | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. }
     )
     .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
     .flatten();

@@ -86,8 +86,8 @@ fn a_rate_whose_powers_are_no_numbers_is_not_followed() {
     m.well(m.set_real(8, -1e300));
     assert_eq!(timed(&m, "an absurd rate", 1e-300), Status::Error);
     assert!(m.heard()[0].text.contains("rad/s is refused"));
-    let m = with(&[(2, 1e50)]);
-    assert_eq!(timed(&m, "a rate that is just allowed", 1e-45), Status::Ok);
+    let m = with(&[(2, 1e12)]);
+    assert_eq!(timed(&m, "a rate that is just allowed", 1e-7), Status::Ok);
 }
 
 #[test]
