@@ -30,8 +30,8 @@ const WIDEST: f64 = 0.15;
 const FOLD: f64 = 0.5;
 /// Share of the drive that may change the amplitude.
 const SHARE: f64 = 0.76;
-/// Relative uncertainty of the effect of a steady drift: its second order, and the mass ratio times this.
-const LATE: [f64; 2] = [0.036, 4.0];
+/// Relative uncertainty of the effect of a steady drift.
+const LATE: f64 = 0.036;
 /// Largest parts of the uncertainty of sigma, over `backbone.precision`, by the drift and by noise.
 const PARTS: [f64; 2] = [0.6, 0.55];
 /// Largest part of it by the curvature, where periods of the neighbours are used.
@@ -183,19 +183,14 @@ fn slowest(scene: &Scene, order: &Order, before: f64) -> Option<[f64; 2]> {
         return None;
     }
     let by_drive = width / (SHARE * d.epsilon * PI * order.known.last()?.g);
-    let by_drift = late(scene) * slopes.drift[1].abs() * width * d.b * d.omega0 / (TAU * PARTS[0] * precision(scene));
+    let by_drift = LATE * slopes.drift[1].abs() * width * d.b * d.omega0 / (TAU * PARTS[0] * precision(scene));
     Some([by_drive.max(by_drift).max(FEWEST), bent])
-}
-
-/// Relative uncertainty of the effect of a steady drift.
-fn late(scene: &Scene) -> f64 {
-    LATE[0] + LATE[1] * scene.dimensionless().epsilon
 }
 
 /// The criterion for a level that is crossed.
 fn of_crossing(scene: &Scene, order: &Order) -> Criterion {
     let mut criterion = order.criterion(scene);
-    (criterion.spread, criterion.slopes.late) = (f64::INFINITY, late(scene));
+    (criterion.spread, criterion.slopes.late) = (f64::INFINITY, LATE);
     criterion.tolerance = criterion.precision;
     criterion
 }
