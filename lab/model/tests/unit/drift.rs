@@ -25,9 +25,11 @@ fn by_map(flow: &SlowFlow, r: f64, c: f64, rate: f64) -> [f64; 2] {
     let velocity = |t: f64| amplitude(t) * t.cos() + rate * t.sin();
     let middle = PI * f64::from(FLIGHTS) / 2.0;
     let weight = |t: f64| {
-        ((t - middle).abs() < 30.0 * PI)
-            .then(|| ((t - middle) / 60.0).cos().powi(4))
-            .unwrap_or(0.0)
+        if (t - middle).abs() < 30.0 * PI {
+            ((t - middle) / 60.0).cos().powi(4)
+        } else {
+            0.0
+        }
     };
     let (mut t, mut wall, mut before) = ((1.0 - FRAC_PI_2 * b).atan2(flow.manifold.dissipation * b), 1.0, -b);
     let (mut sine, mut cosine, mut total) = (0.0, 0.0, 0.0);
