@@ -10,6 +10,7 @@ mod axis;
 mod cell;
 mod doubt;
 mod folder;
+mod monitor;
 mod plan;
 mod run;
 mod settings;
@@ -19,8 +20,9 @@ mod variables;
 
 pub use axis::{Axis, SIGMA, Values};
 pub use cell::Results;
+pub use monitor::Monitor;
 pub use plan::Plan;
-pub use run::{Estimate, Monitor, Shard, estimate, merge, run};
+pub use run::{Estimate, EstimateError, Shard, estimate, merge, run};
 pub use settings::{PlanError, Settings};
 pub use store::StoreError;
 pub use variables::ABSENT;

@@ -14,12 +14,14 @@ use zarrs::array::{
 };
 
 use crate::{
-    adaptive::ROUNDS,
     cell::Cell,
     folder::{Folder, PARTIAL},
     plan::Plan,
     variables::{ABSENT, Read, Variable, variables},
 };
+
+/// Folder of the results of an adaptive sweep's rounds; removed at the end.
+pub(crate) const ROUNDS: &str = ".rounds";
 
 /// Why a store cannot be used.
 #[derive(Debug, thiserror::Error)]
