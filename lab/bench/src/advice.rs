@@ -12,6 +12,8 @@ const SEARCHED: [f64; 2] = [-6.0, 3.0];
 const STEP: f64 = 0.005;
 /// Parts of a step in which the end of the stable range is located.
 const FINER: i32 = 20;
+/// Smallest gap in the range of drives that is searched for.
+const GAP: f64 = 2e-3;
 
 /// The stable symmetric 1:1 orbits at phase resonance, at any drive, by rising detuning.
 pub fn stable_orbits(d: &Dimensionless) -> Vec<Orbit> {
@@ -39,13 +41,29 @@ pub fn largest_stable(d: &Dimensionless) -> Option<f64> {
     Some(finer.map(|orbit| orbit.c).fold(first.c, f64::max))
 }
 
-/// The range of drives, base amplitude over `b epsilon`, with a stable symmetric 1:1 orbit at phase resonance.
+/// The range of drives, base amplitude over `b epsilon`, with a stable symmetric 1:1 orbit at phase resonance; there may be gaps in it.
 pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
-    let drives = stable_orbits(d).into_iter().map(|orbit| orbit.g);
-    drives.fold(None, |range, g| {
-        let [low, high] = range.unwrap_or([g, g]);
-        Some([low.min(g), high.max(g)])
-    })
+    let ranges = stable_ranges(d);
+    Some([ranges.first()?[0], ranges.last()?[1]])
+}
+
+/// The same without the gaps that are wider than `GAP`.
+fn stable_ranges(d: &Dimensionless) -> Vec<[f64; 2]> {
+    let mut drives: Vec<f64> = stable_orbits(d).into_iter().map(|orbit| orbit.g).collect();
+    drives.sort_by(f64::total_cmp);
+    let is_stable = |g: f64| {
+        phase_resonant(&Dimensionless { g, ..*d })
+            .iter()
+            .any(|orbit| orbit.stable)
+    };
+    let mut ranges: Vec<[f64; 2]> = Vec::new();
+    for g in drives {
+        match ranges.last_mut() {
+            Some(last) if g - last[1] < GAP || is_stable(0.5 * (g + last[1])) => last[1] = g,
+            _ => ranges.push([g, g]),
+        }
+    }
+    ranges
 }
 
 /// Why a run that was expected to lock the symmetric 1:1 motion may not have done so: `regime` is that of its last periods, if they show
@@ -54,9 +72,14 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     let d = scene.dimensionless();
     let stable: Vec<Orbit> = phase_resonant(&d).into_iter().filter(|orbit| orbit.stable).collect();
     let Some(last) = stable.last() else {
-        let range = stable_range(&d).map_or("at no G".into(), |[low, high]| {
-            format!("for G from {low:.3} to {high:.3}")
-        });
+        let ranges: Vec<String> = stable_ranges(&d)
+            .into_iter()
+            .map(|[low, high]| format!("from {low:.3} to {high:.3}"))
+            .collect();
+        let range = match ranges[..] {
+            [] => "at no G".into(),
+            _ => format!("for G {}", ranges.join(" and ")),
+        };
         return Some(format!(
             "there is no stable symmetric 1:1 orbit at G = {:.4}; it is stable {range}",
             d.g

@@ -15,4 +15,4 @@ mod track;
 
 pub use point::{Point, Tracked};
 pub use settle::{Criterion, Found};
-pub use track::track;
+pub use track::{track, track_into};

@@ -10,7 +10,7 @@ use thiserror::Error;
 use crate::rig::{Controller, ControllerError, Drive, Fault, Rig, RigError};
 use crate::scene::Scene;
 use vines_model::orbit::phase_resonant;
-use vines_model::theory::{B_SYMMETRY_BREAKING, BackbonePoint, SlowFlow};
+use vines_model::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 
 pub(crate) use bench::Bench;
 pub use record::{Record, Sample, drive_phases, table};
@@ -68,17 +68,14 @@ const LONGEST_DECAY: f64 = 5000.0;
 const DECAY_EXTRA: f64 = 10.0;
 
 /// Length of the recorded decay, natural periods: that of the scene, or as long as first-order theory expects synchrony to last
-/// from symmetry breaking on, with a margin.
+/// from symmetry breaking on, with a margin. A lock may be on the larger one of two stable orbits.
 fn decay_periods(scene: &Scene) -> f64 {
     if let Some(periods) = scene.record.decay_periods {
         return periods;
     }
     let d = scene.dimensionless();
-    let flow = SlowFlow::new(d.lambda, d.r);
-    let stable = flow.phase_resonant(d.g).into_iter().filter(BackbonePoint::stable);
-    let from = stable.map(|point| point.b).fold(f64::NAN, f64::max);
-    let from = if from.is_nan() { B_SYMMETRY_BREAKING } else { from };
-    let duration = flow.decay(from).map_or(0.0, |decay| decay.duration()) / (d.epsilon * std::f64::consts::TAU);
+    let decay = SlowFlow::new(d.lambda, d.r).decay(B_SYMMETRY_BREAKING);
+    let duration = decay.map_or(0.0, |decay| decay.duration()) / (d.epsilon * std::f64::consts::TAU);
     (DECAY_MARGIN * duration + DECAY_EXTRA).min(LONGEST_DECAY)
 }
 

@@ -2,10 +2,10 @@
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
+use vines::{backbone::track_into, comparison::TrackedComparison, report, rig::BuiltIn};
 
 use super::output::{result, writable, written};
-use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure};
+use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, identify::interrupted};
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:
@@ -52,13 +52,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let (endpoint, config) = (&experiment.controller, scene.backbone_config());
     let mut controller = endpoint.controller(&config, &scene.controller_names, reach, open.pace)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
-    let tracked = track(&mut open.rig, controller.as_mut(), &scene, |done, _| {
+    let mut samples = Vec::new();
+    let tracked = track_into(&mut samples, &mut open.rig, controller.as_mut(), &scene, |done, _| {
         bar.set_position(done as u64);
     });
     bar.finish_and_clear();
     drop(controller);
     let timing = open.close();
-    let tracked = tracked?;
+    let tracked = tracked.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let found = TrackedComparison::of(&tracked, &scene);
     let files = report::write_tracked(&found, &experiment.out).map_err(Failure::run)?;
     if let Some(ended) = tracked.ended {

@@ -94,7 +94,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 }
 
 /// The failure of an experiment that ended early, with the reason that the exact orbits know, and what was measured in a file.
-fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &Path) -> Failure {
+pub(super) fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &Path) -> Failure {
     let reason = matches!(
         error,
         ExperimentError::NoLock { .. }

@@ -193,6 +193,21 @@ fn a_drive_without_a_stable_orbit_ends_the_search_when_the_rhythm_is_lost() {
 }
 
 #[test]
+fn a_gap_in_the_range_of_stable_orbits_is_stated() {
+    let scene = scene(&[
+        "plant.epsilon=0.02",
+        "plant.lambda=0.4",
+        "plant.r=0.8",
+        "excitation.G=0.7",
+    ]);
+    let reason = vines::advice::reason(&scene, None).unwrap();
+    assert!(
+        reason.ends_with("it is stable for G from 0.415 to 0.486 and from 0.822 to 0.824"),
+        "{reason}"
+    );
+}
+
+#[test]
 fn from_rest_the_controller_alone_reaches_the_symmetric_orbit() {
     let found = identified(&["start.dq2=0.0"]);
     let exact = found.exact.unwrap();

@@ -28,9 +28,22 @@ pub fn track(
     scene: &Scene,
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
-    let mut samples = Vec::new();
+    track_into(&mut Vec::new(), rig, controller, scene, progress)
+}
+
+/// As [`track`]; if it ends before the first point, what was measured last stays in `samples`.
+///
+/// # Errors
+/// As [`track`].
+pub fn track_into(
+    samples: &mut Vec<Sample>,
+    rig: &mut (impl Rig + ?Sized),
+    controller: &mut (impl Controller + ?Sized),
+    scene: &Scene,
+    progress: impl FnMut(usize, usize),
+) -> Result<Tracked, ExperimentError> {
     let mut bench = Bench {
-        run: experiment::Bench::new(rig, controller, scene.sample_time(), &mut samples),
+        run: experiment::Bench::new(rig, controller, scene.sample_time(), samples),
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),

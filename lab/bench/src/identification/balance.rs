@@ -75,7 +75,10 @@ impl Balance {
         let middle = mean(cycles.iter().map(|cycle| cycle.time));
         let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
         let spread = mean(motion.iter().map(|one| (one.amplitude - response).powi(2)));
-        let bend = ((spread - noise * noise).max(0.0), slopes.curvature);
+        // The effect of the drift is curved as well.
+        let rate = growth(cycles, Cycle::amplitude);
+        let curvature = [0, 1].map(|i| slopes.curvature[i] + rate * slopes.bending[i]);
+        let bend = ((spread - noise * noise).max(0.0), curvature);
         let deviation = integral(&time, motion.iter().map(|one| one.amplitude - response));
         let columns = [vec![1.0; cycles.len()], time, deviation];
         let calibration = total(cycles, |cycle| cycle.base.norm()) / total(cycles, |cycle| cycle.commanded[0].norm());
@@ -165,12 +168,17 @@ impl Balance {
     }
 }
 
+/// Slope of a value over time.
+fn growth(cycles: &[Cycle], value: impl FnMut(&Cycle) -> f64) -> f64 {
+    let duration = cycles[cycles.len() - 1].time - cycles[0].time;
+    slope(&cycles.iter().map(value).collect::<Vec<f64>>()) * cycles.len() as f64 / duration
+}
+
 /// Sizes of the terms beyond those of the second order and beyond the drift: a share of them.
 fn remainders(cycles: &[Cycle], drives: &[Drive], [inertia, gain, response]: [f64; 3], slopes: &Slopes) -> [f64; 2] {
-    let duration = cycles[cycles.len() - 1].time - cycles[0].time;
-    let slope = |values: Vec<f64>| slope(&values) * cycles.len() as f64 / duration;
-    let inertial = REMAINDER * inertia * slope(drives.iter().map(|drive| drive.force.re).collect());
-    let drift = slopes.late * slope(cycles.iter().map(Cycle::amplitude).collect());
+    let mut force = drives.iter().map(|drive| drive.force.re);
+    let inertial = REMAINDER * inertia * growth(cycles, |_| force.next().unwrap_or_default());
+    let drift = slopes.late * growth(cycles, Cycle::amplitude);
     let aside = mean(drives.iter().map(|drive| slopes.beyond(drive.force)));
     [
         (inertial / gain).hypot(drift * slopes.drift[0]).hypot(ASIDE * aside),

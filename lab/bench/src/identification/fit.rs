@@ -22,12 +22,14 @@ pub struct Harmonic {
 const ROUNDS: usize = 6;
 /// Fewest samples of a window.
 const FEWEST: usize = 16;
+/// Largest relative distance of the frequency from the guess: beyond that, the rounds diverge.
+const FARTHEST: f64 = 0.5;
 
 /// Fits `values`, sampled every `sample_time` seconds, by a fundamental near `omega` (rad/s) and its third harmonic, both
 /// with linear drift, and a constant.
 ///
 /// The drift of the fitted phase corrects the frequency, and the fit is repeated about that. `None` for a window that is too
-/// short or contains no motion.
+/// short or contains no motion of about that frequency.
 pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic> {
     if values.len() < FEWEST {
         return None;
@@ -36,12 +38,12 @@ pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic
     let right = DVector::from_column_slice(values);
     // Half a window, s.
     let half = middle * sample_time;
-    let (mut omega, mut last) = (omega, None);
+    let (guess, mut omega, mut last) = (omega, omega, None);
     for _ in 0..ROUNDS {
         let phases: Vec<f64> = (0..values.len())
             .map(|n| (n as f64 - middle) * sample_time * omega)
             .collect();
-        let basis = HarmonicBasis::new(&phases, 0, &[Some(1), None, Some(1)]);
+        let basis = HarmonicBasis::new(&phases, 0, &[Some(2), None, Some(1)]);
         let fit = basis.fit(&right)?;
         let a = fit.harmonic(1);
         let square = a.norm_sqr();
@@ -51,6 +53,9 @@ pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic
         // The phase of a turns by Im(drift/a) per half window.
         let change = fit.drift(1) * a.conj() / half;
         omega += change.im / square;
+        if (omega / guess - 1.0).abs() > FARTHEST {
+            return None;
+        }
         last = Some((basis, fit, a, change.re));
     }
     let (basis, fit, a, growth) = last?;

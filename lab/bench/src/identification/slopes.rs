@@ -19,6 +19,8 @@ pub struct Slopes {
     pub phase: [f64; 2],
     /// Second derivatives of `E_R`, 1/m, and `omega_R`, rad/(s m²), over the amplitude; 0 where they are not known.
     pub curvature: [f64; 2],
+    /// Second derivatives of `drift` over the amplitude: s/m² and rad/m³.
+    pub bending: [f64; 2],
 }
 
 /// Relative standard uncertainty of the slopes of a rig whose parameters are known as well as they are measured.
@@ -33,15 +35,22 @@ impl Slopes {
         let step = 1e-3 * c;
         let at = |c: f64| backbone_at_level(d, c).map(|point| [point.g, point.sigma]);
         let around = at(c - step).zip(at(c)).zip(at(c + step));
-        let known = around.zip(SlowFlow::new(d.lambda, d.r).drift(c));
-        let ([g, sigma], bend, drift) = match known {
-            Some((((low, middle), high), drift)) => (
-                [0, 1].map(|i| (high[i] - low[i]) / (2.0 * step)),
-                [0, 1].map(|i| (low[i] - 2.0 * middle[i] + high[i]) / (step * step)),
-                [drift.g, drift.sigma],
-            ),
-            None => ([d.lambda, 0.0], [0.0; 2], [0.0; 2]),
+        let flow = SlowFlow::new(d.lambda, d.r);
+        let late = |c: f64| flow.drift(c).map(|drift| [drift.g, drift.sigma]);
+        let known = around.zip(late(c - step).zip(late(c)).zip(late(c + step)));
+        let bent = |low: [f64; 2], middle: [f64; 2], high: [f64; 2]| {
+            [0, 1].map(|i| (low[i] - 2.0 * middle[i] + high[i]) / (step * step))
         };
+        let ([g, sigma], bend, drift, bending) = match known {
+            Some((((low, middle), high), ((earlier, drift), later))) => (
+                [0, 1].map(|i| (high[i] - low[i]) / (2.0 * step)),
+                bent(low, middle, high),
+                drift,
+                bent(earlier, drift, later),
+            ),
+            None => ([d.lambda, 0.0], [0.0; 2], [0.0; 2], [0.0; 2]),
+        };
+        let of_drift = |[g, sigma]: [f64; 2]| [g * d.epsilon / d.omega0, sigma * d.epsilon / d.b];
         // Terms of the second order change the drive by about epsilon lambda sigma.
         let second = d.epsilon * d.lambda * (2.0 + sigma.abs());
         let base = [g, SLOPE * g.abs() + second];
@@ -52,7 +61,8 @@ impl Slopes {
             late: LATE,
             // The damper's force on the base leads it by 2 zeta.
             phase: [held, d.epsilon * d.lambda],
-            drift: [drift[0] * d.epsilon / d.omega0, drift[1] * d.epsilon / d.b],
+            drift: of_drift(drift),
+            bending: of_drift(bending).map(|bend| bend / (d.b * d.b)),
             curvature: [d.amplitude(bend[0]), d.omega_change(bend[1])].map(|bend| bend / (d.b * d.b)),
         }
     }

@@ -30,14 +30,19 @@ impl SlowFlow {
         let [up, down] = [rate, -rate].map(|rate| self.flight(c, b, rate));
         let slope = |i: usize| (up[i] - down[i]) / (2.0 * rate);
         let step = 1e-3 * c;
-        let drive = |c: f64| Some(self.backbone_at(self.manifold.b(c, BranchSide::Right)?).g);
-        let by_drive = (drive(c + step)? - drive(c)?) / step;
+        let beside = self.backbone_at(self.manifold.b(c + step, BranchSide::Right)?);
+        let here = self.backbone_at(b);
+        let by_drive = (beside.g - here.g) / step;
+        let turned = (beside.sigma * (c + step) - here.sigma * c) / step;
+        // The mean over a flight, in which the particle's force grows, is not that over many flights: the difference has the mean of
+        // s² cos s over half a period.
+        let grown = FRAC_PI_2 - 4.0 / PI;
         let drift = Drift {
             // The damper acts on the velocity, which a change of C shifts in phase; at phase resonance the damper's force
             // on the base leads it by 2 zeta; and the losses change with C.
-            sigma: slope(0) + 1.5 * self.lambda / c - 0.25 * by_drive / c,
-            // The mean over half a period, in which the particle's force grows, is not that of the first harmonic in its middle.
-            g: slope(1) - self.backbone_at(b).sigma,
+            sigma: slope(0) + (0.25 * PI * grown * (by_drive - self.lambda) + 1.5 * self.lambda - 0.25 * by_drive) / c,
+            // The last part is the work that a change of the frequency needs at a constant amplitude.
+            g: slope(1) - PI * grown * turned + (turned - here.sigma),
         };
         (drift.sigma.is_finite() && drift.g.is_finite()).then_some(drift)
     }
