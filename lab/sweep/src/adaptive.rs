@@ -13,9 +13,10 @@ use vines_model::regime::Regime;
 use crate::{
     cell::Cell,
     doubt::{self, Doubt},
+    error::StoreError,
     plan::Plan,
     run::Monitor,
-    store::{Store, StoreError, code},
+    store::{Store, code},
     variables::ABSENT,
 };
 

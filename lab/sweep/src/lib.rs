@@ -9,6 +9,8 @@ mod adaptive;
 mod axis;
 mod cell;
 mod doubt;
+mod engine;
+mod error;
 mod folder;
 mod plan;
 mod run;
@@ -19,8 +21,8 @@ mod variables;
 
 pub use axis::{Axis, SIGMA, Values};
 pub use cell::Results;
+pub use error::StoreError;
 pub use plan::Plan;
 pub use run::{Estimate, Monitor, Shard, estimate, merge, run};
 pub use settings::{PlanError, Settings};
-pub use store::StoreError;
 pub use variables::ABSENT;

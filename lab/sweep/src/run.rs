@@ -11,12 +11,7 @@ use std::{
 
 use rayon::prelude::*;
 
-use crate::{
-    adaptive,
-    cell::Cell,
-    plan::Plan,
-    store::{Store, StoreError},
-};
+use crate::{adaptive, cell::Cell, error::StoreError, plan::Plan, store::Store};
 
 /// The progress of a sweep, and the flag that stops it.
 #[derive(Debug, Default)]
