@@ -8,7 +8,7 @@ pub mod report;
 
 pub use files::FileError;
 pub use vines_fmu as fmu;
-pub use vines_model::{map, numerics, orbit, regime, theory};
+pub use vines_model::{ArgumentError, map, numerics, orbit, regime, theory};
 pub use vines_net as net;
 #[cfg(feature = "sweep")]
 pub use vines_sweep as sweep;

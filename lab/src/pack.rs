@@ -16,46 +16,19 @@ use std::path::{Path, PathBuf};
 pub use components::{Component, components};
 pub use documentation::documentation;
 pub use error::PackError;
-pub use library::Binary;
+pub use library::{Binary, Libraries};
 pub use platform::Platform;
 
 use crate::{files, scene::Scene};
 
-/// Where the libraries come from.
-#[derive(Debug, Clone)]
-pub struct Libraries {
-    /// Folder with those for this platform, under the names that cargo gives them.
-    pub folder: PathBuf,
-    /// Whether those for this platform are packed at all.
-    pub own: bool,
-    /// Those for other platforms.
-    pub others: Vec<Binary>,
-}
-
-impl From<&Path> for Libraries {
-    fn from(folder: &Path) -> Self {
-        Self { folder: folder.into(), own: true, others: Vec::new() }
-    }
-}
-
-/// Name and content of a file to be.
-type File = (String, Vec<u8>);
-
 /// Packs the components into `out`, one `<identifier>.fmu` each, and returns their paths.
 ///
 /// Nothing is written unless all of them can be; a file is complete or absent.
-///
-/// # Errors
-/// A library that is missing, for another platform, of another version or not an FMI 2.0 component, and failures of the
-/// file system.
 pub fn pack(components: &[Component], libraries: &Libraries, out: &Path) -> Result<Vec<PathBuf>, PackError> {
     Ok(files::write(out, fmu::all(components, libraries)?)?)
 }
 
 /// Packs plant and controller into `out`, and the two of them coupled as `bench.ssp` with the parameters of the scene.
-///
-/// # Errors
-/// As [`pack`], and a scene whose controller settings make no sense.
 pub fn pack_bench(scene: &Scene, libraries: &Libraries, out: &Path) -> Result<Vec<PathBuf>, PackError> {
     let mut files = fmu::all(&components(), libraries)?;
     files.push(system::file(scene, &files)?);

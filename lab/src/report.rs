@@ -13,8 +13,8 @@ mod theme;
 
 pub use figure::FigureError;
 pub use files::{ReportError, write, write_calibration, write_interrupted, write_lateness, write_map, write_tracked};
-pub use section::{Block, Section};
-pub use sections::{Maker, SECTIONS, Subject};
+pub use section::{Block, Maker, Section, Subject};
+pub use sections::SECTIONS;
 pub use study::{Report, write_report};
 pub use table::{Table, number};
 pub use theme::dark;

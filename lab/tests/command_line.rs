@@ -273,6 +273,7 @@ fn absurd_curves_and_maps_are_refused() {
     let refused = ["identify", "--set", "controller.G_max=1.0"];
     fails(&refused, 2, "amplitude_max is controller.G_max");
     fails(&["map", "--x", "G=1:2:3", "--y", "G=1:2:3"], 2, "both axes are G");
+    fails(&["map", "--sigma=-1.1"], 2, "sigma is on an axis already");
     fails(&["report", "--x", "r=0.5:1:3", "--y", "r=0.5:1:3"], 2, "both r");
 }
 

@@ -200,7 +200,7 @@ fn a_library_that_belongs_to_no_component_is_refused() {
 #[test]
 fn an_unknown_platform_is_named_with_those_there_are() {
     for (argument, part) in [("win64", "PLATFORM=PATH"), ("amiga=x.so", "linux64, linux32")] {
-        let message = argument.parse::<Binary>().expect_err("a mistake");
+        let message = argument.parse::<Binary>().expect_err("a mistake").to_string();
         assert!(message.contains(part), "{message}");
     }
 }

@@ -159,11 +159,9 @@ def test_a_date_that_is_none_is_refused_and_nothing_is_written(vines, tmp_path):
 def test_the_page_shows_the_unit_of_every_real_variable(fmus):
     for name, fmu in fmus.items():
         page = (fmu.folder / "documentation" / "index.html").read_text()
-        rows = dict(re.findall(r"<tr><td><code>(.*?)</code></td><td>.*?</td><td>(.*?)</td>", page))
+        rows = dict(re.findall(r"<tr><td>(.*?)</td><td.*?>.*?</td><td.*?>(.*?)</td>", page))
         for variable in fmu.description.modelVariables:
             if variable.type == "Real":
                 assert rows[variable.name] == variable.unit, f"{name}: {variable.name}"
-    assert (
-        "<code>r</code></td><td>0.65</td><td>1</td>"
-        in (fmus["LoViNes"].folder / "documentation" / "index.html").read_text()
-    )
+    page = (fmus["LoViNes"].folder / "documentation" / "index.html").read_text()
+    assert re.search(r"<tr><td>r</td><td.*?>0.65</td><td.*?>1</td>", page)

@@ -143,14 +143,6 @@ pub struct Unknown {
 }
 
 impl Description {
-    /// Reads a description. Names that FMI 2.0 does not know are ignored; [`unknown_names`] lists them.
-    ///
-    /// # Errors
-    /// Text that is not XML, and a missing or invalid attribute.
-    pub fn parse(xml: &str) -> Result<Self, Error> {
-        read::description(xml)
-    }
-
     /// The variable of that name.
     #[must_use]
     pub fn variable(&self, name: &str) -> Option<&ScalarVariable> {

@@ -8,7 +8,17 @@ use crate::error::Error;
 use crate::xml;
 use crate::{Content, DefaultExperiment, Description, Kind, ModelStructure, ScalarVariable, SimpleType, Unknown};
 
-pub(crate) fn description(text: &str) -> Result<Description, Error> {
+impl Description {
+    /// Reads a description. Names that FMI 2.0 does not know are ignored; [`unknown_names`](crate::unknown_names) lists them.
+    ///
+    /// # Errors
+    /// Text that is not XML, and a missing or invalid attribute.
+    pub fn parse(xml: &str) -> Result<Self, Error> {
+        description(xml)
+    }
+}
+
+fn description(text: &str) -> Result<Description, Error> {
     let document = Document::parse(text)?;
     let name = document.root_element().tag_name().name();
     if name != "fmiModelDescription" {

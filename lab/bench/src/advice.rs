@@ -14,7 +14,6 @@ const STEP: f64 = 0.005;
 const FINER: i32 = 20;
 
 /// The stable symmetric 1:1 orbits at phase resonance, at any drive, by rising detuning.
-#[must_use]
 pub fn stable_orbits(d: &Dimensionless) -> Vec<Orbit> {
     let steps = ((SEARCHED[1] - SEARCHED[0]) / STEP) as i32;
     let omega = |n: i32| 1.0 + d.epsilon * (SEARCHED[0] + STEP * f64::from(n));
@@ -27,7 +26,6 @@ pub fn stable_orbits(d: &Dimensionless) -> Vec<Orbit> {
 }
 
 /// The largest response amplitude over b of these orbits, by falling steps from the largest that was found.
-#[must_use]
 pub fn largest_stable(d: &Dimensionless) -> Option<f64> {
     let largest = |orbits: Vec<Orbit>| {
         orbits
@@ -42,7 +40,6 @@ pub fn largest_stable(d: &Dimensionless) -> Option<f64> {
 }
 
 /// The range of drives, base amplitude over `b epsilon`, with a stable symmetric 1:1 orbit at phase resonance.
-#[must_use]
 pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
     let drives = stable_orbits(d).into_iter().map(|orbit| orbit.g);
     drives.fold(None, |range, g| {
@@ -53,7 +50,6 @@ pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
 
 /// Why a run that was expected to lock the symmetric 1:1 motion may not have done so: `regime` is that of its last periods, if they show
 /// one. `None` where the exact orbits know no reason.
-#[must_use]
 pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     let d = scene.dimensionless();
     let stable: Vec<Orbit> = phase_resonant(&d).into_iter().filter(|orbit| orbit.stable).collect();
@@ -106,7 +102,6 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
 }
 
 /// The regime of the last periods of a record that did not lock, from the impacts that the rig reports.
-#[must_use]
 pub fn last_regime(samples: &[Sample], scene: &Scene) -> Option<Regime> {
     let count = (scene.record.hold_periods * scene.controller.samples_per_period) as usize;
     let last = &samples[samples.len().saturating_sub(count)..];

@@ -98,9 +98,6 @@ impl Rig for Logged {
 }
 
 /// Runs every rig at every ratio with the noise of `seeds`, on all cores. `load` reads the scene with further settings.
-///
-/// # Errors
-/// A scene that is refused.
 pub fn calibrate(
     load: impl Fn(&[Override]) -> Result<Scene, SceneError>,
     rigs: &[[f64; 4]],

@@ -82,9 +82,6 @@ const OFF: [&str; 9] = [
 ];
 
 /// The scenes of every stage of [`STAGES`] alone, which `load` reads with further settings, and the scene itself if its chain is on.
-///
-/// # Errors
-/// A scene that is refused.
 pub fn scenes(
     mut load: impl FnMut(&[Override]) -> Result<Scene, SceneError>,
 ) -> Result<Vec<(&'static str, Scene)>, SceneError> {
@@ -104,9 +101,6 @@ pub fn scenes(
 }
 
 /// The effect of the chain of the scene.
-///
-/// # Errors
-/// Settings that plant or controller refuse, or a failure of either.
 pub fn effect(name: &'static str, scene: &Scene) -> Result<Effect, ExperimentError> {
     let (d, step) = (scene.dimensionless(), scene.sample_time());
     let plant = Simulated::new(scene.plant, scene.start).map_err(RigError::from)?;

@@ -63,7 +63,6 @@ pub struct ComparedPoint {
 
 impl Comparison {
     /// Compares what was identified on `scene`.
-    #[must_use]
     pub fn of(found: &Identification, scene: &Scene) -> Self {
         let (parameters, lock) = (found.parameters, found.lock);
         let at_resonance = scene.is_at_resonance();

@@ -51,9 +51,6 @@ pub struct Decay {
 
 impl Decay {
     /// Locks the plant of a scene, releases it, and records the decay in both ways.
-    ///
-    /// # Errors
-    /// Settings that are refused, or no lock.
     pub fn of(scene: &Scene) -> Result<Self, ExperimentError> {
         let mut rig = Simulated::new(scene.plant, scene.start).map_err(RigError::from)?;
         let mut controller = BuiltIn::new(&scene.controller_config()).map_err(ControllerError::from)?;
@@ -74,7 +71,6 @@ impl Decay {
     }
 
     /// Errors of the estimator of `scene` with its window. Noise of `snr` dB is averaged over this number of `seeds`.
-    #[must_use]
     pub fn quality(&self, scene: &Scene, snr: Option<f64>, seeds: u64) -> Quality {
         let seeds = if snr.is_some() { seeds } else { 1 };
         let errors: Vec<f64> = (1..=seeds)
@@ -143,7 +139,6 @@ impl Truth {
     }
 
     /// The detuning at `tau`, interpolated linearly between the middles of two periods; `None` outside.
-    #[must_use]
     pub fn sigma(&self, tau: f64) -> Option<f64> {
         let after = self.points.partition_point(|point| point.0 < tau);
         let (from, to) = (self.points.get(after.checked_sub(1)?)?, self.points.get(after)?);
@@ -157,9 +152,6 @@ const WINDOWS: [f64; 7] = [1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0];
 const NOISE: [Option<f64>; 4] = [None, Some(60.0), Some(50.0), Some(40.0)];
 
 /// Every estimator with every window and noise, on the decay of one scene.
-///
-/// # Errors
-/// As [`Decay::of`].
 pub fn qualities(scene: &Scene) -> Result<Vec<Quality>, ExperimentError> {
     let decay = Decay::of(scene)?;
     let fits = WINDOWS.map(|window| (Estimator::Fit, window));

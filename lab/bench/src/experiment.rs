@@ -34,7 +34,6 @@ pub struct Plan<'a> {
 
 impl<'a> Plan<'a> {
     /// The plan of a scene.
-    #[must_use]
     pub fn of(scene: &'a Scene) -> Self {
         let sample_time = scene.sample_time();
         let period = scene.dimensionless().natural_period();
@@ -98,7 +97,6 @@ pub enum Stage {
 
 impl Stage {
     /// What the experiment does in it.
-    #[must_use]
     pub fn name(self) -> &'static str {
         match self {
             Self::Locking => "searching for phase resonance",
@@ -111,52 +109,31 @@ impl Stage {
 
 /// Why an experiment ended early.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum ExperimentError {
-    /// The rig failed.
     #[error(transparent)]
     Rig(#[from] RigError),
-    /// The controller failed.
     #[error(transparent)]
     Controller(#[from] ControllerError),
-    /// The loop found no stationary phase resonance in the time allowed.
     #[error(
         "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s; \
          see record.lock_periods and the [controller] section",
         phase_error.map_or("the phase cannot be measured".into(), |error| format!("the phase error is {error:.3} degrees"))
     )]
     NoLock {
-        /// Time limit, natural periods.
         periods: f64,
-        /// Last phase error, degrees; absent if it could not be measured.
         phase_error: Option<f64>,
-        /// Last frequency, rad/s.
         omega: f64,
     },
-    /// The motion stays irregular.
     #[error("no lock: for {periods:.0} periods in total the motion was not 1:1, and only such a motion can be locked")]
-    Irregular {
-        /// How long, natural periods.
-        periods: f64,
-    },
-    /// The controller switched the drive off.
+    Irregular { periods: f64 },
     #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}", stage.name())]
-    Tripped {
-        /// Time since the start, periods of the drive.
-        periods: f64,
-        /// Stage of the experiment.
-        stage: Stage,
-        /// The reason.
-        fault: Fault,
-    },
-    /// The controller asked for a drive that is not a number.
+    Tripped { periods: f64, stage: Stage, fault: Fault },
     #[error("the controller asked for omega = {} rad/s and E = {} m, which is refused; the drive is off", .0.omega, .0.amplitude)]
     NotANumber(Drive),
 }
 
 /// Runs the whole experiment. `progress` receives the stage, the samples taken in it, and their largest number.
-///
-/// # Errors
-/// A failure of the rig or of the controller, a controller that switches the drive off, or no lock in the time allowed.
 pub fn run(
     rig: &mut (impl Rig + ?Sized),
     controller: &mut (impl Controller + ?Sized),
@@ -167,9 +144,6 @@ pub fn run(
 }
 
 /// As [`run`]; if the experiment ends early, what was measured stays in `samples`.
-///
-/// # Errors
-/// As [`run`].
 pub fn run_into(
     samples: &mut Vec<Sample>,
     rig: &mut (impl Rig + ?Sized),

@@ -109,7 +109,6 @@ impl<F: FnMut(Option<f64>)> Rig for SensorsOnly<F> {
 /// The rig of a checked scene as a rehearsal needs it: read by the scene's measurement chain, without ground truth, and with a fault that
 /// begins after `seconds` of rig time. When it is dropped after that, `ended` gets the time from the fault to a drive of zero, s, or
 /// `None` if the last drive was not zero.
-#[must_use]
 pub fn rehearsal_rig(
     scene: &Scene,
     kind: Kind,
@@ -144,9 +143,6 @@ pub struct Faults<'a> {
 
 impl<'a> Faults<'a> {
     /// The faults of a scene; `around` adds what the lab adds to its rig. Runs the experiment and the tracking once without a fault.
-    ///
-    /// # Errors
-    /// A scene that does not lock without a fault.
     pub fn new(scene: &Scene, around: &'a dyn Fn(Box<dyn Rig>) -> Box<dyn Rig>) -> Result<Self, ExperimentError> {
         let scene = short(scene);
         let mut faults = Self { scene, around, stages: [[0, 1]; 4] };
@@ -215,7 +211,6 @@ impl<'a> Faults<'a> {
     }
 
     /// A fault at `instants` instants of each stage.
-    #[must_use]
     pub fn row(&self, fault: &'static str, kind: Kind, instants: usize) -> Row {
         let mut row = Row { fault, worst: [Worst::default(); 4], reason: String::new() };
         for (worst, (during, [from, length])) in row.worst.iter_mut().zip(During::ALL.into_iter().zip(self.stages)) {
@@ -239,7 +234,6 @@ impl<'a> Faults<'a> {
     }
 
     /// Duration of the longest configured ramp after a fault, s.
-    #[must_use]
     pub fn ramp(&self) -> f64 {
         let config = self.scene.controller_config();
         let rate = |rate: Option<f64>, amplitude: f64| rate.map_or(0.0, |rate| amplitude / rate);

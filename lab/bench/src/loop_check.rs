@@ -48,9 +48,6 @@ pub struct LoopCheck {
 
 /// Checks a rig at a hundredth of the drive, after a response that is still falling has come to rest. The phase of the rig's oscillator is
 /// a multiple of 2 pi before and after.
-///
-/// # Errors
-/// A failure of the rig.
 pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, RigError> {
     let (d, step) = (scene.dimensionless(), scene.sample_time());
     let omega = scene.controller.omega_start * d.omega0;

@@ -6,6 +6,7 @@ mod configuration;
 mod controller;
 mod error;
 mod family;
+mod load;
 mod names;
 mod option;
 mod overrides;
@@ -14,8 +15,6 @@ mod plant;
 mod record;
 mod sections;
 mod validate;
-
-use std::path::Path;
 
 pub use lovines::Parameters;
 use lovines::State;
@@ -67,30 +66,7 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// Reads the scene file at `path`, or the default scene without one, with the overrides applied in order.
-    ///
-    /// # Errors
-    /// An unreadable file, an unknown or missing key, or a value that is not allowed, each named.
-    pub fn load(path: Option<&Path>, overrides: &[Override]) -> Result<Self, SceneError> {
-        let Some(path) = path else {
-            return Self::parse("paper.toml (the default scene)", PAPER, overrides);
-        };
-        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.into(), source })?;
-        Self::parse(&path.display().to_string(), &text, overrides)
-    }
-
-    /// Reads a scene from `text`; `origin` names it in messages.
-    ///
-    /// # Errors
-    /// As [`Scene::load`].
-    pub fn parse(origin: &str, text: &str, overrides: &[Override]) -> Result<Self, SceneError> {
-        let scene = overrides::read(origin, text, overrides)?.0.resolve(origin)?;
-        scene.controller_config().build()?;
-        Ok(scene)
-    }
-
     /// The numbers that the dimensionless model, the theory and the exact orbits depend on.
-    #[must_use]
     pub fn dimensionless(&self) -> Dimensionless {
         Dimensionless {
             definition: self.resonance,
@@ -99,13 +75,11 @@ impl Scene {
     }
 
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
-    #[must_use]
     pub fn dimensionless_start(&self) -> [f64; 4] {
         self.dimensionless().state(&self.start)
     }
 
     /// The controller's sample time, s.
-    #[must_use]
     pub fn sample_time(&self) -> f64 {
         self.dimensionless().natural_period() / self.controller.samples_per_period
     }

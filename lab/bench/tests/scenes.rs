@@ -268,3 +268,27 @@ fn limits_follow_from_the_numbers_of_the_rig() {
             .is_some()
     );
 }
+
+#[test]
+fn a_number_in_place_of_a_word_lists_the_words_of_a_scene_file() {
+    for (section, words) in [
+        ("[chain]\nsnr_of = 3", "`signal` or `range`"),
+        ("[record]\nestimator = 1.5", "`fit` or `crossings`"),
+        ("[resonance]\nsensor = true", "`v`, `q1`"),
+    ] {
+        let message = complaint(Scene::parse("mine.toml", section, &[]));
+        says(&message, &["mine.toml", "line 2", words]);
+    }
+}
+
+#[test]
+fn a_record_too_long_for_the_memory_counts_the_default_time_limit_of_the_lock() {
+    let message = complaint(paper(&[
+        "controller.samples_per_period=5000",
+        "record.decay_periods=2000",
+    ]));
+    says(
+        &message,
+        &["samples_per_period times all periods", "at most 20 million"],
+    );
+}

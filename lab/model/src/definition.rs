@@ -52,7 +52,6 @@ pub enum Sensor {
 
 impl Definition {
     /// All definitions that differ: at the peak, the reference does not matter.
-    #[must_use]
     pub fn all() -> Vec<Self> {
         let sensors = [Sensor::V, Sensor::Q1, Sensor::Acceleration];
         let cases = [
@@ -68,7 +67,6 @@ impl Definition {
     ///
     /// # Panics
     /// For a peak without the feature.
-    #[must_use]
     pub fn is_peak(&self) -> bool {
         let peak = self.resonance == Resonance::Peak;
         assert!(
@@ -79,25 +77,21 @@ impl Definition {
     }
 
     /// Whether the sensors need differences of samples, so that response and reference are read one sample late.
-    #[must_use]
     pub fn is_late(&self) -> bool {
         self.sensor == Sensor::Acceleration || self.reference == Reference::Force
     }
 
     /// The channels, as a rig at a network address states them: 0, 1 and 2 for v, q1 and the acceleration, and 4 more for the force.
-    #[must_use]
     pub fn channels(&self) -> u8 {
         self.sensor as u8 + 4 * self.reference as u8
     }
 
     /// The channels in words: response and reference.
-    #[must_use]
     pub fn channel_names(&self) -> String {
         format!("{} and {}", self.sensor.name(), self.reference.name())
     }
 
     /// In words, as in a table.
-    #[must_use]
     pub fn name(&self) -> String {
         let sensor = self.sensor.name();
         match self.resonance {
@@ -109,7 +103,6 @@ impl Definition {
 
 impl Sensor {
     /// As in a table.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
             Sensor::V => "v",
@@ -121,7 +114,6 @@ impl Sensor {
 
 impl Reference {
     /// As in a table.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
             Reference::Base => "e",

@@ -27,7 +27,6 @@ pub struct Dimensionless {
 
 impl Dimensionless {
     /// The bare dimensionless model, with `omega0 = 1` and `b = 1`.
-    #[must_use]
     pub fn new(epsilon: f64, lambda: f64, r: f64, g: f64) -> Self {
         Self {
             epsilon,
@@ -41,7 +40,6 @@ impl Dimensionless {
     }
 
     /// The numbers of a plant in SI units whose base moves with the amplitude `amplitude`, m.
-    #[must_use]
     pub fn of(plant: &Parameters, amplitude: f64) -> Self {
         let omega0 = plant.natural_frequency();
         let mut numbers = Self {
@@ -58,64 +56,52 @@ impl Dimensionless {
     }
 
     /// Excitation `G = E/(b epsilon)` of the base amplitude `E`, m.
-    #[must_use]
     pub fn excitation(&self, amplitude: f64) -> f64 {
         amplitude / (self.b * self.epsilon)
     }
 
     /// Base amplitude `E = G b epsilon`, m, of the excitation `g`.
-    #[must_use]
     pub fn amplitude(&self, g: f64) -> f64 {
         g * self.b * self.epsilon
     }
 
     /// Velocity over `b omega0` of a velocity in m/s.
-    #[must_use]
     pub fn speed(&self, velocity: f64) -> f64 {
         velocity / (self.b * self.omega0)
     }
 
     /// (q1, q1', q2, q2') of a state in SI units.
-    #[must_use]
     pub fn state(&self, state: &State) -> [f64; 4] {
         let State { q1, dq1, q2, dq2 } = *state;
         [q1 / self.b, self.speed(dq1), q2 / self.b, self.speed(dq2)]
     }
 
     /// Natural period `2 pi/omega0`, s.
-    #[must_use]
     pub fn natural_period(&self) -> f64 {
         std::f64::consts::TAU / self.omega0
     }
 
     /// Detuning `sigma = (Omega - 1)/epsilon` of the angular frequency `omega`, rad/s.
-    #[must_use]
     pub fn sigma(&self, omega: f64) -> f64 {
         (omega / self.omega0 - 1.0) / self.epsilon
     }
 
     /// Angular frequency, rad/s, at the detuning `sigma`.
-    #[must_use]
     pub fn omega(&self, sigma: f64) -> f64 {
         self.omega0 * (1.0 + self.epsilon * sigma)
     }
 
     /// Change of the angular frequency, rad/s, for a change of sigma.
-    #[must_use]
     pub fn omega_change(&self, sigma: f64) -> f64 {
         sigma * self.epsilon * self.omega0
     }
 
     /// The drive of the dimensionless plant at the detuning `sigma`.
-    #[must_use]
     pub fn drive(&self, sigma: f64) -> Drive {
         Drive::harmonic(self.epsilon * self.g, 1.0 + self.epsilon * sigma)
     }
 
     /// The plant of these numbers in dimensionless form, M = k = b = 1, at (q1, q1', q2, q2').
-    ///
-    /// # Errors
-    /// Invalid parameters or an invalid start.
     pub fn plant(&self, [q1, dq1, q2, dq2]: [f64; 4]) -> Result<Plant, InvalidValue> {
         let parameters = Parameters::dimensionless(self.epsilon, self.lambda, self.r);
         Plant::new(parameters, State { q1, dq1, q2, dq2 })

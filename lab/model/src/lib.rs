@@ -6,6 +6,7 @@
 
 #![forbid(unsafe_code)]
 
+mod argument;
 mod definition;
 mod dimensionless;
 pub mod map;
@@ -14,5 +15,6 @@ pub mod orbit;
 pub mod regime;
 pub mod theory;
 
+pub use argument::ArgumentError;
 pub use definition::{Definition, Reference, Resonance, Sensor};
 pub use dimensionless::Dimensionless;

@@ -8,11 +8,13 @@ mod axis;
 mod decide;
 mod grid;
 mod island;
+mod observe;
 mod response;
 mod run;
 
 pub use axis::{Axis, Range};
 pub use grid::{CONFIRMATIONS, Cell, LIMIT, Map, MapError, Plan};
 pub use island::outline;
+pub use observe::{observe, observe_confirmed};
 pub use response::Response;
-pub use run::{Point, Run, observe, observe_confirmed};
+pub use run::{Point, Run};

@@ -94,14 +94,12 @@ pub struct AfterImpact {
 
 impl Orbit {
     /// The unknowns that shooting starts from: (phase, q1, q1', q2') after the impact on w = +1, sigma, G.
-    #[must_use]
     pub fn unknowns(&self) -> Unknowns {
         let AfterImpact { phase, q1, dq1, dq2, .. } = self.start;
         Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
     }
 
     /// The symmetric motion near this one that satisfies both conditions.
-    #[must_use]
     pub fn periodic(&self, scene: &Dimensionless, conditions: [Condition; 2]) -> Option<Periodic> {
         Periodic::find(scene, &ImpactPattern::symmetric(), &self.unknowns(), conditions)
     }

@@ -60,7 +60,6 @@ impl Regime {
     ];
 
     /// Its short name, as in a table.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
             Regime::NoImpacts => "no impacts",
@@ -110,7 +109,6 @@ const COUNT: f64 = 0.05;
 
 /// The regime of impacts that come `per_period` times a period: symmetric 1:1 where the intervals differ by no more than
 /// `tolerance` ([`MEASURED`]), asymmetric 1:1, or another one.
-#[must_use]
 pub fn one_to_one(impacts: &[Impact], per_period: f64, tolerance: f64) -> Regime {
     let alternate = impacts.windows(2).all(|pair| pair[0].on_other_wall(&pair[1]));
     if (per_period - 2.0).abs() > COUNT || !alternate {
@@ -132,7 +130,6 @@ const IN_STEP: f64 = 0.15 * PI;
 
 /// Share of the impacts that belong to captures into 1:1 resonance: at least eight in a row, on alternating walls, half a
 /// period apart within 15 %. Times are phases of the base, rad.
-#[must_use]
 pub fn synchrony(impacts: &[Impact]) -> f64 {
     let in_step =
         |one: &Impact, other: &Impact| one.on_other_wall(other) && (other.time - one.time - PI).abs() < IN_STEP;
@@ -149,7 +146,6 @@ const LOST: f64 = 0.25;
 
 /// Time of the last impact in synchrony with a motion whose half period starts as `half_period` and changes slowly: on the
 /// other wall than the one before, and about as long after it as that one after its own predecessor.
-#[must_use]
 pub fn end_of_synchrony(impacts: &[Impact], half_period: f64) -> Option<f64> {
     let mut expected = half_period;
     let mut end = impacts.first()?.time;

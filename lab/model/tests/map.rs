@@ -167,7 +167,7 @@ fn maps_that_make_no_sense_are_refused() {
         ("x=0:1:5", "axis"),
         ("G=0:nan:5", "finite"),
     ] {
-        let message = text.parse::<Range>().unwrap_err();
+        let message = text.parse::<Range>().unwrap_err().to_string();
         assert!(message.contains(part), "{text}: {message}");
     }
     let message = |plan: Plan| plan.run(|| {}).unwrap_err().to_string();

@@ -18,7 +18,6 @@ pub enum BindScope {
 
 impl BindScope {
     /// The key, if there is one.
-    #[must_use]
     pub fn key(self) -> Option<Key> {
         match self {
             Self::Keyed(key) => Some(key),

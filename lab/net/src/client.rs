@@ -93,9 +93,6 @@ impl Client {
     }
 
     /// The next valid frame of this session, or None at `end`.
-    ///
-    /// # Errors
-    /// A peer that refuses, has shut down its drive, or has another version.
     pub fn receive(&mut self, end: Instant) -> Result<Option<Frame>, LinkError> {
         let (peer, time) = (self.peer, self.time());
         loop {

@@ -45,7 +45,6 @@ impl NetController {
     }
 
     /// The counters of the session.
-    #[must_use]
     pub fn counters(&self) -> Counters {
         self.client.counters
     }

@@ -102,7 +102,6 @@ pub enum FrameError {
 
 impl Frame {
     /// A frame of session `session` without samples.
-    #[must_use]
     pub fn new(kind: Kind, session: u64) -> Self {
         Self {
             kind,
@@ -115,13 +114,11 @@ impl Frame {
     }
 
     /// Whether a bit of [`flag`] is set.
-    #[must_use]
     pub fn has(&self, flag: u8) -> bool {
         self.flags & flag != 0
     }
 
     /// The bytes of the frame.
-    #[must_use]
     pub fn encode(&self) -> [u8; SIZE] {
         let mut bytes = [0; SIZE];
         bytes[..4].copy_from_slice(&MAGIC);
@@ -140,9 +137,6 @@ impl Frame {
     }
 
     /// Reads a datagram.
-    ///
-    /// # Errors
-    /// A datagram that is not a frame. The version is checked first, because everything after it may differ between versions.
     pub fn decode(bytes: &[u8]) -> Result<Self, FrameError> {
         if bytes.len() < 6 || bytes[..4] != MAGIC {
             return Err(FrameError::Magic);

@@ -1,6 +1,6 @@
 //! The start of a session: Hello, and Welcome or Refusal.
 
-use std::fmt::{self, Display, Formatter};
+use thiserror::Error;
 
 use super::frame::{Frame, Kind, VERSION, flag};
 use super::payload::read_command;
@@ -72,36 +72,38 @@ impl Service {
     }
 }
 
-/// Reason of a server to refuse a session, or to end it.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Reason of a server to refuse a session, or to end it, with its code.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum Refusal {
-    /// Code 1: another client has a session.
+    /// 1
+    #[error("it has another client; sessions are served one at a time")]
     Busy,
-    /// Code 2: the sample times differ; that of the server, s.
+    /// 2: the sample time of the server, s.
+    #[error("its sample time is {0} s, which differs from that of this program: use the same scene for both")]
     SampleTime(f64),
-    /// Code 3: the server is a rig and the client needs a controller, or the reverse.
+    /// 3
+    #[error("it is a rig where a controller is needed, or the reverse")]
     Role,
-    /// Code 4: the versions differ; that of the server.
+    /// 4: the version of the server.
+    #[error("it has version {0} of the protocol, this program has {VERSION}")]
     Version(u16),
-    /// Code 5: a value of a drive is not finite, or above its limit.
-    Drive {
-        /// Index of the value: frequency, amplitude, displacement.
-        index: usize,
-        /// The value, rad/s or m.
-        value: f64,
-        /// Its limit.
-        limit: f64,
-    },
-    /// Code 6: a frame that does not belong here: of another kind, another sample, or damaged.
+    /// 5: a value, rad/s or m, that is not finite or above its limit: frequency, amplitude, displacement.
+    #[error("{}", excess(*index, *value, *limit))]
+    Drive { index: usize, value: f64, limit: f64 },
+    /// 6
+    #[error("a frame was damaged, or was not that of the present sample")]
     Unexpected,
-    /// Code 7: the controller cannot make the move.
+    /// 7
+    #[error(
+        "its controller cannot control the response amplitude now, or not with these values: the loop must be closed, the drive needs a limit"
+    )]
     Move,
-    /// An unknown code.
+    #[error("reason {0}")]
     Other(f64),
 }
 
 impl Refusal {
-    /// The frame that answers `cause`.
     pub(super) fn answer(self, cause: &Frame) -> Frame {
         let values = match self {
             Self::Busy => [1.0, 0.0, 0.0, 0.0],
@@ -134,35 +136,12 @@ impl Refusal {
     }
 }
 
-impl Display for Refusal {
-    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        match *self {
-            Self::Busy => f.write_str("it has another client; sessions are served one at a time"),
-            Self::SampleTime(seconds) => write!(
-                f,
-                "its sample time is {seconds} s, which differs from that of this program: use the same scene for both"
-            ),
-            Self::Role => f.write_str("it is a rig where a controller is needed, or the reverse"),
-            Self::Version(version) => write!(
-                f,
-                "it has version {version} of the protocol, this program has {VERSION}"
-            ),
-            Self::Drive { index, value, limit } => {
-                let (name, unit, advice) = match index {
-                    0 => ("frequency", "rad/s", "the limit is half its sample rate"),
-                    1 => ("amplitude", "m", "`vines rig --max-amplitude` sets the limit"),
-                    _ => ("displacement", "m", "`vines rig --max-amplitude` sets the limit"),
-                };
-                write!(
-                    f,
-                    "the {name} of the drive is {value:e} {unit}, allowed is up to {limit:e} {unit}; {advice}"
-                )
-            }
-            Self::Unexpected => f.write_str("a frame was damaged, or was not that of the present sample"),
-            Self::Move => f.write_str(
-                "its controller cannot control the response amplitude now, or not with these values: the loop must be closed, the drive needs a limit",
-            ),
-            Self::Other(code) => write!(f, "reason {code}"),
-        }
-    }
+/// The message for a drive that is not allowed.
+fn excess(index: usize, value: f64, limit: f64) -> String {
+    let (name, unit, advice) = match index {
+        0 => ("frequency", "rad/s", "the limit is half its sample rate"),
+        1 => ("amplitude", "m", "`vines rig --max-amplitude` sets the limit"),
+        _ => ("displacement", "m", "`vines rig --max-amplitude` sets the limit"),
+    };
+    format!("the {name} of the drive is {value:e} {unit}, allowed is up to {limit:e} {unit}; {advice}")
 }

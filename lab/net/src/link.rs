@@ -174,7 +174,6 @@ impl Listener {
         }
     }
 
-    /// Closes the connection of a client.
     pub fn close(&mut self, client: SocketAddr) {
         if let ListenerSocket::Tcp(_, streams) = &mut self.socket {
             streams.retain(|(from, _)| *from != client);

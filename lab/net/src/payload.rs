@@ -10,7 +10,6 @@ pub(super) struct Reading {
     pub ground_truth: Option<GroundTruth>,
 }
 
-/// Writes readings into a frame.
 pub(super) fn write_reading(mut frame: Frame, reading: &Reading) -> Frame {
     let Reading { sensors, ground_truth } = reading;
     frame.kind = Kind::Sensors;
@@ -32,7 +31,6 @@ pub(super) fn write_reading(mut frame: Frame, reading: &Reading) -> Frame {
     frame
 }
 
-/// The readings in a frame.
 pub(super) fn read_reading(frame: &Frame) -> Reading {
     let [
         response,
@@ -56,7 +54,6 @@ pub(super) fn read_reading(frame: &Frame) -> Reading {
     }
 }
 
-/// Writes a command into a frame.
 pub(super) fn write_command(mut frame: Frame, command: &Command) -> Frame {
     frame.kind = Kind::Drive;
     if command.settled {
@@ -74,7 +71,6 @@ pub(super) fn write_command(mut frame: Frame, command: &Command) -> Frame {
     frame
 }
 
-/// The command in a frame.
 pub(super) fn read_command(frame: &Frame) -> Command {
     let [omega, amplitude, displacement, phase_error, state, fault] = frame.values;
     Command {

@@ -43,20 +43,17 @@ impl Punctuality {
     }
 
     /// Number of samples.
-    #[must_use]
     pub fn samples(&self) -> u64 {
         self.histogram.len()
     }
 
     /// Lateness, s, that this share of the samples does not exceed.
-    #[must_use]
     pub fn quantile(&self, share: f64) -> f64 {
         // The upper limit of a class may be above the largest value in it.
         (self.histogram.value_at_quantile(share) as f64 * NANO).min(self.worst)
     }
 
     /// The classes that samples are in: upper limit of the lateness, s, and number of samples.
-    #[must_use]
     pub fn classes(&self) -> Vec<(f64, u64)> {
         self.histogram
             .iter_recorded()

@@ -39,7 +39,6 @@ pub struct Counters {
 
 impl Counters {
     /// Whether any frame was not delivered once and in time.
-    #[must_use]
     pub fn is_troubled(&self) -> bool {
         *self != Self { received: self.received, ..Self::default() }
     }
@@ -76,7 +75,6 @@ pub struct Session {
 
 impl Session {
     /// Samples per second of the wall clock.
-    #[must_use]
     pub fn rate(&self) -> f64 {
         if self.seconds > 0.0 {
             self.samples as f64 / self.seconds
@@ -127,7 +125,6 @@ pub struct Timing {
 
 impl Timing {
     /// Share of the samples that the rig served too late, or without a drive in time.
-    #[must_use]
     pub fn share(&self) -> f64 {
         self.missed.max(self.held) as f64 / self.samples.max(1) as f64
     }

@@ -56,19 +56,16 @@ impl NetRig {
     }
 
     /// The longest silence, s, of a rig in real time; None for a rig in lock-step.
-    #[must_use]
     pub fn pace(&self) -> Option<f64> {
         self.client.is_real_time().then_some(self.client.silence.as_secs_f64())
     }
 
     /// The counters of the session.
-    #[must_use]
     pub fn counters(&self) -> Counters {
         self.client.counters
     }
 
     /// What a rig in real time reports about its timing. Set at the end of the session, unless the report is lost.
-    #[must_use]
     pub fn timing(&self) -> Arc<OnceLock<Timing>> {
         Arc::clone(&self.timing)
     }

@@ -90,7 +90,6 @@ impl Run {
         self.tell_reading(listener)
     }
 
-    /// Handles a frame of the client.
     pub fn handle(&mut self, frame: &Frame, listener: &mut Listener) -> Result<(), ServerError> {
         self.heard = Instant::now();
         self.counters.received += 1;

@@ -18,7 +18,6 @@ pub struct Key([u8; 32]);
 
 impl Key {
     /// The key of a secret; None if it is shorter than 16 bytes. Space at its end does not count.
-    #[must_use]
     pub fn of(secret: &[u8]) -> Option<Self> {
         let secret = secret.trim_ascii_end();
         (secret.len() >= SECRET).then(|| Self(Sha256::digest(secret).into()))

@@ -4,7 +4,8 @@ use clap::Args;
 use indicatif::ProgressBar;
 use vines::{backbone::track, comparison::TrackedComparison, report, rig::BuiltIn};
 
-use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, result, writable, written};
+use super::output::{result, writable, written};
+use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure};
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:
@@ -39,10 +40,6 @@ pub(super) struct Arguments {
     /// The rig: `built-in`, an FMU, tcp://HOST:PORT (in lock-step), udp://HOST:PORT or helic://HOST[:PORT] (in real time)
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
     rig: Endpoint,
-
-    /// The controller: `built-in`, an FMU with the inputs `hold_response` and `move.*` of PhaseLock.fmu, or tcp://HOST:PORT
-    #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
-    controller: Endpoint,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
@@ -52,10 +49,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     writable(&experiment.out)?;
     let mut open = arguments.rig.rig(&scene, reach)?;
     experiment.check_loop(&mut open.rig, &mut scene)?;
-    let config = scene.backbone_config();
-    let mut controller = arguments
-        .controller
-        .controller(&config, &scene.controller_names, reach, open.pace)?;
+    let (endpoint, config) = (&experiment.controller, scene.backbone_config());
+    let mut controller = endpoint.controller(&config, &scene.controller_names, reach, open.pace)?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let tracked = track(&mut open.rig, controller.as_mut(), &scene, |done, _| {
         bar.set_position(done as u64);

@@ -8,7 +8,8 @@ use vines::calibration::{self, Calibration, Coverage, Kind, Missing, OTHER_RIGS,
 use vines::report::{self, Table};
 use vines::scene::Scene;
 
-use super::{failure::Failure, output, serving::count, writable, written};
+use super::output::{output, writable, written};
+use super::{failure::Failure, serving::count};
 
 /// The scene whose settings the rigs change.
 const SCENE: &str = include_str!("../../../scenes/dimensionless.toml");

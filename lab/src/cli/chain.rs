@@ -4,7 +4,7 @@ use clap::Args;
 use vines::chain_effects::{self, Effect};
 use vines::report::Table;
 
-use super::{failure::Failure, output, scene_arguments::SceneArguments};
+use super::{failure::Failure, output::output, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Locks the plant with each stage of [chain] alone and with some combinations, and prints a Markdown table:

@@ -1,19 +1,12 @@
 //! `vines check`: the loop before the drive rises.
 
 use clap::Args;
-use vines::{
-    experiment::ExperimentError,
-    loop_check::{Channel, LockTime, LoopCheck, Trials, Verdict, check, lock_times, trials},
-    report::Table,
-};
+use vines::loop_check::{Channel, LockTime, LoopCheck, Trials, Verdict, check, lock_times, trials};
+use vines::{experiment::ExperimentError, report::Table};
 
-use super::{
-    endpoint::{Endpoint, ReachArguments},
-    failure::Failure,
-    log_warnings, output,
-    scene_arguments::SceneArguments,
-    serving::count,
-};
+use super::endpoint::{Endpoint, ReachArguments};
+use super::output::{log_warnings, output, print};
+use super::{failure::Failure, scene_arguments::SceneArguments, serving::count};
 
 const HELP: &str = "\
 Drives the rig at a hundredth of the drive for 24 periods with the loop open, and compares amplitude and phase of response and base with
@@ -104,7 +97,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if found.verdict == Verdict::Healthy {
         return Ok(text);
     }
-    super::print(&text)?;
+    print(&text)?;
     Err(Failure::run(format!("the loop check failed: {}", found.verdict)))
 }
 

@@ -4,11 +4,8 @@ use clap::Args;
 use vines::net::{Address, Role, Served, Service};
 use vines::rig::BuiltIn;
 
-use super::{
-    failure::Failure,
-    scene_arguments::SceneArguments,
-    serving::{ServingArguments, positive},
-};
+use super::serving::{ServingArguments, positive};
+use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Examples:

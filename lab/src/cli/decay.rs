@@ -5,7 +5,7 @@ use vines::estimators::{self, Quality};
 use vines::report::Table;
 use vines::scene::Estimator;
 
-use super::{failure::Failure, output, scene_arguments::SceneArguments};
+use super::{failure::Failure, output::output, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Locks the built-in plant, releases it, and estimates sigma along the decay with every estimator and window, on clean data and

@@ -1,23 +1,17 @@
 //! `--rig` and `--controller`: the implementations of the two sides of the bench.
 
-use std::{
-    path::{Path, PathBuf},
-    str::FromStr,
-    sync::{Arc, OnceLock},
-};
+use std::path::{Path, PathBuf};
+use std::str::FromStr;
+use std::sync::{Arc, OnceLock};
 
 use clap::Args;
 use phase_lock::Config;
-use vines::{
-    fmu::{FmuController, FmuError, FmuRig},
-    net::{
-        Address, BindScope, Key, NetController, NetRig, Timing,
-        helic::{Channels, DEFAULT_PORT, HelicRig, Network},
-        resolve,
-    },
-    rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable},
-    scene::{Name, Names, Scene},
-};
+use vines::ArgumentError;
+use vines::fmu::{FmuController, FmuError, FmuRig};
+use vines::net::helic::{Channels, DEFAULT_PORT, HelicRig, Network};
+use vines::net::{Address, BindScope, Key, NetController, NetRig, Timing, resolve};
+use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
+use vines::scene::{Name, Names, Scene};
 
 use super::{failure::Failure, interrupt::stop_flag, real_time::RealTimeArguments};
 
@@ -26,14 +20,13 @@ use super::{failure::Failure, interrupt::stop_flag, real_time::RealTimeArguments
 pub(super) enum Endpoint {
     /// `built-in`: that of this program.
     BuiltIn,
-    /// The path of an FMU.
     Fmu(PathBuf),
     /// `tcp://HOST:PORT` or `udp://HOST:PORT`.
     Network(String),
 }
 
 impl FromStr for Endpoint {
-    type Err = String;
+    type Err = ArgumentError;
 
     fn from_str(text: &str) -> Result<Self, Self::Err> {
         if text == "built-in" {
@@ -49,12 +42,12 @@ impl FromStr for Endpoint {
             Err(format!(
                 "{text} does not exist; give `built-in`, the path of an FMU, tcp://HOST:PORT, or for a rig in real time \
                  udp://HOST:PORT or helic://HOST[:PORT]"
-            ))
+            )
+            .into())
         }
     }
 }
 
-/// A rig.
 pub(super) struct OpenRig {
     pub rig: Stoppable,
     /// In real time, the longest silence that it tolerates, s.
@@ -118,7 +111,6 @@ impl Endpoint {
     }
 }
 
-/// The rig in an FMU.
 pub(super) fn fmu(file: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuError> {
     FmuRig::load(
         file,

@@ -5,7 +5,8 @@ use std::path::PathBuf;
 use clap::Args;
 use vines::{experiment::ExperimentError, loop_check, net::BindScope, rig::Rig, scene::Scene};
 
-use super::{check, endpoint::ReachArguments, failure::Failure, log_warnings, scene_arguments::SceneArguments};
+use super::endpoint::{Endpoint, ReachArguments};
+use super::{check, failure::Failure, output::log_warnings, scene_arguments::SceneArguments};
 
 #[derive(Debug, Args)]
 pub(super) struct ExperimentArguments {
@@ -15,6 +16,11 @@ pub(super) struct ExperimentArguments {
     /// Folder for the results; created if it does not exist
     #[arg(long, value_name = "DIR", default_value = "out")]
     pub out: PathBuf,
+
+    /// The controller: `built-in`, an FMU (for `vines backbone` with the inputs `hold_response` and `move.*` of PhaseLock.fmu), or
+    /// tcp://HOST:PORT
+    #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
+    pub controller: Endpoint,
 
     #[command(flatten)]
     reach: ReachArguments,

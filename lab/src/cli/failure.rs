@@ -3,13 +3,9 @@
 use std::fmt::Display;
 
 use phase_lock::ConfigError;
-use vines::{
-    experiment::ExperimentError,
-    net::LinkError,
-    pack::PackError,
-    rig::{Interrupted, RigError},
-    scene::{SceneError, refusal},
-};
+use vines::rig::{Interrupted, RigError};
+use vines::scene::{SceneError, refusal};
+use vines::{experiment::ExperimentError, net::LinkError, pack::PackError};
 
 /// Exit code of a program that a signal ended: 128 and the number of SIGINT.
 pub(super) const INTERRUPTED: u8 = 130;

@@ -3,13 +3,12 @@
 use std::{panic, process, sync::atomic::Ordering, thread, time::Duration};
 
 use clap::Args;
-use vines::{
-    faults::{During, FAULTS, Faults, Kind, Row, Worst},
-    report::Table,
-    rig::{Rig, Stoppable},
-};
+use vines::faults::{During, FAULTS, Faults, Kind, Row, Worst};
+use vines::report::Table;
+use vines::rig::{Rig, Stoppable};
 
-use super::{failure::Failure, interrupt::stop_flag, output, scene_arguments::SceneArguments, serving::count};
+use super::output::{output, print};
+use super::{failure::Failure, interrupt::stop_flag, scene_arguments::SceneArguments, serving::count};
 
 const HELP: &str = "\
 Injects faults into runs on the built-in plant, at several instants while the loop locks, holds, tracks and releases, and prints the worst
@@ -68,7 +67,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let failed = |worst: &Worst| worst.missed > 0 || worst.shutdown > allowed;
     let text = output(arguments.json, &rows, || table(&rows).markdown())?;
     if rows.iter().any(|row| row.worst.iter().any(failed)) {
-        super::print(&text)?;
+        print(&text)?;
         return Err(Failure::run(format!(
             "a fault was missed, or the drive became zero later than {:.1} ms after the detection",
             1e3 * allowed

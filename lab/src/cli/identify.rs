@@ -4,20 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::{
-    advice,
-    comparison::Comparison,
-    experiment::{ExperimentError, Plan, Sample, Stage, run_into},
-    identification::{self, IdentificationError},
-    pack, report,
-    rig::BuiltIn,
-    scene::Scene,
-};
+use vines::experiment::{ExperimentError, Plan, Sample, Stage, run_into};
+use vines::identification::{self, IdentificationError};
+use vines::{advice, comparison::Comparison, pack, report, rig::BuiltIn, scene::Scene};
 
-use super::{
-    endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, pack::beside_this_program, progress_bar,
-    result, writable, written,
-};
+use super::output::{progress_bar, result, writable, written};
+use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, pack::beside_this_program};
 
 const HELP: &str = "\
 Examples:
@@ -41,10 +33,6 @@ pub(super) struct Arguments {
     /// [default: this program's plant FMU]
     #[arg(long, value_name = "ENDPOINT")]
     rig: Option<Endpoint>,
-
-    /// The controller: `built-in`, an FMU, or tcp://HOST:PORT
-    #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
-    controller: Endpoint,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
@@ -64,10 +52,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     };
     writable(&experiment.out)?;
     experiment.check_loop(&mut open.rig, &mut scene)?;
-    let mut controller =
-        arguments
-            .controller
-            .controller(&scene.controller_config(), &scene.controller_names, reach, open.pace)?;
+    let (endpoint, config) = (&experiment.controller, scene.controller_config());
+    let mut controller = endpoint.controller(&config, &scene.controller_names, reach, open.pace)?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(plan.lock as u64, "{msg:29} [{wide_bar}] {pos}/{len} samples");
     let mut samples = Vec::new();

@@ -1,12 +1,8 @@
 //! Ctrl-C and SIGTERM while a rig is driven: the drive becomes zero and the session ends before the program does.
 
-use std::{
-    process,
-    sync::{
-        Arc, OnceLock,
-        atomic::{AtomicBool, Ordering},
-    },
-};
+use std::process;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use super::failure::{Failure, INTERRUPTED};
 

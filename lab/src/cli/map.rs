@@ -4,17 +4,13 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::{
-    map::{CONFIRMATIONS, LIMIT, Map, Plan, Range},
-    orbit::Branch,
-    report::{
-        self,
-        summary::{parameters, regimes},
-    },
-    scene::Scene,
-};
+use vines::map::{Axis, CONFIRMATIONS, LIMIT, Map, Plan, Range};
+use vines::report;
+use vines::report::summary::{parameters, regimes};
+use vines::{orbit::Branch, scene::Scene};
 
-use super::{failure::Failure, progress_bar, scene_arguments::SceneArguments, serving::count, writable, written};
+use super::output::{progress_bar, writable, written};
+use super::{failure::Failure, scene_arguments::SceneArguments, serving::count};
 
 const HELP: &str = "\
 Every cell is one plant, driven at a fixed frequency from the scene's start:
@@ -95,6 +91,11 @@ fn plan(arguments: &Arguments, scene: &Scene) -> Result<Plan, Failure> {
         return Err(Failure::input(format!(
             "--sigma = {sigma} (dimensionless) is not a finite number"
         )));
+    }
+    if arguments.sigma.is_some() && [arguments.x.axis, arguments.y.axis].contains(&Axis::Sigma) {
+        return Err(Failure::input(
+            "--sigma: sigma is on an axis already, by default on that of --x; leave --sigma out, or take --x r=0.3:1:71",
+        ));
     }
     let plan = Plan::new(
         scene.dimensionless(),

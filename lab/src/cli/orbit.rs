@@ -4,14 +4,11 @@ mod studies;
 mod text;
 
 use clap::Args;
-use vines::{
-    orbit::{Condition, Exploration, Limits, backbone, continue_both_ways, phase_resonant, response, settle},
-    report::summary::parameters,
-    scene::Dimensionless,
-};
+use vines::orbit::{Condition, Exploration, Limits, backbone, continue_both_ways, phase_resonant, response, settle};
+use vines::{ArgumentError, scene::Dimensionless};
 
 use studies::{converged, defined};
-use text::{curve, described, listing, searched};
+use text::{curve, described, listing, searched, shown};
 
 use super::{failure::Failure, scene_arguments::SceneArguments};
 
@@ -144,16 +141,12 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> 
 }
 
 /// Parses FIRST:LAST.
-fn detunings(text: &str) -> Result<[f64; 2], String> {
-    let form = || {
-        format!(
-            "`{text}`: expected FIRST:LAST, two detunings (dimensionless), the first below the last, for instance -6:6"
-        )
-    };
-    let (from, to) = text.split_once(':').ok_or_else(form)?;
+fn detunings(text: &str) -> Result<[f64; 2], ArgumentError> {
+    let form = "expected FIRST:LAST, two detunings (dimensionless), the first below the last, for instance -6:6";
+    let (from, to) = text.split_once(':').ok_or(form)?;
     match (from.trim().parse::<f64>(), to.trim().parse::<f64>()) {
         (Ok(from), Ok(to)) if from < to && from.is_finite() && to.is_finite() => Ok([from, to]),
-        _ => Err(form()),
+        _ => Err(form.into()),
     }
 }
 
@@ -189,17 +182,5 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
     }
     shown(scene, "Exact orbit", &motion, arguments.json, || {
         described(&pattern, &motion)
-    })
-}
-
-fn shown(
-    scene: &Dimensionless,
-    title: &str,
-    found: &impl serde::Serialize,
-    json: bool,
-    text: impl FnOnce() -> String,
-) -> Result<String, Failure> {
-    super::output(json, found, || {
-        format!("{title}\n  {}\n\n{}", parameters(scene), text())
     })
 }

@@ -1,5 +1,7 @@
 //! Options of a program that must meet deadlines: priority, memory and processor.
 
+use std::io;
+
 use clap::Args;
 
 use super::failure::Failure;
@@ -38,47 +40,51 @@ impl RealTimeArguments {
     }
 }
 
-fn asked(option: &str, answer: Result<(), String>, help: &str) -> Result<(), Failure> {
+fn asked(option: &str, answer: io::Result<()>, help: &str) -> Result<(), Failure> {
     answer.map_err(|error| Failure::run(format!("{option}: the system refuses: {error}; {help}")))
 }
 
 #[cfg(target_os = "linux")]
 mod system {
+    use std::io;
+
     use rustix::{mm, thread};
     use thread_priority::{
         RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy, set_thread_priority_and_policy,
         thread_native_id,
     };
 
-    pub fn priority(priority: u8) -> Result<(), String> {
+    pub fn priority(priority: u8) -> io::Result<()> {
         let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
-        let value = ThreadPriority::Crossplatform(priority.try_into()?);
-        set_thread_priority_and_policy(thread_native_id(), value, policy).map_err(|error| error.to_string())
+        let value = ThreadPriority::Crossplatform(priority.try_into().map_err(io::Error::other)?);
+        set_thread_priority_and_policy(thread_native_id(), value, policy).map_err(io::Error::other)
     }
 
-    pub fn lock_memory() -> Result<(), String> {
+    pub fn lock_memory() -> io::Result<()> {
         let all = mm::MlockAllFlags::CURRENT | mm::MlockAllFlags::FUTURE;
-        mm::mlockall(all).map_err(|error| error.to_string())
+        Ok(mm::mlockall(all)?)
     }
 
-    pub fn processor(number: usize) -> Result<(), String> {
+    pub fn processor(number: usize) -> io::Result<()> {
         if number >= thread::CpuSet::MAX_CPU {
-            return Err("there is no such processor".into());
+            return Err(io::Error::other("there is no such processor"));
         }
         let mut set = thread::CpuSet::new();
         set.set(number);
-        thread::sched_setaffinity(None, &set).map_err(|error| error.to_string())
+        Ok(thread::sched_setaffinity(None, &set)?)
     }
 }
 
 #[cfg(not(target_os = "linux"))]
 mod system {
-    pub fn priority<T>(_: T) -> Result<(), String> {
-        Err("this option exists on Linux only".into())
+    use std::io;
+
+    pub fn priority<T>(_: T) -> io::Result<()> {
+        Err(io::Error::other("this option exists on Linux only"))
     }
     pub use priority as processor;
 
-    pub fn lock_memory() -> Result<(), String> {
+    pub fn lock_memory() -> io::Result<()> {
         priority(())
     }
 }

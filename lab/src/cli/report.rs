@@ -3,13 +3,11 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::{
-    map::Range,
-    report::{Subject, write_report},
-    rig::BuiltIn,
-};
+use vines::report::{Subject, write_report};
+use vines::{map::Range, rig::BuiltIn};
 
-use super::{failure::Failure, progress_bar, scene_arguments::SceneArguments, writable};
+use super::output::{progress_bar, writable};
+use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Runs the experiment, tracks the backbone, follows the exact curves, studies the convergence, maps the regimes, and writes

@@ -3,19 +3,16 @@
 use std::{path::PathBuf, str::FromStr};
 
 use clap::{Args, ValueEnum};
+use vines::ArgumentError;
 use vines::faults::{FAULTS, Kind, rehearsal_rig};
 use vines::net::{Address, Role, Served, Service, Session, helic::Device};
 use vines::report;
 use vines::rig::{Rig, RigError, Simulated};
 use vines::scene::Scene;
 
-use super::{
-    endpoint::{Endpoint, fmu},
-    failure::Failure,
-    print,
-    scene_arguments::SceneArguments,
-    serving::{ServingArguments, positive},
-};
+use super::endpoint::{Endpoint, fmu};
+use super::serving::{ServingArguments, positive};
+use super::{failure::Failure, output::print, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Examples:
@@ -112,9 +109,9 @@ struct Fault {
 }
 
 impl FromStr for Fault {
-    type Err = String;
+    type Err = ArgumentError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, ArgumentError> {
         let (name, seconds) = text
             .rsplit_once('@')
             .ok_or("expected NAME@SECONDS, for instance \"response sensor dead@60\"")?;
@@ -124,7 +121,7 @@ impl FromStr for Fault {
         let seconds = positive(seconds)?;
         match faults.clone().find(|(one, _)| *one == name) {
             Some((_, kind)) => Ok(Self { kind, seconds }),
-            None => Err(format!("unknown fault; known are: {}", known())),
+            None => Err(format!("unknown fault; known are: {}", known()).into()),
         }
     }
 }

@@ -5,7 +5,7 @@ use vines::random_rigs::{self, Outcome, Row};
 use vines::report::Table;
 use vines::scene::Override;
 
-use super::{failure::Failure, output, serving::count};
+use super::{failure::Failure, output::output, serving::count};
 
 const HELP: &str = "\
 Draws rigs at random, each with a drive at which a stable symmetric 1:1 orbit exists: epsilon from 0.001 to 0.05, lambda from

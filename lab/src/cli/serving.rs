@@ -1,23 +1,15 @@
 //! Common options of the two servers: address, end, output.
 
-use std::{
-    sync::{Arc, atomic::Ordering},
-    time::{Duration, Instant},
-};
+use std::sync::{Arc, atomic::Ordering};
+use std::time::{Duration, Instant};
 
 use clap::Args;
-use vines::net::{
-    Address, LinkError, Served, Server, ServerError, Service, Session,
-    helic::{Device, HelicServer},
-    resolve,
-};
+use vines::ArgumentError;
+use vines::net::helic::{Device, HelicServer};
+use vines::net::{Address, LinkError, Served, Server, ServerError, Service, Session, resolve};
 
-use super::{
-    endpoint::{ReachArguments, no_key},
-    failure::Failure,
-    interrupt::stop_flag,
-    print,
-};
+use super::endpoint::{ReachArguments, no_key};
+use super::{failure::Failure, interrupt::stop_flag, output::print};
 
 #[derive(Debug, Args)]
 pub(super) struct ServingArguments {
@@ -113,7 +105,7 @@ impl ServingArguments {
 }
 
 /// A number above 0 and at most 1e8, for seconds and metres.
-pub(super) fn positive(text: &str) -> Result<f64, String> {
+pub(super) fn positive(text: &str) -> Result<f64, ArgumentError> {
     let value: f64 = text.parse().map_err(|_| "expected a number")?;
     if value > 0.0 && value <= 1e8 {
         Ok(value)
@@ -123,7 +115,7 @@ pub(super) fn positive(text: &str) -> Result<f64, String> {
 }
 
 /// A number of runs, seeds or the like.
-pub(super) fn count<T: TryFrom<u64>>(text: &str) -> Result<T, String> {
+pub(super) fn count<T: TryFrom<u64>>(text: &str) -> Result<T, ArgumentError> {
     let value = text.parse().ok().filter(|count| (1..=1_000_000_000).contains(count));
     let value = value.and_then(|count: u64| count.try_into().ok());
     value.ok_or_else(|| "expected a whole number from 1 to 1000000000".into())

@@ -1,21 +1,14 @@
 //! `vines sweep`: any parameters of a scene over grids, lists and random or Sobol designs, to a Zarr store.
 
-use std::{
-    path::PathBuf,
-    sync::atomic::{AtomicBool, Ordering::Relaxed},
-    thread,
-    time::Duration,
-};
+use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
+use std::{path::PathBuf, thread, time::Duration};
 
 use clap::Args;
+use vines::ArgumentError;
 use vines::sweep::{self, Axis, Estimate, Monitor, Plan, Results, Settings, Shard};
 
-use super::{
-    failure::{Failure, INTERRUPTED},
-    interrupt::stop_flag,
-    progress_bar,
-    scene_arguments::SceneArguments,
-};
+use super::failure::{Failure, INTERRUPTED};
+use super::{interrupt::stop_flag, output::progress_bar, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Axes; a key is sigma (the detuning) or section.key of a scene:
@@ -149,7 +142,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
 }
 
 /// The part `I/N` of a sweep.
-fn shard(text: &str) -> Result<Shard, String> {
+fn shard(text: &str) -> Result<Shard, ArgumentError> {
     let parts = text
         .split_once('/')
         .and_then(|(one, of)| Some((one.parse::<u64>().ok()?, of.parse().ok()?)));

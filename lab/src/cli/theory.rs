@@ -8,7 +8,8 @@ use vines::{
     theory::{Activation, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, SlowFlow, backbone, resonant},
 };
 
-use super::{failure::Failure, output, scene_arguments::SceneArguments, yes_no};
+use super::output::{output, yes_no};
+use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Everything is of first order in epsilon, except the thresholds from rest. Both branches of the slow invariant manifold

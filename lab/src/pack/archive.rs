@@ -4,8 +4,11 @@ use std::io::{self, Cursor, Write};
 
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
-use super::{File, PackError};
+use super::PackError;
 use crate::files::FileError;
+
+/// Name and content of a file to be.
+pub(super) type File = (String, Vec<u8>);
 
 /// The archive of `entries`, (name inside, content), as a file.
 pub(super) fn file(name: String, entries: &[(&str, &[u8])]) -> Result<File, PackError> {

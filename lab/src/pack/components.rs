@@ -30,7 +30,6 @@ impl Component {
 }
 
 /// The plant and the controller.
-#[must_use]
 pub fn components() -> [Component; 2] {
     [
         Component {

@@ -3,7 +3,9 @@
 //! The tables of the page come from `modelDescription.xml`; equations and explanations are in `pictures/`.
 
 use fmi2_description::{Description, Error, ScalarVariable};
-use maud::{DOCTYPE, Markup, PreEscaped, html};
+use maud::{DOCTYPE, PreEscaped, html};
+
+use crate::report::Table;
 
 /// The files: name inside the FMU, content. A component without a figure gets the page only.
 pub fn documentation(identifier: &str, description: &str) -> Result<Vec<(String, Vec<u8>)>, Error> {
@@ -43,7 +45,8 @@ const MATERIAL: [Material; 2] = [
 const STYLE: &str = "body{font:16px/1.5 system-ui,sans-serif;color:#1f2933;max-width:62rem;margin:2rem auto;padding:0 1rem}\
     svg{max-width:100%;height:auto}table{border-collapse:collapse;width:100%}\
     th,td{text-align:left;vertical-align:top;padding:.3rem .6rem;border-bottom:1px solid #d9e2ec}\
-    td:nth-child(n+2):nth-child(-n+4){white-space:nowrap}code{font-size:.95em}h2{margin-top:2.2rem}";
+    td:nth-child(n+2):nth-child(-n+4){white-space:nowrap}td:first-child,code{font:.95em monospace}\
+    h2{margin-top:2.2rem}caption{font-size:1.5em;font-weight:bold;text-align:left;margin-top:2.2rem}";
 
 fn page(xml: &str, material: Option<&Material>) -> Result<String, Error> {
     let description = Description::parse(xml)?;
@@ -71,7 +74,10 @@ fn page(xml: &str, material: Option<&Material>) -> Result<String, Error> {
                     "Version " (description.version) "; FMI " (description.fmi_version) "; " (interfaces.join(" and "))
                     ". Default experiment: " (start) " s to " (stop) " s in steps of " (step) " s."
                 }
-                @for (causality, heading) in SECTIONS { (table(&description, causality, heading)) }
+                @for (causality, heading) in SECTIONS {
+                    @let table = table(&description, causality);
+                    @if !table.is_empty() { (table.html(heading)) }
+                }
             }
         }
     };
@@ -102,28 +108,19 @@ fn rounded(text: &str) -> String {
     }
 }
 
-fn table(description: &Description, causality: &str, heading: &str) -> Markup {
+/// The variables of one causality.
+fn table(description: &Description, causality: &str) -> Table {
     let is_one = |one: &&ScalarVariable| one.causality.as_deref().unwrap_or("local") == causality;
-    let variables: Vec<_> = description.variables.iter().filter(is_one).collect();
-    html! {
-        @if !variables.is_empty() {
-            h2 { (heading) }
-            table {
-                tr { th { "name" } th { "start" } th { "unit" } th { "variability" } th { "meaning" } }
-                @for one in variables {
-                    @let content = one.content.first();
-                    "\n"
-                    tr {
-                        td { code { (one.name) } }
-                        td { (rounded(content.and_then(|c| c.start.as_deref()).unwrap_or_default())) }
-                        td { (content.and_then(|c| c.unit.as_deref()).unwrap_or_default()) }
-                        td { (one.variability.as_deref().unwrap_or_default()) }
-                        td { (one.description) }
-                    }
-                }
-            }
-        }
-    }
+    let rows = description.variables.iter().filter(is_one).map(|one| {
+        let content = one.content.first();
+        let start = content.and_then(|content| content.start.as_deref());
+        let unit = content.and_then(|content| content.unit.as_deref());
+        let texts = [unit, one.variability.as_deref(), Some(one.description.as_str())];
+        let mut cells = vec![one.name.clone(), rounded(start.unwrap_or_default())];
+        cells.extend(texts.map(|text| text.unwrap_or_default().to_string()));
+        cells
+    });
+    Table::new("name | start | unit | variability | meaning").rows(rows)
 }
 
 #[cfg(test)]

@@ -1,10 +1,8 @@
 //! One FMU: its description and its libraries, one for each platform.
 
-use super::{
-    Component, File, Libraries, PackError, archive, date, documentation,
-    library::{Fitted, fitted},
-    platform::Platform,
-};
+use super::archive::{self, File};
+use super::library::{Fitted, fitted};
+use super::{Component, Libraries, PackError, date, documentation, platform::Platform};
 
 /// The FMUs of the components.
 pub(super) fn all(components: &[Component], libraries: &Libraries) -> Result<Vec<File>, PackError> {

@@ -1,17 +1,13 @@
 //! Libraries: found, checked, and given to the components that they belong to.
 
-use std::{
-    env::consts::{DLL_PREFIX, DLL_SUFFIX},
-    io::ErrorKind,
-    path::{Path, PathBuf},
-    str::FromStr,
-};
+use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::path::{Path, PathBuf};
+use std::{io::ErrorKind, str::FromStr};
 
-use super::{
-    Component, Libraries, PackError,
-    platform::Platform,
-    symbols::{exports, mentions},
-};
+use vines_model::ArgumentError;
+
+use super::symbols::{exports, mentions};
+use super::{Component, PackError, platform::Platform};
 
 /// A library for the platform of a folder under `binaries/`; parse it from `win64=PATH`.
 #[derive(Debug, Clone)]
@@ -21,9 +17,9 @@ pub struct Binary {
 }
 
 impl FromStr for Binary {
-    type Err = String;
+    type Err = ArgumentError;
 
-    fn from_str(argument: &str) -> Result<Self, String> {
+    fn from_str(argument: &str) -> Result<Self, ArgumentError> {
         let (folder, path) = argument
             .split_once('=')
             .ok_or("expected PLATFORM=PATH, for instance win64=lovines_fmu.dll")?;
@@ -32,6 +28,23 @@ impl FromStr for Binary {
             format!("`{folder}` is not a platform; known are {known}")
         })?;
         Ok(Self { platform, path: path.into() })
+    }
+}
+
+/// Where the libraries come from.
+#[derive(Debug, Clone)]
+pub struct Libraries {
+    /// Folder with those for this platform, under the names that cargo gives them.
+    pub folder: PathBuf,
+    /// Whether those for this platform are packed at all.
+    pub own: bool,
+    /// Those for other platforms.
+    pub others: Vec<Binary>,
+}
+
+impl From<&Path> for Libraries {
+    fn from(folder: &Path) -> Self {
+        Self { folder: folder.into(), own: true, others: Vec::new() }
     }
 }
 
@@ -111,12 +124,12 @@ fn fit(Binary { platform, path }: &Binary, components: &[Component]) -> Result<F
 /// Reads an FMI 2.0 component for `platform`; `place` and `advice` are for the message.
 fn read(path: &Path, platform: &Platform, place: &str, advice: &str) -> Result<Vec<u8>, PackError> {
     let content = std::fs::read(path).map_err(|source| PackError::Read { path: path.into(), source })?;
-    let problem = match platform.check(&content) {
-        Err(found) => format!("is {found}, but {place} needs {}{advice}", platform.name),
-        Ok(()) if !exports(&content, "fmi2Instantiate") => {
+    let problem = match platform.mismatch(&content) {
+        Some(found) => format!("is {found}, but {place} needs {}{advice}", platform.name),
+        None if !exports(&content, "fmi2Instantiate") => {
             format!("has no function fmi2Instantiate, so it is not an FMI 2.0 component{advice}")
         }
-        Ok(()) => return Ok(content),
+        None => return Ok(content),
     };
     Err(PackError::Library { path: path.into(), problem })
 }

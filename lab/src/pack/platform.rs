@@ -55,7 +55,6 @@ const fn platform(
 
 impl Platform {
     /// The platform that this program runs on; 64-bit Linux where it is none of those known.
-    #[must_use]
     pub fn running() -> Self {
         let format = match OS {
             "windows" => Pe,
@@ -93,17 +92,17 @@ impl Platform {
         KNOWN.into_iter().find(|platform| platform.folder == folder)
     }
 
-    /// Checks the header of a library against this platform; the error says what the file is instead.
-    pub(super) fn check(&self, file: &[u8]) -> Result<(), String> {
+    /// What a file is instead of a library for this platform, by its header; None for such a library.
+    pub(super) fn mismatch(self, file: &[u8]) -> Option<String> {
         if FileKind::parse(file).is_err() {
-            return Err("not a shared library (unknown header)".into());
+            return Some("not a shared library (unknown header)".into());
         }
         // A universal library for macOS holds several.
         let mut found = Vec::new();
         for image in images(file) {
             match object::File::parse(image) {
                 Ok(parsed) => found.push((parsed.format(), parsed.architecture())),
-                Err(error) => return Err(format!("a damaged library ({error})")),
+                Err(error) => return Some(format!("a damaged library ({error})")),
             }
         }
         let serves = |&(format, architecture): &(BinaryFormat, Architecture)| {
@@ -111,12 +110,12 @@ impl Platform {
             KNOWN.iter().any(|one| one.folder == self.folder && same(one))
         };
         match found.first() {
-            _ if found.iter().any(serves) => Ok(()),
-            Some(&(format, architecture)) => Err(match find(format, architecture) {
+            _ if found.iter().any(serves) => None,
+            Some(&(format, architecture)) => Some(match find(format, architecture) {
                 Some(known) => known.name.into(),
                 None => format!("a library for another platform ({format:?}, {architecture:?})"),
             }),
-            None => Err("an empty universal library".into()),
+            None => Some("an empty universal library".into()),
         }
     }
 }

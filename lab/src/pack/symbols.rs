@@ -1,9 +1,7 @@
 //! The symbols of a library.
 
-use object::{
-    Export, FileKind, NameOrOrdinal, Object,
-    read::macho::{FatArch, MachOFatFile32, MachOFatFile64},
-};
+use object::read::macho::{FatArch, MachOFatFile32, MachOFatFile64};
+use object::{Export, FileKind, NameOrOrdinal, Object};
 
 /// The library itself, or those in a universal library for macOS.
 pub(super) fn images(file: &[u8]) -> Vec<&[u8]> {

@@ -2,7 +2,8 @@
 
 mod parameters;
 
-use super::{File, PackError, archive, date};
+use super::archive::{self, File};
+use super::{PackError, date};
 use crate::scene::Scene;
 
 use parameters::parameter_set;

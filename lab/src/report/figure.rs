@@ -10,10 +10,7 @@ use thiserror::Error;
 
 use crate::scene::{Dimensionless, Sensor};
 
-pub use stability::{Marked, clipped, thinned};
-
-/// A place in a panel, in the units of its axes.
-pub type Place = (f64, f64);
+pub use stability::{Marked, Place, clipped, thinned};
 
 /// Axis labels that several figures share.
 pub const DETUNING: &str = "detuning σ = (ω/ω₀ − 1)/ε";

@@ -18,12 +18,10 @@ use super::theme::{DECAY, LOCK};
 const THINNED: usize = 4;
 const DECAY_LABEL: &str = "free decay, identified";
 
-/// Points along the decay.
 fn decay_points(panel: &mut Panel, points: impl Iterator<Item = Place>, label: &str) {
     panel.circles(points.collect(), 4, line(DECAY, 16), label);
 }
 
-/// The locked point.
 fn locked_point(panel: &mut Panel, place: Place) {
     panel.square(place, LOCK, "locked, measured");
 }

@@ -13,7 +13,6 @@ const STYLE: &str = include_str!("page.css");
 const UNRESERVED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'_').remove(b'.').remove(b'~');
 
 /// Puts the sections together. `work_precision` is a figure of run time against error, as SVG, where there is one.
-#[must_use]
 pub fn page(scene: &Scene, sections: &[Section], work_precision: Option<&str>) -> String {
     let dark = theme::dark_rules();
     let style = format!("{STYLE}\n@media screen and (prefers-color-scheme: dark){{{dark}}}\n");

@@ -2,7 +2,22 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::files::ReportError;
 use super::table::Table;
+use crate::map::Range;
+use crate::scene::Scene;
+
+/// The subject of a report.
+#[derive(Debug, Clone)]
+pub struct Subject {
+    /// The scene.
+    pub scene: Scene,
+    /// Axes of the regime map.
+    pub map: [Range; 2],
+}
+
+/// Computes one section; calls the callback with the fraction done, from 0 to 1.
+pub type Maker = fn(&Subject, &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError>;
 
 /// One part of a section. A figure is SVG for white paper; its name is that of its files, without ending.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

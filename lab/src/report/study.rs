@@ -7,8 +7,8 @@ use sha2::{Digest, Sha256};
 use super::dark;
 use super::files::ReportError;
 use super::page::page;
-use super::section::{Block, Section};
-use super::sections::{SECTIONS, Subject};
+use super::section::{Block, Section, Subject};
+use super::sections::SECTIONS;
 use crate::files;
 
 /// Folder of cached sections, inside the folder of the report.

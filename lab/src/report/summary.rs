@@ -10,7 +10,6 @@ use crate::scene::{Definition, Dimensionless, PhaseOrigin, Sensor};
 const RIPPLE: usize = 200;
 
 /// The numbers that a result belongs to, in one line.
-#[must_use]
 pub fn parameters(p: &Dimensionless) -> String {
     let definition = match p.definition == Definition::default() {
         true => String::new(),
@@ -25,7 +24,6 @@ fn rig(p: &Dimensionless) -> String {
 }
 
 /// How often each regime occurs on a map.
-#[must_use]
 pub fn regimes(map: &Map) -> Table {
     let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
     let share = |count: usize, of: usize| match of {
@@ -41,7 +39,6 @@ pub fn regimes(map: &Map) -> Table {
 }
 
 /// An identification: the locked point beside theory and exact orbit, then the decay.
-#[must_use]
 pub fn identification(found: &Comparison) -> String {
     let lock = &found.lock;
     let row = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
@@ -140,7 +137,6 @@ fn agreement(found: &Comparison) -> String {
 }
 
 /// The points of a tracked backbone, and what they cost.
-#[must_use]
 pub fn tracked(found: &TrackedComparison) -> String {
     let rows = found.points.iter().map(|TrackedPoint { point, exact }| {
         let regime = match point.regime_by_impacts {

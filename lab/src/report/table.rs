@@ -12,27 +12,23 @@ pub struct Table {
 
 impl Table {
     /// An empty table with these headings, separated by ` | `.
-    #[must_use]
     pub fn new(headings: &str) -> Self {
         let headings = headings.split(" | ").map(String::from).collect();
         Self { headings, rows: Vec::new() }
     }
 
     /// With a row for each item; a row has as many cells as there are headings.
-    #[must_use]
     pub fn rows<R: Into<Vec<String>>>(mut self, rows: impl IntoIterator<Item = R>) -> Self {
         self.rows.extend(rows.into_iter().map(Into::into));
         self
     }
 
     /// Whether it has no row.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.rows.is_empty()
     }
 
     /// Columns under their headings, separated by two spaces; words to the left, numbers to the right.
-    #[must_use]
     pub fn text(&self) -> String {
         let numbers = self.numbers();
         let all = || std::iter::once(&self.headings).chain(&self.rows);
@@ -52,7 +48,6 @@ impl Table {
     }
 
     /// A Markdown table.
-    #[must_use]
     pub fn markdown(&self) -> String {
         let line = |cells: &[String]| format!("| {} |\n", cells.join(" | "));
         let rule = format!("|{}\n", "---|".repeat(self.headings.len()));
@@ -61,7 +56,6 @@ impl Table {
     }
 
     /// An HTML table with its caption; columns of numbers are set to the right.
-    #[must_use]
     pub fn html(&self, caption: &str) -> Markup {
         let numbers = self.numbers();
         let class = |n: usize| numbers[n].then_some("number");
@@ -94,13 +88,11 @@ impl Table {
 }
 
 /// A number of a table.
-#[must_use]
 pub fn number(value: f64) -> String {
     format!("{value:.6}")
 }
 
 /// A number of a table with its standard uncertainty.
-#[must_use]
 pub fn with_uncertainty(value: f64, uncertainty: f64) -> String {
     format!("{value:.6} ± {uncertainty:.1e}")
 }

@@ -57,7 +57,6 @@ const DARK: [(&str, &str); 9] = [
 ];
 
 /// A figure for dark screens.
-#[must_use]
 pub fn dark(svg: &str) -> String {
     // Every colour is in quotes, and each is replaced once.
     svg.split('"')
@@ -70,7 +69,6 @@ pub fn dark(svg: &str) -> String {
 }
 
 /// Style rules that do the same for figures inside a page.
-#[must_use]
 pub fn dark_rules() -> String {
     DARK.iter()
         .flat_map(|(light, dark)| ["fill", "stroke"].map(|what| format!("svg [{what}=\"{light}\"]{{{what}:{dark}}}")))

@@ -14,22 +14,17 @@ use crate::{
     cell::Cell,
     doubt::Doubt,
     error::StoreError,
+    monitor::Monitor,
     plan::Plan,
-    run::Monitor,
-    store::{Store, code},
+    store::{ROUNDS, Store, code},
     variables::ABSENT,
 };
 
-/// Folder of the results of rounds; removed at the end.
-pub(crate) const ROUNDS: &str = ".rounds";
 /// Code of a cell that is not known yet.
 const UNKNOWN: u8 = 254;
 
 /// Least number of cells of the first grid along a side, roughly.
 const SIDE: usize = 4;
-
-/// Largest number of cells: all their regimes are in memory, two bytes per cell.
-pub(crate) const MOST: u64 = 1_000_000_000;
 
 /// What is known of all cells.
 struct Map {

@@ -8,6 +8,8 @@ use rand_chacha::{
     rand_core::{Rng, SeedableRng},
 };
 
+use vines_model::ArgumentError;
+
 use crate::sobol;
 
 /// The detuning, which belongs to the drive and not to the scene.
@@ -48,17 +50,17 @@ impl Axis {
     ///
     /// # Errors
     /// A value that is not finite, fewer than two values, a value twice, or an empty interval.
-    pub fn new(name: &str, values: Values) -> Result<Self, String> {
+    pub fn new(name: &str, values: Values) -> Result<Self, ArgumentError> {
         let finite = |value: f64| match value.is_finite() {
             true => Ok(()),
-            false => Err(format!("{name} = {value} is not a finite number")),
+            false => Err(ArgumentError::from(format!("{name} = {value} is not a finite number"))),
         };
         match &values {
             Values::Grid { from, to, points } => {
                 [*from, *to].into_iter().try_for_each(finite)?;
                 few(name, *points, *from)?;
                 if from >= to {
-                    return Err(format!("{name} from {from} to {to}: the first must be below the last"));
+                    return Err(format!("{name} from {from} to {to}: the first must be below the last").into());
                 }
             }
             Values::List(list) => {
@@ -67,13 +69,13 @@ impl Axis {
                 let mut sorted = list.clone();
                 sorted.sort_by(f64::total_cmp);
                 if let Some(pair) = sorted.windows(2).find(|pair| pair[0] == pair[1]) {
-                    return Err(format!("{name} has the value {} twice", pair[0]));
+                    return Err(format!("{name} has the value {} twice", pair[0]).into());
                 }
             }
             Values::Random([from, to]) | Values::Sobol([from, to]) => {
                 [*from, *to].into_iter().try_for_each(finite)?;
                 if from >= to {
-                    return Err(format!("{name} from {from} to {to}: the first must be below the last"));
+                    return Err(format!("{name} from {from} to {to}: the first must be below the last").into());
                 }
             }
         }
@@ -105,19 +107,21 @@ impl Axis {
     }
 }
 
-fn few(name: &str, points: u64, value: f64) -> Result<(), String> {
+fn few(name: &str, points: u64, value: f64) -> Result<(), ArgumentError> {
     match points {
-        0 => Err(format!("{name} has no values; at least 2 are needed")),
+        0 => Err(format!("{name} has no values; at least 2 are needed").into()),
         1 if name == SIGMA => Err(format!(
             "{name} has one value; at least 2 are needed. A constant is a setting of the sweep: --sigma={value}, \
              in Python sigma={value}"
-        )),
+        )
+        .into()),
         1 => {
             let (section, key) = name.split_once('.').unwrap_or(("section", name));
             Err(format!(
                 "{name} has one value; at least 2 are needed. A constant belongs to the scene: --set {name}={value}, \
                  in Python Scene({section}={{\"{key}\": {value}}})"
-            ))
+            )
+            .into())
         }
         _ => Ok(()),
     }
@@ -174,16 +178,16 @@ impl Display for Axis {
 }
 
 impl FromStr for Axis {
-    type Err = String;
+    type Err = ArgumentError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, ArgumentError> {
         let form = "expected KEY=FIRST:LAST:POINTS, KEY=VALUE,VALUE,..., KEY=random:FIRST:LAST or KEY=sobol:FIRST:LAST, \
                     for instance plant.r=0.3:1:71";
         let (name, values) = text.split_once('=').ok_or(form)?;
         let number = |text: &str| {
             let text = text.trim();
             text.parse::<f64>()
-                .map_err(|_| format!("`{text}` is not a number; {form}"))
+                .map_err(|_| ArgumentError::from(format!("`{text}` is not a number; {form}")))
         };
         let parts: Vec<&str> = values.split(':').collect();
         let values = match parts[..] {

@@ -1,6 +1,9 @@
 //! One cell of a sweep: its result, and the variables that are stored of it.
 
+use std::error::Error;
+
 use vines_model::{
+    ArgumentError,
     map::{Point, Response, Run},
     orbit::{Orbit, symmetric_orbits},
     regime::Regime,
@@ -40,7 +43,7 @@ impl Results {
     ///
     /// # Errors
     /// An unknown name.
-    pub fn parse<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Self, String> {
+    pub fn parse<'a>(names: impl IntoIterator<Item = &'a str>) -> Result<Self, ArgumentError> {
         let mut results = Self::default();
         for name in names {
             match name.trim() {
@@ -49,9 +52,9 @@ impl Results {
                 "orbits" => results.orbits = true,
                 "lock" => results.lock = true,
                 other => {
-                    return Err(format!(
-                        "unknown results `{other}`; known are regime, response, orbits and lock"
-                    ));
+                    return Err(
+                        format!("unknown results `{other}`; known are regime, response, orbits and lock").into(),
+                    );
                 }
             }
         }
@@ -88,7 +91,10 @@ pub(crate) fn compute(scene: &Scene, sigma: f64, g: Option<f64>, periods: usize,
     }
     match simulated(&numbers, sigma, scene.dimensionless_start(), periods, results.response) {
         Ok((point, response)) => {
-            let lock = results.lock.then(|| locked(scene)).transpose();
+            let (lock, failure) = match results.lock.then(|| locked(scene)).transpose() {
+                Ok(lock) => (lock, String::new()),
+                Err(error) => (None, format!("no locked point: {error}")),
+            };
             Cell {
                 regime: Some(point.regime),
                 inferred: false,
@@ -96,8 +102,8 @@ pub(crate) fn compute(scene: &Scene, sigma: f64, g: Option<f64>, periods: usize,
                 response,
                 orbits: results.orbits.then(|| symmetric_orbits(&numbers, sigma)),
                 power: scene.plant.stiffness * numbers.b * numbers.b * numbers.omega0,
-                failure: lock.as_ref().err().cloned().unwrap_or_default(),
-                lock: lock.ok().flatten(),
+                failure,
+                lock,
             }
         }
         Err(error) => Cell::failed(error.to_string()),
@@ -105,15 +111,12 @@ pub(crate) fn compute(scene: &Scene, sigma: f64, g: Option<f64>, periods: usize,
 }
 
 /// The locked point of the scene.
-fn locked(scene: &Scene) -> Result<Lock, String> {
-    let message = |error: &dyn std::fmt::Display| format!("no locked point: {error}");
+fn locked(scene: &Scene) -> Result<Lock, Box<dyn Error>> {
     let plan = experiment::Plan { decay: 0, ..experiment::Plan::of(scene) };
-    let mut rig = Simulated::of(scene).map_err(|error| message(&error))?;
-    let mut controller = BuiltIn::new(&scene.controller_config()).map_err(|error| message(&error))?;
-    let record =
-        experiment::run(rig.as_mut(), &mut controller, &plan, |_, _, _| {}).map_err(|error| message(&error))?;
-    let found = identification::identify(&record, scene).map_err(|error| message(&error))?;
-    Ok(found.lock)
+    let mut rig = Simulated::of(scene)?;
+    let mut controller = BuiltIn::new(&scene.controller_config())?;
+    let record = experiment::run(rig.as_mut(), &mut controller, &plan, |_, _, _| {})?;
+    Ok(identification::identify(&record, scene)?.lock)
 }
 
 fn simulated(

@@ -4,46 +4,14 @@ use std::{
     path::{Path, PathBuf},
     sync::{
         Mutex,
-        atomic::{AtomicBool, AtomicU64, Ordering::Relaxed},
+        atomic::{AtomicBool, Ordering::Relaxed},
     },
     time::{Duration, Instant},
 };
 
 use rayon::prelude::*;
 
-use crate::{adaptive, cell::Cell, error::StoreError, plan::Plan, store::Store};
-
-/// The progress of a sweep, and the flag that stops it.
-#[derive(Debug, Default)]
-pub struct Monitor {
-    /// Cells that were in the store at the start.
-    pub found: AtomicU64,
-    /// Cells computed since then.
-    pub computed: AtomicU64,
-    /// Those of them that failed.
-    pub failed: AtomicU64,
-    /// Cells that were inferred; known at the end of an adaptive sweep.
-    pub inferred: AtomicU64,
-    /// Ends the sweep within the duration of a cell; unfinished chunks are dropped.
-    pub stop: AtomicBool,
-    /// Reason of the first failure.
-    pub reason: Mutex<Option<String>>,
-}
-
-impl Monitor {
-    /// Counts a cell.
-    pub(crate) fn note(&self, cell: &Cell) {
-        if !cell.failure.is_empty() {
-            self.failed.fetch_add(1, Relaxed);
-            if let Ok(mut reason) = self.reason.lock() {
-                reason.get_or_insert_with(|| cell.failure.clone());
-            }
-        }
-        if cell.regime.is_some() || !cell.failure.is_empty() {
-            self.computed.fetch_add(1, Relaxed);
-        }
-    }
-}
+use crate::{adaptive, cell::Cell, error::StoreError, monitor::Monitor, plan::Plan, store::Store};
 
 /// The part of a sweep that one process computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -187,6 +155,14 @@ impl Estimate {
     }
 }
 
+/// All cells that were tried fail; the reason is that of the first.
+#[derive(Debug, thiserror::Error)]
+#[error("all of {tried} cells that were tried fail: {reason}")]
+pub struct EstimateError {
+    tried: usize,
+    reason: String,
+}
+
 /// Largest number of cells, and duration, of the trial behind an estimate.
 const TRIED: usize = 64;
 const TRIAL: Duration = Duration::from_secs(1);
@@ -195,7 +171,7 @@ const TRIAL: Duration = Duration::from_secs(1);
 ///
 /// # Errors
 /// If all of them fail: the reason of the first.
-pub fn estimate(plan: &Plan, stop: &AtomicBool) -> Result<Estimate, String> {
+pub fn estimate(plan: &Plan, stop: &AtomicBool) -> Result<Estimate, EstimateError> {
     let start = Instant::now();
     // Positions that do not follow a regular grid: the golden ratio.
     let tried: Vec<Cell> = (0..TRIED)
@@ -204,8 +180,8 @@ pub fn estimate(plan: &Plan, stop: &AtomicBool) -> Result<Estimate, String> {
         .map(|position| plan.cell_near(position))
         .collect();
     if tried.iter().all(|cell| !cell.failure.is_empty()) {
-        let reason = tried.first().map_or("", |cell| &cell.failure);
-        return Err(format!("all of {} cells that were tried fail: {reason}", tried.len()));
+        let reason = tried.first().map_or(String::new(), |cell| cell.failure.clone());
+        return Err(EstimateError { tried: tried.len(), reason });
     }
     let cell = start.elapsed().as_secs_f64() / tried.len() as f64;
     let threads = rayon::current_num_threads() as f64;

@@ -3,7 +3,6 @@
 use vines_testbench::scene::SceneError;
 
 use crate::{
-    adaptive,
     axis::{Axis, SIGMA},
     cell::Results,
     sobol,
@@ -89,13 +88,10 @@ impl Settings {
         if points.len() != 2 || self.axes.len() != 2 {
             return refused("adaptive refinement needs exactly two axes, each a grid or a list".into());
         }
-        if points[0]
-            .checked_mul(points[1])
-            .is_none_or(|cells| cells > adaptive::MOST)
-        {
+        if points[0].checked_mul(points[1]).is_none_or(|cells| cells > ADAPTIVE) {
             return refused(format!(
                 "adaptive refinement of more than {} cells, which must be in memory",
-                adaptive::MOST
+                ADAPTIVE
             ));
         }
         if self.results != Results::default() {
@@ -116,6 +112,8 @@ pub enum PlanError {
     Setting(String),
 }
 
+/// Most cells of an adaptive sweep: all their regimes are in memory, two bytes per cell.
+const ADAPTIVE: u64 = 1_000_000_000;
 /// Most cells: their number must be countable in the metadata of the store.
 const MOST: u64 = 1 << 53;
 /// Number of points of a Sobol sequence.

@@ -14,13 +14,15 @@ use zarrs::array::{
 };
 
 use crate::{
-    adaptive::ROUNDS,
     cell::Cell,
     error::StoreError,
     folder::{Folder, PARTIAL},
     plan::Plan,
     variables::{ABSENT, Read, Variable, variables},
 };
+
+/// Folder of the results of an adaptive sweep's rounds; removed at the end.
+pub(crate) const ROUNDS: &str = ".rounds";
 
 /// An open store.
 pub(crate) struct Store {

@@ -168,7 +168,7 @@ fn a_failed_cell_has_its_reason_and_stops_nothing() {
 
 #[test]
 fn axes_that_make_no_sense_are_refused_with_their_name_and_value() {
-    let axis = |text: &str| text.parse::<Axis>().unwrap_err();
+    let axis = |text: &str| text.parse::<Axis>().unwrap_err().to_string();
     assert!(axis("plant.r=0.7").contains("plant.r has one value") && axis("plant.r=0.7").contains("--set plant.r=0.7"));
     assert!(axis("plant.r=0.7").contains("Scene(plant={\"r\": 0.7})") && axis("sigma=-1").contains("--sigma=-1"));
     assert!(axis("plant.r=0.3:NaN:5").contains("NaN is not a finite number"));
@@ -199,7 +199,8 @@ fn axes_that_make_no_sense_are_refused_with_their_name_and_value() {
         &plan(settings(&["plant.r=1.2:1.4:3"])).unwrap(),
         &AtomicBool::new(false),
     )
-    .unwrap_err();
+    .unwrap_err()
+    .to_string();
     assert!(
         none.contains("all of") && none.contains("above 0 and at most 1"),
         "{none}"

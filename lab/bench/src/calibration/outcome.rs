@@ -57,7 +57,6 @@ pub const HALF_WIDTH: f64 = 1.96;
 
 impl Coverage {
     /// Of some outcomes; shares of none are NaN.
-    #[must_use]
     pub fn of<'a>(outcomes: impl Iterator<Item = &'a Outcome> + Clone) -> Self {
         let count = outcomes.clone().count();
         let pulls = outcomes.clone().map(|one| one.error.abs() / one.uncertainty);

@@ -32,7 +32,6 @@ pub struct Distance {
 
 impl ExactCurve {
     /// The curve of a scene.
-    #[must_use]
     pub fn of(scene: &Dimensionless) -> Self {
         let limits = Limits { step: STEP, points: 20_000, ..Limits::default() };
         let mut points = backbone(scene, &limits).map_or(Vec::new(), |branch| branch.points);
@@ -53,13 +52,11 @@ impl ExactCurve {
     }
 
     /// C, sigma and G of its orbits, from the fold on.
-    #[must_use]
     pub fn places(&self) -> &[[f64; 3]] {
         &self.places
     }
 
     /// `[sigma, G]` at the amplitude `c`; `None` outside the curve.
-    #[must_use]
     pub fn at(&self, c: f64) -> Option<[f64; 2]> {
         let pair = self
             .places
@@ -70,7 +67,6 @@ impl ExactCurve {
     }
 
     /// How far `(C, sigma, G)` lies from the curve; `None` where there is no curve.
-    #[must_use]
     pub fn distance(&self, c: f64, sigma: f64, g: f64) -> Option<Distance> {
         let segments = self
             .places

@@ -35,7 +35,6 @@ pub struct TrackedPoint {
 
 impl TrackedComparison {
     /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than that of resonance.
-    #[must_use]
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
         let parameters = scene.dimensionless();
         let curve = ExactCurve::of(&parameters);
@@ -54,13 +53,11 @@ impl TrackedComparison {
     }
 
     /// All periods, the lock included, over the number of points.
-    #[must_use]
     pub fn periods_per_point(&self) -> f64 {
         self.periods / self.points.len() as f64
     }
 
     /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.
-    #[must_use]
     pub fn worst(&self) -> Option<Worst> {
         let errors = self.points.iter().filter(|one| one.point.settled).filter_map(|one| {
             let Distance { nearest, sigma, g } = one.exact?;

@@ -18,7 +18,6 @@ pub struct Sample {
 }
 
 /// The samples as a table (CSV): what a run that ended early has measured.
-#[must_use]
 pub fn table(samples: &[Sample]) -> String {
     let mut text = String::from("time,response,reference,omega,E,phase_error,state,fault\n");
     for Sample { time, sensors, command, .. } in samples {
@@ -40,7 +39,6 @@ pub fn table(samples: &[Sample]) -> String {
 }
 
 /// Phases of the drive at the samples, rad, from `start` at the first.
-#[must_use]
 pub fn drive_phases(samples: &[Sample], sample_time: f64, start: f64) -> Vec<f64> {
     let advance = |phase: &mut f64, sample: &Sample| {
         let now = *phase;
@@ -65,13 +63,11 @@ pub struct Record {
 
 impl Record {
     /// The samples between the settled lock and the release.
-    #[must_use]
     pub fn hold(&self) -> &[Sample] {
         &self.samples[self.settled..self.released]
     }
 
     /// The samples from the release on.
-    #[must_use]
     pub fn decay(&self) -> &[Sample] {
         &self.samples[self.released..]
     }

@@ -28,9 +28,6 @@ pub struct LockTime {
 }
 
 /// The times of a scene with a simulated rig, for a lock of the phase whatever the amplitude does.
-///
-/// # Errors
-/// A scene that the plant or the controller refuses.
 pub fn lock_times(scene: &Scene) -> Result<Vec<LockTime>, ExperimentError> {
     let mut scene = scene.clone();
     let settings = &mut scene.controller;

@@ -76,7 +76,6 @@ fn fault(scene: &Scene, random: &mut Random) -> (Verdict, Kind) {
     }
 }
 
-/// A random scene at rest.
 fn random_scene(scene: &Scene, random: &mut Random) -> Scene {
     let mut scene = scene.clone();
     let (mass, stiffness) = (scene.plant.primary_mass, scene.plant.stiffness);
@@ -107,9 +106,6 @@ fn rig(scene: &Scene, random: &mut Random, kind: Kind) -> Result<(Box<dyn Rig>, 
 }
 
 /// Checks `count` healthy rigs, and as many with a random fault.
-///
-/// # Errors
-/// A scene that a random rig does not allow.
 pub fn trials(scene: &Scene, count: usize, seed: u64) -> Result<Trials, SceneError> {
     let mut random = Random(ChaCha8Rng::seed_from_u64(seed));
     let mut trials = Trials::default();

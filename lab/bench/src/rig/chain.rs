@@ -67,7 +67,6 @@ fn converted(converter: Option<&Converter>, value: f64) -> f64 {
 
 impl Chain {
     /// The rig behind its chain, or the rig itself where the chain is off.
-    #[must_use]
     pub fn around(rig: Box<dyn Rig>, scene: &Scene) -> Box<dyn Rig> {
         if scene.chain.is_on() {
             Box::new(Self::new(rig, scene))
@@ -77,7 +76,6 @@ impl Chain {
     }
 
     /// The chain of a scene around `rig`.
-    #[must_use]
     pub fn new(rig: Box<dyn Rig>, scene: &Scene) -> Self {
         let (settings, d) = (&scene.chain, scene.dimensionless());
         // The power of a signal is averaged over about one period.

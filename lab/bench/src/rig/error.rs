@@ -11,14 +11,12 @@ type Cause = Box<dyn Error + Send + Sync>;
 
 /// Why a rig cannot go on.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum RigError {
-    /// The implementation of the rig failed: an FMU, a link to a peer.
     #[error("the rig: {0}")]
     Failed(#[source] Cause),
-    /// The built-in plant refused a drive.
     #[error("the rig: {0}")]
     Refused(#[from] InvalidValue),
-    /// The rig cannot be driven by held samples.
     #[error(
         "the rig accepts frequency and amplitude only, not samples of the base displacement: chain.hold = true needs a rig that does, and so \
          does `vines rig --protocol helic`"
@@ -28,23 +26,20 @@ pub enum RigError {
 
 /// Why a controller cannot go on.
 #[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum ControllerError {
-    /// The implementation of the controller failed: an FMU, a link to a peer.
     #[error("the controller: {0}")]
     Failed(#[source] Cause),
-    /// The controller cannot control the response.
     #[error(
         "the controller cannot hold the amplitude of the response; use the built-in controller, PhaseLock.fmu or `vines controller`"
     )]
     NoResponseLoop,
-    /// The controller refused a value.
     #[error("the controller: {0}")]
     Refused(#[from] ConfigError),
 }
 
 impl RigError {
     /// The error of the implementation, if it is an `E`.
-    #[must_use]
     pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
         match self {
             Self::Failed(cause) => cause.downcast_ref(),
@@ -55,7 +50,6 @@ impl RigError {
 
 impl ControllerError {
     /// The error of the implementation, if it is an `E`.
-    #[must_use]
     pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
         match self {
             Self::Failed(cause) => cause.downcast_ref(),

@@ -23,7 +23,6 @@ pub struct Measured<R> {
 
 impl<R: Rig> Measured<R> {
     /// The rig `rig` with the parameters `plant` and the sensors of `definition`.
-    #[must_use]
     pub fn new(rig: R, definition: Definition, plant: &Parameters) -> Self {
         Self {
             rig,

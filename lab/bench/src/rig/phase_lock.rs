@@ -13,9 +13,6 @@ pub struct BuiltIn {
 
 impl BuiltIn {
     /// The controller of a configuration, at its start.
-    ///
-    /// # Errors
-    /// Settings that the controller cannot work with.
     pub fn new(config: &Config) -> Result<Self, ConfigError> {
         let lock = config.build()?;
         Ok(Self { state: lock.start(), lock })

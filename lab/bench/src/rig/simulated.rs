@@ -16,25 +16,18 @@ pub struct Simulated {
 
 impl Simulated {
     /// A plant at its start; its response is v.
-    ///
-    /// # Errors
-    /// An invalid parameter or start.
     pub fn new(parameters: Parameters, start: State) -> Result<Self, InvalidValue> {
         let plant = Plant::new(parameters, start)?;
         Ok(Self { plant, sensor: Sensor::V })
     }
 
     /// The rig of a scene, with its measurement chain.
-    ///
-    /// # Errors
-    /// An invalid parameter or start.
     pub fn of(scene: &Scene) -> Result<Box<dyn Rig>, InvalidValue> {
         let plant = Self::new(scene.plant, scene.start)?.with_sensors(scene.resonance);
         Ok(Chain::around(Box::new(plant), scene))
     }
 
     /// The same with the sensors of a definition.
-    #[must_use]
     pub fn with_sensors(mut self, definition: Definition) -> Measured<Self> {
         self.sensor = definition.sensor;
         let parameters = *self.plant.parameters();

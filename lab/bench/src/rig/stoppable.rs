@@ -1,9 +1,7 @@
 //! A rig that stops on a flag, which a signal or another thread sets.
 
-use std::sync::{
-    Arc,
-    atomic::{AtomicBool, Ordering},
-};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use thiserror::Error;
 
@@ -23,7 +21,6 @@ pub struct Stoppable {
 
 impl Stoppable {
     /// `sample_time` in s.
-    #[must_use]
     pub fn around(rig: Box<dyn Rig>, sample_time: f64, stop: &Arc<AtomicBool>) -> Self {
         Self { rig, sample_time, stop: Arc::clone(stop) }
     }

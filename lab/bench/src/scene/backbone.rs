@@ -68,7 +68,6 @@ impl Default for Backbone {
 
 impl Backbone {
     /// The levels, response amplitude over b, in the order in which they are visited.
-    #[must_use]
     pub fn levels(&self) -> Vec<f64> {
         let steps = f64::from(self.points.max(2) - 1);
         // Rounded as a person would write them: 0.68, not 0.6799999999999999.

@@ -72,7 +72,6 @@ impl Default for Chain {
 
 impl Chain {
     /// Whether anything is switched on.
-    #[must_use]
     pub fn is_on(&self) -> bool {
         let Self {
             adc_bits,
@@ -90,7 +89,6 @@ impl Chain {
 
     /// Delay from the drive to the sensors that the controller compensates, in units of 1/omega0, for samples `step` apart: on
     /// average, a held sample lags by half a sample.
-    #[must_use]
     pub fn stated_delay(&self, step: f64) -> f64 {
         if !self.compensate {
             return 0.0;

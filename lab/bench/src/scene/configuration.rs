@@ -39,7 +39,6 @@ pub enum PhaseOrigin {
 
 impl PhaseTarget {
     /// In radians.
-    #[must_use]
     pub fn radians(&self) -> f64 {
         self.degrees.to_radians()
     }
@@ -47,7 +46,6 @@ impl PhaseTarget {
 
 impl Scene {
     /// Parameters and start of the plant, under the names of the FMU's variables.
-    #[must_use]
     pub fn start_values(&self) -> [(&'static str, f64); 10] {
         let [mass, k, c, m, b, r] = symbols(&self.plant);
         let State { q1, dq1, q2, dq2 } = self.start;
@@ -56,14 +54,12 @@ impl Scene {
     }
 
     /// Whether the loop holds resonance by the scene's definition, for which theory and exact orbits hold.
-    #[must_use]
     pub fn is_at_resonance(&self) -> bool {
         self.resonance.resonance == Resonance::Peak || self.controller.is_at_phase_resonance()
     }
 
     /// The phase that a lock at the scene's drive holds. At the peak of the response it depends on the drive: unless the scene states
     /// another phase than that of phase resonance, it is that of the exact orbit.
-    #[must_use]
     pub fn phase_target(&self) -> PhaseTarget {
         let stated = self.controller.phase_target;
         if !self.resonance.is_peak() || !self.controller.is_at_phase_resonance() {
@@ -80,7 +76,6 @@ impl Scene {
     }
 
     /// Configuration of the controller for the scene's excitation.
-    #[must_use]
     pub fn controller_config(&self) -> Config {
         let d = self.dimensionless();
         let omega0 = d.omega0;
@@ -159,7 +154,6 @@ impl Scene {
 
     /// Largest drive, base amplitude over `b epsilon`: as set, or four times the larger of the requested drive and that at which
     /// impacts begin.
-    #[must_use]
     pub fn g_max(&self) -> f64 {
         let d = self.dimensionless();
         let needed = d.g.max(self.impact_drive()).max(LAMBDA_MIN);
@@ -167,14 +161,12 @@ impl Scene {
     }
 
     /// Drive, base amplitude over `b epsilon`, that holds the linear mode at the amplitude at which impacts certainly occur.
-    #[must_use]
     pub fn impact_drive(&self) -> f64 {
         CAPTURE * self.dimensionless().lambda
     }
 
     /// Whether the controller captures a motion with impacts before it goes to the requested drive: as set, or where everything
     /// is at rest at the start.
-    #[must_use]
     pub fn captures(&self) -> bool {
         let State { dq1, dq2, .. } = self.start;
         self.controller.capture.unwrap_or(dq1 == 0.0 && dq2 == 0.0)
@@ -188,14 +180,12 @@ impl Scene {
     }
 
     /// Natural periods in which the amplitude of the linear mode falls by a factor of e.
-    #[must_use]
     pub fn relaxation_periods(&self) -> f64 {
         let d = self.dimensionless();
         1.0 / (PI * d.epsilon * d.lambda)
     }
 
     /// Time limit for the lock, natural periods: as set, or at least 3000 and 20 times the relaxation time.
-    #[must_use]
     pub fn lock_periods(&self) -> f64 {
         let relaxation = PI * self.relaxation_periods();
         let samples_per_period = self.controller.samples_per_period;
@@ -205,7 +195,6 @@ impl Scene {
     }
 
     /// Configuration of the controller for tracking: with the largest drive and the bandwidth of `[backbone]`.
-    #[must_use]
     pub fn backbone_config(&self) -> Config {
         let d = self.dimensionless();
         Config {

@@ -5,11 +5,8 @@ use std::f64::consts::TAU;
 use phase_lock::Config;
 use serde::{Deserialize, Serialize};
 
-use super::{
-    SceneError,
-    option::{given, option},
-    validate::Quantity,
-};
+use super::option::{given, option};
+use super::{SceneError, validate::Quantity};
 
 /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -96,13 +93,11 @@ impl Default for Controller {
 
 impl Controller {
     /// The phase target in radians.
-    #[must_use]
     pub fn phase_target_radians(&self) -> f64 {
         self.phase_target.to_radians()
     }
 
     /// Whether the target is phase resonance, for which theory and exact orbits hold.
-    #[must_use]
     pub fn is_at_phase_resonance(&self) -> bool {
         self.phase_target == -90.0
     }

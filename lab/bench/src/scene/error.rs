@@ -9,72 +9,39 @@ use super::refusal;
 
 /// Why a scene cannot be used.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum SceneError {
-    /// The file could not be read.
     #[error("cannot read the scene {}: {source}", path.display())]
-    Read {
-        /// The file asked for.
-        path: PathBuf,
-        /// Error of the system.
-        source: std::io::Error,
-    },
-    /// Not TOML, an unknown key or a value of the wrong type; the message shows the line.
+    Read { path: PathBuf, source: std::io::Error },
     #[error("{origin}: {message}")]
-    Syntax {
-        /// The file.
-        origin: String,
-        /// The reader's message, with line and column.
-        message: String,
-    },
-    /// An argument of `--set` that is not section.key=value.
+    Syntax { origin: String, message: String },
     #[error("--set: {0}")]
     Argument(#[from] SyntaxError),
-    /// A `--set` argument that does not fit.
     #[error("--set {argument}: {message}")]
-    Override {
-        /// The argument as given.
-        argument: String,
-        /// What is wrong with it.
-        message: String,
-    },
-    /// A number outside its range.
+    Override { argument: String, message: String },
     #[error("{key} = {} {unit}: {allowed}", Number(*value))]
     Value {
-        /// Dotted key.
         key: &'static str,
-        /// The value given.
         value: f64,
-        /// Its unit, in brackets.
         unit: &'static str,
-        /// What is allowed.
         allowed: String,
     },
-    /// The plant refuses a parameter or the start.
     #[error("[plant] or [start]: {0}")]
     Plant(#[from] InvalidValue),
-    /// A drive that the plant does not take.
     #[error("[excitation] or [controller]: {0}")]
     Drive(InvalidValue),
-    /// The controller refuses its configuration.
     #[error("{}", refusal(.0))]
     Controller(#[from] ConfigError),
-    /// Keys that are missing or do not go together.
     #[error("{origin}: {message}")]
-    Keys {
-        /// The file.
-        origin: String,
-        /// Which keys, and what to do.
-        message: String,
-    },
+    Keys { origin: String, message: String },
 }
 
 /// An argument that is not `section.key=value`.
 #[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum SyntaxError {
-    /// Not TOML.
     #[error("{}; expected section.key=value, for instance plant.r=0.7 or resonance.sensor=q1", .0.message())]
     Toml(#[from] toml::de::Error),
-    /// TOML, but not one key of one section.
     #[error("expected one section.key=value, for instance plant.r=0.7")]
     NotOneKey,
 }

@@ -18,9 +18,6 @@ pub struct Family {
 
 impl Family {
     /// Reads a scene from `text`, or the default scene without one; nothing varies yet.
-    ///
-    /// # Errors
-    /// As [`Scene::parse`].
     pub fn parse(origin: &str, text: Option<&str>, overrides: &[Override]) -> Result<Self, SceneError> {
         let (origin, text) = text.map_or(("paper.toml (the default scene)", PAPER), |text| (origin, text));
         let (sections, table) = overrides::read(origin, text, overrides)?;
@@ -29,9 +26,6 @@ impl Family {
     }
 
     /// Lets the number under `section.key` vary too.
-    ///
-    /// # Errors
-    /// A key that no scene has, or that does not go with the others; one whose value is not a number.
     pub fn vary(&mut self, key: &str) -> Result<(), SceneError> {
         let refused = |message: &str| SceneError::Keys { origin: format!("axis {key}"), message: message.into() };
         let form = || refused("expected sigma or section.key, for instance plant.r");
@@ -48,9 +42,6 @@ impl Family {
     }
 
     /// The scene with these values under the keys that vary, in the order in which the keys were given.
-    ///
-    /// # Errors
-    /// A value that the scene refuses.
     pub fn scene(&self, values: &[f64]) -> Result<Scene, SceneError> {
         let mut sections = self.sections.clone();
         let mut changed: Vec<&str> = self.keys.iter().map(|[section, _]| section.as_str()).collect();

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::{PI, TAU};
 
 use serde::{Deserialize, Serialize};
+use vines_model::ArgumentError;
 
 /// Units, and SI units per unit.
 const UNITS: [(&str, f64); 12] = [
@@ -44,9 +45,9 @@ enum Written {
 }
 
 impl TryFrom<Written> for Name {
-    type Error = String;
+    type Error = ArgumentError;
 
-    fn try_from(written: Written) -> Result<Self, String> {
+    fn try_from(written: Written) -> Result<Self, ArgumentError> {
         let (name, unit, factor) = match written {
             Written::Plain(name) => (name, None, None),
             Written::Full { name, unit, factor } => (name, unit, factor),
@@ -59,7 +60,7 @@ impl TryFrom<Written> for Name {
         };
         let known = || UNITS.map(|(unit, _)| unit).join(", ");
         let factor = match (unit, factor) {
-            (Some(_), Some(_)) => return Err(format!("{name}: give a unit or a factor, not both")),
+            (Some(_), Some(_)) => return Err(format!("{name}: give a unit or a factor, not both").into()),
             (Some(unit), None) => of(&unit).ok_or_else(|| {
                 format!(
                     "{name}: the unit {unit} is unknown; known are {}, or give a factor",
@@ -69,9 +70,7 @@ impl TryFrom<Written> for Name {
             (None, factor) => factor.unwrap_or(1.0),
         };
         if !factor.is_finite() || factor == 0.0 {
-            return Err(format!(
-                "{name}: the factor {factor} must be a finite number other than 0"
-            ));
+            return Err(format!("{name}: the factor {factor} must be a finite number other than 0").into());
         }
         Ok(Self { name, factor })
     }
@@ -84,26 +83,22 @@ pub struct Names(BTreeMap<String, Name>);
 
 impl Names {
     /// The variable for `ours`; if it is not mapped, it has the same name, in SI units.
-    #[must_use]
     pub fn of(&self, ours: &str) -> Name {
         let same = || Name { name: ours.into(), factor: 1.0 };
         self.0.get(ours).cloned().unwrap_or_else(same)
     }
 
     /// The variable for `ours`, if it is mapped.
-    #[must_use]
     pub fn mapped(&self, ours: &str) -> Option<&Name> {
         self.0.get(ours)
     }
 
     /// Whether nothing is mapped.
-    #[must_use]
     pub fn is_empty(&self) -> bool {
         self.0.is_empty()
     }
 
     /// A name that is mapped and not among `known`.
-    #[must_use]
     pub fn unknown(&self, known: &[&str]) -> Option<&str> {
         self.0.keys().map(String::as_str).find(|name| !known.contains(name))
     }

@@ -5,12 +5,8 @@ use std::str::FromStr;
 use serde::Deserialize;
 use toml::{Table, Value};
 
-use super::{
-    SceneError, SyntaxError,
-    error::plain,
-    plant::{DIMENSIONLESS_KEYS, SI_KEYS},
-    sections::Sections,
-};
+use super::plant::{DIMENSIONLESS_KEYS, SI_KEYS};
+use super::{SceneError, SyntaxError, error::plain, sections::Sections};
 
 /// One replaced value.
 #[derive(Debug, Clone)]
@@ -46,13 +42,11 @@ impl FromStr for Override {
 
 impl Override {
     /// A refusal of this setting.
-    #[must_use]
     pub fn error(&self, message: impl Into<String>) -> SceneError {
         SceneError::Override { argument: self.argument.clone(), message: message.into() }
     }
 
     /// Whether this sets one of these sections and `section.key`s.
-    #[must_use]
     pub fn is_one_of(&self, keys: &[&str]) -> bool {
         let name = format!("{}.{}", self.section, self.key);
         keys.iter().any(|key| *key == name || *key == self.section)
@@ -123,10 +117,24 @@ pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, S
     Ok(table)
 }
 
+/// The message of an error in `text`; for a number in the place of a word, with the words that are allowed.
+fn message(error: &toml::de::Error, text: &str) -> String {
+    let no_word = "wanted string or table";
+    let quoted = error
+        .span()
+        .filter(|_| error.message().contains(no_word))
+        .and_then(|place| {
+            let mut text = text.to_string();
+            text.replace_range(place.clone(), &format!("{:?}", &text[place]));
+            toml::from_str::<Sections>(&text).err()
+        });
+    let listed = quoted.map_or(no_word.into(), |error| error.message().to_string());
+    plain(&error.to_string().replace(no_word, &listed))
+}
+
 /// Reads `text` and merges the overrides into it; with the merged table. `origin` names the text in messages.
 pub(super) fn read(origin: &str, text: &str, overrides: &[Override]) -> Result<(Sections, Table), SceneError> {
-    let syntax =
-        |error: toml::de::Error| SceneError::Syntax { origin: origin.into(), message: plain(&error.to_string()) };
+    let syntax = |error: toml::de::Error| SceneError::Syntax { origin: origin.into(), message: message(&error, text) };
     // The file is checked on its own first, so that an error can name the line.
     toml::from_str::<Sections>(text).map_err(syntax)?;
     let table = merge(toml::from_str(text).map_err(syntax)?, overrides)?;

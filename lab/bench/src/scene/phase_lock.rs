@@ -3,6 +3,7 @@
 use phase_lock::{Config, ConfigError, NONE, PARAMETERS, Parameter, Value as Setting};
 use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
+use vines_model::ArgumentError;
 
 /// The parameters that other keys of a scene set, in units that suit any plant.
 pub const KEYS: [(&str, &str); 23] = [
@@ -32,7 +33,6 @@ pub const KEYS: [(&str, &str); 23] = [
 ];
 
 /// The message for a refused configuration, with the keys of the scene.
-#[must_use]
 pub fn refusal(error: &ConfigError) -> String {
     let key = |name: &str| {
         let key = KEYS.iter().find(|(parameter, _)| *parameter == name);
@@ -52,9 +52,9 @@ pub fn refusal(error: &ConfigError) -> String {
 pub struct PhaseLock(Vec<(&'static str, Setting)>);
 
 impl TryFrom<Table> for PhaseLock {
-    type Error = String;
+    type Error = ArgumentError;
 
-    fn try_from(table: Table) -> Result<Self, String> {
+    fn try_from(table: Table) -> Result<Self, ArgumentError> {
         let mut flat = Table::new();
         for (name, value) in table {
             match value {
@@ -63,7 +63,7 @@ impl TryFrom<Table> for PhaseLock {
             }
         }
         let settings = flat.iter().map(|(name, value)| setting(name, value));
-        Ok(Self(settings.collect::<Result<_, String>>()?))
+        Ok(Self(settings.collect::<Result<_, _>>()?))
     }
 }
 
@@ -93,9 +93,9 @@ impl PhaseLock {
 }
 
 /// Name and value of a parameter, from the name and the value in the file.
-fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), String> {
+fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), ArgumentError> {
     if let Some((_, key)) = KEYS.iter().find(|(parameter, _)| *parameter == name) {
-        return Err(format!("phase_lock.{name} is set by {key}"));
+        return Err(format!("phase_lock.{name} is set by {key}").into());
     }
     let parameter = Parameter::find(name).ok_or_else(|| {
         let free = PARAMETERS.iter().map(|one| one.name);
@@ -115,9 +115,7 @@ fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), String>
         (Setting::Boolean(_), Value::Boolean(one)) => Setting::Boolean(*one),
         _ => {
             let (allowed, given) = (parameter.range.allowed(), value.type_str());
-            return Err(format!(
-                "phase_lock.{name} is a {given}, which is refused; allowed is {allowed}"
-            ));
+            return Err(format!("phase_lock.{name} is a {given}, which is refused; allowed is {allowed}").into());
         }
     };
     let accepted = parameter.set(&mut config, setting);

@@ -47,9 +47,9 @@ impl Default for Record {
 const MOST_SAMPLES: f64 = 2e7;
 
 impl Record {
-    pub(super) fn check(&self, controller: &Controller) -> Result<(), SceneError> {
+    /// `lock_periods` is the time limit for the lock, as set or by default.
+    pub(super) fn check(&self, controller: &Controller, lock_periods: f64) -> Result<(), SceneError> {
         let unit = "(natural periods)";
-        let lock_periods = self.lock_periods.unwrap_or(2000.0);
         Quantity::new("record.lock_periods", lock_periods, unit).positive()?;
         Quantity::new("record.hold_periods", self.hold_periods, unit).check(
             (3.0..=1e6).contains(&self.hold_periods),

@@ -106,7 +106,7 @@ impl Sections {
                 "must be at least {needed:.3}: from rest, impacts begin only there; or set controller.capture = false"
             ),
         )?;
-        scene.record.check(&scene.controller)?;
+        scene.record.check(&scene.controller, scene.lock_periods())?;
         scene.backbone.check(&scene.controller)?;
         scene.chain.check(&scene.controller)?;
         if scene.resonance.reference == Reference::Force && !scene.chain.reference {

@@ -5,6 +5,8 @@ use std::str::FromStr;
 
 use serde::Serialize;
 
+use crate::ArgumentError;
+
 /// Quantity of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 pub enum Axis {
@@ -66,9 +68,9 @@ impl Display for Range {
 }
 
 impl FromStr for Range {
-    type Err = String;
+    type Err = ArgumentError;
 
-    fn from_str(text: &str) -> Result<Self, String> {
+    fn from_str(text: &str) -> Result<Self, ArgumentError> {
         let form = "expected AXIS=FIRST:LAST:POINTS with the axis sigma, G or r, for instance sigma=-4:4:81";
         let (name, values) = text.split_once('=').ok_or(form)?;
         let axis = match name.trim() {
@@ -94,7 +96,7 @@ impl FromStr for Range {
             .filter(|points| (2..=MOST).contains(points))
             .ok_or_else(|| format!("`{points}` is not a number of points from 2 to {MOST}"))?;
         if from >= to {
-            return Err(format!("{axis} from {from} to {to}: the first must be below the last"));
+            return Err(format!("{axis} from {from} to {to}: the first must be below the last").into());
         }
         let allowed = match axis {
             Axis::Sigma => None,
@@ -102,7 +104,7 @@ impl FromStr for Range {
             Axis::R => (from <= 0.0 || to > 1.0).then_some("above 0 and at most 1"),
         };
         match allowed {
-            Some(allowed) => Err(format!("{axis} from {from} to {to} (dimensionless): must be {allowed}")),
+            Some(allowed) => Err(format!("{axis} from {from} to {to} (dimensionless): must be {allowed}").into()),
             None => Ok(Self { axis, from, to, points }),
         }
     }

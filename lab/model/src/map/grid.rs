@@ -9,7 +9,8 @@ use lovines::InvalidValue;
 
 use super::{
     axis::{Axis, Range},
-    run::{Point, observe, observe_confirmed},
+    observe::{observe, observe_confirmed},
+    run::Point,
 };
 use crate::Dimensionless;
 use crate::orbit::{BifurcationCurve, Limits, bifurcation_curves, random_state, stable_resonant};

@@ -1,4 +1,4 @@
-//! One point of the map: a plant is driven until its regime is decided.
+//! A simulated motion of one point of the map, and the result of the point.
 
 use std::cell::OnceCell;
 use std::f64::consts::{PI, TAU};
@@ -6,7 +6,6 @@ use std::f64::consts::{PI, TAU};
 use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
 
-use super::decide::REPEATED;
 use crate::Dimensionless;
 use crate::orbit::{Disturbance, Driven, Moment, Periodic, Symmetric};
 use crate::regime::{Impact, Regime};
@@ -41,62 +40,8 @@ pub struct Point {
     pub state: [f64; 4],
 }
 
-/// Periods after which the motion is compared with the symmetric orbit for the first time; from then on whenever their number has grown
-/// by [`LATER`].
-const FIRST: usize = 14;
-const LATER: f64 = 1.25;
-/// Periods over which the exponent of a repeating motion is measured.
-const EXPONENT: usize = 256;
-
 /// Number of events for which there is room at first.
 const EXPECTED: usize = 1024;
-
-/// Cells that are undecided after the limit are continued to so many times its number of periods.
-const CONTINUED: usize = 4;
-
-/// Drives the dimensionless plant of `scene` at the detuning `sigma` from `start` = (q1, q1', q2, q2') until its regime is decided, for
-/// at most `limit` periods. Only a motion that settles on a periodic one, or cannot reach a wall, is decided earlier, and only an
-/// undecided one is continued.
-///
-/// # Errors
-/// Invalid parameters or an invalid start.
-pub fn observe(scene: &Dimensionless, sigma: f64, start: [f64; 4], limit: usize) -> Result<Point, InvalidValue> {
-    Run::new(scene, sigma, start)?.decided(0, limit)
-}
-
-/// Difference of the starts of motions that must agree, and periods from which on a transient may be chaos that ends at random.
-const APART: f64 = 1e-9;
-const LATE: f64 = 500.0;
-
-/// As [`observe`], with the regime of a motion from another start, 1e-9 and more apart, that differs. `others` such motions are followed
-/// where chance decides when chaos ends: the regime is irregular, or it began late.
-///
-/// # Errors
-/// As [`observe`].
-pub fn observe_confirmed(
-    scene: &Dimensionless,
-    sigma: f64,
-    start: [f64; 4],
-    limit: usize,
-    others: usize,
-) -> Result<(Point, Option<Regime>), InvalidValue> {
-    let point = observe(scene, sigma, start, limit)?;
-    let irregular = point.impacts == 0 && ![Regime::NoImpacts, Regime::Undecided].contains(&point.regime);
-    let count = if irregular || point.transient > LATE { others } else { 0 };
-    for n in 1..=count {
-        let [q1, dq1, q2, dq2] = start;
-        let regime = observe(scene, sigma, [q1, dq1 + n as f64 * APART, q2, dq2], limit)?.regime;
-        if regime != point.regime {
-            return Ok((point, Some(regime)));
-        }
-    }
-    Ok((point, None))
-}
-
-/// Number of periods at the next examination.
-fn later(periods: usize, last: usize) -> usize {
-    ((periods as f64 * LATER).ceil() as usize).min(last)
-}
 
 /// A simulated motion.
 pub struct Run {
@@ -107,7 +52,7 @@ pub struct Run {
     pub(super) drive: Drive,
     pub(super) driven: Driven,
     /// Periods so far.
-    periods: usize,
+    pub(super) periods: usize,
     /// The motion at the start, after every event, and wherever it was examined.
     pub(super) moments: Vec<Moment>,
     /// States at the beginning of every half period and now, as far as they were needed.
@@ -159,66 +104,6 @@ impl Run {
             repetitions: OnceCell::new(),
             symmetric: OnceCell::new(),
         })
-    }
-
-    /// Follows the motion until its regime is decided, for at most `limit` periods; it is not examined before `first` periods.
-    ///
-    /// # Errors
-    /// As [`Self::new`].
-    pub fn decided(&mut self, first: usize, limit: usize) -> Result<Point, InvalidValue> {
-        let mut next = FIRST.min(limit);
-        let mut repelled = false;
-        loop {
-            self.follow(next)?;
-            if next < first.min(limit) {
-                next = later(next, limit);
-                continue;
-            }
-            let early = next < limit;
-            if early && let Some(point) = self.approaching(limit) {
-                return Ok(point);
-            }
-            if next < (REPEATED / 2).min(limit) {
-                next = later(next, limit);
-                continue;
-            }
-            if let Some(point) = self.without_impacts() {
-                return Ok(point);
-            }
-            // A motion leaves the neighbourhood of an unstable one before it can settle, and a slow approach is seen at the limit.
-            repelled &= early && self.approached().is_some();
-            if !repelled {
-                if let Some(point) = self.settled(early)? {
-                    return Ok(point);
-                }
-                repelled = self.lingers();
-            }
-            if next >= limit {
-                let point = self.irregular();
-                if point.regime != Regime::Undecided || next >= CONTINUED * limit {
-                    return Ok(point);
-                }
-            }
-            next = later(next, if early { limit } else { CONTINUED * limit });
-        }
-    }
-
-    /// The motion repeats itself, or will soon.
-    fn settled(&mut self, early: bool) -> Result<Option<Point>, InvalidValue> {
-        let settling = self.settling(early);
-        if settling.is_some() || self.repeating(early).is_none() {
-            return Ok(settling);
-        }
-        // Near an unstable motion, recurrence lasts a while: it must last longer, and disturbances must shrink.
-        let settled = self.periods;
-        self.follow(settled + EXPONENT)?;
-        let (exponent, error) = self.exponent(settled);
-        let point = self.repeating(early).filter(|_| exponent < 0.0);
-        Ok(point.map(|point| Point {
-            exponent: Some(exponent),
-            exponent_error: Some(error),
-            ..point
-        }))
     }
 
     /// Half periods so far.

@@ -18,14 +18,12 @@ const NORMAL: f64 = 1.959_964;
 
 impl Estimate {
     /// An estimate from a value and the independent parts of its uncertainty.
-    #[must_use]
     pub fn new(value: f64, parts: &[f64]) -> Self {
         let uncertainty = parts.iter().map(|part| part * part).sum::<f64>().sqrt();
         Self { value, uncertainty }
     }
 
     /// The mean of independent values.
-    #[must_use]
     pub fn mean(values: &[f64]) -> Self {
         let fit = Regression::fit(&[vec![1.0; values.len()]], values, &[], 0.0);
         fit.map_or(Self { value: f64::NAN, uncertainty: f64::NAN }, |fit| {
@@ -34,7 +32,6 @@ impl Estimate {
     }
 
     /// In another unit.
-    #[must_use]
     pub fn scaled(self, factor: f64) -> Self {
         Self {
             value: self.value * factor,
@@ -45,7 +42,6 @@ impl Estimate {
 
 /// Half width of a 95 % interval of Student's distribution over that of the normal distribution (Cornish and Fisher's expansion;
 /// within 1 % from 4 degrees of freedom on).
-#[must_use]
 pub fn student_factor(degrees: f64) -> f64 {
     let (z, n) = (NORMAL, degrees.max(1.0));
     let first = (z.powi(3) + z) / (4.0 * n);
@@ -89,7 +85,6 @@ impl Regression {
     /// Fits `values` by the sum of `columns`. `noise` is the standard deviation of a value, 0 where it is not known; where the
     /// residuals scatter significantly more, their scatter counts, with Student's distribution and the correlation of neighbours. Priors need a known noise. `None` for
     /// too few values, or columns that are not independent.
-    #[must_use]
     pub fn fit(columns: &[Vec<f64>], values: &[f64], priors: &[Prior], noise: f64) -> Option<Self> {
         let (rows, terms) = (values.len(), columns.len());
         let degrees = (rows + priors.len())
@@ -146,13 +141,11 @@ impl Regression {
     }
 
     /// A coefficient.
-    #[must_use]
     pub fn coefficient(&self, n: usize) -> f64 {
         self.coefficients[n]
     }
 
     /// The sum of the coefficients with these weights.
-    #[must_use]
     pub fn estimate(&self, weights: &[f64]) -> Estimate {
         let weights = DVector::from_column_slice(weights);
         Estimate {

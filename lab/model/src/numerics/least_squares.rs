@@ -21,7 +21,6 @@ pub struct HarmonicFit {
 impl HarmonicBasis {
     /// The basis at the `phases` (rad) of the fundamental: a polynomial of degree `trend`, and each of the harmonics 1, 2, …
     /// of `harmonics` that is given with the degree of its amplitude; `None` leaves one out.
-    #[must_use]
     pub fn new(phases: &[f64], trend: usize, harmonics: &[Option<usize>]) -> Self {
         let last = (phases.len().max(2) - 1) as f64;
         let time = |row: usize| 2.0 * row as f64 / last - 1.0;
@@ -43,14 +42,12 @@ impl HarmonicBasis {
     }
 
     /// Number of unknowns.
-    #[must_use]
     pub fn terms(&self) -> usize {
         self.matrix.ncols()
     }
 
     /// The best fit of `values`, one for each phase; `None` for fewer values than unknowns, or phases for which the
     /// terms are not independent.
-    #[must_use]
     pub fn fit(&self, values: &DVector<f64>) -> Option<HarmonicFit> {
         if self.matrix.nrows() < self.terms() {
             return None;
@@ -64,7 +61,6 @@ impl HarmonicBasis {
 
     /// Variances of a harmonic's sine and cosine coefficient of this degree, for values with noise of variance 1; NaN where the
     /// terms are not independent. `harmonic` counts from 1.
-    #[must_use]
     pub fn variances(&self, harmonic: usize, degree: usize) -> [f64; 2] {
         let column = self.columns[harmonic - 1] + 2 * degree;
         let identity = DMatrix::identity(self.terms(), self.terms());
@@ -75,7 +71,6 @@ impl HarmonicBasis {
     }
 
     /// The residual of a fit.
-    #[must_use]
     pub fn residual(&self, values: &DVector<f64>, fit: &HarmonicFit) -> DVector<f64> {
         values - &self.matrix * &fit.coefficients
     }
@@ -83,13 +78,11 @@ impl HarmonicBasis {
 
 impl HarmonicFit {
     /// Complex amplitude a of a harmonic in the middle: `Im(a exp(i n phase))`. `harmonic` counts from 1.
-    #[must_use]
     pub fn harmonic(&self, harmonic: usize) -> Complex<f64> {
         self.pair(self.columns[harmonic - 1])
     }
 
     /// Change of that amplitude per half of the window; the basis has it where the harmonic's degree is at least 1.
-    #[must_use]
     pub fn drift(&self, harmonic: usize) -> Complex<f64> {
         self.pair(self.columns[harmonic - 1] + 2)
     }

@@ -4,7 +4,6 @@ use std::convert::Infallible;
 
 /// Roots of `a x^2 + b x + c`, without cancellation; each is a continuous function of the coefficients, also through
 /// `a = 0`, where one of them becomes infinite.
-#[must_use]
 pub fn quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
     let discriminant = b * b - 4.0 * a * c;
     if discriminant.is_nan() || discriminant < 0.0 {
@@ -28,9 +27,6 @@ pub fn bisection(a: f64, b: f64, mut f: impl FnMut(f64) -> bool) -> (f64, f64) {
 }
 
 /// Ends of an interval, at most `width` wide or of neighbouring doubles, at which `like_a` changes; it is true at `a`.
-///
-/// # Errors
-/// The first error of `like_a`.
 pub fn try_bisection<E>(
     mut a: f64,
     mut b: f64,

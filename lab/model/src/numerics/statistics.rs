@@ -16,7 +16,6 @@ pub fn mean_square(values: impl IntoIterator<Item = f64>) -> f64 {
 }
 
 /// Standard deviation of the values themselves (divided by n), not of a population they stand for; NaN for no values.
-#[must_use]
 pub fn standard_deviation(values: &[f64]) -> f64 {
     let mean = mean(values.iter().copied());
     mean_square(values.iter().map(|value| value - mean)).sqrt()
@@ -36,7 +35,6 @@ pub fn equally_spaced(from: f64, to: f64, count: usize) -> impl Iterator<Item = 
 }
 
 /// Standard deviation of the white noise on a smooth signal, from third differences; 0 for fewer than six values.
-#[must_use]
 pub fn noise(values: &[f64]) -> f64 {
     let differences = values.windows(4).map(|v| v[3] - 3.0 * v[2] + 3.0 * v[1] - v[0]);
     if differences.len() < 3 {
@@ -47,7 +45,6 @@ pub fn noise(values: &[f64]) -> f64 {
 }
 
 /// Slope of the straight line that fits equally spaced values best, from a value to the next.
-#[must_use]
 pub fn slope(values: &[f64]) -> f64 {
     let n = values.len() as f64;
     let middle = 0.5 * (n - 1.0);

@@ -5,13 +5,8 @@ use std::f64::consts::PI;
 
 use nalgebra::{Matrix4, Vector4};
 
-use super::{
-    Orbit,
-    bounce::Bounce,
-    driven::Moment,
-    pattern::{ImpactPattern, follow},
-    search::stable_symmetric,
-};
+use super::pattern::{ImpactPattern, follow};
+use super::{Orbit, bounce::Bounce, driven::Moment, search::stable_symmetric};
 use crate::Dimensionless;
 
 /// Impacts over which the motion is compared with the linearised map.
@@ -41,7 +36,6 @@ pub struct Approach {
 }
 
 /// Whether the last impacts alternate between the walls, so that a symmetric orbit may be close by.
-#[must_use]
 pub fn alternates(moments: &[Moment]) -> bool {
     let mut last = moments.iter().rev().filter_map(Moment::bounce).take(COMPARED + 1);
     let Some(mut one) = last.next() else { return false };
@@ -54,7 +48,6 @@ pub fn alternates(moments: &[Moment]) -> bool {
 
 impl Symmetric {
     /// The stable symmetric orbit at the detuning `sigma`, if there is one.
-    #[must_use]
     pub fn stable(scene: &Dimensionless, sigma: f64) -> Option<Self> {
         let orbit = stable_symmetric(scene, sigma)?;
         let map = follow(scene, &ImpactPattern::symmetric(), &orbit.unknowns())?.monodromy;
@@ -62,7 +55,6 @@ impl Symmetric {
     }
 
     /// How a motion approaches the orbit, if it certainly does; `tolerance` bounds its recurrence at the end.
-    #[must_use]
     pub fn approach(&self, moments: &[Moment], tolerance: f64) -> Option<Approach> {
         let bounces = moments.iter().rev().filter_map(Moment::bounce);
         let apart = bounces.map(|one| self.apart(&one));

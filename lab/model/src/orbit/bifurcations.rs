@@ -21,7 +21,6 @@ const LEVELS: usize = 25;
 
 /// The curves of folds, symmetry breakings, period doublings and Neimark-Sacker bifurcations of the symmetric and asymmetric 1:1
 /// motions that cross one of 25 levels of G in `limits`.
-#[must_use]
 pub fn bifurcation_curves(scene: &Dimensionless, limits: &Limits) -> Vec<BifurcationCurve> {
     let mut found: Vec<BifurcationCurve> = Vec::new();
     let exploration = Exploration { starts: 0, seed: 1, doublings: 1 };
@@ -47,7 +46,6 @@ pub fn bifurcation_curves(scene: &Dimensionless, limits: &Limits) -> Vec<Bifurca
 
 impl BifurcationCurve {
     /// As in a table: the bifurcation and the motions.
-    #[must_use]
     pub fn name(&self) -> String {
         format!("{} of {}", self.kind.name(), self.branch.points[0].pattern.name())
     }

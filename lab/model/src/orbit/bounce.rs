@@ -39,7 +39,6 @@ impl Bounce {
     }
 
     /// Displacement of the particle over b.
-    #[must_use]
     pub fn q2(&self) -> f64 {
         self.q1 - self.wall
     }

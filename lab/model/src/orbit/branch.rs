@@ -128,7 +128,6 @@ impl Serialize for Branch {
 
 impl Branch {
     /// The motions that a drawing needs: the ends, both sides of a change of stability, and those without which a line is too far off.
-    #[must_use]
     pub fn drawn(&self) -> Vec<&Periodic> {
         let points = &self.points;
         let (mut drawn, mut from) = (vec![&points[0]], 0);
@@ -169,7 +168,6 @@ fn off(motion: &Periodic, [from, to]: [&Periodic; 2]) -> f64 {
 
 impl Ended {
     /// As in a table.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
             Ended::Range => "left the range",
@@ -185,7 +183,6 @@ impl Ended {
 
 impl Special {
     /// As in a table. A modulation begins at a torus bifurcation only if the motion was stable before.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         match (self.kind, self.of_stable) {
             (Bifurcation::Torus, true) => "torus (modulation begins)",

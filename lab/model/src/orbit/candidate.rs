@@ -48,7 +48,6 @@ pub(super) struct Family {
     /// Factor of the sensor, and direction of the reference in the complex plane.
     scale: f64,
     reference: Complex<f64>,
-    /// Harmonic of the base over y.
     base_over_y: Complex<f64>,
     p: Vector2<f64>,
 }

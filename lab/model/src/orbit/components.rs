@@ -6,17 +6,14 @@
 
 use std::f64::consts::TAU;
 
-use rand_chacha::{
-    ChaCha8Rng,
-    rand_core::{Rng, SeedableRng},
-};
+use rand_chacha::ChaCha8Rng;
+use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::Serialize;
 
+use super::settle::{LONGEST, settle};
 use super::{
     Bifurcation, Branch, Condition, ImpactPattern, Limits, Periodic, branch_off, continue_both_ways,
-    search::least_excitation,
-    settle::{LONGEST, settle},
-    symmetric_orbits,
+    search::least_excitation, symmetric_orbits,
 };
 use crate::Dimensionless;
 use crate::numerics::{equally_spaced, golden_section};
@@ -86,7 +83,6 @@ pub fn random_state(random: &mut impl Rng) -> [f64; 4] {
 }
 
 /// The exact frequency response at the scene's G over the range of sigma in `limits`.
-#[must_use]
 pub fn response(scene: &Dimensionless, limits: &Limits, exploration: Exploration) -> Response {
     let condition = Condition::Excitation(scene.g);
     let mut search = Search {
@@ -215,7 +211,6 @@ impl Response {
     }
 
     /// A motion of the scene lies on one of the components.
-    #[must_use]
     pub fn contains(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
         self.components.iter().any(|one| one.branch.passes(scene, motion))
     }
@@ -234,7 +229,6 @@ impl Branch {
     }
 
     /// Whether this branch of a frequency response passes a motion or its mirror image.
-    #[must_use]
     pub fn passes(&self, scene: &Dimensionless, motion: &Periodic) -> bool {
         let pattern = |one: &Periodic| (one.pattern.impacts(), one.pattern.periods(), one.pattern.mirrored);
         if pattern(&self.points[0]) != pattern(motion) {

@@ -46,7 +46,6 @@ const STEP: f64 = 1e-6;
 
 impl Bifurcation {
     /// As in a table.
-    #[must_use]
     pub fn name(&self) -> &'static str {
         match self {
             Bifurcation::Fold => "fold",
@@ -85,7 +84,6 @@ impl Bifurcation {
 
 impl Condition {
     /// What selects the backbone by the scene's definition.
-    #[must_use]
     pub fn backbone(scene: &Dimensionless) -> Self {
         match scene.definition.resonance {
             Resonance::Phase => Condition::PhaseResonance,

@@ -6,13 +6,11 @@
 
 use nalgebra::{Matrix4, Matrix6, SVector};
 
-use super::{
-    branch::{Branch, Ended, Limits, Special},
-    condition::{Bifurcation, Condition},
-    crossings::Part,
-    pattern::{Returned, Unknowns, follow},
-    periodic::{Periodic, newton},
-};
+use super::branch::{Branch, Ended, Limits, Special};
+use super::condition::{Bifurcation, Condition};
+use super::crossings::Part;
+use super::pattern::{Returned, Unknowns, follow};
+use super::periodic::{Periodic, newton};
 use crate::Dimensionless;
 use crate::numerics::try_bisection;
 
@@ -191,7 +189,6 @@ fn joins(from: &Periodic, to: &Periodic) -> bool {
 }
 
 /// Follows the curve of `condition` from `start` towards `towards`, a direction in the space of the unknowns.
-#[must_use]
 pub fn continue_from(
     scene: &Dimensionless,
     start: &Periodic,
@@ -253,7 +250,6 @@ pub fn continue_from(
 }
 
 /// Follows the curve of `condition` through `start` in both directions, from falling to rising sigma.
-#[must_use]
 pub fn continue_both_ways(scene: &Dimensionless, start: &Periodic, condition: Condition, limits: &Limits) -> Branch {
     let mut towards = Unknowns::zeros();
     towards[4] = 1.0;
@@ -275,7 +271,6 @@ const ASIDE: f64 = 1e-3;
 
 /// The branch of motions that leaves a symmetry breaking or a period doubling, along the curve of `condition`. Its mirror image, or
 /// itself one repetition later, leaves in the opposite direction and counts as the same branch.
-#[must_use]
 pub fn branch_off(scene: &Dimensionless, at: &Special, condition: Condition, limits: &Limits) -> Option<Branch> {
     let from = &at.motion;
     let returned = follow(scene, &from.pattern, &from.unknowns())?;

@@ -36,7 +36,6 @@ pub struct Convergence {
 
 /// Compares the stable resonant solutions of theory and exact orbits at the scene's mass ratio and at this number of halvings of
 /// it, with constant lambda, r and G; None where one of them has no stable solution, or there is nothing to fit.
-#[must_use]
 pub fn convergence(scene: &Dimensionless, halvings: u32) -> Option<Convergence> {
     let rows: Vec<Difference> = (0..=halvings)
         .map(|n| {

@@ -10,7 +10,6 @@ const MET_AT: [f64; 6] = [-1.0, -0.7, -1.4, -0.5, -2.0, 0.0];
 /// The exact backbone, through the scene's phase-resonant motion or, without one, through another (with G = 0 where there is neither
 /// damping nor loss): the one with the fastest particle, on the right branch. Without damping and with r = 1 it is the conservative
 /// nonlinear mode.
-#[must_use]
 pub fn backbone(scene: &Dimensionless, limits: &Limits) -> Option<Branch> {
     let condition = Condition::backbone(scene);
     let fastest = |orbits: Vec<Orbit>| orbits.into_iter().max_by(|one, other| one.b.total_cmp(&other.b));

@@ -10,10 +10,8 @@ use std::f64::consts::TAU;
 use lovines::{Event, State, Wall};
 use nalgebra::{Complex, Matrix2, Vector2};
 
-use super::{
-    bounce::Bounce,
-    oscillator::{Oscillator, rough_sin_cos},
-};
+use super::bounce::Bounce;
+use super::oscillator::{Oscillator, rough_sin_cos};
 use crate::Dimensionless;
 
 /// The primary mass, alone or with the particle on its wall, and its steady response to the base.
@@ -103,7 +101,6 @@ pub struct Driven {
 
 impl Driven {
     /// The motion of a plant of `scene` at the frequency `omega` over omega0.
-    #[must_use]
     pub fn new(scene: &Dimensionless, omega: f64) -> Self {
         let zeta = scene.epsilon * scene.lambda / 2.0;
         Self {
@@ -116,7 +113,6 @@ impl Driven {
     }
 
     /// The motion in this state of the plant where the base has the phase `phase`, rad.
-    #[must_use]
     pub fn moment(&self, phase: f64, state: State, wall: Option<Wall>) -> Moment {
         Moment {
             phase,
@@ -129,7 +125,6 @@ impl Driven {
     }
 
     /// The motion after an event at the phase `phase`, which is the first after `from`.
-    #[must_use]
     pub fn after(&self, from: &Moment, phase: f64, event: &Event) -> Moment {
         match *event {
             Event::Impact { wall, velocity, .. } => {
@@ -164,7 +159,6 @@ impl Driven {
     }
 
     /// (q1, q1', q2, q2') where the base has the phase `phase`, rad, if nothing happens between `from` and then.
-    #[must_use]
     pub fn state(&self, from: &Moment, phase: f64) -> [f64; 4] {
         let (mode, t) = (self.mode(from.wall), self.elapsed(from, phase));
         let free = from.primary - mode.steady(from.phase);
@@ -178,7 +172,6 @@ impl Driven {
     }
 
     /// Bound of `|q1|` from (q1, q1') at the phase `phase` on, without impacts.
-    #[must_use]
     pub fn reach(&self, phase: f64, state: [f64; 2]) -> f64 {
         let mode = &self.modes[0];
         (Vector2::from(state) - mode.steady(phase)).norm() + mode.steady.norm()

@@ -46,7 +46,6 @@ pub struct ImpactMap {
 
 impl ImpactMap {
     /// The map of `scene` (except its G) at the frequency `omega` over omega0 and the excitation `g`.
-    #[must_use]
     pub fn new(scene: &Dimensionless, omega: f64, g: f64) -> Self {
         Self {
             epsilon: scene.epsilon,
@@ -57,14 +56,12 @@ impl ImpactMap {
 
     /// The state just after the next impact; None if there is none within many periods, if it grazes, or if
     /// impacts accumulate.
-    #[must_use]
     pub fn next(&self, from: &Bounce) -> Option<Bounce> {
         Some(self.landed(&ParticleFlight::new(&self.oscillator, from))?.next)
     }
 
     /// The state just after the first impact that follows from (q1, q1', q2, q2') at a phase of the base, rad, with the
     /// particle inside its cavity; None as for [`Self::next`].
-    #[must_use]
     pub fn first(&self, phase: f64, [q1, dq1, q2, dq2]: [f64; 4]) -> Option<Bounce> {
         let flight = ParticleFlight::between(&self.oscillator, phase, [q1, dq1, q2, dq2], q1 - q2);
         Some(self.landed(&flight)?.next)

@@ -15,7 +15,6 @@ const LONGEST: f64 = 64.0;
 /// Most steps of a flight: far more than any flight needs, except in chatter.
 const STEPS: usize = 4000;
 
-/// A flight of the particle.
 pub(super) struct ParticleFlight<'a> {
     oscillator: &'a ForcedOscillator,
     /// Where it begins: phase of the base, particle, and relative displacement and velocity.

@@ -22,25 +22,21 @@ pub struct ImpactPattern {
 
 impl ImpactPattern {
     /// Two impacts per period, half a period apart: symmetric 1:1.
-    #[must_use]
     pub fn symmetric() -> Self {
         Self { walls: vec![1.0], half_periods: 1, mirrored: true }
     }
 
     /// Two impacts per period, half a period apart.
-    #[must_use]
     pub fn is_symmetric(&self) -> bool {
         self.mirrored && self.is_one_to_one()
     }
 
     /// Two impacts per period.
-    #[must_use]
     pub fn is_one_to_one(&self) -> bool {
         self.periods() == 1 && self.impacts() == 2
     }
 
     /// As in a table.
-    #[must_use]
     pub fn name(&self) -> String {
         let (impacts, periods) = (self.impacts(), self.periods());
         match (impacts, periods) {
@@ -56,7 +52,6 @@ impl ImpactPattern {
     }
 
     /// The same pattern over a whole period, as after symmetry breaking.
-    #[must_use]
     pub fn doubled(&self) -> Self {
         let mut walls = self.walls.clone();
         if self.mirrored {
@@ -68,7 +63,6 @@ impl ImpactPattern {
     }
 
     /// The pattern of half the length that this one doubles; None if it does not repeat itself or its mirror image.
-    #[must_use]
     pub fn halved(&self) -> Option<Self> {
         let count = self.walls.len() / 2;
         let (walls, rest) = self.walls.split_at(count);
@@ -82,13 +76,11 @@ impl ImpactPattern {
     }
 
     /// Impacts over the whole period of the motion.
-    #[must_use]
     pub fn impacts(&self) -> usize {
         self.walls.len() * if self.mirrored { 2 } else { 1 }
     }
 
     /// Periods of the base over the whole period of the motion.
-    #[must_use]
     pub fn periods(&self) -> u32 {
         if self.mirrored {
             self.half_periods

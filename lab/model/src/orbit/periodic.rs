@@ -3,12 +3,9 @@
 use nalgebra::{Complex, Matrix4, Matrix6, SVector, Vector4};
 use serde::Serialize;
 
-use super::{
-    bounce::Bounce,
-    condition::{Condition, Row},
-    impact_map::ImpactMap,
-    pattern::{ImpactPattern, Returned, Unknowns, follow, wrapped},
-};
+use super::condition::{Condition, Row};
+use super::pattern::{ImpactPattern, Returned, Unknowns, follow, wrapped};
+use super::{bounce::Bounce, impact_map::ImpactMap};
 use crate::Dimensionless;
 
 /// An exact periodic motion.
@@ -53,7 +50,6 @@ const CLOSED: f64 = 1e-8;
 impl Periodic {
     /// The motion with the pattern `pattern` near the unknowns `guess` that satisfies both conditions, by Newton's method with
     /// analytic derivatives; None if the iteration leaves the pattern or does not converge.
-    #[must_use]
     pub fn find(
         scene: &Dimensionless,
         pattern: &ImpactPattern,
@@ -67,7 +63,6 @@ impl Periodic {
     }
 
     /// The unknowns of this motion: (phase, q1, q1', q2') after its first impact, sigma, G.
-    #[must_use]
     pub fn unknowns(&self) -> Unknowns {
         let Bounce { phase, q1, dq1, dq2, .. } = self.bounces[0];
         Unknowns::from([phase, q1, dq1, dq2, self.sigma, self.g])
@@ -130,13 +125,11 @@ impl Periodic {
     }
 
     /// No multiplier is outside the unit circle, except for those that a bifurcation places on it.
-    #[must_use]
     pub fn bounds_stability(&self) -> bool {
         self.moduli()[3] < 1.0 + 1e-5
     }
 
     /// Moduli of the multipliers, ascending.
-    #[must_use]
     pub fn moduli(&self) -> [f64; 4] {
         self.multipliers.map(|[re, im]| re.hypot(im))
     }
@@ -148,7 +141,6 @@ impl Periodic {
 
     /// (tau, q1, q1', q2, q2') at `points` equal steps over one period of the base, from a passage of the base through
     /// zero, upwards; dimensionless. The impacts fall between the points.
-    #[must_use]
     pub fn motion(&self, scene: &Dimensionless, points: usize) -> Vec<[f64; 5]> {
         let omega = 1.0 + scene.epsilon * self.sigma;
         let map = ImpactMap::new(scene, omega, self.g);
@@ -187,7 +179,6 @@ impl Periodic {
     }
 
     /// (q1, q1', q2, q2') where the base passes through zero, upwards: a start for the plant.
-    #[must_use]
     pub fn start(&self, scene: &Dimensionless) -> Option<[f64; 4]> {
         let map = ImpactMap::new(scene, 1.0 + scene.epsilon * self.sigma, self.g);
         self.state_at(&map, 0.0)

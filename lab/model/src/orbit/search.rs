@@ -1,9 +1,7 @@
 //! Search for all phase-resonant orbits of a scene, over frequency.
 
-use super::{
-    Condition, ImpactPattern, Orbit, Periodic, Unknowns,
-    candidate::{Candidate, Family},
-};
+use super::candidate::{Candidate, Family};
+use super::{Condition, ImpactPattern, Orbit, Periodic, Unknowns};
 use crate::Dimensionless;
 use crate::numerics::{bisection, golden_section};
 
@@ -16,7 +14,6 @@ const GROWTH: f64 = 1.0004;
 ///
 /// Frequencies between 0.2 and 3 omega0 are searched on a grid of about 0.001 in the detuning where that is of
 /// order one, and every root is refined to the last bit.
-#[must_use]
 pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
     let grid = grid(scene.epsilon);
     let candidates = [0, 1]
@@ -33,7 +30,6 @@ pub fn phase_resonant(scene: &Dimensionless) -> Vec<Orbit> {
 }
 
 /// The stable one of [`phase_resonant`] with the smallest C.
-#[must_use]
 pub fn stable_resonant(scene: &Dimensionless) -> Option<Orbit> {
     phase_resonant(scene).into_iter().find(|orbit| orbit.stable)
 }
@@ -41,7 +37,6 @@ pub fn stable_resonant(scene: &Dimensionless) -> Option<Orbit> {
 /// The exact backbone: all phase-resonant orbits at the frequency `omega` (over omega0), at any G.
 ///
 /// Without damping and with r = 1 these are the conservative nonlinear mode, with G = 0.
-#[must_use]
 pub fn exact_backbone(scene: &Dimensionless, omega: f64) -> Vec<Orbit> {
     let candidates = Family::new(scene, omega).and_then(|family| family.phase_resonant());
     let orbits = resonant(scene, candidates.as_slice().as_flattened());
@@ -62,7 +57,6 @@ fn peak(scene: &Dimensionless, near: &Orbit, condition: Condition) -> Option<Orb
 }
 
 /// All symmetric 1:1 orbits at the detuning `sigma` and the scene's G, at any phase; none or up to two.
-#[must_use]
 pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
     driven(scene, sigma).collect()
 }

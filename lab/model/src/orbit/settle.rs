@@ -5,13 +5,8 @@ use std::f64::consts::TAU;
 
 use lovines::{InvalidValue, State};
 
-use super::{
-    bounce::Bounce,
-    condition::Condition,
-    impact_map::ImpactMap,
-    pattern::{ImpactPattern, Unknowns},
-    periodic::Periodic,
-};
+use super::pattern::{ImpactPattern, Unknowns};
+use super::{bounce::Bounce, condition::Condition, impact_map::ImpactMap, periodic::Periodic};
 use crate::Dimensionless;
 
 /// States after one repetition that are closer than this belong to a motion that settles, if there is a stable one near.
@@ -25,9 +20,6 @@ pub(super) const LONGEST: usize = 48;
 
 /// The stable periodic motion that `start` = (q1, q1', q2, q2') leads to after `periods` at the detuning `sigma` and
 /// the scene's G; None without a repeating pattern, without impacts, or if the particle sticks.
-///
-/// # Errors
-/// Invalid parameters or an invalid start.
 pub fn settle(
     scene: &Dimensionless,
     sigma: f64,
@@ -45,7 +37,6 @@ pub fn settle(
 
 /// The periodic motion of the shortest pattern close to the motion from `state` = (q1, q1', q2, q2') at a phase of the base, rad; a
 /// stable one rather than an unstable one.
-#[must_use]
 pub fn periodic_near(scene: &Dimensionless, sigma: f64, phase: f64, state: [f64; 4]) -> Option<Periodic> {
     let map = ImpactMap::new(scene, 1.0 + scene.epsilon * sigma, scene.g);
     let first = map.first(phase, state)?;

@@ -5,10 +5,8 @@ use serde::Serialize;
 use crate::numerics::{bisection, golden_section};
 use crate::orbit::impacts_from_rest;
 
-use super::{
-    slow_flow::SlowFlow,
-    stability::{B_SYMMETRY_BREAKING, impacts_stable},
-};
+use super::slow_flow::SlowFlow;
+use super::stability::{B_SYMMETRY_BREAKING, impacts_stable};
 
 /// Smallest base amplitudes G, over `b epsilon`, at one detuning (docs/theory.md, eq. 19).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -32,13 +30,11 @@ const GRID: u32 = 600;
 
 impl SlowFlow {
     /// Base amplitude that holds the particle speed `b` at the detuning `sigma`: `sqrt(loss^2 + spring^2)/C`.
-    #[must_use]
     pub fn excitation_at(&self, sigma: f64, b: f64) -> f64 {
         self.loss(b).hypot(self.spring(sigma, b)) / self.manifold.c(b)
     }
 
     /// The motion at `sigma` and `b` is stable in both senses under the excitation that holds it.
-    #[must_use]
     pub fn stable_at(&self, sigma: f64, b: f64) -> bool {
         let gamma = (-self.loss(b)).atan2(self.spring(sigma, b));
         let g = self.excitation_at(sigma, b);
@@ -46,7 +42,6 @@ impl SlowFlow {
     }
 
     /// A stable 1:1 motion exists at the excitation `g` and the detuning `sigma`.
-    #[must_use]
     pub fn has_stable_motion(&self, g: f64, sigma: f64) -> bool {
         self.equilibria(g, sigma)
             .iter()
@@ -54,7 +49,6 @@ impl SlowFlow {
     }
 
     /// The activation thresholds at the detuning `sigma`; the mass ratio `epsilon` matters only for those from rest.
-    #[must_use]
     pub fn activation(&self, epsilon: f64, sigma: f64) -> Activation {
         let [from_rest, from_rest_any_phase] = impacts_from_rest(epsilon, self.lambda, sigma);
         let g = |b: f64| self.excitation_at(sigma, b);

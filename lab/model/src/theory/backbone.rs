@@ -32,7 +32,6 @@ pub struct BackbonePoint {
 
 impl BackbonePoint {
     /// Stable in both senses: a phase-locked loop can settle here.
-    #[must_use]
     pub fn stable(&self) -> bool {
         self.impacts_stable && self.slow_flow_stable
     }
@@ -40,7 +39,6 @@ impl BackbonePoint {
 
 impl SlowFlow {
     /// The backbone point at the particle speed `b > 0`.
-    #[must_use]
     pub fn backbone_at(&self, b: f64) -> BackbonePoint {
         let c = self.manifold.c(b);
         BackbonePoint {
@@ -55,7 +53,6 @@ impl SlowFlow {
     }
 
     /// Slope dG/dC of the excitation along the backbone (eq. 18).
-    #[must_use]
     pub fn excitation_slope(&self, b: f64) -> f64 {
         let r = self.manifold.dissipation;
         let c = self.manifold.c(b);
@@ -64,7 +61,6 @@ impl SlowFlow {
     }
 
     /// The detuning sigma_R at the amplitude `c` on a branch; None below the fold.
-    #[must_use]
     pub fn backbone_sigma(&self, c: f64, side: BranchSide) -> Option<f64> {
         self.manifold.b(c, side).map(|b| self.free_detuning(b))
     }
@@ -72,7 +68,6 @@ impl SlowFlow {
     /// All phase-resonant solutions at the excitation `g`, on both branches, by increasing B.
     ///
     /// `(G C)^2 = (lambda C^2 + (4/pi) R B^2)^2` (eq. 17) is a quartic in B.
-    #[must_use]
     pub fn phase_resonant(&self, g: f64) -> Vec<BackbonePoint> {
         self.equilibrium_speeds(g, None)
             .into_iter()
@@ -81,7 +76,6 @@ impl SlowFlow {
     }
 
     /// `points` samples of the backbone at equal steps of B, from `from` to `to`.
-    #[must_use]
     pub fn backbone(&self, from: f64, to: f64, points: usize) -> Vec<BackbonePoint> {
         equally_spaced(from, to, points).map(|b| self.backbone_at(b)).collect()
     }

@@ -43,7 +43,6 @@ const PANELS: u32 = 64;
 
 impl SlowFlow {
     /// The free decay from the particle speed `b`; None left of the fold, or without dissipation.
-    #[must_use]
     pub fn decay(&self, b: f64) -> Option<Decay> {
         let dissipates = self.lambda > 0.0 || self.manifold.dissipation > 0.0;
         (dissipates && b >= self.manifold.b_min()).then_some(Decay { flow: *self, start: b })
@@ -52,19 +51,16 @@ impl SlowFlow {
 
 impl Decay {
     /// Slow time at which the fold is reached and the impacts lose synchrony; infinite if it never is.
-    #[must_use]
     pub fn duration(&self) -> f64 {
         self.time(self.flow.manifold.b_min())
     }
 
     /// Slow time at which the particle speed has fallen to `b`, between the fold and the start.
-    #[must_use]
     pub fn time(&self, b: f64) -> f64 {
         self.primitive(self.start) - self.primitive(b)
     }
 
     /// Where the decay is at the slow time `tau1`; None before the release and after the fold.
-    #[must_use]
     pub fn at(&self, tau1: f64) -> Option<DecayPoint> {
         if !(0.0..=self.duration()).contains(&tau1) {
             return None;
@@ -75,7 +71,6 @@ impl Decay {
     }
 
     /// `points` points from the start to the fold, at equal steps of B.
-    #[must_use]
     pub fn samples(&self, points: usize) -> Vec<DecayPoint> {
         let b_min = self.flow.manifold.b_min();
         equally_spaced(self.start, b_min, points)
@@ -85,7 +80,6 @@ impl Decay {
 
     /// Phase, rad, by which v leads `omega0 t` when the particle speed has fallen to `b`: the integral of sigma
     /// over tau1 (docs/theory.md, eq. 21), by Gauss' rule on panels; its integrand is smooth.
-    #[must_use]
     pub fn turned(&self, b: f64) -> f64 {
         let curvature = self.flow.manifold.curvature();
         let integrand = |b: f64| self.flow.free_detuning(b) * (2.0 * curvature * b - PI) / self.flow.loss(b);

@@ -24,7 +24,6 @@ pub struct Drift {
 
 impl SlowFlow {
     /// The effect of a slow drift at the amplitude `c` on the right branch. `None` at the fold and below.
-    #[must_use]
     pub fn drift(&self, c: f64) -> Option<Drift> {
         let b = self.manifold.b(c, BranchSide::Right)?;
         let rate = 1e-6 * c;

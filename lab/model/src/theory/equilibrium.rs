@@ -29,7 +29,6 @@ impl SlowFlow {
     /// All equilibria at the excitation `g` and the detuning `sigma`, on both branches, by rising B.
     ///
     /// The squares of the two equilibrium conditions (eq. 12) add up to a quartic in B (eq. 14).
-    #[must_use]
     pub fn equilibria(&self, g: f64, sigma: f64) -> Vec<Equilibrium> {
         self.equilibrium_speeds(g, Some(sigma))
             .into_iter()

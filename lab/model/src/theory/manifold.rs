@@ -23,7 +23,6 @@ pub enum BranchSide {
 
 impl Manifold {
     /// The manifold for the restitution coefficient `r`, in (0, 1].
-    #[must_use]
     pub fn new(r: f64) -> Self {
         Self { dissipation: (1.0 - r) / (1.0 + r) }
     }
@@ -34,19 +33,16 @@ impl Manifold {
     }
 
     /// Particle speed at the fold, `Bmin = (pi/2)/(R^2 + pi^2/4)` (eq. 5).
-    #[must_use]
     pub fn b_min(&self) -> f64 {
         FRAC_PI_2 / self.curvature()
     }
 
     /// Smallest amplitude, at the fold: `Cmin = R/sqrt(R^2 + pi^2/4)` (eq. 5).
-    #[must_use]
     pub fn c_min(&self) -> f64 {
         self.dissipation / self.curvature().sqrt()
     }
 
     /// Amplitude C at the particle speed `b`.
-    #[must_use]
     pub fn c(&self, b: f64) -> f64 {
         (self.dissipation * b).hypot(1.0 - FRAC_PI_2 * b)
     }
@@ -54,7 +50,6 @@ impl Manifold {
     /// Particle speed `B = Bmin ± sqrt((2/pi) Bmin (C^2 - Cmin^2))` on a branch; None below the fold, and where B < 0.
     ///
     /// Eq. 6; the published text prints pi/2 in that root, but 2/pi follows from the manifold.
-    #[must_use]
     pub fn b(&self, c: f64, side: BranchSide) -> Option<f64> {
         let (b_min, c_min) = (self.b_min(), self.c_min());
         if c.is_nan() || c < c_min {
@@ -69,7 +64,6 @@ impl Manifold {
     }
 
     /// The branch on which `b` lies.
-    #[must_use]
     pub fn side(&self, b: f64) -> BranchSide {
         if b < self.b_min() {
             BranchSide::Left
@@ -79,7 +73,6 @@ impl Manifold {
     }
 
     /// Slope `dB/d(C^2) = 1/(2 (R^2 + pi^2/4)(B - Bmin))`; infinite at the fold.
-    #[must_use]
     pub fn slope(&self, b: f64) -> f64 {
         0.5 / (self.curvature() * (b - self.b_min()))
     }

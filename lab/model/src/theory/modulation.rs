@@ -31,7 +31,6 @@ pub struct Modulation {
 impl SlowFlow {
     /// Phase psi of the triangle wave on the manifold at the particle speed `b` and the phase `gamma` of v, rad:
     /// `C cos(pi/2 - psi + gamma) = R B`, `C sin(pi/2 - psi + gamma) = 1 - pi B/2` (docs/theory.md, eq. 4).
-    #[must_use]
     pub fn psi(&self, b: f64, gamma: f64) -> f64 {
         let impact = (1.0 - FRAC_PI_2 * b).atan2(self.manifold.dissipation * b);
         gamma + FRAC_PI_2 - impact
@@ -43,7 +42,6 @@ impl SlowFlow {
     ///
     /// Ends when the impacts stop alternating between the walls or B is no longer positive: without two impacts per period these
     /// variables have no meaning.
-    #[must_use]
     pub fn modulation(
         &self,
         epsilon: f64,

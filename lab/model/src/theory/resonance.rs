@@ -13,7 +13,6 @@ use crate::{Dimensionless, Resonance, Sensor};
 
 /// All solutions of first-order theory that are resonant by the scene's definition, at its G, by increasing B. `C` is the amplitude that
 /// the sensor reads.
-#[must_use]
 pub fn resonant(scene: &Dimensionless) -> Vec<BackbonePoint> {
     let theory = Reading::of(scene);
     let points = theory.flow.phase_resonant(scene.g).into_iter();
@@ -23,28 +22,24 @@ pub fn resonant(scene: &Dimensionless) -> Vec<BackbonePoint> {
 }
 
 /// `points` samples of the backbone by the scene's definition at equal steps of B, from `from` to `to`. `C` as in [`resonant`].
-#[must_use]
 pub fn backbone(scene: &Dimensionless, from: f64, to: f64, points: usize) -> Vec<BackbonePoint> {
     let theory = Reading::of(scene);
     equally_spaced(from, to, points).map(|b| theory.resonance(b)).collect()
 }
 
 /// The backbone by the scene's definition where its sensor reads the amplitude `c`, on the right branch; None below the fold.
-#[must_use]
 pub fn backbone_at_level(scene: &Dimensionless, c: f64) -> Option<BackbonePoint> {
     let theory = Reading::of(scene);
     theory.speed_at_level(c).map(|b| theory.resonance(b))
 }
 
 /// The detuning of the free decay at the amplitude `c` that the scene's sensor reads, on the right branch; None below the fold.
-#[must_use]
 pub fn free_sigma(scene: &Dimensionless, c: f64) -> Option<f64> {
     let theory = Reading::of(scene);
     theory.speed_at_level(c).map(|b| theory.flow.free_detuning(b))
 }
 
 /// The amplitude that the scene's sensor reads over that of v, at the particle speed `b` and the detuning `sigma`.
-#[must_use]
 pub fn reading(scene: &Dimensionless, b: f64, sigma: f64) -> f64 {
     Reading::of(scene).seen(b, sigma).norm()
 }

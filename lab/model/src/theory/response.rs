@@ -22,7 +22,6 @@ pub struct ResponsePoint {
 impl SlowFlow {
     /// The detunings at which the excitation `g` holds the particle speed `b`, and the phase of v there, rad:
     /// `sigma = sigma_R ± sqrt(G^2 C^2 - loss^2)/(2 C^2)` (docs/theory.md, eq. 15); None if `g` is too small.
-    #[must_use]
     pub fn detunings(&self, g: f64, b: f64) -> Option<[(f64, f64); 2]> {
         let c = self.manifold.c(b);
         let loss = self.loss(b);
@@ -40,7 +39,6 @@ impl SlowFlow {
 
     /// The frequency responses at the excitation `g`: closed curves over all B > 0, each of `points` points from its
     /// smallest C on one side to its largest and back. A curve that reaches B = 0 starts there, at C = 1.
-    #[must_use]
     pub fn frequency_responses(&self, g: f64, points: usize) -> Vec<Vec<ResponsePoint>> {
         let mut ends: Vec<f64> = self.equilibrium_speeds(g, None);
         // At B = 0 the loss is lambda and C is 1.

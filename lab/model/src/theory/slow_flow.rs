@@ -15,25 +15,21 @@ pub struct SlowFlow {
 
 impl SlowFlow {
     /// The slow flow for the damping `lambda` and the restitution coefficient `r`.
-    #[must_use]
     pub fn new(lambda: f64, r: f64) -> Self {
         Self { lambda, manifold: Manifold::new(r) }
     }
 
     /// `lambda C^2 + (4/pi) R B^2`: dissipation of C^2 by damping and impacts per unit of tau1 (eq. 11).
-    #[must_use]
     pub fn loss(&self, b: f64) -> f64 {
         self.lambda * self.manifold.c(b).powi(2) + 2.0 * FRAC_2_PI * self.manifold.dissipation * b * b
     }
 
     /// `(2/pi) B (1 - pi B/2)/C^2`: the detuning at which the motion rotates by itself (eq. 11).
-    #[must_use]
     pub fn free_detuning(&self, b: f64) -> f64 {
         FRAC_2_PI * b * (1.0 - FRAC_PI_2 * b) / self.manifold.c(b).powi(2)
     }
 
     /// `(D1 C~, D1 gamma)` at the particle speed `b` and the phase `gamma`, rad (eq. 11).
-    #[must_use]
     pub fn rates(&self, g: f64, sigma: f64, b: f64, gamma: f64) -> [f64; 2] {
         let c = self.manifold.c(b);
         [

@@ -24,7 +24,6 @@ pub struct Waveform {
 impl Waveform {
     /// The motion at the particle speed `b` on the manifold, the detuning `sigma` and the phase `gamma`, rad; time counts from
     /// a passage of the base through zero, upwards.
-    #[must_use]
     pub fn new(scene: &Dimensionless, sigma: f64, b: f64, gamma: f64) -> Self {
         let flow = SlowFlow::new(scene.lambda, scene.r);
         Self {
@@ -38,38 +37,32 @@ impl Waveform {
     }
 
     /// `v = q1 + epsilon q2`, m, at the time `t`, s.
-    #[must_use]
     pub fn v(&self, t: f64) -> f64 {
         self.amplitude * (self.omega * t + self.gamma).sin()
     }
 
     /// `w = q1 - q2`, m, at the time `t`, s.
-    #[must_use]
     pub fn w(&self, t: f64) -> f64 {
         self.v(t) + self.triangle * triangle_wave(self.omega * t + self.psi)
     }
 
     /// Displacement of the primary mass, m: `(v + epsilon w)/(1 + epsilon)`.
-    #[must_use]
     pub fn q1(&self, t: f64) -> f64 {
         (self.v(t) + self.epsilon * self.w(t)) / (1.0 + self.epsilon)
     }
 
     /// Displacement of the particle, m: `(v - w)/(1 + epsilon)`.
-    #[must_use]
     pub fn q2(&self, t: f64) -> f64 {
         (self.v(t) - self.w(t)) / (1.0 + self.epsilon)
     }
 
     /// The first impact on the wall w = +b at or after t = 0, s.
-    #[must_use]
     pub fn impact_time(&self) -> f64 {
         (FRAC_PI_2 - self.psi).rem_euclid(std::f64::consts::TAU) / self.omega
     }
 }
 
 /// The triangle wave Pi: slope ±1, height pi/2, zero and rising at 0.
-#[must_use]
 pub fn triangle_wave(phase: f64) -> f64 {
     phase.sin().asin()
 }
@@ -77,7 +70,6 @@ pub fn triangle_wave(phase: f64) -> f64 {
 impl Decay {
     /// (v, w) over b at the fast time `tau = omega0 t` since the release, for v at the phase `gamma` (rad) then; None
     /// once the fold is passed. The phase advances by `tau` and the integral of sigma (docs/theory.md, eq. 21).
-    #[must_use]
     pub fn motion(&self, epsilon: f64, gamma: f64, tau: f64) -> Option<[f64; 2]> {
         let point = self.at(epsilon * tau)?;
         let phase = gamma + tau + self.turned(point.b);

@@ -59,7 +59,6 @@ pub enum ErrorCode {
 
 impl ErrorCode {
     /// The error with a number.
-    #[must_use]
     pub fn of_number(number: u8) -> Option<Self> {
         use ErrorCode::{BadFrame, BadIndex, BadLength, BadValue, Busy, ReadOnly, UnknownType};
         [BadFrame, UnknownType, BadIndex, BadLength, ReadOnly, BadValue, Busy]
@@ -86,7 +85,6 @@ pub struct Frame {
 
 impl Frame {
     /// The bytes of the frame.
-    #[must_use]
     pub fn encode(&self) -> Vec<u8> {
         let length = self.payload.len() as u16;
         let mut bytes = [
@@ -128,7 +126,6 @@ impl Frame {
 }
 
 /// The checksum of a frame.
-#[must_use]
 pub fn crc16(bytes: &[u8]) -> u16 {
     CHECKSUM.checksum(bytes)
 }
@@ -152,13 +149,11 @@ pub struct Packet {
 
 impl Packet {
     /// Largest number of records of `width` values.
-    #[must_use]
     pub fn most(width: usize) -> usize {
         (MAX_PACKET - PACKET_HEADER) / (4 * width.max(1))
     }
 
     /// The bytes of the packet.
-    #[must_use]
     pub fn encode(&self) -> Vec<u8> {
         let records = (self.values.len() / usize::from(self.width).max(1)) as u16;
         let mut bytes = [&MAGIC[..], &[VERSION, self.width]].concat();
@@ -192,7 +187,6 @@ impl Packet {
 }
 
 /// The numbers in `bytes`; a rest of less than four bytes is ignored.
-#[must_use]
 pub fn reals(bytes: &[u8]) -> Vec<f32> {
     let four = |bytes: &[u8]| f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
     bytes.chunks_exact(4).map(four).collect()
@@ -213,7 +207,6 @@ pub struct Status {
 
 impl Status {
     /// The payload.
-    #[must_use]
     pub fn encode(&self) -> Vec<u8> {
         let mut bytes = vec![self.version];
         bytes.extend(self.parameters.to_le_bytes());
@@ -254,7 +247,6 @@ pub fn text(bytes: &[u8]) -> Result<(String, &[u8]), Malformed> {
 }
 
 /// The answer to the discovery beacon.
-#[must_use]
 pub fn beacon(control_port: u16, experiment: &str, firmware: &str) -> Vec<u8> {
     /// A locally administered address: the device is a program.
     const MAC: [u8; 6] = [2, b'H', b'L', 0, 0, 1];

@@ -113,15 +113,11 @@ impl Device {
     }
 
     /// Whether the output may be other than zero.
-    #[must_use]
     pub fn is_driven(&self) -> bool {
         self.settings.armed && !self.tripped
     }
 
     /// One sample: reads the sensors, drives the rig until the next sample, and returns a packet for a port of the host if one is complete.
-    ///
-    /// # Errors
-    /// Those of the rig; it cannot be driven by samples, for example.
     pub fn tick(&mut self) -> Result<Option<(u16, Vec<u8>)>, RigError> {
         let Sensors { response, reference } = self.rig.sense()?;
         self.epoch = (self.epoch + std::mem::take(&mut self.commands)) % EPOCH;

@@ -12,7 +12,6 @@ pub fn increment(frequency: f64, sample_rate: f64) -> u32 {
     (frequency / sample_rate * TURN).round() as u32
 }
 
-/// A phase, turns.
 pub fn turns(phase: u32) -> f64 {
     f64::from(phase) / TURN
 }
@@ -52,7 +51,6 @@ impl Series {
     }
 }
 
-/// Settings of the table.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TableSettings {
     /// Of the free modes, Hz.
@@ -68,7 +66,6 @@ pub struct TableSettings {
     pub phase: f64,
 }
 
-/// A one-shot.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 enum Shot {
     #[default]

@@ -170,7 +170,6 @@ impl<T: Transport> Host<T> {
         Ok(())
     }
 
-    /// The present value of a source.
     fn value(&mut self, source: u8) -> Result<f64, HostError> {
         self.stream(&[source], 1, 1)?;
         loop {

@@ -24,7 +24,6 @@ pub enum Access {
     Block,
 }
 
-/// One parameter.
 #[derive(Debug, Clone)]
 pub struct Parameter {
     /// Its name, at most 23 bytes.
@@ -162,7 +161,6 @@ impl Registry {
         Ok([&start.to_le_bytes()[..], &next.to_le_bytes(), &page].concat())
     }
 
-    /// The parameter with an index.
     pub fn at(&self, index: u16) -> Result<&Parameter, ErrorCode> {
         self.0.get(usize::from(index)).ok_or(ErrorCode::BadIndex)
     }

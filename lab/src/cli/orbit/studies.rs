@@ -1,12 +1,11 @@
 //! `vines orbit --convergence` and `--definitions`: theory minus exact orbit as epsilon shrinks.
 
-use vines::{
-    orbit::{Convergence, convergence},
-    report::{Table, number},
-    scene::{Definition, Dimensionless},
-};
+use vines::orbit::{Convergence, convergence};
+use vines::report::{Table, number};
+use vines::scene::{Definition, Dimensionless};
 
-use super::{Failure, shown};
+use super::text::shown;
+use crate::cli::failure::Failure;
 
 /// The convergence of the theory towards the exact orbits.
 pub(super) fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {

@@ -2,14 +2,25 @@
 
 use std::fmt::Write;
 
-use vines::{
-    numerics::range,
-    orbit::{Branch, Ended, Orbit, Periodic, Response},
-    report::{Table, number},
-    scene::Dimensionless,
-};
+use vines::orbit::{Branch, Ended, Orbit, Periodic, Response};
+use vines::report::{Table, number, summary::parameters};
+use vines::{numerics::range, scene::Dimensionless};
 
-use crate::cli::yes_no;
+use crate::cli::failure::Failure;
+use crate::cli::output::{output, yes_no};
+
+/// What was found as JSON, or as text under a title and the parameters of the scene.
+pub(super) fn shown(
+    scene: &Dimensionless,
+    title: &str,
+    found: &impl serde::Serialize,
+    json: bool,
+    text: impl FnOnce() -> String,
+) -> Result<String, Failure> {
+    output(json, found, || {
+        format!("{title}\n  {}\n\n{}", parameters(scene), text())
+    })
+}
 
 /// What was searched for, and how likely it is that something is missing.
 pub(super) fn searched(found: &Response) -> String {

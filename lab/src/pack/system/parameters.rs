@@ -2,10 +2,8 @@
 
 use std::fmt::Write;
 
-use phase_lock::{
-    PARAMETERS,
-    Value::{self, Boolean, Integer, Real},
-};
+use phase_lock::PARAMETERS;
+use phase_lock::Value::{self, Boolean, Integer, Real};
 
 use crate::{pack::PackError, scene::Scene};
 

@@ -1,6 +1,7 @@
 //! Curves in pieces by stability.
 
-use super::Place;
+/// A place in a panel, in the units of its axes.
+pub type Place = (f64, f64);
 
 /// A place, and whether the motion there is stable.
 pub type Marked = (Place, bool);

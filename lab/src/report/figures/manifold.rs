@@ -10,7 +10,6 @@ use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, reading};
 const POINTS: usize = 300;
 const TOP: f64 = 1.4;
 
-/// The manifold, the decay and the locked point.
 pub fn figure(found: &Comparison) -> Figure {
     let p = &found.parameters;
     let flow = SlowFlow::new(p.lambda, p.r);

@@ -14,7 +14,6 @@ const WIDTH: u32 = 770;
 /// Regions in which no square of 2 n + 1 cells fits, with this n, get no letter.
 const NARROW: usize = 1;
 
-/// The map as SVG.
 pub fn svg(map: &Map) -> Result<String, FigureError> {
     // Cells lie side by side without a seam.
     let text = figure(map).svg()?;

@@ -1,13 +1,12 @@
 //! Exact frequency responses and backbone, and one period of the locked motion.
 
-use super::{ReportError, Subject};
 use crate::orbit::{
     Branch, Component, Condition, Exploration, ImpactPattern, Limits, Periodic, Response, backbone, response,
     stable_resonant,
 };
 use crate::report::figures::{period, responses};
-use crate::report::files::csv;
-use crate::report::section::Section;
+use crate::report::files::{ReportError, csv};
+use crate::report::section::{Section, Subject};
 use crate::report::table::Table;
 use crate::scene::Dimensionless;
 use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow};

@@ -3,13 +3,12 @@
 use std::cell::Cell;
 use std::error::Error;
 
-use super::{ReportError, Subject};
 use crate::comparison::{COMPARED_ABOVE, Comparison};
 use crate::experiment::{self, ExperimentError, Plan, Record, Stage};
 use crate::identification::{DecayEnd, identify};
 use crate::report::figures::{backbone, history, manifold};
-use crate::report::files::{decay_csv, json};
-use crate::report::section::Section;
+use crate::report::files::{ReportError, decay_csv, json};
+use crate::report::section::{Section, Subject};
 use crate::report::table::{Table, number};
 use crate::rig::{BuiltIn, Rig, Simulated};
 

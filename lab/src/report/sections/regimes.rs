@@ -2,12 +2,11 @@
 
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::{ReportError, Subject};
 use crate::map::{LIMIT, Map, Plan};
 use crate::regime::Regime;
 use crate::report::figures::regimes;
-use crate::report::files::{bifurcations_csv, map_csv};
-use crate::report::section::Section;
+use crate::report::files::{ReportError, bifurcations_csv, map_csv};
+use crate::report::section::{Section, Subject};
 use crate::report::summary;
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError> {

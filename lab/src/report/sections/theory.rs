@@ -1,10 +1,9 @@
 //! First-order theory: the backbones of several r, activation, and how it approaches the exact orbits.
 
-use super::{ReportError, Subject};
 use crate::orbit::convergence;
 use crate::report::figures::{approach, backbones};
-use crate::report::files::csv;
-use crate::report::section::Section;
+use crate::report::files::{ReportError, csv};
+use crate::report::section::{Section, Subject};
 use crate::report::table::Table;
 use crate::scene::Dimensionless;
 use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, resonant};

@@ -1,12 +1,11 @@
 //! The backbone tracked with the loop closed, level by level.
 
-use super::{ReportError, Subject};
 use crate::backbone::track;
 use crate::comparison::{TrackedComparison, TrackedPoint};
 use crate::identification::Regime;
 use crate::report::figures::tracked as figure;
-use crate::report::files::tracked_csv;
-use crate::report::section::Section;
+use crate::report::files::{ReportError, tracked_csv};
+use crate::report::section::{Section, Subject};
 use crate::rig::{BuiltIn, Simulated};
 
 pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Section, ReportError> {

@@ -5,7 +5,6 @@ use rand_distr::{Distribution, StandardNormal};
 
 use crate::scene::RatioOf;
 
-/// Normally distributed numbers.
 pub struct NormalDistribution(ChaCha8Rng);
 
 impl NormalDistribution {
