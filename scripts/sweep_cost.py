@@ -1,6 +1,7 @@
 """Cost of sweeps and of batches: the tables of docs/scale.md, and ratios; `scripts/sweep-demo --cost` runs it."""
 
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -42,12 +43,18 @@ def measure(name, options, threads=CORES):
     shutil.rmtree(out, ignore_errors=True)
     begin = time.perf_counter()
     child = start(options, out, threads)
-    _, status, usage = os.wait4(child.pid, 0)
+    # Not `ru_maxrss`, which has the size of this process before the program began.
+    done, memory = 0, 0
+    while not done:
+        if peak := re.search(r"VmHWM:\s+(\d+)", Path(f"/proc/{child.pid}/status").read_text()):
+            memory = int(peak[1]) / 1024
+        time.sleep(0.005)
+        done, status, usage = os.wait4(child.pid, os.WNOHANG)
     seconds = time.perf_counter() - begin
     assert status == 0, name
     files = [one for one in out.rglob("*") if one.is_file()]
     size = sum(one.stat().st_size for one in files)
-    work, memory = usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+    work = usage.ru_utime + usage.ru_stime
     print(
         f"| {name} | {seconds:.1f} s | {work:.1f} s | {memory:.0f} MB | {size / 1e6:.1f} MB | {len(files)} |",
         flush=True,

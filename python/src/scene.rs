@@ -3,7 +3,7 @@
 use std::fmt::Display;
 
 use pyo3::{exceptions::PyValueError, prelude::*};
-use vines_testbench::scene::{Family, Override};
+use vines_testbench::scene::{Family, Override, SceneError};
 
 /// A `ValueError`, whose message has the value, its unit and what is allowed.
 pub fn invalid(error: impl Display) -> PyErr {
@@ -34,7 +34,11 @@ impl Scene {
                     .map_err(|error| invalid(format!("{one}: {error}")))
             })
             .collect::<PyResult<Vec<_>>>()?;
-        let family = Family::parse(origin, text, &overrides).map_err(invalid)?;
+        let family = Family::parse(origin, text, &overrides).map_err(|error| match error {
+            // The message of the program has its option.
+            SceneError::Override { argument, message } => invalid(format!("{argument}: {message}")),
+            other => invalid(other),
+        })?;
         let scene = family.scene(&[]).map_err(invalid)?;
         Ok(Self { family, scene })
     }

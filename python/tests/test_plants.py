@@ -106,6 +106,8 @@ def test_a_value_that_is_not_allowed_is_a_value_error_with_value_and_range(wrong
         wrong()
     for part in parts:
         assert part in str(error.value)
+    # What the program's options say, means nothing here.
+    assert "--" not in str(error.value)
 
 
 def test_after_an_error_no_plant_has_advanced():

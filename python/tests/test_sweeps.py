@@ -53,7 +53,7 @@ def test_designs_lists_and_results_become_a_dataset_with_units(tmp_path):
     [
         ({"plant.rr": (0.3, 0.5, 3)}, ["plant.rr", "unknown field"]),
         ({"plant.r": (0.3, float("nan"), 3)}, ["plant.r", "NaN"]),
-        ({"plant.r": [0.5]}, ["plant.r has one value"]),
+        ({"plant.r": [0.5]}, ["plant.r has one value", 'Scene(plant={"r": 0.5})']),
         ({"plant.r": 0.5}, ["plant.r = 0.5", "a list of numbers"]),
         ({"plant.r": ("normal", 0.3, 0.5)}, ["plant.r", "normal", "random and sobol"]),
         (

@@ -57,7 +57,7 @@ def sweep(
     chunk : int
         Largest number of cells in a chunk.
     adaptive : int, optional
-        Only the regime: compute every n-th cell of two grids (8 is usual), then where neighbours differ or
+        Only the regime: compute every n-th cell of two grids (16 is usual), then where neighbours differ or
         inferences fail, and infer the rest; `inferred` marks it. Not with `client`.
     confirm : bool
         Confirms a sweep of more than 2 hours or 20 GB.

@@ -221,6 +221,34 @@ fn regimes_agree_with_those_further_on_and_of_another_plant() {
 
 /// Periods per cell of the comparison of early decisions with the full length.
 const SHORT: usize = 400;
+/// Periods after which irregular cells are counted, to see whether they could be stopped.
+const SHORTER: [usize; 3] = [160, 200, 300];
+
+/// Prints how many cells that are modulated or chaotic after fewer periods have another regime after [`SHORT`]; also of the strongest
+/// chaos alone.
+fn print_irregular(case: &Case, cells: &[(f64, f64, Point, Point)]) {
+    let [epsilon, lambda, r] = case.scene;
+    for periods in SHORTER {
+        let irregular: Vec<(Point, bool)> = cells
+            .par_iter()
+            .map(|(sigma, g, _, full)| {
+                let point = observe(&Dimensionless::new(epsilon, lambda, r, *g), *sigma, case.start, periods).unwrap();
+                (point, point.regime != full.regime)
+            })
+            .filter(|(point, _)| matches!(point.regime, Regime::Modulated | Regime::Chaotic))
+            .collect();
+        let is_strong = |point: &Point| point.exponent.is_some_and(|one| one > 0.9) && point.synchrony < 0.05;
+        let strong: Vec<_> = irregular.iter().filter(|(point, _)| is_strong(point)).collect();
+        println!(
+            "  after {periods} periods: {} irregular cells, {} of them have another regime after {SHORT}; with an exponent above 0.9 and a synchrony \
+             below 0.05: {}, {}",
+            irregular.len(),
+            irregular.iter().filter(|one| one.1).count(),
+            strong.len(),
+            strong.iter().filter(|one| one.1).count()
+        );
+    }
+}
 
 #[test]
 fn an_early_decision_is_that_of_the_full_length() {
@@ -263,6 +291,7 @@ fn an_early_decision_is_that_of_the_full_length() {
             mean(&stopped),
             mean(&found.iter().collect::<Vec<_>>())
         );
+        print_irregular(case, &found);
         wrong += differ.len() as u64;
     }
     assert!(10_000 * wrong <= 3 * cells, "{wrong} of {} cells differ", 3 * cells);

@@ -70,7 +70,7 @@ pub(super) struct Arguments {
     chunk: u64,
 
     /// Only the regime: compute every N-th cell of two grids, then where neighbours differ or inferences fail; `inferred` marks the rest
-    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "8", conflicts_with_all = ["shard", "merge"])]
+    #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "16", conflicts_with_all = ["shard", "merge"])]
     adaptive: Option<u64>,
 
     /// Folder of the store; created if it does not exist

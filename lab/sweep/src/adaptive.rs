@@ -1,9 +1,9 @@
 //! Adaptive refinement: the regime is computed where neighbouring cells differ, and inferred elsewhere.
 //!
 //! A grid of distant cells comes first. The neighbours of every pair that differs are computed until borders are surrounded by equal
-//! cells; then the distance is halved, and a new cell takes the regime of the neighbour before it. In the end inferred cells are tested
-//! where most of those tested before were wrong, and the borders found are followed again. What is computed next follows from what is
-//! known, so that a sweep that was killed reads the results of its rounds again and goes on.
+//! cells; then the distance is halved, and a new cell takes the regime of the neighbour before it. In the end inferred cells are tested,
+//! most likely wrong first (`doubt`). What is computed next follows from what is known, so that a sweep that was killed reads the results
+//! of its rounds again and goes on.
 
 use std::{collections::BTreeMap, sync::atomic::Ordering::Relaxed};
 
@@ -12,10 +12,11 @@ use vines_model::regime::Regime;
 
 use crate::{
     cell::Cell,
-    doubt::{self, Doubt},
+    doubt::Doubt,
+    error::StoreError,
     monitor::Monitor,
     plan::Plan,
-    store::{ROUNDS, Store, StoreError, code},
+    store::{ROUNDS, Store, code},
     variables::ABSENT,
 };
 
@@ -49,7 +50,6 @@ pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) 
     let mut round = 0;
     let mut next = map.grid(stride);
     let mut doubt = Doubt::new(rows, columns);
-    let mut tests = false;
     loop {
         while !next.is_empty() {
             if !map.compute(plan, store, &mut round, &next, monitor)? {
@@ -61,33 +61,41 @@ pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) 
             // Only a cell that was computed, or one beside it, can differ now.
             let near: Vec<usize> = next.iter().flat_map(|n| map.beside(*n, stride).chain([*n])).collect();
             next = map.differing(near, stride);
-            if tests {
-                next.truncate(doubt::room(&map.computed));
-            }
         }
-        if stride > 1 {
-            stride /= 2;
-            map.infer(stride);
-            next = map.differing(map.grid(stride), stride);
-            continue;
-        }
-        tests = true;
-        next = doubt.cells(&map.computed);
-        if next.is_empty() {
+        if stride == 1 {
             break;
         }
-        let inferred: Vec<u8> = next.iter().map(|n| map.codes[*n]).collect();
-        if !map.compute(plan, store, &mut round, &next, monitor)? {
+        stride /= 2;
+        map.infer(stride);
+        next = map.differing(map.grid(stride), stride);
+    }
+    loop {
+        let tests = doubt.cells(&map.codes, &map.computed);
+        if tests.is_empty() {
+            break;
+        }
+        let (cells, inferred): (Vec<usize>, Vec<u8>) = tests.iter().map(|one| (one.cell, map.codes[one.cell])).unzip();
+        if !map.compute(plan, store, &mut round, &cells, monitor)? {
             return Ok(false);
         }
-        for (n, inferred) in next.iter().zip(inferred) {
-            doubt.tested(*n, map.codes[*n] != inferred);
+        for (one, inferred) in tests.into_iter().zip(inferred) {
+            doubt.tested(one, map.codes[one.cell] != inferred);
         }
-        let near: Vec<usize> = next.iter().flat_map(|n| map.beside(*n, 1)).collect();
-        next = map.differing(near, 1);
-        next.truncate(doubt::room(&map.computed));
     }
     map.write(plan, store, monitor)
+}
+
+/// The eight neighbours of a cell at this distance.
+pub(crate) fn beside(n: usize, [rows, columns]: [usize; 2], stride: usize) -> impl Iterator<Item = usize> {
+    let around = move |at: usize, size: usize| {
+        [at.checked_sub(stride), Some(at), Some(at + stride)]
+            .into_iter()
+            .flatten()
+            .filter(move |one| *one < size)
+    };
+    around(n / columns, rows)
+        .flat_map(move |row| around(n % columns, columns).map(move |column| row * columns + column))
+        .filter(move |other| *other != n)
 }
 
 impl Map {
@@ -102,18 +110,11 @@ impl Map {
         .collect()
     }
 
-    /// The eight neighbours of a cell at this distance.
+    /// The four neighbours of a cell at this distance.
     fn beside(&self, n: usize, stride: usize) -> impl Iterator<Item = usize> + use<> {
-        let (rows, columns) = (self.rows, self.columns);
-        let around = move |at: usize, size: usize| {
-            [at.checked_sub(stride), Some(at), Some(at + stride)]
-                .into_iter()
-                .flatten()
-                .filter(move |one| *one < size)
-        };
-        around(n / columns, rows)
-            .flat_map(move |row| around(n % columns, columns).map(move |column| row * columns + column))
-            .filter(move |other| *other != n)
+        let columns = self.columns;
+        beside(n, [self.rows, columns], stride)
+            .filter(move |other| other / columns == n / columns || (other % columns == n % columns))
     }
 
     /// Those of the cells that are not computed and differ from a neighbour, in order.
@@ -163,8 +164,10 @@ impl Map {
     ) -> Result<bool, StoreError> {
         let kept = store
             .read(key)
-            .and_then(|text| serde_json::from_slice::<Vec<(u8, String)>>(&text).ok());
-        let results = match kept.filter(|results| results.len() == cells.len()) {
+            .and_then(|text| serde_json::from_slice::<Vec<(usize, u8, String)>>(&text).ok());
+        // Another rule may have chosen other cells.
+        let same = |results: &Vec<(usize, u8, String)>| results.iter().map(|one| &one.0).eq(cells);
+        let results = match kept.filter(same) {
             Some(results) => {
                 monitor.found.fetch_add(cells.len() as u64, Relaxed);
                 results
@@ -175,7 +178,7 @@ impl Map {
                     (!monitor.stop.load(Relaxed)).then(|| {
                         let cell = plan.cell_at(&index);
                         monitor.note(&cell);
-                        (code(&cell), cell.failure)
+                        (*n, code(&cell), cell.failure)
                     })
                 };
                 let Some(results) = cells.par_iter().map(one).collect::<Option<Vec<_>>>() else {
@@ -185,17 +188,17 @@ impl Map {
                 results
             }
         };
-        for (n, (code, failure)) in cells.iter().zip(results) {
-            self.codes[*n] = code;
-            self.computed[*n] = true;
+        for (n, code, failure) in results {
+            self.codes[n] = code;
+            self.computed[n] = true;
             if !failure.is_empty() {
-                self.failures.insert(*n, failure);
+                self.failures.insert(n, failure);
             }
         }
         Ok(true)
     }
 
-    /// Writes the chunks that the store does not have.
+    /// Writes all chunks, also those that are there: another rule may have written them.
     fn write(&self, plan: &Plan, store: &Store, monitor: &Monitor) -> Result<bool, StoreError> {
         let cell = |index: Vec<u64>| {
             let n = index[0] as usize * self.columns + index[1] as usize;
@@ -207,10 +210,7 @@ impl Map {
                 ..Cell::default()
             }
         };
-        for index in (0..plan.chunks())
-            .map(|n| plan.chunk_index(n))
-            .filter(|index| !store.has(index))
-        {
+        for index in (0..plan.chunks()).map(|n| plan.chunk_index(n)) {
             if monitor.stop.load(Relaxed) {
                 return Ok(false);
             }

@@ -110,10 +110,19 @@ impl Axis {
 fn few(name: &str, points: u64, value: f64) -> Result<(), ArgumentError> {
     match points {
         0 => Err(format!("{name} has no values; at least 2 are needed").into()),
-        1 => Err(format!(
-            "{name} has one value; at least 2 are needed. Set a constant in the scene instead: --set {name}={value}"
+        1 if name == SIGMA => Err(format!(
+            "{name} has one value; at least 2 are needed. A constant is a setting of the sweep: --sigma={value}, \
+             in Python sigma={value}"
         )
         .into()),
+        1 => {
+            let (section, key) = name.split_once('.').unwrap_or(("section", name));
+            Err(format!(
+                "{name} has one value; at least 2 are needed. A constant belongs to the scene: --set {name}={value}, \
+                 in Python Scene({section}={{\"{key}\": {value}}})"
+            )
+            .into())
+        }
         _ => Ok(()),
     }
 }

@@ -7,6 +7,7 @@ use vines_testbench::scene::{Family, Scene};
 use crate::{
     axis::{Axis, SIGMA, Sequence},
     cell::{Cell, compute},
+    engine::engine,
     settings::{PlanError, SAMPLE, Settings, dimensions},
     variables::variables,
 };
@@ -19,6 +20,7 @@ pub struct Plan {
     sequences: Vec<Sequence>,
     scene: Scene,
     sigma: f64,
+    engine: String,
     /// Names of the dimensions, their lengths, and those of a chunk.
     pub(crate) dimensions: Vec<String>,
     pub(crate) shape: Vec<u64>,
@@ -65,12 +67,14 @@ impl Plan {
         } else {
             settings.sigma.unwrap_or_else(resonant)
         };
+        let engine = engine(settings.results)?;
         Ok(Self {
             family,
             settings,
             sequences,
             scene,
             sigma,
+            engine,
             dimensions,
             shape,
             chunk,
@@ -199,6 +203,7 @@ impl Plan {
         let scene = serde_json::to_value(&self.scene).unwrap_or_default();
         json!({
             "version": env!("CARGO_PKG_VERSION"),
+            "engine": self.engine,
             "scene": scene,
             "sigma": self.settings.axes.iter().all(|axis| axis.name != SIGMA).then_some(self.sigma),
             "axes": axes,

@@ -11,13 +11,7 @@ use std::{
 
 use rayon::prelude::*;
 
-use crate::{
-    adaptive,
-    cell::Cell,
-    monitor::Monitor,
-    plan::Plan,
-    store::{Store, StoreError},
-};
+use crate::{adaptive, cell::Cell, error::StoreError, monitor::Monitor, plan::Plan, store::Store};
 
 /// The part of a sweep that one process computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

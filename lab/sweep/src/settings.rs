@@ -134,8 +134,10 @@ pub(crate) fn dimensions(settings: &Settings) -> Result<(Vec<String>, Vec<u64>),
     let (mut names, mut shape): (Vec<String>, Vec<u64>) = own().unzip();
     let sampled = settings.axes.len() - names.len();
     match settings.samples {
-        None if sampled > 0 => return refused("random and Sobol axes need a number of samples: --samples N".into()),
-        Some(_) if sampled == 0 => return refused("--samples needs a random or Sobol axis".into()),
+        None if sampled > 0 => {
+            return refused("random and Sobol axes need a number of samples (--samples N, in Python samples=N)".into());
+        }
+        Some(_) if sampled == 0 => return refused("a number of samples needs a random or Sobol axis".into()),
         Some(samples) if !(2..=SOBOL).contains(&samples) => {
             return refused(format!("{samples} samples: from 2 to {SOBOL} are allowed"));
         }

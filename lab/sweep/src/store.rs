@@ -15,6 +15,7 @@ use zarrs::array::{
 
 use crate::{
     cell::Cell,
+    error::StoreError,
     folder::{Folder, PARTIAL},
     plan::Plan,
     variables::{ABSENT, Read, Variable, variables},
@@ -22,38 +23,6 @@ use crate::{
 
 /// Folder of the results of an adaptive sweep's rounds; removed at the end.
 pub(crate) const ROUNDS: &str = ".rounds";
-
-/// Why a store cannot be used.
-#[derive(Debug, thiserror::Error)]
-pub enum StoreError {
-    /// The store belongs to another sweep.
-    #[error(
-        "{} belongs to another sweep, with another {differs}. It stays as it is; write to another folder, or delete it",
-        folder.display()
-    )]
-    Other {
-        /// The folder.
-        folder: PathBuf,
-        /// What differs.
-        differs: String,
-    },
-    /// The folder holds something else.
-    #[error("{} is not the store of a sweep; name another folder", .0.display())]
-    NotAStore(PathBuf),
-    /// An adaptive sweep in parts.
-    #[error(
-        "an adaptive sweep cannot be computed in parts: what is computed next depends on all cells. Leave out the part"
-    )]
-    Part,
-    /// Reading or writing failed.
-    #[error("cannot write to {}: {source}. Complete chunks stay; the same command continues the sweep", folder.display())]
-    Write {
-        /// The folder.
-        folder: PathBuf,
-        /// Error of the system or of the format.
-        source: Box<dyn std::error::Error + Send + Sync>,
-    },
-}
 
 /// An open store.
 pub(crate) struct Store {
@@ -64,6 +33,8 @@ pub(crate) struct Store {
 
 /// The file of the group. It is written last: where it is, the metadata is complete.
 const GROUP: &str = "zarr.json";
+/// What differs in the metadata if only the program does.
+const BUILD: [&str; 2] = ["version", "engine"];
 /// Compression level: the default of gzip.
 const LEVEL: u32 = 6;
 
@@ -155,16 +126,27 @@ impl Store {
             return Err(StoreError::NotAStore(self.root.clone()));
         };
         // Both have been text once: the same digits give the same numbers.
-        let plan: Value = serde_json::from_str(&plan.description().to_string()).unwrap_or_default();
-        let differs: Vec<String> = object(plan)
+        let here = object(serde_json::from_str(&plan.description().to_string()).unwrap_or_default());
+        let differs: Vec<&str> = here
             .iter()
             .filter(|(key, value)| found.get(*key) != Some(*value))
-            .map(|(key, _)| format!("`{key}`"))
+            .map(|(key, _)| key.as_str())
             .collect();
-        if differs.is_empty() {
-            return Ok(());
+        let folder = self.root.clone();
+        match &differs[..] {
+            [] => Ok(()),
+            some if some.iter().all(|key| BUILD.contains(key)) => {
+                let of = |from: &Map<String, Value>| {
+                    let text = |key: &&str| from.get(*key).and_then(Value::as_str).unwrap_or("unknown").to_string();
+                    BUILD.iter().map(text).collect::<Vec<_>>().join(" ")
+                };
+                Err(StoreError::Build { folder, found: of(&found), here: of(&here) })
+            }
+            some => {
+                let differs = some.iter().map(|key| format!("`{key}`")).collect::<Vec<_>>().join(", ");
+                Err(StoreError::Other { folder, differs })
+            }
         }
-        Err(StoreError::Other { folder: self.root.clone(), differs: differs.join(", ") })
     }
 
     /// Whether all variables of a chunk are there.

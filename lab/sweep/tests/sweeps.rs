@@ -170,6 +170,7 @@ fn a_failed_cell_has_its_reason_and_stops_nothing() {
 fn axes_that_make_no_sense_are_refused_with_their_name_and_value() {
     let axis = |text: &str| text.parse::<Axis>().unwrap_err().to_string();
     assert!(axis("plant.r=0.7").contains("plant.r has one value") && axis("plant.r=0.7").contains("--set plant.r=0.7"));
+    assert!(axis("plant.r=0.7").contains("Scene(plant={\"r\": 0.7})") && axis("sigma=-1").contains("--sigma=-1"));
     assert!(axis("plant.r=0.3:NaN:5").contains("NaN is not a finite number"));
     assert!(axis("plant.r=0.5,0.5").contains("0.5 twice"));
     assert!(axis("plant.r=0.9:0.3:5").contains("from 0.9 to 0.3"));
@@ -234,12 +235,23 @@ fn a_store_of_another_sweep_or_other_files_stay_as_they_are() {
         .to_string();
     assert!(scene.contains("another `scene`"), "{scene}");
     assert!(before == files(folder.path()));
-    // A newer version of the program does not continue a store of an older one.
+    // A program whose version or results differ does not continue the store.
     let group = folder.path().join("zarr.json");
     let text = fs::read_to_string(&group).unwrap();
-    fs::write(&group, text.replace(env!("CARGO_PKG_VERSION"), "0.0.9")).unwrap();
-    let version = go(settings(&["plant.r=0.3,0.5"])).unwrap_err().to_string();
-    assert!(version.contains("another `version`"), "{version}");
+    let engine = text.split("\"engine\": \"").nth(1).unwrap()[..16].to_string();
+    for (here, there) in [
+        (env!("CARGO_PKG_VERSION"), "0.0.9"),
+        (&engine, "0123456789abcdef"),
+        ("\"engine\"", "\"other\""),
+    ] {
+        fs::write(&group, text.replace(here, there)).unwrap();
+        let build = go(settings(&["plant.r=0.3,0.5"])).unwrap_err().to_string();
+        assert!(build.contains("another build") && build.contains(&engine), "{build}");
+        let found = if there == "\"other\"" { "unknown" } else { there };
+        assert!(build.contains(found), "{build}");
+        fs::write(&group, &text).unwrap();
+        assert!(before == files(folder.path()));
+    }
     let notes = tempfile::tempdir().unwrap();
     fs::write(notes.path().join("notes.txt"), "mine").unwrap();
     let error = run(&other, notes.path(), Shard::ALL, &Monitor::default())
