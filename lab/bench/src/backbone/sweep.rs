@@ -14,6 +14,7 @@ use crate::experiment::ExperimentError;
 use crate::identification::{Cycle, PARABOLA, Regime};
 use crate::rig::{Controller, Move, Rig};
 use crate::scene::Scene;
+use vines_model::Dimensionless;
 use vines_model::numerics::{Estimate, mean};
 use vines_model::theory::SlowFlow;
 
@@ -30,8 +31,8 @@ const WIDEST: f64 = 0.15;
 const FOLD: f64 = 0.5;
 /// Share of the drive that may change the amplitude.
 const SHARE: f64 = 0.76;
-/// Relative uncertainty of the effect of a steady drift.
-const LATE: f64 = 0.036;
+/// Relative uncertainty of the effect of a steady drift, of the impact map and per unit of epsilon: theory is of the first order.
+const LATE: [f64; 2] = [0.01, 5.0];
 /// Largest parts of the uncertainty of sigma, over `backbone.precision`, by the drift and by noise.
 const PARTS: [f64; 2] = [0.6, 0.55];
 /// Largest part of it by the curvature, where periods of the neighbours are used.
@@ -172,6 +173,11 @@ fn predicted(scene: &Scene, order: &Order, cycle: &Cycle, n: f64) -> f64 {
     (slope * (2.0 * order.level).max(1.0)).hypot(level)
 }
 
+/// Relative uncertainty of the effect of a steady drift.
+fn late(d: &Dimensionless) -> f64 {
+    LATE[0] + LATE[1] * d.epsilon
+}
+
 /// Periods in which the drive and the drift allow to cross the level of `order` from the one `before`, and the uncertainty of the frequency,
 /// rad/s, by the curvature of the backbone; `None` where that is too large, or the level too far away.
 fn slowest(scene: &Scene, order: &Order, before: f64) -> Option<[f64; 2]> {
@@ -183,14 +189,14 @@ fn slowest(scene: &Scene, order: &Order, before: f64) -> Option<[f64; 2]> {
         return None;
     }
     let by_drive = width / (SHARE * d.epsilon * PI * order.known.last()?.g);
-    let by_drift = LATE * slopes.drift[1].abs() * width * d.b * d.omega0 / (TAU * PARTS[0] * precision(scene));
+    let by_drift = late(&d) * slopes.drift[1].abs() * width * d.b * d.omega0 / (TAU * PARTS[0] * precision(scene));
     Some([by_drive.max(by_drift).max(FEWEST), bent])
 }
 
 /// The criterion for a level that is crossed.
 fn of_crossing(scene: &Scene, order: &Order) -> Criterion {
     let mut criterion = order.criterion(scene);
-    (criterion.spread, criterion.slopes.late) = (f64::INFINITY, LATE);
+    (criterion.spread, criterion.slopes.late) = (f64::INFINITY, late(&scene.dimensionless()));
     criterion.tolerance = criterion.precision;
     criterion
 }
