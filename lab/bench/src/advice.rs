@@ -43,8 +43,11 @@ pub fn largest_stable(d: &Dimensionless) -> Option<f64> {
 
 /// The range of drives, base amplitude over `b epsilon`, with a stable symmetric 1:1 orbit at phase resonance; there may be gaps in it.
 pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
-    let ranges = stable_ranges(d);
-    Some([ranges.first()?[0], ranges.last()?[1]])
+    let drives = stable_orbits(d).into_iter().map(|orbit| orbit.g);
+    drives.fold(None, |range, g| {
+        let [low, high] = range.unwrap_or([g, g]);
+        Some([low.min(g), high.max(g)])
+    })
 }
 
 /// The same without the gaps that are wider than `GAP`.
