@@ -97,16 +97,16 @@ impl Approach {
         }
     }
 
-    /// Updates the observer of this rate, rad/s, with the drive amplitude and the response amplitude, m, and the phase error, rad. Returns
-    /// the drive that would hold the response, m.
-    pub fn observe(&self, state: &mut ApproachState, drive: Real, response: Real, error: Real, rate: Real) -> Real {
+    /// Updates the observer of this rate, rad/s, with the drive amplitude and the response amplitude, m, and the cosine of the phase
+    /// error. Returns the drive that would hold the response, m.
+    pub fn observe(&self, state: &mut ApproachState, drive: Real, response: Real, cosine: Real, rate: Real) -> Real {
         if rate != state.rate {
             // The estimated growth of the response does not change.
             state.response = response - (response - state.response) * state.rate / rate;
             state.rate = rate;
             state.step = -real::expm1(-rate * self.sample_time);
         }
-        state.detected += self.detector_step * (drive * real::cos(error) - state.detected);
+        state.detected += self.detector_step * (drive * cosine - state.detected);
         state.drive += state.step * (state.detected - state.drive);
         state.response += state.step * (response - state.response);
         state.holding = state.drive - rate / self.response_gain * (response - state.response);

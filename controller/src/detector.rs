@@ -26,7 +26,8 @@ pub struct Estimate {
 }
 
 impl Estimate {
-    fn fundamental(&self) -> Complex {
+    /// Coefficient of the fundamental, m, relative to the oscillator's phase: the signal contains `Re(c exp(i phase))`.
+    pub fn fundamental(&self) -> Complex {
         self.coefficients.harmonic[0]
     }
 
@@ -48,13 +49,6 @@ impl Estimate {
     /// Amplitude of the fundamental, m.
     pub fn amplitude(&self) -> Real {
         self.amplitude
-    }
-
-    /// Phase of `sin` relative to the oscillator's sine, rad.
-    pub fn argument(&self) -> Real {
-        // Re(c exp(i phase)) is a cosine; a sine lags a cosine by pi/2.
-        let Complex { re, im } = self.fundamental();
-        Complex { re: -im, im: re }.argument()
     }
 
     /// Power of the fundamental over the sum of itself and the residual power; 0 for a zero signal.
@@ -150,11 +144,14 @@ mod tests {
         let mut oscillator = Oscillator::default();
         let mut worst = 0.0_f64;
         for n in 0..10_000 {
-            let rotors = detector.rotors(oscillator.rotor());
-            detector.update(&mut estimate, signal(oscillator.phase()), &rotors);
+            let rotor = oscillator.rotor();
+            let phase = libm::atan2(rotor.im, rotor.re);
+            detector.update(&mut estimate, signal(phase), &detector.rotors(rotor));
             oscillator.advance(omega, sample_time);
             if n >= 9_900 {
-                let (amplitude, phase) = (estimate.amplitude(), estimate.argument());
+                // Re(c exp(i phase)) is a cosine; a sine lags a cosine by pi/2.
+                let Complex { re, im } = estimate.fundamental();
+                let (amplitude, phase) = (estimate.amplitude(), Complex { re: -im, im: re }.argument());
                 worst = worst.max((amplitude - truth.0).abs().max((phase - truth.1).abs()));
             }
         }

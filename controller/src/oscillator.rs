@@ -14,14 +14,9 @@ pub struct Oscillator {
 }
 
 impl Oscillator {
-    /// Phase, rad, in [0, 2 pi).
-    pub fn phase(self) -> Real {
-        TAU * self.turns.get()
-    }
-
     /// `exp(i phase)`.
     pub fn rotor(self) -> Complex {
-        Complex::unit(self.phase())
+        Complex::of_turns(self.turns.get())
     }
 
     /// Advances by `omega` (rad/s) times `duration` (s), less than one turn. Returns whether a new period begins.
@@ -45,6 +40,6 @@ mod tests {
         let step = TAU / 128.0;
         let wraps = (0..1 << 20).filter(|_| oscillator.advance(step, 1.0)).count();
         assert_eq!(wraps, 1 << 13);
-        assert_eq!(oscillator.phase(), 0.0);
+        assert_eq!(oscillator.turns.get(), 0.0);
     }
 }

@@ -2,7 +2,7 @@
 
 use crate::real::consts::FRAC_PI_3;
 
-use crate::angle::{Complex, wrap};
+use crate::angle::Complex;
 use crate::config::Config;
 use crate::detector::{Estimate, PhaseDetector};
 use crate::plausibility::{Differences, Plausibility};
@@ -24,8 +24,8 @@ const LAG: usize = 5;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sensing {
     detector: PhaseDetector,
-    /// rad
-    phase_target: Real,
+    /// `exp(-i phase_target)`
+    target: Complex,
     /// s
     delay: Real,
     /// m
@@ -83,8 +83,9 @@ pub struct PresentDrive {
 pub struct Measurement {
     /// Fault of the readings.
     pub fault: Option<Fault>,
-    /// Phase error, rad; 0 if it cannot be measured.
+    /// Phase error, rad, in [-pi, pi], and its cosine; 0 and 1 if it cannot be measured.
     pub error: Real,
+    pub cosine: Real,
     /// Whether both amplitudes are above 0.
     pub measurable: bool,
     /// m
@@ -97,8 +98,8 @@ pub struct Measurement {
 
 /// The reference of the phase.
 struct Reference {
-    /// rad
-    phase: Real,
+    /// Coefficient of its fundamental, m.
+    fundamental: Complex,
     /// m
     amplitude: Real,
     valid: bool,
@@ -116,7 +117,7 @@ impl Sensing {
     pub fn new(config: &Config) -> Self {
         Self {
             detector: PhaseDetector::new(config),
-            phase_target: config.phase_target,
+            target: Complex::unit(-config.phase_target),
             delay: config.delay,
             response_max: config.response_max,
             response_min: config.lock.response_min * config.amplitude,
@@ -150,11 +151,21 @@ impl Sensing {
         };
         let response = &state.response;
         let amplitude = response.amplitude();
-        let measurable = amplitude > 0.0 && reference.amplitude > 0.0;
-        let error = response.argument() - reference.phase - self.phase_target;
+        // One function of an angle instead of three: the response in the frame of the reference, turned back by the target.
+        let size = amplitude * reference.amplitude;
+        let measurable = size >= Real::MIN_POSITIVE;
+        let relative = (response.fundamental())
+            .times(reference.fundamental.conjugate())
+            .times(self.target);
+        let (error, cosine) = if measurable {
+            (relative.argument(), relative.re / size)
+        } else {
+            (0.0, 1.0)
+        };
         Measurement {
             fault,
-            error: if measurable { wrap(error) } else { 0.0 },
+            error,
+            cosine,
             measurable,
             reference_amplitude: reference.amplitude,
             valid: measurable && reference.valid && amplitude >= self.response_min && self.is_coherent(response),
@@ -233,7 +244,7 @@ impl Sensing {
     fn measured_reference(&self, estimate: &Estimate, drive: PresentDrive) -> Reference {
         let amplitude = estimate.amplitude();
         Reference {
-            phase: estimate.argument(),
+            fundamental: estimate.fundamental(),
             amplitude,
             valid: amplitude >= REFERENCE_SHARE * drive.amplitude && self.is_coherent(estimate),
         }
@@ -241,8 +252,10 @@ impl Sensing {
 
     /// The internal oscillator as a sensor would read it, with the configured delay.
     fn internal_reference(&self, drive: PresentDrive) -> Reference {
+        let Complex { re, im } = Complex::unit(-drive.omega * self.delay);
         Reference {
-            phase: -drive.omega * self.delay,
+            // A sine lags a cosine by pi/2.
+            fundamental: Complex { re: drive.amplitude * im, im: -drive.amplitude * re },
             amplitude: drive.amplitude,
             valid: true,
         }

@@ -48,7 +48,7 @@ impl PhaseLock {
         let rate = self.capture.observer_rate(&state.capture, reading, self.approach.rate);
         let holding = self
             .approach
-            .observe(&mut state.approach, before, reading, measured.error, rate);
+            .observe(&mut state.approach, before, reading, measured.cosine, rate);
         let holding = near.then_some(holding);
         if let Some(amplitude_loop) = &mut state.amplitude_loop {
             let (amplitude, shift) = self
