@@ -56,8 +56,9 @@ impl Sums {
     /// The sums of these and numbers that are not much larger.
     #[must_use]
     #[inline(always)]
-    pub fn plus(self, numbers: [f64; 2]) -> Self {
-        let [a, b] = [0, 1].map(|n| Sum { value: self.values[n], error: self.errors[n] }.plus(numbers[n]));
+    pub fn plus(self, [x, y]: [f64; 2]) -> Self {
+        let Self { values: [a, b], errors: [c, d] } = self;
+        let (a, b) = (Sum { value: a, error: c }.plus(x), Sum { value: b, error: d }.plus(y));
         Self { values: [a.value, b.value], errors: [a.error, b.error] }
     }
 }

@@ -36,10 +36,10 @@ impl Estimate {
         self.coefficients.harmonic[1..].iter().map(|one| one.magnitude()).sum()
     }
 
-    /// Whether the sum of the amplitudes of the harmonics above the fundamental is at most this, m.
-    pub fn harmonics_within(&self, limit: Real) -> bool {
-        let bound: Real = self.coefficients.harmonic[1..]
-            .iter()
+    /// Whether the sum of the amplitudes of the harmonics above the fundamental is at most this, m; the first `count` harmonics are used.
+    pub fn harmonics_within(&self, limit: Real, count: usize) -> bool {
+        let used = self.coefficients.harmonic.iter().take(count).skip(1);
+        let bound: Real = used
             .map(|one| one.re.abs() + one.im.abs())
             .sum();
         // The bound without roots decides almost always.
@@ -53,9 +53,20 @@ impl Estimate {
 
     /// Power of the fundamental over the sum of itself and the residual power; 0 for a zero signal.
     pub fn coherence(&self) -> Real {
-        let power = 0.5 * self.amplitude() * self.amplitude();
-        let total = power + self.residual_power;
+        let (power, total) = self.powers();
         if total > 0.0 { power / total } else { 0.0 }
+    }
+
+    /// Whether the coherence of a signal above 0 is at least this. (Without a division, which takes as long as ten products.)
+    pub fn is_coherent(&self, least: Real) -> bool {
+        let (power, total) = self.powers();
+        power >= least * total
+    }
+
+    /// Power of the fundamental, and the sum of itself and the residual power, m².
+    fn powers(&self) -> (Real, Real) {
+        let power = 0.5 * self.amplitude() * self.amplitude();
+        (power, power + self.residual_power)
     }
 }
 

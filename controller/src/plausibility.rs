@@ -5,7 +5,7 @@ use crate::real::consts::TAU;
 
 use crate::config::Config;
 use crate::detector::Estimate;
-use crate::real::Real;
+use crate::real::{Real, larger, smaller};
 
 /// Time in the closed loop before the check begins, in time constants of the detector, and in turns.
 const WARM_UP: [Real; 2] = [6.0, 10.0];
@@ -34,6 +34,8 @@ pub struct Plausibility {
     limit: Option<Real>,
     /// s
     warm_up: Real,
+    /// Harmonics that the detectors use.
+    harmonics: usize,
 }
 
 /// Largest differences in this period and in the two before it, m, for each channel.
@@ -57,6 +59,7 @@ impl Plausibility {
         Self {
             limit: config.residual_max,
             warm_up: (WARM_UP[0] / config.bandwidth).max(WARM_UP[1] * TAU / config.omega_start),
+            harmonics: config.harmonics.into(),
         }
     }
 
@@ -86,19 +89,19 @@ impl Plausibility {
             let share = if unchanged[n] * omega > PAUSE { PAUSE_SHARE } else { 1.0 };
             let difference = difference.abs();
             // A fault may have begun at the end of the last period.
-            let normal = NORMAL * last.min(*before);
+            let normal = NORMAL * smaller(*last, *before);
             if let Some(limit) = self.limit {
                 let fast = !(1.0 / FAST..FAST).contains(&change);
                 let [steady, distorted] = [&mut state.steady[n], &mut state.distorted[n]];
                 *steady = if fast { 0.0 } else { *steady + turn };
                 let settled = *steady > SETTLES * TAU;
-                let clear = !settled || estimate.harmonics_within(DISTORTION * limit * amplitude);
+                let clear = !settled || estimate.harmonics_within(DISTORTION * limit * amplitude, self.harmonics);
                 *distorted = if clear { 0.0 } else { *distorted + turn };
-                let slack = if settled { 0.0 } else { SLACK * change.max(1.0) };
+                let slack = if settled { 0.0 } else { SLACK * larger(change, 1.0) };
                 let expected = (share * limit * change + slack) * amplitude + normal;
                 state.implausible |= difference > expected || *distorted > LASTS * TAU;
             }
-            *now = now.max(difference);
+            *now = larger(*now, difference);
         }
     }
 

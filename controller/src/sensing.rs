@@ -262,6 +262,6 @@ impl Sensing {
     }
 
     fn is_coherent(&self, estimate: &Estimate) -> bool {
-        estimate.coherence() >= self.coherence_min
+        estimate.is_coherent(self.coherence_min)
     }
 }

@@ -210,6 +210,8 @@ impl Stationarity {
         lost
     }
 
+    /// (A call: its code is long, and few samples end a period.)
+    #[inline(never)]
     fn end_period(&self, dwell: &mut Dwell, period: &Sums, harmonics: Real) {
         dwell.block.add(period);
         if dwell.block.periods < self.block {

@@ -65,7 +65,7 @@ impl Plant {
             self.begin(drive)?;
         }
         let before = &self.moving.base.drive;
-        if drive.signal != before.signal || drive.amplitude != before.amplitude {
+        if !drive.has_signal_of(before) || drive.amplitude != before.amplitude {
             drive.validate()?;
             check_duration(duration)?;
             self.jump(&drive);
@@ -103,7 +103,8 @@ impl Plant {
         self.fast.contact_free.jump(oscillator, &before, drive, kick);
     }
 
-    /// Follows the motion from event to event to the end of the step.
+    /// Follows the motion from event to event to the end of the step. (A call: most steps do not need it, and its code is long.)
+    #[inline(never)]
     fn follow(&mut self, duration: f64, on_event: impl FnMut(Event)) -> Outcome {
         self.fast.evaluations = 0;
         let mut step = Step {

@@ -11,7 +11,8 @@ use crate::supervisor::LoopState;
 const PHASE_RANGE: Real = crate::real::consts::FRAC_PI_3;
 
 impl PhaseLock {
-    /// One sample of the capture.
+    /// One sample of the capture. (A call: a locked loop needs none of its code.)
+    #[inline(never)]
     pub(super) fn capture(&self, state: &mut State, measured: &Measurement) {
         let complete = self.capture.advance(
             &mut state.capture,
