@@ -66,13 +66,22 @@ mod tests {
             let Complex { re, im } = Complex::of_turns(turns);
             // The rounded angle alone is wrong by half a unit in its last place.
             let tolerance = f64::EPSILON * (TAU * turns).abs().max(1.0);
-            assert!((re - cos).abs() <= tolerance && (im - sin).abs() <= tolerance, "{turns}");
+            assert!(
+                (re - cos).abs() <= tolerance && (im - sin).abs() <= tolerance,
+                "{turns}"
+            );
         }
     }
 
     #[test]
     fn the_rotor_of_a_quarter_turn_is_exact() {
-        for (turns, re, im) in [(0.0, 1.0, 0.0), (0.25, 0.0, 1.0), (0.5, -1.0, 0.0), (0.75, 0.0, -1.0), (1.0, 1.0, 0.0)] {
+        for (turns, re, im) in [
+            (0.0, 1.0, 0.0),
+            (0.25, 0.0, 1.0),
+            (0.5, -1.0, 0.0),
+            (0.75, 0.0, -1.0),
+            (1.0, 1.0, 0.0),
+        ] {
             assert_eq!(Complex::of_turns(turns), Complex { re, im }, "{turns}");
         }
     }

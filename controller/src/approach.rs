@@ -128,6 +128,6 @@ impl Approach {
         if missing.abs() > state.swing.abs() {
             state.swing = missing;
         }
-        (setpoint + gain * missing).clamp(low, high)
+        real::limited(setpoint + gain * missing, low, high)
     }
 }

@@ -39,9 +39,7 @@ impl Estimate {
     /// Whether the sum of the amplitudes of the harmonics above the fundamental is at most this, m; the first `count` harmonics are used.
     pub fn harmonics_within(&self, limit: Real, count: usize) -> bool {
         let used = self.coefficients.harmonic.iter().take(count).skip(1);
-        let bound: Real = used
-            .map(|one| one.re.abs() + one.im.abs())
-            .sum();
+        let bound: Real = used.map(|one| one.re.abs() + one.im.abs()).sum();
         // The bound without roots decides almost always.
         bound <= limit || self.harmonics() <= limit
     }

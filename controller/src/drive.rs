@@ -43,12 +43,12 @@ impl Drive {
     pub fn control(&self, state: &mut DriveState, setpoint: Real, measured: Real) {
         let trim = state.trim + self.control_step * (setpoint - measured);
         // Anti-windup: the trim stays within the range of the drive.
-        state.trim = trim.clamp(-setpoint, self.amplitude_max - setpoint);
+        state.trim = real::limited(trim, -setpoint, self.amplitude_max - setpoint);
     }
 
     /// Ramps towards `setpoint`, m, for one sample. Returns whether the setpoint is reached.
     pub fn ramp(&self, state: &mut DriveState, setpoint: Real) -> bool {
-        let target = (setpoint + state.trim).clamp(0.0, self.amplitude_max);
+        let target = real::limited(setpoint + state.trim, 0.0, self.amplitude_max);
         state.amplitude = approach(state.amplitude, target, self.ramp_step);
         state.amplitude == target
     }
@@ -70,7 +70,7 @@ impl Drive {
 }
 
 fn approach(from: Real, to: Real, step: Real) -> Real {
-    to.clamp(from - step, from + step)
+    real::limited(to, from - step, from + step)
 }
 
 #[cfg(all(test, not(feature = "f32")))]

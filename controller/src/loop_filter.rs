@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::gains::Gains;
-use crate::real::{Real, Sum};
+use crate::real::{Real, Sum, limited};
 
 /// A PI filter with limits, a limited rate of change, and conditional anti-windup.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -66,7 +66,7 @@ impl LoopFilter {
         frequency.integral.add(shift);
         let (now, limits) = (frequency.integral.get(), self.omega_min..=self.omega_max);
         if !limits.contains(&now) {
-            frequency.integral = Sum::new(now.clamp(self.omega_min, self.omega_max));
+            frequency.integral = Sum::new(limited(now, self.omega_min, self.omega_max));
         }
     }
 
@@ -81,9 +81,8 @@ impl LoopFilter {
     }
 
     fn limit(&self, before: Real, unlimited: Real) -> Real {
-        unlimited
-            .clamp(before - self.max_change, before + self.max_change)
-            .clamp(self.omega_min, self.omega_max)
+        let reachable = limited(unlimited, before - self.max_change, before + self.max_change);
+        limited(reachable, self.omega_min, self.omega_max)
     }
 }
 

@@ -14,6 +14,12 @@ pub fn smaller(x: Real, y: Real) -> Real {
     if x < y { x } else { y }
 }
 
+/// `x` within limits. (`clamp` also tests the limits, which takes longer than the rest.)
+pub fn limited(x: Real, low: Real, high: Real) -> Real {
+    let x = if x < low { low } else { x };
+    if x > high { high } else { x }
+}
+
 #[cfg(not(feature = "f32"))]
 mod precision {
     pub use core::f64::consts;

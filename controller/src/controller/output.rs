@@ -1,7 +1,7 @@
 //! The output of one sample.
 
 use super::PhaseLock;
-use crate::real::Real;
+use crate::real::{Real, limited};
 use crate::sensing::Measurement;
 use crate::signals::Output;
 use crate::state::State;
@@ -23,7 +23,7 @@ impl PhaseLock {
             reference_amplitude: measured.reference_amplitude,
             coherence: state.channels.response.coherence(),
             // Rounding can move the mean of values at a limit beyond the limit.
-            frequency: frequency.clamp(self.config.omega_min, self.config.omega_max),
+            frequency: limited(frequency, self.config.omega_min, self.config.omega_max),
             response_mean,
             locked: state.loop_state == LoopState::Locked,
             settled: state.dwell.settled() && state.tuning == self.tuning(),
