@@ -9,7 +9,7 @@
 //! | amplitude | the response amplitude may be controlled instead of the drive amplitude ([`PhaseLock::hold_response`]): a loop of type 1 and order 3 with positive gains from the same parameter |
 //! | sampling | one call of [`PhaseLock::process`] every `sample_time`; the controller has no other clock |
 //!
-//! The phase error is `wrap(arg response - arg reference - phase_target)`, where both phases are those of the
+//! The phase error is `arg response - arg reference - phase_target`, in [-pi, pi], where both phases are those of the
 //! fundamental. With a displacement response and a base displacement as the reference, phase resonance is
 //! `phase_target = -pi/2`.
 //!

@@ -26,7 +26,7 @@ pub struct Output {
     /// Setpoint of the base displacement at this sample, `E sin(phase)`, m, for a rig that takes samples.
     pub drive: Real,
     /// Phase of the response relative to the reference, minus the target, rad, in [-pi, pi]. `None` while one of the two
-    /// amplitudes is 0.
+    /// amplitudes is 0, or their product is below the smallest normal number.
     pub phase_error: Option<Real>,
     /// Amplitude of the response's fundamental, m.
     pub response_amplitude: Real,
