@@ -52,13 +52,6 @@ impl Drive {
         (u1 | u2 | u3) << 1 == 0
     }
 
-    /// Whether the signals are equal. (Number by number: code for size would compare arrays in a loop.)
-    #[inline(always)]
-    pub(crate) fn has_signal_of(&self, other: &Self) -> bool {
-        let ([a0, a1, a2, a3], [b0, b1, b2, b3]) = (self.signal, other.signal);
-        (a0 == b0) & (a1 == b1) & (a2 == b2) & (a3 == b3)
-    }
-
     /// Checks every value.
     ///
     /// # Errors

@@ -136,8 +136,7 @@ impl FastPath {
     fn take_step(&mut self, moving: &mut Moving, late: f64) {
         let drive = &moving.base.drive;
         let response = self.cache.step.response(&moving.rig.free, drive.omega);
-        let start = self.point(moving);
-        let step = &self.cache.step;
+        let (start, step) = (self.point(moving), &self.cache.step);
         let mut increment = step.increment(&response, drive.amplitude, &start);
         let (mut angle, mut t) = (response.angle, step.t);
         if late != 0.0 {

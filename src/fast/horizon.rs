@@ -36,8 +36,7 @@ impl Horizon {
     /// What a bound from the start alone shows: no contact for `t` seconds or more, or nothing.
     pub(super) fn ahead(moving: &Moving, start: &Point, t: f64) -> Self {
         let Moving { rig, masses, base } = moving;
-        let (b, w, dw) = (rig.parameters.half_width, masses.w.value(), masses.dw);
-        let reach = AHEAD * t;
+        let (b, w, dw, reach) = (rig.parameters.half_width, masses.w.value(), masses.dw, AHEAD * t);
         let forcing = forcing(&rig.free, &base.drive, reach) * (1.0 + MARGIN);
         let speed = speed_squared(&rig.free, start).sqrt() + forcing * reach;
         let jumps = MARGIN * speed;
