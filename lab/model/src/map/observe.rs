@@ -15,7 +15,7 @@ const LATER: f64 = 1.25;
 const EXPONENT: usize = 256;
 
 /// Cells that are undecided after the limit are continued to so many times its number of periods.
-const CONTINUED: usize = 4;
+const CONTINUED: usize = 16;
 
 /// Drives the dimensionless plant of `scene` at the detuning `sigma` from `start` = (q1, q1', q2, q2') until its regime is decided, for
 /// at most `limit` periods. Only a motion that settles on a periodic one, or cannot reach a wall, is decided earlier, and only an
