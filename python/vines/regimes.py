@@ -67,7 +67,8 @@ def regime(scene: Scene | None = None, sigma: float | None = None, periods: int 
     sigma : float, optional
         Detuning. Without it: that of the scene's stable phase-resonant orbit, or 0.
     periods : int
-        Largest number of periods, 100 to 100000; an undecided motion is followed four times as long.
+        Largest number of periods, 100 to 100000; an undecided motion is followed for sixteen times as
+        long, but no more than 100000 periods or four times as long, whichever is more.
 
     Returns
     -------

@@ -108,7 +108,7 @@ fn a_moving_particle_is_never_without_impacts() {
     // Even if it is too slow to reach a wall within the periods simulated.
     let scene = Dimensionless::new(0.0084, 1.43, 0.65, 0.0);
     let slow = observe(&scene, 0.0, [0.0, 0.0, 0.0, 1e-5], 1000).unwrap();
-    assert_eq!((slow.regime, slow.followed), (Regime::Undecided, 4000));
+    assert_eq!((slow.regime, slow.followed), (Regime::Undecided, 16_000));
     let rest = observe(&scene, 0.0, REST, 1000).unwrap();
     assert_eq!(rest.regime, Regime::NoImpacts);
 }

@@ -271,14 +271,14 @@ impl Run {
         let linear = 2.0 * (0.5 * n as f64).ln() / (0.5 * n as f64);
         let zero = linear.max(SIGNIFICANT * error);
         let mut point = self.point(Regime::Undecided, from);
-        point.regime = if point.impacts_per_period == 0.0 {
+        // With less than an impact per block, the exponent is not measured: a particle that is almost at rest.
+        let impacts = self.counts(n)[0] - self.counts(from)[0];
+        point.regime = if impacts < BLOCKS {
             Regime::Undecided
+        } else if exponent > zero && point.synchrony < CAPTURES {
+            Regime::Chaotic
         } else if exponent > zero {
-            if point.synchrony < CAPTURES {
-                Regime::Chaotic
-            } else {
-                Regime::Modulated
-            }
+            Regime::Modulated
         } else if exponent > -zero && zero < ZERO {
             Regime::QuasiPeriodic
         } else {

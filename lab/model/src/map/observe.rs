@@ -14,8 +14,10 @@ const LATER: f64 = 1.25;
 /// Periods over which the exponent of a repeating motion is measured.
 const EXPONENT: usize = 256;
 
-/// Cells that are undecided after the limit are continued to so many times its number of periods.
-const CONTINUED: usize = 4;
+/// Periods to which an undecided cell is continued. The whole motion is in memory: about 250 bytes per period.
+fn continued(limit: usize) -> usize {
+    (16 * limit).min((4 * limit).max(100_000))
+}
 
 /// Drives the dimensionless plant of `scene` at the detuning `sigma` from `start` = (q1, q1', q2, q2') until its regime is decided, for
 /// at most `limit` periods. Only a motion that settles on a periodic one, or cannot reach a wall, is decided earlier, and only an
@@ -96,11 +98,11 @@ impl Run {
             }
             if next >= limit {
                 let point = self.irregular();
-                if point.regime != Regime::Undecided || next >= CONTINUED * limit {
+                if point.regime != Regime::Undecided || next >= continued(limit) {
                     return Ok(point);
                 }
             }
-            next = later(next, if early { limit } else { CONTINUED * limit });
+            next = later(next, if early { limit } else { continued(limit) });
         }
     }
 
