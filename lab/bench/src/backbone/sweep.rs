@@ -31,8 +31,8 @@ const WIDEST: f64 = 0.15;
 const FOLD: f64 = 0.5;
 /// Share of the drive that may change the amplitude.
 const SHARE: f64 = 0.76;
-/// Share of the effect of a steady drift that remains after its correction: `0.01 + 5 epsilon`. It counts in the uncertainty. The map of the
-/// impacts confirms the correction within 0.01 (tests of `SlowFlow::drift`); first-order theory lacks the next order in epsilon.
+/// Share of the effect of a steady drift that remains after its correction, `0.01 + 5 epsilon`. It counts in the uncertainty.
+/// The map of the impacts confirms the correction within 0.01 (tests of `SlowFlow::drift`); theory lacks the next order in epsilon.
 const LATE: [f64; 2] = [0.01, 5.0];
 /// Largest parts of the uncertainty of sigma, over `backbone.precision`, by the drift and by noise.
 const PARTS: [f64; 2] = [0.6, 0.55];
