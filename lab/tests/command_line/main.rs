@@ -179,8 +179,8 @@ fn a_response_that_exceeds_its_limit_is_told_at_which_drives_an_orbit_is_stable(
         "--out",
         folder.path().to_str().unwrap(),
     ];
-    let part =
-        "its limit\nthere is no stable symmetric 1:1 orbit at G = 1.1000; it is stable for G from 0.788 to 0.811";
+    let part = "controller.C_max allows 0.04 m. Lower excitation.G or the levels of [backbone], or raise the limit if the rig bears it\n\
+                there is no stable symmetric 1:1 orbit at G = 1.1000; it is stable for G from 0.788 to 0.811";
     fails(&[&run[..], &undamped].concat(), 1, part);
 }
 
