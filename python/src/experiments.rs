@@ -26,23 +26,23 @@ use crate::{
     wait::wait,
 };
 
-/// Runs an experiment on the scene's rig; its failure is a `RuntimeError`.
-fn experiment(
+/// Why an experiment ended without a result.
+type Failure = Box<dyn std::error::Error + Send + Sync>;
+
+/// Runs an experiment on the scene's rig, and returns its result as JSON; its failure is a `RuntimeError`.
+fn experiment<T: serde::Serialize>(
     py: Python<'_>,
     scene: &vines_testbench::scene::Scene,
-    work: impl FnOnce(&mut Stoppable) -> Result<String, String> + Send,
+    work: impl FnOnce(&mut Stoppable) -> Result<T, Failure> + Send,
 ) -> PyResult<String> {
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
-    let run = || {
-        let rig = Simulated::of(scene).map_err(|error| error.to_string())?;
-        work(&mut Stoppable::around(rig, scene.sample_time(), &flag))
+    let run = || -> Result<String, Failure> {
+        let rig = Simulated::of(scene)?;
+        let result = work(&mut Stoppable::around(rig, scene.sample_time(), &flag))?;
+        Ok(serde_json::to_string(&result)?)
     };
-    wait(py, &stop, |_| Ok(()), run)?.map_err(PyRuntimeError::new_err)
-}
-
-fn text(result: &impl serde::Serialize) -> Result<String, String> {
-    serde_json::to_string(result).map_err(|error| error.to_string())
+    wait(py, &stop, |_| Ok(()), run)?.map_err(|error| PyRuntimeError::new_err(error.to_string()))
 }
 
 #[pyfunction]
@@ -50,10 +50,9 @@ pub fn identify(py: Python<'_>, scene: &Scene) -> PyResult<String> {
     let scene = &scene.scene;
     let mut controller = BuiltIn::new(&scene.controller_config()).map_err(invalid)?;
     experiment(py, scene, |rig| {
-        let record =
-            experiment::run(rig, &mut controller, &Plan::of(scene), |_, _, _| {}).map_err(|error| error.to_string())?;
-        let found = identification::identify(&record, scene).map_err(|error| error.to_string())?;
-        text(&Comparison::of(&found, scene))
+        let record = experiment::run(rig, &mut controller, &Plan::of(scene), |_, _, _| {})?;
+        let found = identification::identify(&record, scene)?;
+        Ok(Comparison::of(&found, scene))
     })
 }
 
@@ -62,8 +61,8 @@ pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
     let scene = &scene.scene;
     let mut controller = BuiltIn::new(&scene.backbone_config()).map_err(invalid)?;
     experiment(py, scene, |rig| {
-        let tracked = track(rig, &mut controller, scene, |_, _| {}).map_err(|error| error.to_string())?;
-        text(&TrackedComparison::of(&tracked, scene))
+        let tracked = track(rig, &mut controller, scene, |_, _| {})?;
+        Ok(TrackedComparison::of(&tracked, scene))
     })
 }
 

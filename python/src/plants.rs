@@ -2,7 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 
-use lovines::{Drive, Event, Parameters, Plant, State, Wall};
+use lovines::{Drive, Event, InvalidValue, Parameters, Plant, State, Wall};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ndarray::Array2};
 use pyo3::{exceptions::PyKeyboardInterrupt, prelude::*};
 use rayon::prelude::*;
@@ -105,10 +105,11 @@ impl Plants {
         let (durations, amplitudes, omegas) = (durations.as_array(), amplitudes.as_array(), omegas.as_array());
         let Self { plants, next } = self;
         let stop = AtomicBool::new(false);
-        let one = |(n, plant): (usize, &Plant)| -> (Plant, Result<Events, String>) {
+        // The error of a plant with its number, or none after a signal.
+        let one = |(n, plant): (usize, &Plant)| -> (Plant, Result<Events, Option<(usize, InvalidValue)>>) {
             let (mut plant, mut found) = (*plant, Events::default());
             if stop.load(Relaxed) {
-                return (plant, Err(String::new()));
+                return (plant, Err(None));
             }
             let (drive, start) = (Drive::harmonic(amplitudes[n], omegas[n]), plant.time());
             // One loop over events for both cases: of two, the compiler leaves parts as calls, and each is slower.
@@ -118,7 +119,7 @@ impl Plants {
                 }
             };
             let advanced = plant.advance_with(drive, durations[n], record);
-            let advanced = advanced.map(|_| found).map_err(|error| format!("plant {n}: {error}"));
+            let advanced = advanced.map(|_| found).map_err(|error| Some((n, error)));
             (plant, advanced)
         };
         let mut all = Vec::new();
@@ -133,9 +134,9 @@ impl Plants {
         }
         let mut merged = Events::default();
         for found in all {
-            merged.append(found.map_err(|error| match error.as_str() {
-                "" => PyKeyboardInterrupt::new_err(()),
-                _ => invalid(error),
+            merged.append(found.map_err(|error| match error {
+                None => PyKeyboardInterrupt::new_err(()),
+                Some((n, error)) => invalid(format!("plant {n}: {error}")),
             })?);
         }
         std::mem::swap(plants, next);

@@ -3,6 +3,7 @@
 //! It follows the state of the controller: a controller that switches the drive off ends the experiment at once.
 
 mod bench;
+mod evidence;
 mod record;
 
 use thiserror::Error;
@@ -13,6 +14,7 @@ use vines_model::orbit::phase_resonant;
 use vines_model::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 
 pub(crate) use bench::Bench;
+pub use evidence::Evidence;
 pub use record::{Record, Sample, drive_phases, table};
 
 /// Durations of the stages, in samples.
@@ -124,8 +126,13 @@ pub enum ExperimentError {
     },
     #[error("no lock: for {periods:.0} periods in total the motion was not 1:1, and only such a motion can be locked")]
     Irregular { periods: f64 },
-    #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}", stage.name())]
-    Tripped { periods: f64, stage: Stage, fault: Fault },
+    #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {}", stage.name(), evidence.text(*fault))]
+    Tripped {
+        periods: f64,
+        stage: Stage,
+        fault: Fault,
+        evidence: Box<Evidence>,
+    },
     #[error("the controller asked for omega = {} rad/s and E = {} m, which is refused; the drive is off", .0.omega, .0.amplitude)]
     NotANumber(Drive),
 }
@@ -148,7 +155,7 @@ pub fn run_into(
     plan: &Plan,
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
-    let mut bench = Bench::new(rig, controller, plan.sample_time, samples);
+    let mut bench = Bench::new(rig, controller, plan.scene, samples);
     let (mut settled, mut irregular) = (0, 0);
     loop {
         let command = bench.sample(Stage::Locking)?;

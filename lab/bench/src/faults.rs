@@ -77,6 +77,14 @@ fn short(scene: &Scene) -> Scene {
     scene
 }
 
+/// Why a run ended, without the readings of that one run.
+fn reason(error: &ExperimentError) -> String {
+    match error {
+        ExperimentError::Tripped { fault, .. } => fault.to_string(),
+        other => other.to_string(),
+    }
+}
+
 /// What a real rig shows of itself: its sensors.
 struct SensorsOnly<F: FnMut(Option<f64>)> {
     rig: Box<dyn Rig>,
@@ -184,7 +192,7 @@ impl<'a> Faults<'a> {
         let controller = &mut self.controller(kind, log, During::Tracking);
         Ok(track(&mut *self.rig(kind, log), controller, &self.scene, |_, _| {})?
             .ended
-            .map(|why| why.to_string()))
+            .map(|why| reason(&why)))
     }
 
     /// One run with a fault: detection and shutdown, s, and the reason; `None` if it was missed.
@@ -201,7 +209,7 @@ impl<'a> Faults<'a> {
         }));
         let reason = match ended {
             Err(_) => Some("panic".to_string()),
-            Ok(Err(error)) => Some(error.to_string()),
+            Ok(Err(error)) => Some(reason(&error)),
             Ok(Ok(reason)) => reason,
         };
         // At the release the drive ends whatever happens.

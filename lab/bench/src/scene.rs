@@ -28,7 +28,7 @@ pub use error::{SceneError, SyntaxError};
 pub use family::Family;
 pub use names::{Name, Names};
 pub use overrides::Override;
-pub use phase_lock::{KEYS, PhaseLock, refusal};
+pub use phase_lock::{KEYS, PhaseLock, key, refusal};
 pub use record::{Estimator, Record};
 pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
 

@@ -34,9 +34,18 @@ fn lock(settings: [&str; 4]) -> Lock {
     identify(&record, &scene).unwrap().lock
 }
 
+/// Rigs at rest lock on the symmetric motion of this amplitude over b.
+fn assert_locks(rigs: &[([&str; 4], f64)]) {
+    for (settings, c) in rigs {
+        let lock = lock(*settings);
+        assert_eq!(lock.regime, Regime::Symmetric);
+        assert!((lock.c - c).abs() < 2e-3, "{lock:?}");
+    }
+}
+
 #[test]
 fn orbits_just_above_the_fold_and_just_below_symmetry_breaking_are_reached() {
-    for (settings, c) in [
+    assert_locks(&[
         // The drive belongs to a large asymmetric motion, too.
         (
             [
@@ -96,16 +105,12 @@ fn orbits_just_above_the_fold_and_just_below_symmetry_breaking_are_reached() {
             ],
             0.3386,
         ),
-    ] {
-        let lock = lock(settings);
-        assert_eq!(lock.regime, Regime::Symmetric);
-        assert!((lock.c - c).abs() < 2e-3, "{lock:?}");
-    }
+    ]);
 }
 
 #[test]
 fn subharmonic_motions_of_the_same_drive_are_left_for_the_symmetric_one() {
-    for (settings, c) in [
+    assert_locks(&[
         (
             [
                 "plant.epsilon=0.014429842",
@@ -124,11 +129,7 @@ fn subharmonic_motions_of_the_same_drive_are_left_for_the_symmetric_one() {
             ],
             0.4485,
         ),
-    ] {
-        let lock = lock(settings);
-        assert_eq!(lock.regime, Regime::Symmetric);
-        assert!((lock.c - c).abs() < 2e-3, "{lock:?}");
-    }
+    ]);
 }
 
 #[test]

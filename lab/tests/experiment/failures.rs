@@ -68,10 +68,19 @@ fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_mea
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let mut samples = Vec::new();
     let outcome = experiment::run_into(&mut samples, &mut rig, &mut controller, &plan(&scene), |_, _, _| {});
-    let Err(ExperimentError::Tripped { periods, fault, .. }) = outcome else {
+    let Err(error @ ExperimentError::Tripped { periods, fault, .. }) = &outcome else {
         panic!("{outcome:?}");
     };
-    assert!(fault == Fault::ResponseTooLarge && periods < 50.0, "{periods} {fault}");
+    assert!(
+        *fault == Fault::ResponseTooLarge && *periods < 50.0,
+        "{periods} {fault}"
+    );
+    let message = error.to_string();
+    assert!(
+        message.contains("the response exceeded its limit; it read 0.3")
+            && message.contains("controller.C_max allows 0.3 m"),
+        "{message}"
+    );
     let last = samples.last().unwrap();
     assert!(last.sensors.response.abs() > 0.3 && samples.len() > 100);
     assert_eq!(experiment::table(&samples).lines().count(), samples.len() + 1);

@@ -43,7 +43,7 @@ pub fn track_into(
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
     let mut bench = Bench {
-        run: experiment::Bench::new(rig, controller, scene.sample_time(), samples),
+        run: experiment::Bench::new(rig, controller, scene, samples),
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),

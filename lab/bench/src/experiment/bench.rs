@@ -2,14 +2,17 @@
 
 use std::f64::consts::TAU;
 
-use super::{ExperimentError, Plan, Sample, Stage};
+use super::{Evidence, ExperimentError, Plan, Sample, Stage};
 use crate::identification::{Regime, classify, regime_by_response};
 use crate::rig::{Command, Controller, Drive, Fault, LoopState, Rig};
+use crate::scene::Scene;
 
 /// Rig and controller, and the samples so far.
 pub(crate) struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
     rig: &'a mut R,
     pub controller: &'a mut C,
+    scene: &'a Scene,
+    /// s
     pub sample_time: f64,
     pub samples: &'a mut Vec<Sample>,
     /// Samples since the start.
@@ -21,12 +24,13 @@ pub(crate) struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
 }
 
 impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> Bench<'a, R, C> {
-    /// `sample_time` in s.
-    pub fn new(rig: &'a mut R, controller: &'a mut C, sample_time: f64, samples: &'a mut Vec<Sample>) -> Self {
+    /// Before the first sample.
+    pub fn new(rig: &'a mut R, controller: &'a mut C, scene: &'a Scene, samples: &'a mut Vec<Sample>) -> Self {
         Self {
             rig,
             controller,
-            sample_time,
+            scene,
+            sample_time: scene.sample_time(),
             samples,
             taken: 0,
             periods: 0.0,
@@ -96,6 +100,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> Bench<'a, R, C> {
                 periods: self.periods,
                 stage,
                 fault: fault.unwrap_or(Fault::LockLost),
+                evidence: Box::new(Evidence::of(self.samples, self.scene)),
             },
         }
     }

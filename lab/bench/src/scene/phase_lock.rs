@@ -32,12 +32,14 @@ pub const KEYS: [(&str, &str); 23] = [
     ("capture_response", "controller.capture"),
 ];
 
+/// The key of the scene that sets a parameter of the controller.
+pub fn key(name: &str) -> String {
+    let key = KEYS.iter().find(|(parameter, _)| *parameter == name);
+    key.map_or_else(|| format!("phase_lock.{name}"), |(_, key)| (*key).to_string())
+}
+
 /// The message for a refused configuration, with the keys of the scene.
 pub fn refusal(error: &ConfigError) -> String {
-    let key = |name: &str| {
-        let key = KEYS.iter().find(|(parameter, _)| *parameter == name);
-        key.map_or_else(|| format!("phase_lock.{name}"), |(_, key)| (*key).to_string())
-    };
     let mut text = format!("{}: {error}", key(error.name));
     let words = error.allowed.split([' ', ',', '(', ')']);
     for name in words.filter(|word| Parameter::find(word).is_some()) {
