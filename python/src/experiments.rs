@@ -77,10 +77,10 @@ pub fn orbits(py: Python<'_>, scene: &Scene, sigma: Option<f64>) -> PyResult<Str
 }
 
 #[pyfunction]
-pub fn theory(py: Python<'_>, scene: &Scene, points: usize) -> PyResult<String> {
-    if !(2..=100_000).contains(&points) {
+pub fn theory(py: Python<'_>, scene: &Scene, points: i64) -> PyResult<String> {
+    if !(2..=10_000).contains(&points) {
         return Err(PyValueError::new_err(format!(
-            "points = {points}: a number from 2 to 100000 is allowed"
+            "points = {points}: a number from 2 to 10000 is allowed"
         )));
     }
     let numbers = scene.scene.dimensionless();
@@ -90,7 +90,7 @@ pub fn theory(py: Python<'_>, scene: &Scene, points: usize) -> PyResult<String> 
     json(&py.detach(|| {
         json!({
             "solutions": resonant(&numbers),
-            "backbone": flow.backbone(manifold.b_min(), to, points),
+            "backbone": flow.backbone(manifold.b_min(), to, points as usize),
             "B_min": manifold.b_min(),
             "C_min": manifold.c_min(),
         })
@@ -98,7 +98,7 @@ pub fn theory(py: Python<'_>, scene: &Scene, points: usize) -> PyResult<String> 
 }
 
 #[pyfunction]
-pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<f64>, periods: usize) -> PyResult<String> {
+pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<f64>, periods: i64) -> PyResult<String> {
     finite(sigma)?;
     if !(100..=100_000).contains(&periods) {
         return Err(PyValueError::new_err(format!(
@@ -106,6 +106,12 @@ pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<f64>, periods: usize)
         )));
     }
     let (numbers, start) = (scene.scene.dimensionless(), scene.scene.dimensionless_start());
+    if let Some(sigma) = sigma.filter(|sigma| 1.0 + numbers.epsilon * sigma <= 0.0) {
+        return Err(invalid(format!(
+            "sigma = {sigma} (dimensionless): a number above {} is allowed, so that the frequency is above 0",
+            -1.0 / numbers.epsilon
+        )));
+    }
     let stop = AtomicBool::new(false);
     let point = wait(
         py,
@@ -119,7 +125,7 @@ pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<f64>, periods: usize)
                     .find(|orbit| orbit.stable)
                     .map_or(0.0, |orbit| orbit.sigma)
             });
-            observe(&numbers, sigma, start, periods).map(|point| (sigma, point))
+            observe(&numbers, sigma, start, periods as usize).map(|point| (sigma, point))
         },
     )?;
     let (sigma, point) = point.map_err(invalid)?;

@@ -6,7 +6,7 @@ use std::{
 };
 
 use pyo3::{
-    exceptions::{PyOSError, PyValueError},
+    exceptions::{PyOSError, PyOverflowError, PyValueError},
     prelude::*,
     types::PyDict,
 };
@@ -51,16 +51,24 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
             .get_item(key)?
             .ok_or_else(|| PyValueError::new_err(key.to_string()))
     };
+    let whole = |key: &str| {
+        let value = get(key)?;
+        let number = value.extract::<Option<u64>>();
+        number.map_err(|error| match error.is_instance_of::<PyOverflowError>(value.py()) {
+            true => invalid(format!("{key} = {value}: a whole number from 0 to 2^64 - 1 is allowed")),
+            false => error,
+        })
+    };
     let results: Vec<String> = get("results")?.extract()?;
     let settings = Settings {
         axes,
         sigma: get("sigma")?.extract()?,
-        samples: get("samples")?.extract()?,
-        seed: get("seed")?.extract()?,
-        periods: get("periods")?.extract()?,
+        samples: whole("samples")?,
+        seed: whole("seed")?.unwrap_or_default(),
+        periods: whole("periods")?.unwrap_or_default() as usize,
         results: Results::parse(results.iter().map(String::as_str)).map_err(invalid)?,
-        chunk: get("chunk")?.extract()?,
-        adaptive: get("adaptive")?.extract()?,
+        chunk: whole("chunk")?.unwrap_or_default(),
+        adaptive: whole("adaptive")?,
     };
     Plan::new(scene.family.clone(), settings).map_err(invalid)
 }

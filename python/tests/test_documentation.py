@@ -2,11 +2,17 @@
 
 import doctest
 import importlib
+import os
 import pkgutil
+import re
+import shlex
+import subprocess
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
+import xarray
 
 import vines
 
@@ -25,6 +31,26 @@ def test_the_examples_of_the_page_run(tmp_path):
     result = doctest.testfile(str(page), False, globs={"folder": tmp_path}, optionflags=OPTIONS)
     assert result.attempted > 10
     assert result.failed == 0
+
+
+def test_the_commands_and_the_example_of_the_page_on_sweeps_run(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    page = (Path(__file__).parents[2] / "docs" / "scale.md").read_text()
+    blocks = re.findall(r"```(sh|python)\n(.*?)```", page, re.DOTALL)
+    commands = [
+        line for kind, block in blocks if kind == "sh" for line in block.splitlines() if line.startswith("vines")
+    ]
+    assert len(commands) == 5
+    for command in commands:
+        # Fewer cells: five per axis, and twenty samples.
+        words = shlex.split(re.sub(r"(=[-\d.]+:[-\d.]+):\d+", r"\1:5", command).replace("10000", "20"))
+        subprocess.run([os.environ["VINES"], *words[1:], "--periods=400"], check=True)
+    examples = [block for kind, block in blocks if kind == "python"]
+    # The other one needs a queueing system.
+    assert ["dask_jobqueue" in one for one in examples] == [False, True]
+    matplotlib.use("agg")
+    exec(examples[0], {})
+    assert xarray.open_zarr("map.zarr").regime.shape == (5, 5)
 
 
 def test_every_public_name_has_a_docstring_with_its_errors():

@@ -92,13 +92,24 @@ def test_a_copy_continues_with_the_same_bits():
         (lambda: vines.Batch(vines.Scene(), {"dq2": [0.1, 0.2], "q1": np.zeros(3)}), ["dq2 (2,)", "q1 (3,)"]),
         (lambda: vines.Plant().advance([1.0, 2.0]), ["duration of shape (2,)"]),
         (lambda: vines.Batch({"M": 1.0}), ["k (N/m) is missing"]),
+        (lambda: vines.Batch(vines.Scene(), {"dq2": [1j]}), ["dq2 of type complex128", "real numbers"]),
+        (lambda: vines.Batch(vines.Scene(), {"dq2": "0.5"}), ["dq2 of type <U3", "real numbers"]),
+        (lambda: vines.Batch(vines.Scene(), {"dq2": [None]}), ["dq2 of type object", "real numbers"]),
+        (lambda: vines.Plant().advance(1.0, omega=[True]), ["omega of type bool"]),
+        (lambda: vines.Plant(dq2=[0.1, 0.2]), ["2 plants", "Batch"]),
+        (lambda: vines.Plant(dq2=[]), ["0 plants"]),
         (lambda: vines.Scene(plant={"rr": 1}), ["plant.rr", "unknown field"]),
         (lambda: vines.Scene(controller={"bandwidth": -3.0}), ["controller.bandwidth", "-3"]),
+        (lambda: vines.Scene(plant={"r": None}), ["plant.r = None", "a number"]),
+        (lambda: vines.Scene(plant={"r": np.array([0.7])}), ["plant.r = array([0.7])", "a number"]),
+        (lambda: vines.regime(sigma=-1e9), ["sigma = -1000000000", "above -118.9"]),
         (lambda: vines.Scene(path="a", text="b"), ["give one"]),
         (lambda: vines.fmu("Other"), ["Other", "LoViNes", "PhaseLock"]),
         (lambda: vines.orbits(sigma=np.nan), ["sigma", "NaN"]),
         (lambda: vines.regime(periods=3), ["periods = 3", "100"]),
-        (lambda: vines.theory(points=1), ["points = 1", "2 to 100000"]),
+        (lambda: vines.regime(periods=-3), ["periods = -3", "100"]),
+        (lambda: vines.theory(points=1), ["points = 1", "2 to 10000"]),
+        (lambda: vines.theory(points=-1), ["points = -1", "2 to 10000"]),
     ],
 )
 def test_a_value_that_is_not_allowed_is_a_value_error_with_value_and_range(wrong, parts):
@@ -108,6 +119,31 @@ def test_a_value_that_is_not_allowed_is_a_value_error_with_value_and_range(wrong
         assert part in str(error.value)
     # What the program's options say, means nothing here.
     assert "--" not in str(error.value)
+
+
+def test_arrays_of_any_layout_and_type_of_real_numbers_give_the_same_bits():
+    starts = np.linspace(-0.5, 0.5, 9, dtype=np.float32)
+    expected = vines.Batch(vines.Scene(), {"dq2": starts.tolist()})
+    expected.advance(1.0, **DRIVE)
+    swapped = starts.astype(">f8")
+    swapped.flags.writeable = False
+    for given in (starts, np.repeat(starts, 3)[::3], starts[::-1].copy()[::-1], swapped):
+        batch = vines.Batch(vines.Scene(), {"dq2": given})
+        batch.advance(np.ones(18, dtype=np.int8)[::2], **DRIVE)
+        assert np.array_equal(batch.states, expected.states)
+
+
+def test_a_batch_that_does_not_fit_into_memory_is_a_memory_error():
+    # No memory behind these rows: they are all the same.
+    parameters = np.broadcast_to([3.807, 11680.0, 3.3, 0.032, 0.01, 0.65], (10**12, 6))
+    with pytest.raises(MemoryError, match="1000000000000 plants need"):
+        vines._native.Plants(parameters, np.broadcast_to(0.0, (10**12, 4)))
+
+
+@pytest.mark.parametrize("function", [vines.identify, vines.backbone, vines.orbits, vines.theory, vines.regime])
+def test_what_is_no_scene_is_a_type_error_that_names_the_way(function):
+    with pytest.raises(TypeError, match=r"a Scene is allowed, for instance Scene\(plant="):
+        function({"plant": {"r": 0.7}})
 
 
 def test_after_an_error_no_plant_has_advanced():
@@ -128,6 +164,9 @@ def test_results_become_datasets_with_units():
     decay = vines.identify().to_xarray()
     assert decay.sizes["point"] == 96
     assert decay.attrs["lock_regime"] == "symmetric 1:1"
+    orbit = vines.orbits()[0].to_xarray()
+    assert orbit.gamma.attrs["units"] == "rad"
+    assert orbit.multipliers.sizes == {"multiplier": 4}
     tracked = vines.backbone(vines.Scene(backbone={"C_from": 0.6, "C_to": 0.5, "points": 2})).to_xarray()
     assert tracked.u_sigma.attrs["units"] == "1"
     assert tracked.phase_error_deg.attrs["units"] == "degree"
@@ -151,6 +190,19 @@ def test_ctrl_c_ends_a_batch_within_02_s_and_no_plant_has_advanced():
         batch.advance(3000.0, **DRIVE, events=False)
     # All cores compute until the end, so that processor time tells it on a busy machine, too.
     assert time.process_time() - sent[0] < 0.2 * os.cpu_count()
+    assert batch.times.max() == 0.0
+
+
+@pytest.mark.parametrize("plants", [1, 2])
+def test_ctrl_c_ends_plants_in_the_middle_of_their_motion(plants):
+    batch = vines.Batch(vines.Scene(), {"dq2": np.linspace(0.3, 0.6, plants)})
+    timer = threading.Timer(0.3, os.kill, (os.getpid(), signal.SIGINT))
+    timer.start()
+    # Ten million impacts per plant would take seconds.
+    begun = time.process_time()
+    with pytest.raises(KeyboardInterrupt):
+        batch.advance(1e8, **DRIVE, events=False)
+    assert time.process_time() - begun < 0.5 * os.cpu_count()
     assert batch.times.max() == 0.0
 
 

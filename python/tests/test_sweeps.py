@@ -8,6 +8,8 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+import dask
+import dask.threaded
 import pytest
 from dask.distributed import Client, LocalCluster
 
@@ -61,11 +63,33 @@ def test_designs_lists_and_results_become_a_dataset_with_units(tmp_path):
             ["1000000000000 cells", " h ", "GB", "confirm=True"],
         ),
         ({}, ["at least one axis"]),
+        ({"plant.r": (0.3, 0.9, 7.0)}, ["plant.r = (0.3, 0.9, 7.0)", "a whole number of at least 2"]),
+        ({"plant.r": (0.3, 0.9, -7)}, ["plant.r = (0.3, 0.9, -7)", "a whole number of at least 2"]),
+        ({"plant.r": (0.3, 0.9, True)}, ["one value"]),
     ],
 )
 def test_bad_axes_are_value_errors_and_write_nothing(axes, parts, tmp_path):
     with pytest.raises(ValueError) as error:  # noqa: PT011
         vines.sweep(None, axes, out=tmp_path / "store")
+    for part in parts:
+        assert part in str(error.value)
+    assert not (tmp_path / "store").exists()
+
+
+@pytest.mark.parametrize(
+    ("setting", "parts"),
+    [
+        ({"periods": -1}, ["periods = -1", "from 0"]),
+        ({"chunk": 0}, ["0 cells", "from 1 to 1000000"]),
+        ({"seed": 2**64}, ["seed = 18446744073709551616", "2^64 - 1"]),
+        ({"samples": 5}, ["random or Sobol axis"]),
+        ({"results": "locks"}, ["`locks`", "regime, response, orbits and lock"]),
+        ({"sigma": float("inf")}, ["sigma = inf", "finite"]),
+    ],
+)
+def test_bad_settings_are_value_errors_and_write_nothing(setting, parts, tmp_path):
+    with pytest.raises(ValueError) as error:  # noqa: PT011
+        vines.sweep(None, {"plant.r": [0.5, 0.6]}, out=tmp_path / "store", **setting)
     for part in parts:
         assert part in str(error.value)
     assert not (tmp_path / "store").exists()
@@ -120,8 +144,30 @@ def test_nothing_is_printed_and_a_bar_on_request(tmp_path, capfd):
     assert "2/2" in capfd.readouterr().err
 
 
-def cluster(workers):
-    return LocalCluster(n_workers=workers, threads_per_worker=1, dashboard_address=None)
+def cluster(workers, threads=1):
+    return LocalCluster(n_workers=workers, threads_per_worker=threads, dashboard_address=None)
+
+
+def test_workers_that_come_later_and_have_many_threads_give_the_same_bytes(whole, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    with cluster(0, threads=4) as local, Client(local) as client:
+        # As with a queueing system, whose workers start when it has room for them.
+        threading.Timer(0.2, local.scale, (2,)).start()
+        vines.sweep(None, AXES, out="store", client=client, **SETTINGS)
+    assert content(tmp_path / "store") == whole
+
+
+@pytest.mark.parametrize("scheduler", ["threads", "synchronous", dask.threaded.get])
+def test_other_schedulers_of_dask_give_the_same_bytes(scheduler, whole, tmp_path):
+    vines.sweep(None, AXES, out=tmp_path / "store", client=scheduler, **SETTINGS)
+    assert content(tmp_path / "store") == whole
+
+
+def test_a_worker_that_does_not_see_the_store_says_so(tmp_path):
+    arguments = (vines.Scene(), {"plant.r": [0.5, 0.6]}, {}, str(tmp_path / "elsewhere"))
+    with pytest.raises(OSError, match="elsewhere: this worker does not see the store"):
+        vines.sweeps._chunk(0, 1, *arguments)
+    assert not (tmp_path / "elsewhere").exists()
 
 
 def test_with_dask_a_worker_is_killed_and_one_added_and_the_bytes_are_the_same(whole, tmp_path):

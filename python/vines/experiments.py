@@ -1,7 +1,7 @@
 """Experiments on the simulated rig, exact orbits and first-order theory."""
 
 import json
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from . import _native
 from .datasets import dataset
-from .scenes import Scene
+from .scenes import Scene, checked
 
 if TYPE_CHECKING:
     import xarray
@@ -95,7 +95,7 @@ def identify(scene: Scene | None = None) -> Identification:
     >>> round(found.lock["sigma"], 5), found.lock["regime"]
     (-1.13938, 'symmetric 1:1')
     """
-    found = json.loads(_native.identify((scene or Scene())._native))
+    found = json.loads(_native.identify(checked(scene)._native))
     return Identification(
         lock=found["lock"],
         exact=Orbit._of(found["exact"]) if found["exact"] else None,
@@ -152,7 +152,7 @@ def backbone(scene: Scene | None = None) -> Backbone:
     >>> found.points["C"].round(2)
     array([0.6, 0.5, 0.4])
     """
-    found = json.loads(_native.backbone((scene or Scene())._native))
+    found = json.loads(_native.backbone(checked(scene)._native))
     points = [
         {**point, **{f"{k}_difference": v for k, v in (point.pop("exact") or {}).items()}} for point in found["points"]
     ]
@@ -183,6 +183,12 @@ class Orbit:
     gamma: float
     multipliers: tuple[float, float, float, float]
     stable: bool
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a dataset whose only dimension is `multiplier`, with units as attributes."""
+        units = {"G": "1", "sigma": "1", "C": "1", "B": "1", "gamma": "rad", "multipliers": "1"}
+        values = {name: ((), value) for name, value in asdict(self).items()}
+        return dataset(values | {"multipliers": ("multiplier", list(self.multipliers))}, units)
 
     @classmethod
     def _of(cls, found: dict[str, Any]) -> "Orbit":
@@ -215,7 +221,7 @@ def orbits(scene: Scene | None = None, sigma: float | None = None) -> list[Orbit
     >>> [(round(orbit.sigma, 6), orbit.stable) for orbit in orbits()][0]
     (-1.139376, True)
     """
-    found = json.loads(_native.orbits((scene or Scene())._native, sigma))
+    found = json.loads(_native.orbits(checked(scene)._native, sigma))
     return [Orbit._of(one) for one in found]
 
 
@@ -252,7 +258,7 @@ def theory(scene: Scene | None = None, points: int = 200) -> Theory:
     scene : Scene, optional
         Default: the default scene.
     points : int
-        Number of points along the backbone, 2 to 100000.
+        Number of points along the backbone, 2 to 10000.
 
     Returns
     -------
@@ -268,5 +274,5 @@ def theory(scene: Scene | None = None, points: int = 200) -> Theory:
     >>> theory().solutions["sigma"].round(4)[-1]
     np.float64(-1.1817)
     """
-    found = json.loads(_native.theory((scene or Scene())._native, points))
+    found = json.loads(_native.theory(checked(scene)._native, points))
     return Theory(_table(found["backbone"]), _table(found["solutions"]), found["B_min"], found["C_min"])

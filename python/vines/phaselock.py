@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from . import _native
-from .scenes import Scene
+from .scenes import Scene, checked
 
 _STATES = ("idle", "ramping", "acquiring", "locked", "lock lost", "tripped", "shut down", "capturing")
 
@@ -72,7 +72,7 @@ class PhaseLock:
     """
 
     def __init__(self, scene: Scene | None = None) -> None:
-        self._native = _native.PhaseLock((scene or Scene())._native)
+        self._native = _native.PhaseLock(checked(scene)._native)
 
     @property
     def sample_time(self) -> float:

@@ -92,7 +92,7 @@ class Batch:
         _check("parameters", values, _PARAMETERS)
         _check("starts", given, _START)
         given = {**values, **given}
-        columns = [np.asarray(given[name], dtype=np.float64) for name in (*_PARAMETERS, *_START)]
+        columns = [_numbers(name, given[name]) for name in (*_PARAMETERS, *_START)]
         try:
             rows = np.stack(np.broadcast_arrays(*np.atleast_1d(*columns)), axis=-1)
         except ValueError:
@@ -133,7 +133,7 @@ class Batch:
         """
 
         def array(name: str, given: ArrayLike) -> NDArray[np.float64]:
-            values = np.asarray(given, dtype=np.float64)
+            values = _numbers(name, given)
             if values.shape not in ((), (1,), (len(self),)):
                 raise ValueError(f"{name} of shape {values.shape}: a number or {len(self)} numbers are allowed")
             return np.ascontiguousarray(np.broadcast_to(values, (len(self),)))
@@ -207,6 +207,8 @@ class Plant(Batch):
 
     def __init__(self, parameters: Scene | Mapping[str, float] | None = None, **start: float) -> None:
         super().__init__(Scene() if parameters is None else parameters, start)
+        if len(self) != 1:
+            raise ValueError(f"values for {len(self)} plants: one is allowed here; Batch has more")
 
     def advance(  # type: ignore[override]
         self, duration: float, *, amplitude: float = 0.0, omega: float = 0.0
@@ -240,6 +242,13 @@ class Plant(Batch):
     def wall(self) -> int:
         """Wall that the particle is stuck to: 1 at w = b, -1 at w = -b, 0 if it is free."""
         return int(self.walls[0])
+
+
+def _numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:
+    values = np.asarray(given)
+    if values.dtype.kind not in "fiu":
+        raise ValueError(f"{name} of type {values.dtype}: real numbers are allowed")
+    return values.astype(np.float64, copy=False)
 
 
 def _check(what: str, given: Mapping[str, Any], names: tuple[str, ...]) -> None:

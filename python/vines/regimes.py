@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from . import _native
 from .datasets import dataset
-from .scenes import Scene
+from .scenes import Scene, checked
 
 if TYPE_CHECKING:
     import xarray
@@ -84,5 +84,5 @@ def regime(scene: Scene | None = None, sigma: float | None = None, periods: int 
     >>> regime(sigma=-1.1).regime
     'symmetric 1:1'
     """
-    found = json.loads(_native.regime((scene or Scene())._native, sigma, periods))
+    found = json.loads(_native.regime(checked(scene)._native, sigma, periods))
     return Regime(sigma=found["sigma"], **found["point"])

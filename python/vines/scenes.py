@@ -75,12 +75,24 @@ class Scene:
         return {key: value for key, value in numbers.items() if isinstance(value, float)}
 
 
+def checked(scene: Scene | None) -> Scene:
+    """Return the scene; without one, the default scene."""
+    if scene is None:
+        return Scene()
+    if not isinstance(scene, Scene):
+        raise TypeError(f'scene = {scene!r}: a Scene is allowed, for instance Scene(plant={{"r": 0.7}})')
+    return scene
+
+
 def _overrides(sections: Mapping[str, Mapping[str, Any]]) -> list[str]:
     texts = []
     for section, keys in sections.items():
         if not isinstance(keys, Mapping):
             raise TypeError(f"{section} = {keys!r}: a section is a mapping, for instance plant={{'r': 0.7}}")
-        texts += [f"{section}.{key} = {_toml(value)}" for key, value in keys.items()]
+        for key, value in keys.items():
+            if value is None or (hasattr(value, "ndim") and value.ndim > 0):
+                raise ValueError(f"{section}.{key} = {value!r}: a number, a text or a Boolean is allowed")
+            texts.append(f"{section}.{key} = {_toml(value)}")
     return texts
 
 

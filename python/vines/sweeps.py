@@ -2,11 +2,12 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
-from os import PathLike, fspath
+from os import PathLike
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from . import _native
-from .scenes import Scene
+from .scenes import Scene, checked
 
 if TYPE_CHECKING:
     import xarray
@@ -63,8 +64,9 @@ def sweep(
         Confirms a sweep of more than 2 hours or 20 GB.
     progress : bool
         Whether tqdm shows a bar.
-    client : dask.distributed.Client, optional
-        Its workers compute the chunks and write them to the store, whose folder they must all see.
+    client : dask.distributed.Client, str or callable, optional
+        Its workers compute the chunks and write them to the store, whose folder they must all see. Another
+        scheduler of Dask is named as for `dask.compute`: `"processes"`, or its `get`.
 
     Returns
     -------
@@ -89,19 +91,21 @@ def sweep(
     """
     import xarray
 
-    scene = scene or Scene()
+    scene = checked(scene)
     settings = {
         "sigma": sigma,
         "samples": samples,
         "seed": seed,
         "periods": periods,
-        "results": list(results),
+        "results": [results] if isinstance(results, str) else list(results),
         "chunk": chunk,
         "adaptive": adaptive,
     }
     if adaptive is not None and client is not None:
         raise ValueError("an adaptive sweep runs in one process: leave out adaptive or client")
     axes = {name: _values(name, values) for name, values in axes.items()}
+    # Workers may have another working directory.
+    folder = str(Path(out).absolute())
     plan = _native.Sweep(scene._native, axes, settings)
     cells = plan.cells
     hours, size, large = plan.estimate()
@@ -112,16 +116,21 @@ def sweep(
         )
     with _bar(cells, progress) as bar:
         if client is not None:
-            _distributed(client, (scene, axes, settings, fspath(out)), plan.chunks, cells, bar)
+            # A part without chunks: it makes the store, so that workers can tell whether they see it.
+            plan.run(folder, (plan.chunks, plan.chunks + 1), None)
+            _distributed(client, (scene, axes, settings, folder), plan.chunks, cells, bar)
         look = None if bar is None or client is not None else lambda complete: bar.update(complete - bar.n)
         # After workers nothing is left to compute; this removes what a killed one has left.
-        plan.run(fspath(out), (0, 1), look)
+        plan.run(folder, (0, 1), look)
     opened: xarray.Dataset = xarray.open_zarr(out)
     return opened
 
 
 def _values(name: str, values: Values) -> Values:
     if isinstance(values, tuple) and len(values) == 3:
+        number: Any = values[2]
+        if not isinstance(values[0], str) and (not hasattr(number, "__index__") or number < 0):
+            raise ValueError(f"{name} = {values!r}: the third is a number of values, a whole number of at least 2")
         return values
     try:
         return [float(value) for value in values]
@@ -141,10 +150,22 @@ def _bar(cells: int, progress: bool) -> Any:
 
 def _chunk(part: int, chunks: int, scene: Scene, axes: Any, settings: Any, out: str) -> int:
     """Compute one chunk in a worker; only the number of its cells returns."""
+    if not Path(out, "zarr.json").is_file():
+        raise FileNotFoundError(
+            f"{out}: this worker does not see the store; name a folder that client and all workers see"
+        )
     return _native.Sweep(scene._native, axes, settings).run(out, (part, chunks), None)[0]
 
 
 def _distributed(client: Any, arguments: Any, chunks: int, cells: int, bar: Any) -> None:
+    if not hasattr(client, "submit"):
+        from dask.base import compute
+        from dask.delayed import delayed
+
+        tasks = [delayed(_chunk)(part, chunks, *arguments) for part in range(chunks)]
+        compute(*tasks, scheduler=client)  # type: ignore[no-untyped-call]
+        return
+
     from dask.distributed import as_completed
 
     # The scheduler holds a few tasks per thread at a time, however many chunks there are.
@@ -154,13 +175,20 @@ def _distributed(client: Any, arguments: Any, chunks: int, cells: int, bar: Any)
         part = next(waiting, None)
         return None if part is None else client.submit(_chunk, part, chunks, *arguments, pure=False)
 
-    at_once = 4 * max(1, sum(client.nthreads().values()))
-    started = [one for one in (submit() for _ in range(at_once)) if one is not None]
-    running: Any = as_completed(started)  # type: ignore[no-untyped-call]
+    running: Any = as_completed([submit()])  # type: ignore[no-untyped-call]
+
+    def fill() -> None:
+        # Workers may come and go, and the first ones after this began.
+        at_once = 4 * max(1, sum(client.nthreads().values()))
+        while running.count() < at_once:
+            further = submit()
+            if further is None:
+                return
+            running.add(further)
+
+    fill()
     for finished in running:
         finished.result()
         if bar is not None:
             bar.update(cells / chunks)
-        further = submit()
-        if further is not None:
-            running.add(further)
+        fill()

@@ -1,9 +1,10 @@
 //! A folder as the storage of a Zarr store, whose files are either complete or absent.
 
 use std::{
-    fs, io,
+    fs,
+    hash::{BuildHasher, RandomState},
+    io,
     path::{Path, PathBuf},
-    process,
     sync::atomic::{AtomicU64, Ordering},
 };
 
@@ -16,12 +17,18 @@ pub(crate) const PARTIAL: &str = ".partial";
 #[derive(Debug)]
 pub(crate) struct Folder {
     root: PathBuf,
+    /// A random number. Threads, processes and machines may write to one store: numbers of processes repeat on other machines.
+    writer: u64,
     written: AtomicU64,
 }
 
 impl Folder {
     pub(crate) fn new(root: &Path) -> Self {
-        Self { root: root.into(), written: AtomicU64::new(0) }
+        Self {
+            root: root.into(),
+            writer: RandomState::new().hash_one(0),
+            written: AtomicU64::new(0),
+        }
     }
 
     pub(crate) fn path(&self, key: &str) -> PathBuf {
@@ -31,11 +38,8 @@ impl Folder {
     /// Writes a file completely or not at all: under another name first.
     pub(crate) fn write(&self, key: &str, content: &[u8]) -> io::Result<()> {
         let target = self.path(key);
-        let partial = self.path(PARTIAL);
-        fs::create_dir_all(&partial)?;
-        // Several programs may write to one store.
-        let number = self.written.fetch_add(1, Ordering::Relaxed);
-        let path = partial.join(format!("{}-{number}", process::id()));
+        let path = self.partial();
+        fs::create_dir_all(self.path(PARTIAL))?;
         let complete = || {
             // Not flushed to the disk for each chunk: only a power failure needs it, and loses no more than the last chunks.
             fs::write(&path, content)?;
@@ -45,6 +49,12 @@ impl Folder {
             fs::rename(&path, &target)
         };
         complete().inspect_err(|_| drop(fs::remove_file(&path)))
+    }
+
+    /// A new name for a file that is not complete.
+    fn partial(&self) -> PathBuf {
+        let number = self.written.fetch_add(1, Ordering::Relaxed);
+        self.path(PARTIAL).join(format!("{:016x}-{number}", self.writer))
     }
 
     /// Removes a folder inside, if it is there.
@@ -75,5 +85,17 @@ impl WritableStorageTraits for Folder {
 
     fn supports_set_partial(&self) -> bool {
         false
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn writers_in_one_process_or_in_processes_of_the_same_number_do_not_share_partial_files() {
+        let [one, other] = [(); 2].map(|()| Folder::new(Path::new("store")));
+        assert_ne!(one.partial(), other.partial());
+        assert_ne!(one.partial(), one.partial());
     }
 }

@@ -99,10 +99,11 @@ impl Plan {
         self.grid().iter().product()
     }
 
-    /// Bytes of the store before compression, without coordinates.
+    /// Bytes of the store before compression.
     #[must_use]
     pub fn bytes(&self) -> f64 {
-        variables(&self.settings).count() as f64 * 7.0 * self.cells() as f64
+        let coordinates: u64 = self.coordinates().map(|(.., dimension)| self.shape[dimension]).sum();
+        variables(&self.settings).count() as f64 * 7.0 * self.cells() as f64 + 8.0 * coordinates as f64
     }
 
     /// Number of chunks along each dimension.

@@ -36,9 +36,13 @@ const AT_ONCE: usize = 2;
 /// # Errors
 /// A folder that cannot be used.
 pub fn run(plan: &Plan, folder: &Path, shard: Shard, monitor: &Monitor) -> Result<bool, StoreError> {
-    let store = Store::open(plan, folder)?;
+    let opened = Store::open(plan, folder, &monitor.stop);
+    if monitor.stop.load(Relaxed) {
+        return Ok(false);
+    }
+    let store = opened?;
     let chunks = || (shard.number..plan.chunks()).step_by(shard.of as usize);
-    for n in chunks() {
+    for n in chunks().take_while(|_| !monitor.stop.load(Relaxed)) {
         let index = plan.chunk_index(n);
         if store.has(&index) {
             monitor.found.fetch_add(plan.chunk_cells(&index), Relaxed);
@@ -104,7 +108,7 @@ pub fn merge(plan: &Plan, folder: &Path, from: &[PathBuf]) -> Result<u64, StoreE
         .iter()
         .map(|one| Store::existing(plan, one))
         .collect::<Result<Vec<_>, _>>()?;
-    let store = Store::open(plan, folder)?;
+    let store = Store::open(plan, folder, &AtomicBool::new(false))?;
     let mut missing = 0;
     for index in (0..plan.chunks()).map(|n| plan.chunk_index(n)) {
         if store.has(&index) {

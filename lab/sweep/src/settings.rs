@@ -71,8 +71,11 @@ impl Settings {
                 u32::MAX / 8
             ));
         }
-        if self.chunk == 0 {
-            return refused("a chunk of 0 cells: at least 1 is needed".into());
+        if !(1..=CHUNK).contains(&self.chunk) {
+            return refused(format!(
+                "a chunk of {} cells: from 1 to {CHUNK} are allowed, which must be in memory",
+                self.chunk
+            ));
         }
         self.adaptive.map_or(Ok(()), |stride| self.check_adaptive(stride))
     }
@@ -114,6 +117,8 @@ pub enum PlanError {
 
 /// Most cells of an adaptive sweep: all their regimes are in memory, two bytes per cell.
 const ADAPTIVE: u64 = 1_000_000_000;
+/// Most cells of a chunk: all their results are in memory, half a kilobyte per cell.
+const CHUNK: u64 = 1_000_000;
 /// Most cells: their number must be countable in the metadata of the store.
 const MOST: u64 = 1 << 53;
 /// Number of points of a Sobol sequence.

@@ -3,7 +3,10 @@
 use std::{
     fs, io,
     path::{Path, PathBuf},
-    sync::Arc,
+    sync::{
+        Arc,
+        atomic::{AtomicBool, Ordering::Relaxed},
+    },
 };
 
 use serde_json::{Map, Value, json};
@@ -39,8 +42,8 @@ const BUILD: [&str; 2] = ["version", "engine"];
 const LEVEL: u32 = 6;
 
 impl Store {
-    /// Opens the store of `plan` in a folder, or creates it.
-    pub(crate) fn open(plan: &Plan, root: &Path) -> Result<Self, StoreError> {
+    /// Opens the store of `plan` in a folder, or creates it. Axes may be long: `stop` ends it with an error.
+    pub(crate) fn open(plan: &Plan, root: &Path, stop: &AtomicBool) -> Result<Self, StoreError> {
         let failed = |source| StoreError::Write { folder: root.into(), source };
         let folder = Arc::new(Folder::new(root));
         let arrays = variables(plan.settings())
@@ -51,10 +54,10 @@ impl Store {
         match fs::read_to_string(root.join(GROUP)) {
             Ok(text) => store.check(plan, &text)?,
             Err(error) if error.kind() == io::ErrorKind::NotFound => {
-                if !may_become_a_store(root) {
+                if !store.may_be_created(plan) {
                     return Err(StoreError::NotAStore(root.into()));
                 }
-                store.create(plan).map_err(failed)?;
+                store.create(plan, stop).map_err(failed)?;
             }
             Err(error) => return Err(failed(error.into())),
         }
@@ -64,12 +67,29 @@ impl Store {
     /// Opens the store of `plan` in a folder that must have it.
     pub(crate) fn existing(plan: &Plan, root: &Path) -> Result<Self, StoreError> {
         match root.join(GROUP).is_file() {
-            true => Self::open(plan, root),
+            true => Self::open(plan, root, &AtomicBool::new(false)),
             false => Err(StoreError::NotAStore(root.into())),
         }
     }
 
-    fn create(&self, plan: &Plan) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
+    /// Whether the folder has nothing, or what a program left that was killed before it wrote the group.
+    fn may_be_created(&self, plan: &Plan) -> bool {
+        let Ok(entries) = fs::read_dir(&self.root) else {
+            return true;
+        };
+        let variables = self.arrays.iter().map(|(variable, _)| variable.name);
+        let names: Vec<&str> = variables
+            .chain(plan.coordinates().map(|(axis, ..)| axis.name.as_str()))
+            .chain([PARTIAL])
+            .collect();
+        // A folder is made before the file that goes into it.
+        let empty = |path: &Path| fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
+        entries
+            .flatten()
+            .all(|entry| names.iter().any(|name| entry.file_name() == *name) || empty(&entry.path()))
+    }
+
+    fn create(&self, plan: &Plan, stop: &AtomicBool) -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
         let mut metadata = Map::new();
         let mut note = |array: &Array<Folder>| -> Result<(), Box<dyn std::error::Error + Send + Sync>> {
             array.store_metadata()?;
@@ -93,6 +113,9 @@ impl Store {
                 .build(self.folder.clone(), &format!("/{}", axis.name))?;
             note(&array)?;
             for n in 0..length.div_ceil(chunk) {
+                if stop.load(Relaxed) {
+                    return Err("stopped".into());
+                }
                 let value = |k| if k < length { sequence.at(k) } else { f64::NAN };
                 let values: Vec<f64> = (n * chunk..(n + 1) * chunk).map(value).collect();
                 array.store_chunk_opt(&[n], values, &options())?;
@@ -249,19 +272,6 @@ pub(crate) fn code(cell: &Cell) -> u8 {
 /// A chunk in which all is absent is written too: its file says that it is complete.
 fn options() -> CodecOptions {
     CodecOptions::default().with_store_empty_chunks(true)
-}
-
-/// Nothing, or what a program left that was killed before it wrote the group.
-fn may_become_a_store(root: &Path) -> bool {
-    let Ok(entries) = fs::read_dir(root) else {
-        return true;
-    };
-    // A folder is made before the file that goes into it.
-    let empty = |path: &Path| fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_none());
-    entries.flatten().all(|entry| {
-        let path = entry.path();
-        entry.file_name() == PARTIAL || path.join(GROUP).exists() || empty(&path)
-    })
 }
 
 fn object(value: Value) -> Map<String, Value> {
