@@ -6,6 +6,7 @@ use phase_lock::{Input, State};
 use pyo3::{
     exceptions::{PyRuntimeError, PyValueError},
     prelude::*,
+    types::PyBytes,
 };
 use serde_json::json;
 use vines_model::{
@@ -22,6 +23,7 @@ use vines_testbench::{
 };
 
 use crate::{
+    saved,
     scene::{Scene, invalid, json},
     wait::wait,
 };
@@ -164,6 +166,17 @@ impl PhaseLock {
 
     fn copy(&self) -> Self {
         self.clone()
+    }
+
+    /// Configuration and state as bytes.
+    fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        saved::save(py, &(self.lock, &self.state))
+    }
+
+    #[staticmethod]
+    fn restore(saved: &[u8]) -> PyResult<Self> {
+        let (lock, state) = saved::restore(saved)?;
+        Ok(Self { lock, state })
     }
 
     /// omega, amplitude, drive, phase error, response amplitude, coherence, locked, settled, state, fault.

@@ -2,6 +2,7 @@
 
 mod experiments;
 mod plants;
+mod saved;
 mod scene;
 mod sweeps;
 mod wait;

@@ -14,10 +14,11 @@ use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2,
 use pyo3::{
     exceptions::{PyKeyboardInterrupt, PyMemoryError},
     prelude::*,
+    types::PyBytes,
 };
 use rayon::prelude::*;
 
-use crate::{scene::invalid, wait::wait};
+use crate::{saved, scene::invalid, wait::wait};
 
 /// Plants that advance independently of each other.
 #[pyclass]
@@ -136,6 +137,16 @@ impl Plants {
         reserve(&mut plants, self.plants.len())?;
         plants.extend_from_slice(&self.plants);
         Ok(Self { plants, next: Vec::new() })
+    }
+
+    /// The plants as bytes.
+    fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        saved::save(py, &self.plants)
+    }
+
+    #[staticmethod]
+    fn restore(saved: &[u8]) -> PyResult<Self> {
+        Ok(Self { plants: saved::restore(saved)?, next: Vec::new() })
     }
 
     /// Advances all plants, or none if a value is refused or a signal arrives. Returns the events, if they are wanted.

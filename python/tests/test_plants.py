@@ -1,6 +1,8 @@
 """Plants, batches, scenes and experiments: bits, errors, threads and signals."""
 
+import copy
 import os
+import pickle
 import signal
 import threading
 import time
@@ -75,6 +77,46 @@ def test_a_copy_continues_with_the_same_bits():
     other.advance(1.0, **DRIVE)
     assert one.state == other.state
     assert isinstance(other, vines.Plant)
+
+
+@pytest.mark.parametrize("again", [lambda one: pickle.loads(pickle.dumps(one)), copy.copy, copy.deepcopy])
+def test_what_was_pickled_or_copied_continues_with_the_same_bits(again):
+    random = np.random.default_rng(31)
+    batch = vines.Batch(vines.Scene(), {"dq2": random.uniform(0.0, 1.0, 20)})
+    for duration in random.uniform(0.01, 2.0, 20):
+        batch.advance(duration, **DRIVE)
+    other = again(batch)
+    assert isinstance(other, vines.Batch)
+    found, expected = other.advance(3.0, **DRIVE), batch.advance(3.0, **DRIVE)
+    assert np.array_equal(other.states, batch.states)
+    assert np.array_equal(found.time, expected.time)
+    assert np.array_equal(other.dissipated, batch.dissipated)
+    assert isinstance(again(vines.Plant()), vines.Plant)
+
+    lock, responses = vines.PhaseLock(), 1e-3 * np.sin(0.06 * np.arange(4000))
+    for response in responses[:2000]:
+        lock.sample(response)
+    follower = again(lock)
+    assert [lock.sample(one) for one in responses[2000:]] == [follower.sample(one) for one in responses[2000:]]
+
+
+@pytest.mark.parametrize("one", [vines.Plant(), vines.PhaseLock()])
+def test_bytes_of_another_version_and_damaged_ones_are_refused(one):
+    saved, version = one.__getstate__(), b"0.1.0"
+    assert saved.count(version) == 1
+    for wrong, words in [
+        (saved.replace(version, b"9.9.9"), "pickled with vines 9.9.9, and this is 0.1.0"),
+        (saved[:-3], "not what vines 0.1.0 pickles"),
+        (saved + b"abc", "3 bytes too many"),
+        (b"", "not what vines 0.1.0 pickles"),
+    ]:
+        with pytest.raises(ValueError, match=words):
+            one.__setstate__(wrong)
+
+
+def test_plants_show_their_state():
+    assert repr(vines.Plant(dq2=0.25)) == "<Plant at 0 s: q1 = 0, dq1 = 0, q2 = 0, dq2 = 0.25>"
+    assert repr(vines.Batch(vines.Scene(), {"dq2": [0.1, 0.2]})) == "<Batch of 2 plants>"
 
 
 @pytest.mark.parametrize(

@@ -104,3 +104,9 @@ class PhaseLock:
         other = PhaseLock.__new__(PhaseLock)
         other._native = self._native.copy()
         return other
+
+    def __getstate__(self) -> bytes:
+        return self._native.save()
+
+    def __setstate__(self, saved: bytes) -> None:
+        self._native = _native.PhaseLock.restore(saved)

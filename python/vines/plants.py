@@ -148,6 +148,15 @@ class Batch:
         other._native = self._native.copy()
         return other
 
+    def __getstate__(self) -> bytes:
+        return self._native.save()
+
+    def __setstate__(self, saved: bytes) -> None:
+        self._native = _native.Plants.restore(saved)
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__} of {len(self)} plants>"
+
     @property
     def states(self) -> NDArray[np.float64]:
         """q1 (m), q1' (m/s), q2 (m) and q2' (m/s), shape (n, 4)."""
@@ -209,6 +218,10 @@ class Plant(Batch):
         super().__init__(Scene() if parameters is None else parameters, start)
         if len(self) != 1:
             raise ValueError(f"values for {len(self)} plants: one is allowed here; Batch has more")
+
+    def __repr__(self) -> str:
+        state = ", ".join(f"{name} = {value:.6g}" for name, value in self.state.items())
+        return f"<Plant at {self.time:.6g} s: {state}>"
 
     def advance(  # type: ignore[override]
         self, duration: float, *, amplitude: float = 0.0, omega: float = 0.0
