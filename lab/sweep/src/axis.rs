@@ -3,6 +3,7 @@
 use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
+use phase_lock::Parameter;
 use rand_chacha::{
     ChaCha8Rng,
     rand_core::{Rng, SeedableRng},
@@ -92,18 +93,22 @@ impl Axis {
         }
     }
 
-    /// Unit, as far as the axis alone determines it: `1` for a dimensionless number.
+    /// Unit: `1` for a count, and for what a scene states relative to omega0, b or a period.
     #[must_use]
-    pub fn unit(&self) -> Option<&'static str> {
-        Some(match self.name.as_str() {
-            SIGMA | "plant.r" | "plant.epsilon" | "plant.lambda" | "excitation.G" => "1",
+    pub fn unit(&self) -> &'static str {
+        match self.name.as_str() {
             "plant.M" | "plant.m" => "kg",
             "plant.k" => "N/m",
             "plant.c" => "N s/m",
             "plant.b" | "excitation.E" | "start.q1" | "start.q2" => "m",
             "start.dq1" | "start.dq2" => "m/s",
-            _ => return None,
-        })
+            "controller.phase_target" | "controller.phase_tolerance" => "degree",
+            "chain.snr" => "dB",
+            name => {
+                let parameter = name.strip_prefix("phase_lock.").and_then(Parameter::find);
+                parameter.map_or("1", |one| if one.unit.is_empty() { "1" } else { one.unit })
+            }
+        }
     }
 }
 

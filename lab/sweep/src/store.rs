@@ -102,10 +102,7 @@ impl Store {
         }
         for (axis, sequence, dimension) in plan.coordinates() {
             let (length, chunk) = (plan.shape[dimension], plan.chunk[dimension]);
-            let mut attributes = json!({ "long_name": axis.name });
-            if let Some(unit) = axis.unit() {
-                attributes["units"] = unit.into();
-            }
+            let attributes = json!({ "long_name": axis.name, "units": axis.unit() });
             let array = ArrayBuilder::new(vec![length], vec![chunk], data_type::float64(), f64::NAN)
                 .bytes_to_bytes_codecs(vec![Arc::new(GzipCodec::new(LEVEL)?)])
                 .dimension_names(Some([plan.dimensions[dimension].as_str()]))

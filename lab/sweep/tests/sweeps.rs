@@ -14,6 +14,22 @@ use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, estimate, merge
 use vines_testbench::scene::Family;
 
 #[test]
+fn every_axis_has_a_unit() {
+    for (name, unit) in [
+        ("sigma", "1"),
+        ("plant.c", "N s/m"),
+        ("start.dq2", "m/s"),
+        ("controller.phase_target", "degree"),
+        ("controller.bandwidth", "1"),
+        ("chain.snr", "dB"),
+        ("phase_lock.harmonics", "1"),
+        ("phase_lock.base_bandwidth", "rad/s"),
+    ] {
+        assert_eq!(format!("{name}=1,2").parse::<Axis>().unwrap().unit(), unit, "{name}");
+    }
+}
+
+#[test]
 fn a_sweep_over_sigma_and_g_has_the_bits_of_the_map() {
     let folder = tempfile::tempdir().unwrap();
     let plan = plan(Settings {
