@@ -126,8 +126,9 @@ impl Phase {
     /// The phase, rad, in [0, 2π).
     pub fn radians(self) -> f64 {
         let sum = self.0 + self.1;
-        // Near 0 and 2π the rounding error may carry the sum out of the range.
-        if sum >= TAU.0 { sum - TAU.0 } else { sum.max(0.0) }
+        // Near 0 and 2π the rounding error, which grows with the number of turns, may carry the sum out of the range.
+        let sum = if sum < 0.0 { TAU.0 + (sum + TAU.1) } else { sum };
+        if sum >= TAU.0 { sum - TAU.0 } else { sum }
     }
 
     /// The phase later by `angle`, from -2π to 2π with its rounding error.

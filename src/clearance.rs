@@ -13,7 +13,7 @@ use crate::segment::Derivatives;
 /// A gap and how it closes now: `g(t+h) = gap - closing h - acceleration h²/2 - jerk h³/6 - ...`
 #[derive(Clone, Copy, Debug)]
 pub struct Gap {
-    /// The gap, 0 or above.
+    /// The gap; below 0 it is closed, whether or not it opens again.
     pub gap: f64,
     /// Closing speed, `-g'`.
     pub closing: f64,
@@ -86,7 +86,11 @@ pub fn first_closure<const N: usize>(
         let mut step = left;
         let mut nearest: Option<(f64, usize)> = None;
         for (which, gap) in gaps.iter().enumerate() {
-            let open = bounds.open(gap, &derivatives, left);
+            let open = if gap.gap < 0.0 {
+                0.0
+            } else {
+                bounds.open(gap, &derivatives, left)
+            };
             if open * fastest < NEAR && open < left {
                 let contact = gap.contact_nearby(2.0 * NEAR / fastest);
                 if let Some(h) = contact.filter(|h| *h <= left)
@@ -143,6 +147,9 @@ impl Gap {
 
     /// The contact at most `reach` ahead on the local cubic, if the gap is crossed there.
     fn contact_nearby(&self, reach: f64) -> Option<f64> {
+        if self.gap < 0.0 {
+            return Some(0.0);
+        }
         let mut h = 0.0;
         for _ in 0..4 {
             // The cubic term is a small correction to the acceleration here: a fixed point in two or three rounds.

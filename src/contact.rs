@@ -41,16 +41,6 @@ impl Wall {
     }
 }
 
-/// How particle and wall touch.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub(crate) enum Contact {
-    Free,
-    Stuck(Wall),
-    /// Free, and the wall has ceased to push at this very instant.
-    Released(Wall),
-}
-
 /// Coefficients of Newton's impact law, derived once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ImpactLaw {

@@ -9,7 +9,7 @@ mod events;
 
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::{BaseMotion, Drive};
-use crate::contact::{Contact, Wall};
+use crate::contact::Wall;
 use crate::fast::FastPath;
 use crate::moving::{Masses, Moving, Rig};
 use crate::parameters::{InvalidValue, Parameters};
@@ -25,7 +25,8 @@ pub const MOST_EVALUATIONS: u64 = 500_000_000;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Plant {
     moving: Moving,
-    contact: Contact,
+    /// The wall that the particle is stuck to.
+    contact: Option<Wall>,
     /// Whether the base has a position: the first drive sets it, later ones may make it jump.
     begun: bool,
     time: f64,
@@ -65,7 +66,7 @@ impl Plant {
                 },
                 base: BaseMotion::default(),
             },
-            contact: Contact::Free,
+            contact: None,
             begun: false,
             time: 0.0,
             totals: Totals::default(),
@@ -159,10 +160,7 @@ impl Plant {
 
     /// The wall the particle is stuck to, if it is.
     pub fn contact(&self) -> Option<Wall> {
-        match self.contact {
-            Contact::Stuck(wall) => Some(wall),
-            Contact::Free | Contact::Released(_) => None,
-        }
+        self.contact
     }
 
     /// Totals since the start.

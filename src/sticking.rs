@@ -21,14 +21,15 @@ pub struct Sticking {
 ///
 /// The wall at `w = +b` pushes while the joint acceleration is positive, that at `w = -b` while it is negative.
 /// `noise` (m/s²) is the rounding of that acceleration: a push is said to have ceased only below `-noise`, so that two
-/// masses at rest do not part over a last digit.
+/// masses at rest do not part over a last digit. Below that they part at once, even if the push rises: the base may change its
+/// velocity or acceleration at the start of the stretch, without a jump.
 pub fn until_released(motion: &Segment, wall: Wall, limit: f64, noise: f64) -> Sticking {
     let s = wall.sign();
     let series = motion.series();
     let look = |t: f64| {
         let d = motion.at(&series, t).derivatives;
         let push = Gap {
-            gap: (s * d[2] + noise).max(0.0),
+            gap: s * d[2] + noise,
             closing: -s * d[3],
             acceleration: -s * d[4],
             jerk: -s * d[5],

@@ -130,6 +130,65 @@ fn a_particle_at_rest_on_the_wall_is_held_let_go_and_caught_again() {
     assert!(t > 1.5 && t < 2.0, "released at {t}");
 }
 
+/// A particle at rest on the wall at w = +b, and the wall as the drive leaves it.
+fn pressed(parameters: Parameters, drive: Drive, duration: f64) -> Plant {
+    let mut plant = Plant::new(parameters, State { q2: -1.0, ..State::default() }).unwrap();
+    plant.advance(drive, duration).unwrap();
+    assert_eq!(plant.contact(), Some(Wall::Plus));
+    plant
+}
+
+#[test]
+fn a_wall_that_a_changed_drive_pulls_away_without_a_jump_lets_go_at_once() {
+    let parameters = Parameters { damping: 4.0, ..Parameters::dimensionless(0.1, 0.0, 0.5) };
+    let drive = |signal, amplitude, omega| Drive { signal, amplitude, omega };
+    let ramp = drive([0.0, 1.0, 0.0, 0.0], 0.0, 0.0);
+    // The base stops; it curves downwards as well; its oscillator, passing through 0, slows down. In each case the wall draws away,
+    // and ever more slowly.
+    for (before, after, since) in [
+        (ramp, drive([1.0, 0.0, 0.0, 0.0], 0.0, 0.0), 1.0),
+        (ramp, drive([1.0, -0.3, 0.2, 0.1], 0.0, 0.0), 1.0),
+        (drive([0.0; 4], 1.0, 1.0), drive([0.0; 4], 1.0, 0.1), 0.25),
+    ] {
+        let mut plant = pressed(parameters, before, since);
+        let speed = plant.state().dq2;
+        let mut events = Vec::new();
+        (plant.advance_with(after, 0.25, |event| events.push(event))).unwrap();
+        assert_eq!(events, [Event::Released { t: 0.0, wall: Wall::Plus }], "{after:?}");
+        assert_eq!(plant.state().dq2, speed, "the particle flies on: {after:?}");
+    }
+}
+
+#[test]
+fn a_release_at_the_very_end_of_a_step_says_nothing_about_another_drive_or_other_parameters() {
+    let parameters = Parameters { damping: 4.0, ..Parameters::dimensionless(0.1, 0.0, 0.5) };
+    let start = pressed(parameters, Drive::held(2.0), 0.0);
+    let mut end = f64::NAN;
+    let mut longer = start;
+    let until = |event| {
+        if let Event::Released { t, .. } = event {
+            end = end.min(t);
+        }
+    };
+    longer.advance_with(Drive::held(2.0), 60.0, until).unwrap();
+    let released = || {
+        let mut plant = start;
+        assert_eq!(plant.advance(Drive::held(2.0), end).unwrap().released, 1);
+        plant
+    };
+    // The base moves up, so that the wall presses, and curves down.
+    let mut driven = released();
+    let curved = Drive { signal: [2.0, 0.5, -2.0, 0.0], ..Drive::default() };
+    driven.advance(curved, 0.02).unwrap();
+    // With less damping the spring presses the wall on the particle.
+    let mut eased = released();
+    eased.set_parameters(Parameters { damping: 3.9, ..parameters }).unwrap();
+    eased.advance(Drive::held(2.0), 0.02).unwrap();
+    for plant in [driven, eased] {
+        assert_eq!((plant.contact(), plant.relative_velocity()), (Some(Wall::Plus), 0.0));
+    }
+}
+
 #[test]
 fn at_rest_nothing_happens_for_a_million_periods() {
     let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);

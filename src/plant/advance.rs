@@ -3,7 +3,7 @@
 use super::{Event, MOST_EVALUATIONS, MOST_IMPACTS, Outcome, Plant};
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::Drive;
-use crate::contact::{Contact, Wall};
+use crate::contact::Wall;
 use crate::fast::Next;
 use crate::flight::Flight;
 use crate::parameters::InvalidValue;
@@ -78,7 +78,7 @@ impl Plant {
             self.moving.base.drive.omega = drive.omega;
             self.fast.drive_changed(&self.moving.rig.free, &self.moving.base.drive);
         }
-        if self.contact == Contact::Free && self.fast.step(&mut self.moving, duration) {
+        if self.contact.is_none() && self.fast.step(&mut self.moving, duration) {
             self.time += duration;
             return Ok(Outcome { elapsed: duration, evaluations: 1, ..Outcome::default() });
         }
@@ -99,7 +99,7 @@ impl Plant {
             self.moving.masses.primary = self.moving.masses.primary.plus([0.0, kick]);
             self.moving.masses.dw += kick;
             // The impulse acts on the primary mass alone; contact is decided anew.
-            self.contact = Contact::Free;
+            self.contact = None;
         }
         self.fast.contact_free.jump(oscillator, &before, drive, kick);
     }
@@ -114,29 +114,26 @@ impl Plant {
             outcome: Outcome::default(),
             on_event,
         };
-        if self.contact == Contact::Free
+        if self.contact.is_none()
             && let Some(wall) = self.wall_touched()
         {
             self.touch(wall, &mut step);
         }
         while step.goes_on() {
             let left = step.left.value();
-            let next = match self.contact {
-                Contact::Free => self.fast.next(&mut self.moving, left, duration),
-                _ => Next::Search(left),
-            };
-            match next {
-                Next::ContactFree(t) if t == left => step.left = Sum::default(),
-                Next::ContactFree(t) => step.left = step.left.plus(-t),
-                Next::Contact(t, wall) => {
-                    step.left = step.left.minus(t);
-                    self.touch(wall, &mut step);
-                    continue;
+            if let Some(wall) = self.contact {
+                self.stay(wall, left, &mut step);
+            } else {
+                match self.fast.next(&mut self.moving, left, duration) {
+                    Next::ContactFree(t) if t == left => step.left = Sum::default(),
+                    Next::ContactFree(t) => step.left = step.left.plus(-t),
+                    Next::Contact(t, wall) => {
+                        step.left = step.left.minus(t);
+                        self.touch(wall, &mut step);
+                        continue;
+                    }
+                    Next::Search(limit) => self.search(limit, None, &mut step),
                 }
-                Next::Search(limit) => match self.contact {
-                    Contact::Stuck(wall) => self.stay(wall, limit, &mut step),
-                    _ => self.search(limit, &mut step),
-                },
             }
             step.outcome.cut_short =
                 self.fast.evaluations >= MOST_EVALUATIONS || step.outcome.released >= MOST_RELEASES;
@@ -148,13 +145,10 @@ impl Plant {
         step.outcome
     }
 
-    /// Follows the flight to its first contact by certified search, or for `limit` seconds.
+    /// Follows the flight to its first contact by certified search, or for `limit` seconds; `released` names the wall that has
+    /// just ceased to push.
     #[inline(never)]
-    fn search(&mut self, limit: f64, step: &mut Step<impl FnMut(Event)>) {
-        let released = match self.contact {
-            Contact::Released(wall) => Some(wall),
-            _ => None,
-        };
+    fn search(&mut self, limit: f64, released: Option<Wall>, step: &mut Step<impl FnMut(Event)>) {
         let masses = self.moving.masses;
         let motion = Segment::new(&self.moving.rig.free, self.moving.base, masses.primary.values.into());
         let half_width = self.moving.rig.parameters.half_width;
@@ -164,7 +158,6 @@ impl Plant {
         self.moving.masses.primary = masses.primary.plus([end.moved, end.gained]);
         self.moving.masses.dw += end.gained;
         self.moving.masses.drift(end.drifted, half_width);
-        self.contact = Contact::Free;
         self.base_moves(end.t);
         step.left = step.left.plus(-end.t);
         if let Some(wall) = end.wall {
@@ -172,7 +165,8 @@ impl Plant {
         }
     }
 
-    /// Both masses move as one for at most `left` seconds, until the wall ceases to push.
+    /// Both masses move as one for at most `left` seconds, until the wall ceases to push; then the particle flies on. The release
+    /// is not remembered beyond this call: another drive or other parameters may press the wall on the particle again.
     fn stay(&mut self, wall: Wall, left: f64, step: &mut Step<impl FnMut(Event)>) {
         let start = self.moving.masses.primary.values;
         let noise = self.acceleration_error(start[1]);
@@ -185,10 +179,11 @@ impl Plant {
         self.base_moves(stay.t);
         step.left = step.left.plus(-stay.t);
         if stay.released {
-            self.contact = Contact::Released(wall);
+            self.contact = None;
             step.outcome.released += 1;
             let t = step.now();
             (step.on_event)(Event::Released { t, wall });
+            self.search(step.left.value(), Some(wall), step);
         }
     }
 

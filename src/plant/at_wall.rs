@@ -3,7 +3,7 @@
 use super::advance::Step;
 use super::{Event, Plant};
 use crate::arithmetic::Sum;
-use crate::contact::{Contact, Resolution, Wall};
+use crate::contact::{Resolution, Wall};
 use crate::moving::Masses;
 use crate::oscillator::Oscillator;
 use crate::segment::Segment;
@@ -51,7 +51,7 @@ impl Plant {
             (step.on_event)(Event::Impact { t, wall, velocity });
         }
         if touch.stuck {
-            self.contact = Contact::Stuck(wall);
+            self.contact = Some(wall);
             step.outcome.stuck += 1;
             (step.on_event)(Event::Stuck { t, wall });
         }

@@ -27,6 +27,31 @@ fn a_million_turns_in_one_step_and_in_a_million_agree() {
 }
 
 #[test]
+fn sevenths_of_a_turn_add_up_to_turns_without_losing_digits() {
+    let omega = 0.990_417;
+    let t = TAU.0 / omega / 7.0;
+    let (angle, error) = product(omega, t);
+    let (seven, rounding) = product(7.0, angle);
+    // What seven steps are longer than a turn.
+    let surplus = ((seven - TAU.0) + rounding) + (7.0 * error - TAU.1);
+    for sign in [1.0, -1.0] {
+        let mut base = BaseMotion {
+            drive: Drive::harmonic(1.0, sign * omega),
+            phase: Phase::default(),
+        };
+        for turn in 1..=100_000 {
+            for _ in 0..7 {
+                base = base.after(t);
+            }
+            let phase = base.phase.radians();
+            assert!((0.0..TAU.0).contains(&phase), "{turn}: {phase}");
+            let lost = libm::remainder(phase, TAU.0) - sign * surplus * f64::from(turn);
+            assert!(lost.abs() < 1e-15, "{turn}: {lost:e}");
+        }
+    }
+}
+
+#[test]
 fn the_phase_after_turns_is_the_remainder_of_a_division_by_one_turn() {
     for turns in 1..3000 {
         for beside in [-1, 0, 1] {
