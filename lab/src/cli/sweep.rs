@@ -146,7 +146,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         let share = 100.0 * inferred as f64 / plan.cells() as f64;
         text += &format!("{inferred} cells ({share:.1} %) were inferred from their neighbours\n");
     }
-    let damage = damage(&monitor);
+    let damage = damage(&monitor, "They were replaced");
     text += &damage;
     if let Some(reason) = monitor.reason.lock().ok().and_then(|mut reason| reason.take()) {
         text += &format!("First failure: {reason}\n");
@@ -174,7 +174,8 @@ fn merge(plan: &Plan, arguments: &Arguments) -> Result<String, Failure> {
     let out = arguments.out.display();
     let monitor = Monitor::default();
     let missing = sweep::merge(plan, &arguments.out, &arguments.merge, &monitor).map_err(Failure::input)?;
-    let (computed, damage) = (monitor.computed.load(Relaxed), damage(&monitor));
+    let computed = monitor.computed.load(Relaxed);
+    let damage = damage(&monitor, &format!("{out} does not have them"));
     match missing {
         0 => Ok(format!(
             "{} cells, complete; {computed} of them computed\n{damage}Written: {out}\n",
@@ -194,7 +195,10 @@ fn verify(plan: &Plan, arguments: &Arguments) -> Result<String, Failure> {
         sweep::verify(plan, &arguments.out, part, &monitor)
     })?;
     if !complete {
-        return Err(Failure::new(INTERRUPTED, "interrupted; nothing was written".to_string()));
+        return Err(Failure::new(
+            INTERRUPTED,
+            "interrupted; nothing was written".to_string(),
+        ));
     }
     let (found, cells) = (monitor.found.load(Relaxed), part.cells(plan));
     let undamaged = format!("{found} of {cells} cells are complete and undamaged");
@@ -209,10 +213,10 @@ fn verify(plan: &Plan, arguments: &Arguments) -> Result<String, Failure> {
     }
 }
 
-/// A line about damaged files that were written again.
-fn damage(monitor: &Monitor) -> String {
+/// A line about damaged files, and what became of them.
+fn damage(monitor: &Monitor, consequence: &str) -> String {
     let damage = monitor.damage();
-    damage.map_or(String::new(), |damage| format!("{damage}. They were replaced\n"))
+    damage.map_or(String::new(), |damage| format!("{damage}. {consequence}\n"))
 }
 
 /// Does some work with a bar that shows the progress, until it is complete or a signal stops it.

@@ -98,7 +98,9 @@ impl Store {
     fn new(plan: &Plan, root: &Path) -> Result<Self, StoreError> {
         let folder = Arc::new(Folder::new(root));
         let arrays = variables(plan.settings()).map(|one| Ok((one, variable(plan, &folder, &one)?)));
-        let axes = plan.coordinates().map(|(one, _, dimension)| axis(plan, &folder, one, dimension));
+        let axes = plan
+            .coordinates()
+            .map(|(one, _, dimension)| axis(plan, &folder, one, dimension));
         let failed = |source| StoreError::Write { folder: root.into(), source };
         Ok(Self {
             arrays: arrays.collect::<Result<_, Failed>>().map_err(failed)?,
@@ -172,7 +174,9 @@ impl Store {
                 let values: Vec<f64> = (n * chunk..(n + 1) * chunk).map(value).collect();
                 let key = array.chunk_key(&[n]);
                 let fault = match self.folder.read(key.as_str()) {
-                    Ok(found) if found == values.iter().flat_map(|one| one.to_le_bytes()).collect::<Vec<u8>>() => continue,
+                    Ok(found) if found == values.iter().flat_map(|one| one.to_le_bytes()).collect::<Vec<u8>>() => {
+                        continue;
+                    }
                     Ok(_) => Fault::Content,
                     Err(fault) => fault,
                 };
@@ -298,11 +302,7 @@ impl Store {
     }
 }
 
-fn variable(
-    plan: &Plan,
-    folder: &Arc<Folder>,
-    variable: &Variable,
-) -> Result<Array<Folder>, Failed> {
+fn variable(plan: &Plan, folder: &Arc<Folder>, variable: &Variable) -> Result<Array<Folder>, Failed> {
     // A cell without a file looks as one that is not computed.
     let absent = Cell::default();
     let (data_type, fill): (DataType, ArrayBuilderFillValue) = match variable.read {
