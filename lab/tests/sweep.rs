@@ -99,6 +99,67 @@ fn kills(arguments: &[&str]) {
 }
 
 #[test]
+fn a_verification_names_damaged_and_missing_files_and_the_same_sweep_replaces_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let [out, merged] = ["store", "merged"].map(|name| folder.path().join(name));
+    let go = |further: &[&str], out: &Path, code, parts: &[&str]| {
+        let arguments = [
+            &["sweep", "--axis=plant.r=0.3:0.9:20", "--periods=100", "--chunk=8"],
+            further,
+        ]
+        .concat();
+        let output = vines(&arguments, out).output().unwrap();
+        assert_eq!(output.status.code(), Some(code), "{}", text(&output));
+        for part in parts {
+            assert!(text(&output).contains(part), "{part}: {}", text(&output));
+        }
+    };
+    go(&["--verify"], &out, 1, &["is not the store of a sweep"]);
+    assert!(!out.exists());
+    go(&["--shard=1/2"], &out, 0, &["12 computed"]);
+    go(&["--verify"], &out, 1, &["12 of 20 cells are complete and undamaged"]);
+    go(&["--verify", "--shard=1/2"], &out, 0, &["12 of 12 cells"]);
+    go(&[], &out, 0, &["12 already complete, 8 computed"]);
+    go(
+        &["--verify"],
+        &out,
+        0,
+        &["20 of 20 cells are complete and undamaged", "Verified"],
+    );
+    let whole = content(&out);
+    let damage = || fs::write(out.join("impacts/c/1"), "").unwrap();
+    let named = "1 damaged or incomplete file: ";
+    damage();
+    go(
+        &["--verify"],
+        &out,
+        1,
+        &[named, "impacts/c/1 is empty", "12 of 20 cells", "Without --verify"],
+    );
+    go(
+        &[],
+        &out,
+        0,
+        &[
+            named,
+            "impacts/c/1 is empty",
+            "replaced",
+            "12 already complete, 8 computed",
+        ],
+    );
+    assert!(content(&out) == whole);
+    damage();
+    let merge = format!("--merge={}", out.display());
+    go(
+        &[&merge],
+        &merged,
+        0,
+        &[named, "impacts/c/1 is empty", "20 cells, complete; 8 of them computed"],
+    );
+    assert!(content(&merged) == whole);
+}
+
+#[test]
 fn ctrl_c_keeps_complete_chunks_and_the_same_command_goes_on() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("store");

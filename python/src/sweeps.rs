@@ -1,12 +1,13 @@
 //! Sweeps.
 
 use std::{
+    ffi::CString,
     path::PathBuf,
     sync::atomic::{AtomicBool, Ordering::Relaxed},
 };
 
 use pyo3::{
-    exceptions::{PyOSError, PyOverflowError, PyValueError},
+    exceptions::{PyOSError, PyOverflowError, PyRuntimeWarning, PyValueError},
     prelude::*,
     types::PyDict,
 };
@@ -125,6 +126,10 @@ impl Sweep {
             _ => invalid(error),
         })?;
         looked(py)?;
+        if let Some(damage) = monitor.damage() {
+            let message = CString::new(format!("{damage}. They were replaced"))?;
+            PyErr::warn(py, &py.get_type::<PyRuntimeWarning>(), &message, 2)?;
+        }
         Ok((monitor.computed.load(Relaxed), monitor.failed.load(Relaxed)))
     }
 }

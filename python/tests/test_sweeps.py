@@ -11,6 +11,7 @@ from pathlib import Path
 import dask
 import dask.threaded
 import pytest
+import xarray
 from dask.distributed import Client, LocalCluster
 
 import vines
@@ -104,6 +105,36 @@ def test_a_store_of_another_sweep_stays_and_a_folder_that_cannot_be_written_is_a
     assert content(out) == before
     with pytest.raises(OSError, match="/proc/store"):
         vines.sweep(None, {"plant.r": [0.5, 0.6]}, out="/proc/store", periods=200)
+
+
+def test_damaged_chunks_are_computed_again_with_a_warning(whole, tmp_path):
+    out = tmp_path / "store"
+    vines.sweep(None, AXES, out=out, **SETTINGS)
+    chunk = out / "impacts" / "c" / "3" / "0"
+    chunk.write_bytes(chunk.read_bytes()[:-4])
+    (out / "settling" / "c" / "5" / "0").unlink()
+    with pytest.warns(RuntimeWarning, match=r"2 damaged .*impacts/c/3/0 is truncated; .*settling/c/5/0 is missing"):
+        vines.sweep(None, AXES, out=out, **SETTINGS)
+    assert content(out) == whole
+
+
+def test_cells_that_are_not_computed_are_recognised_in_xarray(tmp_path):
+    out = tmp_path / "store"
+    arguments = ["--axis=plant.r=0.3:0.9:4", "--periods=100", "--chunk=1", "--shard=1/2", f"--out={out}"]
+    subprocess.run([os.environ["VINES"], "sweep", *arguments], check=True)
+    cells = xarray.open_zarr(out).load()
+    absent = [False, True, False, True]
+    assert (cells.regime == 255).values.tolist() == absent
+    assert (cells.failure == "not computed").values.tolist() == absent
+    assert (cells.failure == "").values.tolist() == [not one for one in absent]
+    for name, variable in cells.data_vars.items():
+        if name not in ("regime", "failure"):
+            assert variable.isnull().values[absent].all(), name
+    for name in ["followed", "impacts", "periods", "settling", "synchrony"]:
+        assert cells[name].isnull().values.tolist() == absent, name
+    meanings = dict(zip(cells.regime.attrs["flag_values"], cells.regime.attrs["flag_meanings"].split(), strict=True))
+    assert meanings[255] == "not_computed"
+    assert meanings[254] == "failed"
 
 
 @contextmanager

@@ -34,7 +34,8 @@ def sweep(
 ) -> "xarray.Dataset":
     """Compute one plant per cell, write the results to a Zarr store as they are computed, and open it.
 
-    An interrupted store is continued. It has the same bytes as that of `vines sweep`; docs/scale.md describes it.
+    An interrupted store is continued, and damaged chunks are computed again, with a RuntimeWarning that names them.
+    The store has the same bytes as that of `vines sweep`; docs/scale.md describes it.
 
     Parameters
     ----------

@@ -5,7 +5,7 @@ use std::{path::PathBuf, thread, time::Duration};
 
 use clap::Args;
 use vines::ArgumentError;
-use vines::sweep::{self, Axis, Estimate, Monitor, Plan, Results, Settings, Shard};
+use vines::sweep::{self, Axis, Estimate, Monitor, Plan, Results, Settings, Shard, StoreError};
 
 use super::failure::{Failure, INTERRUPTED};
 use super::{interrupt::stop_flag, output::progress_bar, scene_arguments::SceneArguments};
@@ -25,7 +25,8 @@ Results; the regime is always computed, as by `vines map`:
   lock       the locked point: the experiment of `vines identify`, without its decay
 
 The store is a Zarr group (version 3) that xarray.open_zarr reads; docs/scale.md describes it. It is written chunk by chunk. The same
-command continues a sweep that was interrupted. A cell that fails has its reason in the variable `failure`.
+command continues a sweep that was interrupted, and computes damaged chunks again. A cell that fails has its reason in the variable
+`failure`.
 
 Examples:
   vines sweep --axis sigma=-5:5:101 --axis excitation.G=0.1:3:59 --out map.zarr
@@ -81,13 +82,24 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "I/N", value_parser = shard)]
     shard: Option<Shard>,
 
-    /// Collect the chunks of these stores of the same sweep instead of computing
+    /// Collect the chunks of these stores of the same sweep; only damaged ones are computed
     #[arg(long, value_name = "DIR", num_args = 1.., conflicts_with = "shard")]
     merge: Vec<PathBuf>,
+
+    /// Verify the checksums of the store; nothing is computed or written
+    #[arg(long, conflicts_with = "merge")]
+    verify: bool,
 
     /// Confirms a sweep of more than 2 hours or 20 GB
     #[arg(long)]
     yes: bool,
+}
+
+impl Arguments {
+    /// The part that this process computes.
+    fn part(&self) -> Shard {
+        self.shard.unwrap_or(Shard::ALL)
+    }
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
@@ -105,6 +117,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if !arguments.merge.is_empty() {
         return merge(&plan, arguments);
     }
+    if arguments.verify {
+        return verify(&plan, arguments);
+    }
     let estimate = sweep::estimate(&plan, &AtomicBool::new(false)).map_err(Failure::input)?;
     if estimate.is_large() && !arguments.yes {
         let Estimate { cells, hours, bytes } = estimate;
@@ -114,7 +129,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         )));
     }
     let monitor = Monitor::default();
-    let complete = watched(&plan, arguments, &monitor)?;
+    let work = || sweep::run(&plan, &arguments.out, arguments.part(), &monitor);
+    let complete = watched(&plan, "sweeping", &monitor, work)?;
     let (found, computed, failed) = (
         monitor.found.load(Relaxed),
         monitor.computed.load(Relaxed),
@@ -130,6 +146,8 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         let share = 100.0 * inferred as f64 / plan.cells() as f64;
         text += &format!("{inferred} cells ({share:.1} %) were inferred from their neighbours\n");
     }
+    let damage = damage(&monitor, "They were replaced");
+    text += &damage;
     if let Some(reason) = monitor.reason.lock().ok().and_then(|mut reason| reason.take()) {
         text += &format!("First failure: {reason}\n");
     }
@@ -137,7 +155,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         return Ok(format!("{text}Written: {}\n", arguments.out.display()));
     }
     let out = arguments.out.display();
-    let message = format!("interrupted; {out} has the complete chunks, and the same command continues");
+    let message = format!("{damage}interrupted; {out} has the complete chunks, and the same command continues");
     Err(Failure::new(INTERRUPTED, message))
 }
 
@@ -154,22 +172,65 @@ fn shard(text: &str) -> Result<Shard, ArgumentError> {
 
 fn merge(plan: &Plan, arguments: &Arguments) -> Result<String, Failure> {
     let out = arguments.out.display();
-    match sweep::merge(plan, &arguments.out, &arguments.merge).map_err(Failure::input)? {
-        0 => Ok(format!("{} cells, complete\nWritten: {out}\n", plan.cells())),
+    let monitor = Monitor::default();
+    let missing = sweep::merge(plan, &arguments.out, &arguments.merge, &monitor).map_err(Failure::input)?;
+    let computed = monitor.computed.load(Relaxed);
+    let damage = damage(&monitor, &format!("{out} does not have them"));
+    match missing {
+        0 => Ok(format!(
+            "{} cells, complete; {computed} of them computed\n{damage}Written: {out}\n",
+            plan.cells()
+        )),
         missing => Err(Failure::run(format!(
-            "{missing} of {} cells are in none of these stores; {out} has the others. Without --merge, the same command computes them",
+            "{damage}{missing} of {} cells are in none of these stores; {out} has the others. Without --merge, the same command computes them",
             plan.cells()
         ))),
     }
 }
 
-/// Runs the sweep with a bar that shows the progress, until it is complete or a signal stops it.
-fn watched(plan: &Plan, arguments: &Arguments, monitor: &Monitor) -> Result<bool, Failure> {
+fn verify(plan: &Plan, arguments: &Arguments) -> Result<String, Failure> {
+    let monitor = Monitor::default();
+    let (out, part) = (arguments.out.display(), arguments.part());
+    let complete = watched(plan, "verifying", &monitor, || {
+        sweep::verify(plan, &arguments.out, part, &monitor)
+    })?;
+    if !complete {
+        return Err(Failure::new(
+            INTERRUPTED,
+            "interrupted; nothing was written".to_string(),
+        ));
+    }
+    let (found, cells) = (monitor.found.load(Relaxed), part.cells(plan));
+    let undamaged = format!("{found} of {cells} cells are complete and undamaged");
+    match monitor.damage() {
+        None if found == cells => Ok(format!("{undamaged}\nVerified: {out}\n")),
+        damage => {
+            let damage = damage.map_or(String::new(), |damage| format!("{damage}. "));
+            Err(Failure::run(format!(
+                "{damage}{undamaged}. Without --verify, the same command computes the others"
+            )))
+        }
+    }
+}
+
+/// A line about damaged files, and what became of them.
+fn damage(monitor: &Monitor, consequence: &str) -> String {
+    let damage = monitor.damage();
+    damage.map_or(String::new(), |damage| format!("{damage}. {consequence}\n"))
+}
+
+/// Does some work with a bar that shows the progress, until it is complete or a signal stops it.
+fn watched(
+    plan: &Plan,
+    verb: &str,
+    monitor: &Monitor,
+    work: impl FnOnce() -> Result<bool, StoreError> + Send,
+) -> Result<bool, Failure> {
     let signal = stop_flag()?;
-    let template = "sweeping [{wide_bar}] {pos}/{len} cells, {per_sec}, {eta} left";
-    let bar = progress_bar(plan.cells(), template);
+    let template = format!("{verb} [{{wide_bar}}] {{pos}}/{{len}} cells, {{per_sec}}, {{eta}} left");
+    let bar = progress_bar(plan.cells(), &template);
     thread::scope(|scope| {
-        let work = scope.spawn(|| sweep::run(plan, &arguments.out, arguments.shard.unwrap_or(Shard::ALL), monitor));
+        let work = scope.spawn(work);
         let mut started = false;
         while !work.is_finished() {
             thread::sleep(Duration::from_millis(20));

@@ -16,12 +16,12 @@ use crate::{
     error::StoreError,
     monitor::Monitor,
     plan::Plan,
-    store::{ROUNDS, Store, code},
-    variables::ABSENT,
+    store::{ROUNDS, Store},
+    variables::{ABSENT, FAILED, code},
 };
 
-/// Code of a cell that is not known yet.
-const UNKNOWN: u8 = 254;
+/// Reason of an inferred cell whose neighbour failed.
+const INFERRED: &str = "not computed, as a cell beside it failed";
 
 /// Least number of cells of the first grid along a side, roughly.
 const SIDE: usize = 4;
@@ -41,7 +41,7 @@ pub(crate) fn run(plan: &Plan, store: &Store, stride: usize, monitor: &Monitor) 
     let mut map = Map {
         rows,
         columns,
-        codes: vec![UNKNOWN; rows * columns],
+        codes: vec![ABSENT; rows * columns],
         computed: vec![false; rows * columns],
         failures: BTreeMap::new(),
     };
@@ -130,7 +130,7 @@ impl Map {
     fn infer(&mut self, stride: usize) {
         for n in self.grid(stride) {
             let (row, column) = (n / self.columns, n % self.columns);
-            if self.codes[n] == UNKNOWN {
+            if self.codes[n] == ABSENT {
                 self.codes[n] = self.codes[(row - row % (2 * stride)) * self.columns + column - column % (2 * stride)];
             }
         }
@@ -163,7 +163,7 @@ impl Map {
         monitor: &Monitor,
     ) -> Result<bool, StoreError> {
         let kept = store
-            .read(key)
+            .kept(key, monitor)
             .and_then(|text| serde_json::from_slice::<Vec<(usize, u8, String)>>(&text).ok());
         // Another rule may have chosen other cells.
         let same = |results: &Vec<(usize, u8, String)>| results.iter().map(|one| &one.0).eq(cells);
@@ -202,11 +202,11 @@ impl Map {
     fn write(&self, plan: &Plan, store: &Store, monitor: &Monitor) -> Result<bool, StoreError> {
         let cell = |index: Vec<u64>| {
             let n = index[0] as usize * self.columns + index[1] as usize;
-            let regime = Some(self.codes[n]).filter(|code| *code != ABSENT);
+            let failed = || (self.codes[n] == FAILED).then(|| INFERRED.to_string());
             Cell {
-                regime: regime.map(|code| Regime::SIMULATED[usize::from(code)]),
+                regime: Regime::SIMULATED.get(usize::from(self.codes[n])).copied(),
                 inferred: !self.computed[n],
-                failure: self.failures.get(&n).cloned().unwrap_or_default(),
+                failure: self.failures.get(&n).cloned().or_else(failed).unwrap_or_default(),
                 ..Cell::default()
             }
         };

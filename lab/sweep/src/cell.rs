@@ -62,7 +62,7 @@ impl Results {
     }
 }
 
-/// Result of a cell; all is absent in a cell that failed.
+/// Result of a cell; all is absent in a cell that failed. The default is a cell that is not computed.
 #[derive(Debug, Clone, Default)]
 pub struct Cell {
     /// The regime, unless the cell failed.
@@ -137,6 +137,11 @@ impl Cell {
         Self { failure, ..Self::default() }
     }
 
+    /// Whether the cell was computed or inferred.
+    pub(crate) fn is_known(&self) -> bool {
+        self.regime.is_some() || !self.failure.is_empty()
+    }
+
     pub(crate) fn number(&self, of: impl Fn(&Point) -> f64) -> f64 {
         self.point.as_ref().map_or(f64::NAN, of)
     }
@@ -157,7 +162,8 @@ impl Cell {
             .map_or(f64::NAN, of)
     }
 
-    pub(crate) fn orbits(&self, counted: impl Fn(&&Orbit) -> bool) -> u32 {
-        self.orbits.iter().flatten().filter(counted).count() as u32
+    pub(crate) fn orbits(&self, counted: impl Fn(&&Orbit) -> bool) -> Option<u32> {
+        let orbits = self.orbits.as_ref()?;
+        Some(orbits.iter().filter(counted).count() as u32)
     }
 }

@@ -5,10 +5,9 @@ use std::sync::OnceLock;
 use vines_testbench::scene::{Scene, SceneError};
 
 use crate::{
-    cell::{Results, compute},
+    cell::{Cell, Results, compute},
     settings::Settings,
-    store::code,
-    variables::{Read, variables},
+    variables::{Read, code, count, reason, variables},
 };
 
 /// Detuning, G and r of the probe cells: symmetric, asymmetric, chaotic and modulated motions, and one that sticks.
@@ -23,7 +22,7 @@ const PROBES: [(f64, f64, f64); 6] = [
 /// Periods that they are followed.
 const PERIODS: usize = 400;
 
-/// A hash of all variables of the probe cells, bit by bit, in groups of `results`. Irregular motions multiply every difference of the
+/// A hash of all variables of the probe cells, and of cells without results, bit by bit, in groups of `results`. Irregular motions multiply every difference of the
 /// plant; the locked point is found once.
 pub(crate) fn engine(results: Results) -> Result<String, SceneError> {
     static KNOWN: [OnceLock<String>; 8] = [const { OnceLock::new() }; 8];
@@ -40,25 +39,29 @@ pub(crate) fn engine(results: Results) -> Result<String, SceneError> {
             hash = (hash ^ u64::from(*byte)).wrapping_mul(0x0100_0000_01b3);
         }
     };
+    // What a store says of cells without results counts as well.
+    let mut cells = vec![Cell::default(), Cell::failed("failed".into())];
     for (n, (sigma, g, r)) in PROBES.into_iter().enumerate() {
         let mut scene = Scene::load(None, &[])?;
         scene.plant.restitution = r;
-        let cell = compute(
+        cells.push(compute(
             &scene,
             sigma,
             Some(g),
             PERIODS,
             Results { lock: lock && n == 0, ..results },
-        );
+        ));
+    }
+    for cell in &cells {
         for variable in variables(&settings) {
             match variable.read {
                 // NaN has no sign that all processors agree on.
-                Read::Number(of) => add(&Some(of(&cell))
+                Read::Number(of) => add(&Some(of(cell))
                     .filter(|x| !x.is_nan())
                     .map_or([255; 8], f64::to_le_bytes)),
-                Read::Count(of) => add(&of(&cell).to_le_bytes()),
-                Read::Regime => add(&[code(&cell)]),
-                Read::Failure => add(cell.failure.as_bytes()),
+                Read::Count(of) => add(&count(of, cell).to_le_bytes()),
+                Read::Regime => add(&[code(cell)]),
+                Read::Failure => add(reason(cell).as_bytes()),
             }
         }
     }

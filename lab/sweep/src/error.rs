@@ -30,6 +30,13 @@ pub enum StoreError {
         /// Those of this program.
         here: String,
     },
+    /// Chunks without the file that says to which sweep they belong.
+    #[error(
+        "{} has chunks, but its zarr.json, which says to which sweep they belong, is missing or damaged. \
+         The store stays as it is; restore that file, delete the folder, or name another one",
+        .0.display()
+    )]
+    Group(PathBuf),
     /// The folder holds something else.
     #[error("{} is not the store of a sweep; name another folder", .0.display())]
     NotAStore(PathBuf),

@@ -10,6 +10,8 @@ use std::{
 
 use zarrs::storage::{Bytes, OffsetBytesIterator, StorageError, StoreKey, StorePrefix, WritableStorageTraits};
 
+use crate::gzip::{Fault, unpack};
+
 /// Where files are written before they get their name.
 pub(crate) const PARTIAL: &str = ".partial";
 
@@ -33,6 +35,11 @@ impl Folder {
 
     pub(crate) fn path(&self, key: &str) -> PathBuf {
         self.root.join(key)
+    }
+
+    /// The content of a file that ends with its checksum.
+    pub(crate) fn read(&self, key: &str) -> Result<Vec<u8>, Fault> {
+        unpack(&fs::read(self.path(key))?)
     }
 
     /// Writes a file completely or not at all: under another name first.

@@ -1,7 +1,7 @@
 //! Sweeps over any numbers of a scene and of its start, written to a Zarr store as they are computed.
 //!
-//! A [`Plan`] has the cells in their order, [`run`] computes the chunks that the store does not have. A chunk is complete or
-//! absent, and every cell depends only on its position: a sweep that was killed gives the same bytes as one that was not.
+//! A [`Plan`] has the cells in their order, [`run`] computes the chunks that the store does not have, or whose checksums are wrong.
+//! Every cell depends only on its position: a sweep that was killed gives the same bytes as one that was not.
 
 #![forbid(unsafe_code)]
 
@@ -12,6 +12,7 @@ mod doubt;
 mod engine;
 mod error;
 mod folder;
+mod gzip;
 mod monitor;
 mod plan;
 mod run;
@@ -25,6 +26,6 @@ pub use cell::Results;
 pub use error::StoreError;
 pub use monitor::Monitor;
 pub use plan::Plan;
-pub use run::{Estimate, EstimateError, Shard, estimate, merge, run};
+pub use run::{Estimate, EstimateError, Shard, estimate, merge, run, verify};
 pub use settings::{PlanError, Settings};
-pub use variables::ABSENT;
+pub use variables::{ABSENT, FAILED, UNCOUNTED};

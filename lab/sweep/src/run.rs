@@ -11,7 +11,14 @@ use std::{
 
 use rayon::prelude::*;
 
-use crate::{adaptive, cell::Cell, error::StoreError, monitor::Monitor, plan::Plan, store::Store};
+use crate::{
+    adaptive,
+    cell::Cell,
+    error::StoreError,
+    monitor::Monitor,
+    plan::Plan,
+    store::{Chunk, Store},
+};
 
 /// The part of a sweep that one process computes.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -25,41 +32,45 @@ pub struct Shard {
 impl Shard {
     /// The whole sweep.
     pub const ALL: Self = Self { number: 0, of: 1 };
+
+    /// Number of its cells.
+    #[must_use]
+    pub fn cells(self, plan: &Plan) -> u64 {
+        self.chunks(plan).map(|n| plan.chunk_cells(&plan.chunk_index(n))).sum()
+    }
+
+    /// Its chunks.
+    fn chunks(self, plan: &Plan) -> impl Iterator<Item = u64> + Send {
+        (self.number..plan.chunks()).step_by(self.of as usize)
+    }
 }
 
 /// Chunks that are computed at the same time for every eight threads: the last cells of one and the first of the next.
 const AT_ONCE: usize = 2;
 
-/// Computes the chunks of a part of `plan` that its store in `folder` does not have. True if all are there at the end; false if the
-/// monitor stopped it.
+/// Computes the chunks of a part of `plan` that its store in `folder` does not have, or whose files are damaged. True if all are there at
+/// the end; false if the monitor stopped it.
 ///
 /// # Errors
 /// A folder that cannot be used.
 pub fn run(plan: &Plan, folder: &Path, shard: Shard, monitor: &Monitor) -> Result<bool, StoreError> {
-    let opened = Store::open(plan, folder, &monitor.stop);
+    let opened = Store::open(plan, folder, shard, monitor);
     if monitor.stop.load(Relaxed) {
         return Ok(false);
     }
     let store = opened?;
-    let chunks = || (shard.number..plan.chunks()).step_by(shard.of as usize);
-    for n in chunks().take_while(|_| !monitor.stop.load(Relaxed)) {
-        let index = plan.chunk_index(n);
-        if store.has(&index) {
-            monitor.found.fetch_add(plan.chunk_cells(&index), Relaxed);
-        }
-    }
     if let Some(stride) = plan.settings().adaptive {
         if shard != Shard::ALL {
             return Err(StoreError::Part);
         }
-        if monitor.found.load(Relaxed) == plan.cells() {
+        if count(plan, &store, shard, monitor) == plan.cells() {
             store.tidy()?;
             return Ok(true);
         }
         monitor.found.store(0, Relaxed);
         return adaptive::run(plan, &store, stride as usize, monitor);
     }
-    let next = Mutex::new(chunks());
+    let next = Mutex::new(shard.chunks(plan));
     let error = Mutex::new(None);
     let work = || {
         loop {
@@ -67,7 +78,8 @@ pub fn run(plan: &Plan, folder: &Path, shard: Shard, monitor: &Monitor) -> Resul
             let Some(index) = n.filter(|_| !monitor.stop.load(Relaxed)).map(|n| plan.chunk_index(n)) else {
                 return;
             };
-            if store.has(&index) {
+            if let Chunk::Complete(_) = store.chunk(&index, monitor) {
+                monitor.found.fetch_add(plan.chunk_cells(&index), Relaxed);
                 continue;
             }
             let Some(cells) = chunk(plan, &index, monitor) else {
@@ -99,23 +111,67 @@ pub fn run(plan: &Plan, folder: &Path, shard: Shard, monitor: &Monitor) -> Resul
     }
 }
 
-/// Collects the chunks of other stores of the same sweep. Returns the number of cells that are still missing.
+/// Verifies a part of the store of `plan` in `folder`, and counts its undamaged cells; nothing is written. The monitor has the damage.
+///
+/// # Errors
+/// No store of this sweep.
+pub fn verify(plan: &Plan, folder: &Path, shard: Shard, monitor: &Monitor) -> Result<bool, StoreError> {
+    let store = Store::existing(plan, folder)?;
+    let inspected = store.inspect(plan, shard, monitor);
+    if monitor.stop.load(Relaxed) {
+        return Ok(false);
+    }
+    inspected?;
+    count(plan, &store, shard, monitor);
+    Ok(!monitor.stop.load(Relaxed))
+}
+
+/// Counts the cells of undamaged chunks, until the monitor stops it.
+fn count(plan: &Plan, store: &Store, shard: Shard, monitor: &Monitor) -> u64 {
+    shard.chunks(plan).par_bridge().for_each(|n| {
+        let index = plan.chunk_index(n);
+        if !monitor.stop.load(Relaxed)
+            && let Chunk::Complete(_) = store.chunk(&index, monitor)
+        {
+            monitor.found.fetch_add(plan.chunk_cells(&index), Relaxed);
+        }
+    });
+    monitor.found.load(Relaxed)
+}
+
+/// Collects the chunks of other stores of the same sweep, and computes those again that are damaged in all of them. Returns the number of
+/// cells that are still missing.
 ///
 /// # Errors
 /// A folder that cannot be used, or a store of another sweep.
-pub fn merge(plan: &Plan, folder: &Path, from: &[PathBuf]) -> Result<u64, StoreError> {
+pub fn merge(plan: &Plan, folder: &Path, from: &[PathBuf], monitor: &Monitor) -> Result<u64, StoreError> {
     let sources = from
         .iter()
         .map(|one| Store::existing(plan, one))
         .collect::<Result<Vec<_>, _>>()?;
-    let store = Store::open(plan, folder, &AtomicBool::new(false))?;
+    let store = Store::open(plan, folder, Shard::ALL, monitor)?;
     let mut missing = 0;
     for index in (0..plan.chunks()).map(|n| plan.chunk_index(n)) {
-        if store.has(&index) {
-            continue;
-        }
-        match sources.iter().find(|source| source.has(&index)) {
-            Some(source) => store.copy(&index, source)?,
+        let mut damaged = match store.chunk(&index, monitor) {
+            Chunk::Complete(_) => continue,
+            Chunk::Damaged => true,
+            Chunk::Absent => false,
+        };
+        let undamaged = sources.iter().find_map(|source| match source.chunk(&index, monitor) {
+            Chunk::Complete(files) => Some(files),
+            Chunk::Damaged => {
+                damaged = true;
+                None
+            }
+            Chunk::Absent => None,
+        });
+        match undamaged {
+            Some(files) => store.copy(&index, &files)?,
+            None if damaged => {
+                if let Some(cells) = chunk(plan, &index, monitor) {
+                    store.write(&index, &cells)?;
+                }
+            }
             None => missing += plan.chunk_cells(&index),
         }
     }

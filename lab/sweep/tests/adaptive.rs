@@ -2,10 +2,10 @@
 
 mod common;
 
-use std::{path::Path, sync::atomic::Ordering::Relaxed};
+use std::{fs, path::Path, sync::atomic::Ordering::Relaxed};
 
 use common::{array, files, plan, refused, settings};
-use vines_sweep::{Monitor, Results, Settings, Shard, run};
+use vines_sweep::{FAILED, Monitor, Results, Settings, Shard, merge, run};
 
 #[test]
 fn an_adaptive_map_computes_borders_infers_the_rest_and_resumes_to_the_same_bytes() {
@@ -52,6 +52,57 @@ fn an_adaptive_map_computes_borders_infers_the_rest_and_resumes_to_the_same_byte
     assert!(files(whole.path()) == files(stopped.path()));
     let part = run(&plan, stopped.path(), Shard { number: 0, of: 2 }, &Monitor::default());
     assert!(part.unwrap_err().to_string().contains("in parts"));
+}
+
+#[test]
+fn damaged_rounds_and_chunks_of_an_adaptive_map_are_computed_again() {
+    let [whole, stopped] = std::array::from_fn(|_| tempfile::tempdir().unwrap());
+    let plan = plan(Settings {
+        chunk: 400,
+        adaptive: Some(8),
+        ..settings(&["sigma=-1.6:-0.9:20", "excitation.G=0.8:1.3:20"])
+    })
+    .unwrap();
+    assert!(run(&plan, whole.path(), Shard::ALL, &Monitor::default()).unwrap());
+    let whole = files(whole.path());
+    // A folder with the name of a chunk stops it, after all rounds.
+    assert_eq!(merge(&plan, stopped.path(), &[], &Monitor::default()).unwrap(), 400);
+    let chunk = stopped.path().join("inferred/c/0/0");
+    fs::create_dir_all(&chunk).unwrap();
+    assert!(run(&plan, stopped.path(), Shard::ALL, &Monitor::default()).is_err());
+    fs::remove_dir(&chunk).unwrap();
+    let round = stopped.path().join(".rounds/0-0");
+    let mut content = fs::read(&round).unwrap();
+    let middle = content.len() / 2;
+    content[middle] ^= 4;
+    fs::write(&round, content).unwrap();
+    for damaged in [&round, &chunk] {
+        let monitor = Monitor::default();
+        assert!(run(&plan, stopped.path(), Shard::ALL, &monitor).unwrap());
+        let text = monitor.damage().unwrap();
+        assert!(text.contains(&damaged.display().to_string()), "{text}");
+        assert!(files(stopped.path()) == whole);
+        fs::remove_file(&chunk).unwrap();
+    }
+}
+
+#[test]
+fn an_inferred_cell_beside_failed_ones_is_not_taken_for_one_without_a_result() {
+    let folder = tempfile::tempdir().unwrap();
+    // Half of the starts are outside the cavity.
+    let settings = settings(&["start.q2=-0.03:0.009:40", "start.dq2=0.1:0.6:40"]);
+    let plan = plan(Settings { adaptive: Some(8), chunk: 400, ..settings }).unwrap();
+    let monitor = Monitor::default();
+    assert!(run(&plan, folder.path(), Shard::ALL, &monitor).unwrap());
+    assert!(monitor.inferred.load(Relaxed) > 0);
+    let [regime, reason, inferred] = ["regime", "failure", "inferred"].map(|name| array(folder.path(), name));
+    let codes: Vec<u8> = regime.retrieve_array_subset(&regime.subset_all()).unwrap();
+    let reasons: Vec<String> = reason.retrieve_array_subset(&reason.subset_all()).unwrap();
+    let inferred: Vec<u32> = inferred.retrieve_array_subset(&inferred.subset_all()).unwrap();
+    assert!(inferred.iter().all(|one| *one <= 1));
+    let failed = |n: &usize| codes[*n] == FAILED;
+    assert!((0..1600).filter(failed).any(|n| inferred[n] == 1));
+    assert!((0..1600).all(|n| reasons[n].is_empty() != failed(&n) && reasons[n] != "not computed"));
 }
 
 #[test]

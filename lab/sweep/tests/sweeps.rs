@@ -135,13 +135,22 @@ fn shards_in_stores_of_their_own_merge_to_the_same_bytes() {
             .unwrap()
         );
     }
-    assert_eq!(merge(&plan, merged.path(), &[first.path().into()]).unwrap(), 6);
     assert_eq!(
-        merge(&plan, merged.path(), &[first.path().into(), second.path().into()]).unwrap(),
+        merge(&plan, merged.path(), &[first.path().into()], &Monitor::default()).unwrap(),
+        6
+    );
+    assert_eq!(
+        merge(
+            &plan,
+            merged.path(),
+            &[first.path().into(), second.path().into()],
+            &Monitor::default()
+        )
+        .unwrap(),
         0
     );
     assert!(files(whole.path()) == files(merged.path()));
-    let error = merge(&plan, merged.path(), &["missing".into()])
+    let error = merge(&plan, merged.path(), &["missing".into()], &Monitor::default())
         .unwrap_err()
         .to_string();
     assert!(error.contains("missing is not the store"), "{error}");
