@@ -92,8 +92,27 @@ impl PhaseLock {
     /// The first move starts at the present response amplitude. The control ends when `active` becomes false, or at a fault.
     ///
     /// # Errors
-    /// A move with an invalid value, a drive without a limit (`amplitude_max`), or an open loop; then nothing changes.
+    /// What [`PhaseLock::check_move`] refuses, or an open loop; then nothing changes.
     pub fn hold_response(&self, state: &mut State, to: Move) -> Result<(), ConfigError> {
+        self.check_move(&to)?;
+        Quantity::new("state", (state.loop_state as u8) as Real, "").check(
+            matches!(state.loop_state, LoopState::Acquiring | LoopState::Locked),
+            "2 (acquiring) or 3 (locked): the response amplitude can be controlled only in a closed loop",
+        )?;
+        let (reading, drive) = (state.channels.response.amplitude(), state.drive.amplitude);
+        state
+            .amplitude_loop
+            .get_or_insert(AmplitudeState::constant(reading, drive))
+            .start(to, self.amplitude_loop.sample_time());
+        state.dwell.restart();
+        Ok(())
+    }
+
+    /// Checks a move of the response amplitude.
+    ///
+    /// # Errors
+    /// A move with an invalid value, or a drive without a limit (`amplitude_max`).
+    pub fn check_move(&self, to: &Move) -> Result<(), ConfigError> {
         Quantity::new("response", to.response, "m").positive()?;
         Quantity::new("duration", to.duration, "s").not_negative()?;
         Quantity::new("amplitude", to.amplitude, "m").check(true, "a finite number")?;
@@ -107,16 +126,6 @@ impl PhaseLock {
                 allowed: "above 0 to control the response amplitude: the drive needs a limit",
             });
         }
-        Quantity::new("state", (state.loop_state as u8) as Real, "").check(
-            matches!(state.loop_state, LoopState::Acquiring | LoopState::Locked),
-            "2 (acquiring) or 3 (locked): the response amplitude can be controlled only in a closed loop",
-        )?;
-        let (reading, drive) = (state.channels.response.amplitude(), state.drive.amplitude);
-        state
-            .amplitude_loop
-            .get_or_insert(AmplitudeState::constant(reading, drive))
-            .start(to, self.amplitude_loop.sample_time());
-        state.dwell.restart();
         Ok(())
     }
 
