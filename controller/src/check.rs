@@ -17,6 +17,7 @@ impl Config {
         self.check_frequencies()?;
         self.check_drive()?;
         self.check_detector()?;
+        self.check_structure()?;
         let lock = &self.lock;
         Quantity::new("lock.unlock_tolerance", lock.unlock_tolerance, "rad").check(
             lock.unlock_tolerance >= lock.phase_tolerance,
@@ -56,6 +57,18 @@ impl Config {
             }
             _ => Ok(()),
         }
+    }
+
+    /// The gains are those of a structure with a resonance, whose damping ratio is below 1. A delay whose phase is lost in rounding gives
+    /// no reference.
+    fn check_structure(&self) -> Result<(), ConfigError> {
+        if let Some(rate) = self.damping_rate.filter(|rate| *rate > self.omega_max) {
+            return Err(Quantity::new("damping_rate", rate, "rad/s").refuse("above 0 and at most omega_max, or none"));
+        }
+        Quantity::new("delay", self.delay, "s").check(
+            self.omega_max * self.delay * Real::EPSILON < 1.0,
+            "0 or above, and so short that the rounding error of omega_max delay is below 1 rad",
+        )
     }
 
     fn check_detector(&self) -> Result<(), ConfigError> {

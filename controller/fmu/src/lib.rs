@@ -203,7 +203,7 @@ impl Component for Controller {
             && let Some(running) = self.running.as_ref().filter(|running| running.is_closed())
         {
             // Refused before the step, an invalid move can be corrected.
-            running.lock.check_move(&self.to)?;
+            self.to.check(running.lock.config())?;
         }
         let sample_time = self.config.sample_time;
         if step / sample_time <= MAX_SAMPLES {
