@@ -192,6 +192,13 @@ impl AmplitudeLoop {
         }
     }
 
+    /// Whether no gain overflows.
+    pub fn is_finite(&self) -> bool {
+        [self.proportional, self.integral, self.feedforward]
+            .iter()
+            .all(|gain| gain.is_finite())
+    }
+
     /// Sample time, s.
     pub fn sample_time(&self) -> Real {
         self.sample_time

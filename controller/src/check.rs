@@ -2,8 +2,10 @@
 
 use crate::real::consts::PI;
 
+use crate::amplitude_loop::AmplitudeLoop;
 use crate::config::Config;
 use crate::detector::PhaseDetector;
+use crate::drive::Drive;
 use crate::error::{ConfigError, Quantity};
 use crate::parameters::PARAMETERS;
 use crate::real::Real;
@@ -59,11 +61,14 @@ impl Config {
         }
     }
 
-    /// The gains are those of a structure with a resonance, whose damping ratio is below 1. A delay whose phase is lost in rounding gives
-    /// no reference.
+    /// A damping rate far above the bandwidth leads to gains that overflow, and a delay whose phase is lost in rounding to no reference.
     fn check_structure(&self) -> Result<(), ConfigError> {
-        if let Some(rate) = self.damping_rate.filter(|rate| *rate > self.omega_max) {
-            return Err(Quantity::new("damping_rate", rate, "rad/s").refuse("above 0 and at most omega_max, or none"));
+        if !AmplitudeLoop::new(self, &Drive::new(self)).is_finite() {
+            return Err(
+                Quantity::new("damping_rate", self.damping_rate.unwrap_or(0.0), "rad/s").refuse(
+                    "a lower value, or none: for this bandwidth, response_gain and sample_time the gains overflow",
+                ),
+            );
         }
         Quantity::new("delay", self.delay, "s").check(
             self.omega_max * self.delay * Real::EPSILON < 1.0,
