@@ -16,6 +16,8 @@ use crate::real::consts::TAU;
 
 use crate::config::Config;
 use crate::drive::Drive;
+use crate::error::{ConfigError, Quantity};
+use crate::range::Range;
 use crate::real::{self, Real};
 
 /// Lowest drive, as a share of its integral part.
@@ -55,6 +57,29 @@ pub struct Move {
     pub omega: Real,
     /// Growth rate of the setpoint at the end of the move and after it, m/s; 0 to hold it.
     pub growth: Real,
+}
+
+impl Move {
+    /// Checks the values for a controller of this configuration.
+    ///
+    /// # Errors
+    /// An invalid value, or a drive without a limit (`amplitude_max`).
+    pub fn check(&self, config: &Config) -> Result<(), ConfigError> {
+        Quantity::new("response", self.response, "m").within(Range::Positive)?;
+        Quantity::new("duration", self.duration, "s").within(Range::NotNegative)?;
+        Quantity::new("amplitude", self.amplitude, "m").within(Range::Signed)?;
+        Quantity::new("omega", self.omega, "rad/s").within(Range::Signed)?;
+        Quantity::new("growth", self.growth, "m/s").within(Range::Signed)?;
+        if config.amplitude_max.is_none() {
+            return Err(ConfigError {
+                name: "amplitude_max",
+                value: None,
+                unit: "m",
+                allowed: "above 0 to control the response amplitude: the drive needs a limit",
+            });
+        }
+        Ok(())
+    }
 }
 
 /// State of the loop while it controls the response.
@@ -104,7 +129,8 @@ impl AmplitudeState {
         self.samples = real::ceil(trajectory.duration / sample_time) as u64;
         self.taken = 0;
         let mean = (trajectory.response - self.from) / self.samples as Real;
-        let relative = |growth: Real| Some(growth / mean).filter(|growth| growth.is_finite());
+        // Where the change is only the rounding error of the growth, it has no share in it.
+        let relative = |growth: Real| Some(growth / mean).filter(|growth| growth.abs() * Real::EPSILON < 1.0);
         self.growths = [self.growth, trajectory.growth * sample_time].map(|growth| relative(growth).unwrap_or(0.0));
         if self.samples == 0 {
             self.setpoint = trajectory.response;
@@ -164,6 +190,13 @@ impl AmplitudeLoop {
             max_change: drive.ramp_step,
             sample_time,
         }
+    }
+
+    /// Whether no gain overflows.
+    pub fn is_finite(&self) -> bool {
+        [self.proportional, self.integral, self.feedforward]
+            .iter()
+            .all(|gain| gain.is_finite())
     }
 
     /// Sample time, s.

@@ -2,8 +2,10 @@
 
 use crate::real::consts::PI;
 
+use crate::amplitude_loop::AmplitudeLoop;
 use crate::config::Config;
 use crate::detector::PhaseDetector;
+use crate::drive::Drive;
 use crate::error::{ConfigError, Quantity};
 use crate::parameters::PARAMETERS;
 use crate::real::Real;
@@ -17,6 +19,7 @@ impl Config {
         self.check_frequencies()?;
         self.check_drive()?;
         self.check_detector()?;
+        self.check_structure()?;
         let lock = &self.lock;
         Quantity::new("lock.unlock_tolerance", lock.unlock_tolerance, "rad").check(
             lock.unlock_tolerance >= lock.phase_tolerance,
@@ -56,6 +59,21 @@ impl Config {
             }
             _ => Ok(()),
         }
+    }
+
+    /// A damping rate far above the bandwidth leads to gains that overflow, and a delay whose phase is lost in rounding to no reference.
+    fn check_structure(&self) -> Result<(), ConfigError> {
+        if !AmplitudeLoop::new(self, &Drive::new(self)).is_finite() {
+            return Err(
+                Quantity::new("damping_rate", self.damping_rate.unwrap_or(0.0), "rad/s").refuse(
+                    "a lower value, or none: for this bandwidth, response_gain and sample_time the gains overflow",
+                ),
+            );
+        }
+        Quantity::new("delay", self.delay, "s").check(
+            self.omega_max * self.delay * Real::EPSILON < 1.0,
+            "0 or above, and so short that the rounding error of omega_max delay is below 1 rad",
+        )
     }
 
     fn check_detector(&self) -> Result<(), ConfigError> {

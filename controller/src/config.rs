@@ -3,7 +3,7 @@
 use crate::real::consts::{FRAC_PI_2, TAU};
 
 use crate::gains::Gains;
-use crate::real::Real;
+use crate::real::{LARGEST, Real};
 
 /// Method by which amplitude and phase of the fundamental are estimated. The numbers are those of the FMU's `detector`.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -168,9 +168,9 @@ impl Config {
         }
     }
 
-    /// Largest drive amplitude, m; infinite without a limit.
+    /// Largest drive amplitude, m; without a limit the largest that a parameter may have, so that no sum is infinite.
     pub(crate) fn amplitude_limit(&self) -> Real {
-        self.amplitude_max.unwrap_or(Real::INFINITY)
+        self.amplitude_max.unwrap_or(LARGEST)
     }
 
     /// The gains of both loops.

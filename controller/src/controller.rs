@@ -92,21 +92,9 @@ impl PhaseLock {
     /// The first move starts at the present response amplitude. The control ends when `active` becomes false, or at a fault.
     ///
     /// # Errors
-    /// A move with an invalid value, a drive without a limit (`amplitude_max`), or an open loop; then nothing changes.
+    /// What [`Move::check`] refuses, or an open loop; then nothing changes.
     pub fn hold_response(&self, state: &mut State, to: Move) -> Result<(), ConfigError> {
-        Quantity::new("response", to.response, "m").positive()?;
-        Quantity::new("duration", to.duration, "s").not_negative()?;
-        Quantity::new("amplitude", to.amplitude, "m").check(true, "a finite number")?;
-        Quantity::new("omega", to.omega, "rad/s").check(true, "a finite number")?;
-        Quantity::new("growth", to.growth, "m/s").check(true, "a finite number")?;
-        if self.config.amplitude_max.is_none() {
-            return Err(ConfigError {
-                name: "amplitude_max",
-                value: None,
-                unit: "m",
-                allowed: "above 0 to control the response amplitude: the drive needs a limit",
-            });
-        }
+        to.check(&self.config)?;
         Quantity::new("state", (state.loop_state as u8) as Real, "").check(
             matches!(state.loop_state, LoopState::Acquiring | LoopState::Locked),
             "2 (acquiring) or 3 (locked): the response amplitude can be controlled only in a closed loop",

@@ -1,5 +1,6 @@
 //! Error of a configuration.
 
+use crate::range::Range;
 use crate::real::Real;
 
 use core::fmt;
@@ -77,11 +78,8 @@ impl Quantity {
         }
     }
 
-    pub fn positive(&self) -> Result<(), ConfigError> {
-        self.check(self.value > 0.0, "a finite number above 0")
-    }
-
-    pub fn not_negative(&self) -> Result<(), ConfigError> {
-        self.check(self.value >= 0.0, "a finite number, 0 or above")
+    /// Accepts a value in the range.
+    pub fn within(&self, range: Range) -> Result<(), ConfigError> {
+        self.check(range.contains(self.value), range.allowed())
     }
 }

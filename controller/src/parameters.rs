@@ -100,12 +100,7 @@ impl Parameter {
 
     /// Refuses a value out of range.
     pub(crate) fn check(&self, config: &Config) -> Result<(), ConfigError> {
-        let number = self.get(config).number();
-        if self.range.contains(number) {
-            Ok(())
-        } else {
-            Err(self.refuse(number))
-        }
+        Quantity::new(self.name, self.get(config).number(), self.unit).within(self.range)
     }
 
     fn refuse(&self, value: Real) -> ConfigError {

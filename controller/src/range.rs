@@ -3,7 +3,7 @@
 use crate::real::consts::PI;
 
 use crate::harmonics::MAX_HARMONICS;
-use crate::real::Real;
+use crate::real::{self, LARGEST, Real};
 
 /// A value of a parameter. The types are those of FMI.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -33,12 +33,14 @@ pub const NONE: Real = -1.0;
 /// The values that a parameter may have, whatever the values of the others are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Range {
-    /// Finite and above 0.
+    /// Above 0, and neither so small nor so large that products overflow.
     Positive,
-    /// Finite, 0 or above.
+    /// 0 or above, and not so large that products overflow.
     NotNegative,
-    /// Finite and above 0, or [`NONE`].
+    /// As [`Range::Positive`], or [`NONE`].
     Optional,
+    /// Of either sign, and not so large that products overflow.
+    Signed,
     /// From -pi to pi.
     Angle,
     /// Above 0 and below 1.
@@ -57,11 +59,12 @@ impl Range {
     /// Whether the range contains the number.
     #[must_use]
     pub fn contains(self, number: Real) -> bool {
-        number.is_finite()
+        number.abs() <= LARGEST
             && match self {
-                Self::Positive => number > 0.0,
+                Self::Positive => number >= 1.0 / LARGEST,
                 Self::NotNegative => number >= 0.0,
-                Self::Optional => number > 0.0 || number == NONE,
+                Self::Optional => number >= 1.0 / LARGEST || number == NONE,
+                Self::Signed => true,
                 Self::Angle => number.abs() <= PI,
                 Self::Share => number > 0.0 && number < 1.0,
                 Self::Detector => number == 1.0 || number == 2.0,
@@ -75,9 +78,10 @@ impl Range {
     #[must_use]
     pub fn allowed(self) -> &'static str {
         match self {
-            Self::Positive => "a finite number above 0",
-            Self::NotNegative => "a finite number, 0 or above",
-            Self::Optional => "a finite number above 0, or -1 for none",
+            Self::Positive => real::POSITIVE,
+            Self::NotNegative => real::NOT_NEGATIVE,
+            Self::Optional => real::OPTIONAL,
+            Self::Signed => real::SIGNED,
             Self::Angle => "between -pi and pi",
             Self::Share => "above 0 and below 1",
             Self::Detector => "1 (adaptive) or 2 (demodulator)",

@@ -32,6 +32,16 @@ mod precision {
     /// Largest valid reading, m. The squares of smaller readings cause no overflow.
     pub const READING_MAX: Real = 1e100;
 
+    /// Largest magnitude of a parameter; the smallest one above 0 is its inverse. Products of parameters with each other and with readings,
+    /// as the gains and the loops form them, cause no overflow.
+    pub const LARGEST: Real = 1e30;
+
+    /// Allowed magnitudes in words.
+    pub const POSITIVE: &str = "above 0 (1e-30 to 1e30)";
+    pub const NOT_NEGATIVE: &str = "0 or above, at most 1e30";
+    pub const OPTIONAL: &str = "above 0 (1e-30 to 1e30), or -1 for none";
+    pub const SIGNED: &str = "-1e30 to 1e30";
+
     /// A sum of many small terms.
     #[derive(Clone, Copy, Debug, Default, PartialEq)]
     #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -66,6 +76,16 @@ mod precision {
 
     /// Largest valid reading, m. The squares of smaller readings cause no overflow.
     pub const READING_MAX: Real = 1e15;
+
+    /// Largest magnitude of a parameter; the smallest one above 0 is its inverse. Products of parameters with each other and with readings,
+    /// as the gains and the loops form them, cause no overflow.
+    pub const LARGEST: Real = 1e9;
+
+    /// Allowed magnitudes in words.
+    pub const POSITIVE: &str = "above 0 (1e-9 to 1e9)";
+    pub const NOT_NEGATIVE: &str = "0 or above, at most 1e9";
+    pub const OPTIONAL: &str = "above 0 (1e-9 to 1e9), or -1 for none";
+    pub const SIGNED: &str = "-1e9 to 1e9";
 
     /// A sum of many small terms, with the rounding error of the last one: in single precision, terms below 6e-8 of the sum
     /// would otherwise be lost (Kahan's algorithm).

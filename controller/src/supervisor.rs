@@ -62,6 +62,21 @@ impl LoopState {
         Self::ALL.into_iter().find(|state| *state as i32 == number)
     }
 
+    /// Its name, for messages.
+    #[must_use]
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Idle => "idle",
+            Self::Ramping => "ramping",
+            Self::Acquiring => "acquiring",
+            Self::Locked => "locked",
+            Self::LockLost => "lock lost",
+            Self::Tripped => "tripped",
+            Self::ShutDown => "shut down",
+            Self::Capturing => "capturing",
+        }
+    }
+
     /// Whether a fault has switched the drive off; latched until `active` becomes false.
     #[must_use]
     pub fn is_latched(self) -> bool {
@@ -99,6 +114,12 @@ impl Fault {
             }
             Self::Implausible => "a reading differed from its prediction: a sensor, the drive or the clock has failed",
         }
+    }
+}
+
+impl fmt::Display for LoopState {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(self.name())
     }
 }
 

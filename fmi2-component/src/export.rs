@@ -103,15 +103,15 @@ macro_rules! export {
             #[unsafe(no_mangle)]
             pub unsafe extern "C" fn fmi2SetupExperiment(
                 component: CComponent,
-                _tolerance_defined: CBoolean,
-                _tolerance: f64,
+                tolerance_defined: CBoolean,
+                tolerance: f64,
                 start_time: f64,
                 stop_time_defined: CBoolean,
                 stop_time: f64,
             ) -> Status {
                 unsafe {
                     $crate::abi::setup_experiment::<$component>(
-                        component, start_time, stop_time_defined, stop_time,
+                        component, tolerance_defined, tolerance, start_time, stop_time_defined, stop_time,
                     )
                 }
             }

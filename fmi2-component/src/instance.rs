@@ -18,6 +18,8 @@ const CLOCK_TOLERANCE: f64 = 1e-9;
 /// A component, its log and its FMU states.
 pub(crate) struct Instance<C> {
     pub session: Session<C>,
+    /// End of the experiment, s. It belongs to the instance, so that a state continues in an experiment that ends later.
+    stop_time: f64,
     pub select: Select<C>,
     pub log: Log,
     pub snapshots: Snapshots<C>,
@@ -29,6 +31,7 @@ impl<C: Component> Instance<C> {
     pub fn new(log: Log, select: Select<C>) -> Result<Self, Refusal> {
         Ok(Self {
             session: Session::new(select)?,
+            stop_time: f64::INFINITY,
             select,
             log,
             snapshots: Snapshots::new(),
@@ -36,7 +39,14 @@ impl<C: Component> Instance<C> {
         })
     }
 
-    pub fn set_up(&mut self, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
+    pub fn set_up(&mut self, tolerance: Option<f64>, start_time: f64, stop_time: Option<f64>) -> Result<(), Refusal> {
+        if let Some(tolerance) = tolerance
+            && !(0.0..=1.0).contains(&tolerance)
+        {
+            return Err(Refusal::error(format!(
+                "tolerance = {tolerance:e} is refused; allowed is a relative tolerance from 0 to 1"
+            )));
+        }
         if !start_time.is_finite() {
             return Err(Refusal::error(format!(
                 "startTime = {start_time} s is refused; allowed is a finite number"
@@ -51,7 +61,7 @@ impl<C: Component> Instance<C> {
         }
         self.session.start_time = start_time;
         self.session.time = start_time;
-        self.session.stop_time = stop_time.unwrap_or(f64::INFINITY);
+        self.stop_time = stop_time.unwrap_or(f64::INFINITY);
         self.session.stale = true;
         Ok(())
     }
@@ -78,6 +88,7 @@ impl<C: Component> Instance<C> {
 
     pub fn reset(&mut self) -> Result<(), Refusal> {
         self.session = Session::new(self.select)?;
+        self.stop_time = f64::INFINITY;
         Ok(())
     }
 
@@ -138,7 +149,7 @@ impl<C: Component> Instance<C> {
 
     #[inline]
     fn check_step(&self, time: f64, step: f64) -> Result<(), Refusal> {
-        let &Session { time: own, stop_time, .. } = &self.session;
+        let (own, stop_time) = (self.session.time, self.stop_time);
         let size = if own.abs() > step { own.abs() } else { step };
         let tolerance = CLOCK_TOLERANCE * size;
         let end = time + step;
@@ -176,11 +187,11 @@ fn not_finite(variable: &Variable<f64>, value: f64) -> Refusal {
 #[cold]
 fn not_settable<T>(variable: &Variable<T>, state: State) -> Refusal {
     let initial = match variable.initial {
-        Some(initial) => format!(", initial {initial:?}"),
+        Some(initial) => format!(", initial {initial}"),
         None => String::new(),
     };
     Refusal::error(format!(
-        "{} cannot be set in state {}: it has causality {:?}, variability {:?}{initial}",
+        "{} cannot be set in state {}: it has causality {}, variability {}{initial}",
         variable.name,
         state.name(),
         variable.causality,

@@ -82,12 +82,13 @@
 //! | real, integer, enumeration, Boolean, string variables | yes; no aliases (two variables with one value reference) |
 //! | tunable parameters | between steps |
 //! | several values in one call | all are set or none, whoever refuses one |
-//! | FMU states: get, set, free | yes, by [`Clone`]; those that a master forgets are freed with the instance |
+//! | FMU states: get, set, free | yes, by [`Clone`]; those that a master forgets are freed with the instance. The stop time is not part of them |
 //! | FMU states: serialise | by [`Component::archive`]; blobs of another model, another version or damaged ones are refused |
 //! | input and output derivatives, directional derivatives | where the component provides them |
-//! | logging | categories of the description; reasons of warnings and errors always; text is safe as a printf format |
+//! | logging | categories of the description, `logStatusWarning` for warnings; reasons of refused calls always; text is safe as a printf format |
 //! | status queries | what there is to tell after a discarded step |
-//! | allocation callbacks, `visible`, resource location, tolerance | accepted, not used |
+//! | allocation callbacks, `visible`, resource location | accepted, not used |
+//! | tolerance | from 0 to 1, not used: a component finds out by itself what an integrator resolves |
 //!
 //! Once set up, setting and getting real values and stepping allocate nothing.
 

@@ -16,6 +16,9 @@ pub type Logger = unsafe extern "C" fn(
     ...
 );
 
+/// The standard's category of warnings.
+const WARNING: &str = "logStatusWarning";
+
 /// A category of log lines that the description declares; generated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Category {
@@ -32,8 +35,8 @@ impl Category {
 
 /// Where a component's log lines go.
 ///
-/// Lines of a category appear only while the master has switched it on; the reasons of warnings and errors always do,
-/// since without them a status is a riddle.
+/// Lines of a category appear only while the master has switched it on; so do warnings, in the category `logStatusWarning`. The
+/// reason why a call returns a warning or an error always appears: the status alone does not say it.
 #[derive(Debug)]
 pub struct Log {
     sink: Option<Sink>,
@@ -92,23 +95,28 @@ impl Log {
         }
     }
 
-    /// Logs a line about something that is not quite right.
-    #[cold]
-    pub fn warn(&self, message: Arguments<'_>) {
-        let category = if self.categories.contains(&"logStatusWarning") {
-            "logStatusWarning"
-        } else {
-            "logAll"
-        };
-        self.write(Status::Warning, category, &message.to_string());
+    /// Whether warnings are wanted: as a category of their own, or with all others where the description declares none.
+    fn wants_warnings(&self) -> bool {
+        match self.categories.iter().position(|&c| c == WARNING) {
+            Some(index) => self.enabled & 1 << index != 0,
+            None => self.enabled == u64::MAX,
+        }
     }
 
-    /// Logs a warning the first time that `subject` comes up in the life of the instance, whatever is reset or rolled back:
-    /// what happens in every step would otherwise fill the master's log.
+    /// Logs a line about something that is not quite right, if warnings are wanted.
+    #[cold]
+    pub fn warn(&self, message: Arguments<'_>) {
+        if self.wants_warnings() {
+            self.write(Status::Warning, WARNING, &message.to_string());
+        }
+    }
+
+    /// Logs a warning the first time that `subject` comes up while warnings are wanted, whatever is reset or rolled back: what
+    /// happens in every step would otherwise fill the master's log.
     #[cold]
     pub fn warn_once(&self, subject: &'static str, message: Arguments<'_>) {
         let mut warned = self.warned.borrow_mut();
-        if !warned.contains(&subject) {
+        if self.wants_warnings() && !warned.contains(&subject) {
             warned.push(subject);
             // The logger may call back.
             drop(warned);
@@ -119,7 +127,12 @@ impl Log {
     /// Logs why a call ends in `status`.
     #[cold]
     pub(crate) fn reason(&self, status: Status, message: &str) {
-        self.write(status, "logStatusError", message);
+        let category = if status == Status::Warning {
+            WARNING
+        } else {
+            "logStatusError"
+        };
+        self.write(status, category, message);
     }
 
     /// Switches every category on or off.
@@ -137,10 +150,11 @@ impl Log {
                 Some(index) => self.enabled |= 1 << index,
                 None => {
                     known = false;
-                    self.warn(format_args!(
-                        "fmi2SetDebugLogging: unknown category {name:?}; known are {}",
-                        self.categories.join(", ")
-                    ));
+                    let categories = self.categories.join(", ");
+                    self.reason(
+                        Status::Warning,
+                        &format!("fmi2SetDebugLogging: unknown category \"{name}\"; expected one of {categories}"),
+                    );
                 }
             }
         }

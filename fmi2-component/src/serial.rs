@@ -7,7 +7,7 @@ use crate::refusal::Refusal;
 use crate::session::{Select, Session};
 
 /// Changes with the layout that the shell itself writes.
-const MAGIC: [u8; 8] = *b"FMU2 st2";
+const MAGIC: [u8; 8] = *b"FMU2 st3";
 /// Magic, checksum.
 const HEADER: usize = 16;
 
@@ -47,7 +47,7 @@ pub(crate) fn deserialise<C: Component>(bytes: &[u8], select: Select<C>) -> Resu
     let expected = identity::<C>();
     if found != expected {
         return Err(Refusal::error(format!(
-            "the serialised state is of another model: its GUID and version are {} {:?}, expected {} {:?}",
+            "the serialised state is of another model: its GUID and version are {} and {}, expected {} and {}",
             found.0, found.1, expected.0, expected.1
         )));
     }

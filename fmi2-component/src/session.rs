@@ -18,7 +18,6 @@ pub(crate) struct Session<C> {
     /// Something was set since the component was last initialised.
     pub stale: bool,
     pub start_time: f64,
-    pub stop_time: f64,
     /// Where the last step has led, or what the master has set.
     pub time: f64,
 }
@@ -55,7 +54,6 @@ impl<C: Component> Session<C> {
             state: State::Instantiated,
             stale: true,
             start_time: 0.0,
-            stop_time: f64::INFINITY,
             time: 0.0,
         })
     }
@@ -77,7 +75,7 @@ impl<C: Component> Session<C> {
             .find(|&s| s as u8 == state)
             .ok_or_else(|| Refusal::error(format!("{state} is no state of the life cycle")))?;
         archive.whole(&mut self.stale)?;
-        for time in [&mut self.start_time, &mut self.stop_time, &mut self.time] {
+        for time in [&mut self.start_time, &mut self.time] {
             archive.whole(time)?;
         }
         self.component.archive(archive)

@@ -1,6 +1,6 @@
 //! What `modelDescription.xml` says of a variable, as the build step found it (FMI 2.0, clause 2.2.7).
 
-use std::fmt::Display;
+use std::fmt::{self, Display};
 
 use crate::refusal::Refusal;
 
@@ -46,6 +46,24 @@ pub enum Initial {
     /// It is computed from other variables.
     Calculated,
 }
+
+/// The words of the standard, for messages.
+macro_rules! words {
+    ($type:ident: $($variant:ident $word:literal)*) => {
+        impl Display for $type {
+            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+                f.write_str(match self {
+                    $(Self::$variant => $word,)*
+                })
+            }
+        }
+    };
+}
+
+words!(Causality: Parameter "parameter" CalculatedParameter "calculatedParameter" Input "input" Output "output" Local "local"
+    Independent "independent");
+words!(Variability: Constant "constant" Fixed "fixed" Tunable "tunable" Discrete "discrete" Continuous "continuous");
+words!(Initial: Exact "exact" Approx "approx" Calculated "calculated");
 
 /// A variable whose values are of type `T`.
 #[derive(Clone, Copy, Debug, PartialEq)]

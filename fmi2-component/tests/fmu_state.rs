@@ -49,6 +49,26 @@ fn a_serialised_state_continues_in_another_instance() {
 }
 
 #[test]
+fn a_state_continues_in_an_experiment_that_ends_later() {
+    let (short, long, fresh) = (Master::new(GUID), Master::new(GUID), Master::new(GUID));
+    for (master, stop) in [(&short, 2.5), (&long, 5.0)] {
+        unsafe {
+            assert_eq!(fmi2SetupExperiment(master.c, 0, 0.0, 0.0, 1, stop), Ok);
+            assert_eq!(fmi2EnterInitializationMode(master.c), Ok);
+            assert_eq!(fmi2ExitInitializationMode(master.c), Ok);
+        }
+    }
+    short.step(0.0, 2.0);
+    for master in [&long, &fresh] {
+        let (status, state) = read_back(master, &short.bytes());
+        assert_eq!((status, unsafe { fmi2SetFMUstate(master.c, state) }), (Ok, Ok));
+        assert_eq!(master.step(2.0, 1.0), Ok);
+    }
+    assert_eq!(long.step(3.0, 3.0), Error);
+    long.heard_one(&["stopTime = 5 s"]);
+}
+
+#[test]
 fn a_state_given_on_entry_is_overwritten() {
     let master = Master::ready(GUID);
     let mut state = null_mut();

@@ -207,8 +207,16 @@ fn an_experiment_without_sense_is_refused() {
         assert_eq!(status, Status::Error);
         master.heard_one(&["is refused"]);
     }
+    for tolerance in [f64::NAN, -1e-6, 1e300] {
+        let status = unsafe { fmi2SetupExperiment(master.c, 1, tolerance, 0.0, 1, 1.0) };
+        assert_eq!(status, Status::Error);
+        master.heard_one(&[
+            "tolerance = ",
+            "is refused; allowed is a relative tolerance from 0 to 1",
+        ]);
+    }
     assert_eq!(
-        unsafe { fmi2SetupExperiment(master.c, 0, 0.0, 5.0, 0, f64::NAN) },
+        unsafe { fmi2SetupExperiment(master.c, 0, f64::NAN, 5.0, 0, f64::NAN) },
         Status::Ok
     );
     start(&master);

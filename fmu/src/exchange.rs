@@ -68,7 +68,7 @@ impl ModelExchange for LoViNes {
 
     fn new_discrete_states(&mut self, time: f64, log: &Log) -> Result<Discrete, Refusal> {
         self.progress = Progress::UnderWay;
-        let jumped = (self.hybrid_mut()).resolve(time, |event| log::tell(log, time, event));
+        let jumped = (self.hybrid_mut()).resolve(time, |happening| log::tell_exchange(log, time, happening));
         Ok(Discrete { states_changed: jumped, ..Discrete::default() })
     }
 

@@ -1,15 +1,34 @@
 //! Events as lines for the master's log.
 
 use super::category;
+use crate::model_exchange::hybrid::{Happening, Rest};
 use fmi2_component::Log;
 use lovines::{Event, Wall};
 
-/// One line for one event, `time` being when its advance began.
-pub(super) fn tell(log: &Log, time: f64, event: Event) {
-    let side = |wall: Wall| match wall {
+fn side(wall: Wall) -> &'static str {
+    match wall {
         Wall::Plus => "w = b",
         Wall::Minus => "w = -b",
-    };
+    }
+}
+
+/// One line for one event of model exchange at `time`.
+pub(super) fn tell_exchange(log: &Log, time: f64, happening: Happening) {
+    match happening {
+        Happening::Event(event) => tell(log, time, event),
+        Happening::Rest(Rest { wall, hop, energy }) => log.tell(
+            category::logEvents,
+            format_args!(
+                "the particle came to rest on the wall {} at t = {time} s; left out are hops of at most {hop:e} m, which the \
+                 integrator does not resolve, and their {energy:e} J, which count as dissipated",
+                side(wall),
+            ),
+        ),
+    }
+}
+
+/// One line for one event, `time` being when its advance began.
+pub(super) fn tell(log: &Log, time: f64, event: Event) {
     match event {
         Event::Impact { t, wall, velocity } => log.tell(
             category::logImpacts,

@@ -114,6 +114,13 @@ def test_every_real_variable_has_a_unit_and_says_of_what_kind_and_size_it_is(fmu
             assert any(said) or variable.quantity in ("Angle", "Time"), variable.name
 
 
+@pytest.mark.parametrize("name", ["LoViNes", "PhaseLock"])
+def test_the_default_experiment_is_complete(fmus, name):
+    default = fmus[name].description.defaultExperiment
+    for value in (default.startTime, default.stopTime, default.tolerance, default.stepSize):
+        assert value is not None
+
+
 def test_the_default_experiment_shows_impacts(fmus):
     default = fmus["LoViNes"].description.defaultExperiment
     assert float(default.startTime) == 0

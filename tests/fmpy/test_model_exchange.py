@@ -1,5 +1,7 @@
 """Model exchange against co-simulation: an independent integrator, the same physics."""
 
+import re
+
 import numpy as np
 import pytest
 from fmpy import simulate_fmu
@@ -79,3 +81,46 @@ def test_both_interfaces_agree_to_the_tolerance_of_the_integrator(fmus, instance
             (exchange["contact"] == steps["contact"]).mean(),
             between=(0.99, 1),
         )
+
+
+# Hard impacts from five half-widths away; and low hops on a wall that presses, which end in contact at any r.
+CHATTERS = [{"q1": 0.05, "q2": 0.05, "der(q2)": 0.0}, {"q1": -0.05, "q2": -0.0599, "der(q2)": 0.05}]
+
+
+@pytest.mark.parametrize("start", CHATTERS, ids=["impacts", "hops"])
+@pytest.mark.parametrize("r", [0.05, 0.1, 0.2, 0.3, 0.45, 0.6, 0.75, 0.9])
+def test_every_event_of_a_chatter_is_an_impact_or_its_end_at_any_tolerance(fmus, figure, r, start):
+    half_width, rests, highest = 0.01, 0, 0.0
+    for tolerance in np.logspace(-3, -10, 8):
+        log, points = [], []
+
+        def step_finished(time, _, points=points):
+            points.append(time)
+            return len(points) < 2000
+
+        result = simulate_fmu(
+            str(fmus["LoViNes"].path),
+            fmi_type="ModelExchange",
+            stop_time=1.0,
+            output_interval=0.01,
+            relative_tolerance=tolerance,
+            start_values=start | {"r": r, "E": 1e-4, "omega": 55.0},
+            output=["dissipated"],
+            logger=lambda _environment, _name, _status, _category, message, log=log: log.append(message.decode()),
+            debug_logging=True,
+            step_finished=step_finished,
+        )
+        assert result["time"][-1] == pytest.approx(1.0), "time has stopped"
+        # FMPy records an event twice, and every other point once.
+        events = len(result) - 1 - len(points)
+        kinds = ("impact on", "came to rest", "released")
+        effects = {kind: sum(kind in message for message in log) for kind in kinds}
+        assert events <= sum(effects.values()), f"{tolerance}: {events} events, {effects}"
+        left_out = [
+            re.search(r"at most (\S+) m, .* their (\S+) J", message) for message in log if "came to rest" in message
+        ]
+        rests += len(left_out)
+        highest = max(highest, *(float(one[1]) / half_width / tolerance for one in left_out), 0.0)
+        assert 0 <= sum(float(one[2]) for one in left_out) < 1e-3 * result["dissipated"][-1]
+    figure(f"highest hop left out at r = {r}, in tolerances of CVode times b", highest, below=5)
+    assert rests > 0 or start == CHATTERS[0]

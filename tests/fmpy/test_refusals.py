@@ -80,6 +80,40 @@ def test_a_parameter_cannot_be_changed_while_the_plant_runs(instance):
     assert "M cannot be set" in plant.messages[-1].text
 
 
+def test_an_amplitude_above_its_limit_is_refused_before_and_after_the_first_step(instance):
+    controller = instance("PhaseLock").start({"amplitude_max": 4e-4})
+    for time in (0.0, 0.1):
+        controller.messages.clear()
+        with pytest.raises(FMICallException):
+            controller.set({"amplitude": 5e-4})
+        assert "amplitude = 0.0005 m is refused" in controller.messages[-1].text
+        assert controller.get("amplitude") < 4e-4
+        controller.step(0.1)
+        assert controller.time == pytest.approx(time + 0.1)
+
+
+def test_a_move_that_makes_no_sense_can_be_corrected(instance):
+    controller = instance("PhaseLock").start({"amplitude_max": 4e-4, "signal_timeout": -1})
+    controller.set({"active": True})
+    controller.step(0.001, 1000)
+    assert controller.get("state") == 2, "acquiring"
+    controller.set({"hold_response": True, "move.response": -0.01})
+    with pytest.raises(FMICallException):
+        controller.step(0.001)
+    assert "response = -0.01 m is refused" in controller.messages[-1].text
+    controller.set({"move.response": 0.01})
+    controller.step(0.001)
+
+
+def test_a_fault_is_told_in_words(instance):
+    controller = instance("PhaseLock", logging=True).start()
+    controller.set({"active": True})
+    controller.step(0.001, 10000)
+    told = [message.text for message in controller.messages if message.category == "logEvents"]
+    assert any("acquiring -> tripped at t = " in text and "could not be measured" in text for text in told), told
+    assert not any(word in text for text in told for word in ("Some", "None", "NoSignal")), told
+
+
 def test_the_log_tells_of_impacts_when_asked_to(instance):
     plant = instance("LoViNes", logging=True).start({"der(q2)": 0.5})
     plant.step(0.1)

@@ -11,14 +11,6 @@
 #include <stdint.h>
 #include <stdlib.h>
 
-// Method of the phase detector.
-typedef enum PhaseLockDetector {
-  // Adaptive harmonic filter.
-  PHASE_LOCK_DETECTOR_ADAPTIVE = 1,
-  // Synchronous demodulation.
-  PHASE_LOCK_DETECTOR_DEMODULATOR = 2,
-} PhaseLockDetector;
-
 // State of the loop.
 typedef enum PhaseLockStage {
   // Not armed.
@@ -56,6 +48,14 @@ typedef enum PhaseLockFault {
   // A reading differed from its prediction by more than residual_max.
   PHASE_LOCK_FAULT_IMPLAUSIBLE = 6,
 } PhaseLockFault;
+
+// Method of the phase detector.
+typedef enum PhaseLockDetector {
+  // Adaptive harmonic filter.
+  PHASE_LOCK_DETECTOR_ADAPTIVE = 1,
+  // Synchronous demodulation.
+  PHASE_LOCK_DETECTOR_DEMODULATOR = 2,
+} PhaseLockDetector;
 
 #if defined(PHASE_LOCK_F32)
 // The floating-point type: float if PHASE_LOCK_F32 is defined, for the library with the feature f32; otherwise double.
@@ -99,8 +99,8 @@ typedef struct PhaseLockConfig {
   struct PhaseLockOptional base_bandwidth;
   // Setpoint of the phase of the response relative to the reference, rad.
   PhaseLockReal phase_target;
-  // Method of the phase detector.
-  enum PhaseLockDetector detector;
+  // Method of the phase detector, a PhaseLockDetector; an integer, because any other value must be refused.
+  int32_t detector;
   // Bandwidth of the detector, rad/s: the tuning parameter.
   PhaseLockReal bandwidth;
   // Damping rate of the structure, rad/s; not present: unknown.

@@ -73,8 +73,8 @@ pub unsafe extern "C" fn phase_lock_init(
     if controller.is_null() {
         return NULL_POINTER;
     }
-    let built = Config::from(config)
-        .build()
+    let built = Config::try_from(config)
+        .and_then(Config::build)
         .map(|lock| Stored { state: lock.start(), lock });
     // SAFETY: the storage is large and aligned enough, and may be written.
     let outcome = built.map(|stored| unsafe { controller.cast::<Stored>().write(stored) });

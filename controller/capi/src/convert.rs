@@ -1,6 +1,6 @@
 //! Conversions between the types of the header and those of the core.
 
-use phase_lock::{Config, Detector, Fault, Input, LoopState, Move, Output};
+use phase_lock::{Config, ConfigError, Detector, Fault, Input, LoopState, Move, Output, Parameter, Value};
 
 use crate::types::{
     PhaseLockConfig, PhaseLockDetector, PhaseLockFault, PhaseLockInput, PhaseLockMove, PhaseLockOptional,
@@ -10,9 +10,8 @@ use crate::types::{
 // Every parameter is a field of the same name.
 macro_rules! read {
     (detector, $c:ident, $config:ident, $group:ident, $field:ident) => {
-        $config.$field = match $c.$field {
-            PhaseLockDetector::Adaptive => Detector::Adaptive,
-            PhaseLockDetector::Demodulator => Detector::Demodulator,
+        if let Some(parameter) = Parameter::find(stringify!($field)) {
+            parameter.set(&mut $config, Value::Integer($c.$field))?;
         }
     };
     (optional, $c:ident, $config:ident, config, $field:ident) => {
@@ -31,7 +30,7 @@ macro_rules! write {
         $c.$field = match $config.$field {
             Detector::Adaptive => PhaseLockDetector::Adaptive,
             Detector::Demodulator => PhaseLockDetector::Demodulator,
-        }
+        } as i32
     };
     (optional, $c:ident, $config:ident, config, $field:ident) => {
         $c.$field = $config.$field.into()
@@ -59,11 +58,13 @@ impl From<Option<PhaseLockReal>> for PhaseLockOptional {
 /// Conversions in both directions, from the table of the parameters.
 macro_rules! conversions {
     ($($group:ident $field:ident: $type:ident, $unit:literal, $range:ident;)*) => {
-        impl From<&PhaseLockConfig> for Config {
-            fn from(c: &PhaseLockConfig) -> Self {
+        impl TryFrom<&PhaseLockConfig> for Config {
+            type Error = ConfigError;
+
+            fn try_from(c: &PhaseLockConfig) -> Result<Self, ConfigError> {
                 let mut config = Self::for_resonance(1.0, 1.0);
                 $(read!($type, c, config, $group, $field);)*
-                config
+                Ok(config)
             }
         }
 
@@ -141,7 +142,7 @@ impl From<Output> for PhaseLockOutput {
 
 #[cfg(test)]
 mod tests {
-    use phase_lock::{PARAMETERS, Value};
+    use phase_lock::PARAMETERS;
 
     use super::*;
 
@@ -159,8 +160,21 @@ mod tests {
                 parameter.set(&mut config, value).expect(parameter.name);
             }
             let c = PhaseLockConfig::from(&config);
-            assert_eq!(Config::from(&c), config);
-            assert_eq!(PhaseLockConfig::from(&Config::from(&c)), c);
+            assert_eq!(Config::try_from(&c), Ok(config));
+            assert_eq!(PhaseLockConfig::from(&config), c);
+        }
+    }
+
+    #[test]
+    fn a_detector_that_does_not_exist_is_refused() {
+        let mut c = PhaseLockConfig::from(&Config::for_resonance(55.0, 1e-4));
+        for detector in [-1, 0, 3, 4, 5, i32::MAX] {
+            c.detector = detector;
+            let refused = Config::try_from(&c).unwrap_err();
+            assert_eq!(
+                (refused.name, refused.value),
+                ("detector", Some(detector as PhaseLockReal))
+            );
         }
     }
 }

@@ -74,8 +74,8 @@ pub struct PhaseLockConfig {
     pub base_bandwidth: PhaseLockOptional,
     /// Setpoint of the phase of the response relative to the reference, rad.
     pub phase_target: PhaseLockReal,
-    /// Method of the phase detector.
-    pub detector: PhaseLockDetector,
+    /// Method of the phase detector, a PhaseLockDetector; an integer, because any other value must be refused.
+    pub detector: i32,
     /// Bandwidth of the detector, rad/s: the tuning parameter.
     pub bandwidth: PhaseLockReal,
     /// Damping rate of the structure, rad/s; not present: unknown.

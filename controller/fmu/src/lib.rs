@@ -28,6 +28,8 @@ struct Controller {
     active: bool,
     hold_response: bool,
     to: Move,
+    /// Whether Initialization Mode has been left. Until then parameters may change together; a later change is checked at once.
+    initialised: bool,
     running: Option<Running>,
 }
 
@@ -44,10 +46,14 @@ struct Running {
 }
 
 impl Running {
+    /// Whether the response amplitude can be controlled.
+    fn is_closed(&self) -> bool {
+        matches!(self.output.state, LoopState::Acquiring | LoopState::Locked)
+    }
+
     /// Controls the response amplitude as the master asks, as soon as the loop is closed; `None`: the drive amplitude.
     fn hold_response(&mut self, to: Option<Move>) -> Result<(), Refusal> {
-        let is_closed = matches!(self.output.state, LoopState::Acquiring | LoopState::Locked);
-        let to = to.filter(|_| is_closed);
+        let to = to.filter(|_| self.is_closed());
         if to != self.moved {
             match to {
                 Some(to) => self.lock.hold_response(&mut self.state, to)?,
@@ -69,11 +75,6 @@ const LONGEST_STEP: f64 = 2.0;
 const MAX_SAMPLES: f64 = 1e7;
 
 impl Controller {
-    /// Whether the first sample has been taken. Until then parameters may change together.
-    fn is_stepping(&self) -> bool {
-        self.running.as_ref().is_some_and(|running| running.clock.taken() > 0)
-    }
-
     /// The value of a parameter or of an output; 0 for an output without a value.
     fn value(&self, variable: impl Key) -> Value {
         let name = variable.variable().name;
@@ -96,7 +97,7 @@ impl Controller {
             .ok_or_else(|| Refusal::error("this variable is computed, not set"))?;
         let mut config = self.config;
         parameter.set(&mut config, value)?;
-        if self.is_stepping() {
+        if self.initialised {
             // A tunable parameter: an invalid value is refused now, a valid one takes effect at the next step.
             config.build()?;
         }
@@ -117,6 +118,7 @@ impl Component for Controller {
             active: false,
             hold_response: false,
             to: Move::default(),
+            initialised: false,
             running: None,
         }
     }
@@ -192,7 +194,17 @@ impl Component for Controller {
         Ok(())
     }
 
+    fn leave_initialization(&mut self) {
+        self.initialised = true;
+    }
+
     fn accept_step(&self, step: f64) -> Result<(), Refusal> {
+        if self.hold_response
+            && let Some(running) = self.running.as_ref().filter(|running| running.is_closed())
+        {
+            // Refused before the step, an invalid move can be corrected.
+            self.to.check(running.lock.config())?;
+        }
         let sample_time = self.config.sample_time;
         if step / sample_time <= MAX_SAMPLES {
             return Ok(());
@@ -241,9 +253,11 @@ impl Component for Controller {
             if running.output.state != before {
                 let t = running.start_time + sample as f64 * sample_time;
                 let Output { state, fault, .. } = running.output;
+                let reason = fault.filter(|_| state.is_latched()).map_or("", |fault| fault.text());
+                let colon = if reason.is_empty() { "" } else { ": " };
                 log.tell(
                     category::logEvents,
-                    format_args!("{before:?} -> {state:?} at t = {t} s, fault: {fault:?}"),
+                    format_args!("{before} -> {state} at t = {t} s{colon}{reason}"),
                 );
             }
         }

@@ -7,15 +7,18 @@ use crate::instance::Instance;
 use crate::life_cycle::{Function, State};
 use crate::status::Status;
 
-/// `fmi2SetupExperiment`. The tolerance is not used: what a component cannot do exactly it decides for itself.
+/// `fmi2SetupExperiment`. The tolerance is checked and not used: what a component cannot do exactly it decides for itself.
 pub unsafe fn setup_experiment<C: Component>(
     component: CComponent,
+    tolerance_defined: CBoolean,
+    tolerance: f64,
     start_time: f64,
     stop_time_defined: CBoolean,
     stop_time: f64,
 ) -> Status {
     let stop_time = (stop_time_defined != 0).then_some(stop_time);
-    let body = |instance: &mut Instance<C>| instance.set_up(start_time, stop_time);
+    let tolerance = (tolerance_defined != 0).then_some(tolerance);
+    let body = |instance: &mut Instance<C>| instance.set_up(tolerance, start_time, stop_time);
     let function = Function::SetupExperiment;
     // SAFETY: the contract is passed on.
     unsafe { enter(component, function, "fmi2SetupExperiment", body) }

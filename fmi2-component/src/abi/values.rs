@@ -1,5 +1,6 @@
 //! `fmi2GetReal`, `fmi2SetReal`, and the same for integers and Booleans (FMI 2.0, clause 2.1.7).
 
+use std::any::TypeId;
 use std::ffi::c_int;
 
 use super::entry::enter;
@@ -178,9 +179,28 @@ pub(super) fn find<K: Key>(reference: CValueReference) -> Result<K, Refusal> {
 
 #[cold]
 fn unknown<K: Key>(reference: CValueReference) -> Refusal {
-    let kind = std::any::type_name::<K::Value>();
-    let known: Vec<_> = K::VARIABLES.iter().map(|v| v.value_reference).collect();
+    let type_name = type_name::<K>();
+    let known: Vec<_> = K::VARIABLES.iter().map(|v| v.value_reference.to_string()).collect();
+    let expected = if known.is_empty() {
+        format!("the model has no variables of type {type_name}")
+    } else {
+        format!("expected one of {}", known.join(", "))
+    };
     Refusal::error(format!(
-        "value reference {reference} is unknown among variables of type {kind}; known are {known:?}"
+        "value reference {reference} is unknown among variables of type {type_name}; {expected}"
     ))
+}
+
+/// The name of a type of variables in the standard.
+fn type_name<K: Key>() -> &'static str {
+    let names = [
+        (TypeId::of::<f64>(), "Real"),
+        (TypeId::of::<i32>(), "Integer"),
+        (TypeId::of::<bool>(), "Boolean"),
+    ];
+    let own = TypeId::of::<K::Value>();
+    names
+        .iter()
+        .find(|(id, _)| *id == own)
+        .map_or("String", |(_, name)| name)
 }

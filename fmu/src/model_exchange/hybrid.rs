@@ -4,9 +4,13 @@
 //! An integrator stops a little before or behind a zero. A contact is therefore reported [`DEPTH`] half-widths behind the wall, and a release
 //! slightly below a contact force of zero. A function without a meaning in the present contact state is held above zero.
 //!
-//! An integrator cannot follow a chatter to its accumulation point. A rebound that would lift the particle less than
-//! [`LOWEST_HOP`] half-widths off its wall, and whose chatter is over within [`LONGEST_CHATTER`] of the rig's time, ends in
-//! contact at once; what that neglects is of third order in the rebound's speed, 1e-15 here.
+//! An integrator cannot follow a chatter to its accumulation point. It ends in contact where the integrator no longer resolves the
+//! hops. That shows by itself: the integrator reports a contact while the particle, free since its last impact, still moves away from
+//! the wall that presses towards it. Such a hop is shorter than a step at the integrator's tolerance, which most masters do not state.
+//! A tighter tolerance resolves lower hops. An integrator that resolves every hop is stopped by a limit: a rebound that would lift
+//! the particle less than [`LOWEST_HOP`] half-widths off its wall, and whose chatter is over within [`LONGEST_CHATTER`] of the rig's
+//! time, ends in contact at once. What a rest neglects is of third order in the rebound's speed, 1e-15 at that limit; the kinetic
+//! energy of the relative motion counts as dissipated, as it would at the end of the chatter ([`Rest`]).
 //!
 //! The contact force depends on the velocity of the base. That of the built-in oscillator is known while its amplitude is
 //! held; that of a signal is unknown, and taken for zero; the plant in closed form ([`lovines::plant`]) has no such limit.
@@ -19,7 +23,7 @@ use lovines::plant::{Event, Plant, State, Totals};
 
 /// Distance behind a wall at which a contact is reported, as a fraction of the half-width.
 pub const DEPTH: f64 = 1e-12;
-/// The lowest hop that is followed, as a fraction of the half-width.
+/// The lowest hop that is followed with any integrator, as a fraction of the half-width.
 pub const LOWEST_HOP: f64 = 1e-10;
 /// The longest chatter that is cut short, as a fraction of the time `1/omega0`.
 pub const LONGEST_CHATTER: f64 = 1e-2;
@@ -37,6 +41,26 @@ pub struct States {
     pub u2: f64,
     /// Phase of the base oscillator, rad.
     pub phase: f64,
+}
+
+/// The end of a chatter, and what the rest leaves out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Rest {
+    /// The wall that the particle rests on.
+    pub wall: Wall,
+    /// Height of the next hop, m.
+    pub hop: f64,
+    /// Kinetic energy of the relative motion, J; counted as dissipated.
+    pub energy: f64,
+}
+
+/// An event that is logged.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Happening {
+    /// An impact or a release, as in the plant in closed form.
+    Event(Event),
+    /// The particle came to rest on a wall.
+    Rest(Rest),
 }
 
 /// The rig between two calls of an integrator.
@@ -135,19 +159,21 @@ impl Hybrid {
     }
 
     /// Applies what is due now, at `time`: a jump of the base, an impact, rest, release; whether states have jumped.
-    pub fn resolve(&mut self, time: f64, mut on_event: impl FnMut(Event)) -> bool {
+    pub fn resolve(&mut self, time: f64, mut on_event: impl FnMut(Happening)) -> bool {
         let before = (self.states, self.contact);
+        // After a jump of the base or a release, a particle behind the wall may leave it: that is no hop.
+        let hops = self.contact.is_none() && self.base_before == Some(self.instant().base());
         self.base_jump();
         if let Some(wall) = self.contact
             && self.push(wall, &self.instant()) < -0.5 * DEPTH
         {
             self.part(None);
-            on_event(Event::Released { t: 0.0, wall });
+            on_event(Happening::Event(Event::Released { t: 0.0, wall }));
         } else if self.contact.is_none() {
             let now = self.instant();
             let touched = (Wall::BOTH.into_iter()).find(|&wall| self.gap(wall, &now) <= 0.5 * DEPTH);
             if let Some(wall) = touched {
-                self.touch(wall, time, &mut on_event);
+                self.touch(wall, time, hops, &mut on_event);
             }
         }
         // States may jump now, so that the phase can be brought back to one turn.
@@ -204,31 +230,43 @@ impl Hybrid {
         }
     }
 
-    /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave.
-    fn touch(&mut self, wall: Wall, time: f64, on_event: &mut impl FnMut(Event)) {
+    /// The particle is at `wall`: impact if it approaches, then rest if it cannot leave, or if the integrator cannot resolve that
+    /// it leaves. `hops`: it has been free since its last impact.
+    fn touch(&mut self, wall: Wall, time: f64, hops: bool, on_event: &mut impl FnMut(Happening)) {
+        let now = self.instant();
+        let unresolved = hops && self.gap(wall, &now) < -0.5 * DEPTH && wall.sign() * now.relative_velocity() < 0.0;
         self.states.q2 = self.states.q1 - wall.sign() * self.parameters.half_width;
         let law = ImpactLaw::new(&self.parameters);
-        let now = self.instant();
         let velocities = (now.dq1, now.dq2, now.dq1 - now.dq2);
+        let (mut hop, mut energy) = (0.0, 0.0);
         let touch = law.touch(wall, velocities, |primary, speed| {
-            self.rests(&law, wall, primary, speed)
+            let pressing = self.pressing(wall, primary);
+            if speed > 0.0 {
+                hop = 0.5 * speed * speed / pressing;
+                energy = 0.5 * self.parameters.relative_mass() * speed * speed;
+            }
+            unresolved && pressing > 0.0 || self.rests(&law, speed, pressing)
         });
         self.totals.add(&touch, time);
         if let Some(velocity) = touch.impact {
-            on_event(Event::Impact { t: 0.0, wall, velocity });
+            on_event(Happening::Event(Event::Impact { t: 0.0, wall, velocity }));
         }
         if touch.stuck {
             self.contact = Some(wall);
-            on_event(Event::Stuck { t: 0.0, wall });
+            on_event(Happening::Rest(Rest { wall, hop, energy }));
         }
         self.set_velocities(touch.primary, touch.particle);
     }
 
-    /// Whether a particle that leaves `wall` at `speed` counts as at rest on it.
-    fn rests(&self, law: &ImpactLaw, wall: Wall, primary: f64, speed: f64) -> bool {
-        let (b, fast) = self.scales();
+    /// Acceleration, m/s², of `wall` towards a free particle on it, at this velocity of the primary mass, m/s.
+    fn pressing(&self, wall: Wall, primary: f64) -> f64 {
         let now = Instant { dq1: primary, ..self.instant() };
-        let pressing = wall.sign() * now.acceleration();
+        wall.sign() * now.acceleration()
+    }
+
+    /// Whether a particle that leaves a wall at `speed` counts as at rest on it, however accurate the integrator is.
+    fn rests(&self, law: &ImpactLaw, speed: f64, pressing: f64) -> bool {
+        let (b, fast) = self.scales();
         let resolution = Resolution {
             lowest_hop: LOWEST_HOP * b,
             longest_chatter: LONGEST_CHATTER * b / fast,
@@ -238,3 +276,7 @@ impl Hybrid {
         law.rests(speed, (pressing, 0.5 * DEPTH * fast * fast / b), &resolution)
     }
 }
+
+#[cfg(test)]
+#[path = "../../tests/unit/hybrid.rs"]
+mod tests;

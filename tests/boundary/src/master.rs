@@ -120,6 +120,16 @@ impl Master {
         }
     }
 
+    /// Switches on these categories of the log and no other.
+    ///
+    /// # Panics
+    /// If the call is refused.
+    pub fn listen(&self, categories: &[&CStr]) {
+        let names: Vec<_> = categories.iter().map(|name| name.as_ptr()).collect();
+        // SAFETY: the instance is alive, and the names outlive the call.
+        self.well(unsafe { (self.f.fmi2SetDebugLogging)(self.c, 1, names.len(), names.as_ptr()) });
+    }
+
     /// Asserts that a call was done.
     ///
     /// # Panics

@@ -107,9 +107,13 @@ fn a_controller_tuned_to_nonsense_takes_no_part_of_it() {
 
 #[test]
 fn a_reference_of_another_type_is_refused() {
-    refused("type i32", |m| unsafe { (m.f.fmi2GetInteger)(m.c, &Q1, 1, &mut 0) });
-    refused("type bool", |m| unsafe { (m.f.fmi2SetBoolean)(m.c, &E, 1, &1) });
-    refused("type &str", |m| unsafe { (m.f.fmi2GetString)(m.c, &E, 1, &mut null()) });
+    refused("type Integer", |m| unsafe { (m.f.fmi2GetInteger)(m.c, &Q1, 1, &mut 0) });
+    refused("no variables of type Boolean", |m| unsafe {
+        (m.f.fmi2SetBoolean)(m.c, &E, 1, &1)
+    });
+    refused("no variables of type String", |m| unsafe {
+        (m.f.fmi2GetString)(m.c, &E, 1, &mut null())
+    });
 }
 
 #[test]

@@ -47,6 +47,7 @@ fn derivatives_of_held_inputs_are_accepted_and_have_no_effect() {
 #[test]
 fn an_ignored_input_derivative_is_warned_of_once() {
     let m = Master::ready(&Fmu::plant());
+    m.listen(&[c"logStatusWarning"]);
     for n in 0..3 {
         m.well(set_input_derivative(&m, E, 1, 0.0));
         m.well(set_input_derivative(&m, OMEGA, 1, 0.0));
@@ -62,6 +63,29 @@ fn an_ignored_input_derivative_is_warned_of_once() {
         panic!("one warning expected: {heard:?}");
     };
     assert!(warning.contains("omega") && warning.contains("held"), "{warning}");
+}
+
+#[test]
+fn a_warning_is_told_in_its_own_category_and_only_there() {
+    let m = Master::ready(&Fmu::plant());
+    let mut time = 0.0;
+    let mut warned = || {
+        m.well(set_input_derivative(&m, OMEGA, 1, 2.0));
+        m.well(m.step(time, 1e-3));
+        time += 1e-3;
+        m.heard()
+    };
+    assert!(warned().is_empty(), "logging is off");
+    m.listen(&[c"logStatusError", c"logEvents"]);
+    assert!(warned().is_empty(), "warnings are not wanted");
+    m.listen(&[c"logStatusWarning"]);
+    let [line] = &warned()[..] else {
+        panic!("one warning expected");
+    };
+    assert_eq!(
+        (line.status, line.category.as_str()),
+        (Status::Warning, "logStatusWarning")
+    );
 }
 
 #[test]
@@ -140,6 +164,7 @@ fn a_step_longer_than_the_sample_time_is_warned_of_once() {
     let m = Master::new(&Fmu::controller(), Interface::CoSimulation);
     m.well(m.set_real(SAMPLE_TIME, 0.001));
     m.start();
+    m.listen(&[c"logStatusWarning"]);
     for n in 0..10 {
         m.well(m.step(f64::from(n) * 0.001, 0.001));
     }
