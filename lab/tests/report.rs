@@ -88,8 +88,18 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
         write(&finer, folder.path()).kept,
         ["experiment", "tracking", "theory", "curves"]
     );
-    // What is made anew has the same bytes.
+    // What is made anew has the same bytes, also of a damaged section.
     write(&subject, folder.path());
+    assert_eq!(std::fs::read_to_string(&page).unwrap(), html);
+    let kept = folder.path().join(".vines/theory.json");
+    let text = std::fs::read_to_string(&kept).unwrap();
+    let digit = text.rfind("0.").unwrap() + 2;
+    let other = if text[digit..].starts_with('5') { "6" } else { "5" };
+    std::fs::write(&kept, text[..digit].to_string() + other + &text[digit + 1..]).unwrap();
+    assert_eq!(
+        write(&subject, folder.path()).kept,
+        ["experiment", "tracking", "curves", "regimes"]
+    );
     assert_eq!(std::fs::read_to_string(&page).unwrap(), html);
 
     let Some((console, seen)) = browser(&page, &["--dump-dom"]) else {

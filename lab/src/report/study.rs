@@ -47,9 +47,9 @@ pub fn write_report(
             continue;
         }
         let section = make(subject, &at)?;
-        // With a hash of its input.
-        let text = serde_json::to_string(&(key, &section))?;
-        files::write(&out.join(KEPT), [(file, text)])?;
+        let text = serde_json::to_string(&section)?;
+        let hash = hash(&format!("{key}\n{text}"));
+        files::write(&out.join(KEPT), [(file, format!("{hash}\n{text}"))])?;
         sections.push(section);
     }
     let mut files = vec![(
@@ -72,14 +72,14 @@ pub fn write_report(
     })
 }
 
-/// The section cached in a file, if its input is the same.
+/// The section cached in a file, if it is undamaged and its input is the same: its first line is a hash of both.
 fn found(file: &Path, key: &str) -> Option<Section> {
-    let text = std::fs::read_to_string(file).ok()?;
-    let (made_from, section): (String, Section) = serde_json::from_str(&text).ok()?;
-    (made_from == key).then_some(section)
+    let content = std::fs::read_to_string(file).ok()?;
+    let (first, text) = content.split_once('\n')?;
+    (first == hash(&format!("{key}\n{text}"))).then(|| serde_json::from_str(text).ok())?
 }
 
-/// A hash of everything that a section depends on.
+/// Everything that a section depends on.
 fn key(subject: &Subject, section: &str) -> String {
     let axes = if section == "regimes" {
         format!("{} {}", subject.map[0], subject.map[1])
@@ -88,6 +88,9 @@ fn key(subject: &Subject, section: &str) -> String {
     };
     let scene = serde_json::to_string(&subject.scene).unwrap_or_default();
     let version = env!("CARGO_PKG_VERSION");
-    let hash = Sha256::digest(format!("{section}\n{version}\n{axes}\n{scene}"));
-    hash.iter().map(|byte| format!("{byte:02x}")).collect()
+    format!("{section}\n{version}\n{axes}\n{scene}")
+}
+
+fn hash(text: &str) -> String {
+    Sha256::digest(text).iter().map(|byte| format!("{byte:02x}")).collect()
 }
