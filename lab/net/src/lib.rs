@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 mod address;
+mod bridge;
 mod client;
 mod controller_client;
 mod error;

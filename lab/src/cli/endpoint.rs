@@ -8,7 +8,7 @@ use clap::Args;
 use phase_lock::Config;
 use vines::ArgumentError;
 use vines::fmu::{FmuController, FmuError, FmuRig};
-use vines::net::helic::{Channels, DEFAULT_PORT, HelicRig, Network};
+use vines::net::helic::{Channels, DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
 use vines::scene::{Name, Names, Scene};
@@ -133,7 +133,7 @@ fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Netw
     } else {
         format!("{place}:{DEFAULT_PORT}")
     };
-    let network = Network::connect(resolve(&place, scope)?).map_err(|error| {
+    let network = Network::connect(resolve(&place, scope)?, LONGEST_SILENCE).map_err(|error| {
         let advice = "is `vines rig --protocol helic` or a device running there?";
         Failure::run(format!("no answer from {address}: {error}; {advice}"))
     })?;
