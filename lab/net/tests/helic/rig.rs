@@ -147,7 +147,7 @@ fn an_experiment_rides_through_lost_datagrams_and_gives_the_same_backbone() {
 #[test]
 fn a_longer_blackout_ends_the_run_and_says_how_long_it_was() {
     let scene = scene();
-    let mut rig = connect(|n| usize::from(n < 100 || n >= 140));
+    let mut rig = connect(|n| usize::from(!(100..140).contains(&n)));
     let error = (0..1000).find_map(|_| {
         let sensed = rig.sense();
         sensed.and_then(|_| rig.advance(drive(), scene.sample_time())).err()
