@@ -57,8 +57,11 @@ impl Watchdog {
         Ok(Self { shared, _alive: alive })
     }
 
-    /// The host has taken a reading.
+    /// The host has taken a reading. After the drive was stopped, this is too late, and does not count.
     pub fn beat(&self) {
+        if self.has_fired() {
+            return;
+        }
         let now = self.shared.start.elapsed().as_micros() as u64;
         self.shared.last.store(now, Ordering::Relaxed);
     }
