@@ -36,21 +36,21 @@ pub(super) struct Client {
 }
 
 impl Client {
-    /// Opens a session. If the server has another client, which may be about to leave, it is asked again for a while.
-    pub fn connect(peer: Address, controller: bool, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
+    /// Opens a session; `flags` are those of Hello. If the server has another client, which may be about to leave, it is asked again for a while.
+    pub fn connect(peer: Address, flags: u8, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
         let end = Instant::now() + CONNECT;
         loop {
-            match Self::open(peer, controller, sample_time, key) {
+            match Self::open(peer, flags, sample_time, key) {
                 Err(LinkError::Refused { reason: Refusal::Busy, .. }) if Instant::now() < end => thread::sleep(RESEND),
                 outcome => return outcome,
             }
         }
     }
 
-    fn open(peer: Address, controller: bool, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
-        let unreachable = || unreachable(peer, controller);
+    fn open(peer: Address, flags: u8, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
+        let unreachable = || unreachable(peer, flags & flag::CONTROLLER != 0);
         let mut hello = Frame::new(Kind::Hello, RandomState::new().build_hasher().finish());
-        hello.flags = if controller { flag::CONTROLLER } else { 0 };
+        hello.flags = flags;
         hello.values[0] = sample_time;
         let mut client = Self {
             link: Link::connect(peer, CONNECT, key).map_err(|_| unreachable())?,
@@ -103,14 +103,15 @@ impl Client {
             };
             match self.link.receive(until)? {
                 Some(Err(FrameError::Version(theirs))) => return Err(LinkError::Version { peer, theirs }),
-                Some(Err(FrameError::Closed)) => return Err(LinkError::ShutDown { peer, time }),
+                Some(Err(FrameError::Closed)) => return Err(LinkError::Closed { peer, time }),
                 Some(Err(_)) => self.counters.malformed += 1,
                 Some(Ok(frame)) if frame.session != self.session => self.counters.foreign += 1,
                 Some(Ok(frame)) if frame.kind == Kind::Refusal => {
                     return Err(LinkError::Refused { peer, reason: Refusal::read(&frame) });
                 }
                 Some(Ok(frame)) if frame.has(flag::SHUT_DOWN) => {
-                    return Err(LinkError::ShutDown { peer, time: frame.time });
+                    let seconds = self.silence.as_secs_f64();
+                    return Err(LinkError::ShutDown { peer, time: frame.time, seconds });
                 }
                 Some(Ok(frame)) => {
                     self.counters.received += 1;
@@ -147,6 +148,18 @@ impl Client {
     pub fn silent(&self) -> LinkError {
         let (peer, seconds) = (self.peer, self.silence.as_secs_f64());
         LinkError::Silent { peer, seconds, time: self.time() }
+    }
+
+    /// So many readings of a rig were lost one after the other.
+    pub fn blackout(&self, samples: u64) -> LinkError {
+        let (peer, allowed) = (self.peer, self.silence.as_secs_f64());
+        LinkError::Blackout {
+            peer,
+            samples,
+            seconds: samples as f64 * self.sample_time,
+            allowed,
+            time: self.time(),
+        }
     }
 
     pub fn invalid(&self) -> LinkError {

@@ -44,13 +44,30 @@ pub enum LinkError {
         theirs: String,
         ours: String,
     },
-    #[error("{peer} has been silent for {seconds} s, at t = {time} s of the experiment")]
+    #[error(
+        "nothing has arrived from {peer} for {seconds} s, at t = {time:.3} s of the experiment: it is too slow or has ended, or the network is down"
+    )]
     Silent { peer: Address, seconds: f64, time: f64 },
     #[error(
-        "{peer} has shut down its drive, at t = {time} s of the experiment: it was stopped, or has received no frame from \
-         this program for too long"
+        "{samples} readings of {peer} were lost in the network or came too late, {seconds:.3} s, at t = {time:.3} s of the experiment; gaps of \
+         up to {allowed} s are bridged"
     )]
-    ShutDown { peer: Address, time: f64 },
+    Blackout {
+        peer: Address,
+        samples: u64,
+        seconds: f64,
+        allowed: f64,
+        time: f64,
+    },
+    #[error(
+        "{peer} has shut down its drive, at t = {time:.3} s of the experiment: it was stopped, or no drive of this program reached it for \
+         more than {seconds} s, because the network lost them, or this machine was too slow"
+    )]
+    ShutDown { peer: Address, time: f64, seconds: f64 },
+    #[error(
+        "{peer} has closed the connection, at t = {time:.3} s of the experiment: it was stopped, or received nothing for too long"
+    )]
+    Closed { peer: Address, time: f64 },
     #[error(
         "{peer} sent a frame that is damaged, has a value that is not allowed, or is not the answer, at t = {time} s of the experiment"
     )]

@@ -45,7 +45,9 @@ impl Service {
         if hello.flags & flag::CONTROLLER != flags {
             return Err(Refusal::Role);
         }
-        if (hello.values[0] / self.sample_time - 1.0).abs() > SAME_TIME {
+        // Not a number is not the same, either.
+        let same = (hello.values[0] / self.sample_time - 1.0).abs() <= SAME_TIME;
+        if !same {
             return Err(Refusal::SampleTime(self.sample_time));
         }
         let mut welcome = Frame { flags, ..Frame::new(Kind::Welcome, hello.session) };

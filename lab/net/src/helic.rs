@@ -15,9 +15,10 @@ mod server;
 mod settings;
 mod stream;
 mod transport;
+mod watchdog;
 
 pub use device::Device;
 pub use host::{Host, HostError};
 pub use rig_client::{Channels, HelicRig};
 pub use server::{DEFAULT_PORT, HelicServer};
-pub use transport::{Network, Transport};
+pub use transport::{LONGEST_SILENCE, Network, Transport};

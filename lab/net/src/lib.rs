@@ -11,6 +11,7 @@
 #![forbid(unsafe_code)]
 
 mod address;
+mod bridge;
 mod client;
 mod controller_client;
 mod error;
@@ -34,7 +35,7 @@ pub use error::{LinkError, ServerError};
 pub use handshake::{Refusal, Role, Service};
 pub use ramp::RAMP_SAMPLES;
 pub use real_time_clock::Punctuality;
-pub use report::{Counters, Ended, Session, Timing};
+pub use report::{Counters, Ended, ReportLost, Session, Timing};
 pub use resolve::resolve;
 pub use rig_client::NetRig;
 pub use run::Served;

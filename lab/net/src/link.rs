@@ -16,12 +16,12 @@ const FINE: Duration = Duration::from_millis(20);
 const POLL: Duration = Duration::from_micros(50);
 /// Shorter waits do not sleep: the system wakes a program up later than it asks for, by about this.
 const SPIN: Duration = Duration::from_micros(100);
-/// Interval at which a server without connections looks for one.
+/// Interval at which a server without a session looks for connections and what they say.
 const ACCEPT: Duration = Duration::from_millis(5);
 /// Longest time for sending a frame over TCP to a peer that does not read.
 const SEND: Duration = Duration::from_secs(5);
-/// Longest time for a TCP client to say Hello while another one has a session.
-const HELLO: Duration = Duration::from_millis(50);
+/// Longest time for a TCP client to say Hello.
+const HELLO: Duration = Duration::from_secs(1);
 
 /// A frame, or what arrived instead.
 pub(super) type Received = Result<Frame, FrameError>;
@@ -90,8 +90,18 @@ pub(super) struct Listener {
 
 #[derive(Debug)]
 enum ListenerSocket {
-    Tcp(TcpListener, Vec<(SocketAddr, FrameStream)>),
+    Tcp(Connections),
     Udp(UdpSocket),
+}
+
+/// The connections of a TCP server.
+#[derive(Debug)]
+struct Connections {
+    listener: TcpListener,
+    /// The client of the session.
+    client: Option<(SocketAddr, FrameStream)>,
+    /// Those that have said nothing yet, and when they came.
+    visitors: Vec<(SocketAddr, FrameStream, Instant)>,
 }
 
 impl Listener {
@@ -101,7 +111,7 @@ impl Listener {
             Address::Tcp(address) => {
                 let listener = TcpListener::bind(address)?;
                 listener.set_nonblocking(true)?;
-                ListenerSocket::Tcp(listener, Vec::new())
+                ListenerSocket::Tcp(Connections { listener, client: None, visitors: Vec::new() })
             }
         };
         Ok(Self { socket, seal: Seal::new(key, Side::Server) })
@@ -113,44 +123,17 @@ impl Listener {
 
     pub fn address(&self) -> io::Result<Address> {
         Ok(match &self.socket {
-            ListenerSocket::Tcp(listener, _) => Address::Tcp(listener.local_addr()?),
+            ListenerSocket::Tcp(all) => Address::Tcp(all.listener.local_addr()?),
             ListenerSocket::Udp(socket) => Address::Udp(socket.local_addr()?),
         })
     }
 
     /// Waits for a frame until `deadline`, or less.
     pub fn receive(&mut self, deadline: Instant) -> io::Result<Option<(Received, SocketAddr)>> {
-        let seal = &self.seal;
-        let (listener, streams) = match &mut self.socket {
-            ListenerSocket::Udp(socket) => return receive_from(socket, deadline, seal),
-            ListenerSocket::Tcp(listener, streams) => (listener, streams),
-        };
-        if let Ok((stream, from)) = listener.accept() {
-            streams.push((from, FrameStream::new(stream, seal.size())?));
+        match &mut self.socket {
+            ListenerSocket::Udp(socket) => receive_from(socket, deadline, &self.seal),
+            ListenerSocket::Tcp(all) => all.receive(deadline, &self.seal),
         }
-        if streams.is_empty() {
-            thread::sleep(ACCEPT);
-        }
-        // The client of the session is the first one; others have only a moment.
-        for index in (0..streams.len()).rev() {
-            let (from, stream) = &mut streams[index];
-            let from = *from;
-            let until = if index == 0 {
-                deadline
-            } else {
-                deadline.min(Instant::now() + HELLO)
-            };
-            match stream.receive(until, seal)? {
-                Some(Err(FrameError::Closed)) => {
-                    streams.remove(index);
-                    return Ok(Some((Err(FrameError::Closed), from)));
-                }
-                Some(received) => return Ok(Some((received, from))),
-                None if index > 0 => drop(streams.remove(index)),
-                None => {}
-            }
-        }
-        Ok(None)
     }
 
     /// Sends a frame. If a TCP client has left, the next call of `receive` says so.
@@ -158,8 +141,10 @@ impl Listener {
         let bytes = self.seal.encode(frame);
         match &mut self.socket {
             ListenerSocket::Udp(socket) => delivered(socket.send_to(&bytes, to)),
-            ListenerSocket::Tcp(_, streams) => {
-                let stream = streams.iter_mut().find(|(from, _)| *from == to);
+            ListenerSocket::Tcp(all) => {
+                let client = all.client.iter_mut().map(|(from, stream)| (from, stream));
+                let visitors = all.visitors.iter_mut().map(|(from, stream, _)| (from, stream));
+                let stream = client.chain(visitors).find(|(from, _)| **from == to);
                 stream.map_or(Ok(()), |(_, stream)| stream.send(&bytes))
             }
         }
@@ -167,16 +152,62 @@ impl Listener {
 
     /// The session is that of this client.
     pub fn prefer(&mut self, client: SocketAddr) {
-        if let ListenerSocket::Tcp(_, streams) = &mut self.socket
-            && let Some(index) = streams.iter().position(|(from, _)| *from == client)
+        if let ListenerSocket::Tcp(all) = &mut self.socket
+            && let Some(index) = all.visitors.iter().position(|(from, ..)| *from == client)
         {
-            streams.swap(0, index);
+            let (from, stream, _) = all.visitors.swap_remove(index);
+            all.client = Some((from, stream));
         }
     }
 
     pub fn close(&mut self, client: SocketAddr) {
-        if let ListenerSocket::Tcp(_, streams) = &mut self.socket {
-            streams.retain(|(from, _)| *from != client);
+        if let ListenerSocket::Tcp(all) = &mut self.socket {
+            all.client.take_if(|(from, _)| *from == client);
+            all.visitors.retain(|(from, ..)| *from != client);
+        }
+    }
+}
+
+impl Connections {
+    fn receive(&mut self, deadline: Instant, seal: &Seal) -> io::Result<Option<(Received, SocketAddr)>> {
+        loop {
+            while let Ok((stream, from)) = self.listener.accept() {
+                // One that fails has been closed.
+                if let Ok(stream) = FrameStream::new(stream, seal.size()) {
+                    self.visitors.push((from, stream, Instant::now()));
+                }
+            }
+            // Visitors are not waited for: they cost their client, and each other, no time.
+            for index in (0..self.visitors.len()).rev() {
+                let (from, stream, since) = &mut self.visitors[index];
+                let from = *from;
+                let received = stream.receive(Instant::now(), seal)?;
+                let ends = match &received {
+                    None => since.elapsed() > HELLO,
+                    // Another version gets an answer.
+                    Some(Err(error)) => !matches!(error, FrameError::Version(_)),
+                    Some(Ok(_)) => false,
+                };
+                if ends {
+                    drop(self.visitors.swap_remove(index));
+                }
+                if let Some(received) = received {
+                    return Ok(Some((received, from)));
+                }
+            }
+            if let Some((from, stream)) = &mut self.client {
+                let from = *from;
+                let received = stream.receive(deadline, seal)?;
+                if matches!(received, Some(Err(FrameError::Closed))) {
+                    self.client = None;
+                }
+                return Ok(received.map(|received| (received, from)));
+            }
+            let left = deadline.saturating_duration_since(Instant::now());
+            if left.is_zero() {
+                return Ok(None);
+            }
+            thread::sleep(left.min(ACCEPT));
         }
     }
 }

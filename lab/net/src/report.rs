@@ -4,6 +4,7 @@ use std::fmt::{self, Display, Formatter};
 use std::net::SocketAddr;
 
 use serde::Serialize;
+use thiserror::Error;
 
 use super::frame::{Frame, Kind};
 use super::real_time_clock::Punctuality;
@@ -108,6 +109,11 @@ impl Display for Session {
     }
 }
 
+/// The report of a rig in real time did not arrive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
+#[error("the rig's report was lost in the network: whether it got its drives in time is not known")]
+pub struct ReportLost;
+
 /// What a rig in real time reports to its client at the end.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Timing {
@@ -124,9 +130,20 @@ pub struct Timing {
 }
 
 impl Timing {
-    /// Share of the samples that the rig served too late, or without a drive in time.
-    pub fn share(&self) -> f64 {
-        self.missed.max(self.held) as f64 / self.samples.max(1) as f64
+    /// What makes results doubtful: more than this share of the samples came too late, or had no drive in time.
+    pub fn doubt(&self, tolerated: f64) -> Option<String> {
+        let exceeds = |count: u64| count as f64 > tolerated * self.samples.max(1) as f64;
+        let reason = match (exceeds(self.missed), exceeds(self.held)) {
+            (false, false) => return None,
+            (true, false) => "the rig missed deadlines: its machine is too slow or too busy",
+            (false, true) => {
+                "drives did not reach the rig in time: the network lost or delayed frames, or the controller or this machine is too slow"
+            }
+            (true, true) => {
+                "the rig missed deadlines, and drives did not reach it in time: a machine is too busy, or the network too slow"
+            }
+        };
+        Some(format!("{reason}; {self}"))
     }
 
     pub(super) fn write(&self, session: u64) -> Frame {

@@ -1,24 +1,26 @@
 //! A rig at a network address.
 
+use std::f64::consts::TAU;
 use std::sync::{Arc, OnceLock};
 use std::time::{Duration, Instant};
 
 use super::address::Address;
+use super::bridge::Bridge;
 use super::client::Client;
 use super::error::LinkError;
 use super::frame::{Frame, Kind, flag};
 use super::payload::{Reading, read_reading, write_command};
-use super::report::{Counters, Timing};
+use super::report::{Counters, ReportLost, Timing};
 use super::seal::Key;
 use vines_testbench::rig::{Command, Drive, GroundTruth, Rig, RigError, Sensors};
 use vines_testbench::scene::Definition;
 
-/// Longest time for the report of a rig in real time.
-const REPORT: Duration = Duration::from_millis(200);
+/// Longest time for the report of a rig in real time: twenty repetitions of the farewell.
+const REPORT: Duration = Duration::from_secs(1);
 
 /// A rig at a network address: in lock-step over TCP, in real time over UDP.
 ///
-/// The last valid reading replaces a lost one, so that the controller gets every sample of the rig's clock.
+/// Lost readings are bridged, so that the controller gets every sample of the rig's clock.
 #[derive(Debug)]
 pub struct NetRig {
     client: Client,
@@ -28,17 +30,24 @@ pub struct NetRig {
     good: Reading,
     /// The frame with the newest reading, which may be that of a later sample.
     newest: Option<Frame>,
-    timing: Arc<OnceLock<Timing>>,
+    bridge: Bridge,
+    /// Phase of the drive at the present sample, and its last step, turns.
+    phase: f64,
+    turn: f64,
+    timing: Arc<OnceLock<Result<Timing, ReportLost>>>,
 }
 
 impl NetRig {
     /// Opens a session with the rig server at `peer`; `sample_time` in s. A server with another key does not answer.
     pub fn connect(peer: Address, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
         Ok(Self {
-            client: Client::connect(peer, false, sample_time, key)?,
+            client: Client::connect(peer, 0, sample_time, key)?,
             now: None,
             good: Reading::default(),
             newest: None,
+            bridge: Bridge::default(),
+            phase: 0.0,
+            turn: 0.0,
             timing: Arc::default(),
         })
     }
@@ -65,8 +74,8 @@ impl NetRig {
         self.client.counters
     }
 
-    /// What a rig in real time reports about its timing. Set at the end of the session, unless the report is lost.
-    pub fn timing(&self) -> Arc<OnceLock<Timing>> {
+    /// What a rig in real time reports about its timing. Set at the end of the session.
+    pub fn timing(&self) -> Arc<OnceLock<Result<Timing, ReportLost>>> {
         Arc::clone(&self.timing)
     }
 
@@ -79,13 +88,16 @@ impl NetRig {
                 (None, Some(frame)) if frame.sequence == self.client.at => read_reading(&frame),
                 (None, Some(frame)) if frame.sequence > self.client.at => {
                     self.client.counters.held += 1;
-                    self.good
+                    let (next, ahead) = (read_reading(&frame), frame.sequence - self.client.at);
+                    let sensors = self.bridge.fill(self.phase, &next.sensors, ahead, self.turn);
+                    Reading { sensors, ..self.good }
                 }
                 _ => {
                     self.wait(end)?;
                     continue;
                 }
             };
+            self.bridge.keep(self.phase, reading.sensors);
             self.good = reading;
             self.now = Some(reading);
         }
@@ -101,8 +113,9 @@ impl NetRig {
             self.client.counters.late += 1;
             return Ok(());
         }
-        if frame.sequence.saturating_sub(self.client.at) > self.client.patience() {
-            return Err(self.client.silent());
+        let lost = frame.sequence.saturating_sub(self.client.at);
+        if lost > self.client.patience() {
+            return Err(self.client.blackout(lost));
         }
         self.newest = Some(frame);
         Ok(())
@@ -115,6 +128,9 @@ impl NetRig {
         self.client.send(Frame { flags: frame.flags | flags, ..frame })?;
         self.client.at += 1;
         self.now = None;
+        // A rig that plays samples has no frequency: then a line is all that bridges a gap.
+        self.turn = drive.omega * step / TAU;
+        self.phase += self.turn;
         Ok(())
     }
 
@@ -122,13 +138,18 @@ impl NetRig {
     fn farewell(&mut self) -> Result<(), LinkError> {
         self.client.send(self.client.frame(Kind::Farewell))?;
         let end = Instant::now() + REPORT;
-        while let Some(frame) = self.client.receive(end)? {
-            if frame.kind == Kind::Report {
-                let _ = self.timing.set(Timing::read(&frame));
-                break;
+        loop {
+            match self.client.receive(end) {
+                Ok(Some(frame)) if frame.kind == Kind::Report => {
+                    let _ = self.timing.set(Ok(Timing::read(&frame)));
+                    return Ok(());
+                }
+                // Readings of the ramp to zero overtake a report that was lost.
+                Ok(Some(_)) | Err(LinkError::ShutDown { .. }) => {}
+                Ok(None) => return Ok(()),
+                Err(error) => return Err(error),
             }
         }
-        Ok(())
     }
 }
 
@@ -155,6 +176,8 @@ impl Drop for NetRig {
     fn drop(&mut self) {
         if self.client.is_real_time() {
             let _ = self.farewell();
+            // Without effect if the report has arrived.
+            let _ = self.timing.set(Err(ReportLost));
         }
     }
 }

@@ -1,7 +1,7 @@
 //! One session of a server.
 
 use std::net::SocketAddr;
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 use super::error::ServerError;
 use super::frame::{Frame, Kind, flag};
@@ -14,7 +14,7 @@ use super::report::{Counters, Ended, Session, Timing};
 use vines_testbench::rig::{Controller, Rig};
 
 /// Longest time from Hello to the first drive of a rig in real time.
-const FIRST_DRIVE: f64 = 5.0;
+const FIRST_DRIVE: Duration = Duration::from_secs(5);
 
 /// What a server offers in a session.
 pub enum Served {
@@ -69,9 +69,16 @@ impl Run {
         (self.peer, self.welcome.session) == (from, session)
     }
 
-    /// When the next sample is due in real time.
+    /// When the next sample is due in real time, or the client has been silent for too long.
     pub fn due(&self) -> Option<Instant> {
-        Some(self.clock.as_ref()?.due(self.at + 1))
+        match &self.clock {
+            Some(clock) => Some(clock.due(self.at + 1)),
+            // A repeated Hello is not a sign of life: anyone can send a copy.
+            None if self.real_time => Some(self.opened + FIRST_DRIVE),
+            None => self
+                .heard
+                .checked_add(Duration::try_from_secs_f64(self.service.silence).ok()?),
+        }
     }
 
     /// Shuts the drive down. In real time the clock continues until the drive is zero.
@@ -99,7 +106,7 @@ impl Run {
             (Kind::Hello, _) if self.real_time => {}
             (Kind::Farewell, _) if self.real_time => {
                 self.end(Ended::Farewell);
-                listener.send(&self.timing().write(frame.session), self.peer)?;
+                listener.send(&self.report(), self.peer)?;
             }
             _ if self.real_time => self.counters.malformed += 1,
             _ => {
@@ -159,14 +166,7 @@ impl Run {
     /// The deadline has passed: a sample is due, or the client is silent.
     pub fn pass(&mut self, listener: &mut Listener) -> Result<(), ServerError> {
         let Some(clock) = &mut self.clock else {
-            let limit = if self.real_time {
-                FIRST_DRIVE
-            } else {
-                self.service.silence
-            };
-            if self.heard.elapsed().as_secs_f64() > limit {
-                self.end(Ended::Silence);
-            }
+            self.end(Ended::Silence);
             return Ok(());
         };
         clock.serve(self.at + 1);
@@ -205,16 +205,18 @@ impl Run {
         Ok(listener.send(&frame, self.peer)?)
     }
 
-    fn timing(&self) -> Timing {
+    /// The report to the client of a rig in real time.
+    pub fn report(&self) -> Frame {
         let none = Punctuality::default();
         let all = self.clock.as_ref().map_or(&none, |clock| &clock.punctuality);
-        Timing {
+        let timing = Timing {
             samples: self.at,
             missed: all.missed,
             worst: all.worst,
             held: self.counters.held,
             quantiles: [0.99, 0.9999].map(|share| all.quantile(share)),
-        }
+        };
+        timing.write(self.welcome.session)
     }
 
     /// Ends the ramp of a rig in lock-step, and reports.

@@ -22,13 +22,15 @@ const BURST: u32 = 256;
 pub struct Server {
     listener: Listener,
     service: Service,
+    /// The client of the last session, and the report on it.
+    last: Option<(SocketAddr, Frame)>,
 }
 
 impl Server {
     /// Listens on `address`; with port 0 the system chooses a free port. With a key, only for clients that have it.
     pub fn listen(address: Address, service: Service, key: Option<Key>) -> Result<Self, LinkError> {
         let listener = Listener::bind(address, key).map_err(|source| LinkError::Listen { address, source })?;
-        Ok(Self { listener, service })
+        Ok(Self { listener, service, last: None })
     }
 
     /// Address of the server.
@@ -36,18 +38,20 @@ impl Server {
         self.listener.address()
     }
 
-    /// Serves sessions until `stop` returns true. `make` creates the rig or controller of a session; `tell` receives its
+    /// Serves sessions until `stop` returns true. `make` creates the rig, or the controller, of a session, and
+    /// gets whether the rig of a controller is at rest; `tell` receives its
     /// report.
     pub fn serve(
         &mut self,
-        mut make: impl FnMut() -> Result<Served, ServerError>,
+        mut make: impl FnMut(bool) -> Result<Served, ServerError>,
         mut stop: impl FnMut() -> bool,
         mut tell: impl FnMut(&Session),
     ) -> Result<(), ServerError> {
         let mut run: Option<Run> = None;
         let mut burst = 0;
         loop {
-            let deadline = run.as_ref().and_then(Run::due).unwrap_or_else(|| Instant::now() + IDLE);
+            let (due, idle) = (run.as_ref().and_then(Run::due), Instant::now() + IDLE);
+            let deadline = due.map_or(idle, |due| due.min(idle));
             let received = if burst < BURST {
                 self.listener.receive(deadline)?
             } else {
@@ -63,8 +67,8 @@ impl Server {
                     run = self.open(&frame, from, &mut make)?
                 }
                 (Some((received, from)), run) => self.sort(run.as_mut(), received, from)?,
-                (None, Some(run)) => run.pass(&mut self.listener)?,
-                (None, None) => {}
+                (None, Some(run)) if due.is_some_and(|due| Instant::now() >= due) => run.pass(&mut self.listener)?,
+                (None, _) => {}
             }
             let stopped = stop();
             if let Some(run) = run.as_mut().filter(|_| stopped) {
@@ -72,6 +76,7 @@ impl Server {
             }
             if let Some(over) = run.take_if(|run| run.is_over()) {
                 self.listener.close(over.peer);
+                self.last = Some((over.peer, over.report()));
                 tell(&over.finish());
             }
             if stopped && run.is_none() {
@@ -85,7 +90,7 @@ impl Server {
         &mut self,
         hello: &Frame,
         from: SocketAddr,
-        make: &mut impl FnMut() -> Result<Served, ServerError>,
+        make: &mut impl FnMut(bool) -> Result<Served, ServerError>,
     ) -> Result<Option<Run>, ServerError> {
         let mut welcome = match self.service.welcome(hello) {
             Ok(welcome) => welcome,
@@ -99,7 +104,7 @@ impl Server {
         welcome.values[3..5].copy_from_slice(&drawn);
         self.listener.seal.begin(hello.session, drawn);
         let real_time = self.listener.is_real_time();
-        let mut run = Run::new(make()?, self.service, real_time, from, welcome);
+        let mut run = Run::new(make(hello.has(flag::AT_REST))?, self.service, real_time, from, welcome);
         run.welcome(&mut self.listener)?;
         Ok(Some(run))
     }
@@ -130,6 +135,15 @@ impl Server {
                 }
                 // Over TCP, nobody else may keep the server from its client.
                 self.listener.close(from);
+            }
+            // The report was lost, and the session has ended in the meantime.
+            (Ok(frame), None) if frame.kind == Kind::Farewell => {
+                let report = self
+                    .last
+                    .filter(|(to, last)| (*to, last.session) == (from, frame.session));
+                if let Some((to, report)) = report {
+                    self.listener.send(&report, to)?;
+                }
             }
             // The session of this client has ended.
             (Ok(frame), None) if frame.kind == Kind::Drive => {

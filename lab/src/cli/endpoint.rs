@@ -8,8 +8,8 @@ use clap::Args;
 use phase_lock::Config;
 use vines::ArgumentError;
 use vines::fmu::{FmuController, FmuError, FmuRig};
-use vines::net::helic::{Channels, DEFAULT_PORT, HelicRig, Network};
-use vines::net::{Address, BindScope, Key, NetController, NetRig, Timing, resolve};
+use vines::net::helic::{Channels, DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
+use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
 use vines::scene::{Name, Names, Scene};
 
@@ -53,12 +53,12 @@ pub(super) struct OpenRig {
     /// In real time, the longest silence that it tolerates, s.
     pub pace: Option<f64>,
     /// In real time, what it reports when the session has ended.
-    timing: Arc<OnceLock<Timing>>,
+    timing: Arc<OnceLock<Result<Timing, ReportLost>>>,
 }
 
 impl OpenRig {
     /// Ends the session of a rig in real time. Its report has the missed deadlines.
-    pub(super) fn close(self) -> Option<Timing> {
+    pub(super) fn close(self) -> Option<Result<Timing, ReportLost>> {
         drop(self.rig);
         self.timing.get().copied()
     }
@@ -100,7 +100,11 @@ impl Endpoint {
             Self::BuiltIn => Box::new(BuiltIn::new(config)?),
             Self::Fmu(file) => Box::new(FmuController::load(file, config, names).map_err(Failure::run)?),
             Self::Network(address) => match Address::parse(address, scope)? {
-                Address::Tcp(peer) => Box::new(NetController::connect(peer, config.sample_time, pace, scope.key())?),
+                Address::Tcp(peer) => {
+                    let at_rest = config.capture_response.is_some();
+                    let connected = NetController::connect(peer, config.sample_time, pace, at_rest, scope.key())?;
+                    Box::new(connected)
+                }
                 Address::Udp(_) => {
                     return Err(Failure::input(format!(
                         "{address}: a controller has an address tcp://HOST:PORT"
@@ -133,7 +137,7 @@ fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Netw
     } else {
         format!("{place}:{DEFAULT_PORT}")
     };
-    let network = Network::connect(resolve(&place, scope)?).map_err(|error| {
+    let network = Network::connect(resolve(&place, scope)?, LONGEST_SILENCE).map_err(|error| {
         let advice = "is `vines rig --protocol helic` or a device running there?";
         Failure::run(format!("no answer from {address}: {error}; {advice}"))
     })?;

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
-use vines::net::Timing;
+use vines::net::{ReportLost, Timing};
 
 use super::failure::Failure;
 
@@ -50,28 +50,29 @@ pub fn log_warnings() {
         .init();
 }
 
-/// The result of an experiment, as JSON or as a summary with the paths that were written. If a rig in real time was late, stderr
-/// says so; a rig that missed too many deadlines is a failure.
+/// The result of an experiment, as JSON or as a summary with the paths that were written. If a rig in real time missed deadlines, or did not
+/// get its drives in time, stderr says so; more than a few make the results doubtful, and so does a rig that does not report.
 pub fn result(
     as_json: bool,
     found: &impl Serialize,
     summary: &str,
     paths: &[PathBuf],
-    timing: Option<Timing>,
+    timing: Option<Result<Timing, ReportLost>>,
 ) -> Result<String, Failure> {
     let text = output(as_json, found, || format!("{summary}\n{}", written(paths)))?;
-    match timing {
-        Some(timing) if timing.share() > TOLERATED => {
-            print(&text)?;
-            let message = format!("the rig missed too many deadlines, so these results are doubtful: {timing}");
-            Err(Failure::new(LATE, message))
-        }
-        Some(timing) if timing.share() > 0.0 => {
-            eprintln!("warning: the rig missed deadlines: {timing}");
-            Ok(text)
-        }
-        _ => Ok(text),
+    let doubt = match &timing {
+        None => None,
+        Some(Ok(timing)) => timing.doubt(TOLERATED),
+        Some(Err(lost)) => Some(lost.to_string()),
+    };
+    if let Some(doubt) = doubt {
+        print(&text)?;
+        return Err(Failure::new(LATE, format!("these results are doubtful: {doubt}")));
     }
+    if let Some(reason) = timing.and_then(|timing| timing.ok()?.doubt(0.0)) {
+        eprintln!("warning: {reason}");
+    }
+    Ok(text)
 }
 
 /// What was found as JSON, or as text.

@@ -27,7 +27,7 @@ mod safety {
 }
 
 /// Sources of a stream, with their units. A rig without a reference sensor has no `reference`.
-const SOURCES: [(&str, &str); 14] = [
+const SOURCES: [(&str, &str); 15] = [
     ("response", "mm"),
     ("reference", "mm"),
     ("control_mode", "enum"),
@@ -40,6 +40,7 @@ const SOURCES: [(&str, &str); 14] = [
     ("target", "V"),
     ("forcing", "V"),
     ("table", "V"),
+    ("phase", "turns"),
     ("out", "V"),
     ("cmd_epoch", "count"),
 ];
@@ -65,6 +66,11 @@ pub struct Device {
     commands: u32,
     epoch: u32,
     ticks: u32,
+    /// Samples since the last request.
+    silence: u32,
+    /// Time of the last reboot, ms, and whether it has just happened.
+    booted: u32,
+    rebooted: bool,
 }
 
 impl Device {
@@ -72,10 +78,7 @@ impl Device {
     pub fn new(mut rig: Box<dyn Rig>, sample_time: f64, max_amplitude: f64) -> Result<Self, RigError> {
         let has_reference = rig.sense()?.reference.is_some();
         let sample_rate = 1.0 / sample_time;
-        let mut registry = Registry::new(EXPERIMENT);
-        registry.put_real("sample_freq", sample_rate);
-        registry.put_real("rig_gain", GAIN);
-        registry.put_real("rig_out_max", max_amplitude / (GAIN * MILLI));
+        let registry = start_values(sample_rate, max_amplitude / (GAIN * MILLI));
         // The values at the start are allowed: a test shows it.
         let settings = Settings::of(&registry).ok_or(RigError::NoHold)?;
         Ok(Self {
@@ -95,7 +98,28 @@ impl Device {
             commands: 0,
             epoch: 0,
             ticks: 0,
+            silence: 0,
+            booted: 0,
+            rebooted: false,
         })
+    }
+
+    /// Starts again with the values of the start, at `uptime`, ms. The rig and its motion stay as they are.
+    fn reboot(&mut self, uptime: u32) {
+        self.registry = start_values(self.sample_rate, self.registry.real("rig_out_max"));
+        if let Some(settings) = Settings::of(&self.registry) {
+            self.settings = settings;
+        }
+        (self.stream, self.table, self.pll) = (Stream::new(self.sample_rate), Table::default(), Pll::new());
+        self.staged.fill(0.0);
+        (self.committed, self.wrapped, self.tripped) = (false, true, false);
+        (self.phase, self.commands, self.epoch, self.ticks) = (0, 0, 0, 0);
+        (self.booted, self.rebooted) = (uptime, true);
+    }
+
+    /// Whether the device has restarted since the last call: the connection to its host is not valid any more.
+    pub fn has_rebooted(&mut self) -> bool {
+        std::mem::take(&mut self.rebooted)
     }
 
     fn sources(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
@@ -108,6 +132,10 @@ impl Device {
     /// The host has left: output and stream stop.
     pub fn disconnect(&mut self) {
         self.stream.stop();
+        self.disarm();
+    }
+
+    fn disarm(&mut self) {
         self.registry.put_number("arm", 0);
         self.settings.armed = false;
     }
@@ -123,6 +151,11 @@ impl Device {
         self.epoch = (self.epoch + std::mem::take(&mut self.commands)) % EPOCH;
         self.committed = false;
         let step = 1.0 / self.sample_rate;
+        self.silence = self.silence.saturating_add(1);
+        let watchdog = self.settings.watchdog;
+        if watchdog > 0.0 && f64::from(self.silence) * step > watchdog {
+            self.disarm();
+        }
         let locking = self.is_driven() && self.settings.mode == Mode::Locked;
         let nominal = increment(self.settings.frequency, self.sample_rate);
         let [target, forcing] = [&self.settings.target, &self.settings.forcing].map(|series| series.at(self.phase));
@@ -166,7 +199,7 @@ impl Device {
     }
 
     /// The values of all sources: `readings` of reference and response, mm, the frequency, Hz, and target, forcing, table and output, V.
-    fn values(&self, readings: [f64; 2], actual: f64, [target, forcing, table, out]: [f64; 4]) -> [f64; 14] {
+    fn values(&self, readings: [f64; 2], actual: f64, [target, forcing, table, out]: [f64; 4]) -> [f64; 15] {
         let lock = &self.pll;
         [
             readings[1],
@@ -181,6 +214,7 @@ impl Device {
             target,
             forcing,
             table,
+            turns(self.phase),
             out,
             f64::from(self.epoch),
         ]
@@ -201,4 +235,13 @@ impl Device {
         self.registry.put_number("safety", bits);
         out
     }
+}
+
+/// The parameters of a device at its start; its output is limited to `largest`, V.
+fn start_values(sample_rate: f64, largest: f64) -> Registry {
+    let mut registry = Registry::new(EXPERIMENT);
+    registry.put_real("sample_freq", sample_rate);
+    registry.put_real("rig_gain", GAIN);
+    registry.put_real("rig_out_max", largest);
+    registry
 }

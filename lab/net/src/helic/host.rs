@@ -4,20 +4,31 @@ use std::io;
 
 use thiserror::Error;
 
-use super::codec::{ErrorCode, Frame, Malformed, Packet, Status, VERSION, message, text};
-use super::registry::{COEFFICIENTS, HARMONICS};
+use super::codec::{ErrorCode, Frame, Malformed, Status, VERSION, message, text};
 use super::transport::Transport;
 use vines_testbench::rig::RigError;
-
-/// Forcing with which the phase of the oscillator is read while the output is off, V.
-const PROBE: f64 = 0.01;
 
 /// Why a device cannot be used.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum HostError {
-    #[error("the helic device: {0}; is `vines rig --protocol helic` or the device running, with no other host?")]
+    #[error(
+        "no answer from the helic device: {0}; is `vines rig --protocol helic` or the device running, with no other host?"
+    )]
+    Unreachable(#[source] io::Error),
+    #[error("the helic device, {what}: {source}; the drive is stopped as far as the device can still be reached")]
+    Lost { what: String, source: io::Error },
+    #[error("the helic device: {0}")]
     System(#[from] io::Error),
+    #[error(
+        "{samples} samples of the helic device did not arrive, {seconds:.3} s; up to {allowed} s are bridged. Check the network and the          load of this machine"
+    )]
+    Blackout { samples: u32, seconds: f64, allowed: f64 },
+    #[error(
+        "the helic device has no source \"phase\", the phase of its oscillator: update its firmware to one with the standard programme of \
+         protocol {VERSION}"
+    )]
+    NoPhase,
     #[error("the helic device sent an answer that does not match the request: is it another version?")]
     Malformed(#[from] Malformed),
     #[error("the helic device has version {0} of the protocol, this program has version {VERSION}")]
@@ -69,7 +80,10 @@ impl<T: Transport> Host<T> {
             sources,
             sample_rate: 0.0,
         };
-        let answer = host.request(message::STATUS, Vec::new(), "Status")?;
+        let answer = match host.request(message::STATUS, Vec::new(), "Status") {
+            Err(HostError::Lost { source, .. }) => return Err(HostError::Unreachable(source)),
+            answer => answer?,
+        };
         if let Some(version) = answer.first().filter(|version| **version != VERSION) {
             return Err(HostError::Version(*version));
         }
@@ -102,7 +116,8 @@ impl<T: Transport> Host<T> {
     pub fn request(&mut self, kind: u8, payload: Vec<u8>, what: &str) -> Result<Vec<u8>, HostError> {
         self.sequence = self.sequence.wrapping_add(1);
         let request = Frame { kind, sequence: self.sequence, payload };
-        let Frame { kind: answered, sequence, payload } = self.transport.request(&request)?;
+        let lost = |source| HostError::Lost { what: what.into(), source };
+        let Frame { kind: answered, sequence, payload } = self.transport.request(&request).map_err(lost)?;
         if sequence != self.sequence {
             return Err(Malformed.into());
         }
@@ -132,8 +147,13 @@ impl<T: Transport> Host<T> {
         Ok(index as u8)
     }
 
-    /// Sets a parameter. Real numbers become floats.
-    pub fn set(&mut self, name: &str, values: &[f64]) -> Result<(), HostError> {
+    /// Whether the device has a parameter.
+    pub fn has(&self, name: &str) -> bool {
+        self.index(name).is_ok()
+    }
+
+    /// The request that sets a parameter. Real numbers become floats.
+    pub fn setting(&self, name: &str, values: &[f64]) -> Result<Frame, HostError> {
         let (index, code) = self.index(name)?;
         let mut payload = index.to_le_bytes().to_vec();
         for value in values {
@@ -144,7 +164,17 @@ impl<T: Transport> Host<T> {
                 _ => payload.extend((*value as i64 as u32).to_le_bytes()),
             }
         }
-        self.request(message::SET_PAR, payload, &format!("{name} = {values:?}"))?;
+        Ok(Frame { kind: message::SET_PAR, sequence: 0, payload })
+    }
+
+    /// Sets a parameter.
+    pub fn set(&mut self, name: &str, values: &[f64]) -> Result<(), HostError> {
+        let Frame { kind, payload, .. } = self.setting(name, values)?;
+        let what = match values {
+            [value] => format!("{name} = {value}"),
+            _ => name.into(),
+        };
+        self.request(kind, payload, &what)?;
         Ok(())
     }
 
@@ -168,32 +198,6 @@ impl<T: Transport> Host<T> {
         let port = self.transport.port()?.to_le_bytes();
         self.request(message::STREAM_START, port.into(), "StreamStart")?;
         Ok(())
-    }
-
-    fn value(&mut self, source: u8) -> Result<f64, HostError> {
-        self.stream(&[source], 1, 1)?;
-        loop {
-            match Packet::decode(&self.transport.datagram()?) {
-                Ok(Packet { width: 1, values, .. }) if values.len() == 1 => return Ok(values[0].into()),
-                _ => {}
-            }
-        }
-    }
-
-    /// Stops the master oscillator, and returns its cosine and sine: its phase is a state of the device that no parameter sets. The output
-    /// must be off.
-    pub fn stop_oscillator(&mut self) -> Result<[f64; 2], HostError> {
-        let forcing = self.source("forcing")?;
-        self.set("freq", &[0.0])?;
-        let mut parts = [0.0; 2];
-        for (part, place) in parts.iter_mut().zip([1, 1 + HARMONICS]) {
-            let mut coefficients = [0.0; COEFFICIENTS];
-            coefficients[place] = PROBE;
-            self.set("forcing_coeffs", &coefficients)?;
-            *part = self.value(forcing)? / PROBE;
-        }
-        self.set("forcing_coeffs", &[0.0; COEFFICIENTS])?;
-        Ok(parts)
     }
 }
 

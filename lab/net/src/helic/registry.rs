@@ -11,6 +11,11 @@ pub const TABLE: usize = 4096;
 /// Longest text.
 const TEXT: usize = 16;
 
+/// Longest silence of the host, s, before the output is disarmed; 0: no limit.
+pub const WATCHDOG: &str = "rig_watchdog";
+/// The value of `mcu_reboot` that restarts a device.
+pub const REBOOT: u32 = 0x5245_4254;
+
 /// How a parameter is written.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Access {
@@ -39,7 +44,7 @@ pub struct Parameter {
 use Access::{Block, Pulse, Read, Write};
 
 /// Name, type, number of values, access, and value at the start, of all parameters but the two texts.
-const PARAMETERS: [(&str, u8, usize, Access, f32); 53] = [
+const PARAMETERS: [(&str, u8, usize, Access, f32); 55] = [
     ("sample_freq", b'f', 1, Read, 0.0),
     ("ticks", b'I', 1, Read, 0.0),
     ("loop_time_last", b'I', 1, Read, 0.0),
@@ -51,7 +56,6 @@ const PARAMETERS: [(&str, u8, usize, Access, f32); 53] = [
     ("freq", b'f', 1, Write, 0.0),
     ("target_coeffs", b'f', COEFFICIENTS, Write, 0.0),
     ("forcing_coeffs", b'f', COEFFICIENTS, Write, 0.0),
-    ("ctrl_reset", b'I', 1, Pulse, 0.0),
     ("table", b'f', TABLE, Block, 0.0),
     ("table_len", b'H', 1, Read, 0.0),
     ("table_freq", b'f', 1, Write, 0.0),
@@ -70,10 +74,13 @@ const PARAMETERS: [(&str, u8, usize, Access, f32); 53] = [
     ("cmd_backlog_max", b'I', 1, Read, 0.0),
     ("arm", b'I', 1, Write, 0.0),
     ("safety", b'I', 1, Read, 0.0),
+    ("mcu_reboot", b'I', 1, Pulse, 0.0),
     // Those of the rig.
     ("rig_gain", b'f', 1, Read, 0.0),
     ("rig_out_max", b'f', 1, Read, 0.0),
+    (WATCHDOG, b'f', 1, Write, 0.0),
     // Those of the control.
+    ("ctrl_reset", b'I', 1, Pulse, 0.0),
     ("control_mode", b'I', 1, Write, 0.0),
     ("pll_reacquire", b'I', 1, Pulse, 0.0),
     ("pll_centre_freq", b'f', 1, Write, 0.0),

@@ -5,15 +5,19 @@ use std::f64::consts::TAU;
 
 use super::codec::{Packet, message};
 use super::host::{Host, HostError};
-use super::registry::{COEFFICIENTS, HARMONICS};
+use super::registry::{COEFFICIENTS, HARMONICS, WATCHDOG};
 use super::transport::Transport;
+use crate::bridge::Bridge;
 use crate::report::Counters;
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 
 /// Largest relative difference between the sample rates: the device states its own with 24 bits.
 const SAME_RATE: f64 = 1e-6;
-/// Packets after which the device is asked whether its output is on.
-const SUPERVISION: u32 = 20;
+/// Largest relative difference between the commanded frequency and the present one of the device at which the drive begins: an error of the
+/// phase that the next packet corrects.
+const RUNNING: f64 = 0.01;
+/// Share of the longest silence after which the device is asked whether its output is on.
+const SUPERVISION: f64 = 0.25;
 
 /// What a host takes from a device, and gives to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -38,33 +42,54 @@ impl Default for Channels {
     }
 }
 
+/// A record of the stream.
+#[derive(Debug, Clone, Copy)]
+struct Record {
+    sensors: Sensors,
+    /// Phase of the device's oscillator, turns.
+    phase: f64,
+}
+
 /// A device as a rig.
 ///
 /// The device samples on its own clock, and its readings arrive in packets. A drive is sent when all readings that have arrived are used
-/// up, so that there is one command per packet at most. A lost packet costs held readings; a repeated one is not used.
+/// up, so that there is one command per packet at most. A command takes effect at a sample that the host does not know; but the stream
+/// contains the phase of the device's oscillator. The coefficients of the forcing turn it to the phase of the host's drive.
 #[derive(Debug)]
 pub struct HelicRig<T: Transport> {
     host: Host<T>,
     channels: Channels,
-    /// Cosine and sine of the device's oscillator at the start.
-    origin: [f64; 2],
     sample_time: f64,
-    /// Readings that have arrived, and the sensors before them.
-    readings: VecDeque<Sensors>,
+    /// Sources of the stream.
+    sources: Vec<u8>,
+    /// Samples of the device per sample of the scene.
+    decimation: u16,
+    is_streaming: bool,
+    /// Records that have arrived, or were lost.
+    records: VecDeque<Option<Record>>,
     now: Option<Sensors>,
-    good: Sensors,
+    bridge: Bridge,
     /// Number of the sample that the next packet begins with.
     next: Option<u32>,
-    /// Packets since the output was last asked for.
-    unsupervised: u32,
+    /// Phase of the host's drive at the present sample, turns.
+    phase: f64,
+    /// The same less the phase of the device's oscillator, at the last record.
+    lead: Option<f64>,
+    /// Phase of the device's oscillator at the last record, unless the record before the present one was lost, and its step, turns.
+    device_phase: Option<f64>,
+    device_turn: Option<f64>,
+    /// Time since the device was last asked whether its output is on, s.
+    unsupervised: f64,
     wanted: Drive,
-    given: Drive,
-    /// What has arrived, and what was held.
+    /// Frequency of the device, rad/s, and the cosine and sine of its forcing, V.
+    omega: f64,
+    parts: [f64; 2],
+    /// What has arrived, and what was bridged.
     pub counters: Counters,
 }
 
 impl<T: Transport> HelicRig<T> {
-    /// Sets the device up and starts its stream; `sample_time` in s.
+    /// Sets the device up; `sample_time` in s.
     pub fn new(transport: T, channels: Channels, sample_time: f64, samples_per_period: f64) -> Result<Self, HostError> {
         let mut host = Host::new(transport)?;
         let ratio = host.sample_rate * sample_time;
@@ -80,24 +105,41 @@ impl<T: Transport> HelicRig<T> {
         if let Some((name, _)) = &channels.reference {
             sources.push(host.source(name)?);
         }
+        sources.push(host.source("phase").map_err(|_| HostError::NoPhase)?);
         host.set("arm", &[0.0])?;
-        host.set("target_coeffs", &[0.0; COEFFICIENTS])?;
-        host.set("table_mode", &[0.0])?;
-        let origin = host.stop_oscillator()?;
-        host.stream(&sources, ratio.round() as u16, 0)?;
-        host.set("arm", &[1.0])?;
+        for series in ["target_coeffs", "forcing_coeffs"] {
+            host.set(series, &[0.0; COEFFICIENTS])?;
+        }
+        let silence = host.transport.silence().as_secs_f64();
+        for (name, value) in [
+            ("table_mode", 0.0),
+            ("control_mode", 0.0),
+            ("freq", 0.0),
+            (WATCHDOG, silence),
+        ] {
+            if host.has(name) {
+                host.set(name, &[value])?;
+            }
+        }
         Ok(Self {
             host,
             channels,
-            origin,
             sample_time,
-            readings: VecDeque::new(),
+            sources,
+            decimation: ratio.round() as u16,
+            is_streaming: false,
+            records: VecDeque::new(),
             now: None,
-            good: Sensors::default(),
+            bridge: Bridge::default(),
             next: None,
-            unsupervised: 0,
+            phase: 0.0,
+            lead: None,
+            device_phase: None,
+            device_turn: None,
+            unsupervised: 0.0,
             wanted: Drive::default(),
-            given: Drive::default(),
+            omega: 0.0,
+            parts: [0.0; 2],
             counters: Counters::default(),
         })
     }
@@ -107,29 +149,66 @@ impl<T: Transport> HelicRig<T> {
         &mut self.host.transport
     }
 
+    fn is_driven(&self) -> bool {
+        self.parts != [0.0; 2]
+    }
+
     fn reading(&mut self) -> Result<Sensors, HostError> {
-        while self.now.is_none() {
-            match self.readings.pop_front() {
-                Some(reading) => self.now = Some(reading),
-                None => {
+        if !self.is_streaming {
+            // Not earlier: readings that nobody takes only wait.
+            self.host.stream(&self.sources, self.decimation, 0)?;
+            self.is_streaming = true;
+        }
+        loop {
+            if let Some(now) = self.now {
+                return Ok(now);
+            }
+            // The first record after those that were lost.
+            let next = self.records.iter().flatten().next().copied();
+            let reading = match (self.records.pop_front(), next) {
+                (Some(Some(record)), _) => {
+                    self.follow(record.phase);
+                    record.sensors
+                }
+                (Some(None), Some(Record { sensors, .. })) => {
+                    let ahead = 1 + self.records.iter().take_while(|record| record.is_none()).count() as u64;
+                    let turn = self.wanted.omega * self.sample_time / TAU;
+                    self.device_phase = None;
+                    self.bridge.fill(self.phase, &sensors, ahead, turn)
+                }
+                _ => {
                     self.command()?;
                     self.receive()?;
+                    continue;
                 }
+            };
+            self.bridge.keep(self.phase, reading);
+            self.now = Some(reading);
+            self.host.transport.beat();
+            self.unsupervised += self.sample_time;
+            if self.unsupervised > SUPERVISION * self.host.transport.silence().as_secs_f64() && self.is_driven() {
+                self.supervise()?;
             }
         }
-        self.good = self.now.unwrap_or_default();
-        Ok(self.good)
+    }
+
+    /// Takes the phase of the device's oscillator at the present sample, turns.
+    fn follow(&mut self, phase: f64) {
+        self.device_turn = self.device_phase.map(|before| (phase - before).rem_euclid(1.0));
+        self.device_phase = Some(phase);
+        self.lead = Some(self.phase - phase);
     }
 
     /// Waits for the next packet.
     fn receive(&mut self) -> Result<(), HostError> {
-        let bytes = self.host.transport.datagram()?;
+        let datagram = self.host.transport.datagram();
+        let bytes = datagram.map_err(|source| HostError::Lost { what: "its stream".into(), source })?;
         let Ok(packet) = Packet::decode(&bytes) else {
             self.counters.malformed += 1;
             return Ok(());
         };
-        let width = 1 + usize::from(self.channels.reference.is_some());
-        if usize::from(packet.width) != width {
+        let width = self.sources.len();
+        if usize::from(packet.width) != width || packet.decimation != self.decimation {
             self.counters.foreign += 1;
             return Ok(());
         }
@@ -140,33 +219,31 @@ impl<T: Transport> HelicRig<T> {
             self.counters.late += 1;
             return Ok(());
         }
-        let silence = f64::from(missed) * self.sample_time;
-        if silence > 1.0 {
-            return Err(std::io::Error::from(std::io::ErrorKind::TimedOut).into());
+        let seconds = f64::from(missed) * self.sample_time;
+        let allowed = self.host.transport.silence().as_secs_f64();
+        if seconds > allowed {
+            return Err(HostError::Blackout { samples: missed, seconds, allowed });
         }
-        let last = self.readings.back().copied().unwrap_or(self.good);
-        self.readings.extend((0..missed).map(|_| last));
+        self.records.extend((0..missed).map(|_| None));
         self.counters.held += u64::from(missed);
         self.counters.received += 1;
         for record in packet.values.chunks_exact(width) {
             let read = |n: usize, factor: f64| factor * f64::from(record[n]);
-            self.readings.push_back(Sensors {
+            let sensors = Sensors {
                 response: read(0, self.channels.response.1),
                 reference: self.channels.reference.as_ref().map(|(_, factor)| read(1, *factor)),
-            });
+            };
+            self.records
+                .push_back(Some(Record { sensors, phase: read(width - 1, 1.0) }));
         }
         let records = (packet.values.len() / width) as u32;
         self.next = Some(packet.first.wrapping_add(records * step));
-        self.unsupervised += 1;
-        if self.unsupervised > SUPERVISION {
-            self.unsupervised = 0;
-            self.supervise()?;
-        }
         Ok(())
     }
 
     /// The output of the device must be on, if it says whether it is.
     fn supervise(&mut self) -> Result<(), HostError> {
+        self.unsupervised = 0.0;
         let bytes = self.host.get("safety")?;
         let safety = bytes.first().copied().unwrap_or_default().into();
         // Devices without a gate read 0.
@@ -179,31 +256,79 @@ impl<T: Transport> HelicRig<T> {
 
     /// Sends the drive, as far as it has changed.
     fn command(&mut self) -> Result<(), HostError> {
-        if self.wanted.omega != self.given.omega {
+        if self.wanted.omega != self.omega {
             self.host.set("freq", &[self.wanted.omega / TAU])?;
+            self.omega = self.wanted.omega;
         }
-        if self.wanted.amplitude != self.given.amplitude {
-            let ([cosine, sine], volts) = (self.origin, self.wanted.amplitude / self.channels.gain);
-            let mut forcing = [0.0; COEFFICIENTS];
-            (forcing[1], forcing[1 + HARMONICS]) = (-volts * sine, volts * cosine);
-            self.host.set("forcing_coeffs", &forcing)?;
+        let turn = self.omega * self.sample_time / TAU;
+        let runs = self.device_turn.is_some_and(|now| (now - turn).abs() <= RUNNING * turn);
+        let volts = self.wanted.amplitude / self.channels.gain;
+        let parts = match self.lead {
+            // The drive begins when the oscillator has its frequency.
+            Some(lead) if self.is_driven() || runs => {
+                let (sine, cosine) = (TAU * lead).sin_cos();
+                [volts * sine, volts * cosine].map(|part| f64::from(part as f32))
+            }
+            _ => [0.0; 2],
+        };
+        if parts == self.parts {
+            return Ok(());
         }
-        self.given = self.wanted;
+        let was_driven = self.is_driven();
+        let mut forcing = [0.0; COEFFICIENTS];
+        (forcing[1], forcing[1 + HARMONICS]) = (parts[0], parts[1]);
+        if !was_driven {
+            let stop = [
+                self.host.setting("forcing_coeffs", &[0.0; COEFFICIENTS])?,
+                self.host.setting("arm", &[0.0])?,
+            ];
+            self.host.transport.guard(Some(stop.into()))?;
+        }
+        self.host.set("forcing_coeffs", &forcing)?;
+        self.parts = parts;
+        if !was_driven {
+            self.host.set("arm", &[1.0])?;
+            self.unsupervised = 0.0;
+        } else if !self.is_driven() {
+            self.supervise()?;
+            self.host.set("arm", &[0.0])?;
+            self.host.transport.guard(None)?;
+        }
+        Ok(())
+    }
+
+    /// After an error the device is not driven any more.
+    fn ended<V>(&mut self, outcome: Result<V, HostError>) -> Result<V, RigError> {
+        if outcome.is_err() {
+            self.host.transport.close();
+        }
+        Ok(outcome?)
+    }
+
+    fn stop(&mut self) -> Result<(), HostError> {
+        if self.is_driven() {
+            self.host.set("forcing_coeffs", &[0.0; COEFFICIENTS])?;
+        }
+        self.host.set("arm", &[0.0])?;
+        self.host.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
         Ok(())
     }
 }
 
 impl<T: Transport> Rig for HelicRig<T> {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        Ok(self.reading()?)
+        let reading = self.reading();
+        self.ended(reading)
     }
 
-    fn advance(&mut self, drive: Drive, _: f64) -> Result<(), RigError> {
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         self.wanted = drive;
         self.now = None;
-        if drive.amplitude == 0.0 {
+        self.phase += drive.omega * step / TAU;
+        if drive.amplitude == 0.0 && self.is_driven() {
             // A drive of zero is not delayed.
-            self.command()?;
+            let sent = self.command();
+            return self.ended(sent);
         }
         Ok(())
     }
@@ -211,9 +336,9 @@ impl<T: Transport> Rig for HelicRig<T> {
 
 impl<T: Transport> Drop for HelicRig<T> {
     fn drop(&mut self) {
-        // If the device does not answer any more, the end of the connection disarms it.
-        let _ = self.host.set("arm", &[0.0]);
-        let _ = self.host.request(message::STREAM_STOP, Vec::new(), "StreamStop");
+        if self.stop().is_err() {
+            self.host.transport.close();
+        }
         if self.counters.is_troubled() {
             log::warn!("helic device: {}", self.counters);
         }

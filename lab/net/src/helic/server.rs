@@ -155,7 +155,7 @@ impl Connection {
         match self.stream.read(&mut more) {
             Ok(0) => return false,
             Ok(size) => self.bytes.extend(&more[..size]),
-            Err(error) if error.kind() == ErrorKind::WouldBlock => return true,
+            Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => return true,
             Err(_) => return false,
         }
         loop {
@@ -165,7 +165,7 @@ impl Connection {
                 Ok(Some((request, length))) => {
                     self.bytes.drain(..length);
                     let answer = device.handle(&request, uptime).encode();
-                    if self.stream.write_all(&answer).is_err() {
+                    if self.stream.write_all(&answer).is_err() || device.has_rebooted() {
                         return false;
                     }
                 }

@@ -2,7 +2,7 @@
 
 use super::generator::{Series, TableSettings};
 use super::pll::PllSettings;
-use super::registry::Registry;
+use super::registry::{Registry, WATCHDOG};
 
 /// How the output is made.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -26,6 +26,8 @@ pub struct Settings {
     pub mode: Mode,
     pub pll: PllSettings,
     pub armed: bool,
+    /// Longest silence of the host, s, or 0.
+    pub watchdog: f64,
 }
 
 impl Settings {
@@ -53,6 +55,7 @@ impl Settings {
             },
             pll: PllSettings::of(real),
             armed: number("arm") == 1,
+            watchdog: real(WATCHDOG),
         };
         let frequencies = [settings.frequency, settings.table.frequency];
         let allowed = frequencies.iter().all(|frequency| (0.0..nyquist).contains(frequency))
@@ -63,6 +66,7 @@ impl Settings {
             && settings.table.multiple >= 1
             && (0.0..1.0).contains(&settings.table.phase)
             && number("arm") <= 1
+            && settings.watchdog >= 0.0
             && settings.pll.is_allowed(nyquist);
         allowed.then_some(settings)
     }

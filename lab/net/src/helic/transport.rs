@@ -2,13 +2,16 @@
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{SocketAddr, TcpStream, UdpSocket};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use super::codec::Frame;
+use super::watchdog::{Watchdog, stop_and_close};
 use crate::address::is_loopback;
 
-/// Longest time for an answer, and for the next packet.
+/// Longest time for an answer while the device is set up.
 const PATIENCE: Duration = Duration::from_secs(2);
+/// Longest silence of a driven device, and of a host that drives it. The drive stops within 0.2 s, with some time for the way.
+pub const LONGEST_SILENCE: Duration = Duration::from_millis(150);
 
 /// The way to a device.
 pub trait Transport {
@@ -20,6 +23,24 @@ pub trait Transport {
 
     /// Port on which the datagrams arrive.
     fn port(&self) -> io::Result<u16>;
+
+    /// Longest silence of either side while the device is driven.
+    fn silence(&self) -> Duration {
+        LONGEST_SILENCE
+    }
+
+    /// From now on the device is driven: after a silence of the host, the transport sends these requests, which stop the drive, and closes
+    /// the control channel. With None, it is not driven any more. A transport without a clock does nothing.
+    fn guard(&mut self, stop: Option<Vec<Frame>>) -> io::Result<()> {
+        let _ = stop;
+        Ok(())
+    }
+
+    /// The host has taken a reading.
+    fn beat(&mut self) {}
+
+    /// Sends the requests that stop the drive, if there is one, and closes the control channel.
+    fn close(&mut self) {}
 }
 
 /// A device on the network.
@@ -28,29 +49,72 @@ pub struct Network {
     control: TcpStream,
     stream: UdpSocket,
     bytes: Vec<u8>,
+    silence: Duration,
+    watchdog: Option<Watchdog>,
+    /// The requests that stop the drive, while there is one.
+    stop: Vec<u8>,
 }
 
 impl Network {
-    /// Connects to the control channel at `peer`, and sends the device's stream port the datagram that opens firewalls.
-    pub fn connect(peer: SocketAddr) -> io::Result<Self> {
+    /// Connects to the control channel at `peer`, and sends the device's stream port the datagram that opens firewalls. The drive stops after
+    /// a silence of either side that is longer than `silence`; [`LONGEST_SILENCE`] fits a device that sends a packet every 5 ms.
+    pub fn connect(peer: SocketAddr, silence: Duration) -> io::Result<Self> {
         let control = TcpStream::connect_timeout(&peer, PATIENCE)?;
         control.set_nodelay(true)?;
-        control.set_read_timeout(Some(PATIENCE))?;
-        control.set_write_timeout(Some(PATIENCE))?;
         let mut own = control.local_addr()?;
         own.set_port(0);
         let stream = UdpSocket::bind(own)?;
-        stream.set_read_timeout(Some(PATIENCE))?;
+        stream.set_read_timeout(Some(silence))?;
         let port = peer.port().saturating_add(1);
         if !is_loopback(peer.ip()) {
             stream.send_to(b"vines", SocketAddr::new(peer.ip(), port))?;
         }
-        Ok(Self { control, stream, bytes: Vec::new() })
+        let mut network = Self {
+            control,
+            stream,
+            bytes: Vec::new(),
+            silence,
+            watchdog: None,
+            stop: Vec::new(),
+        };
+        network.patience(PATIENCE)?;
+        Ok(network)
     }
-}
 
-impl Transport for Network {
-    fn request(&mut self, request: &Frame) -> io::Result<Frame> {
+    /// Sets the longest time for an answer.
+    fn patience(&mut self, patience: Duration) -> io::Result<()> {
+        self.control.set_read_timeout(Some(patience))?;
+        self.control.set_write_timeout(Some(patience))
+    }
+
+    /// `error` in words: of the two sides, the one that was silent for longer since the last reading is to blame.
+    fn explained(&self, error: io::Error, waited: &str, since: Instant) -> io::Error {
+        let waiting = since.elapsed();
+        let fired = self.watchdog.as_ref().filter(|watchdog| watchdog.has_fired());
+        if fired.is_some_and(|watchdog| since.saturating_duration_since(watchdog.last()) > waiting) {
+            let seconds = self.silence.as_secs_f64();
+            let message = format!(
+                "this program took no reading for {seconds} s, so the drive was stopped and the connection closed; is the machine too busy?"
+            );
+            return io::Error::new(ErrorKind::TimedOut, message);
+        }
+        let said = || {
+            io::Error::new(
+                ErrorKind::TimedOut,
+                format!("{waited} for {:.2} s", waiting.as_secs_f64()),
+            )
+        };
+        match error.kind() {
+            ErrorKind::WouldBlock | ErrorKind::TimedOut => said(),
+            _ if fired.is_some() => said(),
+            ErrorKind::ConnectionAborted | ErrorKind::BrokenPipe | ErrorKind::ConnectionReset => {
+                io::Error::new(ErrorKind::ConnectionAborted, "the connection is closed")
+            }
+            _ => error,
+        }
+    }
+
+    fn answer(&mut self, request: &Frame) -> io::Result<Frame> {
         self.control.write_all(&request.encode())?;
         let mut more = [0; 2048];
         loop {
@@ -59,22 +123,66 @@ impl Transport for Network {
                     self.bytes.drain(..length);
                     return Ok(answer);
                 }
-                None => match self.control.read(&mut more)? {
+                None => match uninterrupted(|| self.control.read(&mut more))? {
                     0 => return Err(ErrorKind::ConnectionAborted.into()),
                     size => self.bytes.extend(&more[..size]),
                 },
             }
         }
     }
+}
+
+impl Transport for Network {
+    fn request(&mut self, request: &Frame) -> io::Result<Frame> {
+        let began = Instant::now();
+        self.answer(request)
+            .map_err(|error| self.explained(error, "no answer", began))
+    }
 
     fn datagram(&mut self) -> io::Result<Vec<u8>> {
-        let mut bytes = vec![0; 2048];
-        let size = self.stream.recv(&mut bytes)?;
+        let (began, mut bytes) = (Instant::now(), vec![0; 2048]);
+        let size = uninterrupted(|| self.stream.recv(&mut bytes))
+            .map_err(|error| self.explained(error, "no packet of its stream has arrived", began))?;
         bytes.truncate(size);
         Ok(bytes)
     }
 
     fn port(&self) -> io::Result<u16> {
         Ok(self.stream.local_addr()?.port())
+    }
+
+    fn silence(&self) -> Duration {
+        self.silence
+    }
+
+    fn guard(&mut self, stop: Option<Vec<Frame>>) -> io::Result<()> {
+        self.patience(if stop.is_some() { self.silence } else { PATIENCE })?;
+        self.stop = stop.iter().flatten().flat_map(Frame::encode).collect();
+        self.watchdog = None;
+        if stop.is_some() {
+            let control = self.control.try_clone()?;
+            self.watchdog = Some(Watchdog::start(control, self.stop.clone(), self.silence)?);
+        }
+        Ok(())
+    }
+
+    fn beat(&mut self) {
+        if let Some(watchdog) = &self.watchdog {
+            watchdog.beat();
+        }
+    }
+
+    fn close(&mut self) {
+        stop_and_close(&mut self.control, &self.stop);
+    }
+}
+
+/// Repeats a call that a signal has interrupted: whoever catches signals decides what they mean.
+fn uninterrupted<T>(mut call: impl FnMut() -> io::Result<T>) -> io::Result<T> {
+    loop {
+        match call() {
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            outcome => return outcome,
+        }
     }
 }

@@ -75,6 +75,80 @@ fn forcing_reaches_the_plant_only_when_armed_and_a_host_that_leaves_disarms() {
 }
 
 #[test]
+fn parameters_and_sources_begin_and_end_with_those_of_version_3() {
+    let base = "firmware experiment sample_freq ticks loop_time_last loop_time_max clock_jitter overruns tick_timeouts records_dropped freq \
+                target_coeffs forcing_coeffs table table_len table_freq table_gain table_interp table_mode table_mult table_phase \
+                table_trigger wake_phase_min wake_phase_max t_measure_max t_actuate_max t_rest_max diag_reset cmd_backlog_max arm \
+                safety mcu_reboot";
+    let mut host = Host::new(device());
+    for (index, name) in base.split_whitespace().enumerate() {
+        assert_eq!(usize::from(host.parameters[name].0), index, "{name}");
+    }
+    let sources = host.sources();
+    let last = ["target", "forcing", "table", "phase", "out", "cmd_epoch"];
+    assert_eq!(sources[sources.len() - last.len()..], last);
+}
+
+#[test]
+fn the_source_phase_is_that_of_the_forcing_of_the_same_record() {
+    let mut host = Host::new(device());
+    host.set("forcing_coeffs", &cosine(1.0)).unwrap();
+    host.set("freq", &[8.8]).unwrap();
+    let (_, records) = host.capture(&["phase", "forcing"], 1, 500);
+    for record in &records {
+        let expected = (std::f32::consts::TAU * record[0]).cos();
+        assert!(
+            (record[1] - expected).abs() < 1e-5 && (0.0..=1.0).contains(&record[0]),
+            "{record:?}"
+        );
+    }
+    assert!(records.iter().any(|record| record[0] > 0.9));
+}
+
+#[test]
+fn a_reboot_needs_its_word_and_restores_the_start_without_the_drive() {
+    let mut host = Host::new(device());
+    host.set("freq", &[8.8]).unwrap();
+    host.set("forcing_coeffs", &cosine(0.1)).unwrap();
+    host.set("arm", &[1.0]).unwrap();
+    host.capture(&["out"], 1, 10);
+    for wrong in [0.0, 1.0] {
+        assert_eq!(host.set("mcu_reboot", &[wrong]), Err(ErrorCode::BadValue));
+    }
+    assert!(host.device.is_driven() && !host.device.has_rebooted());
+    let payload = [&host.parameters["mcu_reboot"].0.to_le_bytes()[..], b"TBER"].concat();
+    host.ask(message::SET_PAR, &payload).unwrap();
+    assert!(host.device.has_rebooted() && !host.device.is_driven());
+    assert_eq!(
+        (host.number("mcu_reboot"), host.number("arm"), host.number("ticks")),
+        (0, 0, 0)
+    );
+    assert_eq!(reals(&host.get("freq")), [0.0]);
+    assert_eq!(host.set_up(&["out"], 1, 0), Ok(()));
+    assert_eq!(host.capture(&["cmd_epoch", "out"], 1, 3).1, [[0.0, 0.0]; 3]);
+}
+
+#[test]
+fn the_watchdog_disarms_a_device_whose_host_is_silent_and_is_off_at_the_start() {
+    let mut host = Host::new(device());
+    host.set("forcing_coeffs", &cosine(0.1)).unwrap();
+    host.set("arm", &[1.0]).unwrap();
+    let samples = (0.3 / scene().sample_time()) as u32;
+    let ticks = |host: &mut Host| (0..samples).for_each(|_| drop(host.device.tick().unwrap()));
+    ticks(&mut host);
+    assert!(host.device.is_driven());
+    host.set("rig_watchdog", &[0.2]).unwrap();
+    assert_eq!(host.set("rig_watchdog", &[-0.1]), Err(ErrorCode::BadValue));
+    let half = |host: &mut Host| (0..samples / 2).for_each(|_| drop(host.device.tick().unwrap()));
+    for _ in 0..5 {
+        half(&mut host);
+        assert_eq!(host.number("safety"), 1);
+    }
+    ticks(&mut host);
+    assert_eq!((host.number("arm"), host.number("safety")), (0, 8));
+}
+
+#[test]
 fn a_sum_above_the_limit_is_clamped_and_says_so() {
     let mut host = Host::new(device());
     host.set("forcing_coeffs", &cosine(8.0)).unwrap();

@@ -1,17 +1,22 @@
 //! The device on loopback. Nothing here depends on how fast the machine is.
 
 use std::io::{Read, Write};
-use std::net::{SocketAddr, TcpStream};
+use std::net::{SocketAddr, TcpListener, TcpStream};
 use std::sync::Arc;
+use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
+use std::time::Duration;
 
 use vines_net::helic::codec::{Frame, message};
-use vines_net::helic::{Channels, HelicRig, HelicServer, Network};
+use vines_net::helic::{Channels, Device, HelicRig, HelicServer, Network, Transport};
 use vines_net::{Ended, Session};
-use vines_testbench::rig::{Drive, Rig};
+use vines_testbench::rig::{Drive, Rig, RigError, Sensors, Simulated};
 
-use super::host::{device, scene};
+use super::host::{Host, device, scene};
+
+/// A silence longer than the pauses of a busy machine.
+const PATIENT: Duration = Duration::from_secs(2);
 
 /// A server in a thread.
 struct Served {
@@ -22,6 +27,10 @@ struct Served {
 
 impl Served {
     fn start() -> Self {
+        Self::of(device)
+    }
+
+    fn of(device: impl FnOnce() -> Device + Send + 'static) -> Self {
         let stop = Arc::new(AtomicBool::new(false));
         let (flag, (tell, told)) = (Arc::clone(&stop), std::sync::mpsc::channel());
         let thread = thread::spawn(move || {
@@ -49,7 +58,7 @@ impl Served {
 #[test]
 fn a_device_on_the_network_is_driven_and_disarmed_when_its_host_leaves() {
     let (scene, server) = (scene(), Served::start());
-    let network = Network::connect(server.address).unwrap();
+    let network = Network::connect(server.address, PATIENT).unwrap();
     let mut rig = HelicRig::new(network, Channels::default(), scene.sample_time(), 100.0).unwrap();
     let drive = Drive { omega: 55.0, amplitude: 9e-5, displacement: 0.0 };
     let mut largest = 0.0_f64;
@@ -90,5 +99,168 @@ fn bad_framing_ends_that_connection_only() {
     }
     good.read_exact(&mut [0; 20]).unwrap();
     drop(good);
+    server.end();
+}
+
+/// A silence after which the drive must be off.
+const SHORT: Duration = Duration::from_millis(500);
+
+/// A plant that tells the displacement of its base.
+struct Shown(Simulated, Arc<Mutex<f64>>);
+
+impl Rig for Shown {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.0.sense()
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.0.advance(drive, step)
+    }
+
+    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+        *self.1.lock().unwrap() = displacement;
+        self.0.hold(displacement, step)
+    }
+}
+
+fn shown() -> (Served, Arc<Mutex<f64>>) {
+    let shown = Arc::<Mutex<f64>>::default();
+    let copy = Arc::clone(&shown);
+    let server = Served::of(move || {
+        let scene = scene();
+        let plant = Simulated::new(scene.plant, scene.start).unwrap();
+        Device::new(
+            Box::new(Shown(plant, copy)),
+            scene.sample_time(),
+            scene.plant.half_width,
+        )
+        .unwrap()
+    });
+    (server, shown)
+}
+
+/// Drives the device for `samples` samples with a frequency that always changes.
+fn drive(rig: &mut HelicRig<Network>, samples: u32) -> Result<(), RigError> {
+    (0..samples).try_for_each(|n| {
+        rig.sense()?;
+        let drive = Drive {
+            omega: 55.0 + 1e-3 * f64::from(n),
+            amplitude: 9e-5,
+            displacement: 0.0,
+        };
+        rig.advance(drive, scene().sample_time())
+    })
+}
+
+fn connected(address: SocketAddr) -> HelicRig<Network> {
+    let network = Network::connect(address, SHORT).unwrap();
+    HelicRig::new(network, Channels::default(), scene().sample_time(), 100.0).unwrap()
+}
+
+fn is_off(base: &Mutex<f64>) -> bool {
+    // One value may be zero by chance.
+    (0..20).all(|_| {
+        thread::sleep(Duration::from_millis(3));
+        *base.lock().unwrap() == 0.0
+    })
+}
+
+#[test]
+fn a_stream_that_stops_ends_the_drive_and_says_so() {
+    let (server, base) = shown();
+    let mut rig = connected(server.address);
+    drive(&mut rig, 200).unwrap();
+    assert!(!is_off(&base));
+    let stop = Frame { kind: message::STREAM_STOP, sequence: 0, payload: vec![] };
+    rig.transport().request(&stop).unwrap();
+    let message = drive(&mut rig, 200).unwrap_err().to_string();
+    assert!(
+        message.contains("no packet of its stream has arrived for 0.5"),
+        "{message}"
+    );
+    assert!(is_off(&base));
+    drop(rig);
+    server.end();
+}
+
+#[test]
+fn a_host_that_takes_no_readings_any_more_ends_the_drive_and_learns_why() {
+    let (server, base) = shown();
+    let mut rig = connected(server.address);
+    drive(&mut rig, 200).unwrap();
+    assert!(!is_off(&base));
+    thread::sleep(2 * SHORT);
+    assert!(is_off(&base));
+    let message = drive(&mut rig, 2000).unwrap_err().to_string();
+    assert!(message.contains("took no reading for 0.5 s"), "{message}");
+    drop(rig);
+    server.end();
+}
+
+/// Carries the control channel to `server` until `dead` is set, and then nothing any more, not even the end of the connection.
+fn carrier(server: SocketAddr, dead: Arc<AtomicBool>) -> SocketAddr {
+    let listener = TcpListener::bind("127.0.0.1:0").unwrap();
+    let address = listener.local_addr().unwrap();
+    thread::spawn(move || {
+        let host = listener.accept().unwrap().0;
+        let device = TcpStream::connect(server).unwrap();
+        let ways = [(&host, &device), (&device, &host)];
+        let mut bytes = [0; 2048];
+        for way in [&host, &device] {
+            way.set_nodelay(true).unwrap();
+            way.set_read_timeout(Some(Duration::from_millis(1))).unwrap();
+        }
+        let mut open = 0;
+        while open < 60_000 {
+            open += 1;
+            for (mut from, mut to) in ways {
+                if dead.load(Ordering::Relaxed) {
+                    thread::sleep(Duration::from_millis(1));
+                } else if let Ok(size) = from.read(&mut bytes) {
+                    if size == 0 {
+                        return;
+                    }
+                    to.write_all(&bytes[..size]).unwrap();
+                }
+            }
+        }
+    });
+    address
+}
+
+#[test]
+fn a_dead_control_channel_ends_the_drive_of_a_device_with_a_watchdog() {
+    let (server, base) = shown();
+    let dead = Arc::new(AtomicBool::new(false));
+    let mut rig = connected(carrier(server.address, Arc::clone(&dead)));
+    drive(&mut rig, 200).unwrap();
+    assert!(!is_off(&base));
+    dead.store(true, Ordering::Relaxed);
+    let message = drive(&mut rig, 5000).unwrap_err().to_string();
+    println!("{message}");
+    assert!(message.contains("no answer for 0."), "{message}");
+    // Nothing reaches the device: its own watchdog has stopped it.
+    thread::sleep(SHORT);
+    assert!(is_off(&base));
+    drop(rig);
+    server.end();
+}
+
+#[test]
+fn a_reboot_ends_the_connection_and_the_drive() {
+    let (server, base) = shown();
+    let mut rig = connected(server.address);
+    drive(&mut rig, 200).unwrap();
+    let mut host = Host::new(device());
+    let index = host.parameters["mcu_reboot"].0.to_le_bytes();
+    assert_eq!(host.number("mcu_reboot"), 0);
+    let payload = [&index[..], &0x5245_4254_u32.to_le_bytes()].concat();
+    let reboot = Frame { kind: message::SET_PAR, sequence: 0, payload };
+    assert_eq!(rig.transport().request(&reboot).unwrap().kind, message::SET_PAR);
+    let message = drive(&mut rig, 5000).unwrap_err().to_string();
+    println!("{message}");
+    assert!(message.contains("the connection is closed"), "{message}");
+    assert!(is_off(&base));
+    drop(rig);
     server.end();
 }

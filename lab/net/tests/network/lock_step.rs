@@ -26,7 +26,8 @@ fn an_experiment_across_the_network_gives_the_same_bits() {
     let sample_time = scene.sample_time();
     {
         let mut rig = NetRig::connect(rig_server.address, sample_time, None).unwrap();
-        let mut peer = NetController::connect(socket(controller_server.address), sample_time, None, None).unwrap();
+        let mut peer =
+            NetController::connect(socket(controller_server.address), sample_time, None, false, None).unwrap();
         assert_eq!(rig.pace(), None);
         assert_eq!(measure(&scene, &mut rig, &mut peer), direct);
     }
@@ -125,7 +126,7 @@ fn a_silence_ramps_the_drive_down_and_a_client_that_returns_is_informed() {
     assert_eq!(server.sessions(1)[0].ended, Ended::Silence);
     assert_eq!(log.lock().unwrap().last().unwrap().amplitude, 0.0);
     let error = shake(&mut rig, &scene, 2).unwrap_err();
-    assert!(matches!(link_error(&error), LinkError::ShutDown { .. }), "{error}");
+    assert!(matches!(link_error(&error), LinkError::Closed { .. }), "{error}");
     // Only another session arms the rig again.
     let mut next = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     shake(&mut next, &scene, 20).unwrap();

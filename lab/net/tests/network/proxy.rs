@@ -106,7 +106,7 @@ impl<F: FnMut(Kind, u64) -> Fate> Worker<F> {
             via.send_to(bytes, to).unwrap();
         };
         let frame = Frame::decode(bytes).unwrap();
-        if !matches!(frame.kind, Kind::Sensors | Kind::Drive) {
+        if !matches!(frame.kind, Kind::Sensors | Kind::Drive | Kind::Report) {
             return send(bytes);
         }
         let fate = (self.fate)(frame.kind, self.seen[direction]);

@@ -1,13 +1,13 @@
 //! Sessions that are refused, each with a message that says what to do.
 
-use std::net::UdpSocket;
+use std::net::{TcpStream, UdpSocket};
 use std::time::{Duration, Instant};
 
 use vines_net::frame::{Frame, Kind};
 use vines_net::{Address, LinkError, NetController, NetRig, Refusal, Server};
 use vines_testbench::scene::Definition;
 
-use crate::bench::{controller, lock_step_rig, real_time_rig, scene, service, socket};
+use crate::bench::{controller, lock_step_rig, real_time_rig, scene, service, shake, socket};
 
 #[test]
 fn a_missing_server_is_reported_with_the_command_that_starts_it() {
@@ -24,7 +24,7 @@ fn a_missing_server_is_reported_with_the_command_that_starts_it() {
             "vines rig --lock-step --listen",
         ),
         (
-            NetController::connect(place, 1e-3, None, None).unwrap_err(),
+            NetController::connect(place, 1e-3, None, false, None).unwrap_err(),
             "vines controller --listen",
         ),
     ] {
@@ -84,7 +84,7 @@ fn a_rig_is_not_accepted_as_a_controller_nor_the_reverse() {
     let sample_time = scene.sample_time();
     let error = NetRig::connect(peer.address, sample_time, None).unwrap_err();
     assert_eq!(refused(&error), Refusal::Role);
-    let error = NetController::connect(socket(rig.address), sample_time, None, None).unwrap_err();
+    let error = NetController::connect(socket(rig.address), sample_time, None, false, None).unwrap_err();
     assert_eq!(refused(&error), Refusal::Role);
 }
 
@@ -141,4 +141,30 @@ fn a_server_stopped_by_its_owner_reports_the_session_it_had() {
     let sessions = server.stop();
     assert_eq!(sessions.len(), 1);
     assert_eq!(sessions[0].ended, vines_net::Ended::Stopped);
+}
+
+#[test]
+fn a_sample_time_that_is_not_a_number_is_refused() {
+    let (server, _) = real_time_rig(&scene(&[]), 1.0);
+    let client = UdpSocket::bind("127.0.0.1:0").unwrap();
+    client.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
+    let mut hello = Frame::new(Kind::Hello, 1);
+    hello.values[0] = f64::NAN;
+    client.send_to(&hello.encode(), socket(server.address)).unwrap();
+    let mut bytes = [0; 256];
+    let size = client.recv(&mut bytes).unwrap();
+    let answer = Frame::decode(&bytes[..size]).unwrap();
+    assert_eq!((answer.kind, answer.values[0]), (Kind::Refusal, 2.0));
+}
+
+#[test]
+fn silent_connections_do_not_keep_a_client_waiting() {
+    let scene = scene(&[]);
+    let (server, _) = lock_step_rig(&scene, 5.0);
+    let _silent: Vec<_> = (0..130)
+        .map(|_| TcpStream::connect(socket(server.address)).unwrap())
+        .collect();
+    // It gives up after 2 s.
+    let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
+    shake(&mut rig, &scene, 10).unwrap();
 }

@@ -2,7 +2,7 @@
 
 use super::super::codec::{ErrorCode, Frame, Status, VERSION, message, reals};
 use super::super::pll::{Pll, PllState};
-use super::super::registry::{Access, TABLE};
+use super::super::registry::{Access, REBOOT, TABLE, WATCHDOG};
 use super::super::settings::Settings;
 use super::Device;
 
@@ -10,6 +10,7 @@ impl Device {
     /// Answers a request. `uptime` in ms.
     pub fn handle(&mut self, request: &Frame, uptime: u32) -> Frame {
         let Frame { kind, sequence, ref payload } = *request;
+        self.silence = 0;
         let (kind, payload) = match self.answer(kind, payload, uptime) {
             Ok(payload) => (kind, payload),
             Err(code) => (message::ERROR, vec![code as u8, kind]),
@@ -30,7 +31,7 @@ impl Device {
                 return Ok(self.sources().flat_map(entry).collect());
             }
             message::GET_PAR => return self.registry.read(payload),
-            message::SET_PAR => self.set(payload)?,
+            message::SET_PAR => self.set(payload, uptime)?,
             message::SET_BLOCK => self.stage(payload)?,
             message::COMMIT => self.commit(payload)?,
             message::STREAM_SETUP => self.stream.set_up(payload, self.sources().count())?,
@@ -46,7 +47,7 @@ impl Device {
                     parameters: self.registry.len() as u16,
                     sources: self.sources().count() as u8,
                     sample_rate: self.sample_rate as f32,
-                    uptime,
+                    uptime: uptime.wrapping_sub(self.booted),
                 };
                 return Ok(status.encode());
             }
@@ -56,12 +57,17 @@ impl Device {
     }
 
     /// `index u16, value`.
-    fn set(&mut self, payload: &[u8]) -> Result<(), ErrorCode> {
+    fn set(&mut self, payload: &[u8], uptime: u32) -> Result<(), ErrorCode> {
         let (index, value) = payload.split_at_checked(2).ok_or(ErrorCode::BadLength)?;
         let index = u16::from_le_bytes([index[0], index[1]]);
         let before = self.registry.write(index, value)?;
         let parameter = self.registry.at(index)?;
         let (name, pulse) = (parameter.name, parameter.access == Access::Pulse);
+        if name == "mcu_reboot" {
+            let confirmed = self.registry.number(name) == REBOOT;
+            self.registry.put_number(name, 0);
+            return confirmed.then(|| self.reboot(uptime)).ok_or(ErrorCode::BadValue);
+        }
         let changed =
             Settings::of(&self.registry).filter(|new| !(self.settings.armed && new.mode != self.settings.mode));
         let Some(settings) = changed else {
@@ -73,7 +79,7 @@ impl Device {
         if pulse {
             self.registry.put_number(name, 0);
         }
-        if given && !["arm", "diag_reset"].contains(&name) {
+        if given && !["arm", "diag_reset", WATCHDOG].contains(&name) {
             self.commands += 1;
         }
         if given {
