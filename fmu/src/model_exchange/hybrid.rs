@@ -238,3 +238,7 @@ impl Hybrid {
         law.rests(speed, (pressing, 0.5 * DEPTH * fast * fast / b), &resolution)
     }
 }
+
+#[cfg(test)]
+#[path = "../../tests/unit/hybrid.rs"]
+mod tests;
