@@ -5,11 +5,13 @@
 mod balance;
 #[path = "../common/mod.rs"]
 mod common;
+mod drives;
 mod elastic;
 mod follow;
 mod graze;
 mod random;
 mod simple;
+mod simulation;
 mod spacing;
 mod steps;
 mod table;
@@ -26,6 +28,7 @@ fn hard_scenes_are_survived() {
     let mut table = Table::begin();
     random::scenes(n, &mut table);
     random::balance(n / 10, &mut table);
+    drives::compare(n / 5, &mut table);
     elastic::one_by_one(n, &mut table);
     elastic::drift(1_000_000, &mut table);
     graze::both_ways(n / 10, &mut table);

@@ -135,6 +135,9 @@ pub fn balance(n: usize, table: &mut Table) {
 pub fn one(name: &str) {
     let (kind, number) = name.split_once(':').expect("a kind of scenes, a colon and a number");
     let number = number.parse().expect("a number");
+    if kind == "new drives" {
+        return crate::drives::one(number);
+    }
     let (kind, _) = KINDS.iter().find(|(k, _)| *k == kind).expect("a kind of scenes");
     let scene = draw(&strategy(kind), number);
     println!("{scene:#?}\n{:#?}", follow(&scene, Name { kind, number }));
