@@ -4,7 +4,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use vines::{backbone::track_into, comparison::TrackedComparison, report, rig::BuiltIn};
 
-use super::output::{result, writable, written};
+use super::output::{print, result, writable, written};
 use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, identify::interrupted};
 
 const HELP: &str = "\
@@ -70,5 +70,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         )));
     }
     let summary = report::summary::tracked(&found);
-    result(experiment.json, &found, &summary, &files, timing)
+    let text = result(experiment.json, &found, &summary, &files, timing)?;
+    match found.doubt() {
+        Some(reason) => {
+            print(&text)?;
+            Err(Failure::run(reason))
+        }
+        None => Ok(text),
+    }
 }

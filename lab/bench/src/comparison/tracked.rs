@@ -5,6 +5,7 @@ use vines_model::Dimensionless;
 
 use super::exact_curve::{Distance, ExactCurve};
 use crate::backbone::{Point, Tracked};
+use crate::identification::Regime;
 use crate::scene::Scene;
 
 /// A tracked backbone beside the exact one.
@@ -55,6 +56,24 @@ impl TrackedComparison {
     /// All periods, the lock included, over the number of points.
     pub fn periods_per_point(&self) -> f64 {
         self.periods / self.points.len() as f64
+    }
+
+    /// Why these points are no backbone of a motion with impacts; `None` if there is evidence of impacts wherever the motion is settled.
+    pub fn doubt(&self) -> Option<String> {
+        let regimes = || self.points.iter().map(|one| one.point.regime_by_impacts.unwrap_or(one.point.regime));
+        let settled = regimes().zip(&self.points).filter(|(_, one)| one.point.settled);
+        let without = settled.filter(|(regime, _)| *regime == Regime::NotEstablished).count();
+        let of = self.points.len();
+        if without > 0 {
+            return Some(format!(
+                "the regime of {without} of {of} points is not established: neither their third harmonic nor a distance from the linear \
+                 response of the loop check is evidence of impacts. Check that the particle moves freely, and epsilon, b and r of the scene \
+                 (within a factor of two); do not skip the loop check; where noise hides the harmonic, reduce it"
+            ));
+        }
+        regimes().all(|regime| regime == Regime::NoImpacts).then(|| {
+            format!("all {of} points are without impacts (the linear mode): the particle does not reach the walls. Give it a velocity in [start], or set controller.capture = true")
+        })
     }
 
     /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.
