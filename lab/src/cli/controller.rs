@@ -10,6 +10,7 @@ use super::{failure::Failure, scene_arguments::SceneArguments};
 const HELP: &str = "\
 Examples:
   vines controller --listen 127.0.0.1:5511      then: vines identify --controller tcp://127.0.0.1:5511
+  vines controller --listen 127.0.0.1:5511 --sensors-only     for a rig that is at rest at the start, as a real one
 
 Answers every reading with a drive. After --silence the session ends. See docs/network-protocol.md.
 
@@ -26,13 +27,21 @@ pub(super) struct Arguments {
     #[command(flatten)]
     serving: ServingArguments,
 
+    /// The rig is at rest at the start and shows its sensors only, as a real one: the controller captures a motion with impacts from rest
+    /// (use it with `vines rig --sensors-only`)
+    #[arg(long)]
+    sensors_only: bool,
+
     /// Longest silence before the session is shut down, s
     #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = positive)]
     silence: f64,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
-    let scene = arguments.scene.load()?;
+    let mut scene = arguments.scene.load()?;
+    if arguments.sensors_only {
+        scene.start = Default::default();
+    }
     let first = BuiltIn::new(&scene.controller_config())?;
     let service = Service {
         role: Role::Controller,

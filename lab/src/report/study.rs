@@ -47,9 +47,11 @@ pub fn write_report(
             continue;
         }
         let section = make(subject, &at)?;
-        // With a hash of its input.
+        // With a hash of its input. A section that cannot be kept is still part of this report.
         let text = serde_json::to_string(&(key, &section))?;
-        files::write(&out.join(KEPT), [(file, text)])?;
+        if let Err(error) = files::write(&out.join(KEPT), [(file, text)]) {
+            log::warn!("{error}");
+        }
         sections.push(section);
     }
     let mut files = vec![(
@@ -65,11 +67,11 @@ pub fn write_report(
         }
         files.extend(section.attachments.clone());
     }
-    Ok(Report {
-        written: files::write(out, files)?,
-        kept,
-        findings: sections.into_iter().map(|one| one.finding).collect(),
-    })
+    let findings: Vec<String> = sections.into_iter().map(|one| one.finding).collect();
+    match files::write(out, files) {
+        Ok(written) => Ok(Report { written, kept, findings }),
+        Err(source) => Err(ReportError::Unwritten { findings, source }),
+    }
 }
 
 /// The section cached in a file, if its input is the same.

@@ -58,21 +58,25 @@ impl TrackedComparison {
         self.periods / self.points.len() as f64
     }
 
-    /// Why these points are no backbone of a motion with impacts; `None` if there is evidence of impacts wherever the motion is settled.
+    /// Why these points are no backbone of a motion with impacts: a settled point, or all points, without evidence of impacts.
     pub fn doubt(&self) -> Option<String> {
-        let regimes = || self.points.iter().map(|one| one.point.regime_by_impacts.unwrap_or(one.point.regime));
-        let settled = regimes().zip(&self.points).filter(|(_, one)| one.point.settled);
-        let without = settled.filter(|(regime, _)| *regime == Regime::NotEstablished).count();
+        let regime = |one: &TrackedPoint| one.point.regime_by_impacts.unwrap_or(one.point.regime);
+        let count = |wanted: Regime| self.points.iter().filter(|one| regime(one) == wanted).count();
+        let [linear, doubtful] = [Regime::NoImpacts, Regime::NotEstablished].map(count);
         let of = self.points.len();
-        if without > 0 {
+        let is_settled = |one: &TrackedPoint| one.point.settled && regime(one) == Regime::NotEstablished;
+        if linear == of {
             return Some(format!(
-                "the regime of {without} of {of} points is not established: neither their third harmonic nor a distance from the linear \
-                 response of the loop check is evidence of impacts. Check that the particle moves freely, and epsilon, b and r of the scene \
-                 (within a factor of two); do not skip the loop check; where noise hides the harmonic, reduce it"
+                "all {of} points are without impacts (the linear mode): the particle does not reach the walls. Check that it moves freely; give \
+                 it a velocity in [start], or set controller.capture = true"
             ));
         }
-        regimes().all(|regime| regime == Regime::NoImpacts).then(|| {
-            format!("all {of} points are without impacts (the linear mode): the particle does not reach the walls. Give it a velocity in [start], or set controller.capture = true")
+        (linear + doubtful == of || self.points.iter().any(is_settled)).then(|| {
+            format!(
+                "the regime of {doubtful} of {of} points is not established: neither their third harmonic nor a distance from the linear response \
+                 that the loop check measures is evidence of impacts. Check that the particle moves freely, and epsilon, b and r of the scene \
+                 (within a factor of two); do not skip the loop check; reduce noise that hides the harmonic"
+            )
         })
     }
 
