@@ -4,8 +4,9 @@ use vines::backbone::track;
 use vines::comparison::{ExactCurve, TrackedComparison, TrackedPoint};
 use vines::experiment::ExperimentError;
 use vines::identification::Regime;
+use vines::loop_check::check;
 use vines::rig::{BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated};
-use vines::scene::{Override, Scene};
+use vines::scene::{Override, Parameters, Scene};
 
 fn scene(settings: &[&str]) -> Scene {
     let overrides: Vec<Override> = settings.iter().map(|s| s.parse().unwrap()).collect();
@@ -161,6 +162,81 @@ fn the_response_alone_distinguishes_the_linear_mode_from_the_impacting_one() {
     for one in &report.points {
         assert_eq!(one.point.regime, Regime::NoImpacts);
         assert_eq!(one.point.regime_by_impacts, Some(Regime::NoImpacts));
+    }
+}
+
+/// A rig that shows its sensors only, through the measurement chain of a scene.
+struct SensorsOnly(Box<dyn Rig>);
+
+impl Rig for SensorsOnly {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.0.sense()
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.0.advance(drive, step)
+    }
+}
+
+/// The backbone of a rig with other parameters than those of the scene, from its sensors, after the loop check if `checked`.
+fn tracked_from_sensors(settings: &[&str], rig: impl Fn(&mut Parameters), checked: bool) -> TrackedComparison {
+    let few = ["start.dq2=0", "backbone.points=7", "backbone.C_to=0.3"];
+    let mut scene = scene(&[&few[..], settings].concat());
+    let mut plant = scene.plant;
+    rig(&mut plant);
+    let plant = Simulated::new(plant, scene.start).unwrap().with_sensors(scene.resonance);
+    let mut rig = SensorsOnly(Chain::around(Box::new(plant), &scene));
+    if checked {
+        let found = check(&mut rig, &scene).unwrap();
+        scene.measured = found.linear.map(|linear| linear.response());
+        assert!(scene.measured.is_some(), "{found:?}");
+    }
+    let mut controller = BuiltIn::new(&scene.backbone_config()).unwrap();
+    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {}).unwrap();
+    TrackedComparison::of(&tracked, &scene)
+}
+
+#[test]
+fn without_evidence_of_impacts_no_point_of_a_rig_is_called_one_to_one() {
+    // A cavity that is wider than stated is never reached; a jammed particle moves with the mass.
+    let wide = |plant: &mut Parameters| {
+        plant.half_width *= 1.15;
+        plant.stiffness *= 1.003;
+    };
+    let jammed = |plant: &mut Parameters| {
+        plant.primary_mass += plant.particle_mass;
+        plant.particle_mass *= 1e-6;
+    };
+    let rigs: [&dyn Fn(&mut Parameters); 2] = [&wide, &jammed];
+    for (number, rig) in rigs.into_iter().enumerate() {
+        for settings in [&[][..], &["chain.snr=40"], &["resonance.sensor='q1'"]] {
+            for checked in [true, false] {
+                let found = tracked_from_sensors(settings, rig, checked);
+                let regimes: Vec<Regime> = found.points.iter().map(|one| one.point.regime).collect();
+                let expected = if checked { Regime::NoImpacts } else { Regime::NotEstablished };
+                assert!(
+                    regimes.iter().all(|regime| *regime == expected),
+                    "rig {number}, {settings:?}, {checked}: {regimes:?}"
+                );
+                assert!(found.doubt().is_some());
+            }
+        }
+    }
+}
+
+#[test]
+fn impacts_of_other_rigs_are_recognised_from_the_response_with_and_without_noise() {
+    for rig in [&[][..], &["plant.r=0.4"], &["plant.r=0.85"], &["plant.epsilon=0.003"], &["plant.lambda=1"]] {
+        for seed in ["", "chain.seed=1", "chain.seed=2", "chain.seed=3"] {
+            let (is_noisy, noise) = (!seed.is_empty(), ["chain.snr=40", seed]);
+            let settings = [rig, if is_noisy { &noise } else { &[] }].concat();
+            let found = tracked_from_sensors(&settings, |_| {}, true);
+            for TrackedPoint { point, .. } in &found.points {
+                let clear = point.regime == Regime::Symmetric || (is_noisy && point.regime == Regime::Unresolved);
+                assert!(clear || !point.settled, "{settings:?}: {point:?}");
+            }
+            assert_eq!(found.doubt(), None, "{settings:?}");
+        }
     }
 }
 

@@ -109,7 +109,7 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
         ));
     }
     match regime? {
-        Regime::Unknown | Regime::Unresolved => None,
+        Regime::Unknown | Regime::Unresolved | Regime::NotEstablished => None,
         Regime::NoImpacts => Some(format!(
             "the particle does not reach the walls: from rest, impacts begin at G = {:.3}. Set controller.capture = true, or give it a \
              velocity in [start]; {place}",

@@ -6,6 +6,8 @@ mod bench;
 mod evidence;
 mod record;
 
+use std::fmt::{self, Display, Formatter};
+
 use thiserror::Error;
 
 use crate::rig::{Controller, ControllerError, Drive, Fault, Rig, RigError};
@@ -106,6 +108,30 @@ impl Stage {
     }
 }
 
+/// The phase error of a controller, or why there is none.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum PhaseError {
+    /// Its size, degrees.
+    Degrees(f64),
+    /// The signals have no measurable phase.
+    NotMeasured,
+    /// The controller does not say it.
+    NotReported,
+}
+
+impl Display for PhaseError {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Degrees(degrees) => write!(f, "the phase error is {degrees:.3} degrees"),
+            Self::NotMeasured => write!(f, "the phase cannot be measured"),
+            Self::NotReported => write!(
+                f,
+                "the controller does not report its phase error (an FMU does by the output `phase_error`, which [controller_names] can map)"
+            ),
+        }
+    }
+}
+
 /// Why an experiment ended early.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
@@ -115,13 +141,12 @@ pub enum ExperimentError {
     #[error(transparent)]
     Controller(#[from] ControllerError),
     #[error(
-        "no lock within {periods:.0} periods of the drive: {} at omega = {omega:.6} rad/s; \
-         see record.lock_periods and the [controller] section",
-        phase_error.map_or("the phase cannot be measured".into(), |error| format!("the phase error is {error:.3} degrees"))
+        "no lock within {periods:.0} periods of the drive: {phase_error} at omega = {omega:.6} rad/s; \
+         see record.lock_periods and the [controller] section"
     )]
     NoLock {
         periods: f64,
-        phase_error: Option<f64>,
+        phase_error: PhaseError,
         omega: f64,
     },
     #[error("no lock: for {periods:.0} periods in total the motion was not 1:1, and only such a motion can be locked")]

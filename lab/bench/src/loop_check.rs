@@ -9,7 +9,7 @@ mod open_loop;
 mod trials;
 mod verdict;
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
 use num_complex::Complex64;
 use serde::Serialize;
@@ -24,7 +24,7 @@ pub use trials::{Trials, trials};
 pub use verdict::{Channel, Verdict};
 
 use open_loop::{DECAY, OpenLoop, scatter};
-use verdict::{NOISE, verdict};
+use verdict::{IN_TIME, NOISE, verdict};
 
 /// Drive, as a share of that of the scene.
 const SHARE: f64 = 0.01;
@@ -81,11 +81,18 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
         }
     });
     let amplitudes = expected.map(|one| one.norm());
-    let verdict = verdict(&channels, &amplitudes, has_base);
+    // A delay that looks like the opposite sign is at least this long. Until then, the base rests; one of the opposite sign moves.
+    let first = (samples(1) as f64 * (PI - IN_TIME) / TAU) as usize;
+    let begin = &readings[begins..begins + first];
+    let rest = mean(readings[begins - quiet..begins].iter().map(|reading| reading[2]));
+    let moved = mean_square(begin.iter().map(|reading| reading[2] - rest));
+    let expected_move = mean_square(begin.iter().map(|reading| channels[1].gain * amplitude * reading[0].sin()));
+    let verdict = verdict(&channels, &amplitudes, has_base, moved < 0.5 * expected_move);
+    // Without a sensor, the base moves as expected.
     let base = if has_base {
-        channels[1].gain * amplitudes[1]
+        Seen::of(&readings[begins + driven - window..], 2).phasor
     } else {
-        amplitude
+        expected[1]
     };
     let period = samples(1);
     let phasors: Vec<_> = readings[begins..]

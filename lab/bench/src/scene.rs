@@ -6,6 +6,7 @@ mod configuration;
 mod controller;
 mod error;
 mod family;
+mod linear_response;
 mod load;
 mod names;
 mod option;
@@ -26,6 +27,7 @@ pub use configuration::{PhaseOrigin, PhaseTarget};
 pub use controller::Controller;
 pub use error::{SceneError, SyntaxError};
 pub use family::Family;
+pub use linear_response::LinearResponse;
 pub use names::{Name, Names};
 pub use overrides::Override;
 pub use phase_lock::{KEYS, PhaseLock, key, refusal};
@@ -63,6 +65,9 @@ pub struct Scene {
     /// What a controller other than the built-in one calls its variables.
     #[serde(skip_serializing_if = "Names::is_empty")]
     pub controller_names: Names,
+    /// The linear response that the loop check has measured on the rig; not part of a file.
+    #[serde(skip)]
+    pub measured: Option<LinearResponse>,
 }
 
 impl Scene {

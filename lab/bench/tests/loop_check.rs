@@ -127,8 +127,11 @@ impl Rig for Delayed {
 fn a_delay_of_both_channels_cancels_and_is_healthy() {
     let scene = scene();
     let still = Sensors { response: 0.0, reference: Some(0.0) };
-    let mut rig = Delayed(Simulated::new(scene.plant, scene.start).unwrap(), vec![still; 16]);
-    let found = check(&mut rig, &scene).unwrap();
-    assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
-    assert!((found.base.unwrap().delay - 16.0).abs() < 0.5, "{found:?}");
+    // From 40 on, the phase alone is that of the opposite sign.
+    for delay in [16, 30, 40, 44, 48] {
+        let mut rig = Delayed(Simulated::new(scene.plant, scene.start).unwrap(), vec![still; delay]);
+        let found = check(&mut rig, &scene).unwrap();
+        assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+        assert!((found.base.unwrap().delay - delay as f64).abs() < 0.5, "{found:?}");
+    }
 }

@@ -41,6 +41,9 @@ pub enum Regime {
     /// Steady and off the linear mode; noise hides whether it is symmetric.
     #[serde(rename = "steady, symmetry unresolved")]
     Unresolved,
+    /// The response alone shows neither impacts nor the linear mode.
+    #[serde(rename = "not established")]
+    NotEstablished,
     /// No data to determine it from.
     #[serde(rename = "unknown")]
     Unknown,
@@ -72,6 +75,7 @@ impl Regime {
             Regime::Undecided => "undecided",
             Regime::Other => "irregular",
             Regime::Unresolved => "steady and nonlinear (noise hides its symmetry)",
+            Regime::NotEstablished => "not established (no evidence of impacts)",
             Regime::Unknown => "unknown (the rig does not report impacts)",
         }
     }

@@ -4,7 +4,7 @@ use thiserror::Error;
 
 use super::frame::{Frame, Kind, VERSION, flag};
 use super::payload::read_command;
-use vines_testbench::rig::Drive;
+use vines_testbench::rig::{ControllerError, Drive};
 use vines_testbench::scene::Definition;
 
 /// Largest relative difference of two sample times that count as equal.
@@ -96,11 +96,9 @@ pub enum Refusal {
     /// 6
     #[error("a frame was damaged, or was not that of the present sample")]
     Unexpected,
-    /// 7
-    #[error(
-        "its controller cannot control the response amplitude now, or not with these values: the loop must be closed, the drive needs a limit"
-    )]
-    Move,
+    /// 7: what the controller cannot move, and the value that it refuses.
+    #[error("its controller {}", immovable(*index, *value))]
+    Move { index: usize, value: f64 },
     #[error("reason {0}")]
     Other(f64),
 }
@@ -114,7 +112,7 @@ impl Refusal {
             Self::Version(version) => [4.0, version.into(), 0.0, 0.0],
             Self::Drive { index, value, limit } => [5.0, index as f64, value, limit],
             Self::Unexpected => [6.0, 0.0, 0.0, 0.0],
-            Self::Move => [7.0, 0.0, 0.0, 0.0],
+            Self::Move { index, value } => [7.0, index as f64, value, 0.0],
             Self::Other(code) => [code, 0.0, 0.0, 0.0],
         };
         let mut frame = Frame { flags: 0, kind: Kind::Refusal, ..*cause };
@@ -132,9 +130,57 @@ impl Refusal {
             4 => Self::Version(first as u16),
             5 => Self::Drive { index: first as usize, value, limit },
             6 => Self::Unexpected,
-            7 => Self::Move,
+            7 => Self::Move { index: first as usize, value },
             _ => Self::Other(code),
         }
+    }
+}
+
+/// Values of a refused move, by their numbers from 1: those of the frame, then what the controller itself lacks.
+const MOVE: [(&str, &str); 8] = [
+    ("response", "m"),
+    ("duration", "s"),
+    ("amplitude", "m"),
+    ("omega", "rad/s"),
+    ("phase_target", "rad"),
+    ("growth", "m/s"),
+    ("amplitude_max", "m"),
+    ("state", ""),
+];
+
+impl From<ControllerError> for Refusal {
+    /// The refusal of a move.
+    fn from(error: ControllerError) -> Self {
+        let (index, value) = match error {
+            ControllerError::Refused(error) => {
+                let index = MOVE.iter().position(|(name, _)| *name == error.name);
+                (index.map_or(0, |index| index + 1), error.value.unwrap_or(f64::NAN))
+            }
+            ControllerError::NoResponseLoop => (MOVE.len() + 1, 0.0),
+            ControllerError::Failed(_) => (0, 0.0),
+        };
+        Self::Move { index, value }
+    }
+}
+
+/// The message for a move that is refused.
+fn immovable(index: usize, value: f64) -> String {
+    match index {
+        1..=6 => {
+            let (name, unit) = MOVE[index - 1];
+            let allowed = match index {
+                1 => "above 0",
+                2 => "0 or above",
+                _ => "a finite number that the configuration of the controller allows",
+            };
+            format!("refuses a move with {name} = {value} {unit}: allowed is {allowed}")
+        }
+        7 => "has no limit of the drive, which the control of the response amplitude needs: set phase_lock.amplitude_max in its scene".into(),
+        8 => format!(
+            "is in state {value}: the response amplitude can be controlled in a closed loop only, in state 2 (acquiring) or 3 (locked)"
+        ),
+        9 => "cannot control the response amplitude".into(),
+        _ => "cannot control the response amplitude now".into(),
     }
 }
 

@@ -134,7 +134,7 @@ impl Run {
             (Served::Controller(controller), Kind::Move) => {
                 let (to, phase_target) = read_move(frame);
                 // No answer: the next drive follows from it. A refusal ends the session.
-                Ok(controller.hold_response(to, phase_target).map_err(|_| Refusal::Move))
+                Ok(controller.hold_response(to, phase_target).map_err(Refusal::from))
             }
             (Served::Rig(_), Kind::Drive) => match self.service.drive(frame) {
                 Err(refusal) => Ok(Err(refusal)),

@@ -4,7 +4,7 @@ use clap::Args;
 use indicatif::ProgressBar;
 use vines::{backbone::track_into, comparison::TrackedComparison, report, rig::BuiltIn};
 
-use super::output::{result, writable, written};
+use super::output::{output, print, result, saved, writable, written};
 use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, identify::interrupted};
 
 const HELP: &str = "\
@@ -61,14 +61,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let timing = open.close();
     let tracked = tracked.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let found = TrackedComparison::of(&tracked, &scene);
-    let files = report::write_tracked(&found, &experiment.out).map_err(Failure::run)?;
-    if let Some(ended) = tracked.ended {
-        let points = found.points.len();
-        return Err(Failure::run(format!(
-            "{ended}\n{points} points were measured before. {}",
-            written(&files).trim_end()
-        )));
-    }
     let summary = report::summary::tracked(&found);
-    result(experiment.json, &found, &summary, &files, timing)
+    let saved = saved(report::write_tracked(&found, &experiment.out), || {
+        output(experiment.json, &found, || summary.clone())
+    });
+    if let Some(ended) = tracked.ended {
+        let mut failure = Failure::from(ended);
+        let files = saved.map_or_else(|error| error.message, |files| written(&files));
+        failure.message += &format!("\n{} points were measured before. {}", found.points.len(), files.trim_end());
+        return Err(failure);
+    }
+    let files = saved?;
+    let text = result(experiment.json, &found, &summary, &files, timing)?;
+    match found.doubt() {
+        Some(reason) => {
+            print(&text)?;
+            Err(Failure::run(reason))
+        }
+        None => Ok(text),
+    }
 }

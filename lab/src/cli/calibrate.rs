@@ -8,7 +8,7 @@ use vines::calibration::{self, Calibration, Coverage, Kind, Missing, OTHER_RIGS,
 use vines::report::{self, Table};
 use vines::scene::Scene;
 
-use super::output::{output, writable, written};
+use super::output::{output, saved, writable, written};
 use super::{failure::Failure, serving::count};
 
 /// The scene whose settings the rigs change.
@@ -56,11 +56,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let load = |overrides: &[_]| Scene::parse("dimensionless.toml", SCENE, overrides);
     let found = calibration::calibrate(load, rigs, seeds, |done| bar.set_position(done)).map_err(Failure::input)?;
     bar.finish_and_clear();
-    let files = report::write_calibration(&found, &arguments.out).map_err(Failure::run)?;
-    output(arguments.json, &found.outcomes, || {
+    let tables = || {
         let tables = format!("{}\n{}", table(&found).markdown(), missing(&found).markdown());
-        format!("{tables}\n{}\n{}", totals(&found), written(&files))
-    })
+        format!("{tables}\n{}\n", totals(&found))
+    };
+    let files = saved(report::write_calibration(&found, &arguments.out), || {
+        output(arguments.json, &found.outcomes, tables)
+    })?;
+    output(arguments.json, &found.outcomes, || tables() + &written(&files))
 }
 
 /// One row for each ratio and quantity.

@@ -54,6 +54,7 @@ impl ExperimentArguments {
         }
         let found = loop_check::check(rig, scene).map_err(ExperimentError::from)?;
         eprint!("{}", check::described(&found));
+        scene.measured = found.linear.map(|linear| linear.response());
         match found.verdict {
             loop_check::Verdict::Healthy => Ok(()),
             verdict => Err(Failure::run(format!(

@@ -14,7 +14,7 @@ use vines::{
     scene::Scene,
 };
 
-use super::output::{progress_bar, result, writable, written};
+use super::output::{output, print, progress_bar, result, saved, writable, written};
 use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, pack::beside_this_program};
 
 const HELP: &str = "\
@@ -85,11 +85,20 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         kept(Failure::run(error), reason, &record.samples, &experiment.out)
     })?;
     let found = Comparison::of(&found, &scene);
-    let mut files = report::write(&found, &experiment.out).map_err(Failure::run)?;
-    if arguments.rig.is_none() {
-        files.extend(fmus(&experiment.out)?);
-    }
     let summary = report::summary::identification(&found);
+    let mut files = saved(report::write(&found, &experiment.out), || {
+        let points = report::decay_csv(&found).map_err(Failure::run)?;
+        output(experiment.json, &found, || format!("{summary}\n{points}"))
+    })?;
+    if arguments.rig.is_none() {
+        match fmus(&experiment.out) {
+            Ok(fmus) => files.extend(fmus),
+            Err(failure) => {
+                print(&output(experiment.json, &found, || format!("{summary}\n{}", written(&files)))?)?;
+                return Err(failure);
+            }
+        }
+    }
     result(experiment.json, &found, &summary, &files, timing)
 }
 

@@ -9,7 +9,7 @@ use vines::report;
 use vines::report::summary::{parameters, regimes};
 use vines::{orbit::Branch, scene::Scene};
 
-use super::output::{progress_bar, writable, written};
+use super::output::{progress_bar, saved, writable, written};
 use super::{failure::Failure, scene_arguments::SceneArguments, serving::count};
 
 const HELP: &str = "\
@@ -82,7 +82,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let bar = progress_bar(plan.cells() as u64, "mapping regimes [{wide_bar}] {pos}/{len} cells");
     let map = plan.run(|| bar.inc(1)).map_err(Failure::input)?;
     bar.finish_and_clear();
-    let files = report::write_map(&map, &arguments.out).map_err(Failure::run)?;
+    let files = saved(report::write_map(&map, &arguments.out), || {
+        let cells = report::map_csv(&map).map_err(Failure::run)?;
+        Ok(format!("{}\n{cells}", summary(&map)))
+    })?;
     Ok(format!("{}\n{}", summary(&map), written(&files)))
 }
 

@@ -6,6 +6,7 @@ use std::path::{Path, PathBuf};
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
 use vines::net::{ReportLost, Timing};
+use vines::report::ReportError;
 
 use super::failure::Failure;
 
@@ -32,6 +33,17 @@ pub fn yes_no(value: bool) -> String {
 pub fn written(paths: &[PathBuf]) -> String {
     let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     format!("Written: {}\n", files.join(", "))
+}
+
+/// The files of a result. If they cannot be written, the result is printed as `text` instead.
+pub fn saved(
+    files: Result<Vec<PathBuf>, ReportError>,
+    text: impl FnOnce() -> Result<String, Failure>,
+) -> Result<Vec<PathBuf>, Failure> {
+    files.or_else(|error| {
+        print(&text()?)?;
+        Err(Failure::run(format!("{error}; standard output has the results instead")))
+    })
 }
 
 /// Creates a folder for results, and checks that files can be written to it before anything is driven.

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::report::{Subject, write_report};
+use vines::report::{ReportError, Subject, write_report};
 use vines::{map::Range, rig::BuiltIn};
 
-use super::output::{progress_bar, writable};
+use super::output::{print, progress_bar, writable};
 use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
@@ -74,10 +74,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             }
             bar.set_position((1000.0 * done) as u64);
         },
-    )
-    .map_err(Failure::run)?;
+    );
     bar.finish_and_clear();
-    let mut text: String = report.findings.iter().map(|finding| format!("- {finding}\n")).collect();
+    let listed = |findings: &[String]| findings.iter().map(|finding| format!("- {finding}\n")).collect::<String>();
+    let report = match report {
+        Err(ReportError::Unwritten { findings, source }) => {
+            print(&listed(&findings))?;
+            return Err(Failure::run(format!("{source}; standard output has the findings instead")));
+        }
+        other => other.map_err(Failure::run)?,
+    };
+    let mut text = listed(&report.findings);
     if !report.kept.is_empty() {
         text += &format!("\nReused from an earlier run: {}\n", report.kept.join(", "));
     }

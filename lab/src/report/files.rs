@@ -30,6 +30,8 @@ pub enum ReportError {
     Map(#[from] MapError),
     #[error(transparent)]
     File(#[from] FileError),
+    #[error("{source}")]
+    Unwritten { findings: Vec<String>, source: FileError },
     #[error(transparent)]
     Figure(#[from] FigureError),
     #[error("cannot write a table as CSV: {0}")]
@@ -40,39 +42,39 @@ pub enum ReportError {
 
 /// Writes `identification.json`, `backbone.csv`, `backbone.svg` and `sim.svg` into `out` and returns their paths.
 ///
-/// All of it is made before the first file is written, and each file is complete or absent.
+/// The results are written before a figure is made, and each file is complete or absent.
 pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let files = [
-        ("identification.json", json(found)?),
-        ("backbone.csv", decay_csv(found)?),
+    let results = [("identification.json", json(found)?), ("backbone.csv", decay_csv(found)?)];
+    let mut paths = files::write(out, results)?;
+    let figures = [
         ("backbone.svg", backbone::figure(found).svg()?),
         ("sim.svg", manifold::figure(found).svg()?),
     ];
-    Ok(files::write(out, files)?)
+    paths.extend(files::write(out, figures)?);
+    Ok(paths)
 }
 
 /// Writes `map.csv`, `map.svg`, `map-dark.svg` and, over sigma and G, `bifurcations.csv` into `out` and returns their paths, as [`write()`] does.
 pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let figure = regimes::svg(map)?;
-    let mut files = vec![
-        ("map.csv", map_csv(map)?),
-        ("map-dark.svg", dark(&figure)),
-        ("map.svg", figure),
-    ];
+    let mut tables = vec![("map.csv", map_csv(map)?)];
     if !map.curves.is_empty() {
-        files.push(("bifurcations.csv", bifurcations_csv(map)?));
+        tables.push(("bifurcations.csv", bifurcations_csv(map)?));
     }
-    Ok(files::write(out, files)?)
+    let mut paths = files::write(out, tables)?;
+    let figure = regimes::svg(map)?;
+    paths.extend(files::write(out, [("map-dark.svg", dark(&figure)), ("map.svg", figure)])?);
+    Ok(paths)
 }
 
 /// Writes `tracked.json`, `tracked.csv` and `tracked.svg` into `out` and returns their paths, as [`write()`] does.
 pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let files = [
-        ("tracked.json", json(found)?),
-        ("tracked.csv", tracked_csv(found)?),
-        ("tracked.svg", tracked::figure_with_drive(found).svg()?),
-    ];
-    Ok(files::write(out, files)?)
+    let results = [("tracked.json", json(found)?), ("tracked.csv", tracked_csv(found)?)];
+    let mut paths = files::write(out, results)?;
+    paths.extend(files::write(
+        out,
+        [("tracked.svg", tracked::figure_with_drive(found).svg()?)],
+    )?);
+    Ok(paths)
 }
 
 /// Writes `interrupted.csv`: the samples of an experiment that ended early, or without a motion that can be identified.
@@ -113,8 +115,8 @@ pub(super) fn csv<T: Serialize>(headings: &[&str], rows: impl IntoIterator<Item 
     Ok(String::from_utf8_lossy(&bytes).into_owned())
 }
 
-/// The points along a decay.
-pub(super) fn decay_csv(found: &Comparison) -> Result<String, ReportError> {
+/// The points along a decay, as CSV.
+pub fn decay_csv(found: &Comparison) -> Result<String, ReportError> {
     #[derive(Serialize)]
     struct Theory {
         sigma_theory: Option<f64>,
@@ -151,8 +153,8 @@ pub(super) fn tracked_csv(found: &TrackedComparison) -> Result<String, ReportErr
     )
 }
 
-/// The cells of a map.
-pub(super) fn map_csv(map: &Map) -> Result<String, ReportError> {
+/// The cells of a map, as CSV.
+pub fn map_csv(map: &Map) -> Result<String, ReportError> {
     #[derive(Serialize)]
     struct Row {
         sigma: f64,

@@ -48,8 +48,13 @@ pub fn write_report(
         }
         let section = make(subject, &at)?;
         let text = serde_json::to_string(&section)?;
-        let hash = hash(&format!("{key}\n{text}"));
-        files::write(&out.join(KEPT), [(file, format!("{hash}\n{text}"))])?;
+        let hash = hash(&format!("{key}
+{text}"));
+        // A section that cannot be kept is still part of this report.
+        if let Err(error) = files::write(&out.join(KEPT), [(file, format!("{hash}
+{text}"))]) {
+            log::warn!("{error}");
+        }
         sections.push(section);
     }
     let mut files = vec![(
@@ -65,11 +70,11 @@ pub fn write_report(
         }
         files.extend(section.attachments.clone());
     }
-    Ok(Report {
-        written: files::write(out, files)?,
-        kept,
-        findings: sections.into_iter().map(|one| one.finding).collect(),
-    })
+    let findings: Vec<String> = sections.into_iter().map(|one| one.finding).collect();
+    match files::write(out, files) {
+        Ok(written) => Ok(Report { written, kept, findings }),
+        Err(source) => Err(ReportError::Unwritten { findings, source }),
+    }
 }
 
 /// The section cached in a file, if it is undamaged and its input is the same: its first line is a hash of both.

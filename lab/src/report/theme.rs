@@ -30,7 +30,7 @@ pub fn regime(regime: Regime) -> (RGBColor, &'static str, RGBColor) {
         Regime::Chaotic => (RGBColor(106, 52, 128), "C", LIGHT),
         Regime::Undecided => (RGBColor(30, 32, 40), "U", RGBColor(255, 255, 255)),
         // The map shows none of these.
-        Regime::Other | Regime::Unresolved | Regime::Unknown => (UNSTABLE, "?", DARK),
+        Regime::Other | Regime::Unresolved | Regime::NotEstablished | Regime::Unknown => (UNSTABLE, "?", DARK),
     }
 }
 

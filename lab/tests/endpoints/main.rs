@@ -191,10 +191,37 @@ fn from_a_rig_that_shows_its_sensors_only_and_is_at_rest_lock_and_backbone_are_t
     let arguments = ["backbone", "--json", "--out", folder.path().to_str().unwrap()];
     let done = vines(&with_settings(&[&arguments[..], &few, &["--rig", &second.1]].concat()));
     let found: Value = serde_json::from_slice(&done.stdout).unwrap();
+    assert_eq!(done.status.code(), Some(0));
     let error = |point: &Value| point["exact"]["sigma"].as_f64().unwrap().abs();
     let errors: Vec<f64> = found["points"].as_array().unwrap().iter().map(error).collect();
     assert!(
         errors.len() == 3 && errors.iter().all(|error| *error < 2e-3),
         "{errors:?}"
     );
+}
+
+#[test]
+fn a_backbone_without_a_single_impact_is_a_failure() {
+    // The cavity is too wide for the particle to reach its walls.
+    let wide = ["--set", "plant.b=1"];
+    for (check, part) in [(&[][..], "without impacts"), (&["--no-check"], "is not established")] {
+        let rig = Server::start(&[&["rig", "--lock-step", "--sensors-only"], &wide[..]].concat());
+        let out = tempfile::tempdir().unwrap();
+        let few = ["--set", "backbone.points=3", "--set", "backbone.C_to=0.6"];
+        let arguments = ["backbone", "--out", out.path().to_str().unwrap(), "--rig", &rig.1];
+        let done = vines(&with_settings(&[&arguments[..], &few, check].concat()));
+        let [table, message] = [&done.stdout, &done.stderr]
+            .map(|text| String::from_utf8_lossy(text).into_owned());
+        assert_eq!(done.status.code(), Some(1), "{message}");
+        assert!(message.contains(part), "{message}");
+        assert!(table.contains("3 points") && !table.contains("1:1"), "{table}");
+    }
+}
+
+#[test]
+fn a_controller_at_a_network_address_captures_from_rest_if_the_rig_shows_its_sensors_only() {
+    let rig = Server::start(&["rig", "--lock-step", "--sensors-only"]);
+    let peer = Server::start(&["controller"]);
+    let found = identified(&["--rig", &rig.1, "--controller", &peer.1]);
+    assert_eq!(found["lock"]["regime"], "symmetric 1:1");
 }

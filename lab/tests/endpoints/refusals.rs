@@ -156,6 +156,27 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn a_signal_between_two_points_of_a_backbone_keeps_the_points_and_ends_with_the_code_of_a_signal() {
+    let rig = Server::start(&["rig", "--silence", "5"]);
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().to_str().unwrap();
+    let long = ["--set", "backbone.C_from=0.6", "--set", "backbone.C_to=0.58", "--set", "backbone.points=2000"];
+    let client = Command::new(PROGRAM)
+        .args(with_settings(&[&["backbone", "--out", out, "--rig", &rig.1], &long[..]].concat()))
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    std::thread::sleep(std::time::Duration::from_secs(12));
+    let pid = client.id().to_string();
+    assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
+    let output = client.wait_with_output().unwrap();
+    let message = String::from_utf8_lossy(&output.stderr);
+    assert_eq!(output.status.code(), Some(130), "{message}");
+    assert!(message.contains("points were measured before. Written: "), "{message}");
+}
+
 #[test]
 fn backbone_finds_that_it_cannot_write_before_it_drives_the_rig() {
     let file = tempfile::NamedTempFile::new().unwrap();

@@ -5,6 +5,7 @@ use vines_model::Dimensionless;
 
 use super::exact_curve::{Distance, ExactCurve};
 use crate::backbone::{Point, Tracked};
+use crate::identification::Regime;
 use crate::scene::Scene;
 
 /// A tracked backbone beside the exact one.
@@ -55,6 +56,28 @@ impl TrackedComparison {
     /// All periods, the lock included, over the number of points.
     pub fn periods_per_point(&self) -> f64 {
         self.periods / self.points.len() as f64
+    }
+
+    /// Why these points are no backbone of a motion with impacts: a settled point, or all points, without evidence of impacts.
+    pub fn doubt(&self) -> Option<String> {
+        let regime = |one: &TrackedPoint| one.point.regime_by_impacts.unwrap_or(one.point.regime);
+        let count = |wanted: Regime| self.points.iter().filter(|one| regime(one) == wanted).count();
+        let [linear, doubtful] = [Regime::NoImpacts, Regime::NotEstablished].map(count);
+        let of = self.points.len();
+        let is_settled = |one: &TrackedPoint| one.point.settled && regime(one) == Regime::NotEstablished;
+        if linear == of {
+            return Some(format!(
+                "all {of} points are without impacts (the linear mode): the particle does not reach the walls. Check that it moves freely; give \
+                 it a velocity in [start], or set controller.capture = true"
+            ));
+        }
+        (linear + doubtful == of || self.points.iter().any(is_settled)).then(|| {
+            format!(
+                "the regime of {doubtful} of {of} points is not established: neither their third harmonic nor a distance from the linear response \
+                 that the loop check measures is evidence of impacts. Check that the particle moves freely, and epsilon, b and r of the scene \
+                 (within a factor of two); do not skip the loop check; reduce noise that hides the harmonic"
+            )
+        })
     }
 
     /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.

@@ -2,7 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Evidence, ExperimentError, Plan, Sample, Stage};
+use super::{Evidence, ExperimentError, PhaseError, Plan, Sample, Stage};
 use crate::identification::{Regime, classify, regime_by_response};
 use crate::rig::{Command, Controller, Drive, Fault, LoopState, Rig};
 use crate::scene::Scene;
@@ -100,8 +100,17 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> Bench<'a, R, C> {
                 periods: self.periods,
                 stage,
                 fault: fault.unwrap_or(Fault::LockLost),
-                evidence: Box::new(Evidence::of(self.samples, self.scene)),
+                evidence: Box::new(Evidence::of(self.samples, self.scene, |error| self.phase_error(error))),
             },
+        }
+    }
+
+    /// A phase error, rad, or why there is none.
+    fn phase_error(&self, error: Option<f64>) -> PhaseError {
+        match error {
+            Some(radians) => PhaseError::Degrees(radians.to_degrees()),
+            None if self.controller.reports_phase_error() => PhaseError::NotMeasured,
+            None => PhaseError::NotReported,
         }
     }
 
@@ -109,7 +118,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> Bench<'a, R, C> {
     pub fn no_lock(&self, command: &Command) -> ExperimentError {
         ExperimentError::NoLock {
             periods: self.periods,
-            phase_error: command.phase_error.map(f64::to_degrees),
+            phase_error: self.phase_error(command.phase_error),
             omega: command.drive.omega,
         }
     }

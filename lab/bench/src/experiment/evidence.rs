@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use phase_lock::Config;
 
-use super::Sample;
+use super::{PhaseError, Sample};
 use crate::rig::{Fault, Sensors};
 use crate::scene::{Scene, key};
 
@@ -14,14 +14,14 @@ pub struct Evidence {
     last: Sensors,
     /// Largest absolute readings of the last period: response and base, m.
     largest: [f64; 2],
-    /// Mean of the phase error over the last period, rad, if it could be measured throughout.
-    phase_error: Option<f64>,
+    /// Mean of the phase error over the last period, if it could be measured throughout.
+    phase_error: PhaseError,
     config: Config,
 }
 
 impl Evidence {
-    /// The evidence in the last of these samples.
-    pub(super) fn of(samples: &[Sample], scene: &Scene) -> Self {
+    /// The evidence in the last of these samples; `phase_error` makes an error of radians, or of none.
+    pub(super) fn of(samples: &[Sample], scene: &Scene, phase_error: impl Fn(Option<f64>) -> PhaseError) -> Self {
         let config = scene.controller_config();
         let period = (TAU / (config.omega_start * config.sample_time)).round() as usize;
         let samples = &samples[samples.len().saturating_sub(period)..];
@@ -36,7 +36,7 @@ impl Evidence {
                 largest(|sensors| sensors.response),
                 largest(|sensors| sensors.reference.unwrap_or_default()),
             ],
-            phase_error: errors.map(|errors| errors.iter().sum::<f64>() / errors.len() as f64),
+            phase_error: phase_error(errors.map(|errors| errors.iter().sum::<f64>() / errors.len() as f64)),
             config,
         }
     }
@@ -56,10 +56,11 @@ impl Evidence {
                 )
             }
             Fault::LockLost => {
-                let error = phase_error.map_or_else(
-                    || "could not be measured".into(),
-                    |error| format!("was {} degrees", short(error.to_degrees())),
-                );
+                let error = match phase_error {
+                    PhaseError::Degrees(degrees) => format!("was {} degrees", short(*degrees)),
+                    PhaseError::NotMeasured => "could not be measured".into(),
+                    PhaseError::NotReported => "was not reported by the controller".into(),
+                };
                 let tolerance = config.lock.unlock_tolerance.to_degrees();
                 let limit = limit("lock.unlock_tolerance", Some(tolerance), " degrees");
                 format!("in the last period the phase error {error}, and {limit}; the response read at most {most}")

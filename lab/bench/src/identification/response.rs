@@ -3,14 +3,16 @@
 //! The centre of mass moves smoothly, so impacts have little effect on it. The triangle wave of a particle with the speed `B`
 //! excites the harmonic of odd order n of v to the amplitude `4 epsilon B/(pi n^2 (n^2 - 1))`. Uneven impacts add even
 //! harmonics. Irregular impacts make amplitude and phase fluctuate, which leaves a residual. The motion without impacts is
-//! the linear mode: it needs the frequency `omega0` and the drive `c omega A/k`.
+//! the linear mode: response over base is that of a linear test at small amplitude, which the loop check makes.
 
 use nalgebra::DVector;
+use num_complex::Complex64;
 use vines_model::numerics::{HarmonicBasis, noise};
 use vines_model::regime::Regime;
+use vines_model::theory::Manifold;
 
 use crate::experiment::Sample;
-use crate::scene::Scene;
+use crate::scene::{LinearResponse, Scene};
 
 /// Largest residual of a steady motion, relative to the amplitude, unless it is noise.
 const STEADY: f64 = 3e-3;
@@ -18,10 +20,10 @@ const STEADY: f64 = 3e-3;
 const NOISE_SHARE: f64 = 0.5;
 /// Smallest significant harmonic, in standard errors.
 const SIGNIFICANT: f64 = 4.0;
-/// Largest second harmonic of a symmetric motion, relative to the expected third.
-const EVEN_SHARE: f64 = 0.5;
-/// Deviations within which a motion counts as the linear mode: of the frequency, relative to the damping rate, and of the drive.
-const LINEAR: [f64; 2] = [0.1, 0.05];
+/// Smallest share of an expected harmonic that counts: of the second, relative to the third, and of the third.
+const SHARE: f64 = 0.5;
+/// Relative distance from the linear response within which a motion counts as the linear mode, beside the uncertainty of that response.
+const LINEAR: f64 = 0.1;
 /// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.
 const HARMONICS: [Option<usize>; 5] = [Some(2), Some(0), Some(0), Some(0), Some(0)];
 
@@ -69,9 +71,12 @@ impl Content {
     }
 }
 
-/// The regime determined from the response of these samples. Of the rig, this uses only the results of a linear test at small
-/// amplitude (`omega0`, `c`, `k`) and the mass ratio, from which the expected third harmonic follows. `base` (m) is the base
-/// amplitude that holds the motion at phase resonance, and `omega` (rad/s) its frequency.
+/// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at phase resonance, and
+/// `omega` (rad/s) its frequency.
+///
+/// Impacts need evidence. Either the third harmonic is significant, and at least half of what the slowest particle of a 1:1 motion, that at the
+/// fold of the manifold, excites; this knows epsilon, b and r within a factor of two. Or noise hides it, and response over base differs
+/// from the measured linear response.
 #[must_use]
 pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, omega: f64) -> Regime {
     let Some(content) = Content::of(samples, scene.sample_time(), omega) else {
@@ -80,25 +85,30 @@ pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, omega: f
     if content.rest > STEADY && content.noise < NOISE_SHARE * content.rest {
         return Regime::Other;
     }
-    if is_linear(content.amplitude, scene, base, omega) {
-        return Regime::NoImpacts;
-    }
     // The particle's speed is about b omega; the order of magnitude is sufficient.
     let expected = 4.0 * scene.dimensionless().amplitude(1.0) / (72.0 * std::f64::consts::PI * content.amplitude);
+    let least = SHARE * Manifold::new(scene.plant.restitution).b_min() * expected;
     let significant = SIGNIFICANT * content.error;
-    if content.second > significant.max(EVEN_SHARE * expected) {
+    let is_simulated = samples.iter().any(|sample| sample.ground_truth.is_some());
+    // The parameters of a simulation are known.
+    let linear = scene.measured.or_else(|| is_simulated.then(|| LinearResponse::of(scene)));
+    let measured = Complex64::from_polar(content.amplitude / base, scene.phase_target().radians());
+    let is_linear = linear.filter(|_| base > 0.0).map(|linear| is_linear(&linear, measured, omega));
+    if content.second > significant.max(SHARE * expected) {
         Regime::Asymmetric
-    } else if content.third > significant && significant < expected {
+    } else if content.third > significant.max(least) && significant < expected {
         Regime::Symmetric
-    } else {
+    } else if is_linear == Some(true) {
+        Regime::NoImpacts
+    } else if is_linear == Some(false) && significant > least {
         Regime::Unresolved
+    } else {
+        Regime::NotEstablished
     }
 }
 
-/// Whether frequency and drive are those of the linear mode at this amplitude.
-fn is_linear(amplitude: f64, scene: &Scene, drive: f64, omega: f64) -> bool {
-    let (plant, omega0) = (&scene.plant, scene.dimensionless().omega0);
-    let needed = plant.damping * omega0 / plant.stiffness * amplitude;
-    let damping_rate = 0.5 * omega * drive / amplitude;
-    (omega - omega0).abs() <= LINEAR[0] * damping_rate && (drive - needed).abs() <= LINEAR[1] * drive
+/// Whether response over base, `measured`, at the frequency `omega` (rad/s) is that of the linear response.
+fn is_linear(linear: &LinearResponse, measured: Complex64, omega: f64) -> bool {
+    let tolerance = LINEAR + SIGNIFICANT * linear.uncertainty / linear.damping_rate.abs();
+    (linear.at(omega) / measured - 1.0).norm() <= tolerance
 }

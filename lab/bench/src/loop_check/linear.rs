@@ -7,7 +7,7 @@ use num_complex::Complex64;
 use phase_lock::Gains;
 use serde::Serialize;
 
-use crate::scene::Scene;
+use crate::scene::{LinearResponse, Scene};
 
 /// The linear response, and the tuning of the loop for it.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -20,6 +20,8 @@ pub struct Linear {
     pub u_damping_rate: f64,
     /// Growth rate of the response at resonance per amplitude of the base, 1/s.
     pub response_gain: f64,
+    /// Phase of the response at resonance relative to the base, degrees: -90, less what is late.
+    pub phase: f64,
     /// Bandwidth of the detector, rad/s, from which the gains follow.
     pub bandwidth: f64,
     /// Proportional gain, rad/s per rad, and integral gain, rad/s² per rad.
@@ -29,8 +31,9 @@ pub struct Linear {
 }
 
 impl Linear {
-    /// The response whose phasors relative to the base, m, are given period by period, `period` seconds apart. `None` without a growth.
-    pub(super) fn of(phasors: &[Complex64], base: f64, omega: f64, period: f64, scene: &Scene) -> Option<Self> {
+    /// The response whose phasors, m, are given period by period, `period` seconds apart; `base` is the phasor of the base, m. `None` without
+    /// a growth.
+    pub(super) fn of(phasors: &[Complex64], base: Complex64, omega: f64, period: f64, scene: &Scene) -> Option<Self> {
         let steps = phasors.len() as f64 - 1.0;
         let (before, after) = (&phasors[..phasors.len() - 1], &phasors[1..]);
         let mean = |values: &[Complex64]| values.iter().sum::<Complex64>() / steps;
@@ -45,8 +48,8 @@ impl Linear {
         let errors = before.iter().zip(after).map(|(z, next)| (next - q * z - c).norm_sqr());
         let u_q = (errors.sum::<f64>() / (2.0 * steps - 4.0) / power).sqrt();
         let rate = -q.ln() / period;
-        let response_gain = (c * rate / (1.0 - q)).norm() / base;
-        if !(response_gain.is_finite() && u_q.is_finite() && q.norm() > 0.0) {
+        let gain = c * rate / (1.0 - q) / base;
+        if !(gain.norm().is_finite() && u_q.is_finite() && q.norm() > 0.0) {
             return None;
         }
         // Scatter, and what the growth within a period adds to its phasor as a component of twice the frequency.
@@ -58,12 +61,23 @@ impl Linear {
             omega_0: omega - rate.im,
             damping_rate: rate.re,
             u_damping_rate: noise.hypot(leakage),
-            response_gain,
+            response_gain: gain.norm(),
+            phase: gain.arg().to_degrees(),
             bandwidth,
             gains: [gains.proportional, gains.integral],
             phase_margin: gains
                 .phase_margin(bandwidth, rate.re.max(0.0), scene.sample_time())
                 .to_degrees(),
         })
+    }
+
+    /// The frequency response.
+    pub fn response(&self) -> LinearResponse {
+        LinearResponse {
+            omega0: self.omega_0,
+            damping_rate: self.damping_rate,
+            uncertainty: self.u_damping_rate,
+            gain: Complex64::from_polar(self.response_gain, self.phase.to_radians()),
+        }
     }
 }

@@ -12,8 +12,8 @@ const DEAD: f64 = 0.01;
 const GAIN: f64 = 2.0;
 /// RMS of the response without a drive over that of its noise with it, from which the rig moves.
 const AT_REST: f64 = 3.0;
-/// Deviation of the phase, rad, up to which a channel is in time, and from which it is reversed.
-const IN_TIME: f64 = 0.7;
+/// Deviation of the phase, rad, up to which a channel is in time, or reversed.
+pub(super) const IN_TIME: f64 = 0.7;
 
 /// A channel.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -73,8 +73,9 @@ pub enum Verdict {
     BaseNoisy,
 }
 
-/// Judges response and base, whose expected amplitudes are `expected`, m.
-pub(super) fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bool) -> Verdict {
+/// Judges response and base, whose expected amplitudes are `expected`, m. `waits`: the base moves later than the drive, so that its phase is that
+/// of a delay.
+pub(super) fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bool, waits: bool) -> Verdict {
     let [response, base] = channels;
     if !(response.gain + base.gain + response.noise + base.noise).is_finite() {
         return Verdict::NotANumber;
@@ -104,9 +105,10 @@ pub(super) fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bo
         () if !near(response.gain) => Verdict::ResponseGain,
         () if noisy(response, expected[0]) => Verdict::ResponseNoisy,
         () if has_base && noisy(base, expected[1]) => Verdict::BaseNoisy,
-        () if has_base && reversed(response) && reversed(base) => Verdict::BothReversed,
+        () if has_base && !waits && reversed(response) && reversed(base) => Verdict::BothReversed,
+        () if has_base && waits && reversed(base) && in_time(is_off(response.phase - base.phase, 0.0)) => Verdict::Healthy,
         () if reversed(response) => Verdict::ResponseReversed,
-        () if has_base && reversed(base) => Verdict::BaseReversed,
+        () if has_base && !waits && reversed(base) => Verdict::BaseReversed,
         // What delays both, such as a connection, cancels in the phase that the controller holds.
         () if in_time(is_off(response.phase - if has_base { base.phase } else { 0.0 }, 0.0)) => Verdict::Healthy,
         () if has_base && !in_time(base.phase.to_radians()) => Verdict::BaseLate,

@@ -97,6 +97,7 @@ impl Sections {
             resonance: self.resonance,
             rig_names: self.rig.names,
             controller_names: self.controller_names,
+            measured: None,
         };
         scene.controller.check()?;
         let needed = scene.impact_drive();
