@@ -14,7 +14,7 @@ use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, StoreError, Val
 
 use crate::{
     scene::{Scene, invalid},
-    wait::wait,
+    wait::{own_threads, wait},
 };
 
 /// The values of an axis: first, last and number; a list; or an interval with the name of a design.
@@ -96,6 +96,7 @@ impl Sweep {
 
     /// Estimated hours and bytes, and whether these must be confirmed.
     fn estimate(&self, py: Python<'_>) -> PyResult<(f64, f64, bool)> {
+        own_threads()?;
         let stop = AtomicBool::new(false);
         let cost = wait(py, &stop, |_| Ok(()), || estimate(&self.0, &stop))?.map_err(invalid)?;
         Ok((cost.hours, cost.bytes, cost.is_large()))
@@ -109,6 +110,7 @@ impl Sweep {
                 "shard ({number}, {of}): the number counts from 0 to {of} - 1"
             )));
         }
+        own_threads()?;
         let monitor = Monitor::default();
         let looked = |py: Python<'_>| match &look {
             Some(look) => {
