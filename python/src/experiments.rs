@@ -49,11 +49,15 @@ fn experiment<T: serde::Serialize>(
 }
 
 #[pyfunction]
-pub fn identify(py: Python<'_>, scene: &Scene) -> PyResult<String> {
+pub fn identify(py: Python<'_>, scene: &Scene, decay: bool) -> PyResult<String> {
     let scene = &scene.scene;
     let mut controller = BuiltIn::new(&scene.controller_config()).map_err(invalid)?;
+    let mut plan = Plan::of(scene);
+    if !decay {
+        plan.decay = 0;
+    }
     experiment(py, scene, |rig| {
-        let record = experiment::run(rig, &mut controller, &Plan::of(scene), |_, _, _| {})?;
+        let record = experiment::run(rig, &mut controller, &plan, |_, _, _| {})?;
         let found = identification::identify(&record, scene)?;
         Ok(Comparison::of(&found, scene))
     })

@@ -23,6 +23,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(experiments::orbits, module)?,
         wrap_pyfunction!(experiments::theory, module)?,
         wrap_pyfunction!(experiments::regime, module)?,
+        wrap_pyfunction!(sweeps::regimes, module)?,
     ] {
         module.add_function(function)?;
     }
