@@ -1,4 +1,4 @@
-"""Build backend: maturin, after the FMUs that belong into the wheel. The source distribution is the whole repository."""
+"""Build backend: maturin, after the FMUs that belong into the wheel; the source distribution is the whole repository."""
 
 import contextlib
 import gzip
@@ -39,7 +39,7 @@ def _fmus():
     os.environ["RUSTFLAGS"] = flags.stdout
 
 
-def get_requires_for_build_wheel(settings=None):
+def get_requires_for_build_wheel(settings=None):  # noqa: ARG001  the interface of build backends
     """No packages beside those in pyproject.toml."""
     return []
 

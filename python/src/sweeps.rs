@@ -150,5 +150,5 @@ impl Sweep {
 /// Names of the regimes, by their code.
 #[pyfunction]
 pub fn regimes() -> Vec<&'static str> {
-    vines_model::map::Regime::SIMULATED.iter().map(|regime| regime.name()).collect()
+    vines_model::regime::Regime::SIMULATED.iter().map(|regime| regime.name()).collect()
 }

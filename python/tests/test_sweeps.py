@@ -60,9 +60,7 @@ def test_paired_samples_share_a_dimension_and_have_the_cells_of_the_program(tmp_
     assert dict(cells.sizes) == {"sample": 3}
     assert cells["plant.r"].values.tolist() == r
     assert cells["start.dq2"].values.tolist() == start.tolist()
-    grid = vines.sweep(
-        None, {"plant.r": [0.5, 0.65], "start.dq2": start}, out=tmp_path / "grid", periods=200
-    )
+    grid = vines.sweep(None, {"plant.r": [0.5, 0.65], "start.dq2": start}, out=tmp_path / "grid", periods=200)
     for name in ("regime", "followed", "recurrence"):
         expected = [grid[name].values[0, 0], grid[name].values[1, 1], grid[name].values[0, 2]]
         assert np.array_equal(cells[name].values, expected, equal_nan=True)

@@ -11,12 +11,12 @@ if TYPE_CHECKING:
 
 def dataset(variables: Mapping[str, tuple[Any, Any]], units: Mapping[str, str], **attributes: Any) -> "xarray.Dataset":
     """Return a dataset; units and variables have the same names."""
-    xarray = _xarray()
+    module = _xarray()
     arrays = {
         name: (dimension, values, {"units": units[name]} if name in units else {})
         for name, (dimension, values) in variables.items()
     }
-    found: xarray.Dataset = xarray.Dataset(
+    found: xarray.Dataset = module.Dataset(
         arrays, attrs={name: _plain(value) for name, value in attributes.items() if value is not None}
     )
     return found
@@ -24,8 +24,7 @@ def dataset(variables: Mapping[str, tuple[Any, Any]], units: Mapping[str, str], 
 
 def opened(store: "str | PathLike[str]") -> "xarray.Dataset":
     """Return a store of a sweep, opened lazily; its attributes can be written to any format."""
-    xarray = _xarray()
-    found: xarray.Dataset = xarray.open_zarr(store)
+    found: xarray.Dataset = _xarray().open_zarr(store)
     found.attrs = {name: _plain(value) for name, value in found.attrs.items()}
     return found
 
@@ -43,7 +42,8 @@ def _xarray() -> Any:
         import zarr  # noqa: F401
     except ImportError as error:
         raise ImportError(
-            f"datasets need xarray and zarr, and {error.name} is missing: pip install 'vines-testbench[all]' or pip install xarray zarr",
+            f"datasets need xarray and zarr, and {error.name} is missing: pip install xarray zarr, or all that vines can use "
+            "with pip install 'vines-testbench[all]'",
             name=error.name,
         ) from None
     return xarray

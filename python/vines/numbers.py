@@ -1,5 +1,6 @@
 """Numbers of any library: Python, NumPy, xarray, decimal and others."""
 
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -40,17 +41,15 @@ def reals(name: str, given: ArrayLike) -> NDArray[np.float64]:
     values = np.asarray(given)
     if values.dtype.kind == "O" and values.size:
         # Decimals, fractions, and scalars of other libraries.
-        try:
+        with suppress(TypeError, ValueError):
             values = np.array([real(one) for one in values.flat]).reshape(values.shape)
-        except (TypeError, ValueError):
-            pass
     if values.dtype.kind not in "fiu":
         raise ValueError(f"{name} of type {values.dtype}: real numbers are allowed")
     return values.astype(np.float64, copy=False)
 
 
 def _unmasked(value: Any) -> None:
-    # Conversions drop the mask, and compute with what is under it. A masked array may be inside of xarray's, and inside a list.
+    # Conversions drop the mask, and compute with what is under it.
     parts = value if isinstance(value, (list, tuple)) else (value,)
     if any(isinstance(one, np.ma.MaskedArray) and np.ma.is_masked(one) for one in parts):
         raise ValueError(f"{value!r} has masked values: fill them, or leave them out")

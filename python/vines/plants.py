@@ -298,7 +298,9 @@ class Plant(_native.Plant):
         values = _values(Scene() if parameters is None else parameters, start)
         sizes = [np.size(value) for value in values if np.ndim(value)]
         if sizes and np.broadcast_shapes(*(np.shape(value) for value in values)) != (1,):
-            raise ValueError(f"values for {max(sizes) if min(sizes) else 0} plants: one is allowed here; Batch has more")
+            raise ValueError(
+                f"values for {max(sizes) if min(sizes) else 0} plants: one is allowed here; Batch has more"
+            )
         numbers = [float(value.item()) for value in values]
         return super().__new__(cls, numbers[:6], numbers[6:])
 
@@ -367,7 +369,8 @@ class Plant(_native.Plant):
         if not 1 <= operator.index(steps) <= 10**9:
             raise ValueError(f"steps = {steps}: a whole number from 1 to 10^9 is allowed")
         rows, found = self._trajectory(duration, steps, amplitude, omega)
-        return Trajectory(*rows.T, Events(*found))
+        time, q1, dq1, q2, dq2, base = np.ascontiguousarray(rows.T)
+        return Trajectory(time, q1, dq1, q2, dq2, base, Events(*found))
 
     def copy(self) -> Self:
         """Return a copy that continues with the same bits."""
@@ -399,7 +402,13 @@ class Plant(_native.Plant):
 
 
 #: What a step without events returns.
-_NO_EVENTS = Events(*(np.empty(0, dtype) for dtype in (np.uint64, np.float64, np.uint8, np.int8, np.float64)))
+_NO_EVENTS = Events(
+    plant=np.empty(0, np.uint64),
+    time=np.empty(0),
+    kind=np.empty(0, np.uint8),
+    wall=np.empty(0, np.int8),
+    velocity=np.empty(0),
+)
 #: Parameters of a plant that is about to become another one.
 _ANY = dict.fromkeys(_PARAMETERS, 1.0)
 
