@@ -3,6 +3,7 @@
 python examples/basin.py [FOLDER]    writes basin.zarr and basin.svg; continues an interrupted sweep
 """
 
+import json
 import sys
 from pathlib import Path
 
@@ -14,20 +15,19 @@ import vines
 folder = Path(sys.argv[1] if len(sys.argv) > 1 else "out")
 folder.mkdir(parents=True, exist_ok=True)
 scene = vines.Scene(start={"dq2": 0.0})
-axes = {"start.q1": (-0.0099, 0.0099, 61), "start.dq1": (-0.6, 0.6, 61)}
+axes = {"start.q1": vines.linspace(-0.0099, 0.0099, 61), "start.dq1": vines.linspace(-0.6, 0.6, 61)}
 cells = vines.sweep(scene, axes, out=folder / "basin.zarr", periods=1000)
-names = [name.replace("_", " ") for name in cells.regime.attrs["flag_meanings"].split()]
-found = [code for code in range(len(names)) if (cells.regime == code).any()]
+found = [code for code in range(len(vines.REGIMES)) if (cells.regime == code).any()]
 position = cells.regime.copy(data=[[found.index(code) for code in row] for row in cells.regime.values])
 figure, plot = plt.subplots(figsize=(6, 4.5), layout="constrained")
 colours = ListedColormap([f"C{code}" for code in found])
 image = plot.pcolormesh(
     1e3 * cells["start.q1"], cells["start.dq1"], position.T, cmap=colours, vmin=-0.5, vmax=len(found) - 0.5
 )
-figure.colorbar(image, ticks=range(len(found))).set_ticklabels([names[code] for code in found])
+figure.colorbar(image, ticks=range(len(found))).set_ticklabels([vines.REGIMES[code] for code in found])
 plot.set(
     xlabel="q1 at the start, mm",
     ylabel="q1' at the start, m/s",
-    title=f"$\\sigma$ = {cells.attrs['vines']['sigma']:.4f}, G = 1.1",
+    title=f"$\\sigma$ = {json.loads(cells.attrs['vines'])['sigma']:.4f}, G = 1.1",
 )
 figure.savefig(folder / "basin.svg")

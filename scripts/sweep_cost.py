@@ -83,7 +83,10 @@ def cluster(workers):
     ):
         client.run(vines.Scene)
         begin = time.perf_counter()
-        axes = {"sigma": (-5.0, 5.0, 300 // SHRINK), "excitation.G": (0.1, 3.0, 300 // SHRINK)}
+        axes = {
+            "sigma": vines.linspace(-5.0, 5.0, 300 // SHRINK),
+            "excitation.G": vines.linspace(0.1, 3.0, 300 // SHRINK),
+        }
         vines.sweep(None, axes, out=out, periods=400, chunk=3000, client=client)
         return time.perf_counter() - begin
 

@@ -27,7 +27,7 @@ use crate::contact::Wall;
 use crate::moving::Moving;
 use crate::oscillator::Oscillator;
 use crate::segment::Segment;
-use cache::Cache;
+use cache::{Cache, Keys};
 use coefficients::Coefficients;
 use horizon::Horizon;
 use propagator::{Increment, Point};
@@ -51,7 +51,6 @@ pub(crate) enum Next {
 
 /// Predictions, and what they are made from.
 #[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct FastPath {
     pub disabled: bool,
     /// How long there is no contact from now on.
@@ -60,7 +59,6 @@ pub(crate) struct FastPath {
     pub phasor: (f64, f64),
     /// Rotations since it was computed from the phase.
     rotations: u32,
-    #[cfg_attr(feature = "serde", serde(skip))]
     coefficients: Coefficients,
     cache: Cache,
     /// What comes next could not be verified: the plain solver is to search for so long, s.
@@ -69,7 +67,49 @@ pub(crate) struct FastPath {
     pub evaluations: u64,
 }
 
+/// What is saved of the fast path: all that results depend on.
+#[derive(Clone, Copy, Debug)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub(crate) struct SavedPath {
+    disabled: bool,
+    contact_free: Horizon,
+    phasor: (f64, f64),
+    rotations: u32,
+    to_search: f64,
+    keys: Keys,
+}
+
 impl FastPath {
+    /// What is saved of it.
+    pub fn save(&self) -> SavedPath {
+        let Self {
+            disabled,
+            contact_free,
+            phasor,
+            rotations,
+            coefficients: _,
+            cache,
+            to_search,
+            evaluations: _,
+        } = *self;
+        SavedPath {
+            disabled,
+            contact_free,
+            phasor,
+            rotations,
+            to_search,
+            keys: cache.keys(),
+        }
+    }
+
+    /// Restores what was saved. What is cached for the same oscillator and keys stays: it has the same bits as if it were computed again.
+    pub fn restore(&mut self, saved: &SavedPath) {
+        let SavedPath { disabled, contact_free, phasor, rotations, to_search, keys } = *saved;
+        (self.disabled, self.contact_free, self.phasor) = (disabled, contact_free, phasor);
+        (self.rotations, self.to_search) = (rotations, to_search);
+        self.cache.restore(&keys);
+    }
+
     /// The state was changed from outside.
     pub fn state_changed(&mut self, base: &BaseMotion) {
         self.contact_free = Horizon::default();

@@ -6,13 +6,8 @@ use crate::contact::ImpactLaw;
 use crate::oscillator::Oscillator;
 use crate::parameters::Parameters;
 
-/// The parameters and what follows from them. The parameters alone are saved.
+/// The parameters and what follows from them.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(from = "Parameters", into = "Parameters")
-)]
 pub(crate) struct Rig {
     pub parameters: Parameters,
     pub mass_ratio: f64,
@@ -20,12 +15,6 @@ pub(crate) struct Rig {
     /// The primary mass while the particle is free, and both masses while it is stuck.
     pub free: Oscillator,
     pub stuck: Oscillator,
-}
-
-impl From<Rig> for Parameters {
-    fn from(rig: Rig) -> Self {
-        rig.parameters
-    }
 }
 
 impl From<Parameters> for Rig {
@@ -69,7 +58,6 @@ impl Masses {
 
 /// The parts of a plant that move, and the rig.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub(crate) struct Moving {
     pub rig: Rig,
     pub masses: Masses,

@@ -6,6 +6,7 @@
 mod advance;
 mod at_wall;
 mod events;
+mod saved;
 
 use crate::arithmetic::{Sum, Sums};
 use crate::base_motion::{BaseMotion, Drive};
@@ -14,6 +15,7 @@ use crate::fast::FastPath;
 use crate::moving::{Masses, Moving, Rig};
 use crate::parameters::{InvalidValue, Parameters};
 pub use events::{Event, Outcome, State, Totals};
+pub use saved::Saved;
 
 /// Largest number of impacts per step.
 pub const MOST_IMPACTS: u64 = 10_000_000;
@@ -22,7 +24,11 @@ pub const MOST_EVALUATIONS: u64 = 500_000_000;
 
 /// The plant: parameters, what follows from them, and the state.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[cfg_attr(
+    feature = "serde",
+    derive(serde::Serialize, serde::Deserialize),
+    serde(from = "Saved", into = "Saved")
+)]
 pub struct Plant {
     moving: Moving,
     /// The wall that the particle is stuck to.
@@ -41,29 +47,10 @@ impl Plant {
     /// Invalid parameters, a state that is not finite, a particle outside its cavity.
     pub fn new(parameters: Parameters, start: State) -> Result<Self, InvalidValue> {
         parameters.validate()?;
-        let b = parameters.half_width;
-        let finite = |name, value: f64, unit| {
-            let allowed = "a finite number from -1e100 to 1e100";
-            InvalidValue::unless(value.abs() <= 1e100, name, value, unit, allowed)
-        };
-        finite("q1 (displacement of the primary mass)", start.q1, "m")?;
-        finite("der(q1) (velocity of the primary mass)", start.dq1, "m/s")?;
-        finite("q2 (displacement of the particle)", start.q2, "m")?;
-        finite("der(q2) (velocity of the particle)", start.dq2, "m/s")?;
-        let w = start.q1 - start.q2;
-        // The difference of two displacements carries their rounding; a start on the wall means on the wall.
-        let slack = 4.0 * f64::EPSILON * (b + start.q1.abs().max(start.q2.abs()));
-        let name = "w = q1 - q2 (particle outside its cavity at the start)";
-        InvalidValue::unless(w.abs() <= b + slack, name, w, "m", "a number from -b to b")?;
         Ok(Self {
             moving: Moving {
                 rig: Rig::from(parameters),
-                masses: Masses {
-                    primary: Sums { values: [start.q1, start.dq1], errors: [0.0; 2] },
-                    w: Sum::from(w.clamp(-b, b)),
-                    dw: start.dq1 - start.dq2,
-                    particle: start.dq2,
-                },
+                masses: masses(&parameters, start)?,
                 base: BaseMotion::default(),
             },
             contact: None,
@@ -72,6 +59,17 @@ impl Plant {
             totals: Totals::default(),
             fast: FastPath::default(),
         })
+    }
+
+    /// Sets displacements and velocities; contact is decided anew. Base, time and totals stay.
+    ///
+    /// # Errors
+    /// A state that is not finite, a particle outside its cavity; the plant stays as it is.
+    pub fn set_state(&mut self, state: State) -> Result<(), InvalidValue> {
+        self.moving.masses = masses(&self.moving.rig.parameters, state)?;
+        self.contact = Contact::Free;
+        self.fast.state_changed(&self.moving.base);
+        Ok(())
     }
 
     /// Sets the base motion at the start: a drive that is set later is compared with it.
@@ -175,6 +173,30 @@ impl Plant {
         let stretch = q1 - displacement;
         0.5 * (p.primary_mass * dq1 * dq1 + p.particle_mass * dq2 * dq2 + p.stiffness * stretch * stretch)
     }
+}
+
+/// The masses at `start`, checked.
+fn masses(parameters: &Parameters, start: State) -> Result<Masses, InvalidValue> {
+    let b = parameters.half_width;
+    let finite = |name, value: f64, unit| {
+        let allowed = "a finite number from -1e100 to 1e100";
+        InvalidValue::unless(value.abs() <= 1e100, name, value, unit, allowed)
+    };
+    finite("q1 (displacement of the primary mass)", start.q1, "m")?;
+    finite("der(q1) (velocity of the primary mass)", start.dq1, "m/s")?;
+    finite("q2 (displacement of the particle)", start.q2, "m")?;
+    finite("der(q2) (velocity of the particle)", start.dq2, "m/s")?;
+    let w = start.q1 - start.q2;
+    // The difference of two displacements carries their rounding; a start on the wall means on the wall.
+    let slack = 4.0 * f64::EPSILON * (b + start.q1.abs().max(start.q2.abs()));
+    let name = "w = q1 - q2 (particle outside its cavity)";
+    InvalidValue::unless(w.abs() <= b + slack, name, w, "m", "a number from -b to b")?;
+    Ok(Masses {
+        primary: Sums { values: [start.q1, start.dq1], errors: [0.0; 2] },
+        w: Sum::from(w.clamp(-b, b)),
+        dw: start.dq1 - start.dq2,
+        particle: start.dq2,
+    })
 }
 
 #[cfg(all(test, feature = "serde"))]

@@ -23,9 +23,10 @@ use vines_testbench::{
 };
 
 use crate::{
+    number::Real,
     saved,
     scene::{Scene, invalid, json},
-    wait::wait,
+    wait::{may_leave, wait},
 };
 
 /// Why an experiment ended without a result.
@@ -48,11 +49,15 @@ fn experiment<T: serde::Serialize>(
 }
 
 #[pyfunction]
-pub fn identify(py: Python<'_>, scene: &Scene) -> PyResult<String> {
+pub fn identify(py: Python<'_>, scene: &Scene, decay: bool) -> PyResult<String> {
     let scene = &scene.scene;
     let mut controller = BuiltIn::new(&scene.controller_config()).map_err(invalid)?;
+    let mut plan = Plan::of(scene);
+    if !decay {
+        plan.decay = 0;
+    }
     experiment(py, scene, |rig| {
-        let record = experiment::run(rig, &mut controller, &Plan::of(scene), |_, _, _| {})?;
+        let record = experiment::run(rig, &mut controller, &plan, |_, _, _| {})?;
         let found = identification::identify(&record, scene)?;
         Ok(Comparison::of(&found, scene))
     })
@@ -69,7 +74,8 @@ pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
 }
 
 #[pyfunction]
-pub fn orbits(py: Python<'_>, scene: &Scene, sigma: Option<f64>) -> PyResult<String> {
+pub fn orbits(py: Python<'_>, scene: &Scene, sigma: Option<Real>) -> PyResult<String> {
+    let sigma = sigma.map(|one| one.0);
     let numbers = scene.scene.dimensionless();
     finite(sigma)?;
     json(&py.detach(|| match sigma {
@@ -100,7 +106,8 @@ pub fn theory(py: Python<'_>, scene: &Scene, points: i64) -> PyResult<String> {
 }
 
 #[pyfunction]
-pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<f64>, periods: i64) -> PyResult<String> {
+pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<Real>, periods: i64) -> PyResult<String> {
+    let sigma = sigma.map(|one| one.0);
     finite(sigma)?;
     if !(100..=100_000).contains(&periods) {
         return Err(PyValueError::new_err(format!(
@@ -114,22 +121,16 @@ pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<f64>, periods: i64) -
             -1.0 / numbers.epsilon
         )));
     }
-    let stop = AtomicBool::new(false);
-    let point = wait(
-        py,
-        &stop,
-        |_| Ok(()),
-        || {
-            let sigma = sigma.unwrap_or_else(|| {
-                let orbits = orbit::phase_resonant(&numbers);
-                orbits
-                    .iter()
-                    .find(|orbit| orbit.stable)
-                    .map_or(0.0, |orbit| orbit.sigma)
-            });
-            observe(&numbers, sigma, start, periods as usize).map(|point| (sigma, point))
-        },
-    )?;
+    let point = may_leave(py, &AtomicBool::new(false), move || {
+        let sigma = sigma.unwrap_or_else(|| {
+            let orbits = orbit::phase_resonant(&numbers);
+            orbits
+                .iter()
+                .find(|orbit| orbit.stable)
+                .map_or(0.0, |orbit| orbit.sigma)
+        });
+        observe(&numbers, sigma, start, periods as usize).map(|point| (sigma, point))
+    })?;
     let (sigma, point) = point.map_err(invalid)?;
     json(&json!({ "sigma": sigma, "point": point }))
 }
@@ -183,10 +184,11 @@ impl PhaseLock {
     #[allow(clippy::type_complexity)]
     fn sample(
         &mut self,
-        response: f64,
-        reference: Option<f64>,
+        response: Real,
+        reference: Option<Real>,
         active: bool,
     ) -> (f64, f64, f64, Option<f64>, f64, f64, bool, bool, u8, u8) {
+        let (response, reference) = (response.0, reference.map(|one| one.0));
         let output = self
             .lock
             .process(&mut self.state, Input { response, reference, active });

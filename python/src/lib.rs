@@ -1,6 +1,7 @@
 //! The compiled part of the Python package: thin functions; `vines/*.py` has the interface with its documentation.
 
 mod experiments;
+mod number;
 mod plants;
 mod saved;
 mod scene;
@@ -11,6 +12,7 @@ use pyo3::prelude::*;
 
 #[pymodule]
 fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add_class::<plants::Plant>()?;
     module.add_class::<plants::Plants>()?;
     module.add_class::<scene::Scene>()?;
     module.add_class::<experiments::PhaseLock>()?;
@@ -21,6 +23,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
         wrap_pyfunction!(experiments::orbits, module)?,
         wrap_pyfunction!(experiments::theory, module)?,
         wrap_pyfunction!(experiments::regime, module)?,
+        wrap_pyfunction!(sweeps::regimes, module)?,
     ] {
         module.add_function(function)?;
     }

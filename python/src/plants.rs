@@ -3,13 +3,12 @@
 use std::{
     panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
     sync::{
-        OnceLock,
+        Arc,
         atomic::{AtomicBool, Ordering::Relaxed},
     },
-    thread,
 };
 
-use lovines::{Drive, Event, InvalidValue, Parameters, Plant, State, Wall};
+use lovines::{Drive, Event, InvalidValue, Parameters, Plant as OnePlant, State, Wall, plant::Saved};
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2, ndarray::Array2};
 use pyo3::{
     exceptions::{PyKeyboardInterrupt, PyMemoryError},
@@ -18,30 +17,12 @@ use pyo3::{
 };
 use rayon::prelude::*;
 
-use crate::{saved, scene::invalid, wait::wait};
-
-/// Plants that advance independently of each other.
-#[pyclass]
-pub struct Plants {
-    plants: Vec<Plant>,
-    /// Where they advance to, so that all of them stay as they are if one fails. It is kept: a plant has 8 kB, and new memory for every
-    /// advance takes as long as 50 periods.
-    next: Vec<Plant>,
-}
-
-/// What ends a plant's motion at an event, by unwinding.
-struct Stopped;
-
-/// Events of a single plant between two looks at the signals: some milliseconds.
-const LOOK: u32 = 1 << 14;
-
-/// Memory for `n` plants, or a `MemoryError`: without this, a batch that does not fit would end the interpreter.
-fn reserve(plants: &mut Vec<Plant>, n: usize) -> PyResult<()> {
-    plants.try_reserve_exact(n).map_err(|_| {
-        let bytes = n as f64 * size_of::<Plant>() as f64;
-        PyMemoryError::new_err(format!("{n} plants need {:.1} GB", bytes / 1e9))
-    })
-}
+use crate::{
+    number::Real,
+    saved,
+    scene::invalid,
+    wait::{may_leave, own_threads},
+};
 
 /// Number of the plant, time, kind (0 impact, 1 stuck, 2 released), wall, relative velocity.
 #[derive(Default)]
@@ -78,6 +59,10 @@ impl Events {
         )
     }
 
+    fn is_empty(&self) -> bool {
+        self.plant.is_empty()
+    }
+
     fn append(&mut self, mut other: Self) {
         self.plant.append(&mut other.plant);
         self.time.append(&mut other.time);
@@ -95,12 +80,309 @@ type EventArrays<'py> = (
     Bound<'py, PyArray1<f64>>,
 );
 
-/// How the motion of the n-th plant ended; without an error if it was stopped.
-fn ended<T>(advanced: thread::Result<Result<T, InvalidValue>>, n: usize) -> Result<(), Option<(usize, InvalidValue)>> {
-    match advanced {
-        Ok(advanced) => advanced.map(drop).map_err(|error| Some((n, error))),
+/// What ends a plant's motion at an event, by unwinding.
+struct Stopped;
+
+/// Why a plant did not advance: without an error if it was stopped.
+type Failure = Option<InvalidValue>;
+
+/// Advances a plant; `stop` ends its motion at the next event. The number `n` is that of its events.
+fn advance(
+    plant: &mut OnePlant,
+    (drive, duration): (Drive, f64),
+    n: usize,
+    mut found: Option<&mut Events>,
+    stop: &AtomicBool,
+) -> Result<(), Failure> {
+    let start = plant.time();
+    let record = |event| {
+        if stop.load(Relaxed) {
+            resume_unwind(Box::new(Stopped));
+        }
+        if let Some(found) = &mut found {
+            found.push(n, start, event);
+        }
+    };
+    match catch_unwind(AssertUnwindSafe(|| plant.advance_with(drive, duration, record))) {
+        Ok(advanced) => advanced.map(drop).map_err(Some),
         Err(payload) if payload.is::<Stopped>() => Err(None),
         Err(panic) => resume_unwind(panic),
+    }
+}
+
+fn parameters([primary_mass, stiffness, damping, particle_mass, half_width, restitution]: [f64; 6]) -> Parameters {
+    Parameters {
+        primary_mass,
+        stiffness,
+        damping,
+        particle_mass,
+        half_width,
+        restitution,
+    }
+}
+
+fn state([q1, dq1, q2, dq2]: [f64; 4]) -> State {
+    State { q1, dq1, q2, dq2 }
+}
+
+fn wall(plant: &OnePlant) -> i8 {
+    plant
+        .contact()
+        .map_or(0, |wall| if wall == Wall::Plus { 1 } else { -1 })
+}
+
+/// One plant, with all that makes a single step fast.
+#[pyclass(subclass)]
+pub struct Plant {
+    plant: Box<OnePlant>,
+    /// Fastest rate of its free motion, 1/s, or above.
+    fastest: f64,
+}
+
+/// Oscillations (in radians) and crossings of the cavity that take about a millisecond. A longer advance is computed in a thread, so that
+/// Ctrl-C ends it.
+const SHORT: f64 = 1e3;
+
+impl Plant {
+    fn of(plant: OnePlant) -> Self {
+        let p = plant.parameters();
+        let fastest = (p.stiffness / p.primary_mass).sqrt() + p.damping / p.primary_mass;
+        Self { plant: Box::new(plant), fastest }
+    }
+
+    /// Runs `work` on the plant; it stays as it is if that fails. With a long duration it runs in a thread.
+    fn run<T: Send + 'static>(
+        &mut self,
+        py: Python<'_>,
+        (drive, duration): (Drive, f64),
+        work: impl FnOnce(&mut OnePlant, &AtomicBool) -> Result<T, Failure> + Send + 'static,
+    ) -> PyResult<T> {
+        let state = self.plant.state();
+        let speed = state.dq1.abs() + state.dq2.abs() + (drive.amplitude * drive.omega).abs();
+        let crossings = speed / self.plant.parameters().half_width;
+        let result = if duration * (self.fastest + drive.omega.abs() + crossings) < SHORT {
+            let before = self.plant.save();
+            let result = work(&mut self.plant, &AtomicBool::new(false));
+            if result.is_err() {
+                self.plant.restore(&before);
+            }
+            result
+        } else {
+            let (mut plant, stop) = (self.plant.clone(), Arc::new(AtomicBool::new(false)));
+            let flag = Arc::clone(&stop);
+            may_leave(py, &stop, move || work(&mut plant, &flag).map(|result| (plant, result)))?.map(
+                |(plant, result)| {
+                    self.plant = plant;
+                    result
+                },
+            )
+        };
+        result.map_err(|failure| failure.map_or_else(|| PyKeyboardInterrupt::new_err(()), invalid))
+    }
+}
+
+#[pymethods]
+impl Plant {
+    /// M, k, c, m, b, r and q1, dq1, q2, dq2.
+    #[new]
+    fn new(values: [Real; 6], start: [Real; 4]) -> PyResult<Self> {
+        let plant = OnePlant::new(parameters(values.map(|one| one.0)), state(start.map(|one| one.0)));
+        plant.map(Self::of).map_err(invalid)
+    }
+
+    /// The plant as bytes.
+    fn _save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
+        saved::save(py, &self.plant.save())
+    }
+
+    fn _restore(&mut self, saved: &[u8]) -> PyResult<()> {
+        *self = Self::of(saved::restore::<OnePlant>(saved)?);
+        Ok(())
+    }
+
+    /// Advances it. Returns the events, or None without any.
+    fn _advance<'py>(
+        &mut self,
+        py: Python<'py>,
+        duration: Real,
+        amplitude: Real,
+        omega: Real,
+    ) -> PyResult<Option<EventArrays<'py>>> {
+        let motion = (Drive::harmonic(amplitude.0, omega.0), duration.0);
+        let found = self.run(py, motion, move |plant, stop| {
+            let mut found = Events::default();
+            advance(plant, motion, 0, Some(&mut found), stop).map(|()| found)
+        })?;
+        Ok((!found.is_empty()).then(|| found.into_arrays(py)))
+    }
+
+    /// Advances it in equal steps. Returns rows of time, q1, dq1, q2, dq2 and base displacement, and the events.
+    #[allow(clippy::type_complexity)]
+    fn _trajectory<'py>(
+        &mut self,
+        py: Python<'py>,
+        duration: Real,
+        steps: usize,
+        amplitude: Real,
+        omega: Real,
+    ) -> PyResult<(Bound<'py, PyArray2<f64>>, EventArrays<'py>)> {
+        let drive = Drive::harmonic(amplitude.0, omega.0);
+        let step = duration.0 / steps as f64;
+        let mut rows: Vec<[f64; 6]> = Vec::new();
+        rows.try_reserve_exact(steps + 1)
+            .map_err(|_| PyMemoryError::new_err(format!("{} states need too much memory", steps + 1)))?;
+        let (rows, found) = self.run(py, (drive, duration.0), move |plant, stop| {
+            let row = |plant: &OnePlant| {
+                let (State { q1, dq1, q2, dq2 }, phase) = (plant.state(), plant.base().phase.radians());
+                [plant.time(), q1, dq1, q2, dq2, drive.amplitude * phase.sin()]
+            };
+            let mut found = Events::default();
+            rows.push(row(plant));
+            for _ in 0..steps {
+                if stop.load(Relaxed) {
+                    return Err(None);
+                }
+                advance(plant, (drive, step), 0, Some(&mut found), stop)?;
+                rows.push(row(plant));
+            }
+            Ok((rows, found))
+        })?;
+        let rows = Array2::from(rows).into_pyarray(py);
+        Ok((rows, found.into_arrays(py)))
+    }
+
+    fn _set_state(&mut self, values: [Real; 4]) -> PyResult<()> {
+        self.plant.set_state(state(values.map(|one| one.0))).map_err(invalid)
+    }
+
+    /// Displacement of the primary mass, m.
+    #[getter]
+    fn q1(&self) -> f64 {
+        self.plant.state().q1
+    }
+
+    /// Velocity of the primary mass, m/s.
+    #[getter]
+    fn dq1(&self) -> f64 {
+        self.plant.state().dq1
+    }
+
+    /// Displacement of the particle, m.
+    #[getter]
+    fn q2(&self) -> f64 {
+        self.plant.state().q2
+    }
+
+    /// Velocity of the particle, m/s.
+    #[getter]
+    fn dq2(&self) -> f64 {
+        self.plant.state().dq2
+    }
+
+    /// v = q1 + epsilon q2, m: displacement of the centre of mass times 1 + epsilon.
+    #[getter]
+    fn v(&self) -> f64 {
+        self.plant.centre()
+    }
+
+    /// Relative displacement w = q1 - q2, m.
+    #[getter]
+    fn w(&self) -> f64 {
+        self.plant.relative_displacement()
+    }
+
+    /// Relative velocity w', m/s.
+    #[getter]
+    fn dw(&self) -> f64 {
+        self.plant.relative_velocity()
+    }
+
+    /// Displacement of the base, m: E sin(phase), with the E of the last advance.
+    #[getter]
+    fn base(&self) -> f64 {
+        self.plant.base_displacement()
+    }
+
+    /// Phase of the base, rad, in [0, 2 pi).
+    #[getter]
+    fn phase(&self) -> f64 {
+        self.plant.base().phase.radians()
+    }
+
+    /// Time since the start, s.
+    #[getter]
+    fn time(&self) -> f64 {
+        self.plant.time()
+    }
+
+    /// Wall that the particle is stuck to: 1 at w = b, -1 at w = -b, 0 if it is free.
+    #[getter]
+    fn wall(&self) -> i8 {
+        wall(&self.plant)
+    }
+
+    /// Impacts since the start.
+    #[getter]
+    fn impacts(&self) -> u64 {
+        self.plant.totals().impacts
+    }
+
+    /// Energy dissipated by impacts since the start, J.
+    #[getter]
+    fn dissipated(&self) -> f64 {
+        self.plant.totals().dissipated
+    }
+
+    /// q1 (m), q1' (m/s), q2 (m) and q2' (m/s) as an array of shape (1, 4), as of a `Batch`.
+    #[getter]
+    fn states<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
+        let State { q1, dq1, q2, dq2 } = self.plant.state();
+        Array2::from(vec![[q1, dq1, q2, dq2]]).into_pyarray(py)
+    }
+}
+
+/// Plants that advance independently of each other. Each is its saved form; a thread has one plant that takes their place in turn.
+#[pyclass]
+pub struct Plants {
+    plants: Arc<Vec<Saved>>,
+    /// Memory for the next states: all plants stay as they are if one fails.
+    next: Vec<Saved>,
+}
+
+/// Parts of a batch per thread: plants differ in their cost.
+const PARTS: usize = 64;
+
+/// Memory for `n` plants, or a `MemoryError`: without this, a batch that does not fit would end the interpreter.
+fn reserve(plants: &mut Vec<Saved>, n: usize) -> PyResult<()> {
+    plants.try_reserve_exact(n).map_err(|_| {
+        let bytes = n as f64 * size_of::<Saved>() as f64;
+        PyMemoryError::new_err(format!("{n} plants need {:.1} GB", bytes / 1e9))
+    })
+}
+
+impl Plants {
+    fn of(plants: Vec<Saved>) -> Self {
+        Self { plants: Arc::new(plants), next: Vec::new() }
+    }
+
+    /// What `read` finds in every plant.
+    fn each<T>(&self, read: impl Fn(&OnePlant) -> T) -> Vec<T> {
+        let mut workspace = None;
+        self.plants
+            .iter()
+            .map(|saved| read(restored(&mut workspace, saved)))
+            .collect()
+    }
+}
+
+/// The plant in a workspace.
+fn restored<'a>(workspace: &'a mut Option<OnePlant>, saved: &Saved) -> &'a mut OnePlant {
+    match workspace {
+        Some(plant) => {
+            plant.restore(saved);
+            plant
+        }
+        None => workspace.insert(OnePlant::from(saved)),
     }
 }
 
@@ -108,24 +390,19 @@ fn ended<T>(advanced: thread::Result<Result<T, InvalidValue>>, n: usize) -> Resu
 impl Plants {
     /// Rows of M, k, c, m, b, r and of q1, dq1, q2, dq2.
     #[new]
-    fn new(parameters: PyReadonlyArray2<'_, f64>, starts: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
-        let (parameters, starts) = (parameters.as_array(), starts.as_array());
-        let rows = parameters.rows().into_iter().zip(starts.rows());
+    fn new(values: PyReadonlyArray2<'_, f64>, starts: PyReadonlyArray2<'_, f64>) -> PyResult<Self> {
+        let (values, starts) = (values.as_array(), starts.as_array());
         let mut plants = Vec::new();
-        reserve(&mut plants, parameters.nrows())?;
-        for (n, (p, s)) in rows.enumerate() {
-            let parameters = Parameters {
-                primary_mass: p[0],
-                stiffness: p[1],
-                damping: p[2],
-                particle_mass: p[3],
-                half_width: p[4],
-                restitution: p[5],
-            };
-            let start = State { q1: s[0], dq1: s[1], q2: s[2], dq2: s[3] };
-            plants.push(Plant::new(parameters, start).map_err(|error| invalid(format!("plant {n}: {error}")))?);
+        reserve(&mut plants, values.nrows())?;
+        for (n, (p, s)) in values.rows().into_iter().zip(starts.rows()).enumerate() {
+            let (parameters, start) = (
+                parameters(std::array::from_fn(|i| p[i])),
+                state(std::array::from_fn(|i| s[i])),
+            );
+            let plant = OnePlant::new(parameters, start).map_err(|error| invalid(format!("plant {n}: {error}")))?;
+            plants.push(plant.save());
         }
-        Ok(Self { plants, next: Vec::new() })
+        Ok(Self::of(plants))
     }
 
     fn __len__(&self) -> usize {
@@ -136,17 +413,17 @@ impl Plants {
         let mut plants = Vec::new();
         reserve(&mut plants, self.plants.len())?;
         plants.extend_from_slice(&self.plants);
-        Ok(Self { plants, next: Vec::new() })
+        Ok(Self::of(plants))
     }
 
     /// The plants as bytes.
     fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        saved::save(py, &self.plants)
+        saved::save(py, &*self.plants)
     }
 
     #[staticmethod]
     fn restore(saved: &[u8]) -> PyResult<Self> {
-        Ok(Self { plants: saved::restore(saved)?, next: Vec::new() })
+        saved::restore(saved).map(Self::of)
     }
 
     /// Advances all plants, or none if a value is refused or a signal arrives. Returns the events, if they are wanted.
@@ -158,93 +435,75 @@ impl Plants {
         omegas: PyReadonlyArray1<'py, f64>,
         events: bool,
     ) -> PyResult<Option<EventArrays<'py>>> {
-        let (durations, amplitudes, omegas) = (durations.as_array(), amplitudes.as_array(), omegas.as_array());
-        let Self { plants, next } = self;
+        own_threads()?;
+        let [durations, amplitudes, omegas] = [durations, amplitudes, omegas].map(|one| one.as_array().to_vec());
+        let mut next = std::mem::take(&mut self.next);
         next.clear();
-        reserve(next, plants.len())?;
-        let (stop, mut signal, single) = (AtomicBool::new(false), OnceLock::new(), plants.len() == 1);
-        // The error of a plant with its number, or none after a signal.
-        let one = |(n, plant): (usize, &Plant)| -> (Plant, Result<Events, Option<(usize, InvalidValue)>>) {
-            let (mut plant, mut found) = (*plant, Events::default());
-            if stop.load(Relaxed) {
-                return (plant, Err(None));
-            }
-            let (drive, start) = (Drive::harmonic(amplitudes[n], omegas[n]), plant.time());
-            // One loop over events for both cases: of two, the compiler leaves parts as calls, and each is slower.
-            let mut seen = 0_u32;
-            let record = |event| {
-                seen = seen.wrapping_add(1);
-                if single
-                    && seen.is_multiple_of(LOOK)
-                    && let Err(error) = Python::attach(|py| py.check_signals())
-                {
-                    stop.store(true, Relaxed);
-                    let _ = signal.set(error);
-                }
-                if stop.load(Relaxed) {
-                    resume_unwind(Box::new(Stopped));
-                }
-                if events {
-                    found.push(n, start, event);
-                }
-            };
-            // The plant is a copy, which is dropped if its motion is stopped.
-            let advanced = catch_unwind(AssertUnwindSafe(|| plant.advance_with(drive, durations[n], record)));
-            (plant, ended(advanced, n).map(|()| found))
+        reserve(&mut next, self.plants.len())?;
+        let (plants, stop) = (Arc::clone(&self.plants), Arc::new(AtomicBool::new(false)));
+        let flag = Arc::clone(&stop);
+        let work = move || {
+            next.extend_from_slice(&plants);
+            let part = plants.len().div_ceil(PARTS * rayon::current_num_threads()).max(1);
+            let parts = next.par_chunks_mut(part).enumerate();
+            let found: Vec<Result<Events, (usize, Failure)>> = parts
+                .map_init(
+                    || None,
+                    |workspace, (number, part_of_all)| {
+                        let mut found = Events::default();
+                        for (n, saved) in (number * part..).zip(part_of_all) {
+                            if flag.load(Relaxed) {
+                                return Err((n, None));
+                            }
+                            let plant = restored(workspace, saved);
+                            let motion = (Drive::harmonic(amplitudes[n], omegas[n]), durations[n]);
+                            advance(plant, motion, n, events.then_some(&mut found), &flag)
+                                .map_err(|error| (n, error))?;
+                            *saved = plant.save();
+                        }
+                        Ok(found)
+                    },
+                )
+                .collect();
+            (next, found)
         };
-        let mut all = Vec::new();
-        if let [plant] = plants[..] {
-            // A thread would take longer than most steps.
-            let (plant, found) = py.detach(|| one((0, &plant)));
-            next.push(plant);
-            all.push(found);
-        } else {
-            let work = || plants.par_iter().enumerate().map(one).unzip_into_vecs(next, &mut all);
-            wait(py, &stop, |_| Ok(()), work)?;
-        }
+        let (next, found) = may_leave(py, &stop, work)?;
         let mut merged = Events::default();
-        for found in all {
-            merged.append(found.map_err(|error| match (error, signal.take()) {
-                (None, Some(raised)) => raised,
-                (None, None) => PyKeyboardInterrupt::new_err(()),
-                (Some((n, error)), _) => invalid(format!("plant {n}: {error}")),
+        for found in found {
+            merged.append(found.map_err(|(n, failure)| match failure {
+                Some(error) => invalid(format!("plant {n}: {error}")),
+                None => PyKeyboardInterrupt::new_err(()),
             })?);
         }
-        std::mem::swap(plants, next);
+        let before = std::mem::replace(&mut self.plants, Arc::new(next));
+        self.next = Arc::try_unwrap(before).unwrap_or_default();
         Ok(events.then(|| merged.into_arrays(py)))
     }
 
     /// Rows of q1, dq1, q2, dq2.
     fn states<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray2<f64>> {
-        let mut states = Array2::zeros((self.plants.len(), 4));
-        for (mut row, plant) in states.rows_mut().into_iter().zip(&self.plants) {
+        let row = |plant: &OnePlant| {
             let State { q1, dq1, q2, dq2 } = plant.state();
-            row.assign(&numpy::ndarray::arr1(&[q1, dq1, q2, dq2]));
-        }
-        states.into_pyarray(py)
+            [q1, dq1, q2, dq2]
+        };
+        Array2::from(self.each(row)).into_pyarray(py)
     }
 
     /// Time, s.
     fn times<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<f64>> {
-        self.plants.iter().map(Plant::time).collect::<Vec<_>>().into_pyarray(py)
+        self.each(OnePlant::time).into_pyarray(py)
     }
 
     /// Wall that the particle is stuck to: 1, -1, or 0.
     fn walls<'py>(&self, py: Python<'py>) -> Bound<'py, PyArray1<i8>> {
-        let wall = |plant: &Plant| {
-            plant
-                .contact()
-                .map_or(0, |wall| if wall == Wall::Plus { 1 } else { -1 })
-        };
-        self.plants.iter().map(wall).collect::<Vec<i8>>().into_pyarray(py)
+        self.each(wall).into_pyarray(py)
     }
 
     /// Impacts, and the energy that they dissipated, J.
     fn totals<'py>(&self, py: Python<'py>) -> (Bound<'py, PyArray1<u64>>, Bound<'py, PyArray1<f64>>) {
-        let totals = || self.plants.iter().map(Plant::totals);
         (
-            totals().map(|one| one.impacts).collect::<Vec<_>>().into_pyarray(py),
-            totals().map(|one| one.dissipated).collect::<Vec<_>>().into_pyarray(py),
+            self.each(|plant| plant.totals().impacts).into_pyarray(py),
+            self.each(|plant| plant.totals().dissipated).into_pyarray(py),
         )
     }
 }

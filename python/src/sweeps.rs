@@ -1,7 +1,9 @@
 //! Sweeps.
 
 use std::{
+    error::Error,
     ffi::CString,
+    io,
     path::PathBuf,
     sync::atomic::{AtomicBool, Ordering::Relaxed},
 };
@@ -15,14 +17,15 @@ use vines_sweep::{Axis, Monitor, Plan, Results, Settings, Shard, StoreError, Val
 
 use crate::{
     scene::{Scene, invalid},
-    wait::wait,
+    wait::{own_threads, wait},
 };
 
-/// The values of an axis: first, last and number; a list; or an interval with the name of a design.
+/// The values of an axis: a word, first, last and number; an interval with the name of a design; a word and a list; or a list.
 #[derive(FromPyObject)]
 enum Given {
-    Grid(f64, f64, u64),
+    Grid(String, f64, f64, u64),
     Design(String, f64, f64),
+    Paired(String, Vec<f64>),
     List(Vec<f64>),
 }
 
@@ -32,8 +35,9 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
         .map(|(name, values)| {
             let name: String = name.extract()?;
             let values = match values.extract()? {
-                Given::Grid(from, to, points) => Values::Grid { from, to, points },
+                Given::Grid(_, from, to, points) => Values::Grid { from, to, points },
                 Given::List(list) => Values::List(list),
+                Given::Paired(_, list) => Values::Paired(list),
                 Given::Design(design, from, to) => match design.as_str() {
                     "random" => Values::Random([from, to]),
                     "sobol" => Values::Sobol([from, to]),
@@ -74,6 +78,18 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
     Plan::new(scene.family.clone(), settings).map_err(invalid)
 }
 
+/// An `OSError` with the number of the system's error, if it is one.
+fn system(error: &StoreError) -> PyErr {
+    let mut cause: Option<&dyn Error> = Some(error);
+    while let Some(one) = cause {
+        if let Some(number) = one.downcast_ref::<io::Error>().and_then(io::Error::raw_os_error) {
+            return PyOSError::new_err((number, error.to_string()));
+        }
+        cause = one.source();
+    }
+    PyOSError::new_err(error.to_string())
+}
+
 /// A checked sweep.
 #[pyclass(frozen)]
 pub struct Sweep(Plan);
@@ -97,6 +113,7 @@ impl Sweep {
 
     /// Estimated hours and bytes, and whether these must be confirmed.
     fn estimate(&self, py: Python<'_>) -> PyResult<(f64, f64, bool)> {
+        own_threads()?;
         let stop = AtomicBool::new(false);
         let cost = wait(py, &stop, |_| Ok(()), || estimate(&self.0, &stop))?.map_err(invalid)?;
         Ok((cost.hours, cost.bytes, cost.is_large()))
@@ -110,6 +127,7 @@ impl Sweep {
                 "shard ({number}, {of}): the number counts from 0 to {of} - 1"
             )));
         }
+        own_threads()?;
         let monitor = Monitor::default();
         let looked = |py: Python<'_>| match &look {
             Some(look) => {
@@ -122,7 +140,7 @@ impl Sweep {
             run(&self.0, &out, Shard { number, of }, &monitor)
         })?;
         result.map_err(|error| match error {
-            StoreError::Write { .. } => PyOSError::new_err(error.to_string()),
+            StoreError::Write { .. } => system(&error),
             _ => invalid(error),
         })?;
         looked(py)?;
@@ -132,4 +150,10 @@ impl Sweep {
         }
         Ok((monitor.computed.load(Relaxed), monitor.failed.load(Relaxed)))
     }
+}
+
+/// Names of the regimes, by their code.
+#[pyfunction]
+pub fn regimes() -> Vec<&'static str> {
+    vines_model::regime::Regime::SIMULATED.iter().map(|regime| regime.name()).collect()
 }

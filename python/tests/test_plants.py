@@ -1,14 +1,21 @@
 """Plants, batches, scenes and experiments: bits, errors, threads and signals."""
 
 import copy
+import multiprocessing
 import os
 import pickle
 import signal
+import subprocess
+import sys
 import threading
 import time
+from decimal import Decimal
+from fractions import Fraction
 
+import matplotlib
 import numpy as np
 import pytest
+import xarray
 from fmpy import extract, instantiate_fmu, read_model_description
 
 import vines
@@ -67,6 +74,194 @@ def test_a_batch_has_the_bits_of_its_plants_and_all_their_events():
     data = batch.to_xarray()
     assert data.q1.attrs["units"] == "m"
     assert events.to_xarray().velocity.attrs["units"] == "m/s"
+
+
+def test_the_attributes_of_a_plant_are_the_outputs_of_the_fmu():
+    path = vines.fmu("LoViNes")
+    folder, description = extract(path), read_model_description(path)
+    numbers = {one.name: one.valueReference for one in description.modelVariables}
+    fmu = instantiate_fmu(folder, description, "CoSimulation")
+    fmu.setupExperiment(startTime=0.0)
+    values = vines.Scene().settings["plant"] | {"der(q2)": 0.5, "E": DRIVE["amplitude"], "omega": DRIVE["omega"]}
+    fmu.setReal([numbers[name] for name in values], list(values.values()))
+    fmu.enterInitializationMode()
+    fmu.exitInitializationMode()
+    plant = vines.Plant(vines.Scene(), dq2=0.5)
+    names = {"q1": "q1", "der(q1)": "dq1", "q2": "q2", "der(q2)": "dq2", "v": "v", "w": "w", "phase": "phase"}
+    for n in range(500):
+        fmu.doStep(n * 2.0**-10, 2.0**-10)
+        plant.advance(2.0**-10, **DRIVE)
+        found = fmu.getReal([numbers[name] for name in names])
+        assert found == [getattr(plant, name) for name in names.values()]
+        assert abs(plant.base - DRIVE["amplitude"] * np.sin(plant.phase)) < 1e-18
+    fmu.terminate()
+    fmu.freeInstance()
+
+
+def test_a_state_that_is_set_is_that_of_a_start_and_a_refused_one_changes_nothing():
+    plant = vines.Plant()
+    plant.advance(1.0, **DRIVE)
+    start = {"q1": 0.001, "dq1": -0.02, "q2": -0.004, "dq2": 0.3}
+    plant.state = start
+    assert plant.state == start
+    assert plant.time == 1.0
+    plant.state = {"dq2": np.asarray(-0.3)}
+    assert plant.state == start | {"dq2": -0.3}
+    for wrong, parts in [
+        ({"q2": 0.02}, ["w = q1 - q2", "-b to b"]),
+        ({"q3": 0.0}, ["q3", "q1, dq1, q2, dq2"]),
+        ({"q1": np.nan}, ["q1", "NaN"]),
+    ]:
+        with pytest.raises(ValueError) as error:  # noqa: PT011
+            plant.state = wrong
+        assert all(part in str(error.value) for part in parts)
+        assert plant.state == start | {"dq2": -0.3}
+
+
+def test_a_trajectory_has_the_bits_of_its_steps_and_all_their_events():
+    one, other = vines.Plant(dq2=0.5), vines.Plant(dq2=0.5)
+    motion = one.trajectory(2.0, 512, **DRIVE)
+    times = []
+    for n in range(512):
+        times += other.advance(2.0 / 512, **DRIVE).time.tolist()
+        assert [motion.q1[n + 1], motion.dq2[n + 1], motion.base[n + 1]] == [
+            other.q1,
+            other.dq2,
+            pytest.approx(other.base, abs=1e-18),
+        ]
+    assert one == other
+    assert motion.events.time.tolist() == times
+    assert motion.to_xarray().q1.attrs["units"] == "m"
+    with pytest.raises(ValueError, match="steps = 0"):
+        one.trajectory(1.0, 0)
+    with pytest.raises(ValueError, match="omega"):
+        one.trajectory(1.0, 5, omega=np.nan)
+    assert one == other
+
+
+def memory():
+    return int(open("/proc/self/statm").read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
+def test_a_plant_of_a_batch_costs_less_than_1_kb():
+    before, n = memory(), 200_000
+    batch = vines.Batch(vines.Scene(), {"dq2": np.linspace(0.3, 0.6, n)})
+    for _ in range(2):
+        batch.advance(0.01, **DRIVE, events=False)
+    assert (memory() - before) / n < 1000
+
+
+ADVANCE_AND_SWEEP = """
+import multiprocessing, sys, vines
+def batch(n):
+    plants = vines.Batch(vines.Scene(), {"dq2": [0.3, 0.4]})
+    plants.advance(0.1, amplitude=9.2e-5, omega=54.9)
+    return plants.states.tolist()
+def sweep(n):
+    return vines.sweep(None, {"plant.r": [0.5, 0.6]}, out=f"{sys.argv[1]}/{n}", periods=200).sizes["plant.r"]
+def one(n):
+    plant = vines.Plant()
+    plant.advance(0.1)
+    return plant.q1
+works = [batch, sweep]
+for before in works:
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        if before is works[0]:
+            assert all(pool.apply(work, (10 + n,)) for n, work in enumerate(works))
+    before(0)
+    with multiprocessing.get_context("fork").Pool(1) as pool:
+        assert pool.apply(one, (0,)) == one(0)
+        for after in works:
+            try:
+                pool.apply(after, (20,))
+            except RuntimeError as error:
+                assert "was forked from process" in str(error) and 'get_context("spawn")' in str(error)
+            else:
+                raise AssertionError("no error")
+print("done")
+"""
+
+
+@pytest.mark.skipif("fork" not in multiprocessing.get_all_start_methods(), reason="this system cannot fork")
+def test_a_fork_after_use_is_refused_with_the_way_out_and_one_before_it_computes(tmp_path):
+    command = [sys.executable, "-W", "ignore", "-c", ADVANCE_AND_SWEEP, str(tmp_path)]
+    # Instead of an error it would wait for ever.
+    found = subprocess.run(command, capture_output=True, text=True, timeout=120)
+    assert found.stdout == "done\n", found.stderr
+
+
+NUMBERS = [
+    1.5,
+    np.asarray(1.5),
+    np.float32(1.5),
+    np.float16(1.5),
+    np.longdouble(1.5),
+    np.ma.array(1.5),
+    xarray.DataArray(1.5),
+    xarray.Variable((), 1.5),
+    xarray.DataArray([1.0, 1.5])[1],
+    Decimal("1.5"),
+    Fraction(3, 2),
+]
+
+
+@pytest.mark.parametrize("number", NUMBERS, ids=lambda one: type(one).__name__)
+def test_a_number_of_any_library_keeps_its_value_at_every_door(number):
+    assert vines.Scene(excitation={"G": number}).dimensionless["G"] == pytest.approx(1.5, rel=1e-12)
+    small = number / 1000 if not isinstance(number, Decimal) else number / Decimal(1000)
+    if type(number).__name__ not in ("float16", "float32"):
+        assert vines.Plant(q1=small).q1 == 0.0015
+        assert vines.Batch(vines.Scene(), {"q1": small}).states[0, 0] == 0.0015
+    for give in (
+        lambda value: vines.Plant(dq2=value),
+        lambda value: vines.Batch(vines.Scene(), {"dq2": [value, value]}),
+    ):
+        one, other = give(number), give(1.5)
+        for plants, value in ((one, number), (other, 1.5)):
+            plants.advance(value, amplitude=1e-4, omega=value)
+        assert np.array_equal(one.states, other.states)
+    assert vines.Scene().drive(sigma=number) == vines.Scene().drive(sigma=1.5)
+    assert vines.orbits(sigma=number) == vines.orbits(sigma=1.5)
+    assert vines.PhaseLock().sample(number, number) == vines.PhaseLock().sample(1.5, 1.5)
+    assert vines.linspace(number, 2, np.asarray(3)) == vines.linspace(1.5, 2.0, 3)
+
+
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        np.ma.masked,
+        np.ma.array(1.5, mask=True),
+        np.complex128(1.5),
+        np.asarray(1.5 + 0j),
+        np.datetime64("2026-01-01", "ns"),
+        np.array([1.5]),
+        "x",
+    ],
+    ids=repr,
+)
+def test_what_is_no_number_is_refused_at_every_door(wrong):
+    if not isinstance(wrong, str):
+        with pytest.raises(ValueError, match=r"excitation\.G"):
+            vines.Scene(excitation={"G": wrong})
+    for door in (
+        lambda: vines.Plant().advance(1.0, omega=wrong),
+        lambda: vines.Plant().advance(wrong),
+        lambda: vines.PhaseLock().sample(wrong),
+        lambda: vines.orbits(sigma=wrong),
+        lambda: vines.regime(sigma=wrong),
+        lambda: vines.Scene().drive(sigma=wrong),
+        lambda: vines.linspace(wrong, 2.0, 3),
+    ):
+        with pytest.raises((TypeError, ValueError)):
+            door()
+
+
+def test_masked_arrays_are_refused():
+    values = np.ma.masked_array([0.1, 0.2], [False, True])
+    for wrong in (values, [0.1, np.ma.masked]):
+        with pytest.raises(ValueError, match="masked"):
+            vines.Batch(vines.Scene(), {"dq2": wrong})
 
 
 def test_a_copy_continues_with_the_same_bits():
@@ -132,12 +327,17 @@ def test_plants_show_their_state():
         (lambda: vines.Plant().advance(1.0, amplitude=np.inf), ["E (amplitude", "inf", "m"]),
         (lambda: vines.Plant().advance(-1.0), ["-1"]),
         (lambda: vines.Batch(vines.Scene(), {"dq2": [0.1, 0.2], "q1": np.zeros(3)}), ["dq2 (2,)", "q1 (3,)"]),
-        (lambda: vines.Plant().advance([1.0, 2.0]), ["duration of shape (2,)"]),
         (lambda: vines.Batch({"M": 1.0}), ["k (N/m) is missing"]),
         (lambda: vines.Batch(vines.Scene(), {"dq2": [1j]}), ["dq2 of type complex128", "real numbers"]),
         (lambda: vines.Batch(vines.Scene(), {"dq2": "0.5"}), ["dq2 of type <U3", "real numbers"]),
         (lambda: vines.Batch(vines.Scene(), {"dq2": [None]}), ["dq2 of type object", "real numbers"]),
-        (lambda: vines.Plant().advance(1.0, omega=[True]), ["omega of type bool"]),
+        (
+            lambda: vines.Batch(vines.Scene(), {"dq2": [0.1, 0.2]}).advance([1.0, 2.0, 3.0]),
+            ["duration of shape (3,)", "2 numbers"],
+        ),
+        (lambda: vines.Batch(vines.Scene(), {"dq2": 0.1}).advance(1.0, omega=[True]), ["omega of type bool"]),
+        (lambda: vines.Scene().drive(sigma=-1e9), ["sigma = -1000000000", "above -118.9"]),
+        (lambda: vines.identify(results="decay"), ["results = 'decay'", "lock"]),
         (lambda: vines.Plant(dq2=[0.1, 0.2]), ["2 plants", "Batch"]),
         (lambda: vines.Plant(dq2=[]), ["0 plants"]),
         (lambda: vines.Scene(plant={"rr": 1}), ["plant.rr", "unknown field"]),
@@ -188,6 +388,55 @@ def test_what_is_no_scene_is_a_type_error_that_names_the_way(function):
         function({"plant": {"r": 0.7}})
 
 
+def test_a_lock_without_its_decay_is_that_of_the_whole_experiment():
+    whole, lock = vines.identify(), vines.identify(results="lock")
+    assert lock.lock["sigma"] == pytest.approx(whole.lock["sigma"], abs=1e-6)
+    assert lock.exact == whole.exact
+    assert len(lock.to_xarray().variables) == 0
+    assert lock != whole
+
+
+def test_results_compare_by_their_numbers_and_show_themselves_in_a_few_lines():
+    for compute in (
+        lambda: vines.theory(points=5),
+        lambda: vines.regime(sigma=-1.1, periods=1000),
+        lambda: vines.identify(results="lock"),
+        lambda: vines.Plant(dq2=0.5).trajectory(1.0, 10, **DRIVE),
+        lambda: vines.Plant(dq2=0.5).advance(1.0, **DRIVE),
+        lambda: vines.orbits()[0],
+        vines.Scene,
+        vines.Plant,
+        lambda: vines.Batch(vines.Scene(), {"dq2": [0.1, 0.2]}),
+    ):
+        one, other = compute(), compute()
+        assert one == other
+        assert one != "another type"
+        assert len(repr(one)) < 700
+        if isinstance(one, vines.results.Result):
+            assert one._repr_html_().startswith(f"<table><caption>{type(one).__name__}")
+    assert vines.theory(points=5) != vines.theory(points=6)
+    assert vines.Plant() != vines.Plant(dq2=0.1)
+    assert vines.Scene(plant={"r": 0.7}) != vines.Scene()
+
+
+def test_results_draw_themselves():
+    matplotlib.use("agg")
+    backbone = vines.backbone(vines.Scene(backbone={"C_from": 0.6, "C_to": 0.5, "points": 2}))
+    motion = vines.Plant(dq2=0.5).trajectory(1.0, 10, **DRIVE)
+    for one in (vines.theory(points=5), vines.identify(), vines.identify(results="lock"), backbone, motion):
+        assert one.plot().get_lines()
+    assert motion.events.plot().get_xlabel() == "time, s"
+
+
+def test_drives_are_converted_in_both_directions():
+    scene = vines.Scene()
+    n, drive = scene.dimensionless, scene.drive(sigma=-1.1)
+    assert drive["amplitude"] == pytest.approx(n["epsilon"] * 1.1 * n["b"], rel=1e-15)
+    assert drive["omega"] == pytest.approx(n["omega0"] * (1 - 1.1 * n["epsilon"]), rel=1e-15)
+    assert scene.detuning(**scene.drive(sigma=2.0, G=0.3)) == pytest.approx({"sigma": 2.0, "G": 0.3}, rel=1e-12)
+    assert scene.detuning(n["omega0"]) == {"sigma": 0.0}
+
+
 def test_after_an_error_no_plant_has_advanced():
     batch = vines.Batch(vines.Scene(), {"dq2": [0.1, 0.2]})
     with pytest.raises(ValueError, match="plant 1"):
@@ -233,6 +482,34 @@ def test_ctrl_c_ends_a_batch_within_02_s_and_no_plant_has_advanced():
     # All cores compute until the end, so that processor time tells it on a busy machine, too.
     assert time.process_time() - sent[0] < 0.2 * os.cpu_count()
     assert batch.times.max() == 0.0
+
+
+def interrupted(work, after=0.3):
+    """Seconds from Ctrl-C to the exception."""
+    sent = []
+
+    def interrupt():
+        sent.append(time.monotonic())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Timer(after, interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    return time.monotonic() - sent[0]
+
+
+@pytest.mark.parametrize("omega", [1e-9, 54.9, 1e6, 1e12])
+def test_ctrl_c_ends_plants_at_any_frequency(omega):
+    # Without damping, and with a particle that hits nothing: seconds without any event.
+    quiet = {"M": 3.8, "k": 11680.0, "c": 0.0, "m": 0.032, "b": 10.0, "r": 0.65}
+    drive = {"amplitude": 1e-3, "omega": omega}
+    plant, batch = vines.Plant(quiet), vines.Batch(quiet, {"q2": [0.0, 0.1]})
+    for one in (lambda: plant.advance(1e9, **drive), lambda: batch.advance(1e9, **drive, events=False)):
+        try:
+            # Leaves nothing but an interrupt that comes late.
+            print(interrupted(lambda: (one(), time.sleep(0.5))))
+        finally:
+            assert plant.time in (0.0, 1e9)
 
 
 @pytest.mark.parametrize("plants", [1, 2])

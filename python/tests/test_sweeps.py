@@ -1,5 +1,7 @@
 """Sweeps from Python: the bytes of `vines sweep`, interruptions, and a local cluster of Dask."""
 
+import errno
+import json
 import os
 import signal
 import subprocess
@@ -10,13 +12,14 @@ from pathlib import Path
 
 import dask
 import dask.threaded
+import numpy as np
 import pytest
 import xarray
 from dask.distributed import Client, LocalCluster
 
 import vines
 
-AXES = {"sigma": (-3.0, 3.0, 31), "start.dq2": (-0.6, 0.7, 40)}
+AXES = {"sigma": vines.linspace(-3.0, 3.0, 31), "start.dq2": vines.linspace(-0.6, 0.7, 40)}
 SETTINGS = {"periods": 200, "chunk": 40}
 
 
@@ -33,7 +36,7 @@ def whole(tmp_path_factory):
 
 def test_the_store_has_the_bytes_of_the_program(whole, tmp_path):
     program = os.environ["VINES"]
-    axes = [f"--axis={name}={first}:{last}:{number}" for name, (first, last, number) in AXES.items()]
+    axes = [f"--axis={name}={one.first}:{one.last}:{one.number}" for name, one in AXES.items()]
     out = tmp_path / "store"
     subprocess.run([program, "sweep", *axes, "--periods=200", "--chunk=40", f"--out={out}"], check=True)
     assert content(out) == whole
@@ -48,25 +51,75 @@ def test_designs_lists_and_results_become_a_dataset_with_units(tmp_path):
     assert cells["start.dq2"].attrs["units"] == "m/s"
     assert cells.impact_power.attrs["units"] == "W"
     assert (cells.failure == "").all()
-    assert cells.attrs["vines"]["scene"]["plant"]["M"] == 3.807
+    assert json.loads(cells.attrs["vines"])["scene"]["plant"]["M"] == 3.807
+
+
+def test_paired_samples_share_a_dimension_and_have_the_cells_of_the_program(tmp_path):
+    r, start = [0.5, 0.65, 0.5], np.array([0.3, 0.4, 0.5])
+    cells = vines.sweep(None, paired={"plant.r": r, "start.dq2": start}, out=tmp_path / "s", periods=200)
+    assert dict(cells.sizes) == {"sample": 3}
+    assert cells["plant.r"].values.tolist() == r
+    assert cells["start.dq2"].values.tolist() == start.tolist()
+    grid = vines.sweep(None, {"plant.r": [0.5, 0.65], "start.dq2": start}, out=tmp_path / "grid", periods=200)
+    for name in ("regime", "followed", "recurrence"):
+        expected = [grid[name].values[0, 0], grid[name].values[1, 1], grid[name].values[0, 2]]
+        assert np.array_equal(cells[name].values, expected, equal_nan=True)
+    axes = ["--axis=plant.r=paired:0.5,0.65,0.5", "--axis=start.dq2=paired:0.3,0.4,0.5"]
+    out = tmp_path / "program"
+    subprocess.run([os.environ["VINES"], "sweep", *axes, "--periods=200", f"--out={out}"], check=True)
+    assert content(out) == content(tmp_path / "s")
+
+
+@pytest.mark.parametrize(
+    ("axes", "paired", "parts"),
+    [
+        ({}, {"plant.r": [0.5, 0.6], "plant.b": [0.01, 0.02, 0.03]}, ["plant.r has 2", "plant.b has 3"]),
+        ({"plant.r": [0.5, 0.6]}, {"plant.r": [0.5, 0.6]}, ["plant.r", "give one of them"]),
+        ({}, {"plant.r": [0.5]}, ["one value"]),
+    ],
+)
+def test_paired_samples_that_do_not_belong_together_are_value_errors(axes, paired, parts, tmp_path):
+    with pytest.raises(ValueError) as error:  # noqa: PT011
+        vines.sweep(None, axes, paired=paired, out=tmp_path / "store")
+    for part in parts:
+        assert part in str(error.value)
+    assert not (tmp_path / "store").exists()
+
+
+def test_a_list_of_three_numbers_is_three_values(tmp_path):
+    for n, values in enumerate(([0.3, 0.6, 0.9], np.array([0.3, 0.6, 0.9]), xarray.DataArray([0.3, 0.6, 0.9]))):
+        cells = vines.sweep(None, {"plant.r": values}, out=tmp_path / str(n), periods=200)
+        assert cells["plant.r"].values.tolist() == [0.3, 0.6, 0.9]
+
+
+def test_codes_of_regimes_have_names_and_a_store_can_be_written_as_netcdf(tmp_path):
+    cells = vines.sweep(None, {"plant.r": [0.5, 0.65]}, out=tmp_path / "s", sigma=-1.1, periods=1000)
+    assert [vines.REGIMES[code] for code in cells.regime.values] == ["symmetric 1:1"] * 2
+    assert "_".join(vines.REGIMES).replace(" ", "_") == cells.regime.attrs["flag_meanings"].replace(" ", "_")
+    allowed = (str, int, float, np.number, np.ndarray, list)
+    for one in (cells, *cells.variables.values()):
+        assert all(isinstance(value, allowed) and not isinstance(value, bool) for value in one.attrs.values())
 
 
 @pytest.mark.parametrize(
     ("axes", "parts"),
     [
-        ({"plant.rr": (0.3, 0.5, 3)}, ["plant.rr", "unknown field"]),
-        ({"plant.r": (0.3, float("nan"), 3)}, ["plant.r", "NaN"]),
+        ({"plant.rr": vines.linspace(0.3, 0.5, 3)}, ["plant.rr", "unknown field"]),
+        ({"plant.r": vines.linspace(0.3, float("nan"), 3)}, ["plant.r", "NaN"]),
         ({"plant.r": [0.5]}, ["plant.r has one value", 'Scene(plant={"r": 0.5})']),
         ({"plant.r": 0.5}, ["plant.r = 0.5", "a list of numbers"]),
         ({"plant.r": ("normal", 0.3, 0.5)}, ["plant.r", "normal", "random and sobol"]),
         (
-            {"plant.r": (0.3, 1.0, 10**6), "sigma": (-5.0, 5.0, 10**6)},
+            {"plant.r": vines.linspace(0.3, 1.0, 10**6), "sigma": vines.linspace(-5.0, 5.0, 10**6)},
             ["1000000000000 cells", " h ", "GB", "confirm=True"],
         ),
         ({}, ["at least one axis"]),
-        ({"plant.r": (0.3, 0.9, 7.0)}, ["plant.r = (0.3, 0.9, 7.0)", "a whole number of at least 2"]),
-        ({"plant.r": (0.3, 0.9, -7)}, ["plant.r = (0.3, 0.9, -7)", "a whole number of at least 2"]),
-        ({"plant.r": (0.3, 0.9, True)}, ["one value"]),
+        # A range until now, three values for everyone else.
+        ({"plant.r": (0.3, 0.9, 7)}, ["plant.r = (0.3, 0.9, 7)", "vines.linspace", "a list"]),
+        ({"plant.r": (0.3, 0.9)}, ["plant.r = (0.3, 0.9)", "vines.linspace", "a list"]),
+        ({"plant.r": np.ma.masked_array([0.3, 0.5, 0.9], [0, 1, 0])}, ["masked"]),
+        ({"plant.r": [[0.3, 0.5]]}, ["plant.r = [[0.3, 0.5]]", "a list of numbers"]),
+        ({"plant.r": ["0.3", "0.5"]}, ["plant.r", "a list of numbers"]),
     ],
 )
 def test_bad_axes_are_value_errors_and_write_nothing(axes, parts, tmp_path):
@@ -103,8 +156,9 @@ def test_a_store_of_another_sweep_stays_and_a_folder_that_cannot_be_written_is_a
     with pytest.raises(ValueError, match="another `axes`"):
         vines.sweep(None, {"plant.r": [0.5, 0.7]}, out=out, periods=200)
     assert content(out) == before
-    with pytest.raises(OSError, match="/proc/store"):
+    with pytest.raises(OSError, match="/proc/store") as error:
         vines.sweep(None, {"plant.r": [0.5, 0.6]}, out="/proc/store", periods=200)
+    assert error.value.errno == errno.ENOENT
 
 
 def test_damaged_chunks_are_computed_again_with_a_warning(whole, tmp_path):
@@ -160,7 +214,7 @@ def test_ctrl_c_keeps_complete_chunks(tmp_path):
         os.kill(os.getpid(), signal.SIGINT)
 
     # Minutes of work: it is certainly interrupted.
-    axes = AXES | {"sigma": (-3.0, 3.0, 30_001)}
+    axes = AXES | {"sigma": vines.linspace(-3.0, 3.0, 30_001)}
     out = tmp_path / "store"
     with after_the_first_chunk(out, interrupt), pytest.raises(KeyboardInterrupt):
         vines.sweep(None, axes, out=out, **SETTINGS)
@@ -233,7 +287,7 @@ def test_after_the_scheduler_ends_another_one_goes_on(tmp_path):
 
 
 def test_an_adaptive_map_marks_what_it_infers(tmp_path):
-    axes = {"sigma": (-1.6, -0.9, 33), "excitation.G": (0.8, 1.3, 33)}
+    axes = {"sigma": vines.linspace(-1.6, -0.9, 33), "excitation.G": vines.linspace(0.8, 1.3, 33)}
     cells = vines.sweep(None, axes, out=tmp_path / "store", periods=200, adaptive=8)
     assert 0 < int(cells.inferred.sum()) < cells.regime.size
     with pytest.raises(ValueError, match="one process"):

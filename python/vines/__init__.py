@@ -12,12 +12,14 @@ from pathlib import Path as _Path
 from ._native import version as __version__
 from .experiments import Backbone, Identification, Orbit, Theory, backbone, identify, orbits, theory
 from .phaselock import Output, PhaseLock
-from .plants import Batch, Events, Plant
+from .plants import KINDS, Batch, Events, Plant, Trajectory
 from .regimes import Regime, regime
 from .scenes import Scene
-from .sweeps import sweep
+from .sweeps import REGIMES, Range, linspace, sweep
 
 __all__ = [
+    "KINDS",
+    "REGIMES",
     "Backbone",
     "Batch",
     "Events",
@@ -26,13 +28,16 @@ __all__ = [
     "Output",
     "PhaseLock",
     "Plant",
+    "Range",
     "Regime",
     "Scene",
     "Theory",
+    "Trajectory",
     "__version__",
     "backbone",
     "fmu",
     "identify",
+    "linspace",
     "orbits",
     "regime",
     "sweep",

@@ -2,13 +2,14 @@
 
 import json
 from dataclasses import asdict, dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from . import _native
 from .datasets import dataset
+from .results import Result, axes
 from .scenes import Scene, checked
 
 if TYPE_CHECKING:
@@ -37,8 +38,8 @@ def _dataset(table: Table, dimension: str, units: dict[str, str], **attributes: 
     return dataset(columns, {name: units.get(name, "1") for name in columns}, **attributes)
 
 
-@dataclass(frozen=True)
-class Identification:
+@dataclass(frozen=True, eq=False, repr=False)
+class Identification(Result):
     """What an experiment found; dimensionless throughout.
 
     Attributes
@@ -64,19 +65,31 @@ class Identification:
     rms_sigma_exact: float | None
     rms_steady_exact: float | None
 
+    def plot(self, ax: Any = None) -> Any:
+        """Draw C over sigma along the decay, and the lock, with matplotlib, and return the axes."""
+        ax = axes(ax)
+        if self.decay:
+            ax.plot(self.decay["sigma"], self.decay["C"], label="decay")
+        ax.plot(self.lock["sigma"], self.lock["C"], "o", label="lock")
+        ax.set(xlabel="detuning sigma", ylabel="amplitude C")
+        ax.legend()
+        return ax
+
     def to_xarray(self) -> "xarray.Dataset":
         """Return the decay as a dataset over the dimension `point`; the locked point is in its attributes."""
         lock = {f"lock_{name}": value for name, value in self.lock.items() if value is not None}
         return _dataset(self.decay, "point", {}, **lock)
 
 
-def identify(scene: Scene | None = None) -> Identification:
+def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "all") -> Identification:
     """Lock the plant at phase resonance, let it decay, and identify its backbone, as `vines identify` does.
 
     Parameters
     ----------
     scene : Scene, optional
         Default: the default scene.
+    results : {"all", "lock"}
+        "lock": the locked point only; the decay is neither simulated nor identified, and has no points.
 
     Returns
     -------
@@ -85,7 +98,7 @@ def identify(scene: Scene | None = None) -> Identification:
     Raises
     ------
     ValueError
-        A setting that the controller cannot work with.
+        A setting that the controller cannot work with; other results.
     RuntimeError
         No lock in the time allowed, or another regime than the symmetric 1:1 one.
 
@@ -95,7 +108,9 @@ def identify(scene: Scene | None = None) -> Identification:
     >>> round(found.lock["sigma"], 5), found.lock["regime"]
     (-1.13938, 'symmetric 1:1')
     """
-    found = json.loads(_native.identify(checked(scene)._native))
+    if results not in ("all", "lock"):
+        raise ValueError(f"results = {results!r}: 'all' and 'lock' are allowed")
+    found = json.loads(_native.identify(checked(scene)._native, results == "all"))
     return Identification(
         lock=found["lock"],
         exact=Orbit._of(found["exact"]) if found["exact"] else None,
@@ -104,8 +119,8 @@ def identify(scene: Scene | None = None) -> Identification:
     )
 
 
-@dataclass(frozen=True)
-class Backbone:
+@dataclass(frozen=True, eq=False, repr=False)
+class Backbone(Result):
     """A tracked backbone; dimensionless throughout.
 
     Attributes
@@ -119,6 +134,13 @@ class Backbone:
 
     points: Table
     periods: float
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw C over sigma with matplotlib, and return the axes."""
+        ax = axes(ax)
+        ax.plot(self.points["sigma"], self.points["C"], "o-")
+        ax.set(xlabel="detuning sigma", ylabel="amplitude C")
+        return ax
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the points as a dataset over the dimension `point`."""
@@ -159,8 +181,8 @@ def backbone(scene: Scene | None = None) -> Backbone:
     return Backbone(points=_table(points), periods=found["periods"])
 
 
-@dataclass(frozen=True)
-class Orbit:
+@dataclass(frozen=True, eq=False, repr=False)
+class Orbit(Result):
     """An exact symmetric 1:1 orbit; dimensionless.
 
     Attributes
@@ -225,8 +247,8 @@ def orbits(scene: Scene | None = None, sigma: float | None = None) -> list[Orbit
     return [Orbit._of(one) for one in found]
 
 
-@dataclass(frozen=True)
-class Theory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Theory(Result):
     """First-order theory; dimensionless.
 
     Attributes
@@ -244,6 +266,13 @@ class Theory:
     solutions: Table
     B_min: float
     C_min: float
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw C over sigma with matplotlib, and return the axes."""
+        ax = axes(ax)
+        ax.plot(self.backbone["sigma"], self.backbone["C"])
+        ax.set(xlabel="detuning sigma", ylabel="amplitude C")
+        return ax
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the backbone as a dataset over the dimension `point`."""

@@ -65,8 +65,7 @@ class PhaseLock:
     >>> output = lock.sample(0.0, 0.0)
     >>> for _ in range(20000):
     ...     events = plant.advance(lock.sample_time, amplitude=output.amplitude, omega=output.omega)
-    ...     state = plant.state
-    ...     output = lock.sample(state["q1"] + 0.032 / 3.807 * state["q2"])
+    ...     output = lock.sample(plant.v)
     >>> output.state
     'locked'
     """

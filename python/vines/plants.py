@@ -1,14 +1,17 @@
 """Plants: oscillator, particle and walls, advanced from event to event in closed form."""
 
+import operator
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, Self, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from . import _native
 from .datasets import dataset
+from .numbers import reals
+from .results import Result, axes
 from .scenes import Scene
 
 if TYPE_CHECKING:
@@ -17,13 +20,14 @@ if TYPE_CHECKING:
 _PARAMETERS = ("M", "k", "c", "m", "b", "r")
 _START = ("q1", "dq1", "q2", "dq2")
 _UNITS = {"M": "kg", "k": "N/m", "c": "N s/m", "m": "kg", "b": "m", "r": "1"}
+_STATE_UNITS = {"q1": "m", "dq1": "m/s", "q2": "m", "dq2": "m/s", "time": "s", "impacts": "1", "dissipated": "J"}
 
 #: Kinds of events, by their code.
 KINDS = ("impact", "stuck", "released")
 
 
-@dataclass(frozen=True)
-class Events:
+@dataclass(frozen=True, eq=False, repr=False)
+class Events(Result):
     """Events of one or more plants, plant by plant, each in the order of time.
 
     Attributes
@@ -48,6 +52,18 @@ class Events:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def __repr__(self) -> str:
+        counts = np.bincount(self.kind, minlength=len(KINDS))
+        texts = [f"{count} {kind}" for kind, count in zip(KINDS, counts, strict=True) if count]
+        return f"<Events {len(self)}: {', '.join(texts)}>" if texts else "<Events 0>"
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the relative velocity of the impacts over time with matplotlib, and return the axes."""
+        ax, impacts = axes(ax), self.kind == 0
+        ax.plot(self.time[impacts], self.velocity[impacts], ".")
+        ax.set(xlabel="time, s", ylabel="relative velocity before an impact, m/s")
+        return ax
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return a dataset over the dimension `event`, with units as attributes."""
@@ -81,22 +97,12 @@ class Batch:
     def __init__(
         self, parameters: Scene | Mapping[str, ArrayLike], starts: Mapping[str, ArrayLike] | None = None
     ) -> None:
-        first: dict[str, ArrayLike] = dict.fromkeys(_START, 0.0)
-        values: Mapping[str, ArrayLike]
-        if isinstance(parameters, Scene):
-            settings = parameters.settings
-            values, first = settings["plant"], settings["start"]
-        else:
-            values = parameters
-        given = dict(first) | dict(starts or {})
-        _check("parameters", values, _PARAMETERS)
-        _check("starts", given, _START)
-        given = {**values, **given}
-        columns = [_numbers(name, given[name]) for name in (*_PARAMETERS, *_START)]
+        columns = _values(parameters, starts)
         try:
             rows = np.stack(np.broadcast_arrays(*np.atleast_1d(*columns)), axis=-1)
         except ValueError:
-            shapes = ", ".join(f"{name} {np.shape(value)}" for name, value in given.items() if np.ndim(value))
+            names = zip((*_PARAMETERS, *_START), columns, strict=True)
+            shapes = ", ".join(f"{name} {value.shape}" for name, value in names if value.ndim)
             raise ValueError(f"arrays of different shapes: {shapes}; numbers and equal lengths are allowed") from None
         if rows.ndim != 2:
             raise ValueError(f"parameters and starts of shape {rows.shape[:-1]}: one-dimensional arrays are allowed")
@@ -104,6 +110,21 @@ class Batch:
 
     def __len__(self) -> int:
         return len(self._native)
+
+    @overload
+    def advance(
+        self, duration: ArrayLike, *, amplitude: ArrayLike = 0.0, omega: ArrayLike = 0.0, events: Literal[True] = True
+    ) -> Events: ...
+
+    @overload
+    def advance(
+        self, duration: ArrayLike, *, amplitude: ArrayLike = 0.0, omega: ArrayLike = 0.0, events: Literal[False]
+    ) -> None: ...
+
+    @overload
+    def advance(
+        self, duration: ArrayLike, *, amplitude: ArrayLike = 0.0, omega: ArrayLike = 0.0, events: bool
+    ) -> Events | None: ...
 
     def advance(
         self, duration: ArrayLike, *, amplitude: ArrayLike = 0.0, omega: ArrayLike = 0.0, events: bool = True
@@ -133,7 +154,7 @@ class Batch:
         """
 
         def array(name: str, given: ArrayLike) -> NDArray[np.float64]:
-            values = _numbers(name, given)
+            values = reals(name, given)
             if values.shape not in ((), (1,), (len(self),)):
                 raise ValueError(f"{name} of shape {values.shape}: a number or {len(self)} numbers are allowed")
             return np.ascontiguousarray(np.broadcast_to(values, (len(self),)))
@@ -156,6 +177,11 @@ class Batch:
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__} of {len(self)} plants>"
+
+    def __eq__(self, other: object) -> bool:
+        return self._native.save() == other._native.save() if isinstance(other, Batch) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
 
     @property
     def states(self) -> NDArray[np.float64]:
@@ -184,13 +210,63 @@ class Batch:
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the present states as a dataset over the dimension `plant`, with units as attributes."""
-        units = {"q1": "m", "dq1": "m/s", "q2": "m", "dq2": "m/s", "time": "s", "impacts": "1", "dissipated": "J"}
         columns = [*self.states.T, self.times, *self._native.totals()]
-        return dataset({name: ("plant", values) for name, values in zip(units, columns, strict=True)}, units)
+        named = zip(_STATE_UNITS, columns, strict=True)
+        return dataset({name: ("plant", values) for name, values in named}, _STATE_UNITS)
 
 
-class Plant(Batch):
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Result):
+    """The motion of a plant at equal distances of time.
+
+    Attributes
+    ----------
+    time : ndarray of float64, shape (n + 1,)
+        Time since the plant's start, s.
+    q1, q2, dq1, dq2 : ndarray of float64, shape (n + 1,)
+        Displacements, m, and velocities, m/s.
+    base : ndarray of float64, shape (n + 1,)
+        Displacement of the base, m.
+    events : Events
+        All events.
+    """
+
+    time: NDArray[np.float64]
+    q1: NDArray[np.float64]
+    dq1: NDArray[np.float64]
+    q2: NDArray[np.float64]
+    dq2: NDArray[np.float64]
+    base: NDArray[np.float64]
+    events: Events
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return a dataset over the dimension `time`, with units as attributes."""
+        units = {"time": "s", "q1": "m", "dq1": "m/s", "q2": "m", "dq2": "m/s", "base": "m"}
+        return dataset({name: ("time", getattr(self, name)) for name in units}, units)
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the displacements over time with matplotlib, into `ax` or new axes, and return these."""
+        ax = axes(ax)
+        for name in ("q1", "q2"):
+            ax.plot(self.time, getattr(self, name), label=name)
+        ax.set(xlabel="time, s", ylabel="displacement, m")
+        ax.legend()
+        return ax
+
+
+class Plant(_native.Plant):
     """One plant.
+
+    A step of a sample loop takes about a microsecond. All that the plant shows is read at once:
+
+    - `q1`, `q2` (m), `dq1`, `dq2` (m/s): displacements and velocities of the primary mass and of the particle;
+    - `v` = q1 + epsilon q2 (m), `w` = q1 - q2 (m) and its velocity `dw` (m/s);
+    - `base` (m) and `phase` (rad): displacement of the base, and phase of its oscillator;
+    - `time` (s), `impacts`, `dissipated` (J): since the start; `wall`: 1 or -1 if the particle is stuck to the wall at
+      w = b or -b, otherwise 0.
 
     Parameters
     ----------
@@ -207,61 +283,152 @@ class Plant(Batch):
     Examples
     --------
     >>> plant = Plant(Scene(), dq2=0.5)
-    >>> events = plant.advance(2.0, amplitude=9.2e-5, omega=54.9)
-    >>> plant.impacts == int(sum(events.kind == 0))
+    >>> for _ in range(200):
+    ...     events = plant.advance(0.01, amplitude=9.2e-5, omega=54.9)
+    ...     response = plant.v
+    >>> plant.impacts > 20
     True
     >>> sorted(plant.state)
     ['dq1', 'dq2', 'q1', 'q2']
     """
 
-    def __init__(self, parameters: Scene | Mapping[str, float] | None = None, **start: float) -> None:
-        super().__init__(Scene() if parameters is None else parameters, start)
-        if len(self) != 1:
-            raise ValueError(f"values for {len(self)} plants: one is allowed here; Batch has more")
+    __slots__ = ()
+
+    def __new__(cls, parameters: Scene | Mapping[str, float] | None = None, **start: float) -> Self:
+        values = _values(Scene() if parameters is None else parameters, start)
+        sizes = [np.size(value) for value in values if np.ndim(value)]
+        if sizes and np.broadcast_shapes(*(np.shape(value) for value in values)) != (1,):
+            raise ValueError(
+                f"values for {max(sizes) if min(sizes) else 0} plants: one is allowed here; Batch has more"
+            )
+        numbers = [float(value.item()) for value in values]
+        return super().__new__(cls, numbers[:6], numbers[6:])
 
     def __repr__(self) -> str:
         state = ", ".join(f"{name} = {value:.6g}" for name, value in self.state.items())
         return f"<Plant at {self.time:.6g} s: {state}>"
 
-    def advance(  # type: ignore[override]
-        self, duration: float, *, amplitude: float = 0.0, omega: float = 0.0
-    ) -> Events:
-        """Advance the plant; see `Batch.advance`."""
-        events = super().advance(duration, amplitude=amplitude, omega=omega)
-        assert events is not None
-        return events
+    def __eq__(self, other: object) -> bool:
+        return self._save() == other._save() if isinstance(other, Plant) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
+    def advance(self, duration: float, *, amplitude: float = 0.0, omega: float = 0.0) -> Events:
+        """Advance the plant; the base moves as e = E sin(phase + omega t), and its phase continues from call to call.
+
+        Parameters
+        ----------
+        duration : float
+            Duration, s.
+        amplitude : float
+            Amplitude E of the base displacement, m.
+        omega : float
+            Angular frequency, rad/s.
+
+        Returns
+        -------
+        Events
+            The events.
+
+        Raises
+        ------
+        ValueError
+            A value that is not allowed. The plant is not advanced then.
+        """
+        found = self._advance(duration, amplitude, omega)
+        return _NO_EVENTS if found is None else Events(*found)
+
+    def trajectory(self, duration: float, steps: int, *, amplitude: float = 0.0, omega: float = 0.0) -> Trajectory:
+        """Advance the plant in equal steps, and return its motion: the bits of so many calls of `advance`.
+
+        Parameters
+        ----------
+        duration : float
+            Duration of all steps, s.
+        steps : int
+            Number of steps, 1 to 10^9.
+        amplitude, omega : float
+            As of `advance`.
+
+        Returns
+        -------
+        Trajectory
+            The motion at the start and after every step, and all events.
+
+        Raises
+        ------
+        ValueError
+            A value that is not allowed. The plant is not advanced then.
+
+        Examples
+        --------
+        >>> motion = Plant(Scene(), dq2=0.5).trajectory(1.0, 500, amplitude=9.2e-5, omega=54.9)
+        >>> motion
+        <Trajectory time = 501 values, q1 = 501 values, ..., events = <Events 19: 19 impact>>
+        """
+        if not 1 <= operator.index(steps) <= 10**9:
+            raise ValueError(f"steps = {steps}: a whole number from 1 to 10^9 is allowed")
+        rows, found = self._trajectory(duration, steps, amplitude, omega)
+        time, q1, dq1, q2, dq2, base = np.ascontiguousarray(rows.T)
+        return Trajectory(time, q1, dq1, q2, dq2, base, Events(*found))
+
+    def copy(self) -> Self:
+        """Return a copy that continues with the same bits."""
+        other = type(self)(_ANY)
+        other._restore(self._save())
+        return other
+
+    def __getstate__(self) -> bytes:
+        return self._save()
+
+    def __setstate__(self, saved: bytes) -> None:
+        self._restore(saved)
 
     @property
     def state(self) -> dict[str, float]:
-        """q1, q2 (m), dq1 and dq2 (m/s)."""
-        return dict(zip(_START, self.states[0].tolist(), strict=True))
+        """q1, q2 (m), dq1 and dq2 (m/s). What is assigned to it may be a part; base, time and totals stay."""
+        return {"q1": self.q1, "dq1": self.dq1, "q2": self.q2, "dq2": self.dq2}
 
-    @property
-    def impacts(self) -> int:  # type: ignore[override]
-        """Impacts since the start."""
-        return int(super().impacts[0])
+    @state.setter
+    def state(self, values: Mapping[str, float]) -> None:
+        merged = self.state | dict(values)
+        _check("state", merged, _START)
+        self._set_state([merged[name] for name in _START])
 
-    @property
-    def dissipated(self) -> float:  # type: ignore[override]
-        """Energy dissipated by impacts since the start, J."""
-        return float(super().dissipated[0])
-
-    @property
-    def time(self) -> float:
-        """Time since the start, s."""
-        return float(self.times[0])
-
-    @property
-    def wall(self) -> int:
-        """Wall that the particle is stuck to: 1 at w = b, -1 at w = -b, 0 if it is free."""
-        return int(self.walls[0])
+    def to_xarray(self) -> "xarray.Dataset":
+        """Return the present state as a dataset without dimensions, with units as attributes."""
+        values = self.state | {"time": self.time, "impacts": self.impacts, "dissipated": self.dissipated}
+        return dataset({name: ((), value) for name, value in values.items()}, _STATE_UNITS)
 
 
-def _numbers(name: str, given: ArrayLike) -> NDArray[np.float64]:
-    values = np.asarray(given)
-    if values.dtype.kind not in "fiu":
-        raise ValueError(f"{name} of type {values.dtype}: real numbers are allowed")
-    return values.astype(np.float64, copy=False)
+#: What a step without events returns.
+_NO_EVENTS = Events(
+    plant=np.empty(0, np.uint64),
+    time=np.empty(0),
+    kind=np.empty(0, np.uint8),
+    wall=np.empty(0, np.int8),
+    velocity=np.empty(0),
+)
+#: Parameters of a plant that is about to become another one.
+_ANY = dict.fromkeys(_PARAMETERS, 1.0)
+
+
+def _values(
+    parameters: Scene | Mapping[str, ArrayLike], starts: Mapping[str, ArrayLike] | None
+) -> list[NDArray[np.float64]]:
+    """Return parameters and starts, checked, in the order of `_PARAMETERS` and `_START`."""
+    first: dict[str, ArrayLike] = dict.fromkeys(_START, 0.0)
+    values: Mapping[str, ArrayLike] = {}
+    if isinstance(parameters, Scene):
+        settings = parameters.settings
+        values, first = settings["plant"], settings["start"]
+    else:
+        values = parameters
+    given = dict(first) | dict(starts or {})
+    _check("parameters", values, _PARAMETERS)
+    _check("starts", given, _START)
+    given = {**values, **given}
+    return [reals(name, given[name]) for name in (*_PARAMETERS, *_START)]
 
 
 def _check(what: str, given: Mapping[str, Any], names: tuple[str, ...]) -> None:

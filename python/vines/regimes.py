@@ -6,14 +6,15 @@ from typing import TYPE_CHECKING
 
 from . import _native
 from .datasets import dataset
+from .results import Result
 from .scenes import Scene, checked
 
 if TYPE_CHECKING:
     import xarray
 
 
-@dataclass(frozen=True)
-class Regime:
+@dataclass(frozen=True, eq=False, repr=False)
+class Regime(Result):
     """The regime at one detuning, as `vines map` decides it; docs/regimes.md has the rules.
 
     Attributes

@@ -2,11 +2,13 @@
 
 import json
 from collections.abc import Mapping
+from numbers import Integral
 from os import PathLike
 from pathlib import Path
 from typing import Any
 
 from . import _native
+from .numbers import real, scalar
 
 
 class Scene:
@@ -53,6 +55,11 @@ class Scene:
     def __reduce__(self) -> tuple[Any, ...]:
         return _restored, self._arguments
 
+    def __eq__(self, other: object) -> bool:
+        return self.settings == other.settings if isinstance(other, Scene) else NotImplemented
+
+    __hash__ = None  # type: ignore[assignment]
+
     def __repr__(self) -> str:
         numbers = ", ".join(f"{key} = {value:.6g}" for key, value in self.dimensionless.items())
         return f"<Scene {numbers}>"
@@ -74,6 +81,65 @@ class Scene:
         numbers = json.loads(self._native.dimensionless())
         return {key: value for key, value in numbers.items() if isinstance(value, float)}
 
+    def drive(self, sigma: float = 0.0, G: float | None = None) -> dict[str, float]:
+        """Return the drive in SI units: what `Plant.advance` and `Batch.advance` take.
+
+        Parameters
+        ----------
+        sigma : float
+            Detuning: omega = omega0 (1 + epsilon sigma).
+        G : float, optional
+            Dimensionless amplitude: E = epsilon G b. Without it: that of the scene.
+
+        Returns
+        -------
+        dict of str to float
+            amplitude E (m) and omega (rad/s).
+
+        Raises
+        ------
+        ValueError
+            A detuning that is so low that the frequency is not above 0.
+
+        Examples
+        --------
+        >>> plant = Plant(Scene())
+        >>> events = plant.advance(1.0, **Scene().drive(sigma=-1.1, G=1.2))
+        """
+        n, sigma = self.dimensionless, real(sigma)
+        omega = n["omega0"] * (1.0 + n["epsilon"] * sigma)
+        if not omega > 0.0:
+            raise ValueError(
+                f"sigma = {sigma} (dimensionless): a number above {-1.0 / n['epsilon']:.6g} is allowed, "
+                "so that the frequency is above 0"
+            )
+        return {"amplitude": n["epsilon"] * (n["G"] if G is None else real(G)) * n["b"], "omega": omega}
+
+    def detuning(self, omega: float, amplitude: float | None = None) -> dict[str, float]:
+        """Return sigma and, with an amplitude, G: the inverse of `drive`.
+
+        Parameters
+        ----------
+        omega : float
+            Angular frequency, rad/s.
+        amplitude : float, optional
+            Amplitude E of the base displacement, m.
+
+        Returns
+        -------
+        dict of str to float
+            sigma and G.
+
+        Examples
+        --------
+        >>> found = Scene().detuning(**Scene().drive(sigma=-1.1, G=1.2))
+        >>> round(found["sigma"], 9), round(found["G"], 9)
+        (-1.1, 1.2)
+        """
+        n = self.dimensionless
+        found = {"sigma": (real(omega) / n["omega0"] - 1.0) / n["epsilon"]}
+        return found if amplitude is None else found | {"G": real(amplitude) / (n["epsilon"] * n["b"])}
+
 
 def checked(scene: Scene | None) -> Scene:
     """Return the scene; without one, the default scene."""
@@ -89,18 +155,19 @@ def _overrides(sections: Mapping[str, Mapping[str, Any]]) -> list[str]:
     for section, keys in sections.items():
         if not isinstance(keys, Mapping):
             raise TypeError(f"{section} = {keys!r}: a section is a mapping, for instance plant={{'r': 0.7}}")
-        for key, value in keys.items():
-            if value is None or (hasattr(value, "ndim") and value.ndim > 0):
-                raise ValueError(f"{section}.{key} = {value!r}: a number, a text or a Boolean is allowed")
-            texts.append(f"{section}.{key} = {_toml(value)}")
+        texts += [f"{section}.{key} = {_toml(f'{section}.{key}', value)}" for key, value in keys.items()]
     return texts
 
 
-def _toml(value: Any) -> str:
-    if isinstance(value, bool) or not hasattr(value, "__float__"):
-        return json.dumps(value)
-    # NumPy's numbers too.
-    return repr(int(value)) if hasattr(value, "__index__") else repr(float(value))
+def _toml(name: str, given: Any) -> str:
+    try:
+        value = scalar(given)
+        if isinstance(value, (bool, int, str)):
+            return json.dumps(value)
+        return repr(int(value)) if isinstance(value, Integral) else repr(real(value))
+    except (TypeError, ValueError) as error:
+        why = f" ({error})" if "masked" in str(error) else ""
+        raise ValueError(f"{name} = {given!r}: a number, a text or a Boolean is allowed{why}") from None
 
 
 def _restored(text: str | None, origin: str, overrides: list[str]) -> Scene:

@@ -1,26 +1,77 @@
 """Sweeps over any numbers of a scene and of its start."""
 
+import errno
+import operator
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import nullcontext
+from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
+
+from numpy.typing import NDArray
 
 from . import _native
+from .datasets import opened
+from .numbers import real, reals, scalar
 from .scenes import Scene, checked
 
 if TYPE_CHECKING:
     import xarray
 
-#: Values of an axis: first, last and number of values; a list; or ("random" or "sobol", first, last).
-Values = tuple[float, float, int] | Sequence[float] | tuple[str, float, float]
+
+@dataclass(frozen=True)
+class Range:
+    """Values of an axis at equal distances, as `linspace` makes them."""
+
+    first: float
+    last: float
+    number: int
+
+
+def linspace(first: float, last: float, number: int) -> Range:
+    """Return the values of an axis at equal distances; the store keeps first, last and number instead of all values.
+
+    Parameters
+    ----------
+    first, last : float
+        First and last value; the first is below the last.
+    number : int
+        Number of values, at least 2.
+
+    Returns
+    -------
+    Range
+
+    Raises
+    ------
+    ValueError
+        A number of values that is not allowed.
+
+    Examples
+    --------
+    >>> linspace(0.3, 0.9, 7)
+    Range(first=0.3, last=0.9, number=7)
+    """
+    count = scalar(number)
+    if isinstance(count, bool) or not hasattr(count, "__index__") or count < 2:
+        raise ValueError(f"number of values = {number!r}: a whole number of at least 2 is allowed")
+    return Range(real(first), real(last), operator.index(count))
+
+
+#: Values of an axis: a `linspace`, a list or an array, or ("random" or "sobol", first, last).
+Values: TypeAlias = "Range | Sequence[float] | NDArray[Any] | tuple[str, float, float]"
+
+#: Names of the regimes, by their code in a store.
+REGIMES: tuple[str, ...] = tuple(_native.regimes())
 
 
 def sweep(
     scene: Scene | None,
-    axes: Mapping[str, Values],
+    axes: Mapping[str, Values] | None = None,
     *,
     out: str | PathLike[str],
+    paired: Mapping[str, Sequence[float] | NDArray[Any]] | None = None,
     sigma: float | None = None,
     samples: int | None = None,
     seed: int = 0,
@@ -41,11 +92,14 @@ def sweep(
     ----------
     scene : Scene or None
         None: the default scene.
-    axes : mapping of str to values
-        By name, `"sigma"` or `"section.key"` of a scene: a tuple (first, last, number), a list, or a tuple
-        ("random" or "sobol", first, last).
+    axes : mapping of str to values, optional
+        By name, `"sigma"` or `"section.key"` of a scene: a list or an array, `linspace(first, last, number)`, or a
+        tuple ("random" or "sobol", first, last).
     out : path-like
         Folder of the store.
+    paired : mapping of str to sequence of float, optional
+        Samples of your own: by the same names, one value per sample each, all of the same length. They share the
+        dimension `sample`.
     sigma : float, optional
         Detuning, if it is not an axis. Without it: that of the scene's stable phase-resonant orbit, or 0.
     samples : int, optional
@@ -72,7 +126,8 @@ def sweep(
     Returns
     -------
     xarray.Dataset
-        The store, opened lazily, with units as attributes.
+        The store, opened lazily, with units as attributes. `regime` is a code, an index into `vines.REGIMES`; 255 is
+        a cell without one. Mappings among its attributes are JSON texts, so that it can be written as netCDF.
 
     Raises
     ------
@@ -86,15 +141,14 @@ def sweep(
 
     Examples
     --------
-    >>> cells = sweep(None, {"sigma": (-2, 0, 5), "plant.r": [0.5, 0.65]}, out=folder / "r.zarr", periods=400)
+    >>> axes = {"sigma": linspace(-2, 0, 5), "plant.r": [0.5, 0.65]}
+    >>> cells = sweep(None, axes, out=folder / "r.zarr", periods=400)
     >>> dict(cells.sizes), cells.settling.attrs["units"]
     ({'sigma': 5, 'plant.r': 2}, '1')
     """
-    import xarray
-
     scene = checked(scene)
     settings = {
-        "sigma": sigma,
+        "sigma": None if sigma is None else real(sigma),
         "samples": samples,
         "seed": seed,
         "periods": periods,
@@ -104,10 +158,14 @@ def sweep(
     }
     if adaptive is not None and client is not None:
         raise ValueError("an adaptive sweep runs in one process: leave out adaptive or client")
-    axes = {name: _values(name, values) for name, values in axes.items()}
+    given: dict[str, Any] = {name: _values(name, values) for name, values in (axes or {}).items()}
+    for name, values in (paired or {}).items():
+        if name in given:
+            raise ValueError(f"{name} is in axes and in paired: give one of them")
+        given[name] = ("paired", _list(name, values))
     # Workers may have another working directory.
     folder = str(Path(out).absolute())
-    plan = _native.Sweep(scene._native, axes, settings)
+    plan = _native.Sweep(scene._native, given, settings)
     cells = plan.cells
     hours, size, large = plan.estimate()
     if large and not confirm:
@@ -119,26 +177,38 @@ def sweep(
         if client is not None:
             # A part without chunks: it makes the store, so that workers can tell whether they see it.
             plan.run(folder, (plan.chunks, plan.chunks + 1), None)
-            _distributed(client, (scene, axes, settings, folder), plan.chunks, cells, bar)
+            _distributed(client, (scene, given, settings, folder), plan.chunks, cells, bar)
         look = None if bar is None or client is not None else lambda complete: bar.update(complete - bar.n)
         # After workers nothing is left to compute; this removes what a killed one has left.
         plan.run(folder, (0, 1), look)
-    opened: xarray.Dataset = xarray.open_zarr(out)
-    return opened
+    return opened(out)
 
 
-def _values(name: str, values: Values) -> Values:
-    if isinstance(values, tuple) and len(values) == 3:
-        number: Any = values[2]
-        if not isinstance(values[0], str) and (not hasattr(number, "__index__") or number < 0):
-            raise ValueError(f"{name} = {values!r}: the third is a number of values, a whole number of at least 2")
-        return values
-    try:
-        return [float(value) for value in values]
-    except (TypeError, ValueError):
+def _values(name: str, values: Any) -> Any:
+    if isinstance(values, Range):
+        return ("grid", values.first, values.last, values.number)
+    if isinstance(values, tuple):
+        if len(values) == 3 and isinstance(values[0], str):
+            return (values[0], real(values[1]), real(values[2]))
         raise ValueError(
-            f"{name} = {values!r}: a list of numbers, (first, last, number) or (sequence, first, last) is allowed"
-        ) from None
+            f"{name} = {values!r}: a tuple could be a range or three values; a range is vines.linspace(first, last, number), "
+            "values are a list"
+        )
+    return _list(name, values)
+
+
+def _list(name: str, values: Any) -> list[float]:
+    try:
+        numbers = reals(name, values)
+    except ValueError as error:
+        raise ValueError(f"{error}: {_ALLOWED}") from None
+    if numbers.ndim != 1:
+        raise ValueError(f"{name} = {values!r}: {_ALLOWED}")
+    listed: list[float] = numbers.tolist()
+    return listed
+
+
+_ALLOWED = "a list of numbers, linspace(first, last, number) or (sequence, first, last) is allowed"
 
 
 def _bar(cells: int, progress: bool) -> Any:
@@ -153,7 +223,7 @@ def _chunk(part: int, chunks: int, scene: Scene, axes: Any, settings: Any, out: 
     """Compute one chunk in a worker; only the number of its cells returns."""
     if not Path(out, "zarr.json").is_file():
         raise FileNotFoundError(
-            f"{out}: this worker does not see the store; name a folder that client and all workers see"
+            errno.ENOENT, f"{out}: this worker does not see the store; name a folder that client and all workers see"
         )
     return _native.Sweep(scene._native, axes, settings).run(out, (part, chunks), None)[0]
 

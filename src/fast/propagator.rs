@@ -41,11 +41,6 @@ impl Increment {
 
 /// The closed form at time `t`; what follows from that is computed when it is needed. By default it is that over no time.
 #[derive(Clone, Copy, Debug, Default)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(from = "f64", into = "f64")
-)]
 pub(super) struct Propagator {
     /// The key: time, s.
     pub t: f64,
@@ -58,18 +53,6 @@ pub(super) struct Propagator {
     response: Response,
     /// `omega t` from -2π to 2π.
     pub angle: Sum,
-}
-
-impl From<Propagator> for f64 {
-    fn from(propagator: Propagator) -> Self {
-        propagator.t
-    }
-}
-
-impl From<f64> for Propagator {
-    fn from(t: f64) -> Self {
-        Self { t, omega: f64::NAN, ..Self::default() }
-    }
 }
 
 /// The product of two complex numbers.

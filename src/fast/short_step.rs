@@ -20,11 +20,6 @@ const MOMENTS: usize = 5;
 
 /// The propagator of one step length; what follows from that is computed when it is needed.
 #[derive(Clone, Copy, Debug)]
-#[cfg_attr(
-    feature = "serde",
-    derive(serde::Serialize, serde::Deserialize),
-    serde(from = "f64", into = "f64")
-)]
 #[repr(C, align(16))]
 pub(super) struct ShortStep {
     /// What the free motion adds: the sum of both.
@@ -53,12 +48,6 @@ pub(super) struct Response {
     /// Displacement and velocity that a base displacement adds, and a base velocity.
     displacement: (f64, f64),
     slope: (f64, f64),
-}
-
-impl From<ShortStep> for f64 {
-    fn from(step: ShortStep) -> Self {
-        step.t
-    }
 }
 
 impl From<f64> for ShortStep {

@@ -1,5 +1,6 @@
 //! Tests of `plant`.
 
+use crate::plant::Saved;
 use crate::{Drive, Parameters, Plant, State};
 
 #[test]
@@ -31,4 +32,51 @@ fn a_plant_saved_and_restored_at_any_step_goes_on_with_the_same_bits() {
         assert!(plant.totals().impacts > 10);
         assert_eq!(plant.totals(), other.totals());
     }
+}
+
+#[test]
+fn plants_that_take_turns_in_one_workspace_have_the_bits_of_plants_of_their_own() {
+    let start = State { q1: -0.42, dq1: 0.01, q2: -0.99, dq2: -0.86 };
+    let mut plants: Vec<Plant> = (0..12)
+        .map(|n| {
+            let parameters = Parameters::dimensionless(0.0084, 1.43 + f64::from(n / 4), 0.5 + 0.04 * f64::from(n));
+            Plant::new(parameters, start).unwrap()
+        })
+        .collect();
+    let mut saved: Vec<Saved> = plants.iter().map(Plant::save).collect();
+    let mut workspace = plants[0];
+    for step in 0..400 {
+        let duration = [0.063, 0.063, 0.063, 6.3, 1.7][step % 5];
+        for (n, (plant, saved)) in plants.iter_mut().zip(&mut saved).enumerate() {
+            let drive = Drive::harmonic(
+                0.0084 * (1.0 + 0.2 * n as f64),
+                0.99 + 0.03 * (step / 50 * (n % 3)) as f64,
+            );
+            workspace.restore(saved);
+            assert_eq!(plant.advance(drive, duration), workspace.advance(drive, duration));
+            *saved = workspace.save();
+            assert_eq!(plant.state(), workspace.state(), "plant {n}, step {step}");
+        }
+    }
+    assert!(plants.iter().all(|plant| plant.totals().impacts > 10));
+    assert!(size_of::<Saved>() <= 448, "{}", size_of::<Saved>());
+}
+
+#[test]
+fn a_state_that_was_set_has_the_bits_of_a_start_from_it() {
+    let drive = Drive::held(0.0);
+    let start = State { q1: 0.3, dq1: -0.4, q2: -0.7, dq2: 0.2 };
+    let parameters = Parameters::dimensionless(0.0084, 1.43, 0.65);
+    let mut plant = Plant::new(parameters, State { dq2: 0.5, ..State::default() }).unwrap();
+    for step in [0.063, 6.3, 100.0] {
+        plant.advance(drive, 50.0).unwrap();
+        plant.set_state(start).unwrap();
+        let mut other = Plant::new(parameters, start).unwrap();
+        plant.advance(drive, step).unwrap();
+        other.advance(drive, step).unwrap();
+        assert_eq!(plant.state(), other.state());
+    }
+    let before = plant.state();
+    assert!(plant.set_state(State { q1: 3.0, ..State::default() }).is_err());
+    assert_eq!(plant.state(), before);
 }

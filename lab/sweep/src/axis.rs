@@ -30,6 +30,8 @@ pub enum Values {
     },
     /// As listed.
     List(Vec<f64>),
+    /// As listed, one per sample: all such axes of a sweep belong together.
+    Paired(Vec<f64>),
     /// Independent random numbers from an interval, one per sample.
     Random([f64; 2]),
     /// A low-discrepancy sequence in an interval, one number per sample.
@@ -37,7 +39,7 @@ pub enum Values {
 }
 
 /// A number of the scene, or [`SIGMA`], with the values it takes. Parse it from `plant.r=0.3:1:71` (first : last : how many),
-/// `plant.r=0.3,0.5,0.8`, `start.dq2=random:-1:1` or `start.dq2=sobol:-1:1`.
+/// `plant.r=0.3,0.5,0.8`, `plant.r=paired:0.3,0.5,0.5`, `start.dq2=random:-1:1` or `start.dq2=sobol:-1:1`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// `section.key` of a scene, or `sigma`.
@@ -73,6 +75,10 @@ impl Axis {
                     return Err(format!("{name} has the value {} twice", pair[0]).into());
                 }
             }
+            Values::Paired(list) => {
+                list.iter().copied().try_for_each(finite)?;
+                few(name, list.len() as u64, list.first().copied().unwrap_or(f64::NAN))?;
+            }
             Values::Random([from, to]) | Values::Sobol([from, to]) => {
                 [*from, *to].into_iter().try_for_each(finite)?;
                 if from >= to {
@@ -89,7 +95,15 @@ impl Axis {
         match &self.values {
             Values::Grid { points, .. } => Some(*points),
             Values::List(list) => Some(list.len() as u64),
-            Values::Random(_) | Values::Sobol(_) => None,
+            Values::Paired(_) | Values::Random(_) | Values::Sobol(_) => None,
+        }
+    }
+
+    /// Number of values if they are listed sample by sample.
+    pub(crate) fn paired(&self) -> Option<u64> {
+        match &self.values {
+            Values::Paired(list) => Some(list.len() as u64),
+            _ => None,
         }
     }
 
@@ -157,7 +171,7 @@ impl Sequence {
         let within = |[from, to]: [f64; 2], part: f64| from + (to - from) * part;
         match &self.values {
             Values::Grid { from, to, points } => from + (to - from) / (points - 1) as f64 * n as f64,
-            Values::List(list) => list[n as usize],
+            Values::List(list) | Values::Paired(list) => list[n as usize],
             Values::Random(interval) => {
                 // One block of the generator per sample: any sample is found without those before it.
                 let mut random = ChaCha8Rng::seed_from_u64(self.seed);
@@ -173,9 +187,11 @@ impl Sequence {
 impl Display for Axis {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
         write!(f, "{}=", self.name)?;
+        let text = |list: &[f64]| list.iter().map(f64::to_string).collect::<Vec<_>>().join(",");
         match &self.values {
             Values::Grid { from, to, points } => write!(f, "{from}:{to}:{points}"),
-            Values::List(list) => f.write_str(&list.iter().map(f64::to_string).collect::<Vec<_>>().join(",")),
+            Values::List(list) => f.write_str(&text(list)),
+            Values::Paired(list) => write!(f, "paired:{}", text(list)),
             Values::Random([from, to]) => write!(f, "random:{from}:{to}"),
             Values::Sobol([from, to]) => write!(f, "sobol:{from}:{to}"),
         }
@@ -186,7 +202,7 @@ impl FromStr for Axis {
     type Err = ArgumentError;
 
     fn from_str(text: &str) -> Result<Self, ArgumentError> {
-        let form = "expected KEY=FIRST:LAST:POINTS, KEY=VALUE,VALUE,..., KEY=random:FIRST:LAST or KEY=sobol:FIRST:LAST, \
+        let form = "expected KEY=FIRST:LAST:POINTS, KEY=VALUE,VALUE,..., KEY=paired:VALUE,VALUE,..., KEY=random:FIRST:LAST or KEY=sobol:FIRST:LAST, \
                     for instance plant.r=0.3:1:71";
         let (name, values) = text.split_once('=').ok_or(form)?;
         let number = |text: &str| {
@@ -195,7 +211,9 @@ impl FromStr for Axis {
                 .map_err(|_| ArgumentError::from(format!("`{text}` is not a number; {form}")))
         };
         let parts: Vec<&str> = values.split(':').collect();
+        let listed = |list: &str| list.split(',').map(number).collect::<Result<Vec<_>, _>>();
         let values = match parts[..] {
+            ["paired", list] => Values::Paired(listed(list)?),
             ["random", from, to] => Values::Random([number(from)?, number(to)?]),
             ["sobol", from, to] => Values::Sobol([number(from)?, number(to)?]),
             [from, to, points] => Values::Grid {
@@ -206,7 +224,7 @@ impl FromStr for Axis {
                     .parse()
                     .map_err(|_| format!("`{points}` is not a number of points; {form}"))?,
             },
-            [list] => Values::List(list.split(',').map(number).collect::<Result<_, _>>()?),
+            [list] => Values::List(listed(list)?),
             _ => return Err(form.into()),
         };
         Self::new(name.trim(), values)

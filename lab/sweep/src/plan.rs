@@ -56,7 +56,7 @@ impl Plan {
             .iter()
             .map(|axis| {
                 let sequence = Sequence::new(axis, settings.seed, sampled);
-                sampled += usize::from(axis.points().is_none());
+                sampled += usize::from(axis.points().is_none() && axis.paired().is_none());
                 sequence
             })
             .collect();

@@ -15,7 +15,7 @@ pub struct Settings {
     pub axes: Vec<Axis>,
     /// Detuning, if it is not an axis. Without it: that of the scene's stable phase-resonant orbit, or 0.
     pub sigma: Option<f64>,
-    /// Number of samples of random and Sobol axes.
+    /// Number of samples of random and Sobol axes; paired values have their own.
     pub samples: Option<u64>,
     /// Seed of random axes.
     pub seed: u64,
@@ -124,7 +124,7 @@ const MOST: u64 = 1 << 53;
 /// Number of points of a Sobol sequence.
 const SOBOL: u64 = 1 << 32;
 
-/// The dimension that random and Sobol axes share.
+/// The dimension that paired, random and Sobol axes share.
 pub(crate) const SAMPLE: &str = "sample";
 
 /// Names and lengths of the dimensions.
@@ -138,7 +138,25 @@ pub(crate) fn dimensions(settings: &Settings) -> Result<(Vec<String>, Vec<u64>),
     };
     let (mut names, mut shape): (Vec<String>, Vec<u64>) = own().unzip();
     let sampled = settings.axes.len() - names.len();
-    match settings.samples {
+    let mut paired = settings
+        .axes
+        .iter()
+        .filter_map(|axis| Some((&axis.name, axis.paired()?)));
+    let mut samples = settings.samples;
+    if let Some((first, length)) = paired.next() {
+        if let Some((other, second)) = paired.find(|(_, other)| *other != length) {
+            return refused(format!(
+                "{first} has {length} paired values and {other} has {second}: paired values belong together, one per sample"
+            ));
+        }
+        if samples.is_some_and(|samples| samples != length) {
+            return refused(format!(
+                "{length} paired values of {first} are {length} samples: leave out another number"
+            ));
+        }
+        samples = Some(length);
+    }
+    match samples {
         None if sampled > 0 => {
             return refused("random and Sobol axes need a number of samples (--samples N, in Python samples=N)".into());
         }
@@ -152,9 +170,10 @@ pub(crate) fn dimensions(settings: &Settings) -> Result<(Vec<String>, Vec<u64>),
         }
         None => {}
     }
-    if sampled > sobol::MOST {
+    let drawn = sampled - settings.axes.iter().filter_map(Axis::paired).count();
+    if drawn > sobol::MOST {
         return refused(format!(
-            "{sampled} random and Sobol axes: at most {} are allowed",
+            "{drawn} random and Sobol axes: at most {} are allowed",
             sobol::MOST
         ));
     }
