@@ -67,7 +67,7 @@ impl Plant {
     /// A state that is not finite, a particle outside its cavity; the plant stays as it is.
     pub fn set_state(&mut self, state: State) -> Result<(), InvalidValue> {
         self.moving.masses = masses(&self.moving.rig.parameters, state)?;
-        self.contact = Contact::Free;
+        self.contact = None;
         self.fast.state_changed(&self.moving.base);
         Ok(())
     }

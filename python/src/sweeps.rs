@@ -155,5 +155,8 @@ impl Sweep {
 /// Names of the regimes, by their code.
 #[pyfunction]
 pub fn regimes() -> Vec<&'static str> {
-    vines_model::regime::Regime::SIMULATED.iter().map(|regime| regime.name()).collect()
+    vines_model::regime::Regime::SIMULATED
+        .iter()
+        .map(|regime| regime.name())
+        .collect()
 }

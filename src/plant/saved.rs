@@ -2,7 +2,7 @@
 
 use super::{Plant, Totals};
 use crate::base_motion::BaseMotion;
-use crate::contact::Contact;
+use crate::contact::Wall;
 use crate::fast::{FastPath, SavedPath};
 use crate::moving::{Masses, Moving, Rig};
 use crate::parameters::Parameters;
@@ -14,7 +14,7 @@ pub struct Saved {
     parameters: Parameters,
     masses: Masses,
     base: BaseMotion,
-    contact: Contact,
+    contact: Option<Wall>,
     begun: bool,
     time: f64,
     totals: Totals,

@@ -48,11 +48,21 @@ pub fn write_report(
         }
         let section = make(subject, &at)?;
         let text = serde_json::to_string(&section)?;
-        let hash = hash(&format!("{key}
-{text}"));
+        let hash = hash(&format!(
+            "{key}
+{text}"
+        ));
         // A section that cannot be kept is still part of this report.
-        if let Err(error) = files::write(&out.join(KEPT), [(file, format!("{hash}
-{text}"))]) {
+        if let Err(error) = files::write(
+            &out.join(KEPT),
+            [(
+                file,
+                format!(
+                    "{hash}
+{text}"
+                ),
+            )],
+        ) {
             log::warn!("{error}");
         }
         sections.push(section);

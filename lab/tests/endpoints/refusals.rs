@@ -162,9 +162,18 @@ fn a_signal_between_two_points_of_a_backbone_keeps_the_points_and_ends_with_the_
     let rig = Server::start(&["rig", "--silence", "5"]);
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
-    let long = ["--set", "backbone.C_from=0.6", "--set", "backbone.C_to=0.58", "--set", "backbone.points=2000"];
+    let long = [
+        "--set",
+        "backbone.C_from=0.6",
+        "--set",
+        "backbone.C_to=0.58",
+        "--set",
+        "backbone.points=2000",
+    ];
     let client = Command::new(PROGRAM)
-        .args(with_settings(&[&["backbone", "--out", out, "--rig", &rig.1], &long[..]].concat()))
+        .args(with_settings(
+            &[&["backbone", "--out", out, "--rig", &rig.1], &long[..]].concat(),
+        ))
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
