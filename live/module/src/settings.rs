@@ -39,6 +39,7 @@ pub fn default_scene() -> Scene {
         controller_names: Names::default(),
         chain: Chain::default(),
         resonance: Definition::default(),
+        measured: None,
     }
 }
 
