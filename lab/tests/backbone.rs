@@ -180,11 +180,18 @@ impl Rig for SensorsOnly {
 
 /// The backbone of a rig with other parameters than those of the scene, from its sensors, after the loop check if `checked`.
 fn tracked_from_sensors(settings: &[&str], rig: impl Fn(&mut Parameters), checked: bool) -> TrackedComparison {
-    let few = ["start.dq2=0", "backbone.points=7", "backbone.C_to=0.3"];
+    let few = [
+        "start.dq2=0",
+        "backbone.points=7",
+        "backbone.C_from=0.6",
+        "backbone.C_to=0.3",
+    ];
     let mut scene = scene(&[&few[..], settings].concat());
     let mut plant = scene.plant;
     rig(&mut plant);
-    let plant = Simulated::new(plant, scene.start).unwrap().with_sensors(scene.resonance);
+    let plant = Simulated::new(plant, scene.start)
+        .unwrap()
+        .with_sensors(scene.resonance);
     let mut rig = SensorsOnly(Chain::around(Box::new(plant), &scene));
     if checked {
         let found = check(&mut rig, &scene).unwrap();
@@ -213,7 +220,11 @@ fn without_evidence_of_impacts_no_point_of_a_rig_is_called_one_to_one() {
             for checked in [true, false] {
                 let found = tracked_from_sensors(settings, rig, checked);
                 let regimes: Vec<Regime> = found.points.iter().map(|one| one.point.regime).collect();
-                let expected = if checked { Regime::NoImpacts } else { Regime::NotEstablished };
+                let expected = if checked {
+                    Regime::NoImpacts
+                } else {
+                    Regime::NotEstablished
+                };
                 assert!(
                     regimes.iter().all(|regime| *regime == expected),
                     "rig {number}, {settings:?}, {checked}: {regimes:?}"
@@ -226,7 +237,13 @@ fn without_evidence_of_impacts_no_point_of_a_rig_is_called_one_to_one() {
 
 #[test]
 fn impacts_of_other_rigs_are_recognised_from_the_response_with_and_without_noise() {
-    for rig in [&[][..], &["plant.r=0.4"], &["plant.r=0.85"], &["plant.epsilon=0.003"], &["plant.lambda=1"]] {
+    for rig in [
+        &[][..],
+        &["plant.r=0.4"],
+        &["plant.r=0.85"],
+        &["plant.epsilon=0.003"],
+        &["plant.lambda=1"],
+    ] {
         for seed in ["", "chain.seed=1", "chain.seed=2", "chain.seed=3"] {
             let (is_noisy, noise) = (!seed.is_empty(), ["chain.snr=40", seed]);
             let settings = [rig, if is_noisy { &noise } else { &[] }].concat();

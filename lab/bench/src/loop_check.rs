@@ -86,7 +86,11 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
     let begin = &readings[begins..begins + first];
     let rest = mean(readings[begins - quiet..begins].iter().map(|reading| reading[2]));
     let moved = mean_square(begin.iter().map(|reading| reading[2] - rest));
-    let expected_move = mean_square(begin.iter().map(|reading| channels[1].gain * amplitude * reading[0].sin()));
+    let expected_move = mean_square(
+        begin
+            .iter()
+            .map(|reading| channels[1].gain * amplitude * reading[0].sin()),
+    );
     let verdict = verdict(&channels, &amplitudes, has_base, moved < 0.5 * expected_move);
     // Without a sensor, the base moves as expected.
     let base = if has_base {

@@ -68,7 +68,11 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if let Some(ended) = tracked.ended {
         let mut failure = Failure::from(ended);
         let files = saved.map_or_else(|error| error.message, |files| written(&files));
-        failure.message += &format!("\n{} points were measured before. {}", found.points.len(), files.trim_end());
+        failure.message += &format!(
+            "\n{} points were measured before. {}",
+            found.points.len(),
+            files.trim_end()
+        );
         return Err(failure);
     }
     let files = saved?;

@@ -94,7 +94,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         match fmus(&experiment.out) {
             Ok(fmus) => files.extend(fmus),
             Err(failure) => {
-                print(&output(experiment.json, &found, || format!("{summary}\n{}", written(&files)))?)?;
+                print(&output(experiment.json, &found, || {
+                    format!("{summary}\n{}", written(&files))
+                })?)?;
                 return Err(failure);
             }
         }

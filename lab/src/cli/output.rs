@@ -42,7 +42,9 @@ pub fn saved(
 ) -> Result<Vec<PathBuf>, Failure> {
     files.or_else(|error| {
         print(&text()?)?;
-        Err(Failure::run(format!("{error}; standard output has the results instead")))
+        Err(Failure::run(format!(
+            "{error}; standard output has the results instead"
+        )))
     })
 }
 

@@ -76,11 +76,18 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         },
     );
     bar.finish_and_clear();
-    let listed = |findings: &[String]| findings.iter().map(|finding| format!("- {finding}\n")).collect::<String>();
+    let listed = |findings: &[String]| {
+        findings
+            .iter()
+            .map(|finding| format!("- {finding}\n"))
+            .collect::<String>()
+    };
     let report = match report {
         Err(ReportError::Unwritten { findings, source }) => {
             print(&listed(&findings))?;
-            return Err(Failure::run(format!("{source}; standard output has the findings instead")));
+            return Err(Failure::run(format!(
+                "{source}; standard output has the findings instead"
+            )));
         }
         other => other.map_err(Failure::run)?,
     };

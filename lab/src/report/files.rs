@@ -44,7 +44,10 @@ pub enum ReportError {
 ///
 /// The results are written before a figure is made, and each file is complete or absent.
 pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let results = [("identification.json", json(found)?), ("backbone.csv", decay_csv(found)?)];
+    let results = [
+        ("identification.json", json(found)?),
+        ("backbone.csv", decay_csv(found)?),
+    ];
     let mut paths = files::write(out, results)?;
     let figures = [
         ("backbone.svg", backbone::figure(found).svg()?),
@@ -62,7 +65,10 @@ pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     }
     let mut paths = files::write(out, tables)?;
     let figure = regimes::svg(map)?;
-    paths.extend(files::write(out, [("map-dark.svg", dark(&figure)), ("map.svg", figure)])?);
+    paths.extend(files::write(
+        out,
+        [("map-dark.svg", dark(&figure)), ("map.svg", figure)],
+    )?);
     Ok(paths)
 }
 

@@ -281,7 +281,14 @@ fn a_folder_that_is_a_file_is_refused_as_wrong_usage_before_anything_runs() {
 #[test]
 fn results_that_cannot_be_written_are_printed() {
     // The names of the files are taken by folders, as if the disk were full at the end.
-    let quick = ["--set", "record.decay_periods=40", "--set", "controller.amplitude_tolerance=4e-3", "--set", "backbone.points=2"];
+    let quick = [
+        "--set",
+        "record.decay_periods=40",
+        "--set",
+        "controller.amplitude_tolerance=4e-3",
+        "--set",
+        "backbone.points=2",
+    ];
     let quick: Vec<&str> = quick.into_iter().chain(["--rig", "built-in"]).collect();
     for (command, taken, part) in [
         ("identify", "backbone.csv", "exact orbit"),
@@ -296,7 +303,10 @@ fn results_that_cannot_be_written_are_printed() {
         let [text, message] = [&done.stdout, &done.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
         assert_eq!(done.status.code(), Some(1), "{message}");
         assert!(text.contains(part), "{command}: {text}");
-        assert!(message.contains(taken) && message.contains("standard output has the results"), "{message}");
+        assert!(
+            message.contains(taken) && message.contains("standard output has the results"),
+            "{message}"
+        );
         // A figure that fails leaves the tables.
         if taken.ends_with("svg") {
             let results = ["identification.json", "tracked.json"].map(|name| folder.path().join(name).is_file());

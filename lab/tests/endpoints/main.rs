@@ -206,8 +206,7 @@ fn a_backbone_without_a_single_impact_is_a_failure() {
         let few = ["--set", "backbone.points=3", "--set", "backbone.C_to=0.6"];
         let arguments = ["backbone", "--out", out.path().to_str().unwrap(), "--rig", &rig.1];
         let done = vines(&with_settings(&[&arguments[..], &few, check].concat()));
-        let [table, message] = [&done.stdout, &done.stderr]
-            .map(|text| String::from_utf8_lossy(text).into_owned());
+        let [table, message] = [&done.stdout, &done.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
         assert_eq!(done.status.code(), Some(1), "{message}");
         assert!(message.contains(part), "{message}");
         assert!(table.contains("3 points") && !table.contains("1:1"), "{table}");

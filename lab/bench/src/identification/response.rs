@@ -91,9 +91,13 @@ pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, omega: f
     let significant = SIGNIFICANT * content.error;
     let is_simulated = samples.iter().any(|sample| sample.ground_truth.is_some());
     // The parameters of a simulation are known.
-    let linear = scene.measured.or_else(|| is_simulated.then(|| LinearResponse::of(scene)));
+    let linear = scene
+        .measured
+        .or_else(|| is_simulated.then(|| LinearResponse::of(scene)));
     let measured = Complex64::from_polar(content.amplitude / base, scene.phase_target().radians());
-    let is_linear = linear.filter(|_| base > 0.0).map(|linear| is_linear(&linear, measured, omega));
+    let is_linear = linear
+        .filter(|_| base > 0.0)
+        .map(|linear| is_linear(&linear, measured, omega));
     if content.second > significant.max(SHARE * expected) {
         Regime::Asymmetric
     } else if content.third > significant.max(least) && significant < expected {

@@ -106,7 +106,9 @@ pub(super) fn verdict(channels: &[Channel; 2], expected: &[f64; 2], has_base: bo
         () if noisy(response, expected[0]) => Verdict::ResponseNoisy,
         () if has_base && noisy(base, expected[1]) => Verdict::BaseNoisy,
         () if has_base && !waits && reversed(response) && reversed(base) => Verdict::BothReversed,
-        () if has_base && waits && reversed(base) && in_time(is_off(response.phase - base.phase, 0.0)) => Verdict::Healthy,
+        () if has_base && waits && reversed(base) && in_time(is_off(response.phase - base.phase, 0.0)) => {
+            Verdict::Healthy
+        }
         () if reversed(response) => Verdict::ResponseReversed,
         () if has_base && !waits && reversed(base) => Verdict::BaseReversed,
         // What delays both, such as a connection, cancels in the phase that the controller holds.

@@ -17,7 +17,8 @@ fn evidence(settings: &[&str], reading: impl Fn(usize) -> (f64, Option<f64>, Opt
             ground_truth: None,
         }
     };
-    let phase_error = |error: Option<f64>| error.map_or(PhaseError::NotMeasured, |error| PhaseError::Degrees(error.to_degrees()));
+    let phase_error =
+        |error: Option<f64>| error.map_or(PhaseError::NotMeasured, |error| PhaseError::Degrees(error.to_degrees()));
     Evidence::of(&(0..150).map(sample).collect::<Vec<_>>(), &scene, phase_error)
 }
 

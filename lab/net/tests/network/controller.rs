@@ -150,11 +150,15 @@ fn a_move_that_the_controller_cannot_make_ends_the_session_with_the_reason() {
     peer.sample(reading(0), false).unwrap();
     peer.hold_response(Move::default(), 0.0).unwrap();
     let error = peer.sample(reading(1), false).unwrap_err();
-    assert!(error.to_string().contains("response = 0 m: allowed is above 0"), "{error}");
+    assert!(
+        error.to_string().contains("response = 0 m: allowed is above 0"),
+        "{error}"
+    );
     // The loop is open.
     let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
     peer.sample(reading(0), false).unwrap();
-    peer.hold_response(Move { response: 0.1, ..Move::default() }, 0.0).unwrap();
+    peer.hold_response(Move { response: 0.1, ..Move::default() }, 0.0)
+        .unwrap();
     let error = peer.sample(reading(1), false).unwrap_err();
     assert!(error.to_string().contains("is in state 0: "), "{error}");
 }
