@@ -180,7 +180,12 @@ impl Rig for SensorsOnly {
 
 /// The backbone of a rig with other parameters than those of the scene, from its sensors, after the loop check if `checked`.
 fn tracked_from_sensors(settings: &[&str], rig: impl Fn(&mut Parameters), checked: bool) -> TrackedComparison {
-    let few = ["start.dq2=0", "backbone.points=7", "backbone.C_to=0.3"];
+    let few = [
+        "start.dq2=0",
+        "backbone.points=7",
+        "backbone.C_from=0.6",
+        "backbone.C_to=0.3",
+    ];
     let mut scene = scene(&[&few[..], settings].concat());
     let mut plant = scene.plant;
     rig(&mut plant);

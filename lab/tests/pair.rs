@@ -269,3 +269,21 @@ fn fmus_with_other_names_and_units_without_an_oscillator_and_without_settled_loc
     println!("sigma = {found} and {expected}");
     assert!((found - expected).abs() < 5e-3, "{found} {expected}");
 }
+
+#[test]
+fn a_controller_without_the_output_of_its_phase_error_is_not_said_to_measure_none() {
+    let set = ["record.lock_periods=5"].map(|one| one.parse().unwrap());
+    let scene = Scene::load(None, &set).unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = |name| folder.path().join(name);
+    pack_bench(&scene, &libraries().as_path().into(), folder.path()).unwrap();
+    renamed(&path("PhaseLock.fmu"), &path("loop.fmu"), &[("phase_error", "error")]);
+    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
+    let mut controller = FmuController::load(&path("loop.fmu"), &scene.controller_config(), &Names::default()).unwrap();
+    let error = experiment::run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap_err();
+    let message = error.to_string();
+    assert!(
+        message.contains("the controller does not report its phase error"),
+        "{message}"
+    );
+}

@@ -159,7 +159,7 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
 #[cfg(unix)]
 #[test]
 fn a_signal_between_two_points_of_a_backbone_keeps_the_points_and_ends_with_the_code_of_a_signal() {
-    let rig = Server::start(&["rig", "--silence", "5"]);
+    let rig = Server::start(&["rig", "--lock-step", "--silence", "30"]);
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
     let long = [
@@ -177,7 +177,7 @@ fn a_signal_between_two_points_of_a_backbone_keeps_the_points_and_ends_with_the_
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    std::thread::sleep(std::time::Duration::from_secs(12));
+    std::thread::sleep(std::time::Duration::from_secs(5));
     let pid = client.id().to_string();
     assert!(Command::new("kill").args(["-INT", &pid]).status().unwrap().success());
     let output = client.wait_with_output().unwrap();
