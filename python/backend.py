@@ -1,4 +1,4 @@
-"""Build backend: maturin, after the FMUs that belong into the wheel; the source distribution is the whole repository."""
+"""Build backend: maturin, after the FMUs that belong into the wheel. The sdist is the whole repository."""
 
 import contextlib
 import gzip

@@ -11,6 +11,7 @@ import threading
 import time
 from decimal import Decimal
 from fractions import Fraction
+from pathlib import Path
 
 import matplotlib
 import numpy as np
@@ -140,7 +141,7 @@ def test_a_trajectory_has_the_bits_of_its_steps_and_all_their_events():
 
 
 def memory():
-    return int(open("/proc/self/statm").read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+    return int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
@@ -484,32 +485,29 @@ def test_ctrl_c_ends_a_batch_within_02_s_and_no_plant_has_advanced():
     assert batch.times.max() == 0.0
 
 
-def interrupted(work, after=0.3):
-    """Seconds from Ctrl-C to the exception."""
+def interrupted(work):
+    """Sends Ctrl-C in the middle of the work, and prints how long it took."""
     sent = []
 
     def interrupt():
         sent.append(time.monotonic())
         os.kill(os.getpid(), signal.SIGINT)
 
-    threading.Timer(after, interrupt).start()
+    threading.Timer(0.3, interrupt).start()
     with pytest.raises(KeyboardInterrupt):
         work()
-    return time.monotonic() - sent[0]
+    print(f"{time.monotonic() - sent[0]:.3f} s")
 
 
-@pytest.mark.parametrize("omega", [1e-9, 54.9, 1e6, 1e12])
-def test_ctrl_c_ends_plants_at_any_frequency(omega):
-    # Without damping, and with a particle that hits nothing: seconds without any event.
+@pytest.mark.parametrize("omega", [1e6, 1e12])
+def test_ctrl_c_ends_plants_without_events_at_any_frequency(omega):
+    # A particle that hits nothing. Until the largest number of evaluations it would take many seconds.
     quiet = {"M": 3.8, "k": 11680.0, "c": 0.0, "m": 0.032, "b": 10.0, "r": 0.65}
     drive = {"amplitude": 1e-3, "omega": omega}
     plant, batch = vines.Plant(quiet), vines.Batch(quiet, {"q2": [0.0, 0.1]})
-    for one in (lambda: plant.advance(1e9, **drive), lambda: batch.advance(1e9, **drive, events=False)):
-        try:
-            # Leaves nothing but an interrupt that comes late.
-            print(interrupted(lambda: (one(), time.sleep(0.5))))
-        finally:
-            assert plant.time in (0.0, 1e9)
+    for advance in (lambda: plant.advance(1e9, **drive), lambda: batch.advance(1e9, **drive, events=False)):
+        interrupted(advance)
+    assert (plant.time, batch.times.max()) == (0.0, 0.0)
 
 
 @pytest.mark.parametrize("plants", [1, 2])

@@ -42,8 +42,8 @@ def _xarray() -> Any:
         import zarr  # noqa: F401
     except ImportError as error:
         raise ImportError(
-            f"datasets need xarray and zarr, and {error.name} is missing: pip install xarray zarr, or all that vines can use "
-            "with pip install 'vines-testbench[all]'",
+            f"datasets need xarray and zarr, and {error.name} is missing: pip install xarray zarr, or "
+            "pip install 'vines-testbench[all]'",
             name=error.name,
         ) from None
     return xarray

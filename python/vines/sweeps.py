@@ -191,8 +191,8 @@ def _values(name: str, values: Any) -> Any:
         if len(values) == 3 and isinstance(values[0], str):
             return (values[0], real(values[1]), real(values[2]))
         raise ValueError(
-            f"{name} = {values!r}: a tuple could be a range or three values; a range is vines.linspace(first, last, number), "
-            "values are a list"
+            f"{name} = {values!r}: a tuple could be a range or values; a range is "
+            "vines.linspace(first, last, number), values are a list"
         )
     return _list(name, values)
 
