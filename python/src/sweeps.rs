@@ -35,18 +35,16 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
         .map(|(name, values)| {
             let name: String = name.extract()?;
             let values = match values.extract()? {
-                Given::Grid(_, from, to, points) => Values::Grid { from, to, points },
+                Given::Grid(word, from, to, points) if word == "grid" => Values::Grid { from, to, points },
+                Given::Design(word, from, to) if word == "random" => Values::Random([from, to]),
+                Given::Design(word, from, to) if word == "sobol" => Values::Sobol([from, to]),
+                Given::Paired(word, list) if word == "paired" => Values::Paired(list),
                 Given::List(list) => Values::List(list),
-                Given::Paired(_, list) => Values::Paired(list),
-                Given::Design(design, from, to) => match design.as_str() {
-                    "random" => Values::Random([from, to]),
-                    "sobol" => Values::Sobol([from, to]),
-                    other => {
-                        return Err(invalid(format!(
-                            "{name}: unknown design `{other}`; known are random and sobol"
-                        )));
-                    }
-                },
+                Given::Grid(word, ..) | Given::Design(word, ..) | Given::Paired(word, _) => {
+                    return Err(invalid(format!(
+                        "{name}: unknown design `{word}`; known are random and sobol"
+                    )));
+                }
             };
             Axis::new(&name, values).map_err(invalid)
         })
