@@ -156,7 +156,7 @@ fn a_move_that_the_controller_cannot_make_ends_the_session_with_the_reason() {
         "{error}"
     );
     // The loop is open.
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
+    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, false, None).unwrap();
     peer.sample(reading(0), false).unwrap();
     peer.hold_response(Move { response: 0.1, ..Move::default() }, 0.0)
         .unwrap();
