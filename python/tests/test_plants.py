@@ -486,28 +486,32 @@ def test_ctrl_c_ends_a_batch_within_02_s_and_no_plant_has_advanced():
 
 
 def interrupted(work):
-    """Sends Ctrl-C in the middle of the work, and prints how long it took."""
+    """Processor time from Ctrl-C to its exception, s: on a busy machine, too."""
     sent = []
 
     def interrupt():
-        sent.append(time.monotonic())
+        sent.append(time.process_time())
         os.kill(os.getpid(), signal.SIGINT)
 
     threading.Timer(0.3, interrupt).start()
     with pytest.raises(KeyboardInterrupt):
         work()
-    print(f"{time.monotonic() - sent[0]:.3f} s")
+    return time.process_time() - sent[0]
 
 
-@pytest.mark.parametrize("omega", [1e6, 1e12])
-def test_ctrl_c_ends_plants_without_events_at_any_frequency(omega):
-    # A particle that hits nothing. Until the largest number of evaluations it would take many seconds.
-    quiet = {"M": 3.8, "k": 11680.0, "c": 0.0, "m": 0.032, "b": 10.0, "r": 0.65}
-    drive = {"amplitude": 1e-3, "omega": omega}
-    plant, batch = vines.Plant(quiet), vines.Batch(quiet, {"q2": [0.0, 0.1]})
+@pytest.mark.parametrize("omega", [1e-3, 1e6, 1e12])
+def test_ctrl_c_ends_plants_at_any_frequency(omega):
+    scene, drive = vines.Scene(), {"amplitude": 1.0, "omega": omega}
+    plant, batch = vines.Plant(scene), vines.Batch(scene, {"q2": [0.0, 0.001]})
     for advance in (lambda: plant.advance(1e9, **drive), lambda: batch.advance(1e9, **drive, events=False)):
-        interrupted(advance)
+        assert interrupted(advance) < 0.2 * os.cpu_count()
     assert (plant.time, batch.times.max()) == (0.0, 0.0)
+
+
+def test_ctrl_c_ends_the_search_for_a_regime_at_any_frequency():
+    # A period of the base is as long as millions of the oscillator, and nothing looks at signals within one.
+    scene = vines.Scene(excitation={"G": 1000.0})
+    assert interrupted(lambda: vines.regime(scene, sigma=-118.969)) < 0.2 * os.cpu_count()
 
 
 @pytest.mark.parametrize("plants", [1, 2])
