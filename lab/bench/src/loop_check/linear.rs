@@ -1,8 +1,10 @@
 //! The linear response of a rig from its growth in the loop check, and the gains that follow from it.
 //!
-//! From period to period the phasor of the response obeys `z' = q z + c` with `q = exp(-r T)`, `r = delta + i (omega - omega_0)` and
-//! `c = -i g E (1 - q)/r`. Least squares over all periods give `q` and `c`.
+//! In the n-th period the phasor of the response is `z = s + a q^n` with `q = exp(-r T)`, `r = delta + i (omega - omega_0)` and
+//! `s = -i g E/r`. Least squares over all periods (Gauss and Newton) give `s`, `a` and `q`; `a` is free because of delays and of what was
+//! left of an earlier motion.
 
+use nalgebra::{Matrix3, RowVector3, Vector3};
 use num_complex::Complex64;
 use phase_lock::Gains;
 use serde::Serialize;
@@ -34,21 +36,27 @@ impl Linear {
     /// The response whose phasors, m, are given period by period, `period` seconds apart; `base` is the phasor of the base, m. `None` without
     /// a growth.
     pub(super) fn of(phasors: &[Complex64], base: Complex64, omega: f64, period: f64, scene: &Scene) -> Option<Self> {
-        let steps = phasors.len() as f64 - 1.0;
-        let (before, after) = (&phasors[..phasors.len() - 1], &phasors[1..]);
-        let mean = |values: &[Complex64]| values.iter().sum::<Complex64>() / steps;
-        let (mean_before, mean_after) = (mean(before), mean(after));
-        let power: f64 = before.iter().map(|z| (z - mean_before).norm_sqr()).sum();
-        let products = before.iter().zip(after);
-        let q = products
-            .map(|(z, next)| (z - mean_before).conj() * next)
-            .sum::<Complex64>()
-            / power;
-        let c = mean_after - q * mean_before;
-        let errors = before.iter().zip(after).map(|(z, next)| (next - q * z - c).norm_sqr());
-        let u_q = (errors.sum::<f64>() / (2.0 * steps - 4.0) / power).sqrt();
+        let (mut q, [mut steady, mut initial]) = start(phasors)?;
+        let mut u_q = f64::NAN;
+        for _ in 0..ROUNDS {
+            let (mut normal, mut right) = (Matrix3::zeros(), Vector3::zeros());
+            let (mut power, mut rest) = (Complex64::ONE, 0.0);
+            for (n, z) in phasors.iter().enumerate() {
+                let row = RowVector3::new(Complex64::ONE, power, initial * power / q * n as f64);
+                let residual = z - steady - initial * power;
+                normal += row.adjoint() * row;
+                right += row.adjoint() * residual;
+                rest += residual.norm_sqr();
+                power *= q;
+            }
+            let inverse = normal.try_inverse()?;
+            let change = inverse * right;
+            // Two components of each phasor, and of each of three unknowns.
+            u_q = (rest / (2.0 * phasors.len() as f64 - 6.0) * inverse[(2, 2)].re).sqrt();
+            (steady, initial, q) = (steady + change[0], initial + change[1], q + change[2]);
+        }
         let rate = -q.ln() / period;
-        let gain = c * rate / (1.0 - q) / base;
+        let gain = steady * rate / base;
         if !(gain.norm().is_finite() && u_q.is_finite() && q.norm() > 0.0) {
             return None;
         }
@@ -80,4 +88,23 @@ impl Linear {
             gain: Complex64::from_polar(self.response_gain, self.phase.to_radians()),
         }
     }
+}
+
+/// Rounds of the fit; each squares the relative error.
+const ROUNDS: usize = 8;
+
+/// First values of `q`, and of `s` and `a`, by the recursion `z' = q z + (1 - q) s` from period to period. `None` without a growth.
+fn start(phasors: &[Complex64]) -> Option<(Complex64, [Complex64; 2])> {
+    let steps = phasors.len().checked_sub(4)? as f64 + 3.0;
+    let (before, after) = (&phasors[..phasors.len() - 1], &phasors[1..]);
+    let mean = |values: &[Complex64]| values.iter().sum::<Complex64>() / steps;
+    let (mean_before, mean_after) = (mean(before), mean(after));
+    let power: f64 = before.iter().map(|z| (z - mean_before).norm_sqr()).sum();
+    let products = before.iter().zip(after);
+    let q = products
+        .map(|(z, next)| (z - mean_before).conj() * next)
+        .sum::<Complex64>()
+        / power;
+    let steady = (mean_after - q * mean_before) / (1.0 - q);
+    (steady.norm().is_finite() && q.norm() > 0.0).then(|| (q, [steady, phasors[0] - steady]))
 }
