@@ -1,8 +1,6 @@
 //! Sweeps.
 
 use std::{
-    error::Error,
-    io,
     path::PathBuf,
     sync::atomic::{AtomicBool, Ordering::Relaxed},
 };
@@ -19,12 +17,12 @@ use crate::{
     wait::{own_threads, wait},
 };
 
-/// The values of an axis: a word, first, last and number; an interval with the name of a design; a word and a list; or a list.
+/// The values of an axis: first, last and number; an interval with the name of a design; paired values, alone in a tuple; or a list.
 #[derive(FromPyObject)]
 enum Given {
-    Grid(String, f64, f64, u64),
+    Grid(f64, f64, u64),
     Design(String, f64, f64),
-    Paired(String, Vec<f64>),
+    Paired((Vec<f64>,)),
     List(Vec<f64>),
 }
 
@@ -34,9 +32,9 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
         .map(|(name, values)| {
             let name: String = name.extract()?;
             let values = match values.extract()? {
-                Given::Grid(_, from, to, points) => Values::Grid { from, to, points },
+                Given::Grid(from, to, points) => Values::Grid { from, to, points },
                 Given::List(list) => Values::List(list),
-                Given::Paired(_, list) => Values::Paired(list),
+                Given::Paired((list,)) => Values::Paired(list),
                 Given::Design(design, from, to) => match design.as_str() {
                     "random" => Values::Random([from, to]),
                     "sobol" => Values::Sobol([from, to]),
@@ -79,14 +77,10 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
 
 /// An `OSError` with the number of the system's error, if it is one.
 fn system(error: &StoreError) -> PyErr {
-    let mut cause: Option<&dyn Error> = Some(error);
-    while let Some(one) = cause {
-        if let Some(number) = one.downcast_ref::<io::Error>().and_then(io::Error::raw_os_error) {
-            return PyOSError::new_err((number, error.to_string()));
-        }
-        cause = one.source();
+    match error.os_error() {
+        Some(number) => PyOSError::new_err((number, error.to_string())),
+        None => PyOSError::new_err(error.to_string()),
     }
-    PyOSError::new_err(error.to_string())
 }
 
 /// A checked sweep.
@@ -150,5 +144,8 @@ impl Sweep {
 /// Names of the regimes, by their code.
 #[pyfunction]
 pub fn regimes() -> Vec<&'static str> {
-    vines_model::regime::Regime::SIMULATED.iter().map(|regime| regime.name()).collect()
+    vines_model::regime::Regime::SIMULATED
+        .iter()
+        .map(|regime| regime.name())
+        .collect()
 }
