@@ -10,7 +10,7 @@ use pyo3::{
 };
 use serde_json::json;
 use vines_model::{
-    map::observe,
+    map::Run,
     orbit,
     theory::{SlowFlow, resonant},
 };
@@ -121,7 +121,9 @@ pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<Real>, periods: i64) 
             -1.0 / numbers.epsilon
         )));
     }
-    let point = may_leave(py, &AtomicBool::new(false), move || {
+    let stop = Arc::new(AtomicBool::new(false));
+    let flag = Arc::clone(&stop);
+    let point = may_leave(py, &stop, move || {
         let sigma = sigma.unwrap_or_else(|| {
             let orbits = orbit::phase_resonant(&numbers);
             orbits
@@ -129,9 +131,10 @@ pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<Real>, periods: i64) 
                 .find(|orbit| orbit.stable)
                 .map_or(0.0, |orbit| orbit.sigma)
         });
-        observe(&numbers, sigma, start, periods as usize).map(|point| (sigma, point))
+        let mut run = Run::new(&numbers, sigma, start)?.stopped_by(flag);
+        run.decided(0, periods as usize).map(|point| (sigma, point))
     })?;
-    let (sigma, point) = point.map_err(invalid)?;
+    let (sigma, point) = point.map_err(|error: lovines::InvalidValue| invalid(error))?;
     json(&json!({ "sigma": sigma, "point": point }))
 }
 

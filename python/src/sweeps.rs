@@ -1,9 +1,7 @@
 //! Sweeps.
 
 use std::{
-    error::Error,
     ffi::CString,
-    io,
     path::PathBuf,
     sync::atomic::{AtomicBool, Ordering::Relaxed},
 };
@@ -20,12 +18,12 @@ use crate::{
     wait::{own_threads, wait},
 };
 
-/// The values of an axis: a word, first, last and number; an interval with the name of a design; a word and a list; or a list.
+/// The values of an axis: first, last and number; an interval with the name of a design; paired values, alone in a tuple; or a list.
 #[derive(FromPyObject)]
 enum Given {
-    Grid(String, f64, f64, u64),
+    Grid(f64, f64, u64),
     Design(String, f64, f64),
-    Paired(String, Vec<f64>),
+    Paired((Vec<f64>,)),
     List(Vec<f64>),
 }
 
@@ -35,16 +33,18 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
         .map(|(name, values)| {
             let name: String = name.extract()?;
             let values = match values.extract()? {
-                Given::Grid(word, from, to, points) if word == "grid" => Values::Grid { from, to, points },
-                Given::Design(word, from, to) if word == "random" => Values::Random([from, to]),
-                Given::Design(word, from, to) if word == "sobol" => Values::Sobol([from, to]),
-                Given::Paired(word, list) if word == "paired" => Values::Paired(list),
+                Given::Grid(from, to, points) => Values::Grid { from, to, points },
                 Given::List(list) => Values::List(list),
-                Given::Grid(word, ..) | Given::Design(word, ..) | Given::Paired(word, _) => {
-                    return Err(invalid(format!(
-                        "{name}: unknown design `{word}`; known are random and sobol"
-                    )));
-                }
+                Given::Paired((list,)) => Values::Paired(list),
+                Given::Design(design, from, to) => match design.as_str() {
+                    "random" => Values::Random([from, to]),
+                    "sobol" => Values::Sobol([from, to]),
+                    other => {
+                        return Err(invalid(format!(
+                            "{name}: unknown design `{other}`; known are random and sobol"
+                        )));
+                    }
+                },
             };
             Axis::new(&name, values).map_err(invalid)
         })
@@ -78,14 +78,10 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
 
 /// An `OSError` with the number of the system's error, if it is one.
 fn system(error: &StoreError) -> PyErr {
-    let mut cause: Option<&dyn Error> = Some(error);
-    while let Some(one) = cause {
-        if let Some(number) = one.downcast_ref::<io::Error>().and_then(io::Error::raw_os_error) {
-            return PyOSError::new_err((number, error.to_string()));
-        }
-        cause = one.source();
+    match error.os_error() {
+        Some(number) => PyOSError::new_err((number, error.to_string())),
+        None => PyOSError::new_err(error.to_string()),
     }
-    PyOSError::new_err(error.to_string())
 }
 
 /// A checked sweep.

@@ -162,7 +162,7 @@ def sweep(
     for name, values in (paired or {}).items():
         if name in given:
             raise ValueError(f"{name} is in axes and in paired: give one of them")
-        given[name] = ("paired", _list(name, values))
+        given[name] = (_list(name, values),)
     # Workers may have another working directory.
     folder = str(Path(out).absolute())
     plan = _native.Sweep(scene._native, given, settings)
@@ -186,7 +186,7 @@ def sweep(
 
 def _values(name: str, values: Any) -> Any:
     if isinstance(values, Range):
-        return ("grid", values.first, values.last, values.number)
+        return (values.first, values.last, values.number)
     if isinstance(values, tuple):
         if len(values) == 3 and isinstance(values[0], str):
             return (values[0], real(values[1]), real(values[2]))

@@ -1,6 +1,11 @@
 //! Errors of a store.
 
-use std::path::PathBuf;
+use std::{error::Error, io, path::PathBuf};
+
+use zarrs::{
+    array::{ArrayCreateError, ArrayError},
+    storage::StorageError,
+};
 
 /// Why a store cannot be used.
 #[derive(Debug, thiserror::Error)]
@@ -53,4 +58,29 @@ pub enum StoreError {
         /// Error of the system or of the format.
         source: Box<dyn std::error::Error + Send + Sync>,
     },
+}
+
+impl StoreError {
+    /// Number of the system's error, if it is one.
+    #[must_use]
+    pub fn os_error(&self) -> Option<i32> {
+        let mut cause: Option<&(dyn Error + 'static)> = Some(self);
+        while let Some(one) = cause {
+            // Those of zarrs hide their cause.
+            let storage = match (one.downcast_ref(), one.downcast_ref()) {
+                (Some(ArrayError::StorageError(storage)), _) => Some(storage),
+                (_, Some(ArrayCreateError::StorageError(storage))) => Some(storage),
+                _ => one.downcast_ref(),
+            };
+            let system = match storage {
+                Some(StorageError::IOError(error)) => Some(&**error),
+                _ => one.downcast_ref::<io::Error>(),
+            };
+            if let Some(number) = system.and_then(io::Error::raw_os_error) {
+                return Some(number);
+            }
+            cause = one.source();
+        }
+        None
+    }
 }

@@ -2,6 +2,10 @@
 
 use std::cell::OnceCell;
 use std::f64::consts::{PI, TAU};
+use std::sync::{
+    Arc,
+    atomic::{AtomicBool, Ordering::Relaxed},
+};
 
 use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
@@ -72,6 +76,7 @@ pub struct Run {
     pub(super) repetitions: OnceCell<Vec<usize>>,
     /// The stable symmetric 1:1 orbit, if it was looked for.
     pub(super) symmetric: OnceCell<Option<Symmetric>>,
+    stop: Arc<AtomicBool>,
 }
 
 impl Run {
@@ -103,7 +108,15 @@ impl Run {
             periodic: OnceCell::new(),
             repetitions: OnceCell::new(),
             symmetric: OnceCell::new(),
+            stop: Arc::default(),
         })
+    }
+
+    /// Ends the thread that follows the motion, by unwinding, at the next event after `stop` was set: one period of a slow base has
+    /// millions of them.
+    #[must_use]
+    pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
+        Self { stop, ..self }
     }
 
     /// Half periods so far.
@@ -136,9 +149,12 @@ impl Run {
         }
         let (start, end) = (TAU * self.periods as f64, TAU * periods as f64);
         let omega = self.drive.omega;
-        let Self { driven, moments, impacts, sticks, .. } = self;
+        let Self { driven, moments, impacts, sticks, stop, .. } = self;
         let mut now = moments[moments.len() - 1];
         self.plant.advance_with(self.drive, (end - start) / omega, |event| {
+            if stop.load(Relaxed) {
+                std::panic::resume_unwind(Box::new("the motion was stopped"));
+            }
             let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) = event;
             let phase = start + omega * t;
             now = driven.after(&now, phase, &event);
