@@ -508,12 +508,6 @@ def test_ctrl_c_ends_plants_at_any_frequency(omega):
     assert (plant.time, batch.times.max()) == (0.0, 0.0)
 
 
-def test_ctrl_c_ends_the_search_for_a_regime_at_any_frequency():
-    # A period of the base is as long as millions of the oscillator, and nothing looks at signals within one.
-    scene = vines.Scene(excitation={"G": 1000.0})
-    assert interrupted(lambda: vines.regime(scene, sigma=-118.96)) < 0.2 * os.cpu_count()
-
-
 @pytest.mark.parametrize("plants", [1, 2])
 def test_ctrl_c_ends_plants_in_the_middle_of_their_motion(plants):
     batch = vines.Batch(vines.Scene(), {"dq2": np.linspace(0.3, 0.6, plants)})
