@@ -339,7 +339,7 @@ class Plant(_native.Plant):
         return _NO_EVENTS if found is None else Events(*found)
 
     def trajectory(self, duration: float, steps: int, *, amplitude: float = 0.0, omega: float = 0.0) -> Trajectory:
-        """Advance the plant in equal steps, and return its motion: the bits of so many calls of `advance`.
+        """Advance the plant in equal steps, and return its motion: bit-identical to one call of `advance` per step.
 
         Parameters
         ----------

@@ -158,7 +158,7 @@ pub fn one(number: usize) {
     println!("{scene:#?}\n{:#?}", follow(&scene, &changes, number));
 }
 
-/// Follows so many scenes.
+/// Follows the given number of scenes.
 pub fn compare(n: usize, table: &mut Table) {
     let each: Vec<Compared> = (0..n)
         .into_par_iter()

@@ -116,7 +116,7 @@ impl<'a> Simulation<'a> {
         (wall.sign() * 2.0 * x[2], 16.0 * f64::EPSILON * terms / p.primary_mass)
     }
 
-    /// The particle is at `wall`, with so many seconds left.
+    /// The particle is at `wall`, with the given time left, s.
     fn touch(&mut self, wall: Wall, left: f64) {
         let p = &self.scene.parameters;
         self.w[0] = wall.sign() * p.half_width;
@@ -146,7 +146,7 @@ impl<'a> Simulation<'a> {
         };
     }
 
-    /// Follows the motion for so many seconds; `None` if there are too many impacts.
+    /// Follows the motion for the given time, s; returns `None` if there are too many impacts.
     pub fn run(mut self, duration: f64) -> Option<Self> {
         let p = self.scene.parameters;
         let rates = [

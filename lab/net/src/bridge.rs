@@ -20,7 +20,7 @@ impl Bridge {
     /// Keeps the reading at `phase` (turns).
     pub fn keep(&mut self, phase: f64, reading: Sensors) {
         if self.past.back().is_some_and(|(last, _)| *last >= phase) || self.past.len() >= MOST {
-            // The drive has no frequency, or a period is not to be had.
+            // The drive has no frequency, or its period exceeds what is kept.
             self.past.clear();
         }
         self.past.push_back((phase, reading));

@@ -150,7 +150,7 @@ impl Client {
         LinkError::Silent { peer, seconds, time: self.time() }
     }
 
-    /// So many readings of a rig were lost one after the other.
+    /// Number of consecutive readings of a rig that were lost.
     pub fn blackout(&self, samples: u64) -> LinkError {
         let (peer, allowed) = (self.peer, self.silence.as_secs_f64());
         LinkError::Blackout {
