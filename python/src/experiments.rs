@@ -26,7 +26,7 @@ use crate::{
     number::Real,
     saved,
     scene::{Scene, invalid, json},
-    wait::{may_leave, wait},
+    wait::wait,
 };
 
 /// Why an experiment ended without a result.
@@ -123,17 +123,22 @@ pub fn regime(py: Python<'_>, scene: &Scene, sigma: Option<Real>, periods: i64) 
     }
     let stop = Arc::new(AtomicBool::new(false));
     let flag = Arc::clone(&stop);
-    let point = may_leave(py, &stop, move || {
-        let sigma = sigma.unwrap_or_else(|| {
-            let orbits = orbit::phase_resonant(&numbers);
-            orbits
-                .iter()
-                .find(|orbit| orbit.stable)
-                .map_or(0.0, |orbit| orbit.sigma)
-        });
-        let mut run = Run::new(&numbers, sigma, start)?.stopped_by(flag);
-        run.decided(0, periods as usize).map(|point| (sigma, point))
-    })?;
+    let point = wait(
+        py,
+        &stop,
+        |_| Ok(()),
+        || {
+            let sigma = sigma.unwrap_or_else(|| {
+                let orbits = orbit::phase_resonant(&numbers);
+                orbits
+                    .iter()
+                    .find(|orbit| orbit.stable)
+                    .map_or(0.0, |orbit| orbit.sigma)
+            });
+            let mut run = Run::new(&numbers, sigma, start)?.stopped_by(flag);
+            run.decided(0, periods as usize).map(|point| (sigma, point))
+        },
+    )?;
     let (sigma, point) = point.map_err(|error: lovines::InvalidValue| invalid(error))?;
     json(&json!({ "sigma": sigma, "point": point }))
 }

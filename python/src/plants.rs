@@ -2,10 +2,7 @@
 
 use std::{
     panic::{AssertUnwindSafe, catch_unwind, resume_unwind},
-    sync::{
-        Arc,
-        atomic::{AtomicBool, Ordering::Relaxed},
-    },
+    sync::atomic::{AtomicBool, Ordering::Relaxed},
 };
 
 use lovines::{Drive, Event, InvalidValue, Parameters, Plant as OnePlant, State, Wall, plant::Saved};
@@ -21,7 +18,7 @@ use crate::{
     number::Real,
     saved,
     scene::invalid,
-    wait::{may_leave, own_threads},
+    wait::{own_threads, wait},
 };
 
 /// Number of the plant, time, kind (0 impact, 1 stuck, 2 released), wall, relative velocity.
@@ -86,7 +83,17 @@ struct Stopped;
 /// Why a plant did not advance: without an error if it was stopped.
 type Failure = Option<InvalidValue>;
 
-/// Advances a plant; `stop` ends its motion at the next event. The number `n` is that of its events.
+/// Oscillations of a plant or of its drive, in radians, that take some ten milliseconds at most where there is no impact.
+const STRETCH: f64 = 1e4;
+
+/// Fastest rate of the motion between impacts, rad/s, or above.
+fn fastest(plant: &OnePlant, drive: Drive) -> f64 {
+    let p = plant.parameters();
+    (p.stiffness / p.primary_mass).sqrt() + p.damping / p.primary_mass + drive.omega.abs()
+}
+
+/// Advances a plant, in stretches if it takes long; `stop` ends its motion after a stretch, or at an event. The number `n` is that of its
+/// events.
 fn advance(
     plant: &mut OnePlant,
     (drive, duration): (Drive, f64),
@@ -94,20 +101,31 @@ fn advance(
     mut found: Option<&mut Events>,
     stop: &AtomicBool,
 ) -> Result<(), Failure> {
-    let start = plant.time();
-    let record = |event| {
-        if stop.load(Relaxed) {
-            resume_unwind(Box::new(Stopped));
-        }
-        if let Some(found) = &mut found {
-            found.push(n, start, event);
-        }
+    let stretches = (duration * fastest(plant, drive) / STRETCH).ceil();
+    let (stretches, step) = if stretches > 1.0 && stretches.is_finite() {
+        (stretches, duration / stretches)
+    } else {
+        (1.0, duration)
     };
-    match catch_unwind(AssertUnwindSafe(|| plant.advance_with(drive, duration, record))) {
-        Ok(advanced) => advanced.map(drop).map_err(Some),
-        Err(payload) if payload.is::<Stopped>() => Err(None),
-        Err(panic) => resume_unwind(panic),
+    for _ in 0..stretches as u64 {
+        let start = plant.time();
+        let record = |event| {
+            if stop.load(Relaxed) {
+                resume_unwind(Box::new(Stopped));
+            }
+            if let Some(found) = &mut found {
+                found.push(n, start, event);
+            }
+        };
+        match catch_unwind(AssertUnwindSafe(|| plant.advance_with(drive, step, record))) {
+            Ok(Err(error)) => return Err(Some(error)),
+            Err(payload) if payload.is::<Stopped>() => return Err(None),
+            Err(panic) => resume_unwind(panic),
+            Ok(Ok(_)) if stop.load(Relaxed) => return Err(None),
+            Ok(Ok(_)) => {}
+        }
     }
+    Ok(())
 }
 
 fn parameters([primary_mass, stiffness, damping, particle_mass, half_width, restitution]: [f64; 6]) -> Parameters {
@@ -135,8 +153,6 @@ fn wall(plant: &OnePlant) -> i8 {
 #[pyclass(subclass)]
 pub struct Plant {
     plant: Box<OnePlant>,
-    /// Fastest rate of its free motion, 1/s, or above.
-    fastest: f64,
 }
 
 /// Oscillations (in radians) and crossings of the cavity that take about a millisecond. A longer advance is computed in a thread, so that
@@ -145,39 +161,32 @@ const SHORT: f64 = 1e3;
 
 impl Plant {
     fn of(plant: OnePlant) -> Self {
-        let p = plant.parameters();
-        let fastest = (p.stiffness / p.primary_mass).sqrt() + p.damping / p.primary_mass;
-        Self { plant: Box::new(plant), fastest }
+        Self { plant: Box::new(plant) }
     }
 
     /// Runs `work` on the plant; it stays as it is if that fails. With a long duration it runs in a thread.
-    fn run<T: Send + 'static>(
+    fn run<T: Send>(
         &mut self,
         py: Python<'_>,
         (drive, duration): (Drive, f64),
-        work: impl FnOnce(&mut OnePlant, &AtomicBool) -> Result<T, Failure> + Send + 'static,
+        work: impl FnOnce(&mut OnePlant, &AtomicBool) -> Result<T, Failure> + Send,
     ) -> PyResult<T> {
         let state = self.plant.state();
         let speed = state.dq1.abs() + state.dq2.abs() + (drive.amplitude * drive.omega).abs();
         let crossings = speed / self.plant.parameters().half_width;
-        let result = if duration * (self.fastest + drive.omega.abs() + crossings) < SHORT {
-            let before = self.plant.save();
-            let result = work(&mut self.plant, &AtomicBool::new(false));
-            if result.is_err() {
-                self.plant.restore(&before);
-            }
-            result
+        let (before, stop) = (self.plant.save(), AtomicBool::new(false));
+        let result = if duration * (fastest(&self.plant, drive) + crossings) < SHORT {
+            Ok(work(&mut self.plant, &stop))
         } else {
-            let (mut plant, stop) = (self.plant.clone(), Arc::new(AtomicBool::new(false)));
-            let flag = Arc::clone(&stop);
-            may_leave(py, &stop, move || work(&mut plant, &flag).map(|result| (plant, result)))?.map(
-                |(plant, result)| {
-                    self.plant = plant;
-                    result
-                },
-            )
+            wait(py, &stop, |_| Ok(()), || work(&mut self.plant, &stop))
         };
-        result.map_err(|failure| failure.map_or_else(|| PyKeyboardInterrupt::new_err(()), invalid))
+        let result = result.and_then(|result| {
+            result.map_err(|failure| failure.map_or_else(|| PyKeyboardInterrupt::new_err(()), invalid))
+        });
+        if result.is_err() {
+            self.plant.restore(&before);
+        }
+        result
     }
 }
 
@@ -344,7 +353,7 @@ impl Plant {
 /// Plants that advance independently of each other. Each is its saved form; a thread has one plant that takes their place in turn.
 #[pyclass]
 pub struct Plants {
-    plants: Arc<Vec<Saved>>,
+    plants: Vec<Saved>,
     /// Memory for the next states: all plants stay as they are if one fails.
     next: Vec<Saved>,
 }
@@ -362,7 +371,7 @@ fn reserve(plants: &mut Vec<Saved>, n: usize) -> PyResult<()> {
 
 impl Plants {
     fn of(plants: Vec<Saved>) -> Self {
-        Self { plants: Arc::new(plants), next: Vec::new() }
+        Self { plants, next: Vec::new() }
     }
 
     /// What `read` finds in every plant.
@@ -418,7 +427,7 @@ impl Plants {
 
     /// The plants as bytes.
     fn save<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyBytes>> {
-        saved::save(py, &*self.plants)
+        saved::save(py, &self.plants)
     }
 
     #[staticmethod]
@@ -437,37 +446,39 @@ impl Plants {
     ) -> PyResult<Option<EventArrays<'py>>> {
         own_threads()?;
         let [durations, amplitudes, omegas] = [durations, amplitudes, omegas].map(|one| one.as_array().to_vec());
-        let mut next = std::mem::take(&mut self.next);
+        let Self { plants, next } = self;
         next.clear();
-        reserve(&mut next, self.plants.len())?;
-        let (plants, stop) = (Arc::clone(&self.plants), Arc::new(AtomicBool::new(false)));
-        let flag = Arc::clone(&stop);
-        let work = move || {
-            next.extend_from_slice(&plants);
-            let part = plants.len().div_ceil(PARTS * rayon::current_num_threads()).max(1);
-            let parts = next.par_chunks_mut(part).enumerate();
-            let found: Vec<Result<Events, (usize, Failure)>> = parts
-                .map_init(
-                    || None,
-                    |workspace, (number, part_of_all)| {
-                        let mut found = Events::default();
-                        for (n, saved) in (number * part..).zip(part_of_all) {
-                            if flag.load(Relaxed) {
-                                return Err((n, None));
+        reserve(next, plants.len())?;
+        let stop = AtomicBool::new(false);
+        let found = wait(
+            py,
+            &stop,
+            |_| Ok(()),
+            || {
+                next.extend_from_slice(plants);
+                let part = plants.len().div_ceil(PARTS * rayon::current_num_threads()).max(1);
+                let parts = next.par_chunks_mut(part).enumerate();
+                parts
+                    .map_init(
+                        || None,
+                        |workspace, (number, part_of_all)| {
+                            let mut found = Events::default();
+                            for (n, saved) in (number * part..).zip(part_of_all) {
+                                if stop.load(Relaxed) {
+                                    return Err((n, None));
+                                }
+                                let plant = restored(workspace, saved);
+                                let motion = (Drive::harmonic(amplitudes[n], omegas[n]), durations[n]);
+                                advance(plant, motion, n, events.then_some(&mut found), &stop)
+                                    .map_err(|error| (n, error))?;
+                                *saved = plant.save();
                             }
-                            let plant = restored(workspace, saved);
-                            let motion = (Drive::harmonic(amplitudes[n], omegas[n]), durations[n]);
-                            advance(plant, motion, n, events.then_some(&mut found), &flag)
-                                .map_err(|error| (n, error))?;
-                            *saved = plant.save();
-                        }
-                        Ok(found)
-                    },
-                )
-                .collect();
-            (next, found)
-        };
-        let (next, found) = may_leave(py, &stop, work)?;
+                            Ok(found)
+                        },
+                    )
+                    .collect::<Vec<Result<Events, (usize, Failure)>>>()
+            },
+        )?;
         let mut merged = Events::default();
         for found in found {
             merged.append(found.map_err(|(n, failure)| match failure {
@@ -475,8 +486,7 @@ impl Plants {
                 None => PyKeyboardInterrupt::new_err(()),
             })?);
         }
-        let before = std::mem::replace(&mut self.plants, Arc::new(next));
-        self.next = Arc::try_unwrap(before).unwrap_or_default();
+        std::mem::swap(plants, next);
         Ok(events.then(|| merged.into_arrays(py)))
     }
 

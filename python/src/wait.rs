@@ -39,39 +39,13 @@ pub fn wait<T: Send>(
                     failure.get_or_insert(error);
                 }
             }
-            let result = work.join().unwrap_or_else(|panic| std::panic::resume_unwind(panic));
-            failure.map_or(Ok(result), Err)
-        })
-    })
-}
-
-/// As [`wait`] for work that owns all it needs: after a signal it is left to its thread if it does not end at once.
-pub fn may_leave<T: Send + 'static>(
-    py: Python<'_>,
-    stop: &AtomicBool,
-    work: impl FnOnce() -> T + Send + 'static,
-) -> PyResult<T> {
-    py.detach(|| {
-        let (done, is_done) = channel();
-        // Nobody listens after a signal.
-        let thread = thread::spawn(move || done.send(work()).unwrap_or_default());
-        loop {
-            match is_done.recv_timeout(LOOK) {
-                Ok(result) => return Ok(result),
-                Err(RecvTimeoutError::Disconnected) => match thread.join() {
-                    Err(panic) => std::panic::resume_unwind(panic),
-                    Ok(()) => unreachable!("the thread sends its result"),
-                },
-                Err(RecvTimeoutError::Timeout) => {
-                    if let Err(error) = Python::attach(|py| py.check_signals()) {
-                        stop.store(true, Relaxed);
-                        // Mostly it ends at once. Then no core is busy for nothing.
-                        let _ = is_done.recv_timeout(2 * LOOK);
-                        return Err(error);
-                    }
-                }
+            match (failure, work.join()) {
+                // What the stop left of it, a panic too, is of no use.
+                (Some(failure), _) => Err(failure),
+                (None, Ok(result)) => Ok(result),
+                (None, Err(panic)) => std::panic::resume_unwind(panic),
             }
-        }
+        })
     })
 }
 

@@ -485,6 +485,35 @@ def test_ctrl_c_ends_a_batch_within_02_s_and_no_plant_has_advanced():
     assert batch.times.max() == 0.0
 
 
+def interrupted(work):
+    """Processor time from Ctrl-C to its exception, s: on a busy machine, too."""
+    sent = []
+
+    def interrupt():
+        sent.append(time.process_time())
+        os.kill(os.getpid(), signal.SIGINT)
+
+    threading.Timer(0.3, interrupt).start()
+    with pytest.raises(KeyboardInterrupt):
+        work()
+    return time.process_time() - sent[0]
+
+
+@pytest.mark.parametrize("omega", [1e-3, 1e6, 1e12])
+def test_ctrl_c_ends_plants_at_any_frequency(omega):
+    scene, drive = vines.Scene(), {"amplitude": 1.0, "omega": omega}
+    plant, batch = vines.Plant(scene), vines.Batch(scene, {"q2": [0.0, 0.001]})
+    for advance in (lambda: plant.advance(1e9, **drive), lambda: batch.advance(1e9, **drive, events=False)):
+        assert interrupted(advance) < 0.2 * os.cpu_count()
+    assert (plant.time, batch.times.max()) == (0.0, 0.0)
+
+
+def test_ctrl_c_ends_the_search_for_a_regime_at_any_frequency():
+    # A period of the base is as long as millions of the oscillator.
+    scene = vines.Scene(excitation={"G": 1000.0})
+    assert interrupted(lambda: vines.regime(scene, sigma=-118.96)) < 0.2 * os.cpu_count()
+
+
 @pytest.mark.parametrize("plants", [1, 2])
 def test_ctrl_c_ends_plants_in_the_middle_of_their_motion(plants):
     batch = vines.Batch(vines.Scene(), {"dq2": np.linspace(0.3, 0.6, plants)})

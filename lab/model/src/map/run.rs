@@ -47,6 +47,9 @@ pub struct Point {
 /// Number of events for which there is room at first.
 const EXPECTED: usize = 1024;
 
+/// Longest step of the plant, in times of the oscillator: some ten milliseconds where there is no impact.
+const STRETCH: f64 = 1e4;
+
 /// A simulated motion.
 pub struct Run {
     pub(super) scene: Dimensionless,
@@ -112,8 +115,7 @@ impl Run {
         })
     }
 
-    /// Ends the thread that follows the motion, by unwinding, at the next event after `stop` was set: one period of a slow base has
-    /// millions of them.
+    /// Ends the thread that follows the motion, by unwinding, soon after `stop` was set: one period of a slow base has millions of events.
     #[must_use]
     pub fn stopped_by(self, stop: Arc<AtomicBool>) -> Self {
         Self { stop, ..self }
@@ -142,7 +144,7 @@ impl Run {
         ]
     }
 
-    /// Follows the motion to the end of so many periods, in one step of the plant.
+    /// Follows the motion to the end of so many periods, in one step of the plant, or in [`STRETCH`]es.
     pub(super) fn follow(&mut self, periods: usize) -> Result<(), InvalidValue> {
         if periods <= self.periods {
             return Ok(());
@@ -150,21 +152,30 @@ impl Run {
         let (start, end) = (TAU * self.periods as f64, TAU * periods as f64);
         let omega = self.drive.omega;
         let Self { driven, moments, impacts, sticks, stop, .. } = self;
-        let mut now = moments[moments.len() - 1];
-        self.plant.advance_with(self.drive, (end - start) / omega, |event| {
+        let stopped = || {
             if stop.load(Relaxed) {
                 std::panic::resume_unwind(Box::new("the motion was stopped"));
             }
-            let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) = event;
-            let phase = start + omega * t;
-            now = driven.after(&now, phase, &event);
-            moments.push(now);
-            match event {
-                Event::Impact { velocity, .. } => impacts.push(Impact { time: phase, velocity }),
-                Event::Stuck { .. } => sticks.push(phase),
-                Event::Released { .. } => {}
-            }
-        })?;
+        };
+        let mut now = moments[moments.len() - 1];
+        let duration = (end - start) / omega;
+        let stretches = (duration / STRETCH).ceil().max(1.0);
+        for stretch in 0..stretches as u64 {
+            stopped();
+            let from = start + (end - start) * (stretch as f64 / stretches);
+            self.plant.advance_with(self.drive, duration / stretches, |event| {
+                stopped();
+                let (Event::Impact { t, .. } | Event::Stuck { t, .. } | Event::Released { t, .. }) = event;
+                let phase = from + omega * t;
+                now = driven.after(&now, phase, &event);
+                moments.push(now);
+                match event {
+                    Event::Impact { velocity, .. } => impacts.push(Impact { time: phase, velocity }),
+                    Event::Stuck { .. } => sticks.push(phase),
+                    Event::Released { .. } => {}
+                }
+            })?;
+        }
         moments.push(driven.moment(end, self.plant.state(), self.plant.contact()));
         let State { q1, dq1, q2, dq2 } = self.plant.state();
         self.periods = periods;
