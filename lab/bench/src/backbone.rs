@@ -2,17 +2,14 @@
 //! settled, and the drive amplitude and the frequency are measured.
 //!
 //! Under a constant drive, the response would take dozens of periods to settle at every level. The controller therefore controls
-//! the *response*, and the drive follows. A predictor computes drive and frequency of the next point from the points before, so that
-//! the loops have little to correct.
+//! the *response*, and the drive follows. The points before predict drive and frequency of the next one,
+//! so that the loops have little to correct.
 
-mod bench;
+mod level;
 mod peak;
 mod point;
-mod predictor;
-mod settle;
-mod sweep;
 mod track;
 
+pub use level::{Criterion, Found};
 pub use point::{Point, Tracked};
-pub use settle::{Criterion, Found};
 pub use track::{track, track_into};

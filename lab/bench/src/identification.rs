@@ -6,24 +6,21 @@ mod cycle;
 mod decay;
 mod fit;
 mod lock;
-mod motion;
 mod regime;
 mod response;
-mod slopes;
 
 use thiserror::Error;
 
 use crate::experiment::Record;
 use crate::scene::{Dimensionless, Scene};
 
-pub use balance::{Balance, PARABOLA};
+pub use balance::Balance;
 pub use cycle::Cycle;
 pub use decay::{DecayEnd, DecayPoint, DecayPoints, decay_points};
 pub use lock::Lock;
 use regime::longer_after;
 pub use regime::{classify, impacts};
 pub use response::regime_by_response;
-pub use slopes::Slopes;
 pub use vines_model::regime::{Impact, Regime};
 
 /// Why a record cannot be identified.

@@ -21,7 +21,7 @@ pub use lovines::Parameters;
 use lovines::State;
 use serde::Serialize;
 
-pub use backbone::{Backbone, Predictor};
+pub use backbone::Backbone;
 pub use chain::{Chain, RatioOf};
 pub use configuration::{PhaseOrigin, PhaseTarget};
 pub use controller::Controller;
@@ -77,6 +77,11 @@ impl Scene {
             definition: self.resonance,
             ..Dimensionless::of(&self.plant, self.amplitude)
         }
+    }
+
+    /// The linear response: as measured, otherwise that of the scene's plant.
+    pub fn linear(&self) -> LinearResponse {
+        self.measured.unwrap_or_else(|| LinearResponse::of(self))
     }
 
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.

@@ -5,9 +5,8 @@
 //! about resonance. The balances of amplitude and phase convert each point to the drive and the detuning of resonance, which hardly depend on
 //! the phase x from resonance, so that a parabola in x describes them. The drive at the phase x is `G(x)/cos x`; its minimum is the peak.
 
-use super::point::Point;
-use super::predictor::{self, Known};
-use crate::scene::Predictor;
+use super::point::{Known, Point};
+use super::track::extrapolated;
 use vines_model::{Dimensionless, numerics::mean};
 
 /// Phases from resonance at which every level is held, rad.
@@ -32,38 +31,33 @@ pub fn peaks(scans: &[Vec<Point>], scene: &Dimensionless) -> Vec<Point> {
     (0..levels)
         .map(|level| {
             let c = mean(scans.iter().map(|scan| scan[level].c));
-            let points: Vec<Point> = scans.iter().map(|scan| at_level(scan, level, c, scene)).collect();
+            let points: Vec<Point> = scans.iter().map(|scan| at_level(scan, level, c)).collect();
             peak(&points, scene.epsilon)
         })
         .collect()
 }
 
 /// A point corrected to the amplitude `c`, by the parabola through its neighbours in the same scan.
-fn at_level(scan: &[Point], level: usize, c: f64, scene: &Dimensionless) -> Point {
+fn at_level(scan: &[Point], level: usize, c: f64) -> Point {
     let first = level.saturating_sub(1).min(scan.len().saturating_sub(3));
     let usable = |n: &usize| *n != level && scan[*n].settled && scan[*n].reached;
     let others = (first..scan.len().min(first + 3)).filter(usable);
     // The nearest is the last but one, the last is the one that is corrected.
     let mut order: Vec<usize> = others.collect();
     order.sort_by_key(|n| std::cmp::Reverse(n.abs_diff(level)));
-    let known: Vec<Known> = order.into_iter().chain([level]).map(|n| scan[n].known()).collect();
-    let by = |predictor, known| predictor::change(predictor, known, c, scene);
-    let predictor = if known.len() == 1 {
-        Predictor::Theory
-    } else {
-        Predictor::Previous
-    };
-    let (change, simpler) = (
-        by(predictor, &known),
-        by(Predictor::Previous, &known[1.min(known.len() - 1)..]),
-    );
+    let known: Vec<Known> = order.into_iter().chain([level]).filter_map(|n| scan[n].known()).collect();
     let own = scan[level];
+    // The polynomial through all of them, and the one of a lower degree, less the value of the last.
+    let change = |known: &[Known]| {
+        extrapolated(known, c).map_or([0.0; 2], |there| [there.g - own.g, there.sigma - own.sigma])
+    };
+    let (change, simpler) = (change(&known), change(&known[1.min(known.len().saturating_sub(1))..]));
     Point {
         c,
-        g: own.g + change.0,
-        sigma: own.sigma + change.1,
-        u_g: own.u_g.hypot(change.0 - simpler.0),
-        u_sigma: own.u_sigma.hypot(change.1 - simpler.1),
+        g: own.g + change[0],
+        sigma: own.sigma + change[1],
+        u_g: own.u_g.hypot(change[0] - simpler[0]),
+        u_sigma: own.u_sigma.hypot(change[1] - simpler[1]),
         ..own
     }
 }

@@ -2,11 +2,18 @@
 
 use serde::Serialize;
 
-use super::predictor::Known;
-use super::settle::Found;
+use super::level::Found;
 use crate::experiment::ExperimentError;
 use crate::identification::Regime;
 use vines_model::Dimensionless;
+
+/// A working point: response amplitude, drive amplitude, detuning; dimensionless.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Known {
+    pub c: f64,
+    pub g: f64,
+    pub sigma: f64,
+}
 
 /// One point of the backbone; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -48,8 +55,10 @@ pub struct Point {
 }
 
 impl Point {
-    pub(super) fn known(&self) -> Known {
-        Known { c: self.c, g: self.g, sigma: self.sigma }
+    /// Where it is, if it has values.
+    pub(super) fn known(&self) -> Option<Known> {
+        let is_known = self.g.is_finite() && self.sigma.is_finite();
+        is_known.then_some(Known { c: self.c, g: self.g, sigma: self.sigma })
     }
 
     /// A level by an estimate, of which nothing else is known yet.

@@ -1,13 +1,14 @@
 //! The tracking of the backbone.
 
-use super::bench::{Bench, Order};
+use std::f64::consts::TAU;
+
+use vines_model::numerics::Estimate;
+
+use super::level::{Criterion, Found};
 use super::peak;
-use super::point::{Point, Tracked};
-use super::predictor::{self, FIRST, Known, LAST, PHASE};
-use super::settle::Found;
-use super::sweep::Sweep;
+use super::point::{Known, Point, Tracked};
 use crate::experiment::{self, ExperimentError, Sample, Stage};
-use crate::identification::Cycle;
+use crate::identification::{Cycle, Regime, classify, regime_by_response};
 use crate::rig::{Controller, LoopState, Move, Rig};
 use crate::scene::Scene;
 
@@ -15,8 +16,36 @@ use crate::scene::Scene;
 const NEAR: f64 = 0.35;
 /// Periods for which the phase error must have been that small.
 const NEAR_FOR: usize = 3;
+/// Periods between a move and the first that is measured: the loops and the particle follow late.
+const LATE: usize = 8;
+/// Periods of the first level more than those, because the start of the loop disturbs the particle, too.
+const FIRST: usize = 24;
 /// Periods in succession in which the criterion must be met: the halves of a transient can agree by chance.
 const CONFIRMED: usize = 3;
+/// Share of the drive that a move may need in addition to the drive that holds the response.
+const MOVE_SHARE: f64 = 0.8;
+/// Largest relative difference of the response from its level that counts as reached.
+const REACHED: f64 = 0.01;
+/// Relative standard uncertainty of a slope that is that between the two points before: near the fold it grows by a half from level to level.
+const SLOPE: f64 = 0.5;
+
+/// Rig and controller, read period by period.
+struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
+    run: experiment::Bench<'a, R, C>,
+    scene: &'a Scene,
+    stage: Stage,
+    target: f64,
+}
+
+/// What is to be held next.
+struct Order<'a> {
+    /// Response amplitude over b.
+    level: f64,
+    /// Phase error, rad.
+    phase: f64,
+    /// The points before, at this phase.
+    known: &'a [Known],
+}
 
 /// Tracks the backbone of `scene`.
 ///
@@ -47,7 +76,6 @@ pub fn track_into(
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
-        last: None,
     };
     bench.approach()?;
     let periods_to_lock = bench.run.periods;
@@ -72,17 +100,22 @@ pub fn track_into(
     Ok(Tracked { points, periods_to_lock, periods, ended })
 }
 
-/// The points of a scan; before its first, the last one of another.
-fn known(scan: &[Point], last: Option<(Point, f64)>) -> Vec<Known> {
-    let finite = |known: &Known| known.g.is_finite() && known.sigma.is_finite();
-    let own: Vec<Known> = scan.iter().map(Point::known).filter(finite).collect();
-    match own.is_empty() {
-        true => last.iter().map(|(point, _)| point.known()).filter(finite).collect(),
-        false => own,
-    }
-}
-
 impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
+    /// One period of the drive.
+    fn cycle(&mut self) -> Result<Cycle, ExperimentError> {
+        loop {
+            let begin = self.run.samples.len();
+            let first = self.run.periods;
+            while self.run.periods < first.floor() + 1.0 {
+                self.run.sample(self.stage)?;
+            }
+            let samples = &self.run.samples[begin..];
+            if let Some(cycle) = Cycle::of(samples, self.run.sample_time, first * TAU, self.target) {
+                return Ok(cycle);
+            }
+        }
+    }
+
     /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
     fn approach(&mut self) -> Result<(), ExperimentError> {
         let mut near = 0;
@@ -116,80 +149,34 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
     ) -> Result<(), ExperimentError> {
         let levels = self.scene.backbone.levels();
         // The last point, and the phase at which it was held.
-        let mut last = None::<(Point, f64)>;
-        let mut sweep = Sweep::default();
+        let mut last = None::<(Known, f64)>;
         for (n, &level) in levels.iter().enumerate() {
             progress(n, levels.len());
             for k in 0..phases.len() {
                 // The next level begins at the phase at which this one ends.
                 let scan = if n % 2 == 0 { k } else { phases.len() - 1 - k };
-                let order = Order { level, phase: phases[scan], known: known(&scans[scan], last) };
-                // The last level is held: a crossing would go beyond it.
-                let crossed = last.filter(|_| phases.len() == 1 && n + 1 < levels.len());
-                let after = levels.get(n + 1).filter(|_| n + 2 < levels.len()).copied();
-                let periods = |(last, _)| Some((last, sweep.periods(self.scene, &self.last?, &order, &last, after)?));
-                let point = if let Some((last, periods)) = crossed.and_then(periods) {
-                    sweep.cross(self, &order, (&last, periods))?
-                } else {
-                    sweep = Sweep::default();
-                    self.go(&order, last)?
-                };
-                last = Some((point, order.phase));
-                if let Some(before) = scans[scan].last_mut() {
-                    sweep.refine(self.scene, before);
-                }
+                let known: Vec<Known> = scans[scan].iter().filter_map(Point::known).collect();
+                let order = Order { level, phase: phases[scan], known: &known };
+                let point = self.hold(&order, last)?;
+                last = point.known().map(|known| (known, order.phase)).or(last);
                 scans[scan].push(point);
             }
         }
         Ok(())
     }
 
-    /// Goes to the next level or phase and holds it.
-    fn go(&mut self, order: &Order, last: Option<(Point, f64)>) -> Result<Point, ExperimentError> {
-        let d = self.scene.dimensionless();
-        let Order { level, phase, ref known } = *order;
-        let (g, sigma) = predictor::change(self.scene.backbone.predictor, known, level, &d);
-        let expected = known
-            .last()
-            .map(|one| Known { c: level, g: one.g + g, sigma: one.sigma + sigma });
-        let present = last.map(|(point, phase)| peak::at_phase(&point.known(), phase, d.epsilon));
-        let change = expected.zip(present).map(|(expected, present)| {
-            let then = peak::at_phase(&expected, phase, d.epsilon);
-            [then[0] - present[0], then[1] - present[1]]
-        });
-        let [g, sigma] = change
-            .filter(|change| change.iter().all(|one| one.is_finite()))
-            .unwrap_or([0.0; 2]);
-        let from = last.map(|(point, _)| point.known());
-        let periods = predictor::move_periods(self.scene, from.as_ref(), level);
-        let to = Move {
-            response: level * d.b,
-            duration: periods * d.natural_period(),
-            amplitude: d.amplitude(g),
-            omega: d.omega_change(sigma),
-            growth: 0.0,
-        };
-        self.run.controller.hold_response(to, self.target + phase)?;
-        let changed = last.map_or(FIRST, |(_, held)| {
-            if held == phase {
-                predictor::late(&d, level) - LAST
-            } else {
-                PHASE
-            }
-        });
-        self.hold(order, periods + changed)
-    }
-
-    /// Waits for the end of a move and holds the level until the point has settled.
-    fn hold(&mut self, order: &Order, move_periods: f64) -> Result<Point, ExperimentError> {
-        let start = self.run.periods;
+    /// Goes to a level and phase, and holds them until the point has settled, or for the longest time allowed.
+    fn hold(&mut self, order: &Order, last: Option<(Known, f64)>) -> Result<Point, ExperimentError> {
+        let (start, settings) = (self.run.periods, &self.scene.backbone);
+        let (to, periods) = self.step(order, last);
+        self.run.controller.hold_response(to, self.target + order.phase)?;
         self.run.samples.clear();
-        while self.run.periods - start < move_periods {
+        let late = if last.is_some() { LATE } else { FIRST + LATE };
+        while self.run.periods - start < periods + late as f64 {
             self.cycle()?;
         }
         let criterion = order.criterion(self.scene);
         let mut cycles: Vec<Cycle> = Vec::new();
-        let most = self.scene.backbone.dwell_max as usize;
         let mut confirmed = 0;
         let found = loop {
             cycles.push(self.cycle()?);
@@ -197,11 +184,107 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
             let is_met =
                 found.is_some_and(|found| criterion.is_met(&found) && order.is_reached(self.scene, found.response));
             confirmed = if is_met { confirmed + 1 } else { 0 };
-            if cycles.len() >= most || confirmed >= CONFIRMED {
+            if cycles.len() >= settings.dwell_max as usize || confirmed >= CONFIRMED {
                 break found;
             }
         };
-        let said = found.unwrap_or_else(|| Found::unsettled(&cycles[cycles.len() / 2..]));
+        let said = found.unwrap_or_else(|| Found::means(&cycles[cycles.len() / 2..]));
         Ok(self.point(order, start, &said, &cycles, &criterion))
     }
+
+    /// The move to a level and phase, and its periods: those of the scene, or as many as the drive needs to change the response that much.
+    fn step(&self, order: &Order, last: Option<(Known, f64)>) -> (Move, f64) {
+        let d = self.scene.dimensionless();
+        let Order { level, phase, known } = *order;
+        let slowest = last.map_or(0.0, |(last, _)| {
+            (level - last.c).abs() * d.b / (MOVE_SHARE * 0.5 * d.amplitude(last.g) * TAU)
+        });
+        // A smooth move is twice as fast in its middle as on average.
+        let periods = self.scene.backbone.move_periods.max(2.0 * slowest);
+        let change = extrapolated(known, level).zip(last).map(|(expected, (last, held))| {
+            let [then, now] = [(expected, phase), (last, held)].map(|(one, phase)| peak::at_phase(&one, phase, d.epsilon));
+            [then[0] - now[0], then[1] - now[1]]
+        });
+        let [g, sigma] = change.unwrap_or_default();
+        let to = Move {
+            response: level * d.b,
+            duration: periods * d.natural_period(),
+            amplitude: d.amplitude(g),
+            omega: d.omega_change(sigma),
+            growth: 0.0,
+        };
+        (to, periods)
+    }
+
+    /// The point of an estimate from the last of some periods, for a move that began at `start`, in periods.
+    fn point(&self, order: &Order, start: f64, said: &Found, cycles: &[Cycle], criterion: &Criterion) -> Point {
+        let samples = cycles[cycles.len() - said.periods..].iter().map(|cycle| cycle.samples);
+        let averaged = &self.run.samples[self.run.samples.len() - samples.sum::<usize>()..];
+        let [base, omega] = said.at;
+        let regime = regime_by_response(averaged, self.scene, base.value, omega.value);
+        let reached = order.is_reached(self.scene, said.response);
+        Point {
+            periods: self.run.periods - start,
+            regime,
+            regime_by_impacts: self.run.samples[0]
+                .ground_truth
+                .map(|_| classify(averaged, self.run.sample_time, omega.value).1),
+            // An irregular motion can seem steady for a while.
+            settled: reached && regime != Regime::Other && criterion.is_met(said),
+            reached,
+            ..Point::new(order.level, said, &self.scene.dimensionless())
+        }
+    }
+}
+
+impl Order<'_> {
+    /// The criterion for a settled point.
+    fn criterion(&self, scene: &Scene) -> Criterion {
+        let (settings, d) = (&scene.backbone, scene.dimensionless());
+        let share = if scene.resonance.is_peak() {
+            peak::share_of_drive(self.level)
+        } else {
+            1.0
+        };
+        let slopes = match self.known {
+            [.., before, last] if before.c != last.c => {
+                let slope = |difference: f64| {
+                    let slope = difference / (d.b * (last.c - before.c));
+                    Estimate { value: slope, uncertainty: SLOPE * slope.abs() }
+                };
+                Some([
+                    slope(d.amplitude(last.g - before.g)),
+                    slope(d.omega_change(last.sigma - before.sigma)),
+                ])
+            }
+            _ => None,
+        };
+        Criterion {
+            linear: scene.linear(),
+            precision: [share * d.amplitude(settings.precision), d.omega_change(settings.precision)],
+            fewest: settings.dwell_min as usize,
+            phase: self.phase,
+            slopes,
+        }
+    }
+
+    /// Whether a response, m, is at the level.
+    fn is_reached(&self, scene: &Scene, response: Estimate) -> bool {
+        let Estimate { value, uncertainty } = response.scaled(1.0 / scene.dimensionless().b);
+        (value - self.level).abs() <= (REACHED * self.level).max(4.0 * uncertainty)
+    }
+}
+
+/// Drive and detuning at the level `c`, on the polynomial through the last points, three at most; `None` without any.
+pub(super) fn extrapolated(known: &[Known], c: f64) -> Option<Known> {
+    let points = &known[known.len().saturating_sub(3)..];
+    let weights = points.iter().enumerate().map(|(i, point)| {
+        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
+        (point, others.map(|(_, other)| (c - other.c) / (point.c - other.c)).product::<f64>())
+    });
+    let sum = weights.fold([0.0; 2], |[g, sigma], (point, weight)| {
+        [g + weight * point.g, sigma + weight * point.sigma]
+    });
+    let known = Known { c, g: sum[0], sigma: sum[1] };
+    (!points.is_empty() && known.g.is_finite() && known.sigma.is_finite()).then_some(known)
 }

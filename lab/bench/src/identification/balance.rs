@@ -1,26 +1,28 @@
-//! Phase resonance from the balances of amplitude and phase: the estimator of locked and of tracked points.
+//! The one fit: phase resonance from the balances of amplitude and phase, over any window of periods.
 //!
-//! Near phase resonance, amplitude A and phase Theta of the response to a base of the amplitude E obey
-//!
-//! ```text
-//! A' = g (E cos phi - E_R(A)),      Theta' = omega_R(A) - (g E/A) sin phi,      g = omega0^2/(2 omega)
-//! ```
-//!
-//! with the phase error phi. The drive `E_R` and the frequency `omega_R` of phase resonance follow for any history of drive and
-//! frequency, from straight lines in time:
+//! Near resonance a rig, whatever is inside it, is described by two functions of the amplitude A of its response: the drive `E_R(A)` that
+//! holds it at phase resonance, and the frequency `omega_R(A)`. For any slow history of drive E, frequency and phase error phi,
 //!
 //! ```text
-//! A - integral of g E cos phi = const - g E_R t,      Theta + integral of (g E/A) sin phi = const + omega_R t
+//! A' = g (E cos phi - E_R(A)),      Theta' = omega_R(A) - (g E/A) sin phi,      g = omega0^2/(2 omega).
 //! ```
 //!
-//! Where A varies within the periods used, `E_R` and `omega_R` are linear in it, which adds the integral of `A - mean A` to the
-//! lines. docs/estimators.md derives the uncertainties.
+//! Integrated over time, these are straight lines if A is constant. Where it varies within the window, `E_R` and `omega_R` are linear in it:
+//!
+//! ```text
+//! A - integral of g E cos phi = const - g E_R t - g dE_R/dA integral of (A - mean A),
+//! Theta + integral of (g E/A) sin phi = const + omega_R t + domega_R/dA integral of (A - mean A).
+//! ```
+//!
+//! Both are linear least squares, weighted by the noise that the fits of the periods find. Nothing in them is known of the rig but
+//! `omega0` and the damping. A slope is measured where the amplitude varies and has no influence where it does not; a wide prior, or
+//! that of the points next to it, bounds what noise may make of it.
 
 use nalgebra::Complex;
 use vines_model::numerics::{Estimate, Prior, Regression, mean, slope};
 
-use super::motion::{Motion, motion};
-use super::{Cycle, Slopes};
+use super::Cycle;
+use crate::scene::LinearResponse;
 
 /// The two lines, fitted to some periods.
 #[derive(Debug, Clone)]
@@ -29,14 +31,14 @@ pub struct Balance {
     pub response: Estimate,
     /// Standard uncertainty of the amplitude, m, that drive and frequency belong to: its noise within the integrals.
     pub u_level: f64,
+    /// Mean change of the amplitude in a period, m.
+    pub change: f64,
     /// Mean phase error, rad.
     pub phase_error: Estimate,
-    /// Largest scatter of the residuals over the noise of the sensors.
+    /// Largest scatter of the residuals over the noise of the sensors: the root of chi-square per degree of freedom.
     pub excess: f64,
-    /// g.
-    gain: f64,
-    /// Variance of the amplitude within the periods, m², and the curvatures of the backbone.
-    bend: (f64, [f64; 2]),
+    /// g, 1/s.
+    pub gain: f64,
     /// Measured over commanded amplitude of the base.
     calibration: f64,
     /// Coefficients: constant, time, and integral of the amplitude's deviation.
@@ -48,22 +50,24 @@ pub struct Balance {
     within: [f64; 2],
 }
 
-/// Size of the neglected terms relative to those of the second order.
+/// Size of the neglected terms of the second order relative to those that are kept: they have the same form, and a factor below 1.
 const REMAINDER: f64 = 0.7;
-/// Relative uncertainty of the effect of a phase beyond that which is held.
-const ASIDE: f64 = 0.5;
-/// A slope weighs integrated noise by a parabola, whose variance is this multiple of that of a mean.
-pub const PARABOLA: f64 = 1.2;
+/// A slope weighs integrated noise by a parabola, whose variance is 6/5 of that of a mean.
+const PARABOLA: f64 = 1.2;
+/// Standard deviation of a slope of which nothing is known, in units of its natural scale: `E/A`, and `g E/A²`. The slopes of vibro-impact rigs are
+/// from -1 to 3 of them.
+const WIDE: f64 = 3.0;
 
 impl Balance {
-    /// From at least four periods of an oscillator of the natural frequency `omega0`, rad/s.
+    /// From at least four periods of a rig whose linear response is `linear`, held at the phase error `held`, rad. `slopes`: what is
+    /// known of the slopes of `E_R` and `omega_R` over the amplitude.
     #[must_use]
-    pub fn of(cycles: &[Cycle], omega0: f64, slopes: &Slopes) -> Option<Self> {
+    pub fn of(cycles: &[Cycle], linear: &LinearResponse, held: f64, slopes: Option<[Estimate; 2]>) -> Option<Self> {
         let n = cycles.len() as f64;
         if cycles.len() < 4 {
             return None;
         }
-        let omega = mean(cycles.iter().map(|cycle| cycle.omega));
+        let (omega, omega0) = (mean(cycles.iter().map(|cycle| cycle.omega)), linear.omega0);
         let gain = 0.5 * omega0 * omega0 / omega;
         let motion = motion(cycles);
         let response = mean(motion.iter().map(|one| one.amplitude));
@@ -74,43 +78,41 @@ impl Balance {
         let noise = noise.max(1e-14 * response);
         let middle = mean(cycles.iter().map(|cycle| cycle.time));
         let time: Vec<f64> = cycles.iter().map(|cycle| cycle.time - middle).collect();
-        let spread = mean(motion.iter().map(|one| (one.amplitude - response).powi(2)));
-        // The effect of the drift is curved as well.
-        let rate = growth(cycles, Cycle::amplitude);
-        let curvature = [0, 1].map(|i| slopes.curvature[i] + rate * slopes.bending[i]);
-        let bend = ((spread - noise * noise).max(0.0), curvature);
         let deviation = integral(&time, motion.iter().map(|one| one.amplitude - response));
         let columns = [vec![1.0; cycles.len()], time, deviation];
         let calibration = total(cycles, |cycle| cycle.base.norm()) / total(cycles, |cycle| cycle.commanded[0].norm());
         let drives = drives(cycles, &motion, calibration);
+        // The damper's force on the base leads it by twice the damping ratio.
+        let lead = 2.0 * linear.damping_rate / omega0;
+        let beyond = |drive: Complex<f64>| lead * (drive * Complex::from_polar(1.0, -held)).im;
         // The integral of A' is A. Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
-        let [late, turned] = [1.0 + gain * slopes.drift[0], slopes.drift[1]];
         let balanced = motion.into_iter().zip(&drives).map(|(one, Drive { force, work })| {
-            let worked = gain * (work.re + slopes.beyond(*work));
-            let phase = one.phase + (gain * work.im - inertia * force.re) / response - turned * one.amplitude;
-            (one.amplitude * late - inertia * force.im - worked, phase)
+            let amplitude = one.amplitude - inertia * force.im - gain * (work.re + beyond(*work));
+            (amplitude, one.phase + (gain * work.im - inertia * force.re) / response)
         });
         let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
-        let prior = |[value, uncertainty]: [f64; 2]| [Prior { coefficient: 2, value, uncertainty }];
-        let [slope, width] = slopes.base;
-        let drive = Regression::fit(&columns, &amplitudes, &prior([-gain * slope, gain * width]), noise)?;
-        let turning = Regression::fit(&columns, &phases, &prior(slopes.omega), noise / response)?;
-        let remainders = remainders(cycles, &drives, [inertia, gain, response], slopes);
+        let scale = [base / response, gain * base / (response * response)];
+        let unknown = scale.map(|scale| Estimate { value: 0.0, uncertainty: WIDE * scale });
+        let [by_base, by_omega] = slopes.unwrap_or(unknown);
+        let prior = |Estimate { value, uncertainty }| [Prior { coefficient: 2, value, uncertainty }];
+        let drive = Regression::fit(&columns, &amplitudes, &prior(by_base.scaled(-gain)), noise)?;
+        let turning = Regression::fit(&columns, &phases, &prior(by_omega), noise / response)?;
+        let mut force = drives.iter().map(|drive| drive.force.re);
+        let neglected = REMAINDER * inertia * growth(cycles, |_| force.next().unwrap_or_default());
         let phase_noise = (noise / response).hypot(base_noise / base);
-        let excess = drive.excess.max(turning.excess);
         let of = |value, noise: f64| Estimate { value, uncertainty: noise / n.sqrt() };
         Some(Self {
             response: of(response, noise),
             u_level: noise * (PARABOLA / n).sqrt(),
+            change: slope(&cycles.iter().map(Cycle::amplitude).collect::<Vec<f64>>()),
             phase_error: of(phase_error, phase_noise),
-            excess,
+            excess: drive.excess.max(turning.excess),
             gain,
-            bend,
             calibration,
             drive,
             turning,
-            remainders,
+            remainders: [neglected / gain, neglected / response].map(f64::abs),
             within: [
                 base_noise / n.sqrt(),
                 gain * base / response * phase_noise * (PARABOLA / n).sqrt(),
@@ -138,14 +140,6 @@ impl Balance {
         ]
     }
 
-    /// What the curvature of the backbone adds to `E_R`, m, and `omega_R`, rad/s, of amplitudes that vary evenly: a slope weighs the
-    /// rates by a parabola.
-    #[must_use]
-    pub fn bent(&self) -> [f64; 2] {
-        let (spread, curvature) = self.bend;
-        curvature.map(|curvature| 0.3 * curvature * spread)
-    }
-
     /// Frequency, rad/s, and amplitude, m, that a constant base of the commanded amplitude `command`, m, leads to.
     ///
     /// The base sensor calibrates both this base and the drive that it is compared with; its noise cancels.
@@ -153,37 +147,67 @@ impl Balance {
     pub fn limit(&self, command: f64) -> [Estimate; 2] {
         let [by_base, by_omega] = self.slopes().map(|slope| slope.value);
         let ahead = (command * self.calibration - self.at(0.0)[0].value) / by_base;
-        let drive = self.drive.estimate(&[0.0, 1.0, ahead]).scaled(1.0 / self.gain);
-        // The backbone is not straight from the amplitudes measured to the limit.
-        let (spread, curvature) = self.bend;
-        let bent = curvature.map(|curvature| 0.5 * curvature * (ahead * ahead + spread));
         // The uncertainty of the slope is in that of the drive at the limit.
-        let aside = drive.uncertainty.hypot(bent[0]) / by_base;
+        let aside = self.drive.estimate(&[0.0, 1.0, ahead]).scaled(1.0 / self.gain).uncertainty / by_base;
         let turning = self.at(ahead)[1];
         // The noise within the integrals moves the amplitude that the frequency belongs to as it moves the limit: it cancels.
         [
-            Estimate::new(turning.value, &[turning.uncertainty, by_omega * aside, bent[1]]),
+            Estimate::new(turning.value, &[turning.uncertainty, by_omega * aside]),
             Estimate::new(self.response.value + ahead, &[self.u_level, aside]),
         ]
     }
+}
+
+/// The response of a period.
+struct Motion {
+    /// m
+    amplitude: f64,
+    /// rad
+    phase: f64,
+    /// Phase less that of the fit, rad.
+    correction: f64,
+}
+
+/// Amplitudes and phases of the response, continuous from period to period, without the influence of their own drift.
+///
+/// Over one period from the phase 0 on, a drift z' of the complex amplitude per radian changes the fitted amplitude by
+/// -i conj(z')/2.
+fn motion(cycles: &[Cycle]) -> Vec<Motion> {
+    let mut before = cycles[0].response[0];
+    let mut turned = before.arg();
+    let phases: Vec<f64> = cycles
+        .iter()
+        .map(|cycle| {
+            turned += (cycle.response[0] * before.conj()).arg();
+            before = cycle.response[0];
+            cycle.drive_phase + turned
+        })
+        .collect();
+    let last = cycles.len() - 1;
+    (0..=last)
+        .map(|n| {
+            let (from, to) = (n.saturating_sub(1), (n + 1).min(last));
+            let time = (cycles[to].time - cycles[from].time) * cycles[n].omega;
+            let growth = (cycles[to].amplitude() - cycles[from].amplitude()) / time;
+            let amplitude = cycles[n].amplitude();
+            // The frequency of the drive may jump from period to period; that of the response does not.
+            let turning = amplitude * ((phases[to] - phases[from]) / time - 1.0);
+            let z = cycles[n].response[0];
+            let drift = Complex::new(growth, turning) * z / amplitude;
+            let correction = Complex::new(0.0, 0.5) * drift.conj() / z;
+            Motion {
+                amplitude: amplitude * (1.0 + correction.re),
+                phase: phases[n] + correction.im,
+                correction: correction.im,
+            }
+        })
+        .collect()
 }
 
 /// Slope of a value over time.
 fn growth(cycles: &[Cycle], value: impl FnMut(&Cycle) -> f64) -> f64 {
     let duration = cycles[cycles.len() - 1].time - cycles[0].time;
     slope(&cycles.iter().map(value).collect::<Vec<f64>>()) * cycles.len() as f64 / duration
-}
-
-/// Sizes of the terms beyond those of the second order and beyond the drift: a share of them.
-fn remainders(cycles: &[Cycle], drives: &[Drive], [inertia, gain, response]: [f64; 3], slopes: &Slopes) -> [f64; 2] {
-    let mut force = drives.iter().map(|drive| drive.force.re);
-    let inertial = REMAINDER * inertia * growth(cycles, |_| force.next().unwrap_or_default());
-    let drift = slopes.late * growth(cycles, Cycle::amplitude);
-    let aside = mean(drives.iter().map(|drive| slopes.beyond(drive.force)));
-    [
-        (inertial / gain).hypot(drift * slopes.drift[0]).hypot(ASIDE * aside),
-        (inertial / response).hypot(drift * slopes.drift[1]),
-    ]
 }
 
 /// Integral over time from the first value on, by the trapezoidal rule.

@@ -4,13 +4,12 @@ use serde::Serialize;
 
 use vines_model::numerics::{Estimate, mean};
 use vines_model::regime::Regime;
-use vines_model::theory::{BranchSide, Manifold};
 
 use super::regime::classify;
 use super::response::regime_by_response;
-use super::{Balance, Cycle, Slopes};
+use super::{Balance, Cycle};
 use crate::experiment::Record;
-use crate::scene::Scene;
+use crate::scene::{LinearResponse, Scene};
 
 /// The locked point as measured over the hold; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -80,30 +79,17 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let target = scene.phase_target().radians();
     let held = Cycle::all(hold, dt, target);
     let approach = approached(record, scene, target, &held);
-    let slopes = Slopes::by_theory(&d, mean(held.iter().map(Cycle::amplitude)) / d.b, 0.0);
     // The drive of the hold decides where the approach ends.
-    let [base, phase_error, response] = means(&held);
+    let [base, phase_error, _] = means(&held);
     let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
-    let [omega, limit] = limits(&approach, d.omega0, command, &slopes)?;
+    let [omega, limit] = limits(&approach, &scene.linear(), command)?;
     let speeds: Option<Vec<f64>> = hold
         .iter()
         .map(|s| s.ground_truth.map(|w| d.speed(w.particle_velocity.abs())))
         .collect();
-    let b_slope = b_slope(scene, limit.value / d.b);
-    let remaining = (limit.value - response.value) / d.b;
     let b = speeds.map(|speeds| {
-        let per_period: Vec<f64> = speeds
-            .chunks(hold.len().div_ceil(held.len()))
-            .map(|c| mean(c.iter().copied()))
-            .collect();
-        let value = Estimate::mean(&per_period);
-        // The hold belongs to the periods that give the limit: of their noise, a half is common to both.
-        let [one, other] = [limit, response].map(|estimate| estimate.uncertainty.powi(2));
-        let rest = ((one - other).abs() + 0.5 * one.min(other)).sqrt();
-        Estimate::new(
-            value.value + b_slope * remaining,
-            &[value.uncertainty, b_slope * rest / d.b],
-        )
+        let per_period = speeds.chunks(hold.len().div_ceil(held.len())).map(|c| mean(c.iter().copied()));
+        Estimate::mean(&per_period.collect::<Vec<f64>>())
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
         (count, Regime::Unknown) => (count, regime_by_response(hold, scene, base.value, omega.value)),
@@ -131,8 +117,8 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
 ///
 /// The later periods are nearer to it, the longer record has less noise. Where the second half of the periods disagrees with all
 /// of them beyond the noise, the difference is a part of the uncertainty; the periods with the smallest uncertainty count.
-fn limits(approach: &[Cycle], omega0: f64, command: f64, slopes: &Slopes) -> Option<[Estimate; 2]> {
-    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, omega0, slopes)?.limit(command));
+fn limits(approach: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
+    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, 0.0, None)?.limit(command));
     let mut best = limit(approach)?;
     let mut cycles = approach;
     let mut first = true;
@@ -183,12 +169,4 @@ fn means(held: &[Cycle]) -> [Estimate; 3] {
         },
         Estimate { value: response, uncertainty: noise },
     ]
-}
-
-/// Slope of the particle speed over the amplitude `c` by first-order theory.
-fn b_slope(scene: &Scene, c: f64) -> f64 {
-    let manifold = Manifold::new(scene.plant.restitution);
-    manifold
-        .b(c, BranchSide::Right)
-        .map_or(0.0, |b| 2.0 * c * manifold.slope(b))
 }

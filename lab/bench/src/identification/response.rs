@@ -82,7 +82,8 @@ pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, omega: f
     let Some(content) = Content::of(samples, scene.sample_time(), omega) else {
         return Regime::Unknown;
     };
-    if content.rest > STEADY && content.noise < NOISE_SHARE * content.rest {
+    let is_noise = content.noise >= NOISE_SHARE * content.rest;
+    if content.rest > STEADY && !is_noise {
         return Regime::Other;
     }
     // The particle's speed is about b omega; the order of magnitude is sufficient.
@@ -104,7 +105,7 @@ pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, omega: f
         Regime::Symmetric
     } else if is_linear == Some(true) {
         Regime::NoImpacts
-    } else if is_linear == Some(false) && significant > least {
+    } else if is_linear == Some(false) && significant > least && is_noise {
         Regime::Unresolved
     } else {
         Regime::NotEstablished

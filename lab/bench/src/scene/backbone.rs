@@ -4,18 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::{Controller, SceneError, validate::Quantity};
 
-/// What predicts the frequency and the drive at the next level.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Predictor {
-    /// The points before it; works on any rig.
-    Previous,
-    /// First-order theory: the difference between the two levels.
-    Theory,
-    /// Nothing: the loops find them.
-    None,
-}
-
 /// How the response amplitude is stepped with the loop closed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -39,13 +27,8 @@ pub struct Backbone {
     pub dwell_min: u32,
     /// Periods after which a point is taken, settled or not.
     pub dwell_max: u32,
-    /// Largest part of the uncertainties of sigma and G that is not noise: remaining transients.
-    pub tolerance: f64,
-    /// Largest standard uncertainties of sigma and G; noise lengthens the dwell until they are reached.
+    /// Largest standard uncertainties of sigma and G; noise and transients lengthen the dwell until they are reached.
     pub precision: f64,
-    /// What predicts the next point's frequency and drive.
-    #[serde(alias = "feed")]
-    pub predictor: Predictor,
 }
 
 impl Default for Backbone {
@@ -59,9 +42,7 @@ impl Default for Backbone {
             move_periods: 4.0,
             dwell_min: 8,
             dwell_max: 150,
-            tolerance: 5e-4,
             precision: 1.25e-3,
-            predictor: Predictor::Previous,
         }
     }
 }
@@ -102,7 +83,6 @@ impl Backbone {
             (least..=10_000).contains(&most),
             format!("must be from dwell_min = {least} to 10000"),
         )?;
-        Quantity::new("backbone.tolerance", self.tolerance, "(relative)").positive()?;
         Quantity::new("backbone.precision", self.precision, "(relative)").positive()
     }
 }

@@ -5,9 +5,7 @@ use std::f64::consts::PI;
 use lovines::State;
 use phase_lock::{Config, LockCriterion};
 use serde::Serialize;
-use vines_model::numerics::bisection;
 use vines_model::orbit::phase_resonant;
-use vines_model::theory::backbone_at_level;
 
 use super::{Resonance, Scene, Sensor, plant::symbols};
 use crate::advice;
@@ -209,18 +207,14 @@ impl Scene {
 
     /// Largest bandwidth of the loops of phase and amplitude, in units of omega0, at which their coupling is weak. A drive that changes shifts
     /// the phase that the detectors read, and a frequency that changes shifts the amplitude. From loop to loop the gain is the cube of the
-    /// bandwidth times C/(epsilon G).
+    /// bandwidth times A/E, which is largest without impacts: the inverse of twice the damping ratio.
     fn coupled_bandwidth(&self) -> f64 {
-        let d = self.dimensionless();
-        let c = self.backbone.c_from.max(self.backbone.c_to);
-        backbone_at_level(&d, c).map_or(f64::INFINITY, |point| {
-            let cube = d.epsilon * point.g / c;
-            COUPLED * bisection(0.0, cube.max(1.0), |root| root.powi(3) < cube).0
-        })
+        let linear = self.linear();
+        COUPLED * (2.0 * linear.damping_rate / linear.omega0).max(f64::MIN_POSITIVE).cbrt()
     }
 }
 
-/// That bandwidth over the cube root of epsilon G/C, where a crossing takes away three quarters of the drive.
+/// That bandwidth over the cube root of E/A.
 const COUPLED: f64 = 0.9;
 /// Lowest damping lambda that counts for the lock criterion and the largest drive: with less, most of the energy is lost in impacts.
 const LAMBDA_MIN: f64 = 0.01;
