@@ -47,7 +47,7 @@ const BESIDE: f64 = 0.02;
 const RANDOM: f64 = 2.0;
 /// Periods by which the impacts follow a change of the amplitude late: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
 /// (studies/off_scene.rs).
-const LAG: f64 = 1.0;
+const LAG: f64 = 1.6;
 /// Shares of the periods that are considered, from the last one backwards.
 const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
 

@@ -35,6 +35,8 @@ struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
     scene: &'a Scene,
     stage: Stage,
     target: f64,
+    /// Where the loop was closed.
+    present: Option<Known>,
 }
 
 /// What is to be held next.
@@ -76,6 +78,7 @@ pub fn track_into(
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
+        present: None,
     };
     bench.approach()?;
     let periods_to_lock = bench.run.periods;
@@ -136,6 +139,12 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
             } else {
                 0
             };
+            let d = self.scene.dimensionless();
+            self.present = Some(Known {
+                c: cycle.amplitude() / d.b,
+                g: d.excitation(cycle.base.norm()),
+                sigma: d.sigma(cycle.omega),
+            });
         }
         Ok(())
     }
@@ -149,7 +158,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
     ) -> Result<(), ExperimentError> {
         let levels = self.scene.backbone.levels();
         // The last point, and the phase at which it was held.
-        let mut last = None::<(Known, f64)>;
+        let mut last = self.present.map(|present| (present, 0.0));
         for (n, &level) in levels.iter().enumerate() {
             progress(n, levels.len());
             for k in 0..phases.len() {
@@ -171,7 +180,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
         let (to, periods) = self.step(order, last);
         self.run.controller.hold_response(to, self.target + order.phase)?;
         self.run.samples.clear();
-        let late = if last.is_some() { LATE } else { FIRST + LATE };
+        let late = if order.known.is_empty() { FIRST + LATE } else { LATE };
         while self.run.periods - start < periods + late as f64 {
             self.cycle()?;
         }
