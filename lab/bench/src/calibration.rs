@@ -151,7 +151,7 @@ fn run(scene: &Scene, snr: f64, curve: &ExactCurve) -> Calibration {
         what,
         message: format!("{snr} dB, seed {}: {message}", scene.chain.seed),
     };
-    match locked(scene, snr, curve) {
+    match locked(scene, snr) {
         Ok(outcomes) => run.outcomes.extend(outcomes),
         Err(error) => run.missing.push(missing(Part::Lock, &error)),
     }
@@ -174,7 +174,7 @@ fn chained(scene: &Scene, log: &Log) -> Result<Chain, RunError> {
     Ok(Chain::new(Box::new(rig), scene))
 }
 
-fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, RunError> {
+fn locked(scene: &Scene, snr: f64) -> Result<Vec<Outcome>, RunError> {
     let log = Log::default();
     let mut controller = BuiltIn::new(&scene.controller_config())?;
     let record = experiment::run(
@@ -184,7 +184,8 @@ fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, R
         |_, _, _| {},
     )?;
     let found = identify(&record, scene)?;
-    let phase = identify(&with_ideal_sensors(record, &log), scene)?.lock.phase_error_deg;
+    let ideal = identify(&with_ideal_sensors(record, &log), scene)?;
+    let phase = ideal.lock.phase_error_deg;
     let lock = found.lock;
     let orbits = orbit::phase_resonant(&scene.dimensionless());
     let exact = nearest(&orbits, &lock).ok_or("no exact orbit at this G")?;
@@ -208,12 +209,11 @@ fn locked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<Vec<Outcome>, R
     if let (Some(b), Some(u)) = (lock.b, lock.u_b) {
         outcomes.push(outcome(Kind::Lock, "B", b - exact.b, u));
     }
-    for point in found.decay.points.iter().filter(|point| point.c > COMPARED_ABOVE) {
-        if let (Some(sigma), Some(u), Some([exact, _])) = (point.sigma_steady, point.u_sigma_steady, curve.at(point.c))
-        {
-            let outcome = outcome(Kind::Decay, "sigma", sigma - exact, u);
-            outcomes.push(Outcome { c: point.c, ..outcome });
-        }
+    // Both have the same times from the release on.
+    let pairs = found.decay.points.iter().zip(&ideal.decay.points);
+    for (point, clean) in pairs.filter(|(point, _)| point.c > COMPARED_ABOVE) {
+        let outcome = outcome(Kind::Decay, "sigma", point.sigma - clean.sigma, point.u_sigma);
+        outcomes.push(Outcome { c: point.c, ..outcome });
     }
     Ok(outcomes)
 }

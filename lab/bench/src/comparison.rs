@@ -1,5 +1,6 @@
 //! Measurements beside first-order theory and exact orbits at the same parameters.
 
+mod decay;
 mod exact_curve;
 mod tracked;
 
@@ -45,8 +46,8 @@ pub struct Comparison {
     pub rms_sigma_error: Option<f64>,
     /// RMS of the decay's sigma minus that of the exact backbone at the same C, over the same points.
     pub rms_sigma_exact: Option<f64>,
-    /// The same, corrected for the drift.
-    pub rms_steady_exact: Option<f64>,
+    /// RMS of the decay's sigma minus that of the exact plant, released on the exact orbit and evaluated alike, over the same points.
+    pub rms_sigma_predicted: Option<f64>,
 }
 
 /// A point along the decay beside theory.
@@ -59,6 +60,10 @@ pub struct ComparedPoint {
     pub sigma_theory: Option<f64>,
     /// Detuning of the exact backbone at this C; absent outside it.
     pub sigma_exact: Option<f64>,
+    /// Detuning at this C of the decay that the slow flow predicts, to the first order in its rate; absent below the fold.
+    pub sigma_slow_flow: Option<f64>,
+    /// Detuning at this C of the decay of the exact plant from the exact orbit; absent outside it.
+    pub sigma_predicted: Option<f64>,
 }
 
 impl Comparison {
@@ -77,6 +82,8 @@ impl Comparison {
             .collect();
         let exact = nearest(&orbits, &lock);
         let curve = ExactCurve::of(&parameters);
+        let samples = crate::experiment::Plan::of(scene).decay;
+        let predicted = exact.map_or(Vec::new(), |orbit| decay::predicted(&orbit, scene, samples));
         let decay: Vec<ComparedPoint> = found
             .decay
             .points
@@ -85,13 +92,14 @@ impl Comparison {
                 point: *point,
                 sigma_theory: free_sigma(&parameters, point.c),
                 sigma_exact: curve.at(point.c).map(|[sigma, _]| sigma),
+                sigma_slow_flow: decay::by_slow_flow(&parameters, point.c),
+                sigma_predicted: decay::sigma_at(&predicted, point.c),
             })
             .collect();
-        let steady = |one: &ComparedPoint| Some(one.point.sigma_steady? - one.sigma_exact?);
         Self {
             rms_sigma_error: rms(&decay, |one| Some(one.point.sigma - one.sigma_theory?)),
             rms_sigma_exact: rms(&decay, |one| Some(one.point.sigma - one.sigma_exact?)),
-            rms_steady_exact: rms(&decay, steady),
+            rms_sigma_predicted: rms(&decay, |one| Some(one.point.sigma - one.sigma_predicted?)),
             parameters,
             phase: scene.phase_target(),
             lock,

@@ -25,7 +25,6 @@ Examples:
   vines backbone --set backbone.C_to=0.2 --set backbone.points=11
   vines backbone --set chain.snr=40 --set chain.seed=7    with sensor noise
   vines backbone --set resonance.definition=peak     the backbone of the peaks of the response
-  vines backbone --set backbone.predictor=theory     with theory as the predictor
   vines backbone --rig LoViNes.fmu --out out/fmu          another rig: an FMU, or a network address
 
 Writes tracked.json, tracked.csv and tracked.svg.";

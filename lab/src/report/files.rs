@@ -124,15 +124,18 @@ pub(super) fn csv<T: Serialize>(headings: &[&str], rows: impl IntoIterator<Item 
 /// The points along a decay, as CSV.
 pub fn decay_csv(found: &Comparison) -> Result<String, ReportError> {
     #[derive(Serialize)]
-    struct Theory {
+    struct Compared {
         sigma_theory: Option<f64>,
         sigma_exact: Option<f64>,
+        sigma_slow_flow: Option<f64>,
+        sigma_predicted: Option<f64>,
     }
     csv(
         &[],
         found.decay.iter().map(|one| {
-            let ComparedPoint { point, sigma_theory, sigma_exact } = *one;
-            (point, Theory { sigma_theory, sigma_exact })
+            let ComparedPoint { point, sigma_theory, sigma_exact, sigma_slow_flow, sigma_predicted } = *one;
+            let compared = Compared { sigma_theory, sigma_exact, sigma_slow_flow, sigma_predicted };
+            (point, compared)
         }),
     )
 }

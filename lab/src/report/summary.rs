@@ -108,7 +108,7 @@ fn others(found: &Comparison) -> String {
 fn decay(found: &Comparison) -> String {
     let end = match found.decay_end {
         DecayEnd::Synchrony => "where the impacts lose synchrony",
-        DecayEnd::Fold => "where the backbone folds",
+        DecayEnd::Linear => "where the impacts end",
         DecayEnd::Record => "where the record ends; a larger record.decay_periods shows more",
     };
     let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) else {
@@ -128,8 +128,8 @@ fn agreement(found: &Comparison) -> String {
     let Some(rms) = found.rms_sigma_error else {
         return format!("No point of the decay lies above C = {COMPARED_ABOVE}");
     };
-    let exact = found.rms_sigma_exact.zip(found.rms_steady_exact).map_or(String::new(), |(raw, steady)| {
-        format!("\nRMS of sigma against the exact backbone: {raw:.4}; corrected for the drift (sigma_steady): {steady:.4}")
+    let exact = found.rms_sigma_exact.zip(found.rms_sigma_predicted).map_or(String::new(), |(raw, predicted)| {
+        format!("\nRMS of sigma against the exact backbone: {raw:.4}; against the decay that the exact plant predicts: {predicted:.4}")
     });
     format!(
         "RMS of sigma against theory over C > {COMPARED_ABOVE}: {rms:.4} (theory is of first order in epsilon){exact}"

@@ -44,7 +44,8 @@ pub struct Point {
     pub periods: f64,
     /// Periods averaged.
     pub averaged: usize,
-    /// The motion was steady within these uncertainties; otherwise the point was taken at the time limit.
+    /// The motion was steady within these uncertainties, on the level, and neither irregular nor asymmetric; otherwise the point was taken at the
+    /// time limit.
     pub settled: bool,
     /// The response reached the level; otherwise the drive was at a limit, or the time too short.
     pub reached: bool,

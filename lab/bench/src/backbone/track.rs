@@ -238,8 +238,8 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
             regime_by_impacts: self.run.samples[0]
                 .ground_truth
                 .map(|_| classify(averaged, self.run.sample_time, omega.value).1),
-            // An irregular motion can seem steady for a while.
-            settled: reached && regime != Regime::Other && criterion.is_met(said),
+            // An irregular motion can seem steady for a while; an asymmetric one is no point of this backbone.
+            settled: reached && !matches!(regime, Regime::Other | Regime::Asymmetric) && criterion.is_met(said),
             reached,
             ..Point::new(order.level, said, &self.scene.dimensionless())
         }

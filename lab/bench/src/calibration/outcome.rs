@@ -11,7 +11,7 @@ pub enum Kind {
     Lock,
     /// A settled tracked point, against the exact backbone at the same C.
     Tracked,
-    /// A point of the decay with C > 0.2, corrected for the drift, against the same.
+    /// A point of the decay with C > 0.2, against the same sensors without noise.
     Decay,
 }
 

@@ -10,9 +10,8 @@ use super::fit::harmonic;
 use super::regime::impacts;
 use crate::experiment::{Record, Sample};
 use crate::scene::{Dimensionless, Estimator, Scene};
-use vines_model::numerics::{Estimate, mean};
+use vines_model::numerics::mean;
 use vines_model::regime::end_of_synchrony;
-use vines_model::theory::{BranchSide, SlowFlow, half_period_multipliers};
 
 /// One point along the decay; dimensionless.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -29,15 +28,11 @@ pub struct DecayPoint {
     pub sigma: f64,
     /// Rate of change of the amplitude, `dC/dtau`.
     pub rate: f64,
-    /// Detuning of the steady motion of the same amplitude: sigma less the effect of the drift; absent near the fold and below.
-    pub sigma_steady: Option<f64>,
     /// Standard uncertainty of C.
     #[serde(rename = "u_C")]
     pub u_c: f64,
     /// Standard uncertainty of sigma.
     pub u_sigma: f64,
-    /// Standard uncertainty of `sigma_steady`; absent as above.
-    pub u_sigma_steady: Option<f64>,
 }
 
 /// What ended the points of a decay.
@@ -49,9 +44,9 @@ pub enum DecayEnd {
     /// The record ended earlier: record.decay_periods is too short to see the loss of synchrony.
     #[serde(rename = "end of the record")]
     Record,
-    /// The amplitude fell to the fold of the backbone, on a rig that does not report impacts.
-    #[serde(rename = "fold of the backbone")]
-    Fold,
+    /// The amplitude fell no faster than by the damping of the structure, on a rig that does not report impacts.
+    #[serde(rename = "end of the impacts")]
+    Linear,
 }
 
 /// The points along a decay, and what ended them.
@@ -65,8 +60,11 @@ pub struct DecayPoints {
 
 /// Points per period along the decay.
 const PER_PERIOD: f64 = 8.0;
+/// Rate of the decay over that by damping alone at which the impacts have ended: at the fold they still take as much power as damping.
+const LINEAR: f64 = 1.5;
 
-/// The points along the decay of a record, up to the loss of synchrony where the rig reports impacts, otherwise to the fold.
+/// The points along the decay of a record, up to the loss of synchrony where the rig reports impacts, otherwise to
+/// the end of the impacts.
 #[must_use]
 pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
     let d = scene.dimensionless();
@@ -78,31 +76,30 @@ pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
     // Initial frequency: the command of the last held sample.
     let omega = record.hold().last().map_or(d.omega0, |s| s.command.drive.omega);
     let half_period = PI / omega;
-    let flow = SlowFlow::new(d.lambda, d.r);
     let has_impacts = first.ground_truth.is_some();
     let until = if has_impacts {
         end_of_synchrony(&impacts(decay), half_period).unwrap_or(first.time)
     } else {
         f64::INFINITY
     };
-    let lowest = if has_impacts { 0.0 } else { flow.manifold.c_min() * d.b };
+    let damping = scene.linear().damping_rate;
+    let is_linear = |piece: &Piece| !has_impacts && -piece.rate < LINEAR * damping * piece.amplitude;
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
     let pieces = match scene.record.estimator {
         Estimator::Fit => fitted(&values, dt, omega, scene.record.window_periods),
         Estimator::Crossings => crossed(&values, dt),
     };
-    let at_fold = pieces.iter().any(|piece| piece.amplitude < lowest);
-    let end = if at_fold {
-        DecayEnd::Fold
+    let end = if pieces.iter().any(is_linear) {
+        DecayEnd::Linear
     } else if has_impacts && until + 2.0 * half_period < last.time {
         DecayEnd::Synchrony
     } else {
         DecayEnd::Record
     };
     let points = pieces
-        .into_iter()
-        .take_while(|piece| decay[piece.samples.end - 1].time <= until && piece.amplitude >= lowest)
-        .map(|piece| piece.point(decay, &d, &flow))
+        .iter()
+        .take_while(|piece| decay[piece.samples.end - 1].time <= until && !is_linear(piece))
+        .map(|piece| piece.point(decay, &d))
         .collect();
     DecayPoints { points, end }
 }
@@ -122,68 +119,22 @@ struct Piece {
 }
 
 impl Piece {
-    fn point(&self, decay: &[Sample], d: &Dimensionless, flow: &SlowFlow) -> DecayPoint {
+    fn point(&self, decay: &[Sample], d: &Dimensionless) -> DecayPoint {
         let speeds: Option<Vec<f64>> = decay[self.samples.clone()]
             .iter()
             .map(|s| s.ground_truth.map(|w| w.particle_velocity.abs()))
             .collect();
-        let (c, rate, sigma) = (self.amplitude / d.b, self.rate / (d.b * d.omega0), d.sigma(self.omega));
-        let span = (self.samples.end - self.samples.start) as f64 / decay.len() as f64
-            * (decay[decay.len() - 1].time - decay[0].time);
-        let window = rate * d.omega0 * span;
-        let backbone = |c: f64| flow.backbone_sigma(c, BranchSide::Right);
-        // The fit weighs the frequencies of its window by a parabola: curvature changes their mean by a fortieth.
-        let bent = match (backbone(c - 0.5 * window), backbone(c), backbone(c + 0.5 * window)) {
-            (Some(before), Some(middle), Some(after)) => 0.1 * (before - 2.0 * middle + after),
-            _ => 0.0,
-        };
-        let noise = self.uncertainties[1] / d.omega_change(1.0);
-        let [u_c, u_sigma] = [
-            self.uncertainties[0] / d.b,
-            Estimate::new(sigma, &[noise, bent]).uncertainty,
-        ];
-        let correction = correction(flow, d, [c, rate], d.omega0 * self.time);
-        let slope = backbone(c + u_c).zip(backbone(c)).map_or(0.0, |(after, at)| after - at);
         DecayPoint {
             tau: d.omega0 * self.time,
-            c,
+            c: self.amplitude / d.b,
             // The mean is the value at the middle of the straight line that fits best.
             b: speeds.map(|speeds| d.speed(mean(speeds))),
-            sigma,
-            rate,
-            sigma_steady: correction.map(|by_drift| sigma - by_drift.value),
-            u_c,
-            u_sigma,
-            u_sigma_steady: correction
-                .map(|by_drift| Estimate::new(sigma, &[u_sigma, slope, by_drift.uncertainty]).uncertainty),
+            sigma: d.sigma(self.omega),
+            rate: self.rate / (d.b * d.omega0),
+            u_c: self.uncertainties[0] / d.b,
+            u_sigma: self.uncertainties[1] / d.omega_change(1.0),
         }
     }
-}
-
-/// Effect of the drift `[C, dC/dtau]` on sigma, at `tau` since the release.
-///
-/// The particle follows a change with the multipliers of its map. The effect is therefore late by their delay, and is not complete soon
-/// after the release, where the drift begins. Both are parts of the uncertainty. `None` where the first is as large as the effect
-/// (towards the fold), because the series in the rate of the drift fails there.
-fn correction(flow: &SlowFlow, d: &Dimensionless, [c, rate]: [f64; 2], tau: f64) -> Option<Estimate> {
-    let by_drift = |c: f64, rate: f64| Some(flow.drift(c)?.sigma * rate);
-    let b = flow.manifold.b(c, BranchSide::Right)?;
-    let multipliers = half_period_multipliers(d.r, b);
-    let delay = multipliers
-        .map(|one| PI / (1.0 - one).norm())
-        .into_iter()
-        .fold(0.0, f64::max);
-    let slowest = multipliers.map(nalgebra::Complex::norm).into_iter().fold(0.0, f64::max);
-    // Along the decay, by first-order theory.
-    let effect = |c: f64| {
-        let b = flow.manifold.b(c, BranchSide::Right)?;
-        by_drift(c, -0.5 * d.epsilon * flow.backbone_at(b).g)
-    };
-    let step = 1e-3 * c;
-    let late = rate * delay * (effect(c + step)? - effect(c - step)?) / (2.0 * step);
-    let value = by_drift(c, rate)?;
-    let incomplete = value * slowest.min(1.0).powf(tau / PI);
-    (late.abs() < value.abs()).then(|| Estimate::new(value, &[late, incomplete]))
 }
 
 /// Fits in a sliding window of `periods`. Each fit starts from the frequency of the one before, the first from `omega`.

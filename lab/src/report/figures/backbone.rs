@@ -40,17 +40,11 @@ pub fn figure(found: &Comparison) -> Figure {
     let places = drawn.clone().map(|point| (point.sigma, point.c));
     let inside = places.filter(|(sigma, _)| (low..=high).contains(sigma));
     decay_points(&mut panel, inside, DECAY_LABEL);
-    let steady = drawn.filter(|point| point.c > fold);
-    let steady = steady.filter_map(|point| Some(((point.sigma_steady?, point.c), 1.96 * point.u_sigma_steady?)));
-    let steady: Vec<_> = steady
-        .filter(|((sigma, _), half)| sigma - half >= low && sigma + half <= high)
+    let predicted = found.decay.iter().filter_map(|one| Some((one.sigma_predicted?, one.point.c)));
+    let predicted: Vec<_> = predicted
+        .filter(|(sigma, c)| (low..=high).contains(sigma) && *c > fold)
         .collect();
-    panel.crosses(
-        steady.iter().map(|(place, _)| *place).collect(),
-        line(LOCK, 12),
-        "free decay, corrected for the drift",
-    );
-    error_bars(&mut panel, steady.into_iter(), false);
+    panel.curve(predicted, line(LOCK, 12), "free decay, predicted by the exact plant");
     let place = (found.lock.sigma, found.lock.c);
     for (u, upright) in [(found.lock.u_sigma, false), (found.lock.u_c, true)] {
         error_bars(&mut panel, std::iter::once((place, 1.96 * u)), upright);
