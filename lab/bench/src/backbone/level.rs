@@ -36,8 +36,8 @@ pub struct Found {
     pub phase_error: Estimate,
     /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
     pub at: [Estimate; 2],
-    /// Scatter of the periods about the fit, over the noise of the sensors.
-    pub excess: f64,
+    /// Whether what is left is noise: the fit describes the window, and the rest is within the precision.
+    pub steady: bool,
 }
 
 /// Largest deviation of the mean phase, rad, from that which is held: the balances are of the first order in it. At epsilon = 0.02 beside the
@@ -48,6 +48,8 @@ const RANDOM: f64 = 2.0;
 /// Periods by which the impacts follow a change of the amplitude late: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
 /// (studies/off_scene.rs).
 const LAG: f64 = 1.6;
+/// Largest scatter of the periods about the fit, over the noise of the sensors: chi-square per degree of freedom is then at most 4.
+const EXCESS: f64 = 2.0;
 /// Shares of the periods that are considered, from the last one backwards.
 const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
 
@@ -109,7 +111,7 @@ impl Criterion {
             response: whole.response,
             phase_error: whole.phase_error,
             at,
-            excess: whole.excess,
+            steady: whole.excess <= EXCESS && systematic <= self.precision[0].min(units[1] * self.precision[1]),
         })
     }
 }
@@ -124,7 +126,7 @@ impl Found {
             response: mean(&Cycle::amplitude),
             phase_error: mean(&|cycle| cycle.phase_error),
             at: [mean(&|cycle| cycle.base.norm()), mean(&|cycle| cycle.omega)],
-            excess: f64::INFINITY,
+            steady: false,
         }
     }
 }

@@ -239,7 +239,9 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
                 .ground_truth
                 .map(|_| classify(averaged, self.run.sample_time, omega.value).1),
             // An irregular motion can seem steady for a while; an asymmetric one is no point of this backbone.
-            settled: reached && !matches!(regime, Regime::Other | Regime::Asymmetric) && criterion.is_met(said),
+            settled: reached
+                && !matches!(regime, Regime::Other | Regime::Asymmetric)
+                && (said.steady || criterion.is_met(said)),
             reached,
             ..Point::new(order.level, said, &self.scene.dimensionless())
         }

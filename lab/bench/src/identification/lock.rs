@@ -80,16 +80,19 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let held = Cycle::all(hold, dt, target);
     let approach = approached(record, scene, target, &held);
     // The drive of the hold decides where the approach ends.
-    let [base, phase_error, _] = means(&held);
+    let [base, phase_error, response] = means(&held);
     let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
     let [omega, limit] = limits(&approach, &scene.linear(), command)?;
     let speeds: Option<Vec<f64>> = hold
         .iter()
         .map(|s| s.ground_truth.map(|w| d.speed(w.particle_velocity.abs())))
         .collect();
+    // The speed belongs to the amplitude of the hold, and changes about as it does.
+    let aside = ((limit.value - response.value).abs() + limit.uncertainty) / limit.value;
     let b = speeds.map(|speeds| {
         let per_period = speeds.chunks(hold.len().div_ceil(held.len())).map(|c| mean(c.iter().copied()));
-        Estimate::mean(&per_period.collect::<Vec<f64>>())
+        let speed = Estimate::mean(&per_period.collect::<Vec<f64>>());
+        Estimate::new(speed.value, &[speed.uncertainty, speed.value * aside])
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
         (count, Regime::Unknown) => (count, regime_by_response(hold, scene, base.value, omega.value)),
@@ -113,28 +116,24 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     })
 }
 
-/// Frequency, rad/s, and amplitude, m, at the end of the approach.
+/// Frequency, rad/s, and amplitude, m, at the end of the approach: from the longest window that its own second half agrees with.
 ///
-/// The later periods are nearer to it, the longer record has less noise. Where the second half of the periods disagrees with all
-/// of them beyond the noise, the difference is a part of the uncertainty; the periods with the smallest uncertainty count.
+/// A long window has less noise, a late one is nearer to the end. Where even the shortest disagrees, the difference is a part of the
+/// uncertainty.
 fn limits(approach: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
     let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, 0.0, None)?.limit(command));
-    let mut best = limit(approach)?;
     let mut cycles = approach;
-    let mut first = true;
+    let mut whole = limit(cycles)?;
     while cycles.len() >= 2 * FEWEST {
-        let half = &cycles[cycles.len() / 2..];
-        let (whole, late) = (limit(cycles)?, limit(half)?);
-        for i in 0..2 {
-            let difference = (whole[i].value - late[i].value).abs() - RANDOM * late[i].uncertainty;
-            let one = Estimate::new(whole[i].value, &[whole[i].uncertainty, difference.max(0.0)]);
-            if first || one.uncertainty < best[i].uncertainty {
-                best[i] = one;
-            }
+        cycles = &cycles[cycles.len() / 2..];
+        let late = limit(cycles)?;
+        let beyond = [0, 1].map(|i| ((whole[i].value - late[i].value).abs() - RANDOM * late[i].uncertainty).max(0.0));
+        if beyond == [0.0; 2] {
+            break;
         }
-        (cycles, first) = (half, false);
+        whole = [0, 1].map(|i| Estimate::new(late[i].value, &[late[i].uncertainty, beyond[i]]));
     }
-    Some(best)
+    Some(whole)
 }
 
 /// The periods before the release in which the motion was as near as in the hold.
