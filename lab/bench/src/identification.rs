@@ -14,7 +14,7 @@ use thiserror::Error;
 use crate::experiment::Record;
 use crate::scene::{Dimensionless, Scene};
 
-pub use balance::Balance;
+pub use balance::{Balance, Slopes};
 pub use cycle::Cycle;
 pub use decay::{DecayEnd, DecayPoint, DecayPoints, decay_points};
 pub use lock::Lock;

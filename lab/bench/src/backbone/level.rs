@@ -7,7 +7,7 @@
 
 use vines_model::numerics::Estimate;
 
-use crate::identification::{Balance, Cycle};
+use crate::identification::{Balance, Cycle, Slopes};
 use crate::scene::LinearResponse;
 
 /// What is asked of a level.
@@ -21,8 +21,8 @@ pub struct Criterion {
     pub phase: f64,
     /// Fewest periods of a window.
     pub fewest: usize,
-    /// Slopes of drive and frequency over the amplitude at the points before, if there are two.
-    pub slopes: Option<[Estimate; 2]>,
+    /// Slopes of drive and frequency over the amplitude between the points before.
+    pub slopes: Slopes,
 }
 
 /// A point of the backbone from a window of periods.
@@ -88,8 +88,11 @@ impl Criterion {
         let [first, second] = [first, second].map(|half| half.at(amplitude - half.response.value));
         let (estimates, own) = (whole.at(0.0), whole.slopes());
         let slope = |i: usize| {
-            let before = self.slopes.map_or(0.0, |slopes| slopes[i].value);
-            own[i].value.abs().max(before.abs()).hypot(own[i].uncertainty)
+            let before = match self.slopes {
+                Slopes::Known(slopes) => slopes[i].value.abs(),
+                _ => 0.0,
+            };
+            own[i].value.abs().max(before).hypot(own[i].uncertainty)
         };
         // What is not noise belongs to the force of the impacts, a phasor: what is seen of it in one balance may be in the other, too.
         let (units, change) = ([1.0, amplitude / whole.gain], LAG * whole.change);

@@ -8,7 +8,7 @@ use super::level::{Criterion, Found};
 use super::peak;
 use super::point::{Known, Point, Tracked};
 use crate::experiment::{self, ExperimentError, Sample, Stage};
-use crate::identification::{Cycle, Regime, classify, regime_by_response};
+use crate::identification::{Cycle, Regime, Slopes, classify, regime_by_response};
 use crate::rig::{Controller, LoopState, Move, Rig};
 use crate::scene::Scene;
 
@@ -263,12 +263,12 @@ impl Order<'_> {
                     let slope = difference / (d.b * (last.c - before.c));
                     Estimate { value: slope, uncertainty: SLOPE * slope.abs() }
                 };
-                Some([
+                Slopes::Known([
                     slope(d.amplitude(last.g - before.g)),
                     slope(d.omega_change(last.sigma - before.sigma)),
                 ])
             }
-            _ => None,
+            _ => Slopes::Unknown,
         };
         Criterion {
             linear: scene.linear(),

@@ -24,6 +24,17 @@ use vines_model::numerics::{Estimate, Prior, Regression, mean, slope};
 use super::Cycle;
 use crate::scene::LinearResponse;
 
+/// What is known in advance of the slopes of `E_R` and `omega_R` over the amplitude.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Slopes {
+    /// Nothing.
+    Unknown,
+    /// The motion is stable under a constant drive: `E_R` rises, and that by the order of E/A.
+    Rising,
+    /// The values between the points next to it.
+    Known([Estimate; 2]),
+}
+
 /// The two lines, fitted to some periods.
 #[derive(Debug, Clone)]
 pub struct Balance {
@@ -62,7 +73,7 @@ impl Balance {
     /// From at least four periods of a rig whose linear response is `linear`, held at the phase error `held`, rad. `slopes`: what is
     /// known of the slopes of `E_R` and `omega_R` over the amplitude.
     #[must_use]
-    pub fn of(cycles: &[Cycle], linear: &LinearResponse, held: f64, slopes: Option<[Estimate; 2]>) -> Option<Self> {
+    pub fn of(cycles: &[Cycle], linear: &LinearResponse, held: f64, slopes: Slopes) -> Option<Self> {
         let n = cycles.len() as f64;
         if cycles.len() < 4 {
             return None;
@@ -93,8 +104,12 @@ impl Balance {
         });
         let (amplitudes, phases): (Vec<f64>, Vec<f64>) = balanced.unzip();
         let scale = [base / response, gain * base / (response * response)];
-        let unknown = scale.map(|scale| Estimate { value: 0.0, uncertainty: WIDE * scale });
-        let [by_base, by_omega] = slopes.unwrap_or(unknown);
+        let unknown = |scale: f64| Estimate { value: 0.0, uncertainty: WIDE * scale };
+        let [by_base, by_omega] = match slopes {
+            Slopes::Unknown => scale.map(unknown),
+            Slopes::Rising => [Estimate { value: scale[0], uncertainty: scale[0] }, unknown(scale[1])],
+            Slopes::Known(slopes) => slopes,
+        };
         let prior = |Estimate { value, uncertainty }| [Prior { coefficient: 2, value, uncertainty }];
         let drive = Regression::fit(&columns, &amplitudes, &prior(by_base.scaled(-gain)), noise)?;
         let turning = Regression::fit(&columns, &phases, &prior(by_omega), noise / response)?;

@@ -7,7 +7,7 @@ use vines_model::regime::Regime;
 
 use super::regime::classify;
 use super::response::regime_by_response;
-use super::{Balance, Cycle};
+use super::{Balance, Cycle, Slopes};
 use crate::experiment::Record;
 use crate::scene::{LinearResponse, Scene};
 
@@ -121,7 +121,7 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
 /// A long window has less noise, a late one is nearer to the end. Where even the shortest disagrees, the difference is a part of the
 /// uncertainty.
 fn limits(approach: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
-    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, 0.0, None)?.limit(command));
+    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, 0.0, Slopes::Rising)?.limit(command));
     let mut cycles = approach;
     let mut whole = limit(cycles)?;
     while cycles.len() >= 2 * FEWEST {
