@@ -66,6 +66,9 @@ impl Lock {
 const MOST: f64 = 240.0;
 /// Largest relative deviation of the amplitude from that of the hold, unless it is noise.
 const SPREAD: f64 = 0.008;
+/// The same of the periods that give the slopes of drive and frequency, and the relative uncertainty of these because the backbone is curved.
+const WIDE: f64 = 0.1;
+const BENT: f64 = 0.3;
 /// Largest phase error of a period, rad, for the same.
 const PHASE_RANGE: f64 = 0.1;
 /// Fewest periods of an estimate.
@@ -78,11 +81,11 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let (dt, hold) = (record.sample_time, record.hold());
     let target = scene.phase_target().radians();
     let held = Cycle::all(hold, dt, target);
-    let approach = approached(record, scene, target, &held);
+    let (wide, approach) = (approached(record, scene, target, &held, WIDE), approached(record, scene, target, &held, SPREAD));
     // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
     let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
-    let [omega, limit] = limits(&approach, &scene.linear(), command)?;
+    let [omega, limit] = limits(&approach, &wide, &scene.linear(), command)?;
     let speeds: Option<Vec<f64>> = hold
         .iter()
         .map(|s| s.ground_truth.map(|w| d.speed(w.particle_velocity.abs())))
@@ -120,8 +123,10 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
 ///
 /// A long window has less noise, a late one is nearer to the end. Where even the shortest disagrees, the difference is a part of the
 /// uncertainty.
-fn limits(approach: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
-    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, 0.0, Slopes::Rising)?.limit(command));
+fn limits(approach: &[Cycle], wide: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
+    let slopes = Balance::of(wide, linear, 0.0, Slopes::Rising)?.slopes();
+    let slopes = slopes.map(|one| Estimate::new(one.value, &[one.uncertainty, BENT * one.value]));
+    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, 0.0, Slopes::Known(slopes))?.limit(command));
     let mut cycles = approach;
     let mut whole = limit(cycles)?;
     while cycles.len() >= 2 * FEWEST {
@@ -137,7 +142,7 @@ fn limits(approach: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[
 }
 
 /// The periods before the release in which the motion was as near as in the hold.
-fn approached(record: &Record, scene: &Scene, target: f64, held: &[Cycle]) -> Vec<Cycle> {
+fn approached(record: &Record, scene: &Scene, target: f64, held: &[Cycle], spread: f64) -> Vec<Cycle> {
     let most = (MOST * scene.controller.samples_per_period) as usize;
     let samples = &record.samples[record.released.saturating_sub(most.max(record.hold().len()))..record.released];
     let mut cycles = Cycle::all(samples, record.sample_time, target);
@@ -145,7 +150,7 @@ fn approached(record: &Record, scene: &Scene, target: f64, held: &[Cycle]) -> Ve
     let noise = 4.0 * mean(held.iter().map(|cycle| cycle.noise[0])).sqrt();
     let is_near = |cycle: &&Cycle| {
         let deviation = (cycle.amplitude() - level).abs();
-        deviation <= (SPREAD * level).max(noise) && cycle.phase_error.abs() <= PHASE_RANGE
+        deviation <= (spread * level).max(noise) && cycle.phase_error.abs() <= PHASE_RANGE
     };
     let near = cycles.iter().rev().take_while(is_near).count();
     cycles.drain(..cycles.len() - near.max(held.len()).min(cycles.len()));
