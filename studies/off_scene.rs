@@ -78,29 +78,60 @@ fn main() -> Result<(), Failure> {
             found
         })
         .collect();
-    let gather = |values: fn(&Found) -> &Vec<f64>| found.iter().flat_map(|one| values(one).iter().copied()).collect::<Vec<f64>>();
+    let gather = |values: fn(&Found) -> &Vec<f64>| {
+        found
+            .iter()
+            .flat_map(|one| values(one).iter().copied())
+            .collect::<Vec<f64>>()
+    };
     let (ratios, errors) = (gather(|one| &one.ratios), gather(|one| &one.errors));
     let share = |limit: f64| ratios.iter().filter(|ratio| **ratio <= limit).count() as f64 / ratios.len() as f64;
-    let periods: Vec<f64> = found.iter().filter(|one| one.points > 0).map(|one| one.periods / one.points as f64).collect();
+    let periods: Vec<f64> = found
+        .iter()
+        .filter(|one| one.points > 0)
+        .map(|one| one.periods / one.points as f64)
+        .collect();
     println!(
         "all: within 1.96 u {:.3}, within 2 u {:.3}, worst {:.1} u; error median {:.1e}, worst {:.1e}; periods a point median {:.1}, worst {:.1}; settled {} of {}; failed {}",
-        share(1.96), share(2.0), largest(&ratios), median(&errors), largest(&errors), median(&periods), largest(&periods),
-        found.iter().map(|one| one.settled).sum::<usize>(), found.iter().map(|one| one.points).sum::<usize>(),
+        share(1.96),
+        share(2.0),
+        largest(&ratios),
+        median(&errors),
+        largest(&errors),
+        median(&periods),
+        largest(&periods),
+        found.iter().map(|one| one.settled).sum::<usize>(),
+        found.iter().map(|one| one.points).sum::<usize>(),
         found.iter().filter(|one| one.message.is_some()).count(),
     );
     Ok(())
 }
 
 fn failed(rig: [f64; 3], error: &Failure) -> Found {
-    Found { name: format!("{rig:.4?}"), ratios: vec![], errors: vec![], points: 0, settled: 0, periods: 0.0, message: Some(error.to_string()) }
+    Found {
+        name: format!("{rig:.4?}"),
+        ratios: vec![],
+        errors: vec![],
+        points: 0,
+        settled: 0,
+        periods: 0.0,
+        message: Some(error.to_string()),
+    }
 }
 
 fn line(one: &Found) -> String {
     let within = one.ratios.iter().filter(|ratio| **ratio <= 2.0).count() as f64 / one.ratios.len() as f64;
     format!(
         "{}: {:.2} within 2 u, worst {:.1} u; median {:.1e}, worst {:.1e}; {:.1} periods a point; {} of {} settled {}",
-        one.name, within, largest(&one.ratios), median(&one.errors), largest(&one.errors),
-        one.periods / one.points as f64, one.settled, one.points, one.message.as_deref().unwrap_or(""),
+        one.name,
+        within,
+        largest(&one.ratios),
+        median(&one.errors),
+        largest(&one.errors),
+        one.periods / one.points as f64,
+        one.settled,
+        one.points,
+        one.message.as_deref().unwrap_or(""),
     )
 }
 
@@ -113,19 +144,39 @@ fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, [k, c, m, b, dr]: 
     let fold = curve.places().first().ok_or("no backbone")?[0];
     let (from, to) = (0.95 * stable.min(0.75), 1.05 * fold);
     // The rig with M = k = b = 1, and the scene of the client in SI units.
-    let truth = Parameters { primary_mass: 1.0, stiffness: 1.0, damping: epsilon * lambda, particle_mass: epsilon, half_width: 1.0, restitution: r };
+    let truth = Parameters {
+        primary_mass: 1.0,
+        stiffness: 1.0,
+        damping: epsilon * lambda,
+        particle_mass: epsilon,
+        half_width: 1.0,
+        restitution: r,
+    };
     let width = 1.0 + b;
     let settings = [
-        format!("plant.M={:?}", 1.0), format!("plant.k={:?}", 1.0 + k), format!("plant.c={:?}", epsilon * lambda * (1.0 + c)),
-        format!("plant.m={:?}", epsilon * (1.0 + m)), format!("plant.b={width:?}"), format!("plant.r={:?}", r * (1.0 + dr)),
-        format!("excitation.E={:?}", g * epsilon), "start.dq2=0.9".into(), "controller.omega_min=0.8".into(), "controller.omega_max=1.2".into(),
-        format!("backbone.C_from={:?}", from / width), format!("backbone.C_to={:?}", to / width), "backbone.G_max=20".into(), format!("backbone.dwell_min={}", std::env::var("DWELL").unwrap_or("8".into())),
+        format!("plant.M={:?}", 1.0),
+        format!("plant.k={:?}", 1.0 + k),
+        format!("plant.c={:?}", epsilon * lambda * (1.0 + c)),
+        format!("plant.m={:?}", epsilon * (1.0 + m)),
+        format!("plant.b={width:?}"),
+        format!("plant.r={:?}", r * (1.0 + dr)),
+        format!("excitation.E={:?}", g * epsilon),
+        "start.dq2=0.9".into(),
+        "controller.omega_min=0.8".into(),
+        "controller.omega_max=1.2".into(),
+        format!("backbone.C_from={:?}", from / width),
+        format!("backbone.C_to={:?}", to / width),
+        "backbone.G_max=20".into(),
+        format!("backbone.dwell_min={}", std::env::var("DWELL").unwrap_or("8".into())),
     ];
     let mut settings: Vec<String> = settings.into();
     if snr != "none" {
         settings.extend([format!("chain.snr={snr}"), format!("chain.seed={noise}")]);
     }
-    let overrides = settings.iter().map(|one| one.parse()).collect::<Result<Vec<Override>, _>>()?;
+    let overrides = settings
+        .iter()
+        .map(|one| one.parse())
+        .collect::<Result<Vec<Override>, _>>()?;
     let mut scene = Scene::parse("off scene", "[plant]\n[start]\n[excitation]\n", &overrides)?;
     scene.measured = Some(LinearResponse {
         omega0: 1.0,
@@ -140,17 +191,32 @@ fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, [k, c, m, b, dr]: 
     let own = scene.dimensionless();
     let (mut ratios, mut errors, mut settled) = (vec![], vec![], 0);
     let is_backbone = |regime| matches!(regime, Regime::Symmetric | Regime::Unresolved);
-    for point in tracked.points.iter().filter(|point| point.settled && is_backbone(point.regime)) {
+    for point in tracked
+        .points
+        .iter()
+        .filter(|point| point.settled && is_backbone(point.regime))
+    {
         settled += 1;
         // In units of the rig.
         let (c, omega, e) = (point.c * width, own.omega(point.sigma), own.amplitude(point.g));
         let [sigma, g] = [(omega - 1.0) / epsilon, e / epsilon];
-        let [u_sigma, u_g] = [own.omega_change(point.u_sigma) / epsilon, own.amplitude(point.u_g) / epsilon];
-        let Some([exact_sigma, exact_g]) = curve.at(c) else { continue };
+        let [u_sigma, u_g] = [
+            own.omega_change(point.u_sigma) / epsilon,
+            own.amplitude(point.u_g) / epsilon,
+        ];
+        let Some([exact_sigma, exact_g]) = curve.at(c) else {
+            continue;
+        };
         if std::env::var_os("POINTS").is_some() {
             println!(
                 "C {c:.3}: sigma {:+.1e} ({:.1e}), G {:+.1e} ({:.1e}), {:.0} periods, {} averaged, {:?}",
-                sigma - exact_sigma, u_sigma, g - exact_g, u_g, point.periods, point.averaged, point.regime
+                sigma - exact_sigma,
+                u_sigma,
+                g - exact_g,
+                u_g,
+                point.periods,
+                point.averaged,
+                point.regime
             );
         }
         ratios.extend([(sigma - exact_sigma).abs() / u_sigma, (g - exact_g).abs() / u_g]);
@@ -158,7 +224,12 @@ fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, [k, c, m, b, dr]: 
     }
     Ok(Found {
         name: format!("epsilon {epsilon:.4} lambda {lambda:.2} r {r:.2} G {g:.2} C {from:.2} to {to:.2}"),
-        ratios, errors, points: tracked.points.len(), settled, periods: tracked.periods, message: tracked.ended.map(|error| error.to_string()),
+        ratios,
+        errors,
+        points: tracked.points.len(),
+        settled,
+        periods: tracked.periods,
+        message: tracked.ended.map(|error| error.to_string()),
     })
 }
 

@@ -49,12 +49,13 @@ class Identification(Result):
     exact : Orbit or None
         The exact phase-resonant orbit nearest to the lock.
     decay : dict of ndarray
-        Points along the free decay: tau, C, B, sigma, sigma_steady, their standard uncertainties, sigma_theory and
-        sigma_exact.
+        Points along the free decay: tau, C, B, sigma, their standard uncertainties, and at the same C sigma_theory and
+        sigma_exact of steady motions, sigma_slow_flow and sigma_predicted of the decay that theory and the exact plant predict.
     decay_end : str
         What ended the points.
-    rms_sigma_error, rms_sigma_exact, rms_steady_exact : float or None
-        RMS of the decay's sigma, and of sigma_steady, minus theory and minus the exact backbone, over C > 0.2.
+    rms_sigma_error, rms_sigma_exact, rms_sigma_predicted : float or None
+        RMS of the decay's sigma minus theory, minus the exact backbone, and minus the decay that the exact plant predicts, over
+        C > 0.2.
     """
 
     lock: dict[str, Any]
@@ -63,7 +64,7 @@ class Identification(Result):
     decay_end: str
     rms_sigma_error: float | None
     rms_sigma_exact: float | None
-    rms_steady_exact: float | None
+    rms_sigma_predicted: float | None
 
     def plot(self, ax: Any = None) -> Any:
         """Draw C over sigma along the decay, and the lock, with matplotlib, and return the axes."""
@@ -115,7 +116,7 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
         lock=found["lock"],
         exact=Orbit._of(found["exact"]) if found["exact"] else None,
         decay=_table(found["decay"]),
-        **{key: found[key] for key in ("decay_end", "rms_sigma_error", "rms_sigma_exact", "rms_steady_exact")},
+        **{key: found[key] for key in ("decay_end", "rms_sigma_error", "rms_sigma_exact", "rms_sigma_predicted")},
     )
 
 

@@ -133,7 +133,13 @@ pub fn decay_csv(found: &Comparison) -> Result<String, ReportError> {
     csv(
         &[],
         found.decay.iter().map(|one| {
-            let ComparedPoint { point, sigma_theory, sigma_exact, sigma_slow_flow, sigma_predicted } = *one;
+            let ComparedPoint {
+                point,
+                sigma_theory,
+                sigma_exact,
+                sigma_slow_flow,
+                sigma_predicted,
+            } = *one;
             let compared = Compared { sigma_theory, sigma_exact, sigma_slow_flow, sigma_predicted };
             (point, compared)
         }),

@@ -107,7 +107,10 @@ impl Criterion {
             // The noise of the amplitude moves drive and frequency along their slopes.
             let aside = slope(i) * whole.u_level;
             let one = estimates[i];
-            Estimate::new(one.value, &[one.uncertainty, aside, systematic / units[i], whole.remainders[i]])
+            Estimate::new(
+                one.value,
+                &[one.uncertainty, aside, systematic / units[i], whole.remainders[i]],
+            )
         });
         Some(Found {
             periods: cycles.len(),

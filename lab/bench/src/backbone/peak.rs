@@ -45,12 +45,15 @@ fn at_level(scan: &[Point], level: usize, c: f64) -> Point {
     // The nearest is the last but one, the last is the one that is corrected.
     let mut order: Vec<usize> = others.collect();
     order.sort_by_key(|n| std::cmp::Reverse(n.abs_diff(level)));
-    let known: Vec<Known> = order.into_iter().chain([level]).filter_map(|n| scan[n].known()).collect();
+    let known: Vec<Known> = order
+        .into_iter()
+        .chain([level])
+        .filter_map(|n| scan[n].known())
+        .collect();
     let own = scan[level];
     // The polynomial through all of them, and the one of a lower degree, less the value of the last.
-    let change = |known: &[Known]| {
-        extrapolated(known, c).map_or([0.0; 2], |there| [there.g - own.g, there.sigma - own.sigma])
-    };
+    let change =
+        |known: &[Known]| extrapolated(known, c).map_or([0.0; 2], |there| [there.g - own.g, there.sigma - own.sigma]);
     let (change, simpler) = (change(&known), change(&known[1.min(known.len().saturating_sub(1))..]));
     Point {
         c,
@@ -86,7 +89,10 @@ fn peak(points: &[Point], epsilon: f64) -> Point {
         sigma: sum(&values, &|n| points[n].sigma),
     };
     let [g, sigma] = at_phase(&resonance, x, epsilon);
-    let u_phase = size(&slopes, &|n| points[n].u_g) / resonance.g;
+    // A cubic term is neglected: smaller than the quadratic one by about the distance of the phases.
+    let neglected = |value: &dyn Fn(usize) -> f64| (PHASES[2] * (value(0) - 2.0 * value(1) + value(2))).abs();
+    let [by_g, by_sigma] = [neglected(&|n| points[n].g), neglected(&|n| points[n].sigma)];
+    let u_phase = size(&slopes, &|n| points[n].u_g).hypot(by_g / PHASES[2]) / resonance.g;
     let centre = points[points.len() / 2];
     Point {
         c: resonance.c,
@@ -94,8 +100,10 @@ fn peak(points: &[Point], epsilon: f64) -> Point {
         g,
         phase_error_deg: x.to_degrees(),
         u_c: size(&vec![1.0 / points.len() as f64; points.len()], &|n| points[n].u_c),
-        u_sigma: size(&values, &|n| points[n].u_sigma).hypot(u_phase * g / (2.0 * resonance.c)),
-        u_g: size(&values, &|n| points[n].u_g),
+        u_sigma: size(&values, &|n| points[n].u_sigma)
+            .hypot(by_sigma)
+            .hypot(u_phase * g / (2.0 * resonance.c)),
+        u_g: size(&values, &|n| points[n].u_g).hypot(by_g),
         u_phase_deg: u_phase.to_degrees(),
         periods: points.iter().map(|one| one.periods).sum(),
         averaged: points.iter().map(|one| one.averaged).sum(),

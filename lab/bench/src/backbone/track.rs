@@ -211,7 +211,8 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
         // A smooth move is twice as fast in its middle as on average.
         let periods = self.scene.backbone.move_periods.max(2.0 * slowest);
         let change = extrapolated(known, level).zip(last).map(|(expected, (last, held))| {
-            let [then, now] = [(expected, phase), (last, held)].map(|(one, phase)| peak::at_phase(&one, phase, d.epsilon));
+            let [then, now] =
+                [(expected, phase), (last, held)].map(|(one, phase)| peak::at_phase(&one, phase, d.epsilon));
             [then[0] - now[0], then[1] - now[1]]
         });
         let [g, sigma] = change.unwrap_or_default();
@@ -272,7 +273,10 @@ impl Order<'_> {
         };
         Criterion {
             linear: scene.linear(),
-            precision: [share * d.amplitude(settings.precision), d.omega_change(settings.precision)],
+            precision: [
+                share * d.amplitude(settings.precision),
+                d.omega_change(settings.precision),
+            ],
             fewest: settings.dwell_min as usize,
             phase: self.phase,
             slopes,
@@ -291,7 +295,12 @@ pub(super) fn extrapolated(known: &[Known], c: f64) -> Option<Known> {
     let points = &known[known.len().saturating_sub(3)..];
     let weights = points.iter().enumerate().map(|(i, point)| {
         let others = points.iter().enumerate().filter(|(j, _)| *j != i);
-        (point, others.map(|(_, other)| (c - other.c) / (point.c - other.c)).product::<f64>())
+        (
+            point,
+            others
+                .map(|(_, other)| (c - other.c) / (point.c - other.c))
+                .product::<f64>(),
+        )
     });
     let sum = weights.fold([0.0; 2], |[g, sigma], (point, weight)| {
         [g + weight * point.g, sigma + weight * point.sigma]

@@ -41,7 +41,9 @@ pub(super) fn predicted(orbit: &Orbit, scene: &Scene, samples: usize) -> Vec<Dec
 
 /// sigma at the amplitude `c` along falling amplitudes; `None` outside.
 pub(super) fn sigma_at(points: &[DecayPoint], c: f64) -> Option<f64> {
-    let pair = points.windows(2).find(|pair| pair[0].c >= c && c >= pair[1].c && pair[0].c > pair[1].c)?;
+    let pair = points
+        .windows(2)
+        .find(|pair| pair[0].c >= c && c >= pair[1].c && pair[0].c > pair[1].c)?;
     let share = (pair[0].c - c) / (pair[0].c - pair[1].c);
     Some(pair[0].sigma + share * (pair[1].sigma - pair[0].sigma))
 }

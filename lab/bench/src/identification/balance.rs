@@ -163,7 +163,12 @@ impl Balance {
         let [by_base, by_omega] = self.slopes().map(|slope| slope.value);
         let ahead = (command * self.calibration - self.at(0.0)[0].value) / by_base;
         // The uncertainty of the slope is in that of the drive at the limit.
-        let aside = self.drive.estimate(&[0.0, 1.0, ahead]).scaled(1.0 / self.gain).uncertainty / by_base;
+        let aside = self
+            .drive
+            .estimate(&[0.0, 1.0, ahead])
+            .scaled(1.0 / self.gain)
+            .uncertainty
+            / by_base;
         let turning = self.at(ahead)[1];
         // The noise within the integrals moves the amplitude that the frequency belongs to as it moves the limit: it cancels.
         [

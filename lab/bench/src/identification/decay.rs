@@ -44,7 +44,7 @@ pub enum DecayEnd {
     /// The record ended earlier: record.decay_periods is too short to see the loss of synchrony.
     #[serde(rename = "end of the record")]
     Record,
-    /// The amplitude fell no faster than by the damping of the structure, on a rig that does not report impacts.
+    /// The impacts took away less than half of what they did at the release, on a rig that does not report impacts.
     #[serde(rename = "end of the impacts")]
     Linear,
 }
@@ -60,8 +60,9 @@ pub struct DecayPoints {
 
 /// Points per period along the decay.
 const PER_PERIOD: f64 = 8.0;
-/// Rate of the decay over that by damping alone at which the impacts have ended: at the fold they still take as much power as damping.
-const LINEAR: f64 = 1.5;
+/// What the impacts take away, over that at the release, below which they are no longer those of a 1:1 motion: the speed of the particle, and so
+/// this, changes by a third down to the fold.
+const KEPT: f64 = 0.5;
 
 /// The points along the decay of a record, up to the loss of synchrony where the rig reports impacts, otherwise to
 /// the end of the impacts.
@@ -82,13 +83,16 @@ pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
     } else {
         f64::INFINITY
     };
-    let damping = scene.linear().damping_rate;
-    let is_linear = |piece: &Piece| !has_impacts && -piece.rate < LINEAR * damping * piece.amplitude;
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
     let pieces = match scene.record.estimator {
         Estimator::Fit => fitted(&values, dt, omega, scene.record.window_periods),
         Estimator::Crossings => crossed(&values, dt),
     };
+    // What the impacts alone take away, m/s; the mean over the first period is that of the 1:1 motion.
+    let damping = scene.linear().damping_rate;
+    let taken = |piece: &Piece| -piece.rate - damping * piece.amplitude;
+    let at_release = mean(pieces.iter().take(PER_PERIOD as usize).map(taken));
+    let is_linear = |piece: &Piece| !has_impacts && taken(piece) < KEPT * at_release;
     let end = if pieces.iter().any(is_linear) {
         DecayEnd::Linear
     } else if has_impacts && until + 2.0 * half_period < last.time {

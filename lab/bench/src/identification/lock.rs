@@ -81,7 +81,10 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let (dt, hold) = (record.sample_time, record.hold());
     let target = scene.phase_target().radians();
     let held = Cycle::all(hold, dt, target);
-    let (wide, approach) = (approached(record, scene, target, &held, WIDE), approached(record, scene, target, &held, SPREAD));
+    let (wide, approach) = (
+        approached(record, scene, target, &held, WIDE),
+        approached(record, scene, target, &held, SPREAD),
+    );
     // The drive of the hold decides where the approach ends.
     let [base, phase_error, response] = means(&held);
     let command = mean(held.iter().map(|cycle| cycle.commanded[0].norm()));
@@ -93,7 +96,9 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     // The speed belongs to the amplitude of the hold, and changes about as it does.
     let aside = ((limit.value - response.value).abs() + limit.uncertainty) / limit.value;
     let b = speeds.map(|speeds| {
-        let per_period = speeds.chunks(hold.len().div_ceil(held.len())).map(|c| mean(c.iter().copied()));
+        let per_period = speeds
+            .chunks(hold.len().div_ceil(held.len()))
+            .map(|c| mean(c.iter().copied()));
         let speed = Estimate::mean(&per_period.collect::<Vec<f64>>());
         Estimate::new(speed.value, &[speed.uncertainty, speed.value * aside])
     });

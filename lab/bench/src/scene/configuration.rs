@@ -210,7 +210,10 @@ impl Scene {
     /// bandwidth times A/E, which is largest without impacts: the inverse of twice the damping ratio.
     fn coupled_bandwidth(&self) -> f64 {
         let linear = self.linear();
-        COUPLED * (2.0 * linear.damping_rate / linear.omega0).max(f64::MIN_POSITIVE).cbrt()
+        COUPLED
+            * (2.0 * linear.damping_rate / linear.omega0)
+                .max(f64::MIN_POSITIVE)
+                .cbrt()
     }
 }
 

@@ -40,7 +40,10 @@ pub fn figure(found: &Comparison) -> Figure {
     let places = drawn.clone().map(|point| (point.sigma, point.c));
     let inside = places.filter(|(sigma, _)| (low..=high).contains(sigma));
     decay_points(&mut panel, inside, DECAY_LABEL);
-    let predicted = found.decay.iter().filter_map(|one| Some((one.sigma_predicted?, one.point.c)));
+    let predicted = found
+        .decay
+        .iter()
+        .filter_map(|one| Some((one.sigma_predicted?, one.point.c)));
     let predicted: Vec<_> = predicted
         .filter(|(sigma, c)| (low..=high).contains(sigma) && *c > fold)
         .collect();
