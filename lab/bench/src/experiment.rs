@@ -158,6 +158,15 @@ pub enum ExperimentError {
         fault: Fault,
         evidence: Box<Evidence>,
     },
+    #[error(
+        "the 1:1 motion, held at C = {held}, is {regime} at C = {level}: the backbone ends between the two, or the step was too large; \
+         set backbone.C_to nearer to {held}, or more backbone.points"
+    )]
+    MotionLost {
+        held: f64,
+        level: f64,
+        regime: crate::identification::Regime,
+    },
     #[error("the controller asked for omega = {} rad/s and E = {} m, which is refused; the drive is off", .0.omega, .0.amplitude)]
     NotANumber(Drive),
 }

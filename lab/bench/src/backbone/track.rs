@@ -168,7 +168,14 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
                 let order = Order { level, phase: phases[scan], known: &known };
                 let point = self.hold(&order, last)?;
                 last = point.known().map(|known| (known, order.phase)).or(last);
+                let held = scans[scan]
+                    .last()
+                    .filter(|before: &&Point| is_one_to_one(before.regime))
+                    .map(|before| before.level);
                 scans[scan].push(point);
+                if let Some(held) = held.filter(|_| matches!(point.regime, Regime::NoImpacts | Regime::Other)) {
+                    return Err(ExperimentError::MotionLost { held, level, regime: point.regime });
+                }
             }
         }
         Ok(())
@@ -288,6 +295,10 @@ impl Order<'_> {
         let Estimate { value, uncertainty } = response.scaled(1.0 / scene.dimensionless().b);
         (value - self.level).abs() <= (REACHED * self.level).max(4.0 * uncertainty)
     }
+}
+
+fn is_one_to_one(regime: Regime) -> bool {
+    matches!(regime, Regime::Symmetric | Regime::Unresolved)
 }
 
 /// Drive and detuning at the level `c`, on the polynomial through the last points, three at most; `None` without any.
