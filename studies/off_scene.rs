@@ -91,8 +91,17 @@ fn main() -> Result<(), Failure> {
         .filter(|one| one.points > 0)
         .map(|one| one.periods / one.points as f64)
         .collect();
+    let count = |value: fn(&Found) -> usize| found.iter().map(value).sum::<usize>();
+    let failures = found.iter().filter(|one| one.message.is_some()).count();
     println!(
-        "all: within 1.96 u {:.3}, within 2 u {:.3}, worst {:.1} u; error median {:.1e}, worst {:.1e}; periods a point median {:.1}, worst {:.1}; settled {} of {}; failed {}",
+        "rigs,seed,snr_dB,scene,points,settled,within_1.96u,within_2u,worst_u,median_error,worst_error,median_periods,worst_periods,ended_early"
+    );
+    println!(
+        "{},{seed},{snr},{},{},{},{:.4},{:.4},{:.1},{:.1e},{:.1e},{:.1},{:.1},{failures}",
+        found.len(),
+        if shift == "none" { "the rig" } else { "another" },
+        count(|one| one.points),
+        count(|one| one.settled),
         share(1.96),
         share(2.0),
         largest(&ratios),
@@ -100,9 +109,6 @@ fn main() -> Result<(), Failure> {
         largest(&errors),
         median(&periods),
         largest(&periods),
-        found.iter().map(|one| one.settled).sum::<usize>(),
-        found.iter().map(|one| one.points).sum::<usize>(),
-        found.iter().filter(|one| one.message.is_some()).count(),
     );
     Ok(())
 }

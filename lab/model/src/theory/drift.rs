@@ -1,13 +1,17 @@
 //! Amplitudes that drift along the manifold: how far a slowly changing motion differs from the steady one of the same amplitude.
 //!
-//! docs/estimators.md derives it. While C changes by `d = pi dC/dtau` from impact to impact, B and the phase x of v at an impact
+//! While C changes by `d = pi dC/dtau` from impact to impact, B and the phase x of v at an impact
 //! follow late:
 //!
 //! ```text
 //! B+ = r B- + (1 + r) (C cos x + (d/pi) sin x),      2 - C sin x - B+ (x+ + pi - x) - (C + d) sin x+ = 0
 //! ```
 //!
-//! Steady drift, `B+ - B- = d dB/dC` and `x+ - x = d dx/dC`, makes this two linear equations for the deviations of B and x.
+//! Steady drift, `B+ - B- = d dB/dC` and `x+ - x = d dx/dC`, makes this two linear equations for the deviations of B and x. The mean of the
+//! particle's force on v over the flight gives the change of sigma per unit of `C' = dC/dtau`. Over many flights it differs from that of
+//! one flight, because the force grows within a flight: by `m d(R B^2/C)/dC / C` in sigma and by `-2 m d(B sin x)/dC` in the drive, with the
+//! mean `m = pi/2 - 4/pi` of `s^2 cos s` over half a period. Three terms of the same order follow from the oscillator: `lambda C'/(2C)`, `lambda C'/C`
+//! and `-C' G_R'(C)/(4C)`. The map of the impacts, iterated at a constant rate, confirms all of this (tests/unit/drift.rs).
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
