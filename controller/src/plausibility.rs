@@ -3,6 +3,7 @@
 
 use crate::real::consts::TAU;
 
+use crate::balance::{Balance, BalanceState, Powers};
 use crate::config::Config;
 use crate::detector::Estimate;
 use crate::real::{Real, larger, smaller};
@@ -36,6 +37,7 @@ pub struct Plausibility {
     warm_up: Real,
     /// Harmonics that the detectors use.
     harmonics: usize,
+    balance: Balance,
 }
 
 /// Largest differences in this period and in the two before it, m, for each channel.
@@ -49,17 +51,20 @@ pub struct Differences {
     distorted: [Real; 2],
     /// Phase since the amplitude of each channel changed fast, rad.
     steady: [Real; 2],
-    /// Whether the last readings were plausible.
+    /// Whether the last readings were implausible.
     implausible: bool,
+    balance: BalanceState,
 }
 
 impl Plausibility {
     /// The check of a configuration.
     pub fn new(config: &Config) -> Self {
+        let warm_up = (WARM_UP[0] / config.bandwidth).max(WARM_UP[1] * TAU / config.omega_start);
         Self {
             limit: config.residual_max,
-            warm_up: (WARM_UP[0] / config.bandwidth).max(WARM_UP[1] * TAU / config.omega_start),
+            warm_up,
             harmonics: config.harmonics.into(),
+            balance: Balance::new(config, warm_up),
         }
     }
 
@@ -103,6 +108,11 @@ impl Plausibility {
             }
             *now = larger(*now, difference);
         }
+    }
+
+    /// Whether the amplitudes contradict the balance of power between drive and response.
+    pub fn contradicts(&self, state: &mut Differences, seen: &Powers) -> bool {
+        self.balance.contradicts(&mut state.balance, seen) && self.limit.is_some()
     }
 
     /// Whether the last readings show a fault, `closed` seconds after the loop was closed.

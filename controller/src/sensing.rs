@@ -5,6 +5,7 @@ use crate::real::consts::FRAC_PI_3;
 use crate::angle::Complex;
 use crate::config::Config;
 use crate::detector::{Estimate, PhaseDetector};
+use crate::balance::Powers;
 use crate::plausibility::{Differences, Plausibility};
 use crate::real::{self, Real};
 use crate::signals::Input;
@@ -162,13 +163,24 @@ impl Sensing {
         } else {
             (0.0, 1.0)
         };
+        let valid = measurable && reference.valid && amplitude >= self.response_min && self.is_coherent(response);
+        let seen = Powers {
+            reading: if fault == Some(Fault::Sensor) { 0.0 } else { input.response },
+            turn: drive.omega * self.sample_time,
+            drive: drive.amplitude,
+            lagging: state.drive,
+            base: if channel.is_some() { reference.amplitude } else { state.drive },
+            response: amplitude,
+            cosine: if valid { cosine } else { 1.0 },
+        };
+        let contradicts = self.plausibility.contradicts(&mut state.differences, &seen);
         Measurement {
-            fault,
+            fault: fault.or(contradicts.then_some(Fault::Implausible)),
             error,
             cosine,
             measurable,
             reference_amplitude: reference.amplitude,
-            valid: measurable && reference.valid && amplitude >= self.response_min && self.is_coherent(response),
+            valid,
             has_sensor: channel.is_some(),
         }
     }
