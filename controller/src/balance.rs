@@ -13,16 +13,18 @@
 //!   structure. A dead sensor, a shaker that is off, or a factor that is three times too small.
 
 use crate::config::Config;
-use crate::real::consts::PI;
+use crate::real::consts::{PI, TAU};
 use crate::real::{Real, larger};
 
 /// Largest growth without work: multiples of the largest drive and of the response. Twice what 500 random rigs showed, half of which
 /// started with a particle that moves.
 const GROWTH: [Real; 2] = [3.0, 0.5];
 /// Largest loss beyond damping and impacts, as above; the response is that before the loss.
-const LOSS: [Real; 2] = [0.5, 0.15];
+const LOSS: [Real; 2] = [0.4, 0.12];
 /// Largest distance below the linear response in the first periods: multiples of the largest drive and of the linear response.
 const FIRST: [Real; 2] = [1.0, 0.5];
+/// Length of the first periods: turns, and time constants of the detector, whose lag they include.
+const FIRST_TIMES: [Real; 2] = [3.0, 3.0];
 
 /// Coefficients of the balance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -82,14 +84,15 @@ pub struct Powers {
 }
 
 impl Balance {
-    /// The balance of a configuration; `first`: length of the first periods, s.
-    pub fn new(config: &Config, first: Real) -> Self {
+    /// The balance of a configuration.
+    pub fn new(config: &Config) -> Self {
+        let [turns, lags] = FIRST_TIMES;
         Self {
             gain: config.response_gain * config.sample_time,
             damping: config.damping_rate.unwrap_or(0.0) * config.sample_time,
             is_known: config.base_bandwidth.is_none(),
             sample_time: config.sample_time,
-            first,
+            first: turns * TAU / config.omega_start + lags / config.bandwidth,
         }
     }
 
@@ -126,7 +129,6 @@ impl Balance {
 #[cfg(all(test, not(feature = "f32")))]
 mod tests {
     use super::*;
-    use crate::real::consts::TAU;
 
     const SAMPLE_TIME: Real = 1e-3;
     const BALANCE: Balance = Balance {

@@ -51,20 +51,19 @@ pub struct Differences {
     distorted: [Real; 2],
     /// Phase since the amplitude of each channel changed fast, rad.
     steady: [Real; 2],
-    /// Whether the last readings were implausible.
-    implausible: bool,
+    /// Whether the last readings of the channels were implausible.
+    implausible: [bool; 2],
     balance: BalanceState,
 }
 
 impl Plausibility {
     /// The check of a configuration.
     pub fn new(config: &Config) -> Self {
-        let warm_up = (WARM_UP[0] / config.bandwidth).max(WARM_UP[1] * TAU / config.omega_start);
         Self {
             limit: config.residual_max,
-            warm_up,
+            warm_up: (WARM_UP[0] / config.bandwidth).max(WARM_UP[1] * TAU / config.omega_start),
             harmonics: config.harmonics.into(),
-            balance: Balance::new(config, warm_up),
+            balance: Balance::new(config),
         }
     }
 
@@ -87,7 +86,7 @@ impl Plausibility {
                 (*before, *last, *now) = (*last, *now, 0.0);
             }
         }
-        state.implausible = false;
+        state.implausible = [false; 2];
         for (n, [now, last, before]) in state.largest.iter_mut().enumerate() {
             let (difference, estimate, change) = differences[n];
             let amplitude = estimate.amplitude();
@@ -104,7 +103,7 @@ impl Plausibility {
                 *distorted = if clear { 0.0 } else { *distorted + turn };
                 let slack = if settled { 0.0 } else { SLACK * larger(change, 1.0) };
                 let expected = (share * limit * change + slack) * amplitude + normal;
-                state.implausible |= difference > expected || *distorted > LASTS * TAU;
+                state.implausible[n] = difference > expected || *distorted > LASTS * TAU;
             }
             *now = larger(*now, difference);
         }
@@ -117,6 +116,8 @@ impl Plausibility {
 
     /// Whether the last readings show a fault, `closed` seconds after the loop was closed.
     pub fn refuses(&self, state: &Differences, closed: Real) -> bool {
-        state.implausible && closed > self.warm_up
+        let [response, base] = state.implausible;
+        // The base follows the drive at once; the response grows, and its detector lags.
+        base || response && closed > self.warm_up
     }
 }

@@ -171,7 +171,7 @@ impl Sensing {
             lagging: state.drive,
             base: if channel.is_some() { reference.amplitude } else { state.drive },
             response: amplitude,
-            cosine: if valid { cosine } else { 1.0 },
+            cosine: if amplitude >= self.response_min { cosine } else { 1.0 },
         };
         let contradicts = self.plausibility.contradicts(&mut state.differences, &seen);
         Measurement {

@@ -39,7 +39,7 @@ pub enum Fault {
     LockLost = 4,
     /// No valid measurement for `signal_timeout`: the amplitude of a channel is too small, or its noise too large.
     NoSignal = 5,
-    /// A reading differed from its prediction by more than `residual_max`.
+    /// A reading differed from its prediction by more than `residual_max`, or the response contradicts the power of its drive.
     Implausible = 6,
 }
 
@@ -112,7 +112,7 @@ impl Fault {
             Self::NoSignal => {
                 "the response or the base could not be measured: too small an amplitude, or too much noise"
             }
-            Self::Implausible => "a reading differed from its prediction: a sensor, the drive or the clock has failed",
+            Self::Implausible => "a reading differed from its prediction, or the response from its drive: a sensor, the drive or the clock has failed",
         }
     }
 }

@@ -45,7 +45,7 @@ typedef enum PhaseLockFault {
   PHASE_LOCK_FAULT_LOCK_LOST = 4,
   // No valid measurement for signal_timeout.
   PHASE_LOCK_FAULT_NO_SIGNAL = 5,
-  // A reading differed from its prediction by more than residual_max.
+  // A reading differed from its prediction by more than residual_max, or the response contradicts the power of its drive.
   PHASE_LOCK_FAULT_IMPLAUSIBLE = 6,
 } PhaseLockFault;
 

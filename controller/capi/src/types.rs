@@ -170,7 +170,7 @@ pub enum PhaseLockFault {
     LockLost = 4,
     /// No valid measurement for signal_timeout.
     NoSignal = 5,
-    /// A reading differed from its prediction by more than residual_max.
+    /// A reading differed from its prediction by more than residual_max, or the response contradicts the power of its drive.
     Implausible = 6,
 }
 
