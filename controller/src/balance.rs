@@ -23,6 +23,8 @@ const GROWTH: [Real; 2] = [3.0, 0.5];
 const LOSS: [Real; 2] = [0.4, 0.12];
 /// Largest distance below the linear response in the first periods: multiples of the largest drive and of the linear response.
 const FIRST: [Real; 2] = [1.0, 0.5];
+/// The same if the damping is not known: a fifth is left after eight periods with a damping ratio of 0.1.
+const FIRST_UNKNOWN: [Real; 2] = [1.0, 0.8];
 /// Length of the first periods: turns, and time constants of the detector, whose lag they include.
 const FIRST_TIMES: [Real; 2] = [3.0, 3.0];
 
@@ -34,6 +36,11 @@ pub struct Balance {
     gain: Real,
     /// Share of the response that damping takes per sample.
     damping: Real,
+    /// What impacts take at most, per largest drive and sample; with the damping if it is not known: in the steady linear motion it takes
+    /// what the drive gives.
+    taken: Real,
+    /// `FIRST`, or `FIRST_UNKNOWN`.
+    below: [Real; 2],
     /// Whether the base follows the drive with a known gain.
     is_known: bool,
     /// s
@@ -87,8 +94,15 @@ impl Balance {
     /// The balance of a configuration.
     pub fn new(config: &Config) -> Self {
         let [turns, lags] = FIRST_TIMES;
+        let gain = config.response_gain * config.sample_time;
+        let (taken, below) = match config.damping_rate {
+            Some(_) => (gain, FIRST),
+            None => (2.0 * gain, FIRST_UNKNOWN),
+        };
         Self {
-            gain: config.response_gain * config.sample_time,
+            gain,
+            taken,
+            below,
             damping: config.damping_rate.unwrap_or(0.0) * config.sample_time,
             is_known: config.base_bandwidth.is_none(),
             sample_time: config.sample_time,
@@ -115,14 +129,14 @@ impl Balance {
         let work = self.gain * seen.base * seen.cosine;
         let given = self.gain * if self.is_known { seen.lagging } else { seen.base } * seen.cosine;
         state.growth = larger(state.growth + rise - work, 0.0);
-        state.loss = larger(state.loss + work - rise - self.damping * response - self.gain * drive, 0.0);
+        state.loss = larger(state.loss + work - rise - self.damping * response - self.taken * drive, 0.0);
         state.linear += given - self.damping * state.linear;
         let exceeds = |sum: Real, [of_drive, of_response]: [Real; 2], response: Real| {
             sum > of_drive * drive + of_response * response
         };
         exceeds(state.growth - state.initial, GROWTH, response)
             || exceeds(state.loss, LOSS, response + state.loss)
-            || state.driven < self.first && exceeds(state.linear - response, FIRST, state.linear)
+            || state.driven < self.first && exceeds(state.linear - response, self.below, state.linear)
     }
 }
 
@@ -134,6 +148,8 @@ mod tests {
     const BALANCE: Balance = Balance {
         gain: 0.03,
         damping: 3e-4,
+        taken: 0.03,
+        below: FIRST,
         is_known: true,
         sample_time: SAMPLE_TIME,
         first: 1.0,

@@ -174,8 +174,9 @@ impl Sensing {
             cosine: if amplitude >= self.response_min { cosine } else { 1.0 },
         };
         let contradicts = self.plausibility.contradicts(&mut state.differences, &seen);
+        let reason = if state.seen { Fault::Implausible } else { Fault::NoSignal };
         Measurement {
-            fault: fault.or(contradicts.then_some(Fault::Implausible)),
+            fault: fault.or(contradicts.then_some(reason)),
             error,
             cosine,
             measurable,

@@ -37,7 +37,7 @@ pub enum Fault {
     TimedOut = 3,
     /// The phase error exceeded `unlock_tolerance`, or the response was no longer valid, while locked.
     LockLost = 4,
-    /// No valid measurement for `signal_timeout`: the amplitude of a channel is too small, or its noise too large.
+    /// No valid measurement for `signal_timeout`, or none in the first periods of the drive: the amplitude of a channel is too small, or its noise too large.
     NoSignal = 5,
     /// A reading differed from its prediction by more than `residual_max`, or the response contradicts the power of its drive.
     Implausible = 6,
