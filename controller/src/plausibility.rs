@@ -27,6 +27,9 @@ const NORMAL: Real = 2.0;
 const DISTORTION: Real = 0.5;
 const LASTS: Real = 5.0;
 
+/// Number of the channel of the base.
+const BASE: usize = 1;
+
 /// Coefficients of the check.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -51,8 +54,10 @@ pub struct Differences {
     distorted: [Real; 2],
     /// Phase since the amplitude of each channel changed fast, rad.
     steady: [Real; 2],
-    /// Whether the last readings of the channels were implausible.
+    /// Whether the last readings of the channels were implausible, and the readings before.
     implausible: [bool; 2],
+    /// As above.
+    before: [bool; 2],
     balance: BalanceState,
 }
 
@@ -68,8 +73,7 @@ impl Plausibility {
     }
 
     /// Takes differences between readings and their predictions, m, the estimates, the factors by which the amplitude has
-    /// changed since, and the times for which the readings have not
-    /// changed, s. `omega` in rad/s.
+    /// changed since, and the times for which the readings have not changed, s. `omega` in rad/s; `closed`: time in the closed loop, s.
     pub fn take(
         &self,
         state: &mut Differences,
@@ -77,6 +81,7 @@ impl Plausibility {
         unchanged: [Real; 2],
         omega: Real,
         sample_time: Real,
+        closed: Real,
     ) {
         let turn = omega * sample_time;
         state.phase += turn;
@@ -86,6 +91,7 @@ impl Plausibility {
                 (*before, *last, *now) = (*last, *now, 0.0);
             }
         }
+        state.before = state.implausible;
         state.implausible = [false; 2];
         for (n, [now, last, before]) in state.largest.iter_mut().enumerate() {
             let (difference, estimate, change) = differences[n];
@@ -103,9 +109,13 @@ impl Plausibility {
                 *distorted = if clear { 0.0 } else { *distorted + turn };
                 let slack = if settled { 0.0 } else { SLACK * larger(change, 1.0) };
                 let expected = (share * limit * change + slack) * amplitude + normal;
-                state.implausible[n] = difference > expected || *distorted > LASTS * TAU;
+                // The base follows the drive at once; the response grows, and its detector lags.
+                let is_known = n == BASE || closed > self.warm_up;
+                state.implausible[n] = is_known && (difference > expected || *distorted > LASTS * TAU);
             }
-            *now = larger(*now, difference);
+            if !state.implausible[n] || state.before[n] {
+                *now = larger(*now, difference);
+            }
         }
     }
 
@@ -114,10 +124,13 @@ impl Plausibility {
         self.balance.contradicts(&mut state.balance, seen) && self.limit.is_some()
     }
 
-    /// Whether the last readings show a fault, `closed` seconds after the loop was closed.
-    pub fn refuses(&self, state: &Differences, closed: Real) -> bool {
-        let [response, base] = state.implausible;
-        // The base follows the drive at once; the response grows, and its detector lags.
-        base || response && closed > self.warm_up
+    /// Whether the last readings show a fault: one implausible reading alone is a glitch.
+    pub fn refuses(&self, state: &Differences) -> bool {
+        (0..2).any(|n| state.implausible[n] && state.before[n])
+    }
+
+    /// Whether the last reading of each channel was the first implausible one.
+    pub fn glitches(&self, state: &Differences) -> [bool; 2] {
+        [0, 1].map(|n| state.implausible[n] && !state.before[n])
     }
 }

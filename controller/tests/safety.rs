@@ -309,3 +309,23 @@ fn a_heavily_damped_structure_of_unknown_damping_is_no_fault() {
         assert_eq!(bench.run(200).fault, None, "{zeta}");
     }
 }
+
+#[test]
+fn a_glitch_of_one_sample_is_ignored() {
+    for size in [-5.0, 0.0, 5.0] {
+        for channel in [0, 1] {
+            for phase in [0, 10, 25, 60] {
+                let mut bench = Bench::new(config());
+                bench.run_to_lock(2000).expect("a lock");
+                (0..phase).for_each(|_| assert!(bench.sample().locked));
+                let mut readings = [bench.resonator.q, bench.resonator.base];
+                readings[channel] = size * [bench.sample().response_amplitude, AMPLITUDE][channel];
+                bench.sample_reading(readings[0], Some(readings[1]));
+                for _ in 0..500 {
+                    let output = bench.sample();
+                    assert!(output.locked && output.phase_error.is_some_and(|error| error.abs() < 0.02), "{output:?}");
+                }
+            }
+        }
+    }
+}
