@@ -16,7 +16,7 @@ const FAST: Real = 1.2;
 const SETTLES: Real = 4.0;
 const SLACK: Real = 0.8;
 /// Phase, rad, after which a reading that does not change at all needs a smaller difference: this share of the limit. Shorter pauses are
-/// those of a connection that loses a few samples.
+/// those of a connection that loses a few samples. An implausible reading that no other follows within this phase is a glitch.
 const PAUSE: Real = TAU / 12.0;
 const PAUSE_SHARE: Real = 0.15;
 /// Differences that count as normal, in units of the largest one of a period.
@@ -54,11 +54,23 @@ pub struct Differences {
     distorted: [Real; 2],
     /// Phase since the amplitude of each channel changed fast, rad.
     steady: [Real; 2],
-    /// Whether the last readings of the channels were implausible, and the readings before.
-    implausible: [bool; 2],
-    /// As above.
-    before: [bool; 2],
+    /// What the last readings of the channels were.
+    found: [Found; 2],
+    /// Phase since the last implausible reading of each channel, rad.
+    since: [Real; 2],
     balance: BalanceState,
+}
+
+/// What a reading is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+enum Found {
+    #[default]
+    Plausible,
+    /// An implausible reading alone.
+    Glitch,
+    /// One of several.
+    Fault,
 }
 
 impl Plausibility {
@@ -91,8 +103,7 @@ impl Plausibility {
                 (*before, *last, *now) = (*last, *now, 0.0);
             }
         }
-        state.before = state.implausible;
-        state.implausible = [false; 2];
+        state.found = [Found::Plausible; 2];
         for (n, [now, last, before]) in state.largest.iter_mut().enumerate() {
             let (difference, estimate, change) = differences[n];
             let amplitude = estimate.amplitude();
@@ -111,9 +122,13 @@ impl Plausibility {
                 let expected = (share * limit * change + slack) * amplitude + normal;
                 // The base follows the drive at once; the response grows, and its detector lags.
                 let is_known = n == BASE || closed > self.warm_up;
-                state.implausible[n] = is_known && (difference > expected || *distorted > LASTS * TAU);
+                state.since[n] += turn;
+                if is_known && (difference > expected || *distorted > LASTS * TAU) {
+                    state.found[n] = if state.since[n] > PAUSE { Found::Glitch } else { Found::Fault };
+                    state.since[n] = 0.0;
+                }
             }
-            if !state.implausible[n] || state.before[n] {
+            if state.found[n] != Found::Glitch {
                 *now = larger(*now, difference);
             }
         }
@@ -124,13 +139,13 @@ impl Plausibility {
         self.balance.contradicts(&mut state.balance, seen) && self.limit.is_some()
     }
 
-    /// Whether the last readings show a fault: one implausible reading alone is a glitch.
+    /// Whether the last readings show a fault.
     pub fn refuses(&self, state: &Differences) -> bool {
-        (0..2).any(|n| state.implausible[n] && state.before[n])
+        state.found.contains(&Found::Fault)
     }
 
-    /// Whether the last reading of each channel was the first implausible one.
+    /// Whether the last reading of each channel is a glitch.
     pub fn glitches(&self, state: &Differences) -> [bool; 2] {
-        [0, 1].map(|n| state.implausible[n] && !state.before[n])
+        state.found.map(|found| found == Found::Glitch)
     }
 }
