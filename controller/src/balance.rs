@@ -16,12 +16,14 @@ use crate::config::Config;
 use crate::real::consts::{PI, TAU};
 use crate::real::{Real, larger};
 
-/// Largest growth without work: multiples of the largest drive and of the response. Twice what 500 random rigs showed, half of which
-/// started with a particle that moves.
+/// Largest growth without work: multiples of the largest drive and of the response. 1.6 times the largest of 2400 random rigs, half of
+/// which started with a particle that moves.
 const GROWTH: [Real; 2] = [3.0, 0.5];
-/// Largest loss beyond damping and impacts, as above; the response is that before the loss.
+/// Largest loss beyond damping and impacts, as above; the response is that before the loss. Four times the largest of the 1200 rigs that
+/// started at rest; one of the others exceeds it.
 const LOSS: [Real; 2] = [0.4, 0.12];
-/// Largest distance below the linear response in the first periods: multiples of the largest drive and of the linear response.
+/// Largest distance below the linear response in the first periods: multiples of the largest drive and of the linear response. Four and
+/// 1.4 times the largest of these rigs.
 const FIRST: [Real; 2] = [1.0, 0.5];
 /// The same if the damping is not known: a fifth is left after eight periods with a damping ratio of 0.1.
 const FIRST_UNKNOWN: [Real; 2] = [1.0, 0.8];
