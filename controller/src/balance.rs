@@ -120,7 +120,12 @@ impl Balance {
         }
         if seen.drive == 0.0 {
             let BalanceState { begun, initial, .. } = *state;
-            *state = BalanceState { response: seen.response, begun, initial, ..BalanceState::default() };
+            *state = BalanceState {
+                response: seen.response,
+                begun,
+                initial,
+                ..BalanceState::default()
+            };
             return false;
         }
         state.drive = larger(state.drive, seen.drive);
@@ -131,7 +136,10 @@ impl Balance {
         let work = self.gain * seen.base * seen.cosine;
         let given = self.gain * if self.is_known { seen.lagging } else { seen.base } * seen.cosine;
         state.growth = larger(state.growth + rise - work, 0.0);
-        state.loss = larger(state.loss + work - rise - self.damping * response - self.taken * drive, 0.0);
+        state.loss = larger(
+            state.loss + work - rise - self.damping * response - self.taken * drive,
+            0.0,
+        );
         state.linear += given - self.damping * state.linear;
         let exceeds = |sum: Real, [of_drive, of_response]: [Real; 2], response: Real| {
             sum > of_drive * drive + of_response * response

@@ -124,7 +124,11 @@ impl Plausibility {
                 let is_known = n == BASE || closed > self.warm_up;
                 state.since[n] += turn;
                 if is_known && (difference > expected || *distorted > LASTS * TAU) {
-                    state.found[n] = if state.since[n] > PAUSE { Found::Glitch } else { Found::Fault };
+                    state.found[n] = if state.since[n] > PAUSE {
+                        Found::Glitch
+                    } else {
+                        Found::Fault
+                    };
                     state.since[n] = 0.0;
                 }
             }

@@ -3,9 +3,9 @@
 use crate::real::consts::FRAC_PI_3;
 
 use crate::angle::Complex;
+use crate::balance::Powers;
 use crate::config::Config;
 use crate::detector::{Estimate, PhaseDetector};
-use crate::balance::Powers;
 use crate::plausibility::{Differences, Plausibility};
 use crate::real::{self, Real};
 use crate::signals::Input;
@@ -165,16 +165,28 @@ impl Sensing {
         };
         let valid = measurable && reference.valid && amplitude >= self.response_min && self.is_coherent(response);
         let seen = Powers {
-            reading: if fault == Some(Fault::Sensor) { 0.0 } else { input.response },
+            reading: if fault == Some(Fault::Sensor) {
+                0.0
+            } else {
+                input.response
+            },
             turn: drive.omega * self.sample_time,
             drive: drive.amplitude,
             lagging: state.drive,
-            base: if channel.is_some() { reference.amplitude } else { state.drive },
+            base: if channel.is_some() {
+                reference.amplitude
+            } else {
+                state.drive
+            },
             response: amplitude,
             cosine: if amplitude >= self.response_min { cosine } else { 1.0 },
         };
         let contradicts = self.plausibility.contradicts(&mut state.differences, &seen);
-        let reason = if state.seen { Fault::Implausible } else { Fault::NoSignal };
+        let reason = if state.seen {
+            Fault::Implausible
+        } else {
+            Fault::NoSignal
+        };
         Measurement {
             fault: fault.or(contradicts.then_some(reason)),
             error,

@@ -112,7 +112,9 @@ impl Fault {
             Self::NoSignal => {
                 "the response or the base could not be measured: too small an amplitude, or too much noise"
             }
-            Self::Implausible => "a reading differed from its prediction, or the response from its drive: a sensor, the drive or the clock has failed",
+            Self::Implausible => {
+                "a reading differed from its prediction, or the response from its drive: a sensor, the drive or the clock has failed"
+            }
         }
     }
 }

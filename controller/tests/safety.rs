@@ -323,7 +323,10 @@ fn a_glitch_of_one_sample_is_ignored() {
                 bench.sample_reading(readings[0], Some(readings[1]));
                 for _ in 0..500 {
                     let output = bench.sample();
-                    assert!(output.locked && output.phase_error.is_some_and(|error| error.abs() < 0.02), "{output:?}");
+                    assert!(
+                        output.locked && output.phase_error.is_some_and(|error| error.abs() < 0.02),
+                        "{output:?}"
+                    );
                 }
             }
         }

@@ -148,7 +148,7 @@ typedef struct PhaseLockConfig {
 // Storage of a controller and its state, initialised by phase_lock_init. May be copied; its content is private.
 typedef struct PhaseLockController {
   // Opaque.
-  uint64_t words[352];
+  uint64_t words[384];
 } PhaseLockController;
 
 // Sensor readings of a sample, and the operator's request.

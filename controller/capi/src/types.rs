@@ -14,7 +14,7 @@ pub type PhaseLockReal = f64;
 #[derive(Clone, Copy)]
 pub struct PhaseLockController {
     /// Opaque.
-    pub words: [u64; 352],
+    pub words: [u64; 384],
 }
 
 /// Content of the storage.

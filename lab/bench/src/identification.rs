@@ -65,7 +65,9 @@ pub enum IdentificationError {
         tolerance: f64,
     },
     /// A sensor failed after the release.
-    #[error("a sensor {what} {seconds:.3} s after the release, so that the decay is not recorded: check its cable and converter")]
+    #[error(
+        "a sensor {what} {seconds:.3} s after the release, so that the decay is not recorded: check its cable and converter"
+    )]
     SensorAfterRelease {
         /// Time since the release, s.
         seconds: f64,

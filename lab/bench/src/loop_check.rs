@@ -95,7 +95,10 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
     // Without a sensor, the base moves as expected.
     let base = if has_base {
         let seen = Seen::of(&readings[begins + driven - window..], 2);
-        (seen.phasor, seen.noise / seen.phasor.norm() * (2.0 / window as f64).sqrt())
+        (
+            seen.phasor,
+            seen.noise / seen.phasor.norm() * (2.0 / window as f64).sqrt(),
+        )
     } else {
         (expected[1], 0.0)
     };
@@ -132,7 +135,8 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
 /// Removes the drift of the response: a particle that flies slowly moves the centre of mass, which looks like a response in every period.
 fn without_drift(readings: &mut [[f64; 3]]) {
     let half = readings.len() / 2;
-    let [first, second] = [&readings[..half], &readings[half..2 * half]].map(|part| mean(part.iter().map(|one| one[1])));
+    let [first, second] =
+        [&readings[..half], &readings[half..2 * half]].map(|part| mean(part.iter().map(|one| one[1])));
     let slope = (second - first) / half as f64;
     for (n, reading) in readings.iter_mut().enumerate() {
         reading[1] -= slope * n as f64;

@@ -148,7 +148,13 @@ struct Altered {
 
 impl Altered {
     fn new(plant: Box<dyn Rig>) -> Self {
-        Self { plant, factors: [1.0; 2], late: [0; 2], past: Vec::new(), clock: 1.0 }
+        Self {
+            plant,
+            factors: [1.0; 2],
+            late: [0; 2],
+            past: Vec::new(),
+            clock: 1.0,
+        }
     }
 }
 
@@ -183,8 +189,17 @@ fn what_would_falsify_a_measurement_is_refused_with_and_without_noise() {
         (|rig| rig.clock = 1.01, Verdict::Clock),
         (|rig| rig.clock = 0.99, Verdict::Clock),
     ];
-    for settings in [&[][..], &["chain.snr=40"], &["chain.snr=30", "chain.seed=9"], &["resonance.reference='force'"]] {
-        let overrides: Vec<_> = settings.iter().chain(&["start.dq2=0"]).map(|one| one.parse().unwrap()).collect();
+    for settings in [
+        &[][..],
+        &["chain.snr=40"],
+        &["chain.snr=30", "chain.seed=9"],
+        &["resonance.reference='force'"],
+    ] {
+        let overrides: Vec<_> = settings
+            .iter()
+            .chain(&["start.dq2=0"])
+            .map(|one| one.parse().unwrap())
+            .collect();
         let scene = Scene::parse("paper.toml", PAPER, &overrides).unwrap();
         for (alter, expected) in cases {
             let mut rig = Altered::new(Simulated::of(&scene).unwrap());
@@ -207,7 +222,12 @@ fn natural_frequency_and_damping_of_the_rig_replace_those_of_the_scene() {
         let rig = Simulated::new(plant, scene.start).unwrap();
         let found = check(&mut *Chain::around(Box::new(rig), &scene), &scene).unwrap();
         assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
-        let differ: Vec<&str> = found.quantities.iter().filter(|one| one.differs()).map(|one| one.name).collect();
+        let differ: Vec<&str> = found
+            .quantities
+            .iter()
+            .filter(|one| one.differs())
+            .map(|one| one.name)
+            .collect();
         assert_eq!(differ, ["natural frequency", "damping rate"]);
         let linear = found.linear.unwrap();
         println!("{settings:?}: {linear:?}");
@@ -224,6 +244,9 @@ fn natural_frequency_and_damping_of_the_rig_replace_those_of_the_scene() {
         assert!((config.damping_rate.unwrap() / linear.damping_rate - 1.0).abs() < 1e-12);
         assert!((config.omega_start / linear.omega_0 - scene.controller.omega_start).abs() < 1e-12);
         assert!((config.response_gain - 0.5 * linear.omega_0).abs() < 1e-9);
-        assert_eq!((measured.epsilon, measured.r, measured.b, measured.g), (stated.epsilon, stated.r, stated.b, stated.g));
+        assert_eq!(
+            (measured.epsilon, measured.r, measured.b, measured.g),
+            (stated.epsilon, stated.r, stated.b, stated.g)
+        );
     }
 }

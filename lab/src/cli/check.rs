@@ -1,8 +1,8 @@
 //! `vines check`: the loop before the drive rises.
 
 use clap::Args;
-use vines::loop_check::{Channel, LockTime, LoopCheck, Trials, Verdict, check, lock_times, trials};
 use vines::experiment::ExperimentError;
+use vines::loop_check::{Channel, LockTime, LoopCheck, Trials, Verdict, check, lock_times, trials};
 use vines::report::{Table, number, with_uncertainty};
 
 use super::endpoint::{Endpoint, ReachArguments};
@@ -122,8 +122,17 @@ pub(super) fn described(found: &LoopCheck) -> String {
     let mut text = format!("{}\n", table.markdown());
     if !found.quantities.is_empty() {
         let rows = found.quantities.iter().map(|one| {
-            let name = format!("{}{}{}", one.name, if one.unit.is_empty() { "" } else { ", " }, one.unit);
-            [name, with_uncertainty(one.measured, one.uncertainty), number(one.expected)]
+            let name = format!(
+                "{}{}{}",
+                one.name,
+                if one.unit.is_empty() { "" } else { ", " },
+                one.unit
+            );
+            [
+                name,
+                with_uncertainty(one.measured, one.uncertainty),
+                number(one.expected),
+            ]
         });
         text += &format!("{}\n", Table::new("measured | value | scene").rows(rows).markdown());
     }

@@ -28,7 +28,10 @@ fn in_si(p: &Dimensionless, [sigma, c, g]: [(f64, f64); 3]) -> [String; 3] {
     let hertz = |omega: f64| omega / std::f64::consts::TAU;
     let metres = |value: f64, u: f64| format!("{value:.5e} ± {u:.1e}");
     [
-        with_uncertainty(hertz(p.omega0 + p.omega_change(sigma.0)), hertz(p.omega_change(sigma.1))),
+        with_uncertainty(
+            hertz(p.omega0 + p.omega_change(sigma.0)),
+            hertz(p.omega_change(sigma.1)),
+        ),
         metres(p.b * c.0, p.b * c.1),
         metres(p.amplitude(g.0), p.amplitude(g.1)),
     ]
@@ -154,7 +157,11 @@ fn agreement(found: &Comparison) -> String {
 /// The points of a tracked backbone, and what they cost.
 pub fn tracked(found: &TrackedComparison) -> String {
     let on_a_rig = found.points.iter().all(|one| one.point.regime_by_impacts.is_none());
-    let si = if on_a_rig { "frequency, Hz | response, m | base, m | " } else { "" };
+    let si = if on_a_rig {
+        "frequency, Hz | response, m | base, m | "
+    } else {
+        ""
+    };
     let rows = found.points.iter().map(|TrackedPoint { point, exact }| {
         let regime = match point.regime_by_impacts {
             Some(by_impacts) => format!("{} / {by_impacts}", point.regime),

@@ -30,7 +30,8 @@ pub(super) fn sensors_after_release(record: &Record, scene: &Scene) -> Result<()
         Err(IdentificationError::SensorAfterRelease { seconds, what })
     };
     let is_number = |value: f64| value.is_finite();
-    let all_numbers = |n: &usize| is_number(decay[*n].sensors.response) && decay[*n].sensors.reference.is_none_or(is_number);
+    let all_numbers =
+        |n: &usize| is_number(decay[*n].sensors.response) && decay[*n].sensors.reference.is_none_or(is_number);
     if let Some(n) = (0..decay.len()).find(|n| !all_numbers(n)) {
         return failed(n, "reads no number");
     }

@@ -65,10 +65,19 @@ pub(super) fn measured(linear: &Linear, ratio: Complex64, scene: &Scene) -> Vec<
         verdict: None,
     };
     let hertz = [linear.omega_0, u, stated.omega0].map(|omega| omega / TAU);
-    let late = if ratio.arg() > 0.0 { Verdict::BaseLate } else { Verdict::ResponseLate };
+    let late = if ratio.arg() > 0.0 {
+        Verdict::BaseLate
+    } else {
+        Verdict::ResponseLate
+    };
     vec![
         replaced("natural frequency", "Hz", hertz, NOTED[0]),
-        replaced("damping rate", "1/s", [linear.damping_rate, u, stated.damping_rate], NOTED[1]),
+        replaced(
+            "damping rate",
+            "1/s",
+            [linear.damping_rate, u, stated.damping_rate],
+            NOTED[1],
+        ),
         Quantity {
             name: "phase of the response to the base, less the expected one",
             unit: "degrees",
@@ -78,13 +87,24 @@ pub(super) fn measured(linear: &Linear, ratio: Complex64, scene: &Scene) -> Vec<
             tolerance: PHASE,
             verdict: Some(late),
         },
-        factor("response over base, over the expected one", ratio.norm(), linear.u_gain, Verdict::ResponseGain, FACTOR),
+        factor(
+            "response over base, over the expected one",
+            ratio.norm(),
+            linear.u_gain,
+            Verdict::ResponseGain,
+            FACTOR,
+        ),
     ]
 }
 
 /// Amplitude of the base, whose phasor, m, and its relative uncertainty are given, over that of the drive, and its frequency from its
 /// phasors, period by period.
-pub(super) fn of_base((phasor, u): (Complex64, f64), drive: f64, periods: &[Complex64], scene: &Scene) -> [Quantity; 2] {
+pub(super) fn of_base(
+    (phasor, u): (Complex64, f64),
+    drive: f64,
+    periods: &[Complex64],
+    scene: &Scene,
+) -> [Quantity; 2] {
     // A delay may shift the beginning by some periods.
     let last = &periods[periods.len() / 2..];
     let turned: Complex64 = last.windows(2).map(|pair| pair[0].conj() * pair[1]).sum();
@@ -95,7 +115,13 @@ pub(super) fn of_base((phasor, u): (Complex64, f64), drive: f64, periods: &[Comp
     // The phases of a window's ends.
     let u_clock = u * (periods.len() as f64).sqrt() / (TAU * (last.len() as f64 - 1.0));
     [
-        factor("frequency of the base over that of the drive", 1.0 + turned.arg() / TAU, u_clock, Verdict::Clock, CLOCK),
+        factor(
+            "frequency of the base over that of the drive",
+            1.0 + turned.arg() / TAU,
+            u_clock,
+            Verdict::Clock,
+            CLOCK,
+        ),
         factor("base over drive", ratio, u * ratio, Verdict::BaseGain, tolerance),
     ]
 }

@@ -80,7 +80,9 @@ pub enum Verdict {
     ResponseLate,
     #[error("the base sensor is late: check its filter and delay; a lock would hold another phase than it reports")]
     BaseLate,
-    #[error("the base moves at another frequency than the drive: check the clocks and the sample times of rig and controller")]
+    #[error(
+        "the base moves at another frequency than the drive: check the clocks and the sample times of rig and controller"
+    )]
     Clock,
     #[error("the response is noisy: check its shield and range")]
     ResponseNoisy,
