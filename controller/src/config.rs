@@ -101,8 +101,8 @@ pub struct Config {
     /// has a delay of half a sample.
     pub delay: Real,
     /// Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s. For an oscillator excited
-    /// through its base: half the natural frequency in rad/s. Used only by
-    /// [`PhaseLock::hold_response`](crate::PhaseLock::hold_response).
+    /// through its base: half the natural frequency in rad/s. Used by
+    /// [`PhaseLock::hold_response`](crate::PhaseLock::hold_response), and by the check of the response against the drive.
     pub response_gain: Real,
     /// How much faster the response approaches its steady state than under a constant drive: `1 + approach_gain` times. The
     /// drive is shaped by this gain until the lock criterion is met, and constant from then on.
@@ -123,7 +123,7 @@ pub struct Config {
     /// Longest time in the closed loop without a valid measurement, s: with too small an amplitude or too much noise.
     pub signal_timeout: Option<Real>,
     /// Largest difference between a reading and its prediction by the detector, as a share of the amplitude of the channel, beyond twice
-    /// the differences of the last periods. `None`: any.
+    /// the differences of the last periods. `None`: any, and the response is not checked against the drive either.
     pub residual_max: Option<Real>,
     /// Whether a sensor measures the base. Without it the internal oscillator with the configured `delay` is the reference.
     pub reference_connected: bool,

@@ -50,6 +50,7 @@
 mod amplitude_loop;
 mod angle;
 mod approach;
+mod balance;
 mod capture;
 mod check;
 mod config;

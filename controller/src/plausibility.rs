@@ -3,6 +3,7 @@
 
 use crate::real::consts::TAU;
 
+use crate::balance::{Balance, BalanceState, Powers};
 use crate::config::Config;
 use crate::detector::Estimate;
 use crate::real::{Real, larger, smaller};
@@ -15,7 +16,7 @@ const FAST: Real = 1.2;
 const SETTLES: Real = 4.0;
 const SLACK: Real = 0.8;
 /// Phase, rad, after which a reading that does not change at all needs a smaller difference: this share of the limit. Shorter pauses are
-/// those of a connection that loses a few samples.
+/// those of a connection that loses a few samples. An implausible reading that no other follows within this phase is a glitch.
 const PAUSE: Real = TAU / 12.0;
 const PAUSE_SHARE: Real = 0.15;
 /// Differences that count as normal, in units of the largest one of a period.
@@ -25,6 +26,9 @@ const NORMAL: Real = 2.0;
 /// which it must last: a change of the drive disturbs the harmonics for one or two.
 const DISTORTION: Real = 0.5;
 const LASTS: Real = 5.0;
+
+/// Number of the channel of the base.
+const BASE: usize = 1;
 
 /// Coefficients of the check.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -36,6 +40,7 @@ pub struct Plausibility {
     warm_up: Real,
     /// Harmonics that the detectors use.
     harmonics: usize,
+    balance: Balance,
 }
 
 /// Largest differences in this period and in the two before it, m, for each channel.
@@ -49,8 +54,23 @@ pub struct Differences {
     distorted: [Real; 2],
     /// Phase since the amplitude of each channel changed fast, rad.
     steady: [Real; 2],
-    /// Whether the last readings were plausible.
-    implausible: bool,
+    /// What the last readings of the channels were.
+    found: [Found; 2],
+    /// Phase since the last implausible reading of each channel, rad.
+    since: [Real; 2],
+    balance: BalanceState,
+}
+
+/// What a reading is.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+enum Found {
+    #[default]
+    Plausible,
+    /// An implausible reading alone.
+    Glitch,
+    /// One of several.
+    Fault,
 }
 
 impl Plausibility {
@@ -60,12 +80,12 @@ impl Plausibility {
             limit: config.residual_max,
             warm_up: (WARM_UP[0] / config.bandwidth).max(WARM_UP[1] * TAU / config.omega_start),
             harmonics: config.harmonics.into(),
+            balance: Balance::new(config),
         }
     }
 
     /// Takes differences between readings and their predictions, m, the estimates, the factors by which the amplitude has
-    /// changed since, and the times for which the readings have not
-    /// changed, s. `omega` in rad/s.
+    /// changed since, and the times for which the readings have not changed, s. `omega` in rad/s; `closed`: time in the closed loop, s.
     pub fn take(
         &self,
         state: &mut Differences,
@@ -73,6 +93,7 @@ impl Plausibility {
         unchanged: [Real; 2],
         omega: Real,
         sample_time: Real,
+        closed: Real,
     ) {
         let turn = omega * sample_time;
         state.phase += turn;
@@ -82,7 +103,7 @@ impl Plausibility {
                 (*before, *last, *now) = (*last, *now, 0.0);
             }
         }
-        state.implausible = false;
+        state.found = [Found::Plausible; 2];
         for (n, [now, last, before]) in state.largest.iter_mut().enumerate() {
             let (difference, estimate, change) = differences[n];
             let amplitude = estimate.amplitude();
@@ -99,14 +120,36 @@ impl Plausibility {
                 *distorted = if clear { 0.0 } else { *distorted + turn };
                 let slack = if settled { 0.0 } else { SLACK * larger(change, 1.0) };
                 let expected = (share * limit * change + slack) * amplitude + normal;
-                state.implausible |= difference > expected || *distorted > LASTS * TAU;
+                // The base follows the drive at once; the response grows, and its detector lags.
+                let is_known = n == BASE || closed > self.warm_up;
+                state.since[n] += turn;
+                if is_known && (difference > expected || *distorted > LASTS * TAU) {
+                    state.found[n] = if state.since[n] > PAUSE {
+                        Found::Glitch
+                    } else {
+                        Found::Fault
+                    };
+                    state.since[n] = 0.0;
+                }
             }
-            *now = larger(*now, difference);
+            if state.found[n] != Found::Glitch {
+                *now = larger(*now, difference);
+            }
         }
     }
 
-    /// Whether the last readings show a fault, `closed` seconds after the loop was closed.
-    pub fn refuses(&self, state: &Differences, closed: Real) -> bool {
-        state.implausible && closed > self.warm_up
+    /// Whether the amplitudes contradict the balance of power between drive and response.
+    pub fn contradicts(&self, state: &mut Differences, seen: &Powers) -> bool {
+        self.balance.contradicts(&mut state.balance, seen) && self.limit.is_some()
+    }
+
+    /// Whether the last readings show a fault.
+    pub fn refuses(&self, state: &Differences) -> bool {
+        state.found.contains(&Found::Fault)
+    }
+
+    /// Whether the last reading of each channel is a glitch.
+    pub fn glitches(&self, state: &Differences) -> [bool; 2] {
+        state.found.map(|found| found == Found::Glitch)
     }
 }

@@ -3,6 +3,7 @@
 use crate::real::consts::FRAC_PI_3;
 
 use crate::angle::Complex;
+use crate::balance::Powers;
 use crate::config::Config;
 use crate::detector::{Estimate, PhaseDetector};
 use crate::plausibility::{Differences, Plausibility};
@@ -162,13 +163,37 @@ impl Sensing {
         } else {
             (0.0, 1.0)
         };
+        let valid = measurable && reference.valid && amplitude >= self.response_min && self.is_coherent(response);
+        let seen = Powers {
+            reading: if fault == Some(Fault::Sensor) {
+                0.0
+            } else {
+                input.response
+            },
+            turn: drive.omega * self.sample_time,
+            drive: drive.amplitude,
+            lagging: state.drive,
+            base: if channel.is_some() {
+                reference.amplitude
+            } else {
+                state.drive
+            },
+            response: amplitude,
+            cosine: if amplitude >= self.response_min { cosine } else { 1.0 },
+        };
+        let contradicts = self.plausibility.contradicts(&mut state.differences, &seen);
+        let reason = if state.seen {
+            Fault::Implausible
+        } else {
+            Fault::NoSignal
+        };
         Measurement {
-            fault,
+            fault: fault.or(contradicts.then_some(reason)),
             error,
             cosine,
             measurable,
             reference_amplitude: reference.amplitude,
-            valid: measurable && reference.valid && amplitude >= self.response_min && self.is_coherent(response),
+            valid,
             has_sensor: channel.is_some(),
         }
     }
@@ -180,7 +205,7 @@ impl Sensing {
         state.invalid = self.longer(state.invalid, !measured.valid);
         if state.seen && state.unchanged.iter().any(|time| time * omega > UNCHANGED) {
             Some(Fault::Sensor)
-        } else if state.seen && self.plausibility.refuses(&state.differences, state.closed) {
+        } else if state.seen && self.plausibility.refuses(&state.differences) {
             Some(Fault::Implausible)
         } else if self.signal_timeout.is_some_and(|limit| state.invalid > limit) {
             Some(Fault::NoSignal)
@@ -197,9 +222,8 @@ impl Sensing {
     /// Updates the detectors, and compares the readings with what they predicted.
     fn predict(&self, state: &mut Channels, response: Real, reference: Option<Real>, drive: PresentDrive) {
         let rotors = self.detector.rotors(drive.rotor);
+        let before = [state.response, state.reference];
         let difference = self.detector.update(&mut state.response, response, &rotors);
-        let [a, b, c, d, e, _] = state.residuals;
-        state.residuals = [difference, a, b, c, d, e];
         let (mut differences, mut change) = ([difference, 0.0], 1.0);
         if let Some(reading) = reference {
             let predicted = reading - self.detector.update(&mut state.reference, reading, &rotors);
@@ -222,7 +246,18 @@ impl Sensing {
             state.unchanged,
             drive.omega,
             self.sample_time,
+            state.closed,
         );
+        // The detectors ignore a glitch.
+        let [of_response, of_base] = self.plausibility.glitches(&state.differences);
+        let [a, b, c, d, e, _] = state.residuals;
+        state.residuals = [if of_response { 0.0 } else { difference }, a, b, c, d, e];
+        if of_response {
+            state.response = before[0];
+        }
+        if of_base {
+            state.reference = before[1];
+        }
     }
 
     /// A time, s, after one more sample of a condition.

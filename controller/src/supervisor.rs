@@ -37,9 +37,9 @@ pub enum Fault {
     TimedOut = 3,
     /// The phase error exceeded `unlock_tolerance`, or the response was no longer valid, while locked.
     LockLost = 4,
-    /// No valid measurement for `signal_timeout`: the amplitude of a channel is too small, or its noise too large.
+    /// No valid measurement for `signal_timeout`, or none in the first periods of the drive: the amplitude of a channel is too small, or its noise too large.
     NoSignal = 5,
-    /// A reading differed from its prediction by more than `residual_max`.
+    /// A reading differed from its prediction by more than `residual_max`, or the response contradicts the power of its drive.
     Implausible = 6,
 }
 
@@ -112,7 +112,9 @@ impl Fault {
             Self::NoSignal => {
                 "the response or the base could not be measured: too small an amplitude, or too much noise"
             }
-            Self::Implausible => "a reading differed from its prediction: a sensor, the drive or the clock has failed",
+            Self::Implausible => {
+                "a reading differed from its prediction, or the response from its drive: a sensor, the drive or the clock has failed"
+            }
         }
     }
 }

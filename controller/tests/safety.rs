@@ -89,7 +89,8 @@ fn too_large_a_response_trips() {
 
 #[test]
 fn acquiring_times_out() {
-    let mut bench = Bench::new(Config { acquire_timeout: Some(0.5), ..config() });
+    // Only the time limit ends a search for a response of zero.
+    let mut bench = Bench::new(Config { acquire_timeout: Some(0.5), residual_max: None, ..config() });
     let states: Vec<_> = (0..600).map(|_| bench.sample_reading(0.0, None).state).collect();
     assert_eq!(states[400], LoopState::Acquiring);
     assert_eq!(states[599], LoopState::Tripped);
@@ -175,7 +176,7 @@ fn a_sensor_that_fails_while_the_response_is_controlled_ramps_the_drive_down() {
 
 #[test]
 fn a_response_that_fades_out_does_not_make_the_drive_exceed_its_limit_or_its_rate() {
-    let mut bench = holding(Config { ramp_rate: Some(AMPLITUDE), ..config() });
+    let mut bench = holding(Config { ramp_rate: Some(AMPLITUDE), residual_max: None, ..config() });
     let step = bench.controller.config().sample_time * AMPLITUDE;
     let mut before = bench.sample().amplitude;
     for n in 0..20_000 {
@@ -257,4 +258,77 @@ fn the_plausibility_check_does_not_trip_at_a_change_of_the_drive() {
             .expect("a sensible drive");
     }
     assert_eq!(bench.run(50).fault, None);
+}
+
+/// Periods until the trip of a bench at rest whose readings of response and base pass through `fault` from this period on.
+fn periods_to_trip(from: u32, fault: impl Fn(f64, f64) -> [f64; 2]) -> Option<f64> {
+    let mut bench = Bench::new(Config { damping_rate: Some(rig::ZETA * OMEGA_0), ..config() });
+    for _ in 0..100 * from {
+        bench.sample();
+    }
+    (0..100 * 20).find_map(|n| {
+        let [response, base] = fault(bench.resonator.q, bench.resonator.base);
+        let output = bench.sample_reading(response, Some(base));
+        (output.state == LoopState::Tripped).then_some(f64::from(n) / 100.0)
+    })
+}
+
+#[test]
+fn reversed_swapped_and_dead_sensors_trip_in_the_first_periods_of_the_drive() {
+    for from in 0..10 {
+        let trips = |most: f64, fault: fn(f64, f64) -> [f64; 2]| {
+            let periods = periods_to_trip(from, fault);
+            assert!(periods.is_some_and(|periods| periods < most), "{from}: {periods:?}");
+        };
+        trips(3.0, |q, e| [-q, e]);
+        trips(3.0, |q, e| [q, -e]);
+        trips(3.0, |q, e| [e, q]);
+        trips(10.0, |q, e| [3.0 * q, e]);
+        trips(10.0, |q, e| [0.3 * q, e]);
+    }
+    assert!(periods_to_trip(0, |_, e| [0.0, e]).is_some_and(|periods| periods < 3.0));
+    assert!(periods_to_trip(0, |q, _| [q, 0.0]).is_some_and(|periods| periods < 6.0));
+    assert!(periods_to_trip(0, |_, _| [0.0, 0.0]).is_some_and(|periods| periods < 3.0));
+}
+
+#[test]
+fn a_response_that_moves_before_the_drive_begins_is_no_fault() {
+    for turns in [0.0, 0.2, 0.4, 0.7] {
+        let mut bench = Bench::new(config());
+        let (s, c) = (turns * std::f64::consts::TAU).sin_cos();
+        (bench.resonator.q, bench.resonator.dq) = (60.0 * AMPLITUDE * s, 60.0 * AMPLITUDE * OMEGA_0 * c);
+        assert_eq!(bench.run(200).fault, None);
+    }
+}
+
+#[test]
+fn a_heavily_damped_structure_of_unknown_damping_is_no_fault() {
+    for zeta in [0.02, 0.05, 0.1] {
+        let mut bench = Bench::new(config());
+        bench.resonator.zeta = zeta;
+        assert_eq!(bench.run(200).fault, None, "{zeta}");
+    }
+}
+
+#[test]
+fn a_glitch_of_one_sample_is_ignored() {
+    for size in [-5.0, 0.0, 5.0] {
+        for channel in [0, 1] {
+            for phase in [0, 10, 25, 60] {
+                let mut bench = Bench::new(config());
+                bench.run_to_lock(2000).expect("a lock");
+                (0..phase).for_each(|_| assert!(bench.sample().locked));
+                let mut readings = [bench.resonator.q, bench.resonator.base];
+                readings[channel] = size * [bench.sample().response_amplitude, AMPLITUDE][channel];
+                bench.sample_reading(readings[0], Some(readings[1]));
+                for _ in 0..500 {
+                    let output = bench.sample();
+                    assert!(
+                        output.locked && output.phase_error.is_some_and(|error| error.abs() < 0.02),
+                        "{output:?}"
+                    );
+                }
+            }
+        }
+    }
 }

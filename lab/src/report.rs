@@ -19,5 +19,5 @@ pub use files::{
 pub use section::{Block, Maker, Section, Subject};
 pub use sections::SECTIONS;
 pub use study::{Report, write_report};
-pub use table::{Table, number};
+pub use table::{Table, number, with_uncertainty};
 pub use theme::dark;

@@ -45,7 +45,7 @@ typedef enum PhaseLockFault {
   PHASE_LOCK_FAULT_LOCK_LOST = 4,
   // No valid measurement for signal_timeout.
   PHASE_LOCK_FAULT_NO_SIGNAL = 5,
-  // A reading differed from its prediction by more than residual_max.
+  // A reading differed from its prediction by more than residual_max, or the response contradicts the power of its drive.
   PHASE_LOCK_FAULT_IMPLAUSIBLE = 6,
 } PhaseLockFault;
 
@@ -148,7 +148,7 @@ typedef struct PhaseLockConfig {
 // Storage of a controller and its state, initialised by phase_lock_init. May be copied; its content is private.
 typedef struct PhaseLockController {
   // Opaque.
-  uint64_t words[352];
+  uint64_t words[384];
 } PhaseLockController;
 
 // Sensor readings of a sample, and the operator's request.

@@ -14,7 +14,7 @@ pub type PhaseLockReal = f64;
 #[derive(Clone, Copy)]
 pub struct PhaseLockController {
     /// Opaque.
-    pub words: [u64; 352],
+    pub words: [u64; 384],
 }
 
 /// Content of the storage.
@@ -170,7 +170,7 @@ pub enum PhaseLockFault {
     LockLost = 4,
     /// No valid measurement for signal_timeout.
     NoSignal = 5,
-    /// A reading differed from its prediction by more than residual_max.
+    /// A reading differed from its prediction by more than residual_max, or the response contradicts the power of its drive.
     Implausible = 6,
 }
 

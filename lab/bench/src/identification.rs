@@ -8,6 +8,7 @@ mod fit;
 mod lock;
 mod regime;
 mod response;
+mod validity;
 
 use thiserror::Error;
 
@@ -47,6 +48,29 @@ pub enum IdentificationError {
         "the hold contains no periodic motion: the response or the base reads zero; check the sensors and record.hold_periods"
     )]
     NoMotion,
+    /// The phase was off its target while the lock was held.
+    #[error(
+        "the phase was {error:.3} ± {uncertainty:.3} degrees off its target while the lock was held; controller.phase_tolerance allows \
+         {tolerance} degrees. A channel may have become late: `vines check` measures its delay"
+    )]
+    OffTarget {
+        /// Mean phase error of the hold, degrees, and its standard uncertainty.
+        error: f64,
+        /// See above.
+        uncertainty: f64,
+        /// Degrees.
+        tolerance: f64,
+    },
+    /// A sensor failed after the release.
+    #[error(
+        "a sensor {what} {seconds:.3} s after the release, so that the decay is not recorded: check its cable and converter"
+    )]
+    SensorAfterRelease {
+        /// Time since the release, s.
+        seconds: f64,
+        /// What it does.
+        what: &'static str,
+    },
 }
 
 /// Names the one of two mirror images that was followed.
@@ -87,6 +111,8 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
                 .flatten(),
         });
     }
+    validity::on_target(&lock, scene)?;
+    validity::sensors_after_release(record, scene)?;
     let decay = decay_points(record, scene);
     Ok(Identification { parameters: scene.dimensionless(), lock, decay })
 }

@@ -6,6 +6,7 @@
 mod linear;
 mod lock_times;
 mod open_loop;
+mod quantity;
 mod trials;
 mod verdict;
 
@@ -20,6 +21,7 @@ use vines_model::numerics::{mean, mean_square};
 
 pub use linear::Linear;
 pub use lock_times::{LockTime, lock_times};
+pub use quantity::Quantity;
 pub use trials::{Trials, trials};
 pub use verdict::{Channel, Verdict};
 
@@ -32,7 +34,7 @@ const SHARE: f64 = 0.01;
 const PERIODS: [usize; 3] = [2, 24, 4];
 
 /// Result of the check.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct LoopCheck {
     /// The verdict.
     pub verdict: Verdict,
@@ -44,6 +46,8 @@ pub struct LoopCheck {
     pub base: Option<Channel>,
     /// The linear response and the gains for it, if the loop is healthy.
     pub linear: Option<Linear>,
+    /// What was measured, beside what the scene says.
+    pub quantities: Vec<Quantity>,
 }
 
 /// Checks a rig at a hundredth of the drive, after a response that is still falling has come to rest. The phase of the rig's oscillator is
@@ -67,18 +71,14 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
     let begins = rig.readings.len();
     rig.drive(driven, amplitude)?;
     rig.end(samples(1))?;
-    let OpenLoop { readings, has_base, .. } = rig;
-    let channels = [0, 1].map(|n| {
+    let OpenLoop { mut readings, has_base, .. } = rig;
+    without_drift(&mut readings[begins..]);
+    let mut channels = [0, 1].map(|n| {
         let seen = Seen::of(&readings[begins + driven - window..], n + 1);
         let ratio = seen.phasor / expected[n];
         let floor = scatter(&readings[begins - quiet..begins], n + 1);
-        Channel {
-            gain: ratio.norm(),
-            phase: ratio.arg().to_degrees(),
-            delay: -ratio.arg() / (omega * step),
-            noise: seen.noise,
-            floor,
-        }
+        let channel = Channel { noise: seen.noise, floor, ..Channel::default() };
+        channel.at(ratio, omega * step)
     });
     let amplitudes = expected.map(|one| one.norm());
     // A delay that looks like the opposite sign is at least this long. Until then, the base rests; one of the opposite sign moves.
@@ -91,26 +91,56 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
             .iter()
             .map(|reading| channels[1].gain * amplitude * reading[0].sin()),
     );
-    let verdict = verdict(&channels, &amplitudes, has_base, moved < 0.5 * expected_move);
+    let waits = moved < 0.5 * expected_move;
     // Without a sensor, the base moves as expected.
     let base = if has_base {
-        Seen::of(&readings[begins + driven - window..], 2).phasor
+        let seen = Seen::of(&readings[begins + driven - window..], 2);
+        (
+            seen.phasor,
+            seen.noise / seen.phasor.norm() * (2.0 / window as f64).sqrt(),
+        )
     } else {
-        expected[1]
+        (expected[1], 0.0)
     };
     let period = samples(1);
-    let phasors: Vec<_> = readings[begins..]
-        .chunks_exact(period)
-        .map(|readings| Seen::of(readings, 1).phasor)
-        .collect();
-    let linear = Linear::of(&phasors, base, omega, period as f64 * step, scene);
+    let phasors = |of: usize| -> Vec<Complex64> {
+        let periods = readings[begins..].chunks_exact(period);
+        periods.map(|readings| Seen::of(readings, of).phasor).collect()
+    };
+    let linear = Linear::of(&phasors(1), base, omega, period, scene);
+    let mut quantities = Vec::new();
+    if has_base {
+        quantities.extend(quantity::of_base(base, amplitude, &phasors(2), scene));
+    }
+    if let Some(linear) = &linear {
+        // Amplitude and phase of the response for the natural frequency and the damping that the rig has.
+        let gain = Complex64::from_polar(linear.response_gain, linear.phase.to_radians());
+        let ratio = gain / linear.expected_gain(omega, scene.resonance.reference);
+        channels[0] = channels[0].at(ratio * base.0 / expected[1], omega * step);
+        quantities.extend(quantity::measured(linear, ratio, scene));
+    }
+    let verdict = verdict(&channels, &amplitudes, has_base, waits);
+    let refused = quantities.iter().find_map(Quantity::refusal);
+    let verdict = refused.filter(|refusal| verdict.may_be(*refusal)).unwrap_or(verdict);
     Ok(LoopCheck {
         verdict,
         linear: linear.filter(|_| verdict == Verdict::Healthy),
         amplitude,
         response: channels[0],
         base: has_base.then_some(channels[1]),
+        quantities,
     })
+}
+
+/// Removes the drift of the response: a particle that flies slowly moves the centre of mass, which looks like a response in every period.
+fn without_drift(readings: &mut [[f64; 3]]) {
+    let half = readings.len() / 2;
+    let [first, second] =
+        [&readings[..half], &readings[half..2 * half]].map(|part| mean(part.iter().map(|one| one[1])));
+    let slope = (second - first) / half as f64;
+    for (n, reading) in readings.iter_mut().enumerate() {
+        reading[1] -= slope * n as f64;
+    }
 }
 
 /// Phasors of response and base, m, at the end of a check of the scene's linear resonator.

@@ -71,12 +71,18 @@ pub struct Scene {
 }
 
 impl Scene {
-    /// The numbers that the dimensionless model, the theory and the exact orbits depend on.
+    /// The numbers that the dimensionless model, the theory and the exact orbits depend on. Natural frequency and damping are those that
+    /// the loop check has measured, if it has run.
     pub fn dimensionless(&self) -> Dimensionless {
-        Dimensionless {
+        let stated = Dimensionless {
             definition: self.resonance,
             ..Dimensionless::of(&self.plant, self.amplitude)
-        }
+        };
+        self.measured.map_or(stated, |measured| Dimensionless {
+            omega0: measured.omega0,
+            lambda: 2.0 * measured.damping_rate.max(0.0) / (stated.epsilon * measured.omega0),
+            ..stated
+        })
     }
 
     /// The linear response: as measured, otherwise that of the scene's plant.
@@ -89,8 +95,8 @@ impl Scene {
         self.dimensionless().state(&self.start)
     }
 
-    /// The controller's sample time, s.
+    /// The controller's sample time, s: rig and controller agree on it before anything is measured.
     pub fn sample_time(&self) -> f64 {
-        self.dimensionless().natural_period() / self.controller.samples_per_period
+        Dimensionless::of(&self.plant, self.amplitude).natural_period() / self.controller.samples_per_period
     }
 }

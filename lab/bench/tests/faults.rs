@@ -1,7 +1,11 @@
 //! Injected faults at a few instants; `vines faults` takes more.
 
-use vines_testbench::faults::{FAULTS, Faults, Kind};
-use vines_testbench::rig::Rig;
+use std::cell::Cell;
+use std::rc::Rc;
+
+use vines_testbench::experiment::{self, ExperimentError, Plan};
+use vines_testbench::faults::{FAULTS, Faults, Kind, Sensor, rehearsal_rig};
+use vines_testbench::rig::{BuiltIn, Rig};
 use vines_testbench::scene::{Override, PAPER, Scene};
 
 fn scene(settings: &[&str]) -> Scene {
@@ -36,4 +40,37 @@ fn every_fault_switches_the_drive_off_within_its_ramp() {
 #[test]
 fn every_fault_is_found_through_noise_and_12_bits() {
     inject(&["chain.snr=40", "chain.adc_bits=12", "controller.ramp_periods=0.5"], 1);
+}
+
+#[test]
+fn faults_in_the_first_periods_of_the_drive_are_found_within_a_second() {
+    let scene = scene(&["start.dq2=0"]);
+    for kind in [
+        Kind::Response(Sensor::Reversed),
+        Kind::Base(Sensor::Reversed),
+        Kind::Both(Sensor::Dead),
+        Kind::Response(Sensor::Dead),
+        Kind::Base(Sensor::Dead),
+        Kind::Response(Sensor::Gain(0.3)),
+        Kind::Response(Sensor::Gain(3.0)),
+        Kind::Shaker(0.0),
+        Kind::Swapped,
+    ] {
+        for seconds in [0.0, 0.25, 0.6, 0.9, 1.3, 2.0] {
+            let zero = Rc::new(Cell::new(None));
+            let told = Rc::clone(&zero);
+            let mut rig = rehearsal_rig(&scene, kind, seconds, move |time| told.set(time));
+            let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+            let outcome = experiment::run(&mut *rig, &mut controller, &Plan::of(&scene), |_, _, _| {});
+            assert!(
+                matches!(outcome, Err(ExperimentError::Tripped { .. })),
+                "{kind:?} at {seconds} s"
+            );
+            drop(rig);
+            assert!(
+                zero.get().is_some_and(|time| time < 1.0),
+                "{kind:?} at {seconds} s: {zero:?}"
+            );
+        }
+    }
 }

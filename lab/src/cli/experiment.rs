@@ -55,6 +55,12 @@ impl ExperimentArguments {
         let found = loop_check::check(rig, scene).map_err(ExperimentError::from)?;
         eprint!("{}", check::described(&found));
         scene.measured = found.linear.map(|linear| linear.response());
+        if let Some(measured) = &scene.measured {
+            eprintln!(
+                "All values of sigma share a standard uncertainty of {:.1e}, that of the natural frequency.",
+                measured.uncertainty / scene.dimensionless().omega_change(1.0)
+            );
+        }
         match found.verdict {
             loop_check::Verdict::Healthy => Ok(()),
             verdict => Err(Failure::run(format!(

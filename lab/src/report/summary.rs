@@ -23,6 +23,20 @@ fn rig(p: &Dimensionless) -> String {
     format!("epsilon = {epsilon:.6}, lambda = {lambda:.4}, r = {r}")
 }
 
+/// Frequency in hertz, amplitude of the response and of the base in metres, with their uncertainties, of sigma, C and G.
+fn in_si(p: &Dimensionless, [sigma, c, g]: [(f64, f64); 3]) -> [String; 3] {
+    let hertz = |omega: f64| omega / std::f64::consts::TAU;
+    let metres = |value: f64, u: f64| format!("{value:.5e} ± {u:.1e}");
+    [
+        with_uncertainty(
+            hertz(p.omega0 + p.omega_change(sigma.0)),
+            hertz(p.omega_change(sigma.1)),
+        ),
+        metres(p.b * c.0, p.b * c.1),
+        metres(p.amplitude(g.0), p.amplitude(g.1)),
+    ]
+}
+
 /// How often each regime occurs on a map.
 pub fn regimes(map: &Map) -> Table {
     let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
@@ -72,8 +86,12 @@ pub fn identification(found: &Comparison) -> String {
     } else {
         ""
     };
+    let [hertz, response, base] = in_si(
+        &found.parameters,
+        [(lock.sigma, lock.u_sigma), (lock.c, lock.u_c), (lock.g, lock.u_g)],
+    );
     format!(
-        "{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{phase}{ripple}{}\n{}\n{}\n",
+        "Measured: {hertz} Hz, response {response} m, base {base} m\n{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{phase}{ripple}{}\n{}\n{}\n",
         rig(&found.parameters),
         with_uncertainty(lock.g, lock.u_g),
         lock.periods_to_lock,
@@ -138,6 +156,12 @@ fn agreement(found: &Comparison) -> String {
 
 /// The points of a tracked backbone, and what they cost.
 pub fn tracked(found: &TrackedComparison) -> String {
+    let on_a_rig = found.points.iter().all(|one| one.point.regime_by_impacts.is_none());
+    let si = if on_a_rig {
+        "frequency, Hz | response, m | base, m | "
+    } else {
+        ""
+    };
     let rows = found.points.iter().map(|TrackedPoint { point, exact }| {
         let regime = match point.regime_by_impacts {
             Some(by_impacts) => format!("{} / {by_impacts}", point.regime),
@@ -150,7 +174,11 @@ pub fn tracked(found: &TrackedComparison) -> String {
             format!("; level {:.3} not reached", point.level)
         };
         let pairs = [(point.c, point.u_c), (point.sigma, point.u_sigma), (point.g, point.u_g)];
-        let mut cells = pairs.map(|(value, u)| with_uncertainty(value, u)).to_vec();
+        let mut cells = Vec::new();
+        if on_a_rig {
+            cells.extend(in_si(&found.parameters, [pairs[1], pairs[0], pairs[2]]));
+        }
+        cells.extend(pairs.map(|(value, u)| with_uncertainty(value, u)));
         let equal = exact.and_then(|exact| Some(exact.sigma?.abs().max(exact.g?.abs())));
         cells.extend([
             format!("{:+.2}°", point.phase_error_deg),
@@ -161,8 +189,8 @@ pub fn tracked(found: &TrackedComparison) -> String {
         ]);
         cells
     });
-    let table = Table::new("C | sigma | G | off target | periods | averaged | error | regime by response / by impacts")
-        .rows(rows);
+    let headings = "C | sigma | G | off target | periods | averaged | error | regime by response / by impacts";
+    let table = Table::new(&format!("{si}{headings}")).rows(rows);
     let worst = found.worst().map_or(String::new(), |worst| {
         format!(
             "Largest error of a settled point, in sigma or G against the exact backbone at the same C: {:.1e} (distance from the nearest \

@@ -70,7 +70,15 @@ fn run(command: &str, wiring: Wiring) -> (Option<i32>, String, f64) {
 
 #[test]
 fn a_rig_with_swapped_dead_or_reversed_sensors_is_never_driven_beyond_the_check() {
-    let wirings: [(Wiring, &str); 4] = [
+    let wirings: [(Wiring, &str); 6] = [
+        (
+            |s| Sensors { response: 2.0 * s.response, ..s },
+            "the amplitude of the response is not as expected",
+        ),
+        (
+            |s| Sensors { reference: s.reference.map(|base| 1.2 * base), ..s },
+            "the amplitude of the base is not that of the drive",
+        ),
         (
             |s| Sensors { response: s.reference.unwrap(), reference: Some(s.response) },
             "response and base are exchanged",

@@ -52,11 +52,11 @@ fn fault(scene: &Scene, random: &mut Random) -> (Verdict, Kind) {
     let range = scene.chain.response_range * scene.plant.half_width;
     let least = STEPS * range / (steps * expected(scene)[0].norm());
     let gain = if random.between(0.0, 1.0) < 0.5 || least > 0.25 {
-        random.log(4.0, 1000.0)
+        random.log(1.15, 1000.0)
     } else {
-        random.log(least.max(0.04), 0.25)
+        random.log(least.max(0.04), 0.85)
     };
-    let late = (random.between(0.17, 0.33) * period) as usize;
+    let late = random.between(2.0, 0.33 * period) as usize;
     match random.between(0.0, 14.0) as usize {
         0 => (Verdict::NotANumber, Kind::Response(Sensor::Value(f64::NAN))),
         1 => (Verdict::NotANumber, Kind::Base(Sensor::Value(f64::INFINITY))),

@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
+use num_complex::Complex64;
 use serde::Serialize;
 
 /// Largest RMS of what is not the drive's frequency, as a share of the amplitude.
@@ -9,14 +10,14 @@ pub(super) const NOISE: f64 = 0.15;
 /// Share of the expected amplitude below which a sensor is dead.
 const DEAD: f64 = 0.01;
 /// Factor by which an amplitude may differ from the expected one, or its inverse: the damping is known roughly.
-const GAIN: f64 = 2.0;
+pub(super) const GAIN: f64 = 2.0;
 /// RMS of the response without a drive over that of its noise with it, from which the rig moves.
 const AT_REST: f64 = 3.0;
 /// Deviation of the phase, rad, up to which a channel is in time, or reversed.
 pub(super) const IN_TIME: f64 = 0.7;
 
 /// A channel.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Channel {
     /// Amplitude at the frequency of the drive over the expected one.
     pub gain: f64,
@@ -28,6 +29,18 @@ pub struct Channel {
     pub noise: f64,
     /// RMS without a drive, m.
     pub floor: f64,
+}
+
+impl Channel {
+    /// The same with another ratio to what is expected; `turn`: phase of a sample, rad.
+    pub(super) fn at(self, ratio: Complex64, turn: f64) -> Self {
+        Self {
+            gain: ratio.norm(),
+            phase: ratio.arg().to_degrees(),
+            delay: -ratio.arg() / turn,
+            ..self
+        }
+    }
 }
 
 /// What the check found.
@@ -56,21 +69,36 @@ pub enum Verdict {
     #[error("both sensors have the opposite sign: the shaker is reversed")]
     BothReversed,
     #[error(
-        "the amplitude of the response is not as expected: check its unit and factor, and mass, spring and damper of the scene"
+        "the amplitude of the response is not as expected: check its unit and factor, and whether the base moves the structure through its spring"
     )]
     ResponseGain,
     #[error(
         "the amplitude of the base is not that of the drive: check its unit and factor, and the gain of the shaker"
     )]
     BaseGain,
-    #[error("the response is late: check its filter and delay, and the natural frequency of the scene")]
+    #[error("the response is late: check its filter and delay; a lock would hold another phase than it reports")]
     ResponseLate,
-    #[error("the base sensor is late: check its filter and delay, and that of the shaker")]
+    #[error("the base sensor is late: check its filter and delay; a lock would hold another phase than it reports")]
     BaseLate,
+    #[error(
+        "the base moves at another frequency than the drive: check the clocks and the sample times of rig and controller"
+    )]
+    Clock,
     #[error("the response is noisy: check its shield and range")]
     ResponseNoisy,
     #[error("the base sensor is noisy: check its shield and range")]
     BaseNoisy,
+}
+
+impl Verdict {
+    /// Whether what the quantities show, `refusal`, may be the reason: phases say nothing where the clocks differ.
+    pub(super) fn may_be(self, refusal: Self) -> bool {
+        let by_phase = matches!(
+            self,
+            Self::ResponseReversed | Self::BaseReversed | Self::BothReversed | Self::ResponseLate | Self::BaseLate
+        );
+        self == Self::Healthy || by_phase && refusal == Self::Clock
+    }
 }
 
 /// Judges response and base, whose expected amplitudes are `expected`, m. `waits`: the base moves later than the drive, so that its phase is that

@@ -1,0 +1,48 @@
+//! What makes a record useless: a phase off its target while the lock was held, and a sensor that fails after the release.
+
+use super::{IdentificationError, Lock};
+use crate::experiment::Record;
+use crate::scene::Scene;
+use vines_model::numerics::standard_deviation;
+
+/// Standard uncertainties of the phase that count as noise.
+const RANDOM: f64 = 3.0;
+/// Share of a free response that is left after two periods at least: impacts and damping take less than half in each (G_imp
+/// pi epsilon/C is 0.4 at epsilon = 0.05, C = 0.5).
+const LEFT: f64 = 0.1;
+/// Steps of a converter below which the scatter of a response says nothing.
+const STEPS: f64 = 8.0;
+
+/// Refuses a lock whose phase is farther from its target than the tolerance of the lock.
+pub(super) fn on_target(lock: &Lock, scene: &Scene) -> Result<(), IdentificationError> {
+    let (error, tolerance) = (lock.phase_error_deg, scene.controller.phase_tolerance);
+    if error.abs() <= tolerance + RANDOM * lock.u_phase_deg {
+        return Ok(());
+    }
+    Err(IdentificationError::OffTarget { error, uncertainty: lock.u_phase_deg, tolerance })
+}
+
+/// Refuses a decay in which a sensor reads no number, or in which the response is lost within two periods.
+pub(super) fn sensors_after_release(record: &Record, scene: &Scene) -> Result<(), IdentificationError> {
+    let decay = record.decay();
+    let failed = |n: usize, what| {
+        let seconds = n as f64 * record.sample_time;
+        Err(IdentificationError::SensorAfterRelease { seconds, what })
+    };
+    let is_number = |value: f64| value.is_finite();
+    let all_numbers =
+        |n: &usize| is_number(decay[*n].sensors.response) && decay[*n].sensors.reference.is_none_or(is_number);
+    if let Some(n) = (0..decay.len()).find(|n| !all_numbers(n)) {
+        return failed(n, "reads no number");
+    }
+    let period = scene.controller.samples_per_period.round() as usize;
+    let response: Vec<f64> = decay.iter().map(|sample| sample.sensors.response).collect();
+    let changes = response.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let step = changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min);
+    let scatters: Vec<f64> = response.chunks_exact(period).map(standard_deviation).collect();
+    let is_lost = |n: &usize| scatters[*n] > STEPS * step && scatters[n + 2] < LEFT * scatters[*n];
+    match (0..scatters.len().saturating_sub(2)).find(is_lost) {
+        Some(n) => failed((n + 1) * period, "stops reading the response"),
+        None => Ok(()),
+    }
+}
