@@ -5,6 +5,7 @@
 mod bench;
 mod evidence;
 mod record;
+mod search;
 
 use std::fmt::{self, Display, Formatter};
 
@@ -18,6 +19,7 @@ use vines_model::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 pub(crate) use bench::Bench;
 pub use evidence::Evidence;
 pub use record::{Record, Sample, drive_phases, table};
+use search::{Found, Search};
 
 /// Durations of the stages, in samples.
 #[derive(Debug, Clone, Copy)]
@@ -181,26 +183,11 @@ pub fn run_into(
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
     let mut bench = Bench::new(rig, controller, plan.scene, samples);
-    let (mut settled, mut irregular) = (0, 0);
-    loop {
-        let command = bench.sample(Stage::Locking)?;
-        progress(Stage::Locking, settled, plan.lock);
-        if command.settled {
-            break;
-        }
-        settled += 1;
-        if settled.is_multiple_of(plan.hold) {
-            irregular += usize::from(bench.is_irregular(plan, &command)) * plan.hold;
-        }
-        if irregular >= plan.irregular || settled >= plan.lock {
-            let periods = irregular as f64 / plan.scene.controller.samples_per_period;
-            return Err(if irregular >= plan.irregular {
-                ExperimentError::Irregular { periods }
-            } else {
-                bench.no_lock(&command)
-            });
-        }
-    }
+    let (settled, held) = match Search::new(&mut bench, plan).run()? {
+        Some(Found::Locked(_)) => (bench.samples.len() - 1, false),
+        Some(Found::Held(_)) => (bench.samples.len() - 1, true),
+        None => (wait(&mut bench, plan, &mut progress)?, false),
+    };
     for n in 0..plan.hold {
         bench.sample(Stage::Holding)?;
         progress(Stage::Holding, n + 1, plan.hold);
@@ -216,5 +203,25 @@ pub fn run_into(
         released: samples.len() - plan.decay,
         samples,
         settled,
+        held,
     })
+}
+
+/// Waits for the lock under the constant drive, for a controller that cannot control the response. Returns the samples taken.
+fn wait<R: Rig + ?Sized, C: Controller + ?Sized>(
+    bench: &mut Bench<R, C>,
+    plan: &Plan,
+    progress: &mut impl FnMut(Stage, usize, usize),
+) -> Result<usize, ExperimentError> {
+    loop {
+        let command = bench.sample(Stage::Locking)?;
+        let taken = bench.samples.len();
+        progress(Stage::Locking, taken, plan.lock);
+        if command.settled {
+            return Ok(taken - 1);
+        }
+        if taken >= plan.lock {
+            return Err(bench.no_lock(&command));
+        }
+    }
 }

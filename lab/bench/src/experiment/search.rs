@@ -1,0 +1,383 @@
+//! The way to a lock at the requested drive, from rest or with a moving particle.
+//!
+//! Near phase resonance a rig obeys `A' = g (E cos phi - E_R(A))`: under control of the response A, the drive `E_R(A)` that holds it is
+//! single-valued. The script therefore moves the setpoint of the response, and measures `E_R` by this balance, leg by leg.
+//!
+//! 1. The loop closes under the requested drive.
+//! 2. The response rises until it departs from the linear response: impacts have begun.
+//! 3. It falls in small steps until the motion is symmetric 1:1 and the drive that holds it falls through the requested one.
+//! 4. Newton's method on the measured `E_R(A)` goes to the requested drive. There, a constant drive takes over if `E_R` rises with the
+//!    amplitude, which is the condition of stability under a constant drive. Otherwise the response stays under control.
+
+use std::f64::consts::TAU;
+
+use nalgebra::DVector;
+use vines_model::numerics::{HarmonicBasis, mean, noise};
+
+use super::{Bench, ExperimentError, Plan, Stage, drive_phases};
+use crate::identification::Cycle;
+use crate::rig::{Command, Controller, ControllerError, LoopState, Move, Rig};
+use crate::scene::LinearResponse;
+
+/// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work. Periods for which.
+const NEAR: f64 = 0.35;
+const NEAR_FOR: usize = 3;
+/// Fewest periods of a leg: the loops, whose slowest time constant is five periods, follow its changes.
+const SHORTEST: f64 = 8.0;
+/// Largest relative change of the response in a leg: the stable orbits above the fold span a few percent.
+const STEP: f64 = 0.04;
+/// Largest share of the drive that may change the response.
+const SHARE: f64 = 0.3;
+/// Periods in which the response rises by the half-width.
+const RISE: f64 = 60.0;
+/// Departure from the linear response that shows impacts, as a share of the drive.
+const DEPARTURE: f64 = 0.2;
+/// Largest amplitude of the second harmonic of a symmetric motion, over that of the third.
+const SYMMETRIC: f64 = 0.3;
+/// Relative distance of the holding drive from the requested one at which a constant drive takes over.
+const ARRIVED: f64 = 2e-4;
+/// Uncertainty of the half-width of the drawing.
+const DRAWING: f64 = 0.1;
+/// Searches, each in steps half as large as the one before.
+const SEARCHES: u32 = 4;
+
+/// One period of the response.
+struct Period {
+    cycle: Cycle,
+    /// Amplitude, m, at the middle.
+    amplitude: f64,
+    /// Phase of the response, rad.
+    phase: f64,
+    /// Work of the drive: its amplitude, m, in phase with the velocity.
+    work: f64,
+    /// Squares of second and third harmonic, and their variance by noise, m².
+    even: f64,
+    odd: f64,
+    noise: f64,
+}
+
+/// What a leg measured.
+#[derive(Debug, Clone, Copy)]
+struct Leg {
+    /// Mean response amplitude, m, and its change.
+    response: f64,
+    change: f64,
+    /// Drive that holds it, m.
+    holding: f64,
+    /// Frequency of the response, rad/s.
+    omega: f64,
+    /// Second over third harmonic.
+    asymmetry: f64,
+    /// Whether impacts take a part of the drive.
+    departed: bool,
+}
+
+impl Leg {
+    fn is_symmetric(&self) -> bool {
+        self.departed && self.asymmetry < SYMMETRIC
+    }
+}
+
+/// How the search ended.
+pub(super) enum Found {
+    /// Locked at a constant drive.
+    Locked(Command),
+    /// The response is held where the requested drive holds it.
+    Held(Command),
+}
+
+/// The search.
+pub(super) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
+    bench: &'b mut Bench<'a, R, C>,
+    plan: &'b Plan<'b>,
+    linear: LinearResponse,
+    /// Requested drive, m.
+    asked: f64,
+    target: f64,
+    /// s
+    period: f64,
+    setpoint: f64,
+    last: Command,
+}
+
+impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
+    pub fn new(bench: &'b mut Bench<'a, R, C>, plan: &'b Plan<'b>) -> Self {
+        let scene = plan.scene;
+        Self {
+            bench,
+            plan,
+            linear: scene.measured.unwrap_or_else(|| LinearResponse::of(scene)),
+            asked: scene.amplitude,
+            target: scene.phase_target().radians(),
+            period: scene.dimensionless().natural_period(),
+            setpoint: 0.0,
+            last: Command::default(),
+        }
+    }
+
+    fn gain(&self, omega: f64) -> f64 {
+        let omega0 = self.plan.scene.dimensionless().omega0;
+        0.5 * omega0 * omega0 / omega
+    }
+
+    /// One sample.
+    fn sample(&mut self) -> Result<(), ExperimentError> {
+        self.last = self.bench.sample(Stage::Locking)?;
+        if self.bench.samples.len() >= self.plan.lock {
+            return Err(self.bench.no_lock(&self.last));
+        }
+        Ok(())
+    }
+
+    /// One period of the drive; `None` without a motion.
+    fn one_period(&mut self) -> Result<Option<Period>, ExperimentError> {
+        let begin = self.bench.samples.len();
+        let first = self.bench.periods;
+        while self.bench.periods < first.floor() + 1.0 {
+            self.sample()?;
+        }
+        let samples = &self.bench.samples[begin..];
+        let Some(cycle) = Cycle::of(samples, self.bench.sample_time, first * TAU, self.target) else {
+            return Ok(None);
+        };
+        let phases = drive_phases(samples, self.bench.sample_time, first * TAU);
+        let middle = mean(phases.iter().copied());
+        let half = 0.5 * (samples.len() - 1) as f64;
+        let phases: Vec<f64> = (0..samples.len())
+            .map(|n| middle + (n as f64 - half) * self.bench.sample_time * cycle.omega)
+            .collect();
+        let basis = HarmonicBasis::new(&phases, 0, &[Some(1), Some(0), Some(0), Some(0), Some(0)]);
+        let values = DVector::from_iterator(samples.len(), samples.iter().map(|one| one.sensors.response));
+        let Some(fit) = basis.fit(&values) else {
+            return Ok(None);
+        };
+        let rest = noise(basis.residual(&values, &fit).as_slice());
+        let [one, two, three] = [1, 2, 3].map(|n| fit.harmonic(n));
+        let amplitude = mean(samples.iter().map(|one| one.command.drive.amplitude));
+        Ok(Some(Period {
+            amplitude: one.norm(),
+            phase: cycle.drive_phase + one.arg(),
+            work: amplitude * cycle.phase_error.cos(),
+            even: two.norm_sqr(),
+            odd: three.norm_sqr(),
+            noise: rest * rest * 4.0 / samples.len() as f64,
+            cycle,
+        }))
+    }
+
+    /// Measures over at least this many periods.
+    fn measure(&mut self, periods: f64) -> Result<Leg, ExperimentError> {
+        let mut all: Vec<Period> = Vec::new();
+        while (all.len() as f64) < periods {
+            all.extend(self.one_period()?);
+        }
+        let (first, last) = (&all[0], &all[all.len() - 1]);
+        let duration = last.cycle.time - first.cycle.time;
+        let omega = mean(all.iter().map(|one| one.cycle.omega));
+        let change = last.amplitude - first.amplitude;
+        let work = mean(all.windows(2).map(|pair| 0.5 * (pair[0].work + pair[1].work)));
+        let gain = self.gain(omega);
+        let holding = work - change / (gain * duration);
+        let response = mean(all.iter().map(|one| one.amplitude));
+        let turned: f64 = all
+            .windows(2)
+            .map(|pair| {
+                let turn = pair[1].cycle.drive_phase - pair[0].cycle.drive_phase;
+                let more = (pair[1].phase - pair[0].phase - turn + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
+                turn + more
+            })
+            .sum();
+        // The frequency at phase resonance, without the part that a phase error adds.
+        let turning = gain * mean(all.iter().map(|one| one.work * one.cycle.phase_error.tan())) / response;
+        let omega_r = turned / duration + turning;
+        let sum = |value: fn(&Period) -> f64| all.iter().map(value).sum::<f64>();
+        let noise = sum(|one| one.noise);
+        let even = (sum(|one| one.even) - noise).max(0.0);
+        let odd = (sum(|one| one.odd) - noise).max(0.0);
+        let needs = self.linear.damping_rate / gain * response;
+        let departure = (holding - needs).hypot(response * (omega_r - self.linear.omega0) / gain);
+        let leg = Leg {
+            response,
+            change,
+            holding,
+            omega: omega_r,
+            asymmetry: (even / odd).sqrt(),
+            departed: departure > DEPARTURE * needs.max(holding),
+        };
+        if std::env::var_os("VINES_TRACE").is_some() {
+            let d = self.plan.scene.dimensionless();
+            eprintln!(
+                "{:8.1} n {:3} set {:.4} C {:.5} dC {:+.4} G {:.5} of {:.4} sigma {:+.4} asym {:.3} dep {} {:?} E {:.4}",
+                self.bench.periods,
+                all.len(),
+                self.setpoint / d.b,
+                response / d.b,
+                change / d.b,
+                d.excitation(holding),
+                d.g,
+                d.sigma(omega_r),
+                leg.asymmetry,
+                departure / needs.max(holding),
+                self.last.state,
+                d.excitation(mean(all.iter().map(|one| one.work))),
+            );
+        }
+        Ok(leg)
+    }
+
+    /// Moves the setpoint in a leg of so many periods, with the growth `onward`, m/s, at its end; measures.
+    fn leg(&mut self, to: f64, periods: f64, onward: f64) -> Result<Leg, ExperimentError> {
+        let go = Move {
+            response: to,
+            duration: periods * self.period,
+            growth: onward,
+            ..Move::default()
+        };
+        self.bench.controller.hold_response(go, self.target)?;
+        self.setpoint = to;
+        self.measure(periods)
+    }
+
+    /// Periods for a change of the response by `change`, m, against the holding drive.
+    fn periods(&self, change: f64, holding: f64) -> f64 {
+        let rate = SHARE * self.gain(self.linear.omega0) * holding.max(0.1 * self.asked);
+        (change.abs() / (rate * self.period)).max(SHORTEST).ceil()
+    }
+
+    /// Runs the script; `None` where the controller cannot control the response.
+    pub fn run(&mut self) -> Result<Option<Found>, ExperimentError> {
+        let mut near = 0;
+        while near < NEAR_FOR {
+            let period = self.one_period()?;
+            let closed = matches!(self.last.state, Some(LoopState::Acquiring | LoopState::Locked));
+            let is_near = period.is_some_and(|one| {
+                self.setpoint = one.amplitude;
+                one.cycle.phase_error.abs() < NEAR && one.cycle.base.norm() > 0.0
+            });
+            near = if closed && is_near { near + 1 } else { 0 };
+        }
+        let mut seen = match self.leg(self.setpoint, SHORTEST, 0.0) {
+            Err(ExperimentError::Controller(ControllerError::NoResponseLoop)) => return Ok(None),
+            seen => seen?,
+        };
+        let mut step = STEP;
+        let mut unstable = None;
+        for _ in 0..SEARCHES {
+            if !seen.is_symmetric() {
+                seen = self.rise(seen)?;
+            }
+            match self.fall(seen, step, unstable)? {
+                Outcome::Found(found) => return Ok(Some(found)),
+                Outcome::Lost { last, crossed } => {
+                    seen = last;
+                    unstable = unstable.or(crossed);
+                    step *= 0.5;
+                }
+            }
+        }
+        Err(self.bench.no_lock(&self.last))
+    }
+
+    /// Raises the response until impacts have begun or the motion is symmetric.
+    fn rise(&mut self, mut seen: Leg) -> Result<Leg, ExperimentError> {
+        let scene = self.plan.scene;
+        let d = scene.dimensionless();
+        let gain = self.gain(d.omega0);
+        let most = d.amplitude(scene.g_max());
+        let spare = gain * (most - 1.2 * d.b * self.linear.damping_rate / gain);
+        let rate = (d.b / (RISE * self.period)).min(0.3 * spare);
+        let periods = 5.0;
+        loop {
+            let to = self.setpoint + rate * periods * self.period;
+            if to > 1.5 * d.b {
+                return Ok(seen);
+            }
+            seen = self.leg(to, periods, rate)?;
+            if seen.is_symmetric() || seen.departed && seen.response > (1.0 - DRAWING) * d.b {
+                return Ok(seen);
+            }
+        }
+    }
+
+    /// Lowers the response to the requested drive.
+    fn fall(&mut self, first: Leg, step: f64, unstable: Option<f64>) -> Result<Outcome, ExperimentError> {
+        let mut before = first;
+        let mut slope = None::<f64>;
+        let mut symmetric = first.is_symmetric();
+        let mut odd = 0;
+        let mut down = -1.0;
+        let mut crossed = None;
+        if symmetric && first.holding < self.asked {
+            down = 1.0;
+        }
+        loop {
+            let largest = step * before.response;
+            let newton = slope
+                .filter(|slope| symmetric && (*slope > 0.0 || unstable.is_some()))
+                .map(|slope| before.response + (self.asked - before.holding) / slope - self.setpoint);
+            let change = newton.unwrap_or(down * largest).clamp(-largest, largest);
+            let sweeps = change.abs() == largest;
+            let periods = self.periods(change, before.holding);
+            let onward = if sweeps { change / (periods * self.period) } else { 0.0 };
+            let seen = self.leg(self.setpoint + change, periods, onward)?;
+            let missing = seen.holding / self.asked - 1.0;
+            if seen.is_symmetric() {
+                odd = 0;
+                if symmetric {
+                    let width = seen.response - before.response;
+                    if width.abs() > 0.003 * seen.response {
+                        let now = (seen.holding - before.holding) / width;
+                        if now < 0.0 && (seen.holding - self.asked) * (before.holding - self.asked) < 0.0 {
+                            crossed = Some(seen.response);
+                        }
+                        slope = Some(now);
+                    }
+                }
+                symmetric = true;
+            } else {
+                odd += 1;
+                if symmetric && odd >= 2 {
+                    return Ok(Outcome::Lost { last: seen, crossed });
+                }
+                if !seen.departed || seen.response < 0.05 * self.plan.scene.dimensionless().b {
+                    return Ok(Outcome::Lost { last: seen, crossed });
+                }
+            }
+            before = seen;
+            let still = seen.change.abs() < 2e-3 * seen.response;
+            if symmetric && odd == 0 && missing.abs() < ARRIVED && still {
+                if slope.is_some_and(|slope| slope < 0.0) {
+                    return Ok(Outcome::Found(Found::Held(self.last)));
+                }
+                return self.hand_over(seen);
+            }
+        }
+    }
+
+    /// Hands over to the constant drive.
+    fn hand_over(&mut self, at: Leg) -> Result<Outcome, ExperimentError> {
+        self.bench.controller.hold_drive()?;
+        loop {
+            for _ in 0..4 {
+                self.one_period()?;
+                if self.last.settled {
+                    return Ok(Outcome::Found(Found::Locked(self.last)));
+                }
+            }
+            let seen = self.measure(4.0)?;
+            if self.last.settled {
+                return Ok(Outcome::Found(Found::Locked(self.last)));
+            }
+            if (seen.response / at.response - 1.0).abs() > 0.1 {
+                return Ok(Outcome::Lost { last: seen, crossed: None });
+            }
+        }
+    }
+}
+
+/// How a descent ended.
+enum Outcome {
+    Found(Found),
+    /// The motion was lost; `crossed` is the response at which the requested drive holds an unstable one.
+    Lost { last: Leg, crossed: Option<f64> },
+}
