@@ -106,6 +106,7 @@ pub fn locks(count: usize, seed: u64, settings: &[Override]) -> Result<Vec<Row>,
             rigs.push((d, stable));
         }
     }
+    if let Some(n) = std::env::var("ONLY").ok().and_then(|n| n.parse::<usize>().ok()) { rigs = vec![rigs.swap_remove(n)]; }
     rigs.par_iter().map(|(d, stable)| lock(d, stable, settings)).collect()
 }
 

@@ -59,9 +59,10 @@ struct Period {
 /// What a leg measured.
 #[derive(Debug, Clone, Copy)]
 struct Leg {
-    /// Mean response amplitude, m, and its change.
+    /// Mean response amplitude, m, its change, and the last one.
     response: f64,
     change: f64,
+    last: f64,
     /// Drive that holds it, m.
     holding: f64,
     /// Frequency of the response, rad/s.
@@ -170,6 +171,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let mut all: Vec<Period> = Vec::new();
         while (all.len() as f64) < periods {
             all.extend(self.one_period()?);
+            if self.last.settled && all.len() > 3 {
+                break;
+            }
         }
         let (first, last) = (&all[0], &all[all.len() - 1]);
         let duration = last.cycle.time - first.cycle.time;
@@ -199,10 +203,11 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let leg = Leg {
             response,
             change,
+            last: last.amplitude,
             holding,
             omega: omega_r,
             asymmetry: (even / odd).sqrt(),
-            departed: departure > DEPARTURE * needs.max(holding),
+            departed: departure > DEPARTURE * needs.max(work),
         };
         if std::env::var_os("VINES_TRACE").is_some() {
             let d = self.plan.scene.dimensionless();
@@ -217,7 +222,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 d.g,
                 d.sigma(omega_r),
                 leg.asymmetry,
-                departure / needs.max(holding),
+                departure / needs.max(work),
                 self.last.state,
                 d.excitation(mean(all.iter().map(|one| one.work))),
             );
@@ -260,19 +265,14 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             Err(ExperimentError::Controller(ControllerError::NoResponseLoop)) => return Ok(None),
             seen => seen?,
         };
-        let mut step = STEP;
-        let mut unstable = None;
-        for _ in 0..SEARCHES {
+        let mut unstable = false;
+        for search in 0..SEARCHES {
             if !seen.is_symmetric() {
                 seen = self.rise(seen)?;
             }
-            match self.fall(seen, step, unstable)? {
+            match self.follow(seen, f64::from(1 << search), unstable)? {
                 Outcome::Found(found) => return Ok(Some(found)),
-                Outcome::Lost { last, crossed } => {
-                    seen = last;
-                    unstable = unstable.or(crossed);
-                    step *= 0.5;
-                }
+                Outcome::Lost { last, crossed } => (seen, unstable) = (last, unstable | crossed),
             }
         }
         Err(self.bench.no_lock(&self.last))
@@ -299,85 +299,124 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         }
     }
 
-    /// Lowers the response to the requested drive.
-    fn fall(&mut self, first: Leg, step: f64, unstable: Option<f64>) -> Result<Outcome, ExperimentError> {
-        let mut before = first;
-        let mut slope = None::<f64>;
-        let mut symmetric = first.is_symmetric();
-        let mut odd = 0;
-        let mut down = -1.0;
-        let mut crossed = None;
-        if symmetric && first.holding < self.asked {
-            down = 1.0;
-        }
+    /// Goes along the symmetric motion to the requested drive, `slower` times as slowly as at first.
+    fn follow(&mut self, first: Leg, slower: f64, unstable: bool) -> Result<Outcome, ExperimentError> {
+        let (mut seen, mut backbone) = (first, Backbone::default());
+        let mut symmetric = seen.is_symmetric();
+        let mut rising = symmetric && seen.holding < self.asked;
+        // Whether the requested drive may be above, and whether a larger one was seen.
+        let (mut upwards, mut exceeded, mut crossed) = (true, false, false);
+        let mut other = 0;
         loop {
-            let largest = step * before.response;
-            let newton = slope
-                .filter(|slope| symmetric && (*slope > 0.0 || unstable.is_some()))
-                .map(|slope| before.response + (self.asked - before.holding) / slope - self.setpoint);
-            let change = newton.unwrap_or(down * largest).clamp(-largest, largest);
-            let sweeps = change.abs() == largest;
-            let periods = self.periods(change, before.holding);
-            let onward = if sweeps { change / (periods * self.period) } else { 0.0 };
-            let seen = self.leg(self.setpoint + change, periods, onward)?;
-            let missing = seen.holding / self.asked - 1.0;
-            if seen.is_symmetric() {
-                odd = 0;
-                if symmetric {
-                    let width = seen.response - before.response;
-                    if width.abs() > 0.003 * seen.response {
-                        let now = (seen.holding - before.holding) / width;
-                        if now < 0.0 && (seen.holding - self.asked) * (before.holding - self.asked) < 0.0 {
-                            crossed = Some(seen.response);
-                        }
-                        slope = Some(now);
-                    }
-                }
-                symmetric = true;
+            let largest = STEP / slower * seen.response;
+            let slope = backbone.slope();
+            let ahead = slope
+                .filter(|slope| symmetric && other == 0 && (*slope > 0.0 || unstable))
+                .and_then(|_| backbone.ahead(self.asked))
+                .map(|ahead| ahead - seen.last)
+                .filter(|change| *change < 0.0 || upwards || exceeded);
+            let change = ahead.unwrap_or(if rising { largest } else { -largest });
+            let change = change.clamp(-largest, largest);
+            rising = change > 0.0;
+            let periods = self.periods(slower * change, seen.holding);
+            let to = self.setpoint + change;
+            seen = if change.abs() == largest {
+                self.leg(to, periods, change / (periods * self.period))?
             } else {
-                odd += 1;
-                if symmetric && odd >= 2 {
+                self.leg(to, 0.5 * periods, 0.0)?;
+                self.measure(SHORTEST)?
+            };
+            let missing = seen.holding - self.asked;
+            if !seen.is_symmetric() {
+                other += 1;
+                if symmetric && rising && upwards {
+                    (symmetric, upwards, rising) = (false, false, false);
+                } else if symmetric && other >= 2 || !seen.departed || seen.response < 0.05 * self.plan.scene.dimensionless().b {
                     return Ok(Outcome::Lost { last: seen, crossed });
                 }
-                if !seen.departed || seen.response < 0.05 * self.plan.scene.dimensionless().b {
-                    return Ok(Outcome::Lost { last: seen, crossed });
-                }
+                continue;
             }
-            before = seen;
-            let still = seen.change.abs() < 2e-3 * seen.response;
-            if symmetric && odd == 0 && missing.abs() < ARRIVED && still {
-                if slope.is_some_and(|slope| slope < 0.0) {
+            (symmetric, other) = (true, 0);
+            exceeded |= missing > 0.0;
+            backbone.add(seen.response, seen.holding);
+            let slope = backbone.slope();
+            if slope.is_some() {
+                rising = false;
+            }
+            let Some(slope) = slope else { continue };
+            crossed |= slope < 0.0 && backbone.encloses(self.asked);
+            let gain = self.gain(seen.omega) * SHORTEST * self.period;
+            let is_slow = gain * missing.abs() < largest;
+            if is_slow && gain * slope > 0.5 || missing.abs() < ARRIVED * self.asked && seen.change.abs() < 2e-3 * seen.response {
+                if slope < 0.0 {
                     return Ok(Outcome::Found(Found::Held(self.last)));
                 }
-                return self.hand_over(seen);
+                return self.hand_over();
             }
         }
     }
 
     /// Hands over to the constant drive.
-    fn hand_over(&mut self, at: Leg) -> Result<Outcome, ExperimentError> {
+    fn hand_over(&mut self) -> Result<Outcome, ExperimentError> {
         self.bench.controller.hold_drive()?;
+        let mut other = 0;
         loop {
-            for _ in 0..4 {
-                self.one_period()?;
-                if self.last.settled {
-                    return Ok(Outcome::Found(Found::Locked(self.last)));
-                }
-            }
-            let seen = self.measure(4.0)?;
+            let seen = self.measure(SHORTEST)?;
             if self.last.settled {
                 return Ok(Outcome::Found(Found::Locked(self.last)));
             }
-            if (seen.response / at.response - 1.0).abs() > 0.1 {
-                return Ok(Outcome::Lost { last: seen, crossed: None });
+            other = if seen.is_symmetric() { 0 } else { other + 1 };
+            if other >= 2 {
+                self.setpoint = seen.last;
+                return Ok(Outcome::Lost { last: seen, crossed: false });
             }
         }
+    }
+}
+
+/// The last measured points of the backbone that differ: response and holding drive, m; the present one first.
+#[derive(Default)]
+struct Backbone {
+    points: Vec<[f64; 2]>,
+}
+
+/// Relative difference of the responses of two points that give a slope.
+const APART: f64 = 3e-3;
+
+impl Backbone {
+    /// A point replaces those beside it.
+    fn add(&mut self, response: f64, holding: f64) {
+        self.points.retain(|point| (point[0] / response - 1.0).abs() >= APART);
+        self.points.insert(0, [response, holding]);
+        self.points.truncate(3);
+    }
+
+    /// Slope of the holding drive over the response.
+    fn slope(&self) -> Option<f64> {
+        let [one, two, ..] = self.points[..] else { return None };
+        Some((one[1] - two[1]) / (one[0] - two[0]))
+    }
+
+    fn encloses(&self, drive: f64) -> bool {
+        let [one, two, ..] = self.points[..] else { return false };
+        (one[1] - drive) * (two[1] - drive) < 0.0
+    }
+
+    /// Response at which the drive is `drive`: as a quadratic function of the drive, which the fold is.
+    fn ahead(&self, drive: f64) -> Option<f64> {
+        let [one, two, ..] = self.points[..] else { return None };
+        let inverse = |a: [f64; 2], b: [f64; 2]| (a[0] - b[0]) / (a[1] - b[1]);
+        let linear = (drive - one[1]) * inverse(one, two);
+        let Some(three) = self.points.get(2) else { return Some(one[0] + linear) };
+        let bend = (inverse(one, two) - inverse(two, *three)) / (one[1] - three[1]);
+        let share = 1.0 + (drive - two[1]) * bend / inverse(one, two);
+        Some(one[0] + linear * share.clamp(0.25, 1.5))
     }
 }
 
 /// How a descent ended.
 enum Outcome {
     Found(Found),
-    /// The motion was lost; `crossed` is the response at which the requested drive holds an unstable one.
-    Lost { last: Leg, crossed: Option<f64> },
+    /// The motion was lost; `crossed`: the requested drive holds an unstable one.
+    Lost { last: Leg, crossed: bool },
 }
