@@ -33,7 +33,7 @@ const RISE: f64 = 60.0;
 /// Departure from the linear response that shows impacts, as a share of the drive.
 const DEPARTURE: f64 = 0.2;
 /// Largest amplitude of the second harmonic of a symmetric motion, over that of the third.
-const SYMMETRIC: f64 = 0.3;
+const SYMMETRIC: f64 = 0.5;
 /// Relative distance of the holding drive from the requested one at which a constant drive takes over.
 const ARRIVED: f64 = 2e-4;
 /// Uncertainty of the half-width of the drawing.
@@ -330,7 +330,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             if !seen.is_symmetric() {
                 other += 1;
                 if symmetric && rising && upwards {
-                    (symmetric, upwards, rising) = (false, false, false);
+                    if other >= 2 {
+                        (symmetric, upwards, rising) = (false, false, false);
+                    }
                 } else if symmetric && other >= 2 || !seen.departed || seen.response < 0.05 * self.plan.scene.dimensionless().b {
                     return Ok(Outcome::Lost { last: seen, crossed });
                 }
