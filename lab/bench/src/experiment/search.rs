@@ -30,12 +30,18 @@ const STEP: f64 = 0.04;
 const SHARE: f64 = 0.3;
 /// Periods in which the response rises by the half-width.
 const RISE: f64 = 60.0;
+/// Largest relative growth of the response in a period: the detector, whose time constant is one to two periods, follows it.
+const GROWTH: f64 = 0.1;
 /// Departure from the linear response that shows impacts, as a share of the drive.
 const DEPARTURE: f64 = 0.2;
 /// Largest amplitude of the second harmonic of a symmetric motion, over that of the third.
 const SYMMETRIC: f64 = 0.5;
 /// Relative distance of the holding drive from the requested one at which a constant drive takes over.
 const ARRIVED: f64 = 2e-4;
+/// Fall of the response after the end of the symmetric motion from which on it is not found again below: its stable range is wider.
+const LOST: f64 = 0.8;
+/// Measurements of a response that is not yet steady.
+const LONGEST: u32 = 6;
 /// Uncertainty of the half-width of the drawing.
 const DRAWING: f64 = 0.1;
 /// Searches, each in steps half as large as the one before.
@@ -63,6 +69,8 @@ struct Leg {
     response: f64,
     change: f64,
     last: f64,
+    /// Drive that changes the response, m.
+    unsteady: f64,
     /// Drive that holds it, m.
     holding: f64,
     /// Frequency of the response, rad/s.
@@ -204,6 +212,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             response,
             change,
             last: last.amplitude,
+            unsteady: (work - holding).abs(),
             holding,
             omega: omega_r,
             asymmetry: (even / odd).sqrt(),
@@ -241,6 +250,18 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         self.bench.controller.hold_response(go, self.target)?;
         self.setpoint = to;
         self.measure(periods)
+    }
+
+    /// Measures until the drive that still changes the response is less than the difference to decide.
+    fn hold(&mut self) -> Result<Leg, ExperimentError> {
+        for _ in 0..LONGEST {
+            let seen = self.measure(SHORTEST)?;
+            let missing = (seen.holding - self.asked).abs();
+            if seen.unsteady < (0.5 * missing).max(ARRIVED * self.asked) || !seen.is_symmetric() {
+                return Ok(seen);
+            }
+        }
+        self.measure(SHORTEST)
     }
 
     /// Periods for a change of the response by `change`, m, against the holding drive.
@@ -288,6 +309,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let rate = (d.b / (RISE * self.period)).min(0.3 * spare);
         let periods = 5.0;
         loop {
+            let rate = rate.min(GROWTH * seen.last / self.period);
             let to = self.setpoint + rate * periods * self.period;
             if to > 1.5 * d.b {
                 return Ok(seen);
@@ -306,7 +328,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let mut rising = symmetric && seen.holding < self.asked;
         // Whether the requested drive may be above, and whether a larger one was seen.
         let (mut upwards, mut exceeded, mut crossed) = (true, false, false);
-        let mut other = 0;
+        let (mut other, mut lowest) = (0, 0.0);
         loop {
             let largest = STEP / slower * seen.response;
             let slope = backbone.slope();
@@ -324,16 +346,17 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 self.leg(to, periods, change / (periods * self.period))?
             } else {
                 self.leg(to, 0.5 * periods, 0.0)?;
-                self.measure(SHORTEST)?
+                self.hold()?
             };
             let missing = seen.holding - self.asked;
             if !seen.is_symmetric() {
                 other += 1;
-                if symmetric && rising && upwards {
-                    if other >= 2 {
-                        (symmetric, upwards, rising) = (false, false, false);
-                    }
-                } else if symmetric && other >= 2 || !seen.departed || seen.response < 0.05 * self.plan.scene.dimensionless().b {
+                if symmetric && other >= 2 {
+                    // Above the symmetric motion, the way is down; below the fold, nothing is.
+                    (symmetric, upwards, exceeded, rising) = (false, false, false, false);
+                    lowest = LOST * seen.response;
+                }
+                if !seen.departed || seen.response < lowest {
                     return Ok(Outcome::Lost { last: seen, crossed });
                 }
                 continue;
@@ -349,7 +372,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             crossed |= slope < 0.0 && backbone.encloses(self.asked);
             let gain = self.gain(seen.omega) * SHORTEST * self.period;
             let is_slow = gain * missing.abs() < largest;
-            if is_slow && gain * slope > 0.5 || missing.abs() < ARRIVED * self.asked && seen.change.abs() < 2e-3 * seen.response {
+            if is_slow && gain * slope > 0.5 || missing.abs() < ARRIVED * self.asked && seen.unsteady < ARRIVED * self.asked {
                 if slope < 0.0 {
                     return Ok(Outcome::Found(Found::Held(self.last)));
                 }
