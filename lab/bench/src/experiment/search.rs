@@ -42,6 +42,9 @@ const ARRIVED: f64 = 2e-4;
 const LOST: f64 = 0.8;
 /// Measurements of a response that is not yet steady.
 const LONGEST: u32 = 6;
+/// Smallest slope of the holding drive that a constant drive needs, over that of the linear response: with less, it takes ten times
+/// as long to settle.
+const FIRM: f64 = 0.1;
 /// Uncertainty of the half-width of the drawing.
 const DRAWING: f64 = 0.1;
 /// Searches, each in steps half as large as the one before.
@@ -252,16 +255,18 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         self.measure(periods)
     }
 
-    /// Measures until the drive that still changes the response is less than the difference to decide.
-    fn hold(&mut self) -> Result<Leg, ExperimentError> {
+    /// Measures until the late impacts falsify the holding drive by little, compared with its distance from the requested one.
+    fn hold(&mut self, slope: f64) -> Result<Leg, ExperimentError> {
+        let mut seen = self.measure(SHORTEST)?;
         for _ in 0..LONGEST {
-            let seen = self.measure(SHORTEST)?;
             let missing = (seen.holding - self.asked).abs();
-            if seen.unsteady.abs() < (0.5 * missing).max(ARRIVED * self.asked) || !seen.is_symmetric() {
-                return Ok(seen);
+            let allowed = (0.1 * missing).max(self.tolerance(slope, seen.response));
+            if LATE * seen.unsteady.abs() < allowed || !seen.is_symmetric() {
+                break;
             }
+            seen = self.measure(SHORTEST)?;
         }
-        self.measure(SHORTEST)
+        Ok(seen)
     }
 
     /// Periods for a change of the response by `change`, m, against the holding drive.
@@ -346,7 +351,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 self.leg(to, periods, change / (periods * self.period))?
             } else {
                 self.leg(to, 0.5 * periods, 0.0)?;
-                self.hold()?
+                self.hold(backbone.slope().unwrap_or_default())?
             };
             let missing = seen.holding - self.asked;
             if !seen.is_symmetric() {
@@ -370,32 +375,46 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             let Some(slope) = slope else { continue };
             crossed |= slope < 0.0 && backbone.encloses(self.asked);
-            let gain = self.gain(seen.omega) * SHORTEST * self.period;
-            let is_slow = gain * missing.abs() < largest;
-            if is_slow && gain * slope > 0.5 || missing.abs() < ARRIVED * self.asked && seen.unsteady.abs() < ARRIVED * self.asked {
-                if slope < 0.0 {
-                    return Ok(Outcome::Found(Found::Held(self.last)));
+            // What the constant drive would change in a leg, and in all; and by how much it relaxes in a leg.
+            let rate = self.gain(seen.omega) * SHORTEST * self.period;
+            let changes = (rate * missing.abs()).min(missing.abs() / slope.abs());
+            let tolerance = self.tolerance(slope, seen.response);
+            let has_arrived = missing.abs() < tolerance && LATE * seen.unsteady.abs() < tolerance;
+            let firm = self.linear.damping_rate / self.gain(seen.omega) * FIRM;
+            if has_arrived && slope < firm {
+                return Ok(Outcome::Found(Found::Held(self.last)));
+            }
+            if slope > 0.0 && (has_arrived || changes < largest && rate * slope > 0.5) {
+                match self.hand_over()? {
+                    Some(found) => return Ok(Outcome::Found(found)),
+                    None => {
+                        seen = self.leg(self.setpoint, SHORTEST, 0.0)?;
+                        (symmetric, upwards, exceeded, rising) = (false, false, false, false);
+                        lowest = LOST * seen.response;
+                    }
                 }
-                return self.hand_over();
             }
         }
     }
 
-    /// Hands over to the constant drive.
-    fn hand_over(&mut self) -> Result<Outcome, ExperimentError> {
+    /// Largest error of the holding drive, m, at the end: as much as changes the response by the same share.
+    fn tolerance(&self, slope: f64, response: f64) -> f64 {
+        ARRIVED * (slope.abs() * response).clamp(0.05 * self.asked, self.asked)
+    }
+
+    /// Hands over to the constant drive; `None` if the motion does not stay symmetric.
+    fn hand_over(&mut self) -> Result<Option<Found>, ExperimentError> {
         self.bench.controller.hold_drive()?;
         let mut other = 0;
-        loop {
+        while other < 2 {
             let seen = self.measure(SHORTEST)?;
             if self.last.settled {
-                return Ok(Outcome::Found(Found::Locked(self.last)));
+                return Ok(Some(Found::Locked(self.last)));
             }
             other = if seen.is_symmetric() { 0 } else { other + 1 };
-            if other >= 2 {
-                self.setpoint = seen.last;
-                return Ok(Outcome::Lost { last: seen, crossed: false });
-            }
+            self.setpoint = seen.last;
         }
+        Ok(None)
     }
 }
 
