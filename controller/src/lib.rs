@@ -49,12 +49,9 @@
 
 mod amplitude_loop;
 mod angle;
-mod approach;
-mod capture;
 mod check;
 mod config;
 mod controller;
-mod descent;
 mod detector;
 mod drive;
 mod error;

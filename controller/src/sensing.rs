@@ -83,9 +83,8 @@ pub struct PresentDrive {
 pub struct Measurement {
     /// Fault of the readings.
     pub fault: Option<Fault>,
-    /// Phase error, rad, in [-pi, pi], and its cosine; 0 and 1 if it cannot be measured.
+    /// Phase error, rad, in [-pi, pi]; 0 if it cannot be measured.
     pub error: Real,
-    pub cosine: Real,
     /// Whether both amplitudes are above 0.
     pub measurable: bool,
     /// m
@@ -157,15 +156,10 @@ impl Sensing {
         let relative = (response.fundamental())
             .times(reference.fundamental.conjugate())
             .times(self.target);
-        let (error, cosine) = if measurable {
-            (relative.argument(), relative.re / size)
-        } else {
-            (0.0, 1.0)
-        };
+        let error = if measurable { relative.argument() } else { 0.0 };
         Measurement {
             fault,
             error,
-            cosine,
             measurable,
             reference_amplitude: reference.amplitude,
             valid: measurable && reference.valid && amplitude >= self.response_min && self.is_coherent(response),

@@ -13,13 +13,12 @@ use thiserror::Error;
 
 use crate::rig::{Controller, ControllerError, Drive, Fault, Rig, RigError};
 use crate::scene::Scene;
-use vines_model::orbit::phase_resonant;
 use vines_model::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 
 pub(crate) use bench::Bench;
 pub use evidence::Evidence;
 pub use record::{Record, Sample, drive_phases, table};
-use search::{Found, Search};
+pub(crate) use search::Search;
 
 /// Durations of the stages, in samples.
 #[derive(Debug, Clone, Copy)]
@@ -30,8 +29,6 @@ pub struct Plan<'a> {
     pub sample_time: f64,
     /// Time limit for the lock.
     pub lock: usize,
-    /// How long the motion may be other than 1:1 before the lock, in total.
-    pub irregular: usize,
     /// How long the lock is held and recorded once it has settled.
     pub hold: usize,
     /// Length of the recorded decay.
@@ -48,21 +45,9 @@ impl<'a> Plan<'a> {
             scene,
             sample_time,
             lock: samples(scene.lock_periods()),
-            irregular: samples(irregular_periods(scene)),
             hold: samples(scene.record.hold_periods),
             decay: samples(decay_periods(scene)),
         }
-    }
-}
-
-/// How long the motion may be other than 1:1 before the lock, in total, in natural periods: some relaxation times of the structure, or
-/// less where the exact orbits show that there is nothing to lock.
-fn irregular_periods(scene: &Scene) -> f64 {
-    let d = scene.dimensionless();
-    if phase_resonant(&d).iter().any(|orbit| orbit.stable) || !scene.controller.is_at_phase_resonance() {
-        f64::max(600.0, 10.0 * scene.relaxation_periods())
-    } else {
-        60.0
     }
 }
 
@@ -151,8 +136,8 @@ pub enum ExperimentError {
         phase_error: PhaseError,
         omega: f64,
     },
-    #[error("no lock: for {periods:.0} periods in total the motion was not 1:1, and only such a motion can be locked")]
-    Irregular { periods: f64 },
+    #[error("the requested drive G = {g:.4} was not reached within {periods:.0} periods: {why}")]
+    NotReached { periods: f64, g: f64, why: String },
     #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {}", stage.name(), evidence.text(*fault))]
     Tripped {
         periods: f64,
@@ -183,11 +168,16 @@ pub fn run_into(
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
     let mut bench = Bench::new(rig, controller, plan.scene, samples);
-    let (settled, held) = match Search::new(&mut bench, plan).run()? {
-        Some(Found::Locked(_)) => (bench.samples.len() - 1, false),
-        Some(Found::Held(_)) => (bench.samples.len() - 1, true),
-        None => (wait(&mut bench, plan, &mut progress)?, false),
+    let held = if plan.scene.controller.is_at_phase_resonance() {
+        let mut searched = |taken| progress(Stage::Locking, taken, plan.lock);
+        Search::new(&mut bench, plan.scene, plan.lock, &mut searched).lock()?
+    } else {
+        None
     };
+    if held.is_none() {
+        wait(&mut bench, plan, &mut progress)?;
+    }
+    let (settled, held) = (bench.taken - 1, held == Some(true));
     for n in 0..plan.hold {
         bench.sample(Stage::Holding)?;
         progress(Stage::Holding, n + 1, plan.hold);
@@ -207,20 +197,19 @@ pub fn run_into(
     })
 }
 
-/// Waits for the lock under the constant drive, for a controller that cannot control the response. Returns the samples taken.
+/// Waits for the lock under the constant drive, for a controller that cannot control the response.
 fn wait<R: Rig + ?Sized, C: Controller + ?Sized>(
     bench: &mut Bench<R, C>,
     plan: &Plan,
     progress: &mut impl FnMut(Stage, usize, usize),
-) -> Result<usize, ExperimentError> {
+) -> Result<(), ExperimentError> {
     loop {
         let command = bench.sample(Stage::Locking)?;
-        let taken = bench.samples.len();
-        progress(Stage::Locking, taken, plan.lock);
+        progress(Stage::Locking, bench.taken, plan.lock);
         if command.settled {
-            return Ok(taken - 1);
+            return Ok(());
         }
-        if taken >= plan.lock {
+        if bench.taken >= plan.lock {
             return Err(bench.no_lock(&command));
         }
     }

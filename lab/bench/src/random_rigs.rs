@@ -184,7 +184,7 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
             } else {
                 Outcome::Failed
             };
-            let message = reason.map_or_else(|| error.to_string(), |why| format!("{error}: {why}"));
+            let message = reason.map_or_else(|| error.to_string(), |why| format!("{error}; {why}"));
             return Row { outcome, message: Some(message), ..row };
         }
     };

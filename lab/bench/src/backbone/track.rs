@@ -8,7 +8,7 @@ use super::settle::Found;
 use super::sweep::Sweep;
 use crate::experiment::{self, ExperimentError, Sample, Stage};
 use crate::identification::Cycle;
-use crate::rig::{Controller, LoopState, Move, Rig};
+use crate::rig::{Controller, Move, Rig};
 use crate::scene::Scene;
 
 /// Phase error, rad, below which the control of the response begins.
@@ -95,9 +95,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
             if self.run.periods >= self.scene.lock_periods() {
                 return Err(self.run.no_lock(&command));
             }
-            // A motion that is being captured is not to be held yet.
-            let captured = command.state != Some(LoopState::Capturing);
-            let driven = cycle.base.norm() > 0.0 && captured;
+            let driven = cycle.base.norm() > 0.0;
             near = if driven && cycle.phase_error.abs() < NEAR {
                 near + 1
             } else {

@@ -1,267 +1,329 @@
 //! The way to a lock at the requested drive, from rest or with a moving particle.
 //!
-//! Near phase resonance a rig obeys `A' = g (E cos phi - E_R(A))`: under control of the response A, the drive `E_R(A)` that holds it is
-//! single-valued. The script therefore moves the setpoint of the response, and measures `E_R` by this balance, leg by leg.
+//! Near phase resonance a rig obeys `A' = g (E cos phi - E_R(A))`, whatever is inside it. While the response A is controlled, the drive
+//! `E_R(A)` that holds it is single-valued. The script moves the setpoint of the response in legs, and measures `E_R` by this balance.
 //!
 //! 1. The loop closes under the requested drive.
-//! 2. The response rises until it departs from the linear response: impacts have begun.
-//! 3. It falls in small steps until the motion is symmetric 1:1 and the drive that holds it falls through the requested one.
-//! 4. Newton's method on the measured `E_R(A)` goes to the requested drive. There, a constant drive takes over if `E_R` rises with the
-//!    amplitude, which is the condition of stability under a constant drive. Otherwise the response stays under control.
+//! 2. The response rises until the motion departs from the linear response: impacts have begun.
+//! 3. It falls in small steps until the motion is symmetric 1:1, and goes on until `E_R` falls through the requested drive.
+//! 4. Steps of the inverse interpolation of the measured `E_R(A)` lead to the requested drive. There a constant drive takes over if `E_R`
+//!    rises with the amplitude, the condition of stability under a constant drive. Otherwise the response stays under control.
+//!
+//! A motion that is symmetric from the start skips steps 2 and 3. A motion that is lost is searched again, more slowly.
 
 use std::f64::consts::TAU;
 
 use nalgebra::DVector;
 use vines_model::numerics::{HarmonicBasis, mean, noise};
 
-use super::{Bench, ExperimentError, Plan, Stage, drive_phases};
+use super::{Bench, ExperimentError, Sample, Stage};
 use crate::identification::Cycle;
 use crate::rig::{Command, Controller, ControllerError, LoopState, Move, Rig};
-use crate::scene::LinearResponse;
+use crate::scene::{LinearResponse, Scene};
 
 /// Phase error, rad, below which the control of the response begins: the drive then does 94 % of its largest work. Periods for which.
 const NEAR: f64 = 0.35;
 const NEAR_FOR: usize = 3;
-/// Fewest periods of a leg: the loops, whose slowest time constant is five periods, follow its changes.
+/// Fewest periods of a leg. The loops, whose slowest time constant is five periods, follow within it.
 const SHORTEST: f64 = 8.0;
 /// Largest relative change of the response in a leg: the stable orbits above the fold span a few percent.
 const STEP: f64 = 0.04;
-/// Largest share of the drive that may change the response.
+/// Largest share of the drive that changes the response: with half of it, one rig in thirty was lost at the fold.
 const SHARE: f64 = 0.3;
-/// Periods in which the response rises by the half-width.
+/// Periods in which the response rises by the half-width, and those of a leg.
 const RISE: f64 = 60.0;
+const RISE_LEG: f64 = 5.0;
 /// Largest relative growth of the response in a period: the detector, whose time constant is one to two periods, follows it.
 const GROWTH: f64 = 0.1;
-/// Departure from the linear response that shows impacts, as a share of the drive.
+/// Departure from the linear response that shows impacts, as a share of the drive: twice the uncertainty of damping and stiffness.
 const DEPARTURE: f64 = 0.2;
-/// Largest amplitude of the second harmonic of a symmetric motion, over that of the third.
+/// Largest amplitude of the second harmonic of a symmetric motion over that of the third: 0.1 is found where it is symmetric, from 2 on
+/// where it is irregular.
 const SYMMETRIC: f64 = 0.5;
-/// Relative distance of the holding drive from the requested one at which a constant drive takes over.
+/// Relative error of the half-width in the drawing, and the response over it at which the particle is not reached, as it seems.
+const DRAWING: f64 = 0.1;
+const UNREACHED: f64 = 1.5;
+/// Relative error of the drive, or of the response if that is larger, with which a constant drive takes over; and of a held response.
 const ARRIVED: f64 = 2e-4;
-/// Fall of the response after the end of the symmetric motion from which on it is not found again below: its stable range is wider.
-const LOST: f64 = 0.8;
+const HELD: f64 = 0.1;
+/// Smallest slope of the holding drive under a constant drive, over that of the linear response: with less, it takes ten times as long
+/// to settle.
+const FIRM: f64 = 0.1;
+/// Relative distance of the responses of two points that tell a slope.
+const APART: f64 = 3e-3;
+/// Share of the drive that changes the response, by which the holding drive may be wrong: impacts follow late. Between up and down at
+/// epsilon = 0.015, r = 0.9, it is 0.02.
+const LATE: f64 = 0.05;
 /// Measurements of a response that is not yet steady.
 const LONGEST: u32 = 6;
-/// Smallest slope of the holding drive that a constant drive needs, over that of the linear response: with less, it takes ten times
-/// as long to settle.
-const FIRM: f64 = 0.1;
-/// Uncertainty of the half-width of the drawing.
-const DRAWING: f64 = 0.1;
-/// Searches, each in steps half as large as the one before.
+/// Fall of the response without symmetry, from where it was lost, after which the motion is lost: its stable range is wider.
+const LOST: f64 = 0.8;
+/// Response over the half-width below which no motion is searched for: the fold is above, up to r = 0.9.
+const LOWEST: f64 = 0.05;
+/// Searches, each twice as slow as the one before.
 const SEARCHES: u32 = 4;
 
 /// One period of the response.
 struct Period {
     cycle: Cycle,
-    /// Amplitude, m, at the middle.
+    /// Amplitude, m, and phase, rad, at the middle.
     amplitude: f64,
-    /// Phase of the response, rad.
     phase: f64,
-    /// Work of the drive: its amplitude, m, in phase with the velocity.
+    /// The drive in phase with the velocity, m.
     work: f64,
     /// Squares of second and third harmonic, and their variance by noise, m².
-    even: f64,
-    odd: f64,
+    harmonics: [f64; 2],
     noise: f64,
 }
 
 /// What a leg measured.
 #[derive(Debug, Clone, Copy)]
 struct Leg {
-    /// Mean response amplitude, m, its change, and the last one.
+    /// Mean response amplitude, and the last one, m.
     response: f64,
-    change: f64,
     last: f64,
-    /// Drive that changes the response, m.
-    unsteady: f64,
-    /// Drive that holds it, m.
+    /// Drive that holds it, and drive that changes it, m.
     holding: f64,
-    /// Frequency of the response, rad/s.
-    omega: f64,
-    /// Second over third harmonic.
-    asymmetry: f64,
+    unsteady: f64,
     /// Whether impacts take a part of the drive.
     departed: bool,
-}
-
-impl Leg {
-    fn is_symmetric(&self) -> bool {
-        self.departed && self.asymmetry < SYMMETRIC
-    }
+    symmetric: bool,
 }
 
 /// How the search ended.
-pub(super) enum Found {
+enum Found {
     /// Locked at a constant drive.
-    Locked(Command),
+    Locked,
     /// The response is held where the requested drive holds it.
-    Held(Command),
+    Held,
+    /// The motion was lost; `crossed`: the requested drive holds an unstable one.
+    Lost { last: Leg, crossed: bool },
 }
 
 /// The search.
-pub(super) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
+pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     bench: &'b mut Bench<'a, R, C>,
-    plan: &'b Plan<'b>,
+    scene: &'b Scene,
     linear: LinearResponse,
-    /// Requested drive, m.
+    /// Time limit, samples.
+    limit: usize,
+    progress: &'b mut dyn FnMut(usize),
+    /// Half-width of the cavity, and requested drive, m.
+    b: f64,
     asked: f64,
+    /// Phase target, rad.
     target: f64,
-    /// s
+    /// Natural period, s.
     period: f64,
+    /// Setpoint of the response, m.
     setpoint: f64,
     last: Command,
+    /// The symmetric motions of the smallest and the largest holding drive: response and drive, m.
+    extremes: Option<[[f64; 2]; 2]>,
 }
 
 impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
-    pub fn new(bench: &'b mut Bench<'a, R, C>, plan: &'b Plan<'b>) -> Self {
-        let scene = plan.scene;
+    /// The search on a bench, for at most `limit` samples; `progress` receives their number.
+    pub fn new(
+        bench: &'b mut Bench<'a, R, C>,
+        scene: &'b Scene,
+        limit: usize,
+        progress: &'b mut dyn FnMut(usize),
+    ) -> Self {
+        let d = scene.dimensionless();
         Self {
             bench,
-            plan,
+            scene,
             linear: scene.measured.unwrap_or_else(|| LinearResponse::of(scene)),
+            limit,
+            progress,
+            b: d.b,
             asked: scene.amplitude,
             target: scene.phase_target().radians(),
-            period: scene.dimensionless().natural_period(),
+            period: d.natural_period(),
             setpoint: 0.0,
             last: Command::default(),
+            extremes: None,
         }
     }
 
-    fn gain(&self, omega: f64) -> f64 {
-        let omega0 = self.plan.scene.dimensionless().omega0;
-        0.5 * omega0 * omega0 / omega
+    /// Goes to the lock at the requested drive. Returns whether the response is held by control there, or `None` where the controller cannot
+    /// control it.
+    pub fn lock(&mut self) -> Result<Option<bool>, ExperimentError> {
+        let mut seen = match self.begin() {
+            Err(ExperimentError::Controller(ControllerError::NoResponseLoop)) => return Ok(None),
+            seen => seen?,
+        };
+        let mut unstable = false;
+        for search in 0..SEARCHES {
+            let slower = f64::from(1 << search);
+            seen = self.symmetric(seen, slower)?;
+            if !seen.symmetric {
+                continue;
+            }
+            match self.follow(seen, slower, unstable)? {
+                Found::Locked => return Ok(Some(false)),
+                Found::Held => return Ok(Some(true)),
+                Found::Lost { last, crossed } => (seen, unstable) = (last, unstable | crossed),
+            }
+        }
+        Err(self.not_reached())
     }
 
-    /// One sample.
-    fn sample(&mut self) -> Result<(), ExperimentError> {
-        self.last = self.bench.sample(Stage::Locking)?;
-        if self.bench.samples.len() >= self.plan.lock {
-            return Err(self.bench.no_lock(&self.last));
-        }
+    /// Goes to a symmetric motion with impacts, if there is one, and holds its response.
+    pub fn impacts(&mut self) -> Result<(), ExperimentError> {
+        let seen = self.begin()?;
+        self.symmetric(seen, 1.0)?;
         Ok(())
     }
 
-    /// One period of the drive; `None` without a motion.
-    fn one_period(&mut self) -> Result<Option<Period>, ExperimentError> {
-        let begin = self.bench.samples.len();
-        let first = self.bench.periods;
-        while self.bench.periods < first.floor() + 1.0 {
-            self.sample()?;
+    /// Closes the loop and begins to control the response.
+    fn begin(&mut self) -> Result<Leg, ExperimentError> {
+        let mut near = 0;
+        while near < NEAR_FOR {
+            let period = self.one_period()?;
+            let state = self.last.state;
+            let closed = state.is_none_or(|state| matches!(state, LoopState::Acquiring | LoopState::Locked));
+            let is_near = period.is_some_and(|one| {
+                self.setpoint = one.amplitude;
+                one.cycle.phase_error.abs() < NEAR && one.work > 0.0
+            });
+            near = if closed && is_near { near + 1 } else { 0 };
         }
-        let samples = &self.bench.samples[begin..];
-        let Some(cycle) = Cycle::of(samples, self.bench.sample_time, first * TAU, self.target) else {
-            return Ok(None);
-        };
-        let phases = drive_phases(samples, self.bench.sample_time, first * TAU);
-        let middle = mean(phases.iter().copied());
-        let half = 0.5 * (samples.len() - 1) as f64;
-        let phases: Vec<f64> = (0..samples.len())
-            .map(|n| middle + (n as f64 - half) * self.bench.sample_time * cycle.omega)
-            .collect();
-        let basis = HarmonicBasis::new(&phases, 0, &[Some(1), Some(0), Some(0), Some(0), Some(0)]);
-        let values = DVector::from_iterator(samples.len(), samples.iter().map(|one| one.sensors.response));
-        let Some(fit) = basis.fit(&values) else {
-            return Ok(None);
-        };
-        let rest = noise(basis.residual(&values, &fit).as_slice());
-        let [one, two, three] = [1, 2, 3].map(|n| fit.harmonic(n));
-        let amplitude = mean(samples.iter().map(|one| one.command.drive.amplitude));
-        Ok(Some(Period {
-            amplitude: one.norm(),
-            phase: cycle.drive_phase + one.arg(),
-            work: amplitude * cycle.phase_error.cos(),
-            even: two.norm_sqr(),
-            odd: three.norm_sqr(),
-            noise: rest * rest * 4.0 / samples.len() as f64,
-            cycle,
-        }))
+        self.leg(self.setpoint, SHORTEST, 0.0)
     }
 
-    /// Measures over at least this many periods.
-    fn measure(&mut self, periods: f64) -> Result<Leg, ExperimentError> {
-        let mut all: Vec<Period> = Vec::new();
-        while (all.len() as f64) < periods {
-            all.extend(self.one_period()?);
-            if self.last.settled && all.len() > 3 {
-                break;
+    /// Goes to a symmetric motion with impacts: raises the response until they have begun, and lowers it until the motion is symmetric.
+    fn symmetric(&mut self, mut seen: Leg, slower: f64) -> Result<Leg, ExperimentError> {
+        let largest = self.scene.controller_config().amplitude_max.unwrap_or(f64::INFINITY);
+        let damping = self.linear.damping_rate / self.gain();
+        let spare = SHARE * self.gain() * (largest - (1.0 + DRAWING) * self.b * damping);
+        let most = (self.b / (RISE * self.period)).min(spare);
+        while !seen.symmetric && !(seen.departed && seen.response > (1.0 - DRAWING) * self.b) {
+            let rate = most.min(GROWTH * seen.last / self.period);
+            let to = self.setpoint + rate * RISE_LEG * self.period;
+            if to > UNREACHED * self.b || rate <= 0.0 {
+                return Ok(seen);
+            }
+            seen = self.leg(to, RISE_LEG, rate)?;
+        }
+        self.fall(seen, slower, LOWEST * self.b)
+    }
+
+    /// Lowers the response until the motion is symmetric, but not below `lowest`, m.
+    fn fall(&mut self, mut seen: Leg, slower: f64, lowest: f64) -> Result<Leg, ExperimentError> {
+        while !seen.symmetric && seen.departed && seen.response > lowest {
+            seen = self.sweep(&seen, -STEP / slower * seen.response, slower)?;
+        }
+        Ok(seen)
+    }
+
+    /// Follows the symmetric motion to the requested drive. `unstable`: also to one that a constant drive does not hold.
+    fn follow(&mut self, first: Leg, slower: f64, unstable: bool) -> Result<Found, ExperimentError> {
+        let (mut seen, mut backbone) = (first, Backbone::default());
+        let mut rising = seen.holding < self.asked;
+        // Whether the requested drive may be above, and whether a larger one was seen.
+        let (mut upwards, mut exceeded, mut crossed) = (true, false, false);
+        let mut other = 0;
+        loop {
+            let largest = STEP / slower * seen.response;
+            let ahead = backbone
+                .slope()
+                .filter(|slope| other == 0 && (*slope > 0.0 || unstable))
+                .and_then(|_| backbone.at(self.asked))
+                .map(|ahead| ahead - seen.last)
+                .filter(|change| *change < 0.0 || upwards || exceeded);
+            let change = ahead.unwrap_or(if rising { largest } else { -largest });
+            rising = change > 0.0;
+            seen = if change.abs() < largest {
+                self.leg(self.setpoint + change, 0.5 * self.periods(change, seen.holding), 0.0)?;
+                self.hold(backbone.slope().unwrap_or_default())?
+            } else {
+                self.sweep(&seen, change.clamp(-largest, largest), slower)?
+            };
+            if !seen.symmetric {
+                other += 1;
+                if other < 2 {
+                    continue;
+                }
+                // Above the symmetric motion, the way is down; below the fold there is none.
+                seen = self.fall(seen, slower, LOST * seen.response)?;
+                if !seen.symmetric {
+                    return Ok(Found::Lost { last: seen, crossed });
+                }
+                (upwards, exceeded, rising) = (false, false, false);
+            }
+            other = 0;
+            backbone.add(seen);
+            let missing = seen.holding - self.asked;
+            exceeded |= missing > 0.0;
+            let Some(slope) = backbone.slope() else { continue };
+            rising = false;
+            crossed |= slope < 0.0 && backbone.encloses(self.asked);
+            // What the constant drive would change in a leg, and in all; and by how much it relaxes in a leg.
+            let rate = self.gain() * SHORTEST * self.period;
+            let changes = (rate * missing.abs()).min(missing.abs() / slope.abs());
+            let error = missing.abs().max(LATE * seen.unsteady.abs());
+            let tolerance = self.tolerance(slope, seen.response);
+            let firm = slope > FIRM * self.linear.damping_rate / self.gain();
+            if !firm && error < HELD * tolerance {
+                return Ok(Found::Held);
+            }
+            if slope > 0.0 && (firm && error < tolerance || changes < largest && rate * slope > 0.5) {
+                if self.hand_over()? {
+                    return Ok(Found::Locked);
+                }
+                seen = self.leg(self.setpoint, SHORTEST, 0.0)?;
+                seen = self.fall(seen, slower, LOST * seen.response)?;
+                if !seen.symmetric {
+                    return Ok(Found::Lost { last: seen, crossed });
+                }
+                (upwards, exceeded) = (false, false);
             }
         }
-        let (first, last) = (&all[0], &all[all.len() - 1]);
-        let duration = last.cycle.time - first.cycle.time;
-        let omega = mean(all.iter().map(|one| one.cycle.omega));
-        let change = last.amplitude - first.amplitude;
-        let work = mean(all.windows(2).map(|pair| 0.5 * (pair[0].work + pair[1].work)));
-        let gain = self.gain(omega);
-        let holding = work - change / (gain * duration);
-        let response = mean(all.iter().map(|one| one.amplitude));
-        let turned: f64 = all
-            .windows(2)
-            .map(|pair| {
-                let turn = pair[1].cycle.drive_phase - pair[0].cycle.drive_phase;
-                let more = (pair[1].phase - pair[0].phase - turn + TAU / 2.0).rem_euclid(TAU) - TAU / 2.0;
-                turn + more
-            })
-            .sum();
-        // The frequency at phase resonance, without the part that a phase error adds.
-        let turning = gain * mean(all.iter().map(|one| one.work * one.cycle.phase_error.tan())) / response;
-        let omega_r = turned / duration + turning;
-        let sum = |value: fn(&Period) -> f64| all.iter().map(value).sum::<f64>();
-        let noise = sum(|one| one.noise);
-        let even = (sum(|one| one.even) - noise).max(0.0);
-        let odd = (sum(|one| one.odd) - noise).max(0.0);
-        let needs = self.linear.damping_rate / gain * response;
-        let departure = (holding - needs).hypot(response * (omega_r - self.linear.omega0) / gain);
-        let leg = Leg {
-            response,
-            change,
-            last: last.amplitude,
-            unsteady: work - holding,
-            holding,
-            omega: omega_r,
-            asymmetry: (even / odd).sqrt(),
-            departed: departure > DEPARTURE * needs.max(work),
-        };
-        if std::env::var_os("VINES_TRACE").is_some() {
-            let d = self.plan.scene.dimensionless();
-            eprintln!(
-                "{:8.1} n {:3} set {:.4} C {:.5} dC {:+.4} G {:.5} of {:.4} sigma {:+.4} asym {:.3} dep {} {:?} E {:.4}",
-                self.bench.periods,
-                all.len(),
-                self.setpoint / d.b,
-                response / d.b,
-                change / d.b,
-                d.excitation(holding),
-                d.g,
-                d.sigma(omega_r),
-                leg.asymmetry,
-                departure / needs.max(work),
-                self.last.state,
-                d.excitation(mean(all.iter().map(|one| one.work))),
-            );
-        }
-        Ok(leg)
     }
 
-    /// Moves the setpoint in a leg of so many periods, with the growth `onward`, m/s, at its end; measures.
+    /// Hands over to the constant drive. Returns whether the motion has locked there; if not, it has lost its symmetry.
+    fn hand_over(&mut self) -> Result<bool, ExperimentError> {
+        self.bench.controller.hold_drive()?;
+        let mut other = 0;
+        while other < 2 {
+            let seen = self.measure(SHORTEST)?;
+            if self.last.settled {
+                return Ok(true);
+            }
+            other = if seen.symmetric { 0 } else { other + 1 };
+            self.setpoint = seen.last;
+        }
+        Ok(false)
+    }
+
+    /// A leg of a sweep: changes the response by `change`, m, and lets it go on at this rate.
+    fn sweep(&mut self, seen: &Leg, change: f64, slower: f64) -> Result<Leg, ExperimentError> {
+        let periods = self.periods(slower * change, seen.holding);
+        self.leg(self.setpoint + change, periods, change / (periods * self.period))
+    }
+
+    /// Moves the setpoint to `to`, m, in so many periods, with the growth `onward`, m/s, at the end and after it. Measures meanwhile.
     fn leg(&mut self, to: f64, periods: f64, onward: f64) -> Result<Leg, ExperimentError> {
-        let go = Move {
+        let to = Move {
             response: to,
             duration: periods * self.period,
             growth: onward,
             ..Move::default()
         };
-        self.bench.controller.hold_response(go, self.target)?;
-        self.setpoint = to;
+        self.bench.controller.hold_response(to, self.target)?;
+        self.setpoint = to.response;
         self.measure(periods)
     }
 
-    /// Measures until the late impacts falsify the holding drive by little, compared with its distance from the requested one.
+    /// Measures until late impacts falsify the holding drive by little, compared with its distance from the requested one.
     fn hold(&mut self, slope: f64) -> Result<Leg, ExperimentError> {
         let mut seen = self.measure(SHORTEST)?;
         for _ in 0..LONGEST {
             let missing = (seen.holding - self.asked).abs();
             let allowed = (0.1 * missing).max(self.tolerance(slope, seen.response));
-            if LATE * seen.unsteady.abs() < allowed || !seen.is_symmetric() {
+            if LATE * seen.unsteady.abs() < allowed || !seen.symmetric {
                 break;
             }
             seen = self.measure(SHORTEST)?;
@@ -269,152 +331,126 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         Ok(seen)
     }
 
-    /// Periods for a change of the response by `change`, m, against the holding drive.
+    /// Largest error of the holding drive, m, at the end: as much as changes the response by the same share.
+    fn tolerance(&self, slope: f64, response: f64) -> f64 {
+        ARRIVED * (slope.abs() * response).clamp(FIRM * self.asked, self.asked)
+    }
+
+    /// Periods for a change of the response by `change`, m, against the holding drive, m.
     fn periods(&self, change: f64, holding: f64) -> f64 {
-        let rate = SHARE * self.gain(self.linear.omega0) * holding.max(0.1 * self.asked);
+        let rate = SHARE * self.gain() * holding.max(FIRM * self.asked);
         (change.abs() / (rate * self.period)).max(SHORTEST).ceil()
     }
 
-    /// Runs the script; `None` where the controller cannot control the response.
-    pub fn run(&mut self) -> Result<Option<Found>, ExperimentError> {
-        let mut near = 0;
-        while near < NEAR_FOR {
-            let period = self.one_period()?;
-            let closed = matches!(self.last.state, Some(LoopState::Acquiring | LoopState::Locked));
-            let is_near = period.is_some_and(|one| {
-                self.setpoint = one.amplitude;
-                one.cycle.phase_error.abs() < NEAR && one.cycle.base.norm() > 0.0
-            });
-            near = if closed && is_near { near + 1 } else { 0 };
+    /// Growth rate of the response per drive, 1/s, at the natural frequency.
+    fn gain(&self) -> f64 {
+        0.5 * self.linear.omega0
+    }
+
+    /// Measures over so many periods, or until the lock has settled.
+    fn measure(&mut self, periods: f64) -> Result<Leg, ExperimentError> {
+        let mut all: Vec<Period> = Vec::new();
+        while (all.len() as f64) < periods && !(self.last.settled && all.len() > 3) {
+            all.extend(self.one_period()?);
         }
-        let mut seen = match self.leg(self.setpoint, SHORTEST, 0.0) {
-            Err(ExperimentError::Controller(ControllerError::NoResponseLoop)) => return Ok(None),
-            seen => seen?,
+        let (first, last) = (&all[0], &all[all.len() - 1]);
+        let duration = last.cycle.time - first.cycle.time;
+        let omega = mean(all.iter().map(|one| one.cycle.omega));
+        let gain = self.gain() * self.linear.omega0 / omega;
+        let response = mean(all.iter().map(|one| one.amplitude));
+        let work = mean(all.windows(2).map(|pair| 0.5 * (pair[0].work + pair[1].work)));
+        let unsteady = (last.amplitude - first.amplitude) / (gain * duration);
+        let holding = work - unsteady;
+        // Its phase turns with that of the drive, and by the change of the difference.
+        let turned: f64 = all.windows(2).map(|pair| turned(&pair[0], &pair[1])).sum();
+        let beside = gain * mean(all.iter().map(|one| one.work * one.cycle.phase_error.tan())) / response;
+        let detuned = turned / duration + beside - self.linear.omega0;
+        let linear = self.linear.damping_rate / gain * response;
+        let departure = (holding - linear).hypot(response * detuned / gain);
+        let noise: f64 = all.iter().map(|one| one.noise).sum();
+        let [even, odd] = [0, 1].map(|n| (all.iter().map(|one| one.harmonics[n]).sum::<f64>() - noise).max(0.0));
+        let departed = departure > DEPARTURE * linear.max(work);
+        let symmetric = departed && even <= SYMMETRIC * SYMMETRIC * odd;
+        if symmetric {
+            let point = [response, holding];
+            let [least, most] = self.extremes.unwrap_or([point, point]);
+            let least = if holding < least[1] { point } else { least };
+            self.extremes = Some([least, if holding > most[1] { point } else { most }]);
+        }
+        Ok(Leg {
+            response,
+            last: last.amplitude,
+            holding,
+            unsteady,
+            departed,
+            symmetric,
+        })
+    }
+
+    /// One period of the drive; `None` without a motion.
+    fn one_period(&mut self) -> Result<Option<Period>, ExperimentError> {
+        let begin = self.bench.samples.len();
+        let first = self.bench.periods;
+        while self.bench.periods < first.floor() + 1.0 {
+            self.last = self.bench.sample(Stage::Locking)?;
+            (self.progress)(self.bench.taken);
+            if self.bench.taken >= self.limit {
+                return Err(self.bench.no_lock(&self.last));
+            }
+        }
+        Ok(Period::of(
+            &self.bench.samples[begin..],
+            self.bench.sample_time,
+            first * TAU,
+            self.target,
+        ))
+    }
+
+    /// Why the requested drive was not reached.
+    fn not_reached(&self) -> ExperimentError {
+        let d = self.scene.dimensionless();
+        let why = match self.extremes {
+            None => format!(
+                "no symmetric 1:1 motion was found at responses up to C = {:.3}",
+                self.setpoint / self.b
+            ),
+            Some(extremes) => {
+                let [least, most] = extremes.map(|[c, g]| format!("G = {:.4} (C = {:.4})", d.excitation(g), c / self.b));
+                format!("the symmetric 1:1 motions that were found need from {least} to {most}, and were lost {SEARCHES} times on the way")
+            }
         };
-        let mut unstable = false;
-        for search in 0..SEARCHES {
-            if !seen.is_symmetric() {
-                seen = self.rise(seen)?;
-            }
-            match self.follow(seen, f64::from(1 << search), unstable)? {
-                Outcome::Found(found) => return Ok(Some(found)),
-                Outcome::Lost { last, crossed } => (seen, unstable) = (last, unstable | crossed),
-            }
-        }
-        Err(self.bench.no_lock(&self.last))
+        ExperimentError::NotReached { periods: self.bench.periods, g: d.g, why }
     }
+}
 
-    /// Raises the response until impacts have begun or the motion is symmetric.
-    fn rise(&mut self, mut seen: Leg) -> Result<Leg, ExperimentError> {
-        let scene = self.plan.scene;
-        let d = scene.dimensionless();
-        let gain = self.gain(d.omega0);
-        let most = d.amplitude(scene.g_max());
-        let spare = gain * (most - 1.2 * d.b * self.linear.damping_rate / gain);
-        let rate = (d.b / (RISE * self.period)).min(0.3 * spare);
-        let periods = 5.0;
-        loop {
-            let rate = rate.min(GROWTH * seen.last / self.period);
-            let to = self.setpoint + rate * periods * self.period;
-            if to > 1.5 * d.b {
-                return Ok(seen);
-            }
-            seen = self.leg(to, periods, rate)?;
-            if seen.is_symmetric() || seen.departed && seen.response > (1.0 - DRAWING) * d.b {
-                return Ok(seen);
-            }
-        }
-    }
+/// Phase, rad, by which the response turns from the middle of a period to that of another.
+fn turned(before: &Period, after: &Period) -> f64 {
+    let drive = after.cycle.drive_phase - before.cycle.drive_phase;
+    let more = after.phase - before.phase;
+    drive + (more + 0.5 * TAU).rem_euclid(TAU) - 0.5 * TAU
+}
 
-    /// Goes along the symmetric motion to the requested drive, `slower` times as slowly as at first.
-    fn follow(&mut self, first: Leg, slower: f64, unstable: bool) -> Result<Outcome, ExperimentError> {
-        let (mut seen, mut backbone) = (first, Backbone::default());
-        let mut symmetric = seen.is_symmetric();
-        let mut rising = symmetric && seen.holding < self.asked;
-        // Whether the requested drive may be above, and whether a larger one was seen.
-        let (mut upwards, mut exceeded, mut crossed) = (true, false, false);
-        let (mut other, mut lowest) = (0, 0.0);
-        loop {
-            let largest = STEP / slower * seen.response;
-            let slope = backbone.slope();
-            let ahead = slope
-                .filter(|slope| symmetric && other == 0 && (*slope > 0.0 || unstable))
-                .and_then(|_| backbone.at(self.asked))
-                .map(|ahead| ahead - seen.last)
-                .filter(|change| *change < 0.0 || upwards || exceeded);
-            let change = ahead.unwrap_or(if rising { largest } else { -largest });
-            let change = change.clamp(-largest, largest);
-            rising = change > 0.0;
-            let periods = self.periods(slower * change, seen.holding);
-            let to = self.setpoint + change;
-            seen = if change.abs() == largest {
-                self.leg(to, periods, change / (periods * self.period))?
-            } else {
-                self.leg(to, 0.5 * periods, 0.0)?;
-                self.hold(backbone.slope().unwrap_or_default())?
-            };
-            let missing = seen.holding - self.asked;
-            if !seen.is_symmetric() {
-                other += 1;
-                if symmetric && other >= 2 {
-                    // Above the symmetric motion, the way is down; below the fold, nothing is.
-                    (symmetric, upwards, exceeded, rising) = (false, false, false, false);
-                    lowest = LOST * seen.response;
-                }
-                if !seen.departed || seen.response < lowest {
-                    return Ok(Outcome::Lost { last: seen, crossed });
-                }
-                continue;
-            }
-            (symmetric, other) = (true, 0);
-            exceeded |= missing > 0.0;
-            backbone.add(seen);
-            let slope = backbone.slope();
-            if slope.is_some() {
-                rising = false;
-            }
-            let Some(slope) = slope else { continue };
-            crossed |= slope < 0.0 && backbone.encloses(self.asked);
-            // What the constant drive would change in a leg, and in all; and by how much it relaxes in a leg.
-            let rate = self.gain(seen.omega) * SHORTEST * self.period;
-            let changes = (rate * missing.abs()).min(missing.abs() / slope.abs());
-            let tolerance = self.tolerance(slope, seen.response);
-            let has_arrived = missing.abs() < tolerance && LATE * seen.unsteady.abs() < tolerance;
-            let firm = self.linear.damping_rate / self.gain(seen.omega) * FIRM;
-            if has_arrived && slope < firm {
-                return Ok(Outcome::Found(Found::Held(self.last)));
-            }
-            if slope > 0.0 && (has_arrived || changes < largest && rate * slope > 0.5) {
-                match self.hand_over()? {
-                    Some(found) => return Ok(Outcome::Found(found)),
-                    None => {
-                        seen = self.leg(self.setpoint, SHORTEST, 0.0)?;
-                        (symmetric, upwards, exceeded, rising) = (false, false, false, false);
-                        lowest = LOST * seen.response;
-                    }
-                }
-            }
-        }
-    }
-
-    /// Largest error of the holding drive, m, at the end: as much as changes the response by the same share.
-    fn tolerance(&self, slope: f64, response: f64) -> f64 {
-        ARRIVED * (slope.abs() * response).clamp(0.05 * self.asked, self.asked)
-    }
-
-    /// Hands over to the constant drive; `None` if the motion does not stay symmetric.
-    fn hand_over(&mut self) -> Result<Option<Found>, ExperimentError> {
-        self.bench.controller.hold_drive()?;
-        let mut other = 0;
-        while other < 2 {
-            let seen = self.measure(SHORTEST)?;
-            if self.last.settled {
-                return Ok(Some(Found::Locked(self.last)));
-            }
-            other = if seen.is_symmetric() { 0 } else { other + 1 };
-            self.setpoint = seen.last;
-        }
-        Ok(None)
+impl Period {
+    /// That of these samples; `phase` (rad) is that of the drive at the first, `target` (rad) that of the response.
+    fn of(samples: &[Sample], sample_time: f64, phase: f64, target: f64) -> Option<Self> {
+        let cycle = Cycle::of(samples, sample_time, phase, target)?;
+        let half = 0.5 * (samples.len() - 1) as f64;
+        let phases = (0..samples.len()).map(|n| cycle.drive_phase + (n as f64 - half) * sample_time * cycle.omega);
+        let phases: Vec<f64> = phases.collect();
+        // A fundamental that drifts leaves no trace in the others.
+        let basis = HarmonicBasis::new(&phases, 0, &[Some(1), Some(0), Some(0), Some(0), Some(0)]);
+        let values = DVector::from_iterator(samples.len(), samples.iter().map(|one| one.sensors.response));
+        let fit = basis.fit(&values)?;
+        let rest = noise(basis.residual(&values, &fit).as_slice());
+        let drive = mean(samples.iter().map(|one| one.command.drive.amplitude));
+        Some(Self {
+            amplitude: fit.harmonic(1).norm(),
+            phase: fit.harmonic(1).arg(),
+            work: drive * cycle.phase_error.cos(),
+            harmonics: [2, 3].map(|n| fit.harmonic(n).norm_sqr()),
+            noise: rest * rest * 4.0 / samples.len() as f64,
+            cycle,
+        })
     }
 }
 
@@ -424,12 +460,6 @@ struct Backbone {
     present: Option<Leg>,
     points: Vec<Leg>,
 }
-
-/// Relative difference of the responses of two points that give a slope.
-const APART: f64 = 3e-3;
-/// Share of the drive that changes the response, by which the holding drive of a motion that is not steady may be wrong: the impacts
-/// follow late. Up and down at epsilon = 0.015, r = 0.9, it was 0.02.
-const LATE: f64 = 0.05;
 
 impl Backbone {
     fn add(&mut self, seen: Leg) {
@@ -468,11 +498,4 @@ impl Backbone {
         let present = self.present.as_ref()?;
         Some(present.response + (drive - present.holding) * slope * share.clamp(0.25, 1.5))
     }
-}
-
-/// How a descent ended.
-enum Outcome {
-    Found(Found),
-    /// The motion was lost; `crossed`: the requested drive holds an unstable one.
-    Lost { last: Leg, crossed: bool },
 }

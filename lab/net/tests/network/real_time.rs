@@ -328,7 +328,6 @@ fn a_controller_that_stops_answering_ramps_the_drive_of_the_rig_down() {
         socket(controller_server.address),
         scene.sample_time(),
         Some(0.5),
-        false,
         None,
     )
     .unwrap();
