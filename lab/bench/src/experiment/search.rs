@@ -54,6 +54,8 @@ const APART: f64 = 3e-3;
 /// Share of the drive that changes the response, by which the holding drive may be wrong: impacts follow late. Between up and down at
 /// epsilon = 0.015, r = 0.9, it is 0.02.
 const LATE: f64 = 0.05;
+/// Standard uncertainties from which on a difference is not noise.
+const SIGNIFICANT: f64 = 3.0;
 /// Measurements of a response that is not yet steady.
 const LONGEST: u32 = 6;
 /// Fall of the response without symmetry, from where it was lost, after which the motion is lost: its stable range is wider.
@@ -71,7 +73,7 @@ struct Period {
     phase: f64,
     /// The drive in phase with the velocity, m.
     work: f64,
-    /// Squares of second and third harmonic, and their variance by noise, m².
+    /// Squares of second and third harmonic, and variance of either component of a harmonic by noise, m².
     harmonics: [f64; 2],
     noise: f64,
 }
@@ -82,8 +84,9 @@ struct Leg {
     /// Mean response amplitude, and the last one, m.
     response: f64,
     last: f64,
-    /// Drive that holds it, and drive that changes it, m.
+    /// Drive that holds it, its standard uncertainty by noise, and drive that changes the response, m.
     holding: f64,
+    noise: f64,
     unsteady: f64,
     /// Whether impacts take a part of the drive.
     departed: bool,
@@ -212,7 +215,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Lowers the response until the motion is symmetric, but not below `lowest`, m.
     fn fall(&mut self, mut seen: Leg, slower: f64, lowest: f64) -> Result<Leg, ExperimentError> {
-        while !seen.symmetric && seen.departed && seen.response > lowest {
+        while !seen.symmetric && seen.departed && seen.response > lowest && self.setpoint > LOWEST * self.b {
             seen = self.sweep(&seen, -STEP / slower * seen.response, slower)?;
         }
         Ok(seen)
@@ -264,9 +267,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             let rate = self.gain() * SHORTEST * self.period;
             let changes = (rate * missing.abs()).min(missing.abs() / slope.abs());
             let error = missing.abs().max(LATE * seen.unsteady.abs());
-            let tolerance = self.tolerance(slope, seen.response);
+            let tolerance = self.tolerance(slope, &seen);
             let firm = slope > FIRM * self.linear.damping_rate / self.gain();
-            if !firm && error < HELD * tolerance {
+            if !firm && error < (HELD * tolerance).max(seen.noise) {
                 return Ok(Found::Held);
             }
             if slope > 0.0 && (firm && error < tolerance || changes < largest && rate * slope > 0.5) {
@@ -307,7 +310,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Moves the setpoint to `to`, m, in so many periods, with the growth `onward`, m/s, at the end and after it. Measures meanwhile.
     fn leg(&mut self, to: f64, periods: f64, onward: f64) -> Result<Leg, ExperimentError> {
         let to = Move {
-            response: to,
+            response: to.max(LOWEST * self.b),
             duration: periods * self.period,
             growth: onward,
             ..Move::default()
@@ -322,7 +325,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let mut seen = self.measure(SHORTEST)?;
         for _ in 0..LONGEST {
             let missing = (seen.holding - self.asked).abs();
-            let allowed = (0.1 * missing).max(self.tolerance(slope, seen.response));
+            let allowed = (0.1 * missing).max(self.tolerance(slope, &seen));
             if LATE * seen.unsteady.abs() < allowed || !seen.symmetric {
                 break;
             }
@@ -331,9 +334,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         Ok(seen)
     }
 
-    /// Largest error of the holding drive, m, at the end: as much as changes the response by the same share.
-    fn tolerance(&self, slope: f64, response: f64) -> f64 {
-        ARRIVED * (slope.abs() * response).clamp(FIRM * self.asked, self.asked)
+    /// Largest error of the holding drive, m, at the end: as much as changes the response by the same share, or what noise hides.
+    fn tolerance(&self, slope: f64, seen: &Leg) -> f64 {
+        (ARRIVED * (slope.abs() * seen.response).clamp(FIRM * self.asked, self.asked)).max(SIGNIFICANT * seen.noise)
     }
 
     /// Periods for a change of the response by `change`, m, against the holding drive, m.
@@ -357,30 +360,50 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let duration = last.cycle.time - first.cycle.time;
         let omega = mean(all.iter().map(|one| one.cycle.omega));
         let gain = self.gain() * self.linear.omega0 / omega;
-        let response = mean(all.iter().map(|one| one.amplitude));
-        let work = mean(all.windows(2).map(|pair| 0.5 * (pair[0].work + pair[1].work)));
-        let unsteady = (last.amplitude - first.amplitude) / (gain * duration);
+        // The slope of the straight line through the amplitudes weighs their changes by a parabola; so is all else.
+        let n = all.len() as f64;
+        let weights = (1..all.len()).map(|i| 6.0 * i as f64 * (n - i as f64) / (n * (n * n - 1.0)));
+        let weighted = |value: &dyn Fn(&Period, &Period) -> f64| -> f64 {
+            let values = all.windows(2).map(|pair| value(&pair[0], &pair[1]));
+            weights.clone().zip(values).map(|(weight, value)| weight * value).sum()
+        };
+        let response = weighted(&|one, next| 0.5 * (one.amplitude + next.amplitude));
+        let work = weighted(&|one, next| 0.5 * (one.work + next.work));
+        let pace = gain * duration / (n - 1.0);
+        let unsteady = weighted(&|one, next| next.amplitude - one.amplitude) / pace;
         let holding = work - unsteady;
+        let scatter = mean(all.iter().map(|one| one.noise)).sqrt();
         // Its phase turns with that of the drive, and by the change of the difference.
         let turned: f64 = all.windows(2).map(|pair| turned(&pair[0], &pair[1])).sum();
         let beside = gain * mean(all.iter().map(|one| one.work * one.cycle.phase_error.tan())) / response;
         let detuned = turned / duration + beside - self.linear.omega0;
         let linear = self.linear.damping_rate / gain * response;
         let departure = (holding - linear).hypot(response * detuned / gain);
-        let noise: f64 = all.iter().map(|one| one.noise).sum();
-        let [even, odd] = [0, 1].map(|n| (all.iter().map(|one| one.harmonics[n]).sum::<f64>() - noise).max(0.0));
+        // Noise gives either harmonic the mean square 2 scatter^2, which itself scatters by a share of 1/sqrt(n).
+        let [even, odd] = [0, 1].map(|k| mean(all.iter().map(|one| one.harmonics[k])) - 2.0 * scatter * scatter);
+        let doubtful = SIGNIFICANT * 2.0 * scatter * scatter / n.sqrt();
         let departed = departure > DEPARTURE * linear.max(work);
-        let symmetric = departed && even <= SYMMETRIC * SYMMETRIC * odd;
+        let symmetric = departed && even <= (SYMMETRIC * SYMMETRIC * odd).max(doubtful);
         if symmetric {
             let point = [response, holding];
             let [least, most] = self.extremes.unwrap_or([point, point]);
             let least = if holding < least[1] { point } else { least };
             self.extremes = Some([least, if holding > most[1] { point } else { most }]);
         }
+        if std::env::var_os("VINES_TRACE").is_some() {
+            let d = self.scene.dimensionless();
+            eprintln!(
+                "{:8.1} n {:3} set {:.4} C {:.5} G {:.5} +- {:.5} of {:.4} unsteady {:.4} sigma {:+.4} even {:.3} doubt {:.3} dep {:.3} {} {:?}",
+                self.bench.periods, n, self.setpoint / d.b, response / d.b, d.excitation(holding),
+                d.excitation((12.0 / (n * (n * n - 1.0))).sqrt() * scatter / pace), d.g, d.excitation(unsteady),
+                d.sigma(detuned + self.linear.omega0), (even.max(0.0) / odd).sqrt(), (doubtful / odd.abs()).sqrt(), departure / linear.max(work), symmetric, self.last.state,
+            );
+        }
         Ok(Leg {
             response,
             last: last.amplitude,
             holding,
+            noise: (12.0 / (n * (n * n - 1.0))).sqrt() * scatter / pace,
             unsteady,
             departed,
             symmetric,
@@ -448,7 +471,7 @@ impl Period {
             phase: fit.harmonic(1).arg(),
             work: drive * cycle.phase_error.cos(),
             harmonics: [2, 3].map(|n| fit.harmonic(n).norm_sqr()),
-            noise: rest * rest * 4.0 / samples.len() as f64,
+            noise: rest * rest * 2.0 / samples.len() as f64,
             cycle,
         })
     }
@@ -465,7 +488,8 @@ impl Backbone {
     fn add(&mut self, seen: Leg) {
         self.present = Some(seen);
         let tells = |point: &Leg| {
-            let late = LATE * (point.unsteady - seen.unsteady).abs();
+            let noise = SIGNIFICANT * point.noise.hypot(seen.noise);
+            let late = (LATE * (point.unsteady - seen.unsteady).abs()).max(noise);
             (point.response / seen.response - 1.0).abs() >= APART && (point.holding - seen.holding).abs() >= late
         };
         if self.points.first().is_none_or(tells) {
