@@ -379,9 +379,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let detuned = turned / duration + beside - self.linear.omega0;
         let linear = self.linear.damping_rate / gain * response;
         let departure = (holding - linear).hypot(response * detuned / gain);
-        // Noise gives either harmonic the mean square 2 scatter^2, which itself scatters by a share of 1/sqrt(n).
-        let [even, odd] = [0, 1].map(|k| mean(all.iter().map(|one| one.harmonics[k])) - 2.0 * scatter * scatter);
-        let doubtful = SIGNIFICANT * 2.0 * scatter * scatter / n.sqrt();
+        // Noise gives either harmonic of two periods the mean square scatter^2, which itself scatters by a share of sqrt(2/n).
+        let [even, odd] = [0, 1].map(|k| mean(all.iter().map(|one| one.harmonics[k])) - scatter * scatter);
+        let doubtful = SIGNIFICANT * scatter * scatter / (0.5 * n).sqrt();
         let departed = departure > DEPARTURE * linear.max(work);
         let symmetric = departed && even <= (SYMMETRIC * SYMMETRIC * odd).max(doubtful);
         if symmetric {
@@ -422,7 +422,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
         }
         Ok(Period::of(
-            &self.bench.samples[begin..],
+            self.bench.samples,
+            begin,
             self.bench.sample_time,
             first * TAU,
             self.target,
@@ -454,24 +455,23 @@ fn turned(before: &Period, after: &Period) -> f64 {
 }
 
 impl Period {
-    /// That of these samples; `phase` (rad) is that of the drive at the first, `target` (rad) that of the response.
-    fn of(samples: &[Sample], sample_time: f64, phase: f64, target: f64) -> Option<Self> {
-        let cycle = Cycle::of(samples, sample_time, phase, target)?;
-        let half = 0.5 * (samples.len() - 1) as f64;
-        let phases = (0..samples.len()).map(|n| cycle.drive_phase + (n as f64 - half) * sample_time * cycle.omega);
-        let phases: Vec<f64> = phases.collect();
-        // A fundamental that drifts leaves no trace in the others.
+    /// The last of these samples, from `begin` on; `phase` (rad) is that of the drive there, `target` (rad) that of the response.
+    fn of(samples: &[Sample], begin: usize, sample_time: f64, phase: f64, target: f64) -> Option<Self> {
+        let cycle = Cycle::of(&samples[begin..], sample_time, phase, target)?;
+        let drive = mean(samples[begin..].iter().map(|one| one.command.drive.amplitude));
+        // Two periods tell the harmonics from a drift of the fundamental.
+        let samples = &samples[(2 * begin).saturating_sub(samples.len())..];
+        let phases: Vec<f64> = (0..samples.len()).map(|n| n as f64 * sample_time * cycle.omega).collect();
         let basis = HarmonicBasis::new(&phases, 0, &[Some(1), Some(0), Some(0), Some(0), Some(0)]);
         let values = DVector::from_iterator(samples.len(), samples.iter().map(|one| one.sensors.response));
         let fit = basis.fit(&values)?;
         let rest = noise(basis.residual(&values, &fit).as_slice());
-        let drive = mean(samples.iter().map(|one| one.command.drive.amplitude));
         Some(Self {
-            amplitude: fit.harmonic(1).norm(),
-            phase: fit.harmonic(1).arg(),
+            amplitude: cycle.amplitude(),
+            phase: cycle.response[0].arg(),
             work: drive * cycle.phase_error.cos(),
             harmonics: [2, 3].map(|n| fit.harmonic(n).norm_sqr()),
-            noise: rest * rest * 2.0 / samples.len() as f64,
+            noise: rest * rest * 2.0 / cycle.samples as f64,
             cycle,
         })
     }
