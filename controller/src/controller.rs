@@ -146,8 +146,7 @@ impl PhaseLock {
             fault,
             ready: state.ready,
             settled: state.dwell.settled(),
-            // A response that moves shifts the phase.
-            lost: state.lost && state.amplitude_loop.is_none(),
+            lost: state.lost,
             timed_out: timeout.is_some_and(|timeout| elapsed >= timeout),
         });
         state.loop_state = next;

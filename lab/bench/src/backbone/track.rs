@@ -6,15 +6,11 @@ use super::point::{Point, Tracked};
 use super::predictor::{self, FIRST, Known, LAST, PHASE};
 use super::settle::Found;
 use super::sweep::Sweep;
-use crate::experiment::{self, ExperimentError, Sample, Stage};
+use crate::experiment::{self, ExperimentError, Sample, Search, Stage};
 use crate::identification::Cycle;
 use crate::rig::{Controller, Move, Rig};
 use crate::scene::Scene;
 
-/// Phase error, rad, below which the control of the response begins.
-const NEAR: f64 = 0.35;
-/// Periods for which the phase error must have been that small.
-const NEAR_FOR: usize = 3;
 /// Periods in succession in which the criterion must be met: the halves of a transient can agree by chance.
 const CONFIRMED: usize = 3;
 
@@ -83,26 +79,10 @@ fn known(scan: &[Point], last: Option<(Point, f64)>) -> Vec<Known> {
 }
 
 impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
-    /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
+    /// Goes to a symmetric motion with impacts, if there is one.
     fn approach(&mut self) -> Result<(), ExperimentError> {
-        let mut near = 0;
-        while near < NEAR_FOR {
-            self.run.samples.clear();
-            let cycle = self.cycle()?;
-            let Some(Sample { command, .. }) = self.run.samples.last().copied() else {
-                continue;
-            };
-            if self.run.periods >= self.scene.lock_periods() {
-                return Err(self.run.no_lock(&command));
-            }
-            let driven = cycle.base.norm() > 0.0;
-            near = if driven && cycle.phase_error.abs() < NEAR {
-                near + 1
-            } else {
-                0
-            };
-        }
-        Ok(())
+        let limit = (self.scene.lock_periods() * self.scene.controller.samples_per_period) as usize;
+        Search::new(&mut self.run, self.scene, limit, &mut |_| {}).impacts()
     }
 
     /// Goes through the levels, and holds each at all `phases`: `scans` gets the points of each phase.

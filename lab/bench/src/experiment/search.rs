@@ -232,13 +232,16 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             let largest = STEP / slower * seen.response;
             let ahead = backbone
                 .slope()
-                .filter(|slope| other == 0 && (*slope > 0.0 || unstable))
+                .filter(|slope| *slope > 0.0 || unstable)
                 .and_then(|_| backbone.at(self.asked))
                 .map(|ahead| ahead - seen.last)
                 .filter(|change| *change < 0.0 || upwards || exceeded);
             let change = ahead.unwrap_or(if rising { largest } else { -largest });
             rising = change > 0.0;
-            seen = if change.abs() < largest {
+            seen = if other > 0 {
+                // A change may disturb the symmetry for a while.
+                self.leg(self.setpoint, SHORTEST, 0.0)?
+            } else if change.abs() < largest {
                 self.leg(self.setpoint + change, 0.5 * self.periods(change, seen.holding), 0.0)?;
                 self.hold(backbone.slope().unwrap_or_default())?
             } else {
@@ -518,8 +521,9 @@ impl Backbone {
         let bend = self.points.get(2).map_or(0.0, |three| {
             (slope - inverse(two, three)) / (one.holding - three.holding)
         });
-        let share = 1.0 + (drive - two.holding) * bend / slope;
         let present = self.present.as_ref()?;
+        let is_latest = present.response == one.response;
+        let share = 1.0 + if is_latest { (drive - two.holding) * bend / slope } else { 0.0 };
         Some(present.response + (drive - present.holding) * slope * share.clamp(0.25, 1.5))
     }
 }
