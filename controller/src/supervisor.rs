@@ -158,9 +158,7 @@ impl LoopState {
     /// The next state, and the fault that caused it.
     pub(crate) fn next(self, conditions: &Conditions) -> (Self, Option<Fault>) {
         match self {
-            Self::Ramping | Self::Acquiring | Self::Locked if !conditions.active => {
-                (Self::ShutDown, None)
-            }
+            Self::Ramping | Self::Acquiring | Self::Locked if !conditions.active => (Self::ShutDown, None),
             Self::LockLost | Self::Tripped if !conditions.active => (Self::Idle, None),
             Self::LockLost | Self::Tripped => (self, None),
             Self::Idle | Self::ShutDown if !conditions.active => (self, None),

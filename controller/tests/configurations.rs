@@ -37,12 +37,7 @@ fn configuration() -> impl Strategy<Value = Config> {
     let change = (0..PARAMETERS.len(), number(), any::<i32>(), any::<bool>());
     let resonance = prop_oneof![(-2.0..5.0), (-30.0..30.0)].prop_map(|x: f64| 10_f64.powf(x) as Real);
     let amplitude = prop_oneof![(-9.0..0.0), (-30.0..30.0)].prop_map(|x: f64| 10_f64.powf(x) as Real);
-    let options = (
-        any::<bool>(),
-        any::<bool>(),
-        any::<bool>(),
-        any::<bool>(),
-    );
+    let options = (any::<bool>(), any::<bool>(), any::<bool>(), any::<bool>());
     (resonance, amplitude, options, prop::collection::vec(change, 0..5)).prop_map(
         |(omega, amplitude, options, changes)| {
             let mut config = Config::for_resonance(omega, amplitude);

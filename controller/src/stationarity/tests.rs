@@ -66,7 +66,8 @@ fn a_scatter_counts_as_noise_only_if_the_residual_has_no_correlation() {
             let sample = step * libm::round(10.0 * t);
             Reading {
                 amplitude: 1.0 + 0.01 * noise(libm::floor(t - 0.05)),
-                residuals: [sample, sample - step].map(|one| 0.1 * if step < 1.0 { libm::sin(one) } else { noise(one) }),
+                residuals: [sample, sample - step]
+                    .map(|one| 0.1 * if step < 1.0 { libm::sin(one) } else { noise(one) }),
                 ..CONSTANT
             }
         };

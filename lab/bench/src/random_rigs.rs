@@ -32,7 +32,7 @@ pub struct Row {
     pub outcome: Outcome,
     /// Periods to the lock.
     pub periods: Option<f64>,
-    /// Whether the response is held by control.
+    /// Whether the response is held by control, because the drive alone would not hold it.
     pub held: bool,
     /// Distance from the nearest stable orbit, the larger of those in sigma and C.
     pub distance: Option<f64>,
@@ -106,7 +106,6 @@ pub fn locks(count: usize, seed: u64, settings: &[Override]) -> Result<Vec<Row>,
             rigs.push((d, stable));
         }
     }
-    if let Some(n) = std::env::var("ONLY").ok().and_then(|n| n.parse::<usize>().ok()) { rigs = vec![rigs.swap_remove(n)]; }
     rigs.par_iter().map(|(d, stable)| lock(d, stable, settings)).collect()
 }
 

@@ -31,12 +31,7 @@ impl NetController {
     /// Beside a rig in real time the client waits for an answer for half a sample period, and then holds the last one.
     /// `pace` is the longest silence of such a rig, s; it also limits the silence of the controller. For a rig that waits,
     /// `pace` is None. A server with another key does not answer.
-    pub fn connect(
-        peer: SocketAddr,
-        sample_time: f64,
-        pace: Option<f64>,
-        key: Option<Key>,
-    ) -> Result<Self, LinkError> {
+    pub fn connect(peer: SocketAddr, sample_time: f64, pace: Option<f64>, key: Option<Key>) -> Result<Self, LinkError> {
         let mut client = Client::connect(Address::Tcp(peer), flag::CONTROLLER, sample_time, key)?;
         let limit = pace.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
         client.silence = limit.map_or(client.silence, |limit| limit.min(client.silence));

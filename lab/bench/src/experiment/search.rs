@@ -40,6 +40,8 @@ const DEPARTURE: f64 = 0.2;
 /// Largest amplitude of the second harmonic of a symmetric motion over that of the third: 0.1 is found where it is symmetric, from 2 on
 /// where it is irregular.
 const SYMMETRIC: f64 = 0.5;
+/// The same of a motion whose symmetry does not matter any more; and above it, it must not grow.
+const STILL: f64 = 2e-3;
 /// Relative error of the half-width in the drawing, and the response over it at which the particle is not reached, as it seems.
 const DRAWING: f64 = 0.1;
 const UNREACHED: f64 = 1.5;
@@ -51,8 +53,8 @@ const HELD: f64 = 0.1;
 const FIRM: f64 = 0.1;
 /// Relative distance of the responses of two points that tell a slope.
 const APART: f64 = 3e-3;
-/// Share of the drive that changes the response, by which the holding drive may be wrong: impacts follow late. Between up and down at
-/// epsilon = 0.015, r = 0.9, it is 0.02.
+/// Share of the drive that changes the response, by which the holding drive may be wrong: impacts follow late. At epsilon =
+/// 0.015, r = 0.9 it is 0.02, at epsilon = 0.002, r = 0.56 0.4.
 const LATE: f64 = 0.05;
 /// Standard uncertainties from which on a difference is not noise.
 const SIGNIFICANT: f64 = 3.0;
@@ -91,6 +93,8 @@ struct Leg {
     /// Whether impacts take a part of the drive.
     departed: bool,
     symmetric: bool,
+    /// Second harmonic over the third, as far as noise does not explain it.
+    asymmetry: f64,
 }
 
 /// How the search ended.
@@ -242,7 +246,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 // A change may disturb the symmetry for a while.
                 self.leg(self.setpoint, SHORTEST, 0.0)?
             } else if change.abs() < largest {
-                self.leg(self.setpoint + change, 0.5 * self.periods(change, seen.holding), 0.0)?;
+                // A smooth move is twice as fast in its middle.
+                let periods = self.periods(2.0 * change, seen.holding).max(0.5 * SHORTEST);
+                self.leg(self.setpoint + change, periods.ceil(), 0.0)?;
                 self.hold(backbone.slope().unwrap_or_default())?
             } else {
                 self.sweep(&seen, change.clamp(-largest, largest), slower)?
@@ -258,6 +264,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                     return Ok(Found::Lost { last: seen, crossed });
                 }
                 (upwards, exceeded, rising) = (false, false, false);
+            }
+            if self.setpoint <= LOWEST * self.b {
+                return Ok(Found::Lost { last: seen, crossed });
             }
             other = 0;
             backbone.add(seen);
@@ -292,12 +301,14 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Hands over to the constant drive. Returns whether the motion has locked there; if not, it has lost its symmetry.
     fn hand_over(&mut self) -> Result<bool, ExperimentError> {
         self.bench.controller.hold_drive()?;
-        let mut other = 0;
+        let (mut other, mut before) = (0, f64::INFINITY);
         while other < 2 {
             let seen = self.measure(SHORTEST)?;
-            if self.last.settled {
+            // Beside symmetry breaking the symmetry is lost slowly.
+            if self.last.settled && seen.asymmetry <= before.max(STILL) {
                 return Ok(true);
             }
+            before = seen.asymmetry;
             other = if seen.symmetric { 0 } else { other + 1 };
             self.setpoint = seen.last;
         }
@@ -306,7 +317,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// A leg of a sweep: changes the response by `change`, m, and lets it go on at this rate.
     fn sweep(&mut self, seen: &Leg, change: f64, slower: f64) -> Result<Leg, ExperimentError> {
-        let periods = self.periods(slower * change, seen.holding);
+        let periods = self.periods(slower * change, seen.holding).max(SHORTEST).ceil();
         self.leg(self.setpoint + change, periods, change / (periods * self.period))
     }
 
@@ -345,7 +356,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Periods for a change of the response by `change`, m, against the holding drive, m.
     fn periods(&self, change: f64, holding: f64) -> f64 {
         let rate = SHARE * self.gain() * holding.max(FIRM * self.asked);
-        (change.abs() / (rate * self.period)).max(SHORTEST).ceil()
+        change.abs() / (rate * self.period)
     }
 
     /// Growth rate of the response per drive, 1/s, at the natural frequency.
@@ -393,15 +404,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             let least = if holding < least[1] { point } else { least };
             self.extremes = Some([least, if holding > most[1] { point } else { most }]);
         }
-        if std::env::var_os("VINES_TRACE").is_some() {
-            let d = self.scene.dimensionless();
-            eprintln!(
-                "{:8.1} n {:3} set {:.4} C {:.5} G {:.5} +- {:.5} of {:.4} unsteady {:.4} sigma {:+.4} even {:.3} doubt {:.3} dep {:.3} {} {:?}",
-                self.bench.periods, n, self.setpoint / d.b, response / d.b, d.excitation(holding),
-                d.excitation((12.0 / (n * (n * n - 1.0))).sqrt() * scatter / pace), d.g, d.excitation(unsteady),
-                d.sigma(detuned + self.linear.omega0), (even.max(0.0) / odd).sqrt(), (doubtful / odd.abs()).sqrt(), departure / linear.max(work), symmetric, self.last.state,
-            );
-        }
         Ok(Leg {
             response,
             last: last.amplitude,
@@ -410,6 +412,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             unsteady,
             departed,
             symmetric,
+            asymmetry: ((even - doubtful).max(0.0) / odd).sqrt(),
         })
     }
 
@@ -442,8 +445,11 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 self.setpoint / self.b
             ),
             Some(extremes) => {
-                let [least, most] = extremes.map(|[c, g]| format!("G = {:.4} (C = {:.4})", d.excitation(g), c / self.b));
-                format!("the symmetric 1:1 motions that were found need from {least} to {most}, and were lost {SEARCHES} times on the way")
+                let [least, most] =
+                    extremes.map(|[c, g]| format!("G = {:.4} (C = {:.4})", d.excitation(g), c / self.b));
+                format!(
+                    "the symmetric 1:1 motions that were found need from {least} to {most}, and were lost {SEARCHES} times on the way"
+                )
             }
         };
         ExperimentError::NotReached { periods: self.bench.periods, g: d.g, why }
@@ -464,7 +470,9 @@ impl Period {
         let drive = mean(samples[begin..].iter().map(|one| one.command.drive.amplitude));
         // Two periods tell the harmonics from a drift of the fundamental.
         let samples = &samples[(2 * begin).saturating_sub(samples.len())..];
-        let phases: Vec<f64> = (0..samples.len()).map(|n| n as f64 * sample_time * cycle.omega).collect();
+        let phases: Vec<f64> = (0..samples.len())
+            .map(|n| n as f64 * sample_time * cycle.omega)
+            .collect();
         let basis = HarmonicBasis::new(&phases, 0, &[Some(1), Some(0), Some(0), Some(0), Some(0)]);
         let values = DVector::from_iterator(samples.len(), samples.iter().map(|one| one.sensors.response));
         let fit = basis.fit(&values)?;
@@ -523,7 +531,12 @@ impl Backbone {
         });
         let present = self.present.as_ref()?;
         let is_latest = present.response == one.response;
-        let share = 1.0 + if is_latest { (drive - two.holding) * bend / slope } else { 0.0 };
+        let share = 1.0
+            + if is_latest {
+                (drive - two.holding) * bend / slope
+            } else {
+                0.0
+            };
         Some(present.response + (drive - present.holding) * slope * share.clamp(0.25, 1.5))
     }
 }

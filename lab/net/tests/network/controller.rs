@@ -40,8 +40,7 @@ fn beside_a_rig_in_real_time_the_last_answer_replaces_a_late_one_and_no_reading_
     let (scene, asked) = (scene(&[]), Arc::default());
     let (log, late) = (Arc::clone(&asked), Duration::from_millis(5));
     let server = serve_controller(&scene, PATIENT, move || Box::new(Echo(Arc::clone(&log), late)));
-    let mut peer =
-        NetController::connect(socket(server.address), scene.sample_time(), Some(PATIENT), None).unwrap();
+    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), Some(PATIENT), None).unwrap();
     let answers: Vec<Command> = (0..200).map(|n| peer.sample(reading(n), true).unwrap()).collect();
     println!("{}", peer.counters());
     assert!(peer.counters().held >= 15);
