@@ -104,15 +104,6 @@ pub struct Config {
     /// through its base: half the natural frequency in rad/s. Used by
     /// [`PhaseLock::hold_response`](crate::PhaseLock::hold_response), and by the check of the response against the drive.
     pub response_gain: Real,
-    /// How much faster the response approaches its steady state than under a constant drive: `1 + approach_gain` times. The
-    /// drive is shaped by this gain until the lock criterion is met, and constant from then on.
-    pub approach_gain: Real,
-    /// Response amplitude, m, at which impacts certainly occur. The response rises to it before the drive goes to its setpoint, so
-    /// that a particle at rest joins the motion. `None`: the drive goes to its setpoint at once.
-    pub capture_response: Option<Real>,
-    /// Largest response amplitude, m, of the motion that is wanted. A captured motion is led below it, and captured again if it rises
-    /// above it. `None`: any motion is wanted.
-    pub captured_max: Option<Real>,
     /// Lock criterion.
     pub lock: LockCriterion,
     /// Reading of the response sensor above which the drive is switched off, m.
@@ -156,9 +147,6 @@ impl Config {
             damping_rate: None,
             delay: 0.0,
             response_gain: 0.5 * omega,
-            approach_gain: 0.0,
-            capture_response: None,
-            captured_max: None,
             lock: LockCriterion::default(),
             response_max: None,
             acquire_timeout: Some(2000.0 * TAU / omega),

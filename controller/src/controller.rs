@@ -4,8 +4,6 @@ mod closed_loop;
 mod output;
 
 use crate::amplitude_loop::{AmplitudeLoop, AmplitudeState, Move};
-use crate::approach::{Approach, ApproachState};
-use crate::capture::{Capture, CaptureState};
 use crate::config::Config;
 use crate::drive::Drive;
 use crate::error::{ConfigError, Quantity};
@@ -27,8 +25,6 @@ pub struct PhaseLock {
     filter: LoopFilter,
     drive: Drive,
     amplitude_loop: AmplitudeLoop,
-    approach: Approach,
-    capture: Capture,
     stationarity: Stationarity,
 }
 
@@ -45,8 +41,6 @@ impl Config {
             filter: LoopFilter::new(&self),
             drive,
             amplitude_loop: AmplitudeLoop::new(&self, &drive),
-            approach: Approach::new(&self),
-            capture: Capture::new(&self),
             stationarity: Stationarity::new(&self.lock),
             config: self,
         })
@@ -110,8 +104,8 @@ impl PhaseLock {
 
     /// Controls the drive amplitude again: the drive ramps to its setpoint.
     pub fn hold_drive(&self, state: &mut State) {
-        if state.loop_state != LoopState::Capturing {
-            state.amplitude_loop = None;
+        if state.amplitude_loop.take().is_some() {
+            state.dwell.restart();
         }
     }
 
@@ -151,22 +145,10 @@ impl PhaseLock {
             active,
             fault,
             ready: state.ready,
-            capture: self.capture.is_on(),
-            escaped: state.amplitude_loop.is_none()
-                && self.capture.has_escaped(
-                    &state.capture,
-                    state.approach.response,
-                    state.dwell.is_other_motion() || state.approach.has_lost_motion(),
-                ),
             settled: state.dwell.settled(),
             lost: state.lost,
             timed_out: timeout.is_some_and(|timeout| elapsed >= timeout),
         });
-        if before == LoopState::Acquiring && next == LoopState::Capturing {
-            let other_motion = state.dwell.is_other_motion().then_some(state.approach.response);
-            state.capture.repeat(other_motion);
-            state.dwell.restart();
-        }
         state.loop_state = next;
         if next == LoopState::Locked && state.tuning.1 != self.config.phase_target {
             // A new phase target: the distance from it does not mean that the lock is lost.
@@ -176,12 +158,8 @@ impl PhaseLock {
         if fault.is_some() || (next == LoopState::Ramping && before != LoopState::Ramping) {
             state.fault = fault;
         }
-        let is_searching = match next {
-            LoopState::Capturing => true,
-            // A held response is a measurement, which takes as long as it needs.
-            LoopState::Acquiring => state.amplitude_loop.is_none(),
-            _ => false,
-        };
+        // A held response is a measurement, which takes as long as it needs.
+        let is_searching = next == LoopState::Acquiring && state.amplitude_loop.is_none();
         state.acquiring = if is_searching { state.acquiring + 1 } else { 0 };
     }
 
@@ -192,8 +170,6 @@ impl PhaseLock {
         state.ready = false;
         if !state.loop_state.is_closed() {
             state.amplitude_loop = None;
-            state.approach = ApproachState::default();
-            state.capture = CaptureState::default();
         }
         let frequency = &mut state.frequency;
         match state.loop_state {
@@ -205,7 +181,6 @@ impl PhaseLock {
                 filter.go_to(frequency, omega_start);
                 state.ready = drive.ramp(&mut state.drive, self.config.amplitude) && frequency.omega == omega_start;
             }
-            LoopState::Capturing => self.capture(state, measured),
             LoopState::Acquiring | LoopState::Locked => self.close_loop(state, measured),
             LoopState::LockLost | LoopState::Tripped => {
                 filter.hold(frequency);
@@ -232,11 +207,6 @@ impl PhaseLock {
                 integral: state.frequency.integral.get(),
                 omega: state.frequency.omega,
                 amplitude: state.channels.response.amplitude(),
-                harmonics: if period_ends {
-                    state.channels.response.harmonics()
-                } else {
-                    0.0
-                },
                 residuals: state.channels.residuals(),
                 valid: measured.valid,
             };

@@ -49,13 +49,10 @@
 
 mod amplitude_loop;
 mod angle;
-mod approach;
 mod balance;
-mod capture;
 mod check;
 mod config;
 mod controller;
-mod descent;
 mod detector;
 mod drive;
 mod error;

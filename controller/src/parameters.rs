@@ -46,9 +46,6 @@ macro_rules! parameters {
             config residual_max: optional, "", Optional;
             config reference_connected: boolean, "", Boolean;
             config response_gain: real, "1/s", Positive;
-            config approach_gain: real, "", NotNegative;
-            config capture_response: optional, "m", Optional;
-            config captured_max: optional, "m", Optional;
         }
     };
 }

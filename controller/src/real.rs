@@ -24,7 +24,7 @@ pub fn limited(x: Real, low: Real, high: Real) -> Real {
 mod precision {
     pub use core::f64::consts;
 
-    pub use libm::{atan2, ceil, cos, exp, expm1, hypot, rint, sin, sincos, sqrt};
+    pub use libm::{atan2, ceil, expm1, hypot, rint, sin, sincos, sqrt};
 
     /// The floating-point type.
     pub type Real = f64;
@@ -69,7 +69,7 @@ mod precision {
 mod precision {
     pub use core::f32::consts;
 
-    pub use libm::{atan2f as atan2, ceilf as ceil, expf as exp, expm1f as expm1, rintf as rint, sqrtf as sqrt};
+    pub use libm::{atan2f as atan2, ceilf as ceil, expm1f as expm1, rintf as rint, sqrtf as sqrt};
 
     /// The floating-point type.
     pub type Real = f32;
@@ -143,10 +143,5 @@ mod precision {
     /// Sine of a few turns.
     pub fn sin(x: Real) -> Real {
         sincos(x).0
-    }
-
-    /// Cosine of a few turns.
-    pub fn cos(x: Real) -> Real {
-        sincos(x).1
     }
 }

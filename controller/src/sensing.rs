@@ -84,9 +84,8 @@ pub struct PresentDrive {
 pub struct Measurement {
     /// Fault of the readings.
     pub fault: Option<Fault>,
-    /// Phase error, rad, in [-pi, pi], and its cosine; 0 and 1 if it cannot be measured.
+    /// Phase error, rad, in [-pi, pi]; 0 if it cannot be measured.
     pub error: Real,
-    pub cosine: Real,
     /// Whether both amplitudes are above 0.
     pub measurable: bool,
     /// m
@@ -190,7 +189,6 @@ impl Sensing {
         Measurement {
             fault: fault.or(contradicts.then_some(reason)),
             error,
-            cosine,
             measurable,
             reference_amplitude: reference.amplitude,
             valid,

@@ -1,8 +1,6 @@
 //! The state of the controller.
 
 use crate::amplitude_loop::AmplitudeState;
-use crate::approach::ApproachState;
-use crate::capture::CaptureState;
 use crate::drive::DriveState;
 use crate::loop_filter::Frequency;
 use crate::oscillator::Oscillator;
@@ -21,7 +19,6 @@ pub struct State {
     pub(crate) drive: DriveState,
     /// Present while the response amplitude is controlled instead of the drive amplitude.
     pub(crate) amplitude_loop: Option<AmplitudeState>,
-    pub(crate) approach: ApproachState,
     pub(crate) dwell: Dwell,
     pub(crate) loop_state: LoopState,
     pub(crate) fault: Option<Fault>,
@@ -31,7 +28,6 @@ pub struct State {
     pub(crate) lost: bool,
     /// Samples since acquiring began.
     pub(crate) acquiring: u64,
-    pub(crate) capture: CaptureState,
     /// Drive amplitude and phase target to which the dwell applies.
     pub(crate) tuning: (Real, Real),
 }
@@ -45,14 +41,12 @@ impl State {
             frequency: Frequency::at(omega_start),
             drive: DriveState::default(),
             amplitude_loop: None,
-            approach: ApproachState::default(),
             dwell: Dwell::default(),
             loop_state: LoopState::Idle,
             fault: None,
             ready: false,
             lost: false,
             acquiring: 0,
-            capture: CaptureState::default(),
             tuning,
         }
     }

@@ -5,8 +5,7 @@
 //! a drift makes the range of four consecutive means ten times as large as the scatter, noise about twice.
 //!
 //! The detector's residual, the difference between readings and their prediction by the odd harmonics, tells noise from motion: noise has
-//! no correlation with itself a few samples before. What is correlated is no noise; if it is also large compared with the harmonics and
-//! does not decay, the motion has even harmonics or subharmonics.
+//! no correlation with itself a few samples before. What is correlated is no noise.
 
 use crate::config::LockCriterion;
 use crate::real::{self, Real, Sum};
@@ -20,15 +19,8 @@ const NOISE_RANGE: Real = 5.0;
 /// Smallest sum of the squared differences from period to period over that of the squared deviations from the mean that counts as
 /// noise. A drift over five periods has 0.4, noise about 1.
 const RANDOM: Real = 0.5;
-/// Largest correlation of the residual with itself a few samples before that counts as noise; and the smallest that noise does not explain,
-/// in standard deviations.
+/// Largest correlation of the residual with itself a few samples before that counts as noise.
 const CORRELATED: Real = 0.5;
-const SIGNIFICANT: Real = 5.0;
-/// Smallest ratio of the residuals of two successive dwells in a motion that does not decay.
-const LASTS: Real = 0.95;
-/// Smallest amplitude of a component that is no harmonic of the symmetric motion, in sums of the amplitudes of its harmonics: a subharmonic
-/// of order three has from ten to sixty of them.
-const OTHER: Real = 3.0;
 /// Largest scatter of the periods, relative, that counts as noise.
 const NOISE_MAX: Real = 0.03;
 
@@ -59,8 +51,6 @@ pub struct Reading {
     pub omega: Real,
     /// Response amplitude, m.
     pub amplitude: Real,
-    /// Sum of the amplitudes of its harmonics, m; used only where a period ends.
-    pub harmonics: Real,
     /// Differences of two readings, a few samples apart, from their predictions, m.
     pub residuals: [Real; 2],
     /// Whether these values are valid.
@@ -142,7 +132,6 @@ pub struct Dwell {
     block: Block,
     means: Option<(Real, Real)>,
     settled: bool,
-    other_motion: bool,
 }
 
 impl Dwell {
@@ -150,11 +139,6 @@ impl Dwell {
     #[inline(never)]
     pub fn restart(&mut self) {
         *self = Self::default();
-    }
-
-    /// Whether it is met by a motion with components that are no harmonics of the symmetric one, such as a subharmonic.
-    pub fn is_other_motion(&self) -> bool {
-        self.other_motion
     }
 
     /// Whether the criterion is met.
@@ -205,14 +189,14 @@ impl Stationarity {
         if lost {
             dwell.restart();
         } else {
-            self.end_period(dwell, &period, reading.harmonics);
+            self.end_period(dwell, &period);
         }
         lost
     }
 
     /// (A call: its code is long, and few samples end a period.)
     #[inline(never)]
-    fn end_period(&self, dwell: &mut Dwell, period: &Sums, harmonics: Real) {
+    fn end_period(&self, dwell: &mut Dwell, period: &Sums) {
         dwell.block.add(period);
         if dwell.block.periods < self.block {
             return;
@@ -225,17 +209,9 @@ impl Stationarity {
         dwell.means = Some((omega, mean(last, |block| block.amplitude.mean)));
         let is_smooth = dwell.complete >= DWELL && self.is_smooth(dwell.last(DWELL));
         let is_noise = dwell.complete == BLOCKS && self.is_noise(&dwell.blocks);
-        let (before, last) = dwell.blocks.split_at(DWELL);
-        let [[_, before], [power, common]] = [before, last].map(residual);
+        let [power, common] = residual(dwell.last(DWELL));
         let is_random = common <= CORRELATED * power;
-        let lasts = is_random || common >= LASTS * before;
-        let samples = period.samples as Real * (self.block as usize * DWELL) as Real;
-        let by_noise = SIGNIFICANT * power / real::sqrt(samples);
-        let component = OTHER * harmonics;
-        // A detector without harmonics leaves those of any motion in its residual.
-        let is_other = component > 0.0 && common > by_noise.max(0.5 * component * component * samples);
         dwell.settled = is_smooth || is_noise && is_random;
-        dwell.other_motion = (is_smooth || is_noise && lasts) && is_other;
     }
 
     fn is_smooth(&self, blocks: &[Block]) -> bool {

@@ -21,8 +21,6 @@ pub enum LoopState {
     Tripped = 5,
     /// `active` became false: the drive is released, the frequency stays constant.
     ShutDown = 6,
-    /// The loop is closed, and the response rises until impacts begin.
-    Capturing = 7,
 }
 
 /// Reason why the drive was switched off. The numbers are those of the FMU's `fault`, where 0 means no fault.
@@ -45,7 +43,7 @@ pub enum Fault {
 
 impl LoopState {
     /// All states, by number.
-    pub const ALL: [Self; 8] = [
+    pub const ALL: [Self; 7] = [
         Self::Idle,
         Self::Ramping,
         Self::Acquiring,
@@ -53,7 +51,6 @@ impl LoopState {
         Self::LockLost,
         Self::Tripped,
         Self::ShutDown,
-        Self::Capturing,
     ];
 
     /// The state of that number.
@@ -73,7 +70,6 @@ impl LoopState {
             Self::LockLost => "lock lost",
             Self::Tripped => "tripped",
             Self::ShutDown => "shut down",
-            Self::Capturing => "capturing",
         }
     }
 
@@ -140,10 +136,6 @@ pub struct Conditions {
     pub fault: Option<Fault>,
     /// The ramp has ended.
     pub ready: bool,
-    /// A motion with impacts is to be captured first.
-    pub capture: bool,
-    /// The motion is not the captured one.
-    pub escaped: bool,
     /// The lock criterion is met.
     pub settled: bool,
     /// The phase error or the validity of the response ends the lock.
@@ -162,25 +154,21 @@ impl LoopState {
     /// Whether the loop is closed.
     #[must_use]
     pub fn is_closed(self) -> bool {
-        matches!(self, Self::Capturing | Self::Acquiring | Self::Locked)
+        matches!(self, Self::Acquiring | Self::Locked)
     }
 
     /// The next state, and the fault that caused it.
     pub(crate) fn next(self, conditions: &Conditions) -> (Self, Option<Fault>) {
         match self {
-            Self::Ramping | Self::Capturing | Self::Acquiring | Self::Locked if !conditions.active => {
-                (Self::ShutDown, None)
-            }
+            Self::Ramping | Self::Acquiring | Self::Locked if !conditions.active => (Self::ShutDown, None),
             Self::LockLost | Self::Tripped if !conditions.active => (Self::Idle, None),
             Self::LockLost | Self::Tripped => (self, None),
             Self::Idle | Self::ShutDown if !conditions.active => (self, None),
             _ if conditions.fault.is_some() => (Self::Tripped, conditions.fault),
             Self::Idle | Self::ShutDown => (Self::Ramping, None),
-            Self::Ramping if conditions.ready && conditions.capture => (Self::Capturing, None),
-            Self::Ramping | Self::Capturing if conditions.ready => (Self::Acquiring, None),
-            Self::Acquiring if conditions.escaped => (Self::Capturing, None),
+            Self::Ramping if conditions.ready => (Self::Acquiring, None),
             Self::Acquiring if conditions.settled => (Self::Locked, None),
-            Self::Capturing | Self::Acquiring if conditions.timed_out => (Self::Tripped, Some(Fault::TimedOut)),
+            Self::Acquiring if conditions.timed_out => (Self::Tripped, Some(Fault::TimedOut)),
             Self::Locked if conditions.lost => (Self::LockLost, Some(Fault::LockLost)),
             running => (running, None),
         }
@@ -197,8 +185,6 @@ mod tests {
         ready: true,
         settled: true,
         lost: false,
-        capture: false,
-        escaped: false,
         timed_out: false,
     };
 
@@ -213,19 +199,7 @@ mod tests {
         for (number, fault) in Fault::ALL.into_iter().enumerate() {
             assert_eq!(Fault::of_number(number as i32 + 1), Some(fault));
         }
-        assert_eq!((LoopState::of_number(8), Fault::of_number(0)), (None, None));
-    }
-
-    #[test]
-    fn a_capture_comes_before_the_approach() {
-        let capture = Conditions { capture: true, ..ACTIVE };
-        assert_eq!(LoopState::Ramping.next(&capture).0, LoopState::Capturing);
-        assert_eq!(LoopState::Capturing.next(&capture).0, LoopState::Acquiring);
-        let late = Conditions { ready: false, timed_out: true, ..capture };
-        assert_eq!(
-            LoopState::Capturing.next(&late),
-            (LoopState::Tripped, Some(Fault::TimedOut))
-        );
+        assert_eq!((LoopState::of_number(7), Fault::of_number(0)), (None, None));
     }
 
     #[test]

@@ -37,22 +37,14 @@ fn configuration() -> impl Strategy<Value = Config> {
     let change = (0..PARAMETERS.len(), number(), any::<i32>(), any::<bool>());
     let resonance = prop_oneof![(-2.0..5.0), (-30.0..30.0)].prop_map(|x: f64| 10_f64.powf(x) as Real);
     let amplitude = prop_oneof![(-9.0..0.0), (-30.0..30.0)].prop_map(|x: f64| 10_f64.powf(x) as Real);
-    let options = (
-        any::<bool>(),
-        any::<bool>(),
-        any::<bool>(),
-        any::<bool>(),
-        prop::option::of(0.5..2.0_f64),
-    );
+    let options = (any::<bool>(), any::<bool>(), any::<bool>(), any::<bool>());
     (resonance, amplitude, options, prop::collection::vec(change, 0..5)).prop_map(
         |(omega, amplitude, options, changes)| {
             let mut config = Config::for_resonance(omega, amplitude);
-            let (ramp, reference, limit, short, capture) = options;
+            let (ramp, reference, limit, short) = options;
             config.ramp_rate = config.ramp_rate.filter(|_| ramp);
             config.amplitude_max = config.amplitude_max.filter(|_| limit);
             config.reference_connected = reference;
-            config.capture_response = capture.map(|share| share as Real * amplitude);
-            config.captured_max = config.capture_response.filter(|_| ramp);
             config.residual_max = None;
             if short {
                 // Few samples in a period, and a lock after a few periods.

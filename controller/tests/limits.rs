@@ -66,15 +66,11 @@ proptest! {
         base_bandwidth in prop::option::of(1e-4..0.02_f64),
         demodulate: bool,
         hold: bool,
-        capture: bool,
-        approach_gain in 0.0..30.0_f64,
     ) {
         let mut config = Config {
             bandwidth: bandwidth * OMEGA_0,
             base_bandwidth: base_bandwidth.map(|wide| wide * OMEGA_0),
             ramp_rate: ramp_time.map(|time| AMPLITUDE / time),
-            capture_response: capture.then_some(0.01),
-            approach_gain,
             ..config()
         };
         if demodulate {

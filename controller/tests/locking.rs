@@ -220,62 +220,6 @@ fn a_ramp_down_to_zero_has_the_rate_of_the_ramp_up() {
 }
 
 #[test]
-fn a_shaped_drive_reaches_the_same_lock_several_times_as_fast_and_is_constant_from_then_on() {
-    let periods = |approach_gain: f64| {
-        let config = Config {
-            approach_gain,
-            damping_rate: Some(ZETA * OMEGA_0),
-            ..config()
-        };
-        let mut bench = Bench::new(config);
-        let (periods, _) = bench.run_to_lock(2000).expect("a lock");
-        let output = bench.run(20);
-        assert!(
-            relative(output.response_amplitude, AMPLITUDE / (2.0 * ZETA)) < 1e-3,
-            "{output:?}"
-        );
-        assert_eq!(output.amplitude, AMPLITUDE);
-        periods
-    };
-    let (constant, shaped) = (periods(0.0), periods(4.0));
-    println!("{constant} {shaped}");
-    assert!(shaped < 0.5 * constant);
-}
-
-#[test]
-fn a_capture_raises_the_response_before_the_drive_goes_to_its_setpoint() {
-    // Under the drive's setpoint the response stays at a quarter of the level.
-    let level = 4.0 * AMPLITUDE / (2.0 * ZETA);
-    let config = Config {
-        capture_response: Some(level),
-        amplitude_max: Some(6.0 * AMPLITUDE),
-        damping_rate: Some(ZETA * OMEGA_0),
-        approach_gain: 2.0,
-        ..config()
-    };
-    let mut bench = Bench::new(config);
-    let (mut largest, mut states) = (0.0_f64, Vec::new());
-    for _ in 0..100 * 1000 {
-        let output = bench.sample();
-        largest = largest.max(output.response_amplitude);
-        if states.last() != Some(&output.state) {
-            states.push(output.state);
-        }
-    }
-    assert_eq!(
-        states,
-        [
-            LoopState::Ramping,
-            LoopState::Capturing,
-            LoopState::Acquiring,
-            LoopState::Locked
-        ]
-    );
-    assert!((0.97..1.05).contains(&(largest / level)), "{}", largest / level);
-    assert!(relative(bench.sample().response_amplitude, 0.25 * level) < 1e-3);
-}
-
-#[test]
 fn retuning_leaves_no_trace_of_the_values_before() {
     let config = Config {
         ramp_rate: Some(AMPLITUDE),

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from . import _native
 from .scenes import Scene, checked
 
-_STATES = ("idle", "ramping", "acquiring", "locked", "lock lost", "tripped", "shut down", "capturing")
+_STATES = ("idle", "ramping", "acquiring", "locked", "lock lost", "tripped", "shut down")
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +29,7 @@ class Output:
     locked, settled : bool
         The lock criterion has been met and the lock has not been lost since; the criterion is met now.
     state : str
-        Loop state: idle, ramping, acquiring, locked, lock lost, tripped, shut down or capturing.
+        Loop state: idle, ramping, acquiring, locked, lock lost, tripped or shut down.
     fault : int
         Number of the fault, as the output `fault` of PhaseLock.fmu; 0 for none.
     """

@@ -27,8 +27,6 @@ typedef enum PhaseLockStage {
   PHASE_LOCK_STAGE_TRIPPED = 5,
   // active became false: the drive is released.
   PHASE_LOCK_STAGE_SHUT_DOWN = 6,
-  // The response rises until impacts begin.
-  PHASE_LOCK_STAGE_CAPTURING = 7,
 } PhaseLockStage;
 
 // Reason why the drive was switched off.
@@ -131,12 +129,6 @@ typedef struct PhaseLockConfig {
   struct PhaseLockOptional residual_max;
   // Whether a sensor measures the base.
   bool reference_connected;
-  // The response approaches its steady state 1 + approach_gain times as fast as under a constant drive.
-  PhaseLockReal approach_gain;
-  // Response amplitude, m, at which impacts certainly occur; it is visited first, so that a particle at rest joins the motion.
-  struct PhaseLockOptional capture_response;
-  // Largest response amplitude, m, of the motion that is wanted; a captured motion is led below it.
-  struct PhaseLockOptional captured_max;
   // Time for which the lock criterion must hold, periods.
   uint32_t dwell;
   // Number of harmonics of the adaptive filter, 1 to 8.

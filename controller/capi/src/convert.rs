@@ -123,7 +123,6 @@ impl From<Output> for PhaseLockOutput {
                 LoopState::LockLost => PhaseLockStage::LockLost,
                 LoopState::Tripped => PhaseLockStage::Tripped,
                 LoopState::ShutDown => PhaseLockStage::ShutDown,
-                LoopState::Capturing => PhaseLockStage::Capturing,
             },
             fault: match o.fault {
                 None => PhaseLockFault::None,

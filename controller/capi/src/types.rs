@@ -106,12 +106,6 @@ pub struct PhaseLockConfig {
     pub residual_max: PhaseLockOptional,
     /// Whether a sensor measures the base.
     pub reference_connected: bool,
-    /// The response approaches its steady state 1 + approach_gain times as fast as under a constant drive.
-    pub approach_gain: PhaseLockReal,
-    /// Response amplitude, m, at which impacts certainly occur; it is visited first, so that a particle at rest joins the motion.
-    pub capture_response: PhaseLockOptional,
-    /// Largest response amplitude, m, of the motion that is wanted; a captured motion is led below it.
-    pub captured_max: PhaseLockOptional,
     /// Time for which the lock criterion must hold, periods.
     pub dwell: u32,
     /// Number of harmonics of the adaptive filter, 1 to 8.
@@ -150,8 +144,6 @@ pub enum PhaseLockStage {
     Tripped = 5,
     /// active became false: the drive is released.
     ShutDown = 6,
-    /// The response rises until impacts begin.
-    Capturing = 7,
 }
 
 /// Reason why the drive was switched off.

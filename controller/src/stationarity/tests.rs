@@ -14,7 +14,6 @@ const CONSTANT: Reading = Reading {
     integral: 1.0,
     omega: 1.0,
     amplitude: 1.0,
-    harmonics: 0.01,
     residuals: [0.0; 2],
     valid: true,
 };
@@ -60,37 +59,20 @@ fn a_slow_modulation_is_not_stationary_at_its_crest() {
     assert_eq!(periods_to_settle(reading), None);
 }
 
-/// A reading with another component of this amplitude and of a third of the frequency.
-fn subharmonic(amplitude: f64) -> impl Fn(f64) -> Reading {
-    let component = move |t: f64| amplitude * libm::sin(core::f64::consts::TAU / 3.0 * t);
-    move |t| Reading { residuals: [component(t), component(t - 0.1)], ..CONSTANT }
-}
-
 #[test]
-fn a_subharmonic_is_another_motion_even_if_its_modulation_resembles_noise() {
-    for (amplitude, modulation, is_other) in [(0.05, 0.0, true), (0.01, 0.0, false), (0.05, 0.01, true)] {
-        let reading = |t: f64| Reading {
-            amplitude: 1.0 + modulation * libm::sin(core::f64::consts::TAU / 3.0 * libm::floor(t - 0.05)),
-            ..subharmonic(amplitude)(t)
+fn a_scatter_counts_as_noise_only_if_the_residual_has_no_correlation() {
+    for step in [1.0, 0.01] {
+        let reading = |t: f64| {
+            let sample = step * libm::round(10.0 * t);
+            Reading {
+                amplitude: 1.0 + 0.01 * noise(libm::floor(t - 0.05)),
+                residuals: [sample, sample - step]
+                    .map(|one| 0.1 * if step < 1.0 { libm::sin(one) } else { noise(one) }),
+                ..CONSTANT
+            }
         };
-        let dwell = after_40_periods(reading);
-        assert_eq!(dwell.is_other_motion(), is_other, "{amplitude}, {modulation}");
-        assert_eq!(dwell.settled(), modulation == 0.0);
+        assert_eq!(after_40_periods(reading).settled(), step == 1.0);
     }
-}
-
-#[test]
-fn noise_of_the_samples_is_no_other_motion() {
-    let reading = |t: f64| {
-        let sample = libm::round(10.0 * t);
-        Reading {
-            amplitude: 1.0 + 0.01 * noise(libm::floor(t - 0.05)),
-            residuals: [noise(sample), noise(sample - 1.0)].map(|one| 0.1 * one),
-            ..CONSTANT
-        }
-    };
-    let dwell = after_40_periods(reading);
-    assert!(dwell.settled() && !dwell.is_other_motion());
 }
 
 fn after_40_periods(reading: impl Fn(f64) -> Reading) -> Dwell {

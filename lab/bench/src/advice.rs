@@ -111,14 +111,13 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     match regime? {
         Regime::Unknown | Regime::Unresolved | Regime::NotEstablished => None,
         Regime::NoImpacts => Some(format!(
-            "the particle does not reach the walls: from rest, impacts begin at G = {:.3}. Set controller.capture = true, or give it a \
-             velocity in [start]; {place}",
+            "the particle does not reach the walls: under a constant drive, impacts begin at G = {:.3}; give it a velocity in [start]; {place}",
             d.lambda
         )),
         Regime::Symmetric => Some(format!(
             "the motion is symmetric but on no stable orbit: {place}. A symmetric orbit of larger amplitude may be unstable and lose \
              its symmetry slowly. Near the end of its stable range the loop may need a smaller \
-             controller.approach_gain or more record.lock_periods"
+controller.frequency_tolerance or more record.lock_periods"
         )),
         regime => Some(format!(
             "the motion is {}, and coexists with the wanted one: {place}. Try another G or another [start]",

@@ -5,6 +5,7 @@
 mod bench;
 mod evidence;
 mod record;
+mod search;
 
 use std::fmt::{self, Display, Formatter};
 
@@ -12,12 +13,12 @@ use thiserror::Error;
 
 use crate::rig::{Controller, ControllerError, Drive, Fault, Rig, RigError};
 use crate::scene::Scene;
-use vines_model::orbit::phase_resonant;
 use vines_model::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 
 pub(crate) use bench::Bench;
 pub use evidence::Evidence;
 pub use record::{Record, Sample, drive_phases, table};
+pub(crate) use search::Search;
 
 /// Durations of the stages, in samples.
 #[derive(Debug, Clone, Copy)]
@@ -28,8 +29,6 @@ pub struct Plan<'a> {
     pub sample_time: f64,
     /// Time limit for the lock.
     pub lock: usize,
-    /// How long the motion may be other than 1:1 before the lock, in total.
-    pub irregular: usize,
     /// How long the lock is held and recorded once it has settled.
     pub hold: usize,
     /// Length of the recorded decay.
@@ -46,21 +45,9 @@ impl<'a> Plan<'a> {
             scene,
             sample_time,
             lock: samples(scene.lock_periods()),
-            irregular: samples(irregular_periods(scene)),
             hold: samples(scene.record.hold_periods),
             decay: samples(decay_periods(scene)),
         }
-    }
-}
-
-/// How long the motion may be other than 1:1 before the lock, in total, in natural periods: some relaxation times of the structure, or
-/// less where the exact orbits show that there is nothing to lock.
-fn irregular_periods(scene: &Scene) -> f64 {
-    let d = scene.dimensionless();
-    if phase_resonant(&d).iter().any(|orbit| orbit.stable) || !scene.controller.is_at_phase_resonance() {
-        f64::max(600.0, 10.0 * scene.relaxation_periods())
-    } else {
-        60.0
     }
 }
 
@@ -149,8 +136,8 @@ pub enum ExperimentError {
         phase_error: PhaseError,
         omega: f64,
     },
-    #[error("no lock: for {periods:.0} periods in total the motion was not 1:1, and only such a motion can be locked")]
-    Irregular { periods: f64 },
+    #[error("the requested drive G = {g:.4} was not reached within {periods:.0} periods: {why}")]
+    NotReached { periods: f64, g: f64, why: String },
     #[error("the controller switched the drive off after {periods:.1} periods while {}: {fault}; {}", stage.name(), evidence.text(*fault))]
     Tripped {
         periods: f64,
@@ -190,26 +177,16 @@ pub fn run_into(
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
     let mut bench = Bench::new(rig, controller, plan.scene, samples);
-    let (mut settled, mut irregular) = (0, 0);
-    loop {
-        let command = bench.sample(Stage::Locking)?;
-        progress(Stage::Locking, settled, plan.lock);
-        if command.settled {
-            break;
-        }
-        settled += 1;
-        if settled.is_multiple_of(plan.hold) {
-            irregular += usize::from(bench.is_irregular(plan, &command)) * plan.hold;
-        }
-        if irregular >= plan.irregular || settled >= plan.lock {
-            let periods = irregular as f64 / plan.scene.controller.samples_per_period;
-            return Err(if irregular >= plan.irregular {
-                ExperimentError::Irregular { periods }
-            } else {
-                bench.no_lock(&command)
-            });
-        }
+    let held = if plan.scene.controller.is_at_phase_resonance() {
+        let mut searched = |taken| progress(Stage::Locking, taken, plan.lock);
+        Search::new(&mut bench, plan.scene, plan.lock, &mut searched).lock()?
+    } else {
+        None
+    };
+    if held.is_none() {
+        wait(&mut bench, plan, &mut progress)?;
     }
+    let (settled, held) = (bench.taken - 1, held == Some(true));
     for n in 0..plan.hold {
         bench.sample(Stage::Holding)?;
         progress(Stage::Holding, n + 1, plan.hold);
@@ -225,5 +202,24 @@ pub fn run_into(
         released: samples.len() - plan.decay,
         samples,
         settled,
+        held,
     })
+}
+
+/// Waits for the lock under the constant drive, for a controller that cannot control the response.
+fn wait<R: Rig + ?Sized, C: Controller + ?Sized>(
+    bench: &mut Bench<R, C>,
+    plan: &Plan,
+    progress: &mut impl FnMut(Stage, usize, usize),
+) -> Result<(), ExperimentError> {
+    loop {
+        let command = bench.sample(Stage::Locking)?;
+        progress(Stage::Locking, bench.taken, plan.lock);
+        if command.settled {
+            return Ok(());
+        }
+        if bench.taken >= plan.lock {
+            return Err(bench.no_lock(&command));
+        }
+    }
 }

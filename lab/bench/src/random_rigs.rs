@@ -32,6 +32,8 @@ pub struct Row {
     pub outcome: Outcome,
     /// Periods to the lock.
     pub periods: Option<f64>,
+    /// Whether the response is held by control, because the drive alone would not hold it.
+    pub held: bool,
     /// Distance from the nearest stable orbit, the larger of those in sigma and C.
     pub distance: Option<f64>,
     /// The message, where the lock is not the expected one.
@@ -169,6 +171,7 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
         parameters,
         outcome: Outcome::Failed,
         periods: None,
+        held: false,
         distance: None,
         message: None,
     };
@@ -180,14 +183,17 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
             } else {
                 Outcome::Failed
             };
-            let message = reason.map_or_else(|| error.to_string(), |why| format!("no lock: {why}"));
+            let message = reason.map_or_else(|| error.to_string(), |why| format!("{error}; {why}"));
             return Row { outcome, message: Some(message), ..row };
         }
     };
     let periods = record.settled as f64 / scene.controller.samples_per_period;
-    let row = Row { periods: Some(periods), ..row };
+    let row = Row { periods: Some(periods), held: record.held, ..row };
+    // A held response needs no stability under a constant drive.
+    let all = phase_resonant(&parameters);
+    let orbits = if record.held { &all } else { stable };
     let distance = |sigma: f64, c: f64| {
-        let distances = stable
+        let distances = orbits
             .iter()
             .map(|orbit| [(orbit.sigma - sigma).abs(), (orbit.c - c).abs()]);
         let largest = |[sigma, c]: &[f64; 2]| sigma.max(*c);

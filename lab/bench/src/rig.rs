@@ -116,4 +116,12 @@ pub trait Controller {
     fn hold_response(&mut self, _to: Move, _phase_target: f64) -> Result<(), ControllerError> {
         Err(ControllerError::NoResponseLoop)
     }
+
+    /// Controls the amplitude of the drive again, at its setpoint.
+    ///
+    /// # Errors
+    /// As [`Controller::hold_response`].
+    fn hold_drive(&mut self) -> Result<(), ControllerError> {
+        Err(ControllerError::NoResponseLoop)
+    }
 }

@@ -28,7 +28,6 @@ fn every_parameter_of_the_controller_has_exactly_one_key_of_the_scene() {
             .map(|(_, key)| *key);
         let value = match (name, parameter.get(&config(&[]).unwrap())) {
             ("reference_connected", _) => "false".into(),
-            ("capture_response", _) => "true".into(),
             ("phase_target", _) => "-80.0".into(),
             ("detector", _) => "2".into(),
             (_, Value::Boolean(one)) => (!one).to_string(),
@@ -60,7 +59,6 @@ fn an_option_of_the_controller_is_switched_off_by_none_or_false_and_not_by_zero(
         ("controller.residual_max", "residual_max"),
         ("phase_lock.base_bandwidth", "base_bandwidth"),
         ("phase_lock.damping_rate", "damping_rate"),
-        ("phase_lock.captured_max", "captured_max"),
     ] {
         let parameter = Parameter::find(name).unwrap();
         assert_eq!(parameter.range, Range::Optional);

@@ -215,10 +215,7 @@ fn text_on_the_command_line_needs_no_quotes() {
 fn a_scene_is_checked_completely_when_it_is_read() {
     for (settings, part) in [
         (&["phase_lock.harmonics=99"][..], "harmonics"),
-        (
-            &["controller.capture=false", "controller.G_max=0.5"],
-            "controller.G_max",
-        ),
+        (&["controller.G_max=0.5"], "controller.G_max"),
         (&["start.dq2=1e300"], "= 1e300 m/s"),
     ] {
         says(&complaint(paper(settings)), &[part]);
@@ -230,20 +227,6 @@ fn a_plant_without_damping_is_accepted() {
     for settings in [&["plant.c=0"][..], &["plant.c=0", "plant.r=1", "excitation.G=0"]] {
         assert!(paper(settings).is_ok(), "{settings:?}");
     }
-}
-
-#[test]
-fn a_drive_limit_below_the_first_impacts_is_refused_with_the_drive_that_is_needed() {
-    let settings = ["start.dq2=0.0", "controller.G_max=1.2"];
-    says(
-        &complaint(paper(&settings)),
-        &["controller.G_max", "1.2", "at least 1.57", "capture = false"],
-    );
-    assert!(paper(&[settings[0], settings[1], "controller.capture=false"]).is_ok());
-    assert!(
-        paper(&["controller.G_max=1.2"]).is_ok(),
-        "the particle of the default scene moves"
-    );
 }
 
 #[test]
@@ -259,14 +242,6 @@ fn limits_follow_from_the_numbers_of_the_rig() {
     assert!((d.excitation(config.amplitude_max.unwrap()) - 4.0 * 1.1 * d.lambda).abs() < 1e-9);
     assert_eq!(config.response_max, Some(4.0 * d.b));
     assert!(config.acquire_timeout.is_some() && config.signal_timeout.is_some());
-    assert_eq!(config.capture_response, None);
-    assert!(
-        paper(&["start.dq2=0.0"])
-            .unwrap()
-            .controller_config()
-            .capture_response
-            .is_some()
-    );
 }
 
 #[test]

@@ -191,6 +191,14 @@ impl Controller for FmuController {
             .ask("take its inputs", |i| i.set_boolean(&hold, &[true.into()]))?;
         Ok(())
     }
+
+    fn hold_drive(&mut self) -> Result<(), ControllerError> {
+        let inputs = self.response_loop.as_ref().ok_or(ControllerError::NoResponseLoop)?;
+        let hold = [inputs.hold];
+        self.fmu
+            .ask("take its inputs", |i| i.set_boolean(&hold, &[false.into()]))?;
+        Ok(())
+    }
 }
 
 /// The inputs of a move.

@@ -30,16 +30,9 @@ impl NetController {
     ///
     /// Beside a rig in real time the client waits for an answer for half a sample period, and then holds the last one.
     /// `pace` is the longest silence of such a rig, s; it also limits the silence of the controller. For a rig that waits,
-    /// `pace` is None. If the rig is `at_rest`, the controller has to excite impacts first. A server with another key does not answer.
-    pub fn connect(
-        peer: SocketAddr,
-        sample_time: f64,
-        pace: Option<f64>,
-        at_rest: bool,
-        key: Option<Key>,
-    ) -> Result<Self, LinkError> {
-        let flags = flag::CONTROLLER | if at_rest { flag::AT_REST } else { 0 };
-        let mut client = Client::connect(Address::Tcp(peer), flags, sample_time, key)?;
+    /// `pace` is None. A server with another key does not answer.
+    pub fn connect(peer: SocketAddr, sample_time: f64, pace: Option<f64>, key: Option<Key>) -> Result<Self, LinkError> {
+        let mut client = Client::connect(Address::Tcp(peer), flag::CONTROLLER, sample_time, key)?;
         let limit = pace.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
         client.silence = limit.map_or(client.silence, |limit| limit.min(client.silence));
         Ok(Self {
@@ -116,6 +109,11 @@ impl Controller for NetController {
 
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
         let frame = write_move(self.client.frame(Kind::Move), to, phase_target);
+        Ok(self.client.send(frame)?)
+    }
+
+    fn hold_drive(&mut self) -> Result<(), ControllerError> {
+        let frame = write_move(self.client.frame(Kind::Move), Move::default(), 0.0);
         Ok(self.client.send(frame)?)
     }
 }

@@ -49,8 +49,6 @@ pub mod flag {
     pub const ACTIVE: u8 = 1;
     /// Drive, from a controller: its lock has settled.
     pub const SETTLED: u8 = 2;
-    /// Hello, to a controller: the rig is at rest, and the controller first has to excite impacts.
-    pub const AT_REST: u8 = 8;
     /// Sensors: there is a reference channel.
     pub const REFERENCE: u8 = 4;
     /// Sensors: the rig is a simulation, and its last four values describe the impacts.

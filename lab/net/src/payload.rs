@@ -82,7 +82,7 @@ pub(super) fn read_command(frame: &Frame) -> Command {
     }
 }
 
-/// Writes a move of the response and its phase target, rad, into a frame.
+/// Writes a move of the response and its phase target, rad, into a frame. A response of 0 ends the control of the response.
 pub(super) fn write_move(mut frame: Frame, to: Move, phase_target: f64) -> Frame {
     frame.kind = Kind::Move;
     frame.values = [

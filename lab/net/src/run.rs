@@ -134,7 +134,11 @@ impl Run {
             (Served::Controller(controller), Kind::Move) => {
                 let (to, phase_target) = read_move(frame);
                 // No answer: the next drive follows from it. A refusal ends the session.
-                Ok(controller.hold_response(to, phase_target).map_err(Refusal::from))
+                let held = match to.response {
+                    0.0 => controller.hold_drive(),
+                    _ => controller.hold_response(to, phase_target),
+                };
+                Ok(held.map_err(Refusal::from))
             }
             (Served::Rig(_), Kind::Drive) => match self.service.drive(frame) {
                 Err(refusal) => Ok(Err(refusal)),

@@ -38,12 +38,11 @@ impl Server {
         self.listener.address()
     }
 
-    /// Serves sessions until `stop` returns true. `make` creates the rig, or the controller, of a session, and
-    /// gets whether the rig of a controller is at rest; `tell` receives its
-    /// report.
+    /// Serves sessions until `stop` returns true. `make` creates the rig, or the controller, of a session;
+    /// `tell` receives its report.
     pub fn serve(
         &mut self,
-        mut make: impl FnMut(bool) -> Result<Served, ServerError>,
+        mut make: impl FnMut() -> Result<Served, ServerError>,
         mut stop: impl FnMut() -> bool,
         mut tell: impl FnMut(&Session),
     ) -> Result<(), ServerError> {
@@ -90,7 +89,7 @@ impl Server {
         &mut self,
         hello: &Frame,
         from: SocketAddr,
-        make: &mut impl FnMut(bool) -> Result<Served, ServerError>,
+        make: &mut impl FnMut() -> Result<Served, ServerError>,
     ) -> Result<Option<Run>, ServerError> {
         let mut welcome = match self.service.welcome(hello) {
             Ok(welcome) => welcome,
@@ -104,7 +103,7 @@ impl Server {
         welcome.values[3..5].copy_from_slice(&drawn);
         self.listener.seal.begin(hello.session, drawn);
         let real_time = self.listener.is_real_time();
-        let mut run = Run::new(make(hello.has(flag::AT_REST))?, self.service, real_time, from, welcome);
+        let mut run = Run::new(make()?, self.service, real_time, from, welcome);
         run.welcome(&mut self.listener)?;
         Ok(Some(run))
     }

@@ -11,7 +11,7 @@ const HELP: &str = "\
 Examples:
   vines controller --listen 127.0.0.1:5511      then: vines identify --controller tcp://127.0.0.1:5511
 
-Answers every reading with a drive. A client whose rig is at rest says so; then the controller first excites impacts. After --silence the session ends. See docs/network-protocol.md.
+Answers every reading with a drive. After --silence the session ends. See docs/network-protocol.md.
 
 The server listens on this machine only, unless --key or --allow-remote is given. With --key, every frame is authenticated; nothing is
 encrypted. Without it, everyone who can reach the address can drive the rig.";
@@ -33,19 +33,13 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
-    let mut at_rest = scene.clone();
-    at_rest.start = Default::default();
-    let [moving, at_rest] = [&scene, &at_rest].map(|scene| BuiltIn::new(&scene.controller_config()));
-    let (moving, at_rest) = (moving?, at_rest?);
+    let controller = BuiltIn::new(&scene.controller_config())?;
     let service = Service {
         role: Role::Controller,
         sample_time: scene.sample_time(),
         silence: arguments.silence,
     };
-    let make = |rests: bool| {
-        let controller = if rests { &at_rest } else { &moving };
-        Ok(Served::Controller(Box::new(controller.clone())))
-    };
+    let make = || Ok(Served::Controller(Box::new(controller.clone())));
     arguments
         .serving
         .serve("controller", Address::Tcp, service, make, |_| {})

@@ -101,8 +101,7 @@ impl Endpoint {
             Self::Fmu(file) => Box::new(FmuController::load(file, config, names).map_err(Failure::run)?),
             Self::Network(address) => match Address::parse(address, scope)? {
                 Address::Tcp(peer) => {
-                    let at_rest = config.capture_response.is_some();
-                    let connected = NetController::connect(peer, config.sample_time, pace, at_rest, scope.key())?;
+                    let connected = NetController::connect(peer, config.sample_time, pace, scope.key())?;
                     Box::new(connected)
                 }
                 Address::Udp(_) => {

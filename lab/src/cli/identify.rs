@@ -109,7 +109,7 @@ pub(super) fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Sc
     let reason = matches!(
         error,
         ExperimentError::NoLock { .. }
-            | ExperimentError::Irregular { .. }
+            | ExperimentError::NotReached { .. }
             | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. }
     )
     .then(|| advice::reason(scene, advice::last_regime(samples, scene)))

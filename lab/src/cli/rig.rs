@@ -199,5 +199,5 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let what = format!("rig, {mode}, {:.1} samples per second,", 1.0 / service.sample_time);
     arguments
         .serving
-        .serve(&what, transport, service, |_| Ok(Served::Rig(make()?)), keep)
+        .serve(&what, transport, service, || Ok(Served::Rig(make()?)), keep)
 }

@@ -40,7 +40,7 @@ impl ServingArguments {
         what: &str,
         transport: fn(std::net::SocketAddr) -> Address,
         service: Service,
-        make: impl FnMut(bool) -> Result<Served, ServerError>,
+        make: impl FnMut() -> Result<Served, ServerError>,
         keep: impl Fn(&Session),
     ) -> Result<String, Failure> {
         let scope = self.reach.reach()?;

@@ -7,15 +7,11 @@ use vines_model::numerics::Estimate;
 use super::level::{Criterion, Found};
 use super::peak;
 use super::point::{Known, Point, Tracked};
-use crate::experiment::{self, ExperimentError, Sample, Stage};
+use crate::experiment::{self, ExperimentError, Sample, Search, Stage};
 use crate::identification::{Cycle, Regime, Slopes, classify, regime_by_response};
-use crate::rig::{Controller, LoopState, Move, Rig};
+use crate::rig::{Controller, Move, Rig};
 use crate::scene::Scene;
 
-/// Phase error, rad, below which the control of the response begins.
-const NEAR: f64 = 0.35;
-/// Periods for which the phase error must have been that small.
-const NEAR_FOR: usize = 3;
 /// Periods between a move and the first that is measured: the loops and the particle follow late.
 const LATE: usize = 8;
 /// Periods of the first level more than those, because the start of the loop disturbs the particle, too.
@@ -119,33 +115,17 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
         }
     }
 
-    /// Runs the loop until it is near phase resonance, with the initial drive amplitude.
+    /// Goes to a symmetric motion with impacts, if there is one.
     fn approach(&mut self) -> Result<(), ExperimentError> {
-        let mut near = 0;
-        while near < NEAR_FOR {
-            self.run.samples.clear();
-            let cycle = self.cycle()?;
-            let Some(Sample { command, .. }) = self.run.samples.last().copied() else {
-                continue;
-            };
-            if self.run.periods >= self.scene.lock_periods() {
-                return Err(self.run.no_lock(&command));
-            }
-            // A motion that is being captured is not to be held yet.
-            let captured = command.state != Some(LoopState::Capturing);
-            let driven = cycle.base.norm() > 0.0 && captured;
-            near = if driven && cycle.phase_error.abs() < NEAR {
-                near + 1
-            } else {
-                0
-            };
-            let d = self.scene.dimensionless();
-            self.present = Some(Known {
-                c: cycle.amplitude() / d.b,
-                g: d.excitation(cycle.base.norm()),
-                sigma: d.sigma(cycle.omega),
-            });
-        }
+        let (scene, d) = (self.scene, self.scene.dimensionless());
+        let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
+        Search::new(&mut self.run, scene, limit, &mut |_| {}).impacts()?;
+        let cycle = self.cycle()?;
+        self.present = Some(Known {
+            c: cycle.amplitude() / d.b,
+            g: d.excitation(cycle.base.norm()),
+            sigma: d.sigma(cycle.omega),
+        });
         Ok(())
     }
 

@@ -68,7 +68,7 @@ impl TrackedComparison {
         if linear == of {
             return Some(format!(
                 "all {of} points are without impacts (the linear mode): the particle does not reach the walls. Check that it moves freely; give \
-                 it a velocity in [start], or set controller.capture = true"
+                 it a velocity in [start]"
             ));
         }
         (linear + doubtful == of || self.points.iter().any(is_settled)).then(|| {

@@ -2,8 +2,7 @@
 
 use std::f64::consts::TAU;
 
-use super::{Evidence, ExperimentError, PhaseError, Plan, Sample, Stage};
-use crate::identification::{Regime, classify, regime_by_response};
+use super::{Evidence, ExperimentError, PhaseError, Sample, Stage};
 use crate::rig::{Command, Controller, Drive, Fault, LoopState, Rig};
 use crate::scene::Scene;
 
@@ -16,7 +15,7 @@ pub(crate) struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
     pub sample_time: f64,
     pub samples: &'a mut Vec<Sample>,
     /// Samples since the start.
-    taken: usize,
+    pub taken: usize,
     /// Phase of the drive since the start, turns.
     pub periods: f64,
     /// Whether the rig was left with a drive.
@@ -64,17 +63,6 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> Bench<'a, R, C> {
         self.rig.advance(drive, self.sample_time)?;
         self.driven = drive.amplitude != 0.0;
         Ok(())
-    }
-
-    /// Whether the last samples, as many as those of the hold, are neither those of a 1:1 motion nor of the linear mode.
-    pub fn is_irregular(&self, plan: &Plan, command: &Command) -> bool {
-        let last = &self.samples[self.samples.len().saturating_sub(plan.hold)..];
-        let Drive { omega, amplitude, .. } = command.drive;
-        let regime = match classify(last, self.sample_time, omega).1 {
-            Regime::Unknown => regime_by_response(last, plan.scene, amplitude, omega),
-            told => told,
-        };
-        command.state != Some(LoopState::Capturing) && regime == Regime::Other
     }
 
     /// Follows the controller's ramp after a fault until the drive is off.

@@ -273,4 +273,8 @@ impl Controller for FaultyController {
     fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
         self.controller.hold_response(to, phase_target)
     }
+
+    fn hold_drive(&mut self) -> Result<(), ControllerError> {
+        self.controller.hold_drive()
+    }
 }

@@ -52,4 +52,9 @@ impl Controller for BuiltIn {
         self.lock.retune(self.lock.config().amplitude, phase_target)?;
         Ok(self.lock.hold_response(&mut self.state, to)?)
     }
+
+    fn hold_drive(&mut self) -> Result<(), ControllerError> {
+        self.lock.hold_drive(&mut self.state);
+        Ok(())
+    }
 }

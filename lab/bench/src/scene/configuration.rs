@@ -8,7 +8,6 @@ use serde::Serialize;
 use vines_model::orbit::phase_resonant;
 
 use super::{Resonance, Scene, Sensor, plant::symbols};
-use crate::advice;
 
 /// The phase of the response relative to the reference that a lock holds.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -80,7 +79,6 @@ impl Scene {
         let c = &self.controller;
         let period = d.natural_period();
         let damping = 0.5 * d.epsilon * d.lambda;
-        let approach_gain = c.approach_gain.unwrap_or_else(|| approach_gain(damping));
         // Without periods or without a drive, steps.
         let rate = |amplitude: f64, periods: f64| {
             Some(amplitude / (periods * period)).filter(|rate| *rate > 0.0 && rate.is_finite())
@@ -114,19 +112,16 @@ impl Scene {
             signal_timeout: c.silence_periods.map(|periods| periods * period),
             residual_max: c.residual_max.unwrap_or_else(|| Some(self.residual())),
             reference_connected: self.chain.reference,
-            approach_gain,
-            capture_response: self.captures().then_some(CAPTURE * d.b),
-            captured_max: self.captured_max().map(|c| c * d.b),
-            lock: self.lock_criterion(approach_gain),
+            lock: self.lock_criterion(),
             ..defaults
         })
     }
 
     /// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.
-    fn lock_criterion(&self, approach_gain: f64) -> LockCriterion {
+    fn lock_criterion(&self) -> LockCriterion {
         let d = self.dimensionless();
         let c = &self.controller;
-        let approached = PI * d.epsilon * d.lambda.max(LAMBDA_MIN) * (1.0 + approach_gain);
+        let approached = PI * d.epsilon * d.lambda.max(LAMBDA_MIN);
         let defaults = LockCriterion::default();
         LockCriterion {
             phase_tolerance: c.phase_tolerance.to_radians(),
@@ -160,21 +155,7 @@ impl Scene {
 
     /// Drive, base amplitude over `b epsilon`, that holds the linear mode at the amplitude at which impacts certainly occur.
     pub fn impact_drive(&self) -> f64 {
-        CAPTURE * self.dimensionless().lambda
-    }
-
-    /// Whether the controller captures a motion with impacts before it goes to the requested drive: as set, or where everything
-    /// is at rest at the start.
-    pub fn captures(&self) -> bool {
-        let State { dq1, dq2, .. } = self.start;
-        self.controller.capture.unwrap_or(dq1 == 0.0 && dq2 == 0.0)
-    }
-
-    /// Largest response amplitude over b of a stable symmetric 1:1 motion, where such a motion of this drive is to be captured.
-    fn captured_max(&self) -> Option<f64> {
-        let d = self.dimensionless();
-        let exists = self.captures() && phase_resonant(&d).iter().any(|orbit| orbit.stable);
-        exists.then(|| advice::largest_stable(&d)).flatten()
+        IMPACTS * self.dimensionless().lambda
     }
 
     /// Natural periods in which the amplitude of the linear mode falls by a factor of e.
@@ -198,8 +179,6 @@ impl Scene {
         Config {
             amplitude_max: Some(d.amplitude(self.backbone.g_max.min(self.controller.g_max.unwrap_or(f64::INFINITY)))),
             bandwidth: self.backbone.bandwidth.min(self.coupled_bandwidth()) * d.omega0,
-            // The amplitude loop takes over as soon as the phase is near resonance.
-            approach_gain: 0.0,
             phase_target: self.controller.phase_target_radians(),
             ..self.controller_config()
         }
@@ -224,10 +203,4 @@ const LAMBDA_MIN: f64 = 0.01;
 /// Share of the amplitude by which a reading may differ from its prediction: a resonant response changes slowly.
 const RESIDUAL: f64 = 0.3;
 /// Response amplitude over b at which impacts certainly occur: a particle at rest in the middle is hit at 1.
-const CAPTURE: f64 = 1.1;
-
-/// Gain of the approach for a structure whose damping rate is `damping`, in units of omega0. A light damping leaves more to gain,
-/// but a large gain amplifies noise: the rate of the approach is the geometric mean of the damping rate and of 0.06 omega0.
-fn approach_gain(damping: f64) -> f64 {
-    ((0.06 / damping).sqrt() - 1.0).clamp(0.0, 30.0)
-}
+const IMPACTS: f64 = 1.1;

@@ -56,10 +56,6 @@ pub struct Controller {
     /// default 0.3, and for an accelerometer what an impact adds.
     #[serde(deserialize_with = "given")]
     pub residual_max: Option<Option<f64>>,
-    /// How much faster than under a constant drive the response approaches its steady state; by default from the damping.
-    pub approach_gain: Option<f64>,
-    /// Whether the response first rises until impacts begin; by default where the start is at rest.
-    pub capture: Option<bool>,
     /// Delay of the rig from the drive to the sensors, samples, in addition to that of `[chain]`; used where no sensor reads the base.
     pub delay: f64,
 }
@@ -84,8 +80,6 @@ impl Default for Controller {
             omega_rate: None,
             silence_periods: Some(20.0),
             residual_max: None,
-            approach_gain: None,
-            capture: None,
             delay: 0.0,
         }
     }
@@ -154,11 +148,10 @@ impl Controller {
 
     fn check_limits(&self) -> Result<(), SceneError> {
         let periods = "(natural periods)";
-        let (ramp, approach_gain) = (self.ramp_periods.unwrap_or(0.0), self.approach_gain.unwrap_or(0.0));
+        let ramp = self.ramp_periods.unwrap_or(0.0);
         for (key, value, unit) in [
             ("controller.ramp_periods", ramp, periods),
             ("controller.release_periods", self.release_periods, periods),
-            ("controller.approach_gain", approach_gain, "(relative)"),
             ("controller.delay", self.delay, "samples"),
         ] {
             Quantity::new(key, value, unit).not_negative()?;

@@ -6,7 +6,7 @@ use toml::{Table, Value};
 use vines_model::ArgumentError;
 
 /// The parameters that other keys of a scene set, in units that suit any plant.
-pub const KEYS: [(&str, &str); 23] = [
+pub const KEYS: [(&str, &str); 21] = [
     ("sample_time", "controller.samples_per_period"),
     ("omega_start", "controller.omega_start"),
     ("omega_min", "controller.omega_min"),
@@ -28,8 +28,6 @@ pub const KEYS: [(&str, &str); 23] = [
     ("signal_timeout", "controller.silence_periods"),
     ("residual_max", "controller.residual_max"),
     ("reference_connected", "chain.reference"),
-    ("approach_gain", "controller.approach_gain"),
-    ("capture_response", "controller.capture"),
 ];
 
 /// The key of the scene that sets a parameter of the controller.

@@ -100,13 +100,6 @@ impl Sections {
             measured: None,
         };
         scene.controller.check()?;
-        let needed = scene.impact_drive();
-        Quantity::new("controller.G_max", scene.g_max(), "(over b epsilon)").check(
-            !scene.captures() || scene.g_max() >= needed,
-            format!(
-                "must be at least {needed:.3}: from rest, impacts begin only there; or set controller.capture = false"
-            ),
-        )?;
         scene.record.check(&scene.controller, scene.lock_periods())?;
         scene.backbone.check(&scene.controller)?;
         scene.chain.check(&scene.controller)?;

@@ -83,7 +83,7 @@ fn serve(
     let thread = std::thread::spawn(move || {
         let stop = || flag.load(Ordering::Relaxed) || Instant::now() >= end;
         let tell = |session: &Session| list.lock().unwrap().push(session.clone());
-        server.serve(|_| Ok(make()), stop, tell).unwrap();
+        server.serve(|| Ok(make()), stop, tell).unwrap();
     });
     Served { address, stop, sessions, thread: Some(thread) }
 }

@@ -40,8 +40,7 @@ fn beside_a_rig_in_real_time_the_last_answer_replaces_a_late_one_and_no_reading_
     let (scene, asked) = (scene(&[]), Arc::default());
     let (log, late) = (Arc::clone(&asked), Duration::from_millis(5));
     let server = serve_controller(&scene, PATIENT, move || Box::new(Echo(Arc::clone(&log), late)));
-    let mut peer =
-        NetController::connect(socket(server.address), scene.sample_time(), Some(PATIENT), false, None).unwrap();
+    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), Some(PATIENT), None).unwrap();
     let answers: Vec<Command> = (0..200).map(|n| peer.sample(reading(n), true).unwrap()).collect();
     println!("{}", peer.counters());
     assert!(peer.counters().held >= 15);
@@ -67,7 +66,7 @@ fn a_controller_that_stops_answering_is_a_permanent_error() {
     for pace in [None, Some(0.2)] {
         let stuck = Duration::from_secs(1);
         let server = serve_controller(&scene, 0.3, move || Box::new(Echo(Arc::default(), stuck)));
-        let mut peer = NetController::connect(socket(server.address), scene.sample_time(), pace, false, None).unwrap();
+        let mut peer = NetController::connect(socket(server.address), scene.sample_time(), pace, None).unwrap();
         let error = (0..5000).find_map(|n| peer.sample(reading(n), true).err()).unwrap();
         let Some(LinkError::Silent { .. }) = error.cause::<LinkError>() else {
             panic!("{error}");
@@ -89,7 +88,7 @@ impl Controller for Broken {
 fn an_answer_that_is_not_finite_is_an_error() {
     let scene = scene(&[]);
     let server = serve_controller(&scene, PATIENT, || Box::new(Broken));
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, false, None).unwrap();
+    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
     let error = peer.sample(reading(0), true).unwrap_err();
     assert!(matches!(error.cause(), Some(LinkError::Invalid { .. })), "{error}");
 }
@@ -98,7 +97,7 @@ fn an_answer_that_is_not_finite_is_an_error() {
 fn a_client_that_was_silent_for_too_long_gets_no_drive() {
     let scene = scene(&[]);
     let server = serve_controller(&scene, 0.2, || Box::new(Echo(Arc::default(), Duration::ZERO)));
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, false, None).unwrap();
+    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
     peer.sample(reading(0), true).unwrap();
     assert_eq!(server.sessions(1)[0].ended, Ended::Silence);
     let error = peer.sample(reading(1), true).unwrap_err();
@@ -134,7 +133,7 @@ fn the_response_is_controlled_across_the_network_with_the_same_bits() {
     let scene = scene(&["phase_lock.harmonics=4", "phase_lock.base_bandwidth=0.5"]);
     let config = scene.controller_config();
     let server = serve_controller(&scene, PATIENT, move || Box::new(BuiltIn::new(&config).unwrap()));
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, false, None).unwrap();
+    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
     let far = moved(&scene, &mut peer, 4000);
     let near = moved(&scene, &mut BuiltIn::new(&config).unwrap(), 4000);
     assert_eq!(far, near);
@@ -147,7 +146,7 @@ fn a_move_that_the_controller_cannot_make_ends_the_session_with_the_reason() {
     let scene = scene(&[]);
     let config = scene.controller_config();
     let server = serve_controller(&scene, PATIENT, move || Box::new(BuiltIn::new(&config).unwrap()));
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, false, None).unwrap();
+    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
     peer.sample(reading(0), false).unwrap();
     peer.hold_response(Move::default(), 0.0).unwrap();
     let error = peer.sample(reading(1), false).unwrap_err();
@@ -156,7 +155,7 @@ fn a_move_that_the_controller_cannot_make_ends_the_session_with_the_reason() {
         "{error}"
     );
     // The loop is open.
-    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, false, None).unwrap();
+    let mut peer = NetController::connect(socket(server.address), scene.sample_time(), None, None).unwrap();
     peer.sample(reading(0), false).unwrap();
     peer.hold_response(Move { response: 0.1, ..Move::default() }, 0.0)
         .unwrap();

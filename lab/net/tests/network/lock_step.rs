@@ -26,8 +26,7 @@ fn an_experiment_across_the_network_gives_the_same_bits() {
     let sample_time = scene.sample_time();
     {
         let mut rig = NetRig::connect(rig_server.address, sample_time, None).unwrap();
-        let mut peer =
-            NetController::connect(socket(controller_server.address), sample_time, None, false, None).unwrap();
+        let mut peer = NetController::connect(socket(controller_server.address), sample_time, None, None).unwrap();
         assert_eq!(rig.pace(), None);
         assert_eq!(measure(&scene, &mut rig, &mut peer), direct);
     }

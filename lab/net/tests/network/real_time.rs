@@ -324,14 +324,8 @@ fn a_controller_that_stops_answering_ramps_the_drive_of_the_rig_down() {
     let stuck = StopsAt(200);
     let controller_server = serve_controller(&scene, 10.0, move || Box::new(stuck));
     let mut rig = NetRig::connect(rig_server.address, scene.sample_time(), None).unwrap();
-    let mut peer = NetController::connect(
-        socket(controller_server.address),
-        scene.sample_time(),
-        Some(0.5),
-        false,
-        None,
-    )
-    .unwrap();
+    let mut peer =
+        NetController::connect(socket(controller_server.address), scene.sample_time(), Some(0.5), None).unwrap();
     let outcome = experiment::run(&mut rig, &mut peer, &Plan::of(&scene), |_, _, _| {});
     let Err(ExperimentError::Controller(error)) = outcome else {
         panic!("{outcome:?}");

@@ -24,7 +24,7 @@ fn a_missing_server_is_reported_with_the_command_that_starts_it() {
             "vines rig --lock-step --listen",
         ),
         (
-            NetController::connect(place, 1e-3, None, false, None).unwrap_err(),
+            NetController::connect(place, 1e-3, None, None).unwrap_err(),
             "vines controller --listen",
         ),
     ] {
@@ -84,7 +84,7 @@ fn a_rig_is_not_accepted_as_a_controller_nor_the_reverse() {
     let sample_time = scene.sample_time();
     let error = NetRig::connect(peer.address, sample_time, None).unwrap_err();
     assert_eq!(refused(&error), Refusal::Role);
-    let error = NetController::connect(socket(rig.address), sample_time, None, false, None).unwrap_err();
+    let error = NetController::connect(socket(rig.address), sample_time, None, None).unwrap_err();
     assert_eq!(refused(&error), Refusal::Role);
 }
 
