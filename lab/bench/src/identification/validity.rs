@@ -7,8 +7,8 @@ use vines_model::numerics::standard_deviation;
 
 /// Standard uncertainties of the phase that count as noise.
 const RANDOM: f64 = 3.0;
-/// Share of a free response that is left after two periods at least: impacts and damping take less than half in each (G_imp
-/// pi epsilon/C is 0.4 at epsilon = 0.05, C = 0.5).
+/// Share of a free response that is left after two periods at least. Impacts take the share pi epsilon G_imp/C in each, with
+/// G_imp = (4/pi) R B^2/C: 0.14 at epsilon = 0.05, r = 0.65, C = 0.5.
 const LEFT: f64 = 0.1;
 /// Steps of a converter below which the scatter of a response says nothing.
 const STEPS: f64 = 8.0;
