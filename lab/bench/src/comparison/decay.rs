@@ -35,7 +35,13 @@ pub(super) fn predicted(orbit: &Orbit, scene: &Scene, samples: usize) -> Vec<Dec
     };
     // The first sample stands for the hold, which gives the frequency at the release.
     let samples = (0..samples + 1).map_while(&mut sample).collect();
-    let record = Record { sample_time: step, samples, settled: 0, released: 1, held: false };
+    let record = Record {
+        sample_time: step,
+        samples,
+        settled: 0,
+        released: 1,
+        held: false,
+    };
     decay_points(&record, scene).points
 }
 
