@@ -48,7 +48,7 @@ fn run(command: &str, wiring: Wiring) -> (Option<i32>, String, f64) {
     let (seen, stop) = (Arc::clone(&largest), Arc::clone(&ended));
     let plant = Simulated::new(scene.plant, scene.start).unwrap();
     let thread = std::thread::spawn(move || {
-        let make = |_| {
+        let make = || {
             let (plant, largest) = (plant.clone(), Arc::clone(&seen));
             Ok(Served::Rig(Box::new(Wired { plant, wiring, largest })))
         };
