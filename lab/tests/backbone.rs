@@ -141,7 +141,6 @@ fn beyond_symmetry_breaking_both_ways_of_telling_the_regime_say_so() {
 fn the_response_alone_distinguishes_the_linear_mode_from_the_impacting_one() {
     let report = tracked(&[
         "start.dq2=0",
-        "controller.capture=false",
         "backbone.C_from=0.6",
         "backbone.C_to=0.5",
         "backbone.points=2",

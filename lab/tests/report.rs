@@ -121,7 +121,7 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
 #[test]
 fn a_scene_that_locks_nothing_gets_an_honest_report() {
     // From rest and without a capture, nothing ever hits: the loop locks the linear mode.
-    let subject = subject(&["start.dq2=0", "controller.capture=false"]);
+    let subject = subject(&["start.dq2=0"]);
     let (name, make) = SECTIONS[0];
     assert_eq!(name, "experiment");
     let section = make(&subject, &|_| {}).unwrap();

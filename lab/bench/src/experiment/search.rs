@@ -246,9 +246,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 // A change may disturb the symmetry for a while.
                 self.leg(self.setpoint, SHORTEST, 0.0)?
             } else if change.abs() < largest {
-                // A smooth move is twice as fast in its middle.
-                let periods = self.periods(2.0 * change, seen.holding).max(0.5 * SHORTEST);
-                self.leg(self.setpoint + change, periods.ceil(), 0.0)?;
+                let periods = self.periods(change, seen.holding).max(SHORTEST);
+                self.leg(self.setpoint + change, (0.5 * periods).ceil(), 0.0)?;
                 self.hold(backbone.slope().unwrap_or_default())?
             } else {
                 self.sweep(&seen, change.clamp(-largest, largest), slower)?

@@ -57,7 +57,7 @@ impl Target {
         let (flag, known) = (Arc::clone(&stop), Arc::clone(&sent));
         let thread = thread::spawn(move || {
             let mut refused = 0;
-            let make = |_| Ok(Served::Rig(Box::new(Oracle(Arc::clone(&known)))));
+            let make = || Ok(Served::Rig(Box::new(Oracle(Arc::clone(&known)))));
             let stop = || flag.load(Ordering::Relaxed);
             let tell = |session: &vines_net::Session| {
                 refused += session.counters.map_or(0, |all| all.malformed + all.foreign + all.late);
