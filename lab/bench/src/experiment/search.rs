@@ -210,7 +210,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let damping = self.linear.damping_rate / self.gain();
         let spare = SHARE * self.gain() * (largest - (1.0 + DRAWING) * self.b * damping);
         let most = (self.b / (RISE * self.period)).min(spare);
-        while !seen.symmetric && !(seen.departed && seen.response > (1.0 - DRAWING) * self.b) {
+        while !(seen.symmetric || seen.departed && seen.response > (1.0 - DRAWING) * self.b) {
             let rate = most.min(GROWTH * seen.last / self.period);
             let to = self.setpoint + rate * RISE_LEG * self.period;
             if to > UNREACHED * self.b || rate <= 0.0 {
