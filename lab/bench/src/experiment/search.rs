@@ -64,6 +64,10 @@ const LONGEST: u32 = 6;
 const LOST: f64 = 0.8;
 /// Response over the half-width below which no motion is searched for: the fold is above, up to r = 0.9.
 const LOWEST: f64 = 0.05;
+/// Legs with nearly the requested drive, relative, after which the constant drive is left to settle by itself: where the holding drive
+/// hardly depends on the amplitude, the interpolation does not converge.
+const NEARLY: f64 = 0.01;
+const PATIENCE: u32 = 20;
 /// Searches, each twice as slow as the one before.
 const SEARCHES: u32 = 4;
 
@@ -231,7 +235,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let mut rising = seen.holding < self.asked;
         // Whether the requested drive may be above, and whether a larger one was seen.
         let (mut upwards, mut exceeded, mut crossed) = (true, false, false);
-        let mut other = 0;
+        let (mut other, mut legs) = (0, 0);
         loop {
             let largest = STEP / slower * seen.response;
             let ahead = backbone
@@ -283,7 +287,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             if !firm && error < (HELD * tolerance).max(seen.noise) {
                 return Ok(Found::Held);
             }
-            if slope > 0.0 && (firm && error < tolerance || changes < largest && rate * slope > 0.5) {
+            legs += u32::from(missing.abs() < NEARLY * self.asked);
+            let settles = rate * slope > 0.5 || legs > PATIENCE;
+            if slope > 0.0 && (firm && error < tolerance || changes < largest && settles) {
                 if self.hand_over()? {
                     return Ok(Found::Locked);
                 }
