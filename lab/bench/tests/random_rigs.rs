@@ -75,16 +75,6 @@ fn orbits_just_above_the_fold_and_just_below_symmetry_breaking_are_reached() {
             ],
             0.2150,
         ),
-        // The instability under a constant drive is two fifths as fast as the detector.
-        (
-            [
-                "plant.epsilon=0.048343268",
-                "plant.lambda=0.65313184",
-                "plant.r=0.66169063",
-                "excitation.G=0.85939351",
-            ],
-            0.1304,
-        ),
         // The first descent ends far above the orbit, and the response falls past it.
         (
             [
