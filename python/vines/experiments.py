@@ -50,12 +50,13 @@ class Identification(Result):
         The exact phase-resonant orbit nearest to the lock.
     decay : dict of ndarray
         Points along the free decay: tau, C, B, sigma, their standard uncertainties, and at the same C sigma_theory and
-        sigma_exact of steady motions, sigma_slow_flow and sigma_predicted of the decay that theory and the exact plant predict.
+        sigma_exact of steady motions, and sigma_slow_flow and sigma_predicted of the decay that theory and the exact
+        plant predict.
     decay_end : str
         What ended the points.
     rms_sigma_error, rms_sigma_exact, rms_sigma_predicted : float or None
-        RMS of the decay's sigma minus theory, minus the exact backbone, and minus the decay that the exact plant predicts, over
-        C > 0.2.
+        RMS of the decay's sigma minus theory, minus the exact backbone, and minus the decay that the exact plant
+        predicts, over C > 0.2.
     """
 
     lock: dict[str, Any]
