@@ -95,11 +95,11 @@ def check_csv(path: Path, points):
     assert [float(row["C"]) for row in rows] == [point["C"] for point in points]
 
 
-def test_identify_says_so_when_something_else_is_locked(call, tmp_path):
-    done = call("identify", "--set", "start.dq2=0.0", "--out", "results")
+def test_identify_says_so_when_the_drive_is_not_reached(call, tmp_path):
+    done = call("identify", "--set", "start.dq2=0.0", "--set", "excitation.G=0.5", "--out", "results")
     assert done.returncode == 1
     assert done.stderr.startswith("error: ")
-    assert "without impacts" in done.stderr
+    assert "1:1" in done.stderr
     assert not (tmp_path / "results" / "identification.json").exists()
     assert (tmp_path / "results" / "interrupted.csv").read_text().startswith("time,response,")
 

@@ -93,7 +93,7 @@ def test_an_amplitude_above_its_limit_is_refused_before_and_after_the_first_step
 
 
 def test_a_move_that_makes_no_sense_can_be_corrected(instance):
-    controller = instance("PhaseLock").start({"amplitude_max": 4e-4, "signal_timeout": -1})
+    controller = instance("PhaseLock").start({"amplitude_max": 4e-4, "signal_timeout": -1, "residual_max": -1})
     controller.set({"active": True})
     controller.step(0.001, 1000)
     assert controller.get("state") == 2, "acquiring"
