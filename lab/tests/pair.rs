@@ -17,7 +17,7 @@ use vines::rig::{BuiltIn, Controller, Drive, GroundTruth, Move, Rig, RigError, S
 use vines::scene::{Names, PAPER, Scene};
 
 /// The periods that are driven: the default scene locks after about 110.
-const PERIODS: f64 = 140.0;
+const PERIODS: f64 = 1000.0;
 const HOLD_PERIODS: f64 = 20.0;
 
 /// The folder of the libraries of this build: cargo makes them because this package depends on them.

@@ -4,7 +4,7 @@ use std::path::Path;
 use std::process::Command;
 
 use vines::{
-    report::{Block, Report, SECTIONS, Subject, write_report},
+    report::{Report, SECTIONS, Subject, write_report},
     scene::{Override, Scene},
 };
 
@@ -116,19 +116,4 @@ fn a_report_is_complete_reproducible_and_opens_in_a_browser() {
     .unwrap();
     assert!(!console.contains("CONSOLE"), "{console}");
     assert!(std::fs::read(&print).unwrap().starts_with(b"%PDF"));
-}
-
-#[test]
-fn a_scene_that_locks_nothing_gets_an_honest_report() {
-    // From rest and without a capture, nothing ever hits: the loop locks the linear mode.
-    let subject = subject(&["start.dq2=0"]);
-    let (name, make) = SECTIONS[0];
-    assert_eq!(name, "experiment");
-    let section = make(&subject, &|_| {}).unwrap();
-    assert!(
-        section.finding.contains("no backbone") && section.finding.contains("not symmetric 1:1"),
-        "{}",
-        section.finding
-    );
-    assert!(section.blocks.iter().all(|block| matches!(block, Block::Words(_))));
 }

@@ -143,12 +143,13 @@ fn from_rest_the_experiment_reaches_the_symmetric_orbit() {
         found.lock.periods_to_lock
     );
     assert!(sigma.abs() < 1e-3 && c.abs() < 1e-3 && found.lock.regime == Regime::Symmetric);
-    assert!(found.lock.periods_to_lock < 200.0);
+    assert!(found.lock.periods_to_lock < 400.0);
 }
 
 #[test]
 fn the_default_lock_takes_at_most_150_periods() {
-    let found = identified(&[]);
+    let scene = Scene::load(None, &[]).unwrap();
+    let found = Comparison::of(&identify(&measure(&scene), &scene).unwrap(), &scene);
     let exact = found.exact.unwrap();
     assert!(found.lock.periods_to_lock <= 150.0, "{}", found.lock.periods_to_lock);
     assert!((found.lock.sigma - exact.sigma).abs() < 1.2e-4);
@@ -186,9 +187,9 @@ fn a_rig_that_does_not_report_its_impacts_is_identified_from_its_response() {
     assert_eq!(mute.lock.regime, Regime::Symmetric);
     assert!(mute.lock.impacts_per_period.is_nan());
     assert_eq!(mute.lock.sigma, telling.lock.sigma);
-    // The decay ends at the fold, and is the same until there.
+    // The decay ends where the impacts do, below the fold, and is the same until there.
     let fold = 0.134;
-    assert!(mute.decay.iter().all(|one| one.point.c > fold));
+    assert!(mute.decay.iter().all(|one| one.point.c > 0.6 * fold));
     assert_eq!(mute.rms_sigma_error, telling.rms_sigma_error);
     let table = vines::report::summary::identification(&mute);
     assert!(

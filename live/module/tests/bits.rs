@@ -3,7 +3,7 @@
 use vines_live::bench::Bench;
 use vines_live::settings::{default_scene, index};
 use vines_testbench::experiment::{Plan, run};
-use vines_testbench::rig::{BuiltIn, Simulated};
+use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Sensors, Simulated};
 use vines_testbench::scene::{PAPER, Scene};
 
 fn paper() -> Scene {
@@ -15,11 +15,20 @@ fn the_default_scene_is_that_of_the_lab() {
     assert_eq!(default_scene(), paper());
 }
 
+/// The controller under a constant drive: the live bench has no script.
+struct ConstantDrive(BuiltIn);
+
+impl Controller for ConstantDrive {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        self.0.sample(sensors, active)
+    }
+}
+
 #[test]
-fn the_default_lock_has_the_bits_of_the_lab() {
+fn the_default_lock_has_the_bits_of_the_lab_under_a_constant_drive() {
     let scene = paper();
     let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
-    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let mut controller = ConstantDrive(BuiltIn::new(&scene.controller_config()).unwrap());
     let record = run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {}).unwrap();
     let mut bench = Bench::new(Bench::default_settings()).unwrap();
     let mut rows = Vec::new();
