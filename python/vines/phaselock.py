@@ -63,7 +63,7 @@ class PhaseLock:
     --------
     >>> plant, lock = Plant(Scene()), PhaseLock()
     >>> output = lock.sample(0.0, 0.0)
-    >>> for _ in range(20000):
+    >>> for _ in range(100_000):
     ...     events = plant.advance(lock.sample_time, amplitude=output.amplitude, omega=output.omega)
     ...     output = lock.sample(plant.v)
     >>> output.state
