@@ -113,7 +113,7 @@ impl Controller for NetController {
     }
 
     fn hold_drive(&mut self) -> Result<(), ControllerError> {
-        let frame = write_move(self.client.frame(Kind::Move), Move::default(), 0.0);
-        Ok(self.client.send(frame)?)
+        let frame = self.client.frame(Kind::Move);
+        Ok(self.client.send(Frame { flags: flag::HOLD, ..frame })?)
     }
 }

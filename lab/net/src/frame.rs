@@ -55,7 +55,7 @@ pub mod flag {
     pub const GROUND_TRUTH: u8 = 8;
     /// Sensors, from a rig in real time: the drive has been shut down for this session.
     pub const SHUT_DOWN: u8 = 16;
-    /// Drive: the rig holds the displacement, instead of its oscillator with frequency and amplitude.
+    /// Drive: the rig holds the displacement, instead of its oscillator with frequency and amplitude. Move: the control of the response ends.
     pub const HOLD: u8 = 128;
     /// Drive, from a controller: its phase error cannot be measured.
     pub const NO_PHASE: u8 = 32;

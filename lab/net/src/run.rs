@@ -134,9 +134,10 @@ impl Run {
             (Served::Controller(controller), Kind::Move) => {
                 let (to, phase_target) = read_move(frame);
                 // No answer: the next drive follows from it. A refusal ends the session.
-                let held = match to.response {
-                    0.0 => controller.hold_drive(),
-                    _ => controller.hold_response(to, phase_target),
+                let held = if frame.has(flag::HOLD) {
+                    controller.hold_drive()
+                } else {
+                    controller.hold_response(to, phase_target)
                 };
                 Ok(held.map_err(Refusal::from))
             }
