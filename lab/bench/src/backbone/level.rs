@@ -21,8 +21,8 @@ pub struct Criterion {
     pub phase: f64,
     /// Fewest periods of a window.
     pub fewest: usize,
-    /// Slopes of drive and frequency over the amplitude between the points before.
-    pub slopes: Slopes,
+    /// The last two points before, the nearest last: amplitude of the response, m, drive, m, and frequency, rad/s.
+    pub before: [Option<[f64; 3]>; 2],
 }
 
 /// A point of the backbone from a window of periods.
@@ -50,6 +50,8 @@ const RANDOM: f64 = 2.0;
 const LAG: f64 = 1.6;
 /// Largest scatter of the periods about the fit, over the noise of the sensors: chi-square per degree of freedom is then at most 4.
 const EXCESS: f64 = 2.0;
+/// Relative standard uncertainty of the slope of a straight line through two points: away from the fold it changes by less from level to level.
+const SLOPE: f64 = 0.5;
 /// Shares of the periods that are considered, from the last one backwards.
 const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
 
@@ -79,20 +81,38 @@ impl Criterion {
         base.max(omega)
     }
 
+    /// Slopes of drive and frequency over the amplitude at a point: of the parabola through it and the two before, with its distance from the
+    /// line through it and the one before as a part of the uncertainty. `None` for the first point.
+    fn slopes(&self, here: [f64; 3]) -> Option<[Estimate; 2]> {
+        let [before, last] = self.before;
+        let last = last?;
+        let between =
+            |one: [f64; 3], other: [f64; 3]| [1, 2].map(|i| (other[i] - one[i]) / (other[0] - one[0]));
+        let line = between(last, here);
+        let bend = before.map_or([0.0; 2], |before| {
+            let earlier = between(before, last);
+            let ahead = (here[0] - last[0]) / (here[0] - before[0]);
+            [0, 1].map(|i| (line[i] - earlier[i]) * ahead)
+        });
+        let slopes = [0, 1].map(|i| Estimate::new(line[i] + bend[i], &[bend[i], SLOPE * line[i]]));
+        slopes.iter().all(|slope| slope.value.is_finite()).then_some(slopes)
+    }
+
     /// The point of a window.
     fn of(&self, cycles: &[Cycle]) -> Option<Found> {
-        let fit = |cycles: &[Cycle]| Balance::of(cycles, &self.linear, self.phase, self.slopes);
+        let fit = |cycles: &[Cycle], slopes| Balance::of(cycles, &self.linear, self.phase, slopes);
+        let whole = fit(cycles, Slopes::Unknown)?;
+        let [base, omega] = whole.at(0.0).map(|one| one.value);
+        let known = self.slopes([whole.response.value, base, omega]);
+        let slopes = known.map_or(Slopes::Unknown, Slopes::Known);
         let (first, second) = cycles.split_at(cycles.len() / 2);
-        let (whole, first, second) = (fit(cycles)?, fit(first)?, fit(second)?);
+        let (whole, first, second) = (fit(cycles, slopes)?, fit(first, slopes)?, fit(second, slopes)?);
         let amplitude = whole.response.value;
         let [first, second] = [first, second].map(|half| half.at(amplitude - half.response.value));
         let (estimates, own) = (whole.at(0.0), whole.slopes());
         let slope = |i: usize| {
-            let before = match self.slopes {
-                Slopes::Known(slopes) => slopes[i].value.abs(),
-                _ => 0.0,
-            };
-            own[i].value.abs().max(before).hypot(own[i].uncertainty)
+            let known = known.map_or(0.0, |slopes| slopes[i].value.abs());
+            own[i].value.abs().max(known).hypot(own[i].uncertainty)
         };
         // What is not noise belongs to the force of the impacts, a phasor: what is seen of it in one balance may be in the other, too.
         let (units, change) = ([1.0, amplitude / whole.gain], LAG * whole.change);

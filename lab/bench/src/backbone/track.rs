@@ -8,7 +8,7 @@ use super::level::{Criterion, Found};
 use super::peak;
 use super::point::{Known, Point, Tracked};
 use crate::experiment::{self, ExperimentError, Sample, Search, Stage};
-use crate::identification::{Cycle, Regime, Slopes, classify, regime_by_response};
+use crate::identification::{Cycle, Regime, classify, regime_by_response};
 use crate::rig::{Controller, Move, Rig};
 use crate::scene::Scene;
 
@@ -22,8 +22,6 @@ const CONFIRMED: usize = 3;
 const MOVE_SHARE: f64 = 0.8;
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
-/// Relative standard uncertainty of the slope between the two points before: away from the fold it changes by less from level to level.
-const SLOPE: f64 = 0.5;
 
 /// Rig and controller, read period by period.
 struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
@@ -245,12 +243,10 @@ impl Order<'_> {
         } else {
             1.0
         };
-        let slopes = slopes(self.known, self.level).map_or(Slopes::Unknown, |[g, sigma]| {
-            Slopes::Known([
-                g.scaled(d.amplitude(1.0) / d.b),
-                sigma.scaled(d.omega_change(1.0) / d.b),
-            ])
-        });
+        let before = |back: usize| {
+            let Known { c, g, sigma } = *self.known.iter().nth_back(back)?;
+            Some([c * d.b, d.amplitude(g), d.omega(sigma)])
+        };
         Criterion {
             linear: scene.linear(),
             precision: [
@@ -259,7 +255,7 @@ impl Order<'_> {
             ],
             fewest: settings.dwell_min as usize,
             phase: self.phase,
-            slopes,
+            before: [before(1), before(0)],
         }
     }
 
@@ -272,27 +268,6 @@ impl Order<'_> {
 
 fn is_one_to_one(regime: Regime) -> bool {
     matches!(regime, Regime::Symmetric | Regime::Unresolved)
-}
-
-/// Slopes of drive and detuning over C at the level `c`: of the parabola through the last three points, with its distance from the line through
-/// the last two as a part of the uncertainty. `None` for fewer than two.
-fn slopes(known: &[Known], c: f64) -> Option<[Estimate; 2]> {
-    let [.., before, last] = known else { return None };
-    let between = |one: &Known, other: &Known| {
-        let step = other.c - one.c;
-        [(other.g - one.g) / step, (other.sigma - one.sigma) / step]
-    };
-    let line = between(before, last);
-    let bend = match known {
-        [.., first, before, last] => {
-            let earlier = between(first, before);
-            let ahead = (c - 0.5 * (before.c + last.c)) / (0.5 * (last.c - first.c));
-            [0, 1].map(|i| (line[i] - earlier[i]) * ahead)
-        }
-        _ => [0.0; 2],
-    };
-    let slopes = [0, 1].map(|i| Estimate::new(line[i] + bend[i], &[bend[i], SLOPE * line[i]]));
-    slopes.iter().all(|slope| slope.value.is_finite()).then_some(slopes)
 }
 
 /// Drive and detuning at the level `c`, on the polynomial through the last points, three at most; `None` without any.
