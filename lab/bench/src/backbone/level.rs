@@ -86,8 +86,7 @@ impl Criterion {
     fn slopes(&self, here: [f64; 3]) -> Option<[Estimate; 2]> {
         let [before, last] = self.before;
         let last = last?;
-        let between =
-            |one: [f64; 3], other: [f64; 3]| [1, 2].map(|i| (other[i] - one[i]) / (other[0] - one[0]));
+        let between = |one: [f64; 3], other: [f64; 3]| [1, 2].map(|i| (other[i] - one[i]) / (other[0] - one[0]));
         let line = between(last, here);
         let bend = before.map_or([0.0; 2], |before| {
             let earlier = between(before, last);
