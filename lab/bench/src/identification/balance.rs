@@ -193,13 +193,13 @@ struct Motion {
 /// Over one period from the phase 0 on, a drift z' of the complex amplitude per radian changes the fitted amplitude by
 /// -i conj(z')/2.
 fn motion(cycles: &[Cycle]) -> Vec<Motion> {
-    let mut before = cycles[0].response[0];
+    let mut before = cycles[0].response;
     let mut turned = before.arg();
     let phases: Vec<f64> = cycles
         .iter()
         .map(|cycle| {
-            turned += (cycle.response[0] * before.conj()).arg();
-            before = cycle.response[0];
+            turned += (cycle.response * before.conj()).arg();
+            before = cycle.response;
             cycle.drive_phase + turned
         })
         .collect();
@@ -212,7 +212,7 @@ fn motion(cycles: &[Cycle]) -> Vec<Motion> {
             let amplitude = cycles[n].amplitude();
             // The frequency of the drive may jump from period to period; that of the response does not.
             let turning = amplitude * ((phases[to] - phases[from]) / time - 1.0);
-            let z = cycles[n].response[0];
+            let z = cycles[n].response;
             let drift = Complex::new(growth, turning) * z / amplitude;
             let correction = Complex::new(0.0, 0.5) * drift.conj() / z;
             Motion {
@@ -259,7 +259,7 @@ fn total(cycles: &[Cycle], value: fn(&Cycle) -> f64) -> f64 {
 
 fn drives(cycles: &[Cycle], motion: &[Motion], calibration: f64) -> Vec<Drive> {
     let relative = |cycle: &Cycle| {
-        let turned = cycle.response[0] * cycle.commanded[0].conj();
+        let turned = cycle.response * cycle.commanded[0].conj();
         turned / turned.norm()
     };
     // Target phase, and phase of the base relative to the command.
