@@ -14,9 +14,10 @@
 
 use std::f64::consts::TAU;
 
-use vines_model::numerics::mean;
+use nalgebra::DVector;
+use vines_model::numerics::{HarmonicBasis, mean, noise};
 
-use super::{Bench, ExperimentError, Stage};
+use super::{Bench, ExperimentError, Sample, Stage};
 use crate::identification::{Balance, Cycle, Slopes};
 use crate::rig::{Command, Controller, ControllerError, LoopState, Move, Rig};
 use crate::scene::{LinearResponse, Scene};
@@ -37,6 +38,8 @@ const DRAWING: f64 = 0.1;
 const UNREACHED: f64 = 1.5;
 /// Response over the half-width below which no motion is searched for: the fold is above, up to r = 0.9.
 const LOWEST: f64 = 0.05;
+/// Fall of the response, from where the symmetry was lost, after which the motion is lost: its stable range is wider.
+const LOST: f64 = 0.8;
 /// Departure from the linear response that shows impacts, as a share of the drive: twice the uncertainty of damping and stiffness.
 const DEPARTURE: f64 = 0.2;
 /// Largest amplitude of the second harmonic of a symmetric motion over that of the third: 0.1 is found where it is symmetric, from 2 on
@@ -173,12 +176,12 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             }
             seen = self.leg(seen.last + change - self.setpoint, LEG, rate)?;
         }
-        self.fall(seen, step)
+        self.fall(seen, step, LOWEST * self.b)
     }
 
-    /// Lowers the response until the motion is symmetric.
-    fn fall(&mut self, mut seen: Leg, step: f64) -> Result<Leg, ExperimentError> {
-        while !seen.symmetric && seen.departed && self.setpoint > LOWEST * self.b {
+    /// Lowers the response until the motion is symmetric, but not below `lowest`, m.
+    fn fall(&mut self, mut seen: Leg, step: f64, lowest: f64) -> Result<Leg, ExperimentError> {
+        while !seen.symmetric && seen.departed && self.setpoint > lowest {
             seen = self.sweep(&seen, -step * seen.last)?;
         }
         Ok(seen)
@@ -207,9 +210,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 // A change may disturb the symmetry for a while.
                 *seen = self.leg(0.0, LEG, 0.0)?;
             }
-            if !seen.symmetric && way > 0.0 {
+            if !seen.symmetric {
                 // Above the symmetric motion, the way is down.
-                *seen = self.fall(*seen, step)?;
+                *seen = self.fall(*seen, step, LOST * seen.response)?;
                 (known, way, passed) = (Known::from(*seen), -step, false);
                 continue;
             }
@@ -226,7 +229,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 if self.settle(seen)? {
                     return Ok(Some(!firm));
                 }
-                *seen = self.fall(*seen, step)?;
+                *seen = self.fall(*seen, step, LOST * seen.response)?;
             }
         }
         Ok(None)
@@ -285,9 +288,18 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Measures over so many periods, or until the lock has settled.
     fn measure(&mut self, periods: usize) -> Result<Leg, ExperimentError> {
-        let mut all: Vec<Cycle> = Vec::new();
+        let (mut all, mut harmonics) = (Vec::new(), Vec::new());
         let fit = loop {
-            all.extend(self.one_period()?);
+            let begin = self.bench.samples.len();
+            if let Some(cycle) = self.one_period()? {
+                // Two periods tell the harmonics from a drift of the fundamental.
+                let two = (2 * begin).saturating_sub(self.bench.samples.len());
+                harmonics.extend(even_and_odd(
+                    &self.bench.samples[two..],
+                    self.bench.sample_time * cycle.omega,
+                ));
+                all.push(cycle);
+            }
             if all.len() >= periods || self.last.settled {
                 if let Some(fit) = Balance::of(&all, &self.linear, 0.0, Slopes::Unknown) {
                     break fit;
@@ -300,12 +312,12 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let detuning = 2.0 * response * (omega.value / self.linear.omega0 - 1.0);
         let departure = (drive.value - linear).hypot(detuning);
         let departed = departure > (DEPARTURE * linear.max(drive.value)).max(SIGNIFICANT * drive.uncertainty);
-        // Noise gives a harmonic the mean square 2 s², which scatters as much.
-        let n = all.len() as f64;
-        let noise = 2.0 * mean(all.iter().map(|one| one.noise[0]));
-        let [even, odd] = [0, 1].map(|k| mean(all.iter().map(|one| one.harmonics[k].norm_sqr())) - noise);
-        let doubtful = SIGNIFICANT * noise / n.sqrt();
-        let symmetric = departed && even <= (SYMMETRIC * SYMMETRIC * odd).max(doubtful);
+        // Noise itself scatters by a share of sqrt(2/n): each window has half of the next one.
+        let [even, odd, noise] = [0, 1, 2].map(|k| mean(harmonics.iter().map(|squares: &[f64; 3]| squares[k])));
+        let (even, odd) = (even - noise, odd - noise);
+        let doubtful = SIGNIFICANT * noise / (0.5 * all.len() as f64).sqrt();
+        let symmetric =
+            departed && self.setpoint > LOWEST * self.b && even <= (SYMMETRIC * SYMMETRIC * odd).max(doubtful);
         if symmetric {
             let point = [response, drive.value];
             let [least, most] = self.extremes.unwrap_or([point, point]);
@@ -356,6 +368,17 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         };
         ExperimentError::NotReached { periods: self.bench.periods, g: d.g, why }
     }
+}
+
+/// Squares of the second and the third harmonic of the response, m², and their mean by noise; `step` is the phase between two samples, rad.
+fn even_and_odd(samples: &[Sample], step: f64) -> Option<[f64; 3]> {
+    let phases: Vec<f64> = (0..samples.len()).map(|n| n as f64 * step).collect();
+    let basis = HarmonicBasis::new(&phases, 0, &[Some(2), Some(0), Some(0), Some(0), Some(0)]);
+    let values = DVector::from_iterator(samples.len(), samples.iter().map(|one| one.sensors.response));
+    let fit = basis.fit(&values)?;
+    let rest = noise(basis.residual(&values, &fit).as_slice());
+    let [even, odd] = [2, 3].map(|n| fit.harmonic(n).norm_sqr());
+    Some([even, odd, rest * rest * 4.0 / samples.len() as f64])
 }
 
 /// The last points of the backbone, at most three.

@@ -20,8 +20,6 @@ pub struct Cycle {
     pub commanded: [Complex<f64>; 2],
     /// Fundamental of the response relative to the drive's phase, m: `Im a exp(i phase)`.
     pub response: Complex<f64>,
-    /// Its second and third harmonic, m, without the influence of a drift of the fundamental.
-    pub harmonics: [Complex<f64>; 2],
     /// Fundamental of the base, m: measured if a sensor reads it, otherwise commanded.
     pub base: Complex<f64>,
     /// Phase error, rad: response minus base minus target.
@@ -57,20 +55,14 @@ impl Cycle {
         // A change of the amplitude within the period is not noise.
         let drifting = HarmonicBasis::new(&uniform, 0, &[Some(1), Some(0), Some(0)]);
         let degrees = (samples.len() - TERMS) as f64;
-        // Harmonics above the third would be taken for lower ones.
-        let five = HarmonicBasis::new(&uniform, 0, &[Some(1), Some(0), Some(0), Some(0), Some(0)]);
         let fitted = |value: fn(&Sample) -> f64| {
             let values = DVector::from_iterator(samples.len(), samples.iter().map(value));
             let fit = basis.fit(&values)?;
-            let with_drift = drifting.fit(&values)?;
-            let variance = drifting.residual(&values, &with_drift).norm_squared() / degrees;
-            Some((
-                fit.harmonic(1),
-                five.fit(&values)?,
-                variance * 2.0 / samples.len() as f64,
-            ))
+            let residual = drifting.residual(&values, &drifting.fit(&values)?);
+            let variance = residual.norm_squared() / degrees;
+            Some((fit.harmonic(1), variance * 2.0 / samples.len() as f64))
         };
-        let (response, with_drift, noise) = fitted(|s| s.sensors.response)?;
+        let (response, noise) = fitted(|s| s.sensors.response)?;
         let mean = |value: fn(&Sample) -> f64| mean(samples.iter().map(value));
         // The amplitude commanded at a sample begins there; a sensor reads what the one before left.
         let before = |n: usize| samples[n.saturating_sub(1)].command.drive.amplitude;
@@ -80,7 +72,7 @@ impl Cycle {
         let as_read = basis.fit(&motion(&before))?.harmonic(1);
         let measured = samples.iter().all(|s| s.sensors.reference.is_some());
         let (base, base_noise) = if measured {
-            let (base, _, noise) = fitted(|s| s.sensors.reference.unwrap_or(0.0))?;
+            let (base, noise) = fitted(|s| s.sensors.reference.unwrap_or(0.0))?;
             (base * commanded.harmonic(1) / as_read, noise)
         } else {
             (Complex::new(mean(|s| s.command.drive.amplitude), 0.0), 0.0)
@@ -97,7 +89,6 @@ impl Cycle {
             drive_phase,
             omega: mean_omega,
             response,
-            harmonics: [2, 3].map(|n| with_drift.harmonic(n)),
             base,
             phase_error,
             noise: [noise, base_noise],
