@@ -220,9 +220,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             let Some(slope) = known.slope() else { continue };
             let scale = (slope.abs() * seen.response).clamp(FIRM * self.asked, self.asked);
             let found = (self.asked - seen.drive).abs() < (FOUND * scale).max(seen.noise);
-            if found || legs == LEGS {
-                // The condition of stability under a constant drive.
-                let firm = slope > FIRM * self.damping();
+            // The condition of stability under a constant drive.
+            let firm = slope > FIRM * self.damping();
+            if found || firm && legs == LEGS {
                 if firm {
                     self.bench.controller.hold_drive()?;
                 }
