@@ -160,8 +160,8 @@ impl Scene {
 
     /// Natural periods in which the amplitude of the linear mode falls by a factor of e.
     pub fn relaxation_periods(&self) -> f64 {
-        let d = self.dimensionless();
-        1.0 / (PI * d.epsilon * d.lambda)
+        let linear = self.linear();
+        linear.omega0 / (2.0 * PI * linear.damping_rate.max(0.0))
     }
 
     /// Time limit for the lock, natural periods: as set, or at least 3000 and 20 times the relaxation time.
