@@ -139,12 +139,14 @@ pub enum ExperimentError {
         evidence: Box<Evidence>,
     },
     #[error(
-        "the 1:1 motion, held at C = {held}, is {regime} at C = {level}: the backbone ends between the two, or the step was too large; \
-         set backbone.C_to nearer to {held}, or more backbone.points"
+        "the 1:1 motion, held at {held:.4e} m (C = {:.4}), is {regime} at {level:.4e} m (C = {:.4}): the backbone ends between the two, or the \
+         step was too large; set backbone.A_to or C_to nearer to the former, or more backbone.points",
+        held / b, level / b
     )]
     MotionLost {
         held: f64,
         level: f64,
+        b: f64,
         regime: crate::identification::Regime,
     },
     #[error("the controller asked for omega = {} rad/s and E = {} m, which is refused; the drive is off", .0.omega, .0.amplitude)]

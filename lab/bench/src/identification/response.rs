@@ -70,20 +70,20 @@ impl Content {
     }
 }
 
-/// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at phase resonance, and
-/// `omega` (rad/s) its frequency.
+/// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase `phase` (rad)
+/// of the response to the base, and `omega` (rad/s) its frequency.
 ///
 /// Impacts need evidence: response over base departs from the linear response. Of a linear response that was measured on the rig, this is
 /// sufficient; where that of the scene stands for it, the third harmonic must be significant as well.
 #[must_use]
-pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, omega: f64) -> Regime {
+pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, phase: f64, omega: f64) -> Regime {
     let Some(content) = Content::of(samples, scene.sample_time(), omega) else {
         return Regime::Unknown;
     };
     if content.rest > STEADY && content.noise < NOISE_SHARE * content.rest {
         return Regime::Other;
     }
-    let measured = Complex64::from_polar(content.amplitude / base, scene.phase_target().radians());
+    let measured = Complex64::from_polar(content.amplitude / base, phase);
     let departs = base > 0.0 && !is_linear(&scene.linear(), measured, omega);
     // The parameters of a simulation are known.
     let is_known = scene.measured.is_some() || samples.iter().any(|sample| sample.ground_truth.is_some());
