@@ -251,7 +251,10 @@ fn levels_and_limits_are_given_in_metres_instead() {
         ("[backbone]\nG_max = 4.0\nE_max = 0.04\n", "both G_max and E_max"),
         ("[controller]\nG_max = 4.0\nE_max = 0.04\n", "both G_max and E_max"),
     ] {
-        says(&complaint(Scene::parse("mine.toml", &format!("{text}{section}"), &[])), &[keys]);
+        says(
+            &complaint(Scene::parse("mine.toml", &format!("{text}{section}"), &[])),
+            &[keys],
+        );
     }
 }
 
