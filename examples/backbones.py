@@ -17,7 +17,7 @@ for number, r in enumerate((0.5, 0.65, 0.8)):
     scene = vines.Scene(
         plant={"r": r},
         chain={"snr": 20.0, "seed": 1},
-        backbone={"C_from": 0.6, "C_to": 0.25, "points": 8, "precision": 0.03},
+        backbone={"C_from": 0.6, "C_to": 0.25, "points": 8, "precision": 0.02},
     )
     points = vines.backbone(scene).points
     theory = vines.theory(scene).backbone

@@ -24,7 +24,7 @@ def locked(bandwidth: float, seed: int) -> tuple[float, float]:
     scene = vines.Scene(
         controller={
             "bandwidth": bandwidth,
-            "frequency_tolerance": 3e-2,
+            "frequency_tolerance": 2e-2,
             "amplitude_tolerance": 8e-3,
             "phase_tolerance": 5.0,
         },

@@ -31,6 +31,10 @@ def _column(values: list[Any]) -> NDArray[Any]:
     return np.array(["" if value is None else value for value in values] if str in kinds else values)
 
 
+SI = {"t_s": "s", "f_Hz": "Hz", "u_f_Hz": "Hz", "A_m": "m", "u_A_m": "m", "E_m": "m", "u_E_m": "m"}
+"""Units of the columns that are not dimensionless."""
+
+
 def _dataset(table: Table, dimension: str, units: dict[str, str], **attributes: Any) -> "xarray.Dataset":
     columns = {
         name: (dimension, values) for name, values in table.items() if values.ndim == 1 and values.dtype != object
@@ -40,16 +44,16 @@ def _dataset(table: Table, dimension: str, units: dict[str, str], **attributes: 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Identification(Result):
-    """What an experiment found; dimensionless throughout.
+    """What an experiment found, in hertz and metres, and dimensionless with the parameters of the scene.
 
     Attributes
     ----------
     lock : dict
-        The locked point: G, sigma, C, B, phase_error_deg, their standard uncertainties u_*, regime and others.
+        The locked point: f_Hz, A_m, E_m, G, sigma, C, B, phase_error_deg, their standard uncertainties u_*, regime and others.
     exact : Orbit or None
         The exact phase-resonant orbit nearest to the lock.
     decay : dict of ndarray
-        Points along the free decay: tau, C, B, sigma, their standard uncertainties, and at the same C sigma_theory and
+        Points along the free decay: t_s, f_Hz, A_m, tau, C, B, sigma, standard uncertainties, and at the same C sigma_theory and
         sigma_exact of steady motions, and sigma_slow_flow and sigma_predicted of the decay that theory and the exact
         plant predict.
     decay_end : str
@@ -80,7 +84,7 @@ class Identification(Result):
     def to_xarray(self) -> "xarray.Dataset":
         """Return the decay as a dataset over the dimension `point`; the locked point is in its attributes."""
         lock = {f"lock_{name}": value for name, value in self.lock.items() if value is not None}
-        return _dataset(self.decay, "point", {}, **lock)
+        return _dataset(self.decay, "point", SI, **lock)
 
 
 def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "all") -> Identification:
@@ -123,12 +127,12 @@ def identify(scene: Scene | None = None, *, results: Literal["all", "lock"] = "a
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Backbone(Result):
-    """A tracked backbone; dimensionless throughout.
+    """A tracked backbone, in hertz and metres, and dimensionless with the parameters of the scene.
 
     Attributes
     ----------
     points : dict of ndarray
-        C, sigma, G, their standard uncertainties u_C, u_sigma and u_G, level, periods, settled, reached, regime
+        f_Hz, A_m, E_m, C, sigma, G, their standard uncertainties u_*, level, periods, settled, reached, regime
         and others.
     periods : float
         All periods, from the start to the last point.
@@ -146,9 +150,8 @@ class Backbone(Result):
 
     def to_xarray(self) -> "xarray.Dataset":
         """Return the points as a dataset over the dimension `point`."""
-        return _dataset(
-            self.points, "point", {"phase_error_deg": "degree", "u_phase_deg": "degree"}, periods=self.periods
-        )
+        units = SI | {"phase_error_deg": "degree", "u_phase_deg": "degree"}
+        return _dataset(self.points, "point", units, periods=self.periods)
 
 
 def backbone(scene: Scene | None = None) -> Backbone:

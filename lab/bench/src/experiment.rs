@@ -13,7 +13,6 @@ use thiserror::Error;
 
 use crate::rig::{Controller, ControllerError, Drive, Fault, Rig, RigError};
 use crate::scene::Scene;
-use vines_model::theory::{B_SYMMETRY_BREAKING, SlowFlow};
 
 pub(crate) use bench::Bench;
 pub use evidence::Evidence;
@@ -51,23 +50,17 @@ impl<'a> Plan<'a> {
     }
 }
 
-/// Length of the recorded decay over the one that theory expects.
-const DECAY_MARGIN: f64 = 1.25;
+/// Share of its amplitude to which the response of the linear rig falls in the recorded decay: the range of the 1:1 motion, from
+/// symmetry breaking to the fold, is smaller, and impacts make the decay faster.
+const DECAYED: f64 = 0.05;
 /// Longest recorded decay, natural periods, that is not asked for.
 const LONGEST_DECAY: f64 = 5000.0;
-/// Periods more than that, for the loss of synchrony to show.
-const DECAY_EXTRA: f64 = 10.0;
 
-/// Length of the recorded decay, natural periods: that of the scene, or as long as first-order theory expects synchrony to last
-/// from symmetry breaking on, with a margin. A lock may be on the larger one of two stable orbits.
+/// Length of the recorded decay, natural periods: that of the scene, or as long as the linear rig takes to fall to [`DECAYED`].
 fn decay_periods(scene: &Scene) -> f64 {
-    if let Some(periods) = scene.record.decay_periods {
-        return periods;
-    }
-    let d = scene.dimensionless();
-    let decay = SlowFlow::new(d.lambda, d.r).decay(B_SYMMETRY_BREAKING);
-    let duration = decay.map_or(0.0, |decay| decay.duration()) / (d.epsilon * std::f64::consts::TAU);
-    (DECAY_MARGIN * duration + DECAY_EXTRA).min(LONGEST_DECAY)
+    let relaxations = -DECAYED.ln();
+    let periods = scene.record.decay_periods;
+    periods.unwrap_or((relaxations * scene.relaxation_periods()).min(LONGEST_DECAY))
 }
 
 /// The stage an experiment is in.
@@ -146,12 +139,14 @@ pub enum ExperimentError {
         evidence: Box<Evidence>,
     },
     #[error(
-        "the 1:1 motion, held at C = {held}, is {regime} at C = {level}: the backbone ends between the two, or the step was too large; \
-         set backbone.C_to nearer to {held}, or more backbone.points"
+        "the 1:1 motion, held at {held:.4e} m (C = {:.4}), is {regime} at {level:.4e} m (C = {:.4}): the backbone ends between the two, or the \
+         step was too large; set backbone.A_to or C_to nearer to the former, or more backbone.points",
+        held / b, level / b
     )]
     MotionLost {
         held: f64,
         level: f64,
+        b: f64,
         regime: crate::identification::Regime,
     },
     #[error("the controller asked for omega = {} rad/s and E = {} m, which is refused; the drive is off", .0.omega, .0.amplitude)]

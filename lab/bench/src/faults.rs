@@ -13,7 +13,7 @@ use serde::Serialize;
 use crate::backbone::track;
 use crate::experiment::{self, ExperimentError, Plan};
 use crate::rig::{BuiltIn, Chain, Drive, Rig, RigError, Sensors, Simulated};
-use crate::scene::Scene;
+use crate::scene::{Backbone, Scene};
 
 use inject::FaultyController;
 pub(crate) use inject::{FaultyRig, Log};
@@ -69,9 +69,16 @@ const RELEASE: f64 = 2.0;
 /// A scene with runs that are short, at the same working points.
 fn short(scene: &Scene) -> Scene {
     let mut scene = scene.clone();
-    let step = (scene.backbone.c_to - scene.backbone.c_from) / f64::from(scene.backbone.points.max(2) - 1);
-    scene.backbone.points = scene.backbone.points.min(4);
-    scene.backbone.c_to = scene.backbone.c_from + f64::from(scene.backbone.points - 1) * step;
+    let levels = scene.levels();
+    let levels = &levels[..levels.len().min(4)];
+    scene.backbone = Backbone {
+        c_from: None,
+        c_to: None,
+        a_from: levels.first().copied(),
+        a_to: levels.last().copied(),
+        points: levels.len() as u32,
+        ..scene.backbone
+    };
     scene.controller.release_periods = RELEASE;
     scene.record.decay_periods = Some(3.0 * RELEASE);
     scene

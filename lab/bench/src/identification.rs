@@ -83,7 +83,7 @@ fn mirrored(longer: Option<i8>) -> String {
     })
 }
 
-/// What a record says; dimensionless throughout.
+/// What a record says.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Identification {
     /// The numbers all of this belongs to.

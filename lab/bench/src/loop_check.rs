@@ -149,8 +149,7 @@ fn expected(scene: &Scene) -> [Complex64; 2] {
     let omega = scene.controller.omega_start * d.omega0;
     let amplitude = SHARE * scene.amplitude;
     let time = (PERIODS[1] as f64 - 0.5 * PERIODS[2] as f64) * TAU / omega;
-    let damping = 0.5 * d.epsilon * d.lambda * d.omega0;
-    let rate = Complex64::new(damping, omega - d.omega0);
+    let rate = Complex64::new(scene.linear().damping_rate, omega - d.omega0);
     let growth = Complex64::new(0.0, -0.5 * d.omega0) * (1.0 - (-rate * time).exp()) / rate;
     // A delay that the chain states is expected.
     let stated = Complex64::from_polar(1.0, -scene.controller_config().delay * omega);

@@ -90,6 +90,11 @@ impl Scene {
         self.measured.unwrap_or_else(|| LinearResponse::of(self))
     }
 
+    /// Levels of the tracked backbone, amplitudes of the response, m, in the order in which they are visited.
+    pub fn levels(&self) -> Vec<f64> {
+        self.backbone.levels(self.plant.half_width)
+    }
+
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
     pub fn dimensionless_start(&self) -> [f64; 4] {
         self.dimensionless().state(&self.start)

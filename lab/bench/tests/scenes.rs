@@ -231,8 +231,31 @@ fn a_plant_without_damping_is_accepted() {
 
 #[test]
 fn levels_are_round_numbers() {
-    let levels = paper(&[]).unwrap().backbone.levels();
+    let levels = paper(&[]).unwrap().backbone.levels(1.0);
     assert_eq!(levels[..3], [0.7, 0.68, 0.66]);
+}
+
+#[test]
+fn levels_and_limits_are_given_in_metres_instead() {
+    let metres = ["backbone.A_from=0.0068", "backbone.E_max=2e-4", "controller.E_max=3e-4"];
+    let scene = paper(&metres).unwrap();
+    // The last level is that of the file, C = 0.14.
+    assert_eq!((scene.levels()[0], scene.levels()[28]), (0.0068, 0.0014));
+    assert_eq!(scene.controller_config().amplitude_max, Some(3e-4));
+    assert_eq!(scene.backbone_config().amplitude_max, Some(2e-4));
+    let set = complaint(paper(&["backbone.A_to=0.001", "backbone.C_to=0.1"]));
+    says(&set, &["backbone.C_to is set as well"]);
+    let text = "[plant]\nepsilon = 0.01\nlambda = 1.0\nr = 0.65\n[excitation]\nG = 1.0\n";
+    for (section, keys) in [
+        ("[backbone]\nC_from = 0.7\nA_from = 0.7\n", "both C_from and A_from"),
+        ("[backbone]\nG_max = 4.0\nE_max = 0.04\n", "both G_max and E_max"),
+        ("[controller]\nG_max = 4.0\nE_max = 0.04\n", "both G_max and E_max"),
+    ] {
+        says(
+            &complaint(Scene::parse("mine.toml", &format!("{text}{section}"), &[])),
+            &[keys],
+        );
+    }
 }
 
 #[test]

@@ -9,6 +9,7 @@ use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failur
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:
+  frequency, response, base   the same in Hz and m, on a rig that does not report impacts; in the files always (f_Hz, A_m, E_m)
   C           amplitude of the first harmonic of the response that the scene's sensor reads, over b
   sigma       detuning (Omega - 1)/epsilon of resonance as [resonance] defines it
   G           base amplitude over b epsilon

@@ -23,17 +23,13 @@ fn rig(p: &Dimensionless) -> String {
     format!("epsilon = {epsilon:.6}, lambda = {lambda:.4}, r = {r}")
 }
 
-/// Frequency in hertz, amplitude of the response and of the base in metres, with their uncertainties, of sigma, C and G.
-fn in_si(p: &Dimensionless, [sigma, c, g]: [(f64, f64); 3]) -> [String; 3] {
-    let hertz = |omega: f64| omega / std::f64::consts::TAU;
-    let metres = |value: f64, u: f64| format!("{value:.5e} ± {u:.1e}");
+/// Frequency in hertz, amplitude of the response and of the base in metres, with their uncertainties.
+fn in_si([frequency, response, base]: [(f64, f64); 3]) -> [String; 3] {
+    let metres = |(value, u): (f64, f64)| format!("{value:.5e} ± {u:.1e}");
     [
-        with_uncertainty(
-            hertz(p.omega0 + p.omega_change(sigma.0)),
-            hertz(p.omega_change(sigma.1)),
-        ),
-        metres(p.b * c.0, p.b * c.1),
-        metres(p.amplitude(g.0), p.amplitude(g.1)),
+        with_uncertainty(frequency.0, frequency.1),
+        metres(response),
+        metres(base),
     ]
 }
 
@@ -86,10 +82,7 @@ pub fn identification(found: &Comparison) -> String {
     } else {
         ""
     };
-    let [hertz, response, base] = in_si(
-        &found.parameters,
-        [(lock.sigma, lock.u_sigma), (lock.c, lock.u_c), (lock.g, lock.u_g)],
-    );
+    let [hertz, response, base] = in_si([(lock.f_hz, lock.u_f_hz), (lock.a_m, lock.u_a_m), (lock.e_m, lock.u_e_m)]);
     format!(
         "Measured: {hertz} Hz, response {response} m, base {base} m\n{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{phase}{ripple}{}\n{}\n{}\n",
         rig(&found.parameters),
@@ -176,7 +169,11 @@ pub fn tracked(found: &TrackedComparison) -> String {
         let pairs = [(point.c, point.u_c), (point.sigma, point.u_sigma), (point.g, point.u_g)];
         let mut cells = Vec::new();
         if on_a_rig {
-            cells.extend(in_si(&found.parameters, [pairs[1], pairs[0], pairs[2]]));
+            cells.extend(in_si([
+                (point.f_hz, point.u_f_hz),
+                (point.a_m, point.u_a_m),
+                (point.e_m, point.u_e_m),
+            ]));
         }
         cells.extend(pairs.map(|(value, u)| with_uncertainty(value, u)));
         let equal = exact.and_then(|exact| Some(exact.sigma?.abs().max(exact.g?.abs())));

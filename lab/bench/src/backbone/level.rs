@@ -7,6 +7,7 @@
 
 use vines_model::numerics::Estimate;
 
+use super::peak;
 use crate::identification::{Balance, Cycle, Slopes};
 use crate::scene::LinearResponse;
 
@@ -15,8 +16,12 @@ use crate::scene::LinearResponse;
 pub struct Criterion {
     /// Linear response of the rig.
     pub linear: LinearResponse,
-    /// Largest standard uncertainties of the drive, m, and of the frequency, rad/s.
-    pub precision: [f64; 2],
+    /// Largest standard uncertainty of the drive E, as a share of it, and of the frequency, as a share of `omega0 E/A` at the largest level A, m.
+    pub precision: f64,
+    /// See above.
+    pub largest: f64,
+    /// Whether the point serves to find the peak of the response, which needs more of the drive.
+    pub is_peak: bool,
     /// Phase error at which the level is held, rad.
     pub phase: f64,
     /// Fewest periods of a window.
@@ -77,8 +82,20 @@ impl Criterion {
 
     /// Largest uncertainty over the largest allowed.
     fn size(&self, found: &Found) -> f64 {
-        let [base, omega] = [0, 1].map(|i| found.at[i].uncertainty / self.precision[i]);
+        let allowed = self.allowed(found.at[0].value, found.response.value);
+        let [base, omega] = [0, 1].map(|i| found.at[i].uncertainty / allowed[i]);
         base.max(omega)
+    }
+
+    /// Largest uncertainties allowed of the drive, m, and of the frequency, rad/s, at this drive and response, m.
+    fn allowed(&self, drive: f64, response: f64) -> [f64; 2] {
+        let (base, omega0) = (self.precision * drive.abs(), self.linear.omega0);
+        let omega = omega0 * base / self.largest;
+        if self.is_peak {
+            [base.min(peak::drive_for(omega, response, omega0)), omega]
+        } else {
+            [base, omega]
+        }
     }
 
     /// Slopes of drive and frequency over the amplitude at a point: of the parabola through it and the two before, with its distance from the
@@ -131,12 +148,13 @@ impl Criterion {
                 &[one.uncertainty, aside, systematic / units[i], whole.remainders[i]],
             )
         });
+        let allowed = self.allowed(at[0].value, amplitude);
         Some(Found {
             periods: cycles.len(),
             response: whole.response,
             phase_error: whole.phase_error,
             at,
-            steady: whole.excess <= EXCESS && systematic <= self.precision[0].min(units[1] * self.precision[1]),
+            steady: whole.excess <= EXCESS && systematic <= allowed[0].min(units[1] * allowed[1]),
         })
     }
 }

@@ -1,44 +1,44 @@
 //! The peak of the response from points at several phases.
 //!
-//! Along a frequency response, at constant G, the amplitude is largest where at constant amplitude the drive is smallest: both are
-//! the point at which the curves of constant G and of constant C touch. The loop therefore holds each level at several phases
+//! Along a frequency response, at a constant drive, the amplitude is largest where at constant amplitude the drive is smallest: both are
+//! the point at which the curves of constant drive and of constant amplitude touch. The loop therefore holds each level at several phases
 //! about resonance. The balances of amplitude and phase convert each point to the drive and the detuning of resonance, which hardly depend on
-//! the phase x from resonance, so that a parabola in x describes them. The drive at the phase x is `G(x)/cos x`; its minimum is the peak.
+//! the phase x from resonance, so that a parabola in x describes them. The drive at the phase x is `E(x)/cos x`; its minimum is the peak.
 
-use super::point::{Known, Point};
+use super::point::{Held, Known};
 use super::track::extrapolated;
-use vines_model::{Dimensionless, numerics::mean};
+use vines_model::numerics::{Estimate, mean};
 
 /// Phases from resonance at which every level is held, rad.
 pub const PHASES: [f64; 3] = [-0.25, 0.0, 0.25];
 
-/// Error of the drives at the level `c` over that of sigma at the peak which follows from them: the phase of the peak is the slope of the
-/// drive over the phase, and sigma changes by G/(2 C) with it.
-pub fn share_of_drive(c: f64) -> f64 {
-    (c * (PHASES[2] - PHASES[0]) * std::f64::consts::SQRT_2).min(1.0)
+/// Largest error of the drives, m, for an error `omega`, rad/s, of the peak which follows from them, at the response `response`, m: the phase of
+/// the peak is the slope of the drive over the phase, and the frequency changes by `omega0 E/(2 A)` with it.
+pub fn drive_for(omega: f64, response: f64, omega0: f64) -> f64 {
+    (PHASES[2] - PHASES[0]) * std::f64::consts::SQRT_2 * response * omega / omega0
 }
 
-/// Drive and detuning that hold the resonance `(C, G, sigma)` at the phase `x`, rad, from it.
-pub fn at_phase(known: &Known, x: f64, epsilon: f64) -> [f64; 2] {
-    let g = known.g / x.cos();
-    let omega = 1.0 + epsilon * known.sigma;
-    [g, known.sigma - g * x.sin() / (2.0 * known.c * omega)]
+/// Drive, m, and frequency, rad/s, that hold the resonance `known` at the phase `x`, rad, from it.
+pub fn at_phase(known: &Known, x: f64, omega0: f64) -> [f64; 2] {
+    let drive = known.drive / x.cos();
+    let gain = 0.5 * omega0 * omega0 / known.omega;
+    [drive, known.omega - gain * drive / known.response * x.sin()]
 }
 
 /// The peaks at the levels at which all phases were held: `scans` has the points of each phase, level by level.
-pub fn peaks(scans: &[Vec<Point>], scene: &Dimensionless) -> Vec<Point> {
+pub fn peaks(scans: &[Vec<Held>], omega0: f64) -> Vec<Held> {
     let levels = scans.iter().map(Vec::len).min().unwrap_or(0);
     (0..levels)
         .map(|level| {
-            let c = mean(scans.iter().map(|scan| scan[level].c));
-            let points: Vec<Point> = scans.iter().map(|scan| at_level(scan, level, c)).collect();
-            peak(&points, scene.epsilon)
+            let response = mean(scans.iter().map(|scan| scan[level].response.value));
+            let points: Vec<Held> = scans.iter().map(|scan| at_level(scan, level, response)).collect();
+            peak(&points, omega0)
         })
         .collect()
 }
 
-/// A point corrected to the amplitude `c`, by the parabola through its neighbours in the same scan.
-fn at_level(scan: &[Point], level: usize, c: f64) -> Point {
+/// A point corrected to the amplitude `response`, m, by the parabola through its neighbours in the same scan.
+fn at_level(scan: &[Held], level: usize, response: f64) -> Held {
     let first = level.saturating_sub(1).min(scan.len().saturating_sub(3));
     let usable = |n: &usize| *n != level && scan[*n].settled && scan[*n].reached;
     let others = (first..scan.len().min(first + 3)).filter(usable);
@@ -52,21 +52,22 @@ fn at_level(scan: &[Point], level: usize, c: f64) -> Point {
         .collect();
     let own = scan[level];
     // The polynomial through all of them, and the one of a lower degree, less the value of the last.
-    let change =
-        |known: &[Known]| extrapolated(known, c).map_or([0.0; 2], |there| [there.g - own.g, there.sigma - own.sigma]);
+    let change = |known: &[Known]| {
+        extrapolated(known, response).map_or([0.0; 2], |there| {
+            [there.drive - own.drive.value, there.omega - own.omega.value]
+        })
+    };
     let (change, simpler) = (change(&known), change(&known[1.min(known.len().saturating_sub(1))..]));
-    Point {
-        c,
-        g: own.g + change[0],
-        sigma: own.sigma + change[1],
-        u_g: own.u_g.hypot(change[0] - simpler[0]),
-        u_sigma: own.u_sigma.hypot(change[1] - simpler[1]),
-        ..own
-    }
+    let [drive, omega] = [0, 1].map(|i| {
+        let one = [own.drive, own.omega][i];
+        Estimate::new(one.value + change[i], &[one.uncertainty, change[i] - simpler[i]])
+    });
+    let response = Estimate { value: response, ..own.response };
+    Held { response, drive, omega, ..own }
 }
 
-fn peak(points: &[Point], epsilon: f64) -> Point {
-    let phases: Vec<f64> = points.iter().map(|one| one.phase_error_deg.to_radians()).collect();
+fn peak(points: &[Held], omega0: f64) -> Held {
+    let phases: Vec<f64> = points.iter().map(|one| one.phase_error.value).collect();
     let sum = |weights: &[f64], value: &dyn Fn(usize) -> f64| -> f64 {
         weights.iter().enumerate().map(|(n, weight)| weight * value(n)).sum()
     };
@@ -77,39 +78,44 @@ fn peak(points: &[Point], epsilon: f64) -> Point {
             .map(|(n, weight)| (weight * value(n)).powi(2));
         squares.sum::<f64>().sqrt()
     };
+    let [drive_at, omega_at] = [
+        &|n: usize| points[n].drive.value,
+        &(|n: usize| points[n].omega.value) as &dyn Fn(usize) -> f64,
+    ];
     let mut x = 0.0_f64;
     for _ in 0..ROUNDS {
         let [values, slopes] = parabola(&phases, x);
-        x = -(sum(&slopes, &|n| points[n].g) / sum(&values, &|n| points[n].g)).atan();
+        x = -(sum(&slopes, drive_at) / sum(&values, drive_at)).atan();
     }
     let [values, slopes] = parabola(&phases, x);
     let resonance = Known {
-        c: points[0].c,
-        g: sum(&values, &|n| points[n].g),
-        sigma: sum(&values, &|n| points[n].sigma),
+        response: points[0].response.value,
+        drive: sum(&values, drive_at),
+        omega: sum(&values, omega_at),
     };
-    let [g, sigma] = at_phase(&resonance, x, epsilon);
+    let [drive, omega] = at_phase(&resonance, x, omega0);
     // A cubic term is neglected: smaller than the quadratic one by about the distance of the phases.
     let neglected = |value: &dyn Fn(usize) -> f64| (PHASES[2] * (value(0) - 2.0 * value(1) + value(2))).abs();
-    let [by_g, by_sigma] = [neglected(&|n| points[n].g), neglected(&|n| points[n].sigma)];
-    let u_phase = size(&slopes, &|n| points[n].u_g).hypot(by_g / PHASES[2]) / resonance.g;
-    let centre = points[points.len() / 2];
-    Point {
-        c: resonance.c,
-        sigma,
-        g,
-        phase_error_deg: x.to_degrees(),
-        u_c: size(&vec![1.0 / points.len() as f64; points.len()], &|n| points[n].u_c),
-        u_sigma: size(&values, &|n| points[n].u_sigma)
-            .hypot(by_sigma)
-            .hypot(u_phase * g / (2.0 * resonance.c)),
-        u_g: size(&values, &|n| points[n].u_g).hypot(by_g),
-        u_phase_deg: u_phase.to_degrees(),
+    let [by_drive, by_omega] = [neglected(drive_at), neglected(omega_at)];
+    let u_drive = |n: usize| points[n].drive.uncertainty;
+    let u_phase = size(&slopes, &u_drive).hypot(by_drive / PHASES[2]) / resonance.drive;
+    let u_response = size(&vec![1.0 / points.len() as f64; points.len()], &|n| {
+        points[n].response.uncertainty
+    });
+    let turned = u_phase * 0.5 * omega0 * drive / resonance.response;
+    Held {
+        response: Estimate { value: resonance.response, uncertainty: u_response },
+        drive: Estimate::new(drive, &[size(&values, &u_drive), by_drive]),
+        omega: Estimate::new(
+            omega,
+            &[size(&values, &|n| points[n].omega.uncertainty), by_omega, turned],
+        ),
+        phase_error: Estimate { value: x, uncertainty: u_phase },
         periods: points.iter().map(|one| one.periods).sum(),
         averaged: points.iter().map(|one| one.averaged).sum(),
         settled: points.iter().all(|one| one.settled),
         reached: points.iter().all(|one| one.reached),
-        ..centre
+        ..points[points.len() / 2]
     }
 }
 

@@ -1,26 +1,95 @@
 //! The tracked backbone and its points.
 
+use std::f64::consts::TAU;
+
 use serde::Serialize;
+use vines_model::numerics::Estimate;
 
 use super::level::Found;
 use crate::experiment::ExperimentError;
 use crate::identification::Regime;
 use vines_model::Dimensionless;
 
-/// A working point: response amplitude, drive amplitude, detuning; dimensionless.
+/// A working point: response amplitude, m, drive amplitude, m, frequency, rad/s.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Known {
-    pub c: f64,
-    pub g: f64,
-    pub sigma: f64,
+    pub response: f64,
+    pub drive: f64,
+    pub omega: f64,
 }
 
-/// One point of the backbone; dimensionless.
+/// A point as measured, in SI units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Held {
+    /// Target level, m.
+    pub level: f64,
+    /// Amplitude of the fundamental of the response, m.
+    pub response: Estimate,
+    /// Base amplitude, m, and frequency, rad/s, at this response.
+    pub drive: Estimate,
+    pub omega: Estimate,
+    /// Mean phase error, rad; of a peak, its phase less the phase target.
+    pub phase_error: Estimate,
+    /// As in [`Point`].
+    pub periods: f64,
+    pub averaged: usize,
+    pub settled: bool,
+    pub reached: bool,
+    pub regime: Regime,
+    pub regime_by_impacts: Option<Regime>,
+}
+
+impl Held {
+    /// Where it is, if it has values.
+    pub fn known(&self) -> Option<Known> {
+        let [response, drive, omega] = [self.response, self.drive, self.omega].map(|one| one.value);
+        let is_known = drive.is_finite() && omega.is_finite();
+        is_known.then_some(Known { response, drive, omega })
+    }
+
+    /// A level, m, by an estimate, of which nothing else is known yet.
+    pub fn new(level: f64, found: &Found) -> Self {
+        let [drive, omega] = found.at;
+        Self {
+            level,
+            response: found.response,
+            drive,
+            omega,
+            phase_error: found.phase_error,
+            periods: 0.0,
+            averaged: found.periods,
+            settled: false,
+            reached: false,
+            regime: Regime::Unknown,
+            regime_by_impacts: None,
+        }
+    }
+}
+
+/// One point of the backbone: as measured, in hertz and metres, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Point {
-    /// Target level.
+    /// Frequency, Hz.
+    #[serde(rename = "f_Hz")]
+    pub f_hz: f64,
+    /// Amplitude of the fundamental of the response, m.
+    #[serde(rename = "A_m")]
+    pub a_m: f64,
+    /// Base amplitude, m.
+    #[serde(rename = "E_m")]
+    pub e_m: f64,
+    /// Standard uncertainties of the amplitude, and of frequency and base at this amplitude.
+    #[serde(rename = "u_f_Hz")]
+    pub u_f_hz: f64,
+    /// See above.
+    #[serde(rename = "u_A_m")]
+    pub u_a_m: f64,
+    /// See above.
+    #[serde(rename = "u_E_m")]
+    pub u_e_m: f64,
+    /// Target level, over b.
     pub level: f64,
-    /// Amplitude of the fundamental of the response.
+    /// Amplitude of the fundamental of the response, over b.
     #[serde(rename = "C")]
     pub c: f64,
     /// Detuning.
@@ -56,31 +125,32 @@ pub struct Point {
 }
 
 impl Point {
-    /// Where it is, if it has values.
-    pub(super) fn known(&self) -> Option<Known> {
-        let is_known = self.g.is_finite() && self.sigma.is_finite();
-        is_known.then_some(Known { c: self.c, g: self.g, sigma: self.sigma })
-    }
-
-    /// A level by an estimate, of which nothing else is known yet.
-    pub(super) fn new(level: f64, found: &Found, d: &Dimensionless) -> Self {
-        let [base, omega] = found.at;
+    /// The point with the parameters of a scene.
+    pub(super) fn of(held: &Held, d: &Dimensionless) -> Self {
+        let Held { response, drive, omega, phase_error, .. } = *held;
         Self {
-            level,
-            c: found.response.value / d.b,
+            f_hz: omega.value / TAU,
+            a_m: response.value,
+            e_m: drive.value,
+            u_f_hz: omega.uncertainty / TAU,
+            u_a_m: response.uncertainty,
+            u_e_m: drive.uncertainty,
+            // The level as a person would write it.
+            level: (1e9 * held.level / d.b).round() / 1e9,
+            c: response.value / d.b,
             sigma: d.sigma(omega.value),
-            g: d.excitation(base.value),
-            phase_error_deg: found.phase_error.value.to_degrees(),
-            u_c: found.response.uncertainty / d.b,
+            g: d.excitation(drive.value),
+            phase_error_deg: phase_error.value.to_degrees(),
+            u_c: response.uncertainty / d.b,
             u_sigma: omega.uncertainty / d.omega_change(1.0),
-            u_g: d.excitation(base.uncertainty),
-            u_phase_deg: found.phase_error.uncertainty.to_degrees(),
-            periods: 0.0,
-            averaged: found.periods,
-            settled: false,
-            reached: false,
-            regime: Regime::Unknown,
-            regime_by_impacts: None,
+            u_g: d.excitation(drive.uncertainty),
+            u_phase_deg: phase_error.uncertainty.to_degrees(),
+            periods: held.periods,
+            averaged: held.averaged,
+            settled: held.settled,
+            reached: held.reached,
+            regime: held.regime,
+            regime_by_impacts: held.regime_by_impacts,
         }
     }
 }

@@ -6,11 +6,11 @@ use vines_model::numerics::Estimate;
 
 use super::level::{Criterion, Found};
 use super::peak;
-use super::point::{Known, Point, Tracked};
+use super::point::{Held, Known, Point, Tracked};
 use crate::experiment::{self, ExperimentError, Sample, Search, Stage};
 use crate::identification::{Cycle, Regime, classify, regime_by_response};
 use crate::rig::{Controller, Move, Rig};
-use crate::scene::Scene;
+use crate::scene::{Definition, Resonance, Scene};
 
 /// Periods between a move and the first that is measured: the loops and the particle follow late.
 const LATE: usize = 8;
@@ -35,7 +35,7 @@ struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
 
 /// What is to be held next.
 struct Order<'a> {
-    /// Response amplitude over b.
+    /// Response amplitude, m.
     level: f64,
     /// Phase error, rad.
     phase: f64,
@@ -88,12 +88,13 @@ pub fn track_into(
     if let Some(error) = ended.take_if(|_| scans.iter().all(Vec::is_empty)) {
         return Err(error);
     }
-    let points = if scene.resonance.is_peak() {
-        peak::peaks(&scans, &scene.dimensionless())
+    let held = if scene.resonance.is_peak() {
+        peak::peaks(&scans, scene.linear().omega0)
     } else {
         scans.swap_remove(0)
     };
-    let periods = bench.run.periods;
+    let (periods, d) = (bench.run.periods, scene.dimensionless());
+    let points = held.iter().map(|one| Point::of(one, &d)).collect();
     Ok(Tracked { points, periods_to_lock, periods, ended })
 }
 
@@ -115,14 +116,17 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
 
     /// Goes to a symmetric motion with impacts, if there is one.
     fn approach(&mut self) -> Result<(), ExperimentError> {
-        let (scene, d) = (self.scene, self.scene.dimensionless());
+        let scene = self.scene;
         let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
-        Search::new(&mut self.run, scene, limit, &mut |_| {}).impacts()?;
+        // The levels are held about phase resonance; the phase of the peak is measured.
+        let definition = Definition { resonance: Resonance::Phase, ..scene.resonance };
+        let at_resonance = Scene { resonance: definition, ..scene.clone() };
+        Search::new(&mut self.run, &at_resonance, limit, &mut |_| {}).impacts()?;
         let cycle = self.cycle()?;
         self.present = Some(Known {
-            c: cycle.amplitude() / d.b,
-            g: d.excitation(cycle.base.norm()),
-            sigma: d.sigma(cycle.omega),
+            response: cycle.amplitude(),
+            drive: cycle.base.norm(),
+            omega: cycle.omega,
         });
         Ok(())
     }
@@ -131,10 +135,10 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
     fn follow(
         &mut self,
         phases: &[f64],
-        scans: &mut [Vec<Point>],
+        scans: &mut [Vec<Held>],
         mut progress: impl FnMut(usize, usize),
     ) -> Result<(), ExperimentError> {
-        let levels = self.scene.backbone.levels();
+        let levels = self.scene.levels();
         // The last point, and the phase at which it was held.
         let mut last = self.present.map(|present| (present, 0.0));
         for (n, &level) in levels.iter().enumerate() {
@@ -142,17 +146,18 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
             for k in 0..phases.len() {
                 // The next level begins at the phase at which this one ends.
                 let scan = if n % 2 == 0 { k } else { phases.len() - 1 - k };
-                let known: Vec<Known> = scans[scan].iter().filter_map(Point::known).collect();
+                let known: Vec<Known> = scans[scan].iter().filter_map(Held::known).collect();
                 let order = Order { level, phase: phases[scan], known: &known };
                 let point = self.hold(&order, last)?;
                 last = point.known().map(|known| (known, order.phase)).or(last);
                 let held = scans[scan]
                     .last()
-                    .filter(|before: &&Point| is_one_to_one(before.regime))
+                    .filter(|before: &&Held| is_one_to_one(before.regime))
                     .map(|before| before.level);
                 scans[scan].push(point);
                 if let Some(held) = held.filter(|_| matches!(point.regime, Regime::NoImpacts | Regime::Other)) {
-                    return Err(ExperimentError::MotionLost { held, level, regime: point.regime });
+                    let b = self.scene.plant.half_width;
+                    return Err(ExperimentError::MotionLost { held, level, b, regime: point.regime });
                 }
             }
         }
@@ -160,7 +165,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
     }
 
     /// Goes to a level and phase, and holds them until the point has settled, or for the longest time allowed.
-    fn hold(&mut self, order: &Order, last: Option<(Known, f64)>) -> Result<Point, ExperimentError> {
+    fn hold(&mut self, order: &Order, last: Option<(Known, f64)>) -> Result<Held, ExperimentError> {
         let (start, settings) = (self.run.periods, &self.scene.backbone);
         let (to, periods) = self.step(order, last);
         self.run.controller.hold_response(to, self.target + order.phase)?;
@@ -175,8 +180,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
         let found = loop {
             cycles.push(self.cycle()?);
             let found = criterion.best(&cycles);
-            let is_met =
-                found.is_some_and(|found| criterion.is_met(&found) && order.is_reached(self.scene, found.response));
+            let is_met = found.is_some_and(|found| criterion.is_met(&found) && order.is_reached(found.response));
             confirmed = if is_met { confirmed + 1 } else { 0 };
             if cycles.len() >= settings.dwell_max as usize || confirmed >= CONFIRMED {
                 break found;
@@ -188,37 +192,36 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
 
     /// The move to a level and phase, and its periods: those of the scene, or as many as the drive needs to change the response that much.
     fn step(&self, order: &Order, last: Option<(Known, f64)>) -> (Move, f64) {
-        let d = self.scene.dimensionless();
+        let omega0 = self.scene.linear().omega0;
         let Order { level, phase, known } = *order;
         let slowest = last.map_or(0.0, |(last, _)| {
-            (level - last.c).abs() * d.b / (MOVE_SHARE * 0.5 * d.amplitude(last.g) * TAU)
+            (level - last.response).abs() / (MOVE_SHARE * 0.5 * last.drive * TAU)
         });
         // A smooth move is twice as fast in its middle as on average.
         let periods = self.scene.backbone.move_periods.max(2.0 * slowest);
         let change = extrapolated(known, level).zip(last).map(|(expected, (last, held))| {
-            let [then, now] =
-                [(expected, phase), (last, held)].map(|(one, phase)| peak::at_phase(&one, phase, d.epsilon));
+            let [then, now] = [(expected, phase), (last, held)].map(|(one, phase)| peak::at_phase(&one, phase, omega0));
             [then[0] - now[0], then[1] - now[1]]
         });
-        let [g, sigma] = change.unwrap_or_default();
+        let [amplitude, omega] = change.unwrap_or_default();
         let to = Move {
-            response: level * d.b,
-            duration: periods * d.natural_period(),
-            amplitude: d.amplitude(g),
-            omega: d.omega_change(sigma),
+            response: level,
+            duration: periods * TAU / omega0,
+            amplitude,
+            omega,
             growth: 0.0,
         };
         (to, periods)
     }
 
     /// The point of an estimate from the last of some periods, for a move that began at `start`, in periods.
-    fn point(&self, order: &Order, start: f64, said: &Found, cycles: &[Cycle], criterion: &Criterion) -> Point {
+    fn point(&self, order: &Order, start: f64, said: &Found, cycles: &[Cycle], criterion: &Criterion) -> Held {
         let samples = cycles[cycles.len() - said.periods..].iter().map(|cycle| cycle.samples);
         let averaged = &self.run.samples[self.run.samples.len() - samples.sum::<usize>()..];
         let [base, omega] = said.at;
-        let regime = regime_by_response(averaged, self.scene, base.value, omega.value);
-        let reached = order.is_reached(self.scene, said.response);
-        Point {
+        let regime = regime_by_response(averaged, self.scene, base.value, self.target, omega.value);
+        let reached = order.is_reached(said.response);
+        Held {
             periods: self.run.periods - start,
             regime,
             regime_by_impacts: self.run.samples[0]
@@ -229,7 +232,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
                 && !matches!(regime, Regime::Other | Regime::Asymmetric)
                 && (said.steady || criterion.is_met(said)),
             reached,
-            ..Point::new(order.level, said, &self.scene.dimensionless())
+            ..Held::new(order.level, said)
         }
     }
 }
@@ -237,31 +240,24 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
 impl Order<'_> {
     /// The criterion for a settled point.
     fn criterion(&self, scene: &Scene) -> Criterion {
-        let (settings, d) = (&scene.backbone, scene.dimensionless());
-        let share = if scene.resonance.is_peak() {
-            peak::share_of_drive(self.level)
-        } else {
-            1.0
-        };
         let before = |back: usize| {
-            let Known { c, g, sigma } = *self.known.iter().nth_back(back)?;
-            Some([c * d.b, d.amplitude(g), d.omega(sigma)])
+            let Known { response, drive, omega } = *self.known.iter().nth_back(back)?;
+            Some([response, drive, omega])
         };
         Criterion {
             linear: scene.linear(),
-            precision: [
-                share * d.amplitude(settings.precision),
-                d.omega_change(settings.precision),
-            ],
-            fewest: settings.dwell_min as usize,
+            precision: scene.backbone.precision,
+            largest: scene.levels().into_iter().fold(0.0, f64::max),
+            is_peak: scene.resonance.is_peak(),
+            fewest: scene.backbone.dwell_min as usize,
             phase: self.phase,
             before: [before(1), before(0)],
         }
     }
 
     /// Whether a response, m, is at the level.
-    fn is_reached(&self, scene: &Scene, response: Estimate) -> bool {
-        let Estimate { value, uncertainty } = response.scaled(1.0 / scene.dimensionless().b);
+    fn is_reached(&self, response: Estimate) -> bool {
+        let Estimate { value, uncertainty } = response;
         (value - self.level).abs() <= (REACHED * self.level).max(4.0 * uncertainty)
     }
 }
@@ -270,21 +266,21 @@ fn is_one_to_one(regime: Regime) -> bool {
     matches!(regime, Regime::Symmetric | Regime::Unresolved)
 }
 
-/// Drive and detuning at the level `c`, on the polynomial through the last points, three at most; `None` without any.
-pub(super) fn extrapolated(known: &[Known], c: f64) -> Option<Known> {
+/// Drive and frequency at the amplitude `response`, m, on the polynomial through the last points, three at most; `None` without any.
+pub(super) fn extrapolated(known: &[Known], response: f64) -> Option<Known> {
     let points = &known[known.len().saturating_sub(3)..];
     let weights = points.iter().enumerate().map(|(i, point)| {
         let others = points.iter().enumerate().filter(|(j, _)| *j != i);
         (
             point,
             others
-                .map(|(_, other)| (c - other.c) / (point.c - other.c))
+                .map(|(_, other)| (response - other.response) / (point.response - other.response))
                 .product::<f64>(),
         )
     });
-    let sum = weights.fold([0.0; 2], |[g, sigma], (point, weight)| {
-        [g + weight * point.g, sigma + weight * point.sigma]
+    let [drive, omega] = weights.fold([0.0; 2], |[drive, omega], (point, weight)| {
+        [drive + weight * point.drive, omega + weight * point.omega]
     });
-    let known = Known { c, g: sum[0], sigma: sum[1] };
-    (!points.is_empty() && known.g.is_finite() && known.sigma.is_finite()).then_some(known)
+    let known = Known { response, drive, omega };
+    (!points.is_empty() && drive.is_finite() && omega.is_finite()).then_some(known)
 }

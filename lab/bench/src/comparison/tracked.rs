@@ -74,8 +74,8 @@ impl TrackedComparison {
         (linear + doubtful == of || self.points.iter().any(is_settled)).then(|| {
             format!(
                 "the regime of {doubtful} of {of} points is not established: neither their third harmonic nor a distance from the linear response \
-                 that the loop check measures is evidence of impacts. Check that the particle moves freely, and epsilon, b and r of the scene \
-                 (within a factor of two); do not skip the loop check; reduce noise that hides the harmonic"
+                 that the loop check measures is evidence of impacts. Check that the particle moves freely; do not skip the loop check; reduce \
+                 noise that hides the harmonic"
             )
         })
     }

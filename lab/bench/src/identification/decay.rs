@@ -13,9 +13,23 @@ use crate::scene::{Dimensionless, Estimator, Scene};
 use vines_model::numerics::mean;
 use vines_model::regime::end_of_synchrony;
 
-/// One point along the decay; dimensionless.
+/// One point along the decay, in SI units, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct DecayPoint {
+    /// Time since the release, s.
+    pub t_s: f64,
+    /// Frequency, Hz.
+    #[serde(rename = "f_Hz")]
+    pub f_hz: f64,
+    /// Amplitude of the fundamental of the response, m.
+    #[serde(rename = "A_m")]
+    pub a_m: f64,
+    /// Standard uncertainty of the frequency, Hz.
+    #[serde(rename = "u_f_Hz")]
+    pub u_f_hz: f64,
+    /// Standard uncertainty of the amplitude, m.
+    #[serde(rename = "u_A_m")]
+    pub u_a_m: f64,
     /// Time since the release, `omega0 t`.
     pub tau: f64,
     /// Amplitude of the fundamental of v.
@@ -129,6 +143,11 @@ impl Piece {
             .map(|s| s.ground_truth.map(|w| w.particle_velocity.abs()))
             .collect();
         DecayPoint {
+            t_s: self.time,
+            f_hz: self.omega / TAU,
+            a_m: self.amplitude,
+            u_f_hz: self.uncertainties[1] / TAU,
+            u_a_m: self.uncertainties[0],
             tau: d.omega0 * self.time,
             c: self.amplitude / d.b,
             // The mean is the value at the middle of the straight line that fits best.

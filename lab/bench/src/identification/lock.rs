@@ -1,5 +1,7 @@
 //! The locked point.
 
+use std::f64::consts::TAU;
+
 use serde::Serialize;
 
 use vines_model::numerics::{Estimate, mean};
@@ -11,10 +13,28 @@ use super::{Balance, Cycle, Slopes};
 use crate::experiment::Record;
 use crate::scene::{LinearResponse, Scene};
 
-/// The locked point as measured over the hold; dimensionless.
+/// The locked point as measured over the hold, in hertz and metres, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lock {
-    /// Base amplitude over `b epsilon`, measured if a sensor reads the base, otherwise commanded.
+    /// Frequency, Hz.
+    #[serde(rename = "f_Hz")]
+    pub f_hz: f64,
+    /// Amplitude of the fundamental of the response, m.
+    #[serde(rename = "A_m")]
+    pub a_m: f64,
+    /// Base amplitude, m, measured if a sensor reads the base, otherwise commanded.
+    #[serde(rename = "E_m")]
+    pub e_m: f64,
+    /// Standard uncertainty of the frequency, Hz.
+    #[serde(rename = "u_f_Hz")]
+    pub u_f_hz: f64,
+    /// Standard uncertainty of the response, m.
+    #[serde(rename = "u_A_m")]
+    pub u_a_m: f64,
+    /// Standard uncertainty of the base amplitude, m.
+    #[serde(rename = "u_E_m")]
+    pub u_e_m: f64,
+    /// Base amplitude over `b epsilon`.
     #[serde(rename = "G")]
     pub g: f64,
     /// Detuning.
@@ -103,10 +123,16 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
         Estimate::new(speed.value, &[speed.uncertainty, speed.value * aside])
     });
     let (impacts_per_period, regime) = match classify(hold, dt, omega.value) {
-        (count, Regime::Unknown) => (count, regime_by_response(hold, scene, base.value, omega.value)),
+        (count, Regime::Unknown) => (count, regime_by_response(hold, scene, base.value, target, omega.value)),
         told => told,
     };
     Some(Lock {
+        f_hz: omega.value / TAU,
+        a_m: limit.value,
+        e_m: base.value,
+        u_f_hz: omega.uncertainty / TAU,
+        u_a_m: limit.uncertainty,
+        u_e_m: base.uncertainty,
         g: d.excitation(base.value),
         sigma: d.sigma(omega.value),
         c: limit.value / d.b,
@@ -118,7 +144,7 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
         u_b: b.map(|b| b.uncertainty),
         u_phase_deg: phase_error.uncertainty.to_degrees(),
         averaged: approach.len(),
-        periods_to_lock: record.settled as f64 * dt * omega.value / std::f64::consts::TAU,
+        periods_to_lock: record.settled as f64 * dt * omega.value / TAU,
         impacts_per_period,
         regime,
     })

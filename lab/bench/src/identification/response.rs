@@ -1,15 +1,13 @@
 //! The regime from the response alone, as on a real rig.
 //!
-//! The centre of mass moves smoothly, so impacts have little effect on it. The triangle wave of a particle with the speed `B`
-//! excites the harmonic of odd order n of v to the amplitude `4 epsilon B/(pi n^2 (n^2 - 1))`. Uneven impacts add even
-//! harmonics. Irregular impacts make amplitude and phase fluctuate, which leaves a residual. The motion without impacts is
-//! the linear mode: response over base is that of a linear test at small amplitude, which the loop check makes.
+//! Two impacts per period at even intervals excite odd harmonics, and uneven impacts even ones, too. Irregular impacts make amplitude
+//! and phase fluctuate, which leaves a residual. The motion without impacts is the linear mode: response over base is that of a
+//! linear test at small amplitude, which the loop check makes.
 
 use nalgebra::DVector;
 use num_complex::Complex64;
 use vines_model::numerics::{HarmonicBasis, noise};
 use vines_model::regime::Regime;
-use vines_model::theory::Manifold;
 
 use crate::experiment::Sample;
 use crate::scene::{LinearResponse, Scene};
@@ -20,8 +18,8 @@ const STEADY: f64 = 3e-3;
 const NOISE_SHARE: f64 = 0.5;
 /// Smallest significant harmonic, in standard errors.
 const SIGNIFICANT: f64 = 4.0;
-/// Smallest share of an expected harmonic that counts: of the second, relative to the third, and of the third.
-const SHARE: f64 = 0.5;
+/// Smallest amplitude of the second harmonic over the third of an asymmetric motion.
+const ASYMMETRIC: f64 = 0.5;
 /// Relative distance from the linear response within which a motion counts as the linear mode, beside the uncertainty of that response.
 const LINEAR: f64 = 0.1;
 /// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.
@@ -35,7 +33,8 @@ struct Content {
     /// Amplitudes of the second and the third harmonic, relative.
     second: f64,
     third: f64,
-    /// Standard error of either.
+    /// Standard error of either: by noise, and what a change of the motion adds to a harmonic, as the fourth shows. The impacts excite the
+    /// fourth harmonic twenty times less than the second.
     error: f64,
     /// RMS of the residual, relative, and its part that is noise.
     rest: f64,
@@ -55,60 +54,47 @@ impl Content {
         let values = DVector::from_iterator(n, samples.iter().map(|s| s.sensors.response));
         let fit = basis.fit(&values)?;
         let rest = basis.residual(&values, &fit);
-        let [amplitude, second, third] = [1, 2, 3].map(|n| fit.harmonic(n).norm());
+        let [amplitude, second, third, fourth] = [1, 2, 3, 4].map(|n| fit.harmonic(n).norm());
         if amplitude == 0.0 || !amplitude.is_finite() {
             return None;
         }
-        let rms = (rest.norm_squared() / (n - basis.terms()) as f64).sqrt();
+        let rms = (rest.norm_squared() / (n - basis.terms()) as f64).sqrt() / amplitude;
         Some(Self {
             amplitude,
             second: second / amplitude,
             third: third / amplitude,
-            error: rms * (2.0 / n as f64).sqrt() / amplitude,
-            rest: rms / amplitude,
+            error: (rms * (2.0 / n as f64).sqrt()).hypot(fourth / amplitude),
+            rest: rms,
             noise: noise(rest.as_slice()) / amplitude,
         })
     }
 }
 
-/// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at phase resonance, and
-/// `omega` (rad/s) its frequency.
+/// The regime determined from the response of these samples. `base` (m) is the base amplitude that holds the motion at the phase `phase` (rad)
+/// of the response to the base, and `omega` (rad/s) its frequency.
 ///
-/// Impacts need evidence. Either the third harmonic is significant, and at least half of what the slowest particle of a 1:1 motion, that at the
-/// fold of the manifold, excites; this knows epsilon, b and r within a factor of two. Or noise hides it, and response over base differs
-/// from the measured linear response.
+/// Impacts need evidence: response over base departs from the linear response. Of a linear response that was measured on the rig, this is
+/// sufficient; where that of the scene stands for it, the third harmonic must be significant as well.
 #[must_use]
-pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, omega: f64) -> Regime {
+pub fn regime_by_response(samples: &[Sample], scene: &Scene, base: f64, phase: f64, omega: f64) -> Regime {
     let Some(content) = Content::of(samples, scene.sample_time(), omega) else {
         return Regime::Unknown;
     };
-    let is_noise = content.noise >= NOISE_SHARE * content.rest;
-    if content.rest > STEADY && !is_noise {
+    if content.rest > STEADY && content.noise < NOISE_SHARE * content.rest {
         return Regime::Other;
     }
-    // The particle's speed is about b omega; the order of magnitude is sufficient.
-    let expected = 4.0 * scene.dimensionless().amplitude(1.0) / (72.0 * std::f64::consts::PI * content.amplitude);
-    let least = SHARE * Manifold::new(scene.plant.restitution).b_min() * expected;
-    let significant = SIGNIFICANT * content.error;
-    let is_simulated = samples.iter().any(|sample| sample.ground_truth.is_some());
+    let measured = Complex64::from_polar(content.amplitude / base, phase);
+    let departs = base > 0.0 && !is_linear(&scene.linear(), measured, omega);
     // The parameters of a simulation are known.
-    let linear = scene
-        .measured
-        .or_else(|| is_simulated.then(|| LinearResponse::of(scene)));
-    let measured = Complex64::from_polar(content.amplitude / base, scene.phase_target().radians());
-    let is_linear = linear
-        .filter(|_| base > 0.0)
-        .map(|linear| is_linear(&linear, measured, omega));
-    if content.second > significant.max(SHARE * expected) {
-        Regime::Asymmetric
-    } else if content.third > significant.max(least) && significant < expected {
-        Regime::Symmetric
-    } else if is_linear == Some(true) {
-        Regime::NoImpacts
-    } else if is_linear == Some(false) && significant > least && is_noise {
-        Regime::Unresolved
-    } else {
-        Regime::NotEstablished
+    let is_known = scene.measured.is_some() || samples.iter().any(|sample| sample.ground_truth.is_some());
+    let significant = SIGNIFICANT * content.error;
+    match (departs, is_known) {
+        (false, true) => Regime::NoImpacts,
+        (false, false) => Regime::NotEstablished,
+        _ if content.second > significant.max(ASYMMETRIC * content.third) => Regime::Asymmetric,
+        _ if content.third > significant => Regime::Symmetric,
+        (true, true) => Regime::Unresolved,
+        (true, false) => Regime::NotEstablished,
     }
 }
 

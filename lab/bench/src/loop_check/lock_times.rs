@@ -32,7 +32,7 @@ pub fn lock_times(scene: &Scene) -> Result<Vec<LockTime>, ExperimentError> {
     let mut scene = scene.clone();
     let settings = &mut scene.controller;
     (settings.phase_tolerance, settings.dwell_periods) = (2.0, 20);
-    (settings.frequency_tolerance, settings.amplitude_tolerance) = (0.32, 27.0);
+    (settings.frequency_tolerance, settings.amplitude_tolerance) = (0.22, 27.0);
     // The largest bandwidth needs more than a hundred samples per period.
     settings.samples_per_period = settings.samples_per_period.max(200.0);
     let start = Simulated::new(scene.plant, scene.start).map_err(RigError::from)?;

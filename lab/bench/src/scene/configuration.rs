@@ -78,12 +78,11 @@ impl Scene {
         let omega0 = d.omega0;
         let c = &self.controller;
         let period = d.natural_period();
-        let damping = 0.5 * d.epsilon * d.lambda;
         // Without periods or without a drive, steps.
         let rate = |amplitude: f64, periods: f64| {
             Some(amplitude / (periods * period)).filter(|rate| *rate > 0.0 && rate.is_finite())
         };
-        let amplitude_max = d.amplitude(self.g_max());
+        let amplitude_max = self.drive_max();
         let defaults = Config::for_resonance(omega0, self.amplitude);
         self.phase_lock.apply(Config {
             sample_time: self.sample_time(),
@@ -91,7 +90,7 @@ impl Scene {
             omega_min: c.omega_min * omega0,
             omega_max: c.omega_max * omega0,
             bandwidth: c.bandwidth * omega0,
-            damping_rate: Some(damping * omega0).filter(|rate| *rate > 0.0),
+            damping_rate: Some(self.linear().damping_rate).filter(|rate| *rate > 0.0),
             phase_target: self.phase_target().radians(),
             delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0
                 + (c.delay + f64::from(u8::from(self.resonance.is_late()))) * self.sample_time(),
@@ -119,13 +118,13 @@ impl Scene {
 
     /// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.
     fn lock_criterion(&self) -> LockCriterion {
-        let d = self.dimensionless();
         let c = &self.controller;
-        let approached = PI * d.epsilon * d.lambda.max(LAMBDA_MIN);
+        let bandwidth = self.bandwidth().max(BANDWIDTH_MIN);
+        let approached = PI * bandwidth;
         let defaults = LockCriterion::default();
         LockCriterion {
             phase_tolerance: c.phase_tolerance.to_radians(),
-            frequency_drift: c.frequency_tolerance * d.epsilon * approached,
+            frequency_drift: c.frequency_tolerance * bandwidth * approached,
             amplitude_drift: c.amplitude_tolerance * approached,
             dwell: c.dwell_periods,
             ..defaults
@@ -135,33 +134,40 @@ impl Scene {
     /// Largest plausible difference between a reading and its prediction, as a share of the amplitude.
     fn residual(&self) -> f64 {
         let impulse = match self.resonance.sensor {
-            // An impact changes the velocity by epsilon (1 + r) times that of the particle, twice b omega0 or so, within a sample.
-            Sensor::Acceleration => {
-                let d = self.dimensionless();
-                2.0 * d.epsilon * (1.0 + d.r) * self.controller.samples_per_period / std::f64::consts::TAU
-            }
+            // Impacts change the velocity within a sample. Two in a period that balance the base amplitude E have the acceleration
+            // omega0^2 E samples/4; frequency and transients take a few times as much. The amplitude of the response is about b.
+            Sensor::Acceleration => self.drive_needed() / self.dimensionless().b * self.controller.samples_per_period,
             Sensor::V | Sensor::Q1 => 0.0,
         };
         RESIDUAL + impulse
     }
 
-    /// Largest drive, base amplitude over `b epsilon`: as set, or four times the larger of the requested drive and that at which
-    /// impacts begin.
-    pub fn g_max(&self) -> f64 {
-        let d = self.dimensionless();
-        let needed = d.g.max(self.impact_drive()).max(LAMBDA_MIN);
-        self.controller.g_max.unwrap_or(4.0 * needed)
+    /// Largest drive, m: as set, or four times what is needed.
+    fn drive_max(&self) -> f64 {
+        self.drive_limit().unwrap_or(4.0 * self.drive_needed())
     }
 
-    /// Drive, base amplitude over `b epsilon`, that holds the linear mode at the amplitude at which impacts certainly occur.
-    pub fn impact_drive(&self) -> f64 {
-        IMPACTS * self.dimensionless().lambda
+    /// Largest drive, m, where `[controller]` sets it.
+    fn drive_limit(&self) -> Option<f64> {
+        let by_g = |g| self.dimensionless().amplitude(g);
+        self.controller.e_max.or(self.controller.g_max.map(by_g))
+    }
+
+    /// The larger of the requested drive, m, and the one that holds the linear mode at the amplitude at which impacts certainly occur.
+    fn drive_needed(&self) -> f64 {
+        let linear = self.bandwidth().max(BANDWIDTH_MIN);
+        self.amplitude.max(IMPACTS * linear * self.dimensionless().b)
+    }
+
+    /// Half-power bandwidth of the linear response over omega0: twice the damping ratio, and base over response at resonance.
+    fn bandwidth(&self) -> f64 {
+        let linear = self.linear();
+        2.0 * linear.damping_rate.max(0.0) / linear.omega0
     }
 
     /// Natural periods in which the amplitude of the linear mode falls by a factor of e.
     pub fn relaxation_periods(&self) -> f64 {
-        let d = self.dimensionless();
-        1.0 / (PI * d.epsilon * d.lambda)
+        1.0 / (PI * self.bandwidth())
     }
 
     /// Time limit for the lock, natural periods: as set, or at least 3000 and 20 times the relaxation time.
@@ -177,7 +183,11 @@ impl Scene {
     pub fn backbone_config(&self) -> Config {
         let d = self.dimensionless();
         Config {
-            amplitude_max: Some(d.amplitude(self.backbone.g_max.min(self.controller.g_max.unwrap_or(f64::INFINITY)))),
+            amplitude_max: Some(
+                self.backbone
+                    .drive_max(&d)
+                    .min(self.drive_limit().unwrap_or(f64::INFINITY)),
+            ),
             bandwidth: self.backbone.bandwidth.min(self.coupled_bandwidth()) * d.omega0,
             phase_target: self.controller.phase_target_radians(),
             ..self.controller_config()
@@ -188,18 +198,15 @@ impl Scene {
     /// the phase that the detectors read, and a frequency that changes shifts the amplitude. From loop to loop the gain is the cube of the
     /// bandwidth times A/E, which is largest without impacts: the inverse of twice the damping ratio.
     fn coupled_bandwidth(&self) -> f64 {
-        let linear = self.linear();
-        COUPLED
-            * (2.0 * linear.damping_rate / linear.omega0)
-                .max(f64::MIN_POSITIVE)
-                .cbrt()
+        COUPLED * self.bandwidth().max(f64::MIN_POSITIVE).cbrt()
     }
 }
 
 /// That bandwidth over the cube root of E/A.
 const COUPLED: f64 = 0.9;
-/// Lowest damping lambda that counts for the lock criterion and the largest drive: with less, most of the energy is lost in impacts.
-const LAMBDA_MIN: f64 = 0.01;
+/// Smallest half-power bandwidth over omega0 that counts for the lock criterion and the largest drive: with less, most of the energy is lost in
+/// impacts.
+const BANDWIDTH_MIN: f64 = 1e-4;
 /// Share of the amplitude by which a reading may differ from its prediction: a resonant response changes slowly.
 const RESIDUAL: f64 = 0.3;
 /// Response amplitude over b at which impacts certainly occur: a particle at rest in the middle is hit at 1.

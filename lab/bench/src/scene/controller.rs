@@ -26,8 +26,8 @@ pub struct Controller {
     pub phase_target: f64,
     /// Largest phase error that counts as locked, degrees.
     pub phase_tolerance: f64,
-    /// Distance from the steady state that counts as settled: of the detuning, and of the response amplitude, relative. Judged by the
-    /// drift and the rate at which the steady state is approached; noise widens it.
+    /// Distance from the steady state that counts as settled: of the frequency, over the half-power bandwidth of the linear response, and of
+    /// the response amplitude, relative. Judged by the drift and the rate at which the steady state is approached; noise widens it.
     pub frequency_tolerance: f64,
     /// As `frequency_tolerance`, for the amplitude.
     pub amplitude_tolerance: f64,
@@ -37,6 +37,9 @@ pub struct Controller {
     /// impacts begin.
     #[serde(rename = "G_max")]
     pub g_max: Option<f64>,
+    /// The same in m.
+    #[serde(rename = "E_max", skip_serializing_if = "Option::is_none")]
+    pub e_max: Option<f64>,
     /// Response above which the drive is shut down, over b.
     #[serde(rename = "C_max", deserialize_with = "option")]
     pub c_max: Option<f64>,
@@ -70,10 +73,11 @@ impl Default for Controller {
             omega_max: 1.1,
             phase_target: -90.0,
             phase_tolerance: 0.3,
-            frequency_tolerance: 3e-4,
+            frequency_tolerance: 2e-4,
             amplitude_tolerance: 8e-5,
             dwell_periods: 20,
             g_max: None,
+            e_max: None,
             c_max: Some(4.0),
             ramp_periods: None,
             release_periods: 0.0,
@@ -136,7 +140,11 @@ impl Controller {
             .check(target.abs() <= 180.0, "must lie between -180 and 180 degrees")?;
         for (key, value, unit) in [
             ("controller.phase_tolerance", self.phase_tolerance, "degrees"),
-            ("controller.frequency_tolerance", self.frequency_tolerance, "(detuning)"),
+            (
+                "controller.frequency_tolerance",
+                self.frequency_tolerance,
+                "(bandwidths)",
+            ),
             ("controller.amplitude_tolerance", self.amplitude_tolerance, "(relative)"),
         ] {
             Quantity::new(key, value, unit).positive()?;
@@ -160,6 +168,7 @@ impl Controller {
         let (rate, residual) = (given(self.omega_rate.flatten()), given(self.residual_max.flatten()));
         for (key, value, unit) in [
             ("controller.G_max", given(self.g_max), "(over b epsilon)"),
+            ("controller.E_max", given(self.e_max), "m"),
             ("controller.C_max", given(self.c_max), "(over b)"),
             ("controller.omega_rate", rate, "(omega0 per natural period)"),
             ("controller.silence_periods", given(self.silence_periods), periods),

@@ -8,6 +8,15 @@ use toml::{Table, Value};
 use super::plant::{DIMENSIONLESS_KEYS, SI_KEYS};
 use super::{SceneError, SyntaxError, error::plain, sections::Sections};
 
+/// Keys of a section that say the same thing, dimensionless and in m.
+const PAIRS: [(&str, [&str; 2]); 5] = [
+    ("excitation", ["G", "E"]),
+    ("controller", ["G_max", "E_max"]),
+    ("backbone", ["G_max", "E_max"]),
+    ("backbone", ["C_from", "A_from"]),
+    ("backbone", ["C_to", "A_to"]),
+];
+
 /// One replaced value.
 #[derive(Debug, Clone)]
 pub struct Override {
@@ -82,10 +91,12 @@ impl Override {
         if self.section == "plant" {
             self.check_units(section)?;
         }
-        // G and E say the same thing: the one that is set replaces the other.
-        for (set, other) in [("E", "G"), ("G", "E")] {
-            if self.is("excitation", set) {
-                section.remove(other);
+        // The one that is set replaces the other.
+        for (of, keys) in PAIRS {
+            for (set, other) in [(0, 1), (1, 0)] {
+                if self.is(of, keys[set]) {
+                    section.remove(keys[other]);
+                }
             }
         }
         match (section.get_mut(&self.key), &self.value) {
@@ -99,9 +110,11 @@ impl Override {
 /// `table` with the overrides applied one by one, so that an error names the
 /// argument that caused it.
 pub(super) fn merge(mut table: Table, overrides: &[Override]) -> Result<Table, SceneError> {
-    let sets = |key| overrides.iter().find(|one| one.is("excitation", key));
-    if let (Some(_), Some(second)) = (sets("G"), sets("E")) {
-        return Err(second.error("excitation.G is set as well: set one of them"));
+    for (section, [one, other]) in PAIRS {
+        let sets = |key| overrides.iter().find(|one| one.is(section, key));
+        if let (Some(_), Some(second)) = (sets(one), sets(other)) {
+            return Err(second.error(format!("{section}.{one} is set as well: set one of them")));
+        }
     }
     for one in overrides {
         one.merge_into(&mut table)?;

@@ -22,8 +22,7 @@ pub struct Record {
     pub lock_periods: Option<f64>,
     /// How long the settled lock is held and measured, natural periods.
     pub hold_periods: f64,
-    /// Length of the recorded decay, natural periods; by default until the loss of synchrony that theory expects,
-    /// and a quarter more.
+    /// Length of the recorded decay, natural periods; by default as long as the linear response takes to fall to 5 %.
     pub decay_periods: Option<f64>,
     /// Window of the fit along the decay, periods of the motion.
     pub window_periods: f64,

@@ -5,6 +5,7 @@ use serde::Deserialize;
 
 use super::{
     Backbone, Chain, Controller, Definition, Dimensionless, Names, PhaseLock, Record, Reference, Scene, SceneError,
+    backbone::both,
     plant::{PlantSection, StartSection},
     validate::Quantity,
 };
@@ -83,7 +84,11 @@ impl Sections {
         Ok(())
     }
 
-    pub(super) fn resolve(self, origin: &str) -> Result<Scene, SceneError> {
+    pub(super) fn resolve(mut self, origin: &str) -> Result<Scene, SceneError> {
+        self.backbone.complete(origin)?;
+        if self.controller.g_max.and(self.controller.e_max).is_some() {
+            return Err(both(origin, "controller", "G_max", "E_max"));
+        }
         let plant = self.plant.resolve(origin)?;
         let scene = Scene {
             start: self.start.resolve(&plant)?,
