@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::level::Found;
 use crate::experiment::ExperimentError;
-use crate::identification::Regime;
+use crate::identification::{Regime, Tone};
 use vines_model::Dimensionless;
 
 /// A working point: response amplitude, drive amplitude, detuning; dimensionless.
@@ -53,6 +53,9 @@ pub struct Point {
     pub regime: Regime,
     /// The regime determined from the impacts, if the rig is a simulation.
     pub regime_by_impacts: Option<Regime>,
+    /// A tone in the response that is not part of the motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tone: Option<Tone>,
 }
 
 impl Point {
@@ -81,6 +84,7 @@ impl Point {
             reached: false,
             regime: Regime::Unknown,
             regime_by_impacts: None,
+            tone: None,
         }
     }
 }

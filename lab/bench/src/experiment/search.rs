@@ -17,7 +17,7 @@ use nalgebra::DVector;
 use vines_model::numerics::{HarmonicBasis, mean, noise};
 
 use super::{Bench, ExperimentError, Sample, Stage};
-use crate::identification::Cycle;
+use crate::identification::{Cycle, without_tones};
 use crate::rig::{Command, Controller, ControllerError, LoopState, Move, Rig};
 use crate::scene::{LinearResponse, Scene};
 
@@ -371,9 +371,23 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Measures over so many periods, or until the lock has settled.
     fn measure(&mut self, periods: f64) -> Result<Leg, ExperimentError> {
-        let mut all: Vec<Period> = Vec::new();
+        let (mut all, mut begins): (Vec<Period>, Vec<_>) = (Vec::new(), Vec::new());
         while (all.len() as f64) < periods && !(self.last.settled && all.len() > 3) {
+            begins.push((self.bench.samples.len(), self.bench.periods));
             all.extend(self.one_period()?);
+        }
+        // Where a foreign tone was read, the periods are measured again without it.
+        let from = begins[0]
+            .0
+            .saturating_sub(self.scene.controller.samples_per_period as usize);
+        let omega = mean(all.iter().map(|one| one.cycle.omega));
+        if let Some(samples) = without_tones(&self.bench.samples[from..], self.scene, omega) {
+            let ends = begins[1..].iter().map(|next| next.0 - from).chain([samples.len()]);
+            let again = begins.iter().zip(ends).filter_map(|(&(begin, turns), end)| {
+                let step = self.bench.sample_time;
+                Period::of(&samples[..end], begin - from, step, turns * TAU, self.target)
+            });
+            all = again.collect();
         }
         let (first, last) = (&all[0], &all[all.len() - 1]);
         let duration = last.cycle.time - first.cycle.time;
