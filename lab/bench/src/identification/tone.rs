@@ -16,6 +16,9 @@ use crate::scene::{Dimensionless, Sensor};
 /// Factor above the largest line of a motion: epsilon and b are known within a factor of two.
 const ABOVE: f64 = 2.0;
 
+/// Largest number of values in which a line is searched for: the work grows with its square.
+const SEARCHED: usize = 2048;
+
 /// A sine in the response that is not part of the motion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Tone {
@@ -46,14 +49,18 @@ pub(super) struct Line {
 }
 
 impl Line {
-    /// The strongest line of these values.
+    /// The strongest line of these values; where there are many, the strongest of the last ones.
     pub fn strongest(values: &[f64]) -> Self {
-        let bin = PI / values.len() as f64;
-        let power = |turn: f64| transform(values, turn).iter().map(|part| part * part).sum::<f64>();
-        let highest = (1..values.len())
-            .map(|k| (k as f64 * bin, power(k as f64 * bin)))
+        let power = |values: &[f64], turn: f64| transform(values, turn).iter().map(|part| part * part).sum::<f64>();
+        let highest = |values: &[f64], turn: f64, width: f64| {
+            golden_section(turn - width, turn + width, |turn| -power(values, turn))
+        };
+        let last = &values[values.len().saturating_sub(SEARCHED)..];
+        let [bin, fine] = [last.len(), values.len()].map(|count| PI / count as f64);
+        let (coarse, _) = (1..last.len())
+            .map(|k| (k as f64 * bin, power(last, k as f64 * bin)))
             .fold((bin, 0.0), |best, next| if next.1 > best.1 { next } else { best });
-        let turn = golden_section(highest.0 - bin, highest.0 + bin, |turn| -power(turn));
+        let turn = highest(values, highest(last, coarse, bin), fine);
         let scale = 2.0 / values.len() as f64;
         Self {
             turn,
