@@ -36,8 +36,8 @@ impl Rig for SensorsOnly {
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         self.0.advance(drive, step)
     }
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.0.hold(displacement, step)
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.0.hold(drive, step)
     }
 }
 

@@ -116,8 +116,8 @@ impl<F: FnMut(Option<f64>)> Rig for SensorsOnly<F> {
         self.rig.advance(drive, step)
     }
 
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.rig.hold(displacement, step)
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.rig.hold(drive, step)
     }
 }
 

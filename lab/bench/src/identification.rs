@@ -8,6 +8,7 @@ mod fit;
 mod lock;
 mod regime;
 mod response;
+mod tone;
 mod validity;
 
 use thiserror::Error;
@@ -21,7 +22,9 @@ pub use decay::{DecayEnd, DecayPoint, DecayPoints, decay_points};
 pub use lock::Lock;
 use regime::longer_after;
 pub use regime::{classify, impacts};
-pub use response::regime_by_response;
+pub(crate) use response::without_tones;
+pub use response::{foreign_tone, regime_by_response};
+pub use tone::Tone;
 pub use vines_model::regime::{Impact, Regime};
 
 /// Why a record cannot be identified.

@@ -64,11 +64,11 @@ pub trait Rig {
     /// As [`Rig::sense`].
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError>;
 
-    /// Holds the base at `displacement` (m) for one sample period of `step` seconds.
+    /// Holds the base at the displacement of the drive for one sample period of `step` seconds.
     ///
     /// # Errors
     /// As [`Rig::sense`], and a rig whose base follows its own oscillator only.
-    fn hold(&mut self, _displacement: f64, _step: f64) -> Result<(), RigError> {
+    fn hold(&mut self, _drive: Drive, _step: f64) -> Result<(), RigError> {
         Err(RigError::NoHold)
     }
 

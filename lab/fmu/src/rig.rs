@@ -101,17 +101,17 @@ impl Rig for FmuRig {
             // The middle of the step: the mean of what is held is then in time.
             let displacement = drive.amplitude * (self.phase + 0.5 * drive.omega * step).sin();
             self.phase = (self.phase + drive.omega * step) % TAU;
-            return self.hold(displacement, step);
+            return self.hold(Drive { displacement, ..drive }, step);
         };
         self.fmu
             .write("take a drive", &inputs, &[drive.omega, drive.amplitude])?;
         Ok(self.fmu.step(step)?)
     }
 
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         let mut inputs = vec![self.held.ok_or(RigError::NoHold)?];
         inputs.extend(self.inputs.map(|[_, amplitude]| amplitude));
-        let values = [displacement, 0.0];
+        let values = [drive.displacement, 0.0];
         self.fmu.write("take a sample of the base", &inputs, &values)?;
         Ok(self.fmu.step(step)?)
     }

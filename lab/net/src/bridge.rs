@@ -8,8 +8,8 @@ use vines_testbench::rig::Sensors;
 const MOST: usize = 1 << 18;
 
 /// The readings of the last period of the drive, from which lost ones are reconstructed: a lost reading repeats the one a period before
-/// it, plus a straight line that meets the readings on both sides of the gap. Before the end of the first period, or with a drive without a
-/// frequency, only the line is left.
+/// it; for the response plus a straight line that meets the readings on both sides of the gap. Before the end of the first period, or with a
+/// drive without a frequency, only the line is left.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Bridge {
     /// Phase of the drive, turns, and the reading, in order.
@@ -47,9 +47,11 @@ impl Bridge {
             of(&at_phase) + start + share * (end - start)
         };
         let reference = |sensors: &Sensors| sensors.reference.unwrap_or_default();
+        // A rig may stop its base where no sample of the drive arrives: after the gap it is elsewhere for one sample.
+        let at_base = before[1].map_or_else(|| value(reference), |before| reference(&before));
         Sensors {
             response: value(|sensors| sensors.response),
-            reference: next.reference.map(|_| value(reference)),
+            reference: next.reference.map(|_| at_base),
         }
     }
 

@@ -20,8 +20,9 @@ pub struct NetController {
     patience: Option<Duration>,
     /// Since when an answer is due.
     waiting: Option<Instant>,
-    /// The last answer.
+    /// The last answer, and the number of samples until then.
     good: Command,
+    answered: u64,
     failed: bool,
 }
 
@@ -40,6 +41,7 @@ impl NetController {
             patience: pace.map(|_| Duration::from_secs_f64(0.5 * sample_time)),
             waiting: None,
             good: Command::default(),
+            answered: 0,
             failed: false,
         })
     }
@@ -62,11 +64,12 @@ impl NetController {
                 if Instant::now() >= end {
                     return Err(self.client.silent());
                 }
-                self.client.counters.held += 1;
+                self.client.counters.hold(self.client.at + 1 - self.answered);
                 break self.held(active);
             };
             self.good = self.read(&frame)?;
             self.waiting = None;
+            self.answered = frame.sequence + 1;
             if frame.sequence == self.client.at {
                 break self.good;
             }

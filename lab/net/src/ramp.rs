@@ -11,6 +11,9 @@ pub(super) struct Ramp {
     drive: Drive,
     /// Whether the rig holds the displacement of the drive.
     pub holds: bool,
+    /// The displacement before that of the drive, m, and whether the drive has arrived since the last sample.
+    before: f64,
+    is_new: bool,
     /// Remaining samples of the ramp after the shutdown.
     left: Option<u32>,
 }
@@ -19,17 +22,33 @@ impl Ramp {
     /// Sets a new drive; without effect after the shutdown.
     pub fn set(&mut self, drive: Drive, holds: bool) {
         if self.left.is_none() {
-            (self.drive, self.holds) = (drive, holds);
+            self.before = self.drive.displacement;
+            (self.drive, self.holds, self.is_new) = (drive, holds, true);
         }
     }
 
     /// Drives the rig for the next sample period of `step` seconds.
     pub fn apply(&mut self, rig: &mut dyn Rig, step: f64) -> Result<(), RigError> {
+        if self.holds && !self.is_new && self.left.is_none() {
+            self.extrapolate(step);
+        }
+        self.is_new = false;
         let drive = self.next();
         if self.holds {
-            rig.hold(drive.displacement, step)
+            rig.hold(drive, step)
         } else {
             rig.advance(drive, step)
+        }
+    }
+
+    /// Continues a sine of which the next displacement is late: a base that stops and jumps would be a disturbance of the structure.
+    /// A drive without an amplitude is not known to be a sine.
+    fn extrapolate(&mut self, step: f64) {
+        let Drive { omega, amplitude, displacement } = self.drive;
+        if amplitude > 0.0 {
+            let next = 2.0 * (omega * step).cos() * displacement - self.before;
+            self.before = displacement;
+            self.drive.displacement = next.clamp(-amplitude, amplitude);
         }
     }
 

@@ -36,9 +36,17 @@ pub struct Counters {
     pub malformed: u64,
     /// Samples for which the last valid value was held.
     pub held: u64,
+    /// Most of them in a row.
+    pub longest: u64,
 }
 
 impl Counters {
+    /// Counts a sample for which the last valid value was held, one of at least `row` in a row.
+    pub(super) fn hold(&mut self, row: u64) {
+        self.held += 1;
+        self.longest = self.longest.max(row);
+    }
+
     /// Whether any frame was not delivered once and in time.
     pub fn is_troubled(&self) -> bool {
         *self != Self { received: self.received, ..Self::default() }
@@ -47,10 +55,10 @@ impl Counters {
 
 impl Display for Counters {
     fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
-        let Self { received, late, foreign, malformed, held } = self;
+        let Self { received, late, foreign, malformed, held, longest } = self;
         write!(
             f,
-            "{received} frames received, {late} late, {foreign} foreign, {malformed} malformed; {held} samples held"
+            "{received} frames received, {late} late, {foreign} foreign, {malformed} malformed; {held} samples held, at most {longest} in a row"
         )
     }
 }

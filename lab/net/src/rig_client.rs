@@ -87,8 +87,8 @@ impl NetRig {
                 (Some(reading), _) => return Ok(reading),
                 (None, Some(frame)) if frame.sequence == self.client.at => read_reading(&frame),
                 (None, Some(frame)) if frame.sequence > self.client.at => {
-                    self.client.counters.held += 1;
                     let (next, ahead) = (read_reading(&frame), frame.sequence - self.client.at);
+                    self.client.counters.hold(ahead);
                     let sensors = self.bridge.fill(self.phase, &next.sensors, ahead, self.turn);
                     Reading { sensors, ..self.good }
                 }
@@ -162,8 +162,7 @@ impl Rig for NetRig {
         Ok(self.drive(drive, 0, step)?)
     }
 
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        let drive = Drive { displacement, ..Drive::default() };
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         Ok(self.drive(drive, flag::HOLD, step)?)
     }
 

@@ -176,7 +176,7 @@ impl Run {
         };
         clock.serve(self.at + 1);
         if self.newest < self.at && !self.drive.is_shut_down() {
-            self.counters.held += 1;
+            self.counters.hold(self.at - self.newest);
             // The age of a drive counts from its sample, not from its arrival: a client that is too far behind is as bad as a
             // silent one.
             if (self.at - self.newest) as f64 * self.service.sample_time > self.service.silence {

@@ -82,9 +82,12 @@ pub fn identification(found: &Comparison) -> String {
     } else {
         ""
     };
+    let tone = lock.tone.map_or_else(String::new, |tone| {
+        format!("  ({tone}: more than the particle can cause, so it is no part of the motion; check the cable of the sensor)\n")
+    });
     let [hertz, response, base] = in_si([(lock.f_hz, lock.u_f_hz), (lock.a_m, lock.u_a_m), (lock.e_m, lock.u_e_m)]);
     format!(
-        "Measured: {hertz} Hz, response {response} m, base {base} m\n{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{phase}{ripple}{}\n{}\n{}\n",
+        "Measured: {hertz} Hz, response {response} m, base {base} m\n{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{phase}{ripple}{tone}{}\n{}\n{}\n",
         rig(&found.parameters),
         with_uncertainty(lock.g, lock.u_g),
         lock.periods_to_lock,
@@ -166,6 +169,7 @@ pub fn tracked(found: &TrackedComparison) -> String {
         } else {
             format!("; level {:.3} not reached", point.level)
         };
+        let tone = point.tone.map_or_else(String::new, |tone| format!("; {tone}"));
         let pairs = [(point.c, point.u_c), (point.sigma, point.u_sigma), (point.g, point.u_g)];
         let mut cells = Vec::new();
         if on_a_rig {
@@ -182,7 +186,7 @@ pub fn tracked(found: &TrackedComparison) -> String {
             format!("{:.1}", point.periods),
             point.averaged.to_string(),
             equal.map_or("-".into(), |error| format!("{error:.1e}")),
-            regime + settled + &reached,
+            regime + settled + &reached + &tone,
         ]);
         cells
     });

@@ -7,7 +7,7 @@ use vines_model::numerics::Estimate;
 
 use super::level::Found;
 use crate::experiment::ExperimentError;
-use crate::identification::Regime;
+use crate::identification::{Regime, Tone};
 use vines_model::Dimensionless;
 
 /// A working point: response amplitude, m, drive amplitude, m, frequency, rad/s.
@@ -37,6 +37,7 @@ pub(super) struct Held {
     pub reached: bool,
     pub regime: Regime,
     pub regime_by_impacts: Option<Regime>,
+    pub tone: Option<Tone>,
 }
 
 impl Held {
@@ -62,6 +63,7 @@ impl Held {
             reached: false,
             regime: Regime::Unknown,
             regime_by_impacts: None,
+            tone: None,
         }
     }
 }
@@ -122,6 +124,9 @@ pub struct Point {
     pub regime: Regime,
     /// The regime determined from the impacts, if the rig is a simulation.
     pub regime_by_impacts: Option<Regime>,
+    /// A tone in the response that is not part of the motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tone: Option<Tone>,
 }
 
 impl Point {
@@ -151,6 +156,7 @@ impl Point {
             reached: held.reached,
             regime: held.regime,
             regime_by_impacts: held.regime_by_impacts,
+            tone: held.tone,
         }
     }
 }

@@ -8,7 +8,7 @@ use super::level::{Criterion, Found};
 use super::peak;
 use super::point::{Held, Known, Point, Tracked};
 use crate::experiment::{self, ExperimentError, Sample, Search, Stage};
-use crate::identification::{Cycle, Regime, classify, regime_by_response};
+use crate::identification::{Cycle, Regime, classify, foreign_tone, regime_by_response};
 use crate::rig::{Controller, Move, Rig};
 use crate::scene::{Definition, Resonance, Scene};
 
@@ -227,6 +227,7 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
             regime_by_impacts: self.run.samples[0]
                 .ground_truth
                 .map(|_| classify(averaged, self.run.sample_time, omega.value).1),
+            tone: foreign_tone(averaged, self.scene, omega.value),
             // An irregular motion can seem steady for a while; an asymmetric one is no point of this backbone.
             settled: reached
                 && !matches!(regime, Regime::Other | Regime::Asymmetric)

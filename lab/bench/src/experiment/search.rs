@@ -18,7 +18,7 @@ use nalgebra::DVector;
 use vines_model::numerics::{HarmonicBasis, mean, noise};
 
 use super::{Bench, ExperimentError, Sample, Stage};
-use crate::identification::{Balance, Cycle, Slopes};
+use crate::identification::{Balance, Cycle, Slopes, without_tones};
 use crate::rig::{Command, Controller, ControllerError, LoopState, Move, Rig};
 use crate::scene::{LinearResponse, Scene};
 
@@ -27,6 +27,8 @@ const NEAR: f64 = 0.35;
 const NEAR_FOR: usize = 3;
 /// Periods of a leg at least. The loops, whose slowest time constant is five periods, follow within it.
 const LEG: usize = 8;
+/// Fewest periods of the fit.
+const FEWEST: usize = 4;
 /// Largest relative change of the response in a leg: the stable orbits above the fold span a few percent.
 const STEP: f64 = 0.04;
 /// Largest share of the drive that changes the response.
@@ -288,23 +290,30 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Measures over so many periods, or until the lock has settled.
     fn measure(&mut self, periods: usize) -> Result<Leg, ExperimentError> {
+        let mut begins = Vec::new();
+        while begins.len() < periods.max(FEWEST) && !(self.last.settled && begins.len() >= FEWEST) {
+            begins.push((self.bench.samples.len(), self.bench.periods));
+            self.one_period()?;
+        }
+        // Two periods tell the harmonics from a drift of the fundamental.
+        let from = (begins[0].0 + begins[0].0).saturating_sub(begins[1].0);
+        let raw = &self.bench.samples[from..];
+        let mean_omega = mean(raw.iter().map(|one| one.command.drive.omega));
+        let cleaned = without_tones(raw, self.scene, mean_omega);
+        let samples = cleaned.as_deref().unwrap_or(raw);
+        let ends = begins[1..].iter().map(|next| next.0 - from).chain([samples.len()]);
         let (mut all, mut harmonics) = (Vec::new(), Vec::new());
-        let fit = loop {
-            let begin = self.bench.samples.len();
-            if let Some(cycle) = self.one_period()? {
-                // Two periods tell the harmonics from a drift of the fundamental.
-                let two = (2 * begin).saturating_sub(self.bench.samples.len());
-                harmonics.extend(even_and_odd(
-                    &self.bench.samples[two..],
-                    self.bench.sample_time * cycle.omega,
-                ));
-                all.push(cycle);
-            }
-            if all.len() >= periods || self.last.settled {
-                if let Some(fit) = Balance::of(&all, &self.linear, 0.0, Slopes::Unknown) {
-                    break fit;
-                }
-            }
+        for (&(begin, turns), end) in begins.iter().zip(ends) {
+            let (begin, step) = (begin - from, self.bench.sample_time);
+            let Some(cycle) = Cycle::of(&samples[begin..end], step, turns * TAU, self.target) else {
+                continue;
+            };
+            let two = &samples[(2 * begin).saturating_sub(end)..end];
+            harmonics.extend(even_and_odd(two, step * cycle.omega));
+            all.push(cycle);
+        }
+        let Some(fit) = Balance::of(&all, &self.linear, 0.0, Slopes::Unknown) else {
+            return self.measure(periods);
         };
         let [drive, omega] = fit.at(0.0);
         let response = fit.response.value;

@@ -230,10 +230,10 @@ impl Rig for FaultyRig {
             .advance(Drive { amplitude: gain * drive.amplitude, ..drive }, step)
     }
 
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.log.drive(displacement);
-        self.changed.hold(displacement, step)?;
-        self.rig.hold(displacement, step)
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.log.drive(drive.displacement);
+        self.changed.hold(drive, step)?;
+        self.rig.hold(drive, step)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

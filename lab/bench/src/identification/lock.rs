@@ -8,7 +8,8 @@ use vines_model::numerics::{Estimate, mean};
 use vines_model::regime::Regime;
 
 use super::regime::classify;
-use super::response::regime_by_response;
+use super::response::{foreign_tone, regime_by_response};
+use super::tone::Tone;
 use super::{Balance, Cycle, Slopes};
 use crate::experiment::Record;
 use crate::scene::{LinearResponse, Scene};
@@ -68,6 +69,9 @@ pub struct Lock {
     pub impacts_per_period: f64,
     /// The regime: from the impacts, or from the response alone if the rig does not report them.
     pub regime: Regime,
+    /// A tone in the response that is not part of the motion; not looked for in a simulation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tone: Option<Tone>,
 }
 
 impl Lock {
@@ -126,6 +130,10 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
         (count, Regime::Unknown) => (count, regime_by_response(hold, scene, base.value, target, omega.value)),
         told => told,
     };
+    let is_simulated = hold.iter().any(|sample| sample.ground_truth.is_some());
+    let tone = (!is_simulated)
+        .then(|| foreign_tone(hold, scene, omega.value))
+        .flatten();
     Some(Lock {
         f_hz: omega.value / TAU,
         a_m: limit.value,
@@ -147,6 +155,7 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
         periods_to_lock: record.settled as f64 * dt * omega.value / TAU,
         impacts_per_period,
         regime,
+        tone,
     })
 }
 

@@ -137,16 +137,17 @@ impl Rig for Chain {
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         if self.output.is_some() {
-            return self.hold(drive.displacement, step);
+            return self.hold(drive, step);
         }
         let taken = self.taken(step);
         self.rig.advance(drive, taken)
     }
 
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         let taken = self.taken(step);
         let output = self.output.as_ref().and_then(Option::as_ref);
-        self.rig.hold(converted(output, displacement), taken)
+        let displacement = converted(output, drive.displacement);
+        self.rig.hold(Drive { displacement, ..drive }, taken)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

@@ -73,9 +73,9 @@ impl<R: Rig> Rig for Measured<R> {
         self.rig.advance(drive, step)
     }
 
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         self.step_begins(step);
-        self.rig.hold(displacement, step)
+        self.rig.hold(drive, step)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

@@ -50,8 +50,8 @@ impl Rig for Simulated {
         Ok(())
     }
 
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.plant.advance(lovines::Drive::held(displacement), step)?;
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.plant.advance(lovines::Drive::held(drive.displacement), step)?;
         Ok(())
     }
 

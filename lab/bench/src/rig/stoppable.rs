@@ -40,8 +40,8 @@ impl Rig for Stoppable {
         self.rig.advance(drive, step)
     }
 
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.rig.hold(displacement, step)
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.rig.hold(drive, step)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

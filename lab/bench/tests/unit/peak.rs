@@ -26,6 +26,7 @@ fn the_peak_is_where_the_drive_at_a_constant_level_is_smallest() {
             reached: true,
             regime: Regime::Symmetric,
             regime_by_impacts: None,
+            tone: None,
         }
     };
     let scans = PHASES.map(|x| vec![point(x)]);

@@ -7,7 +7,7 @@ use super::pll::{Pll, PllState};
 use super::registry::{Registry, TABLE};
 use super::settings::{Mode, Settings};
 use super::stream::Stream;
-use vines_testbench::rig::{Rig, RigError, Sensors};
+use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 
 /// Name of the device.
 pub const EXPERIMENT: &str = "vines";
@@ -183,7 +183,8 @@ impl Device {
         let from = usize::from(!self.has_reference);
         let shown: Vec<f64> = values[..1].iter().chain(&values[1 + from..]).copied().collect();
         let packet = self.stream.record(self.ticks, &shown);
-        self.rig.hold(out * GAIN * MILLI, step)?;
+        let displacement = out * GAIN * MILLI;
+        self.rig.hold(Drive { displacement, ..Drive::default() }, step)?;
         let step = if locking {
             increment(self.pll.frequency, self.sample_rate)
         } else {

@@ -225,7 +225,7 @@ impl<T: Transport> HelicRig<T> {
             return Err(HostError::Blackout { samples: missed, seconds, allowed });
         }
         self.records.extend((0..missed).map(|_| None));
-        self.counters.held += u64::from(missed);
+        (0..missed).for_each(|_| self.counters.hold(missed.into()));
         self.counters.received += 1;
         for record in packet.values.chunks_exact(width) {
             let read = |n: usize, factor: f64| factor * f64::from(record[n]);

@@ -27,8 +27,8 @@ impl Rig for Spy {
         unreachable!()
     }
 
-    fn hold(&mut self, displacement: f64, _: f64) -> Result<(), RigError> {
-        *self.0.lock().unwrap() = displacement;
+    fn hold(&mut self, drive: Drive, _: f64) -> Result<(), RigError> {
+        *self.0.lock().unwrap() = drive.displacement;
         Ok(())
     }
 }

@@ -232,9 +232,9 @@ impl Rig for Resonator {
         self.plant.advance(drive, step)
     }
 
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         self.taken += 1;
-        self.plant.hold(displacement, step)
+        self.plant.hold(drive, step)
     }
 }
 

@@ -117,9 +117,9 @@ impl Rig for Shown {
         self.0.advance(drive, step)
     }
 
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        *self.1.lock().unwrap() = displacement;
-        self.0.hold(displacement, step)
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        *self.1.lock().unwrap() = drive.displacement;
+        self.0.hold(drive, step)
     }
 }
 

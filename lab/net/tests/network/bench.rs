@@ -153,9 +153,9 @@ impl Rig for Spy {
         self.0.advance(drive, step)
     }
 
-    fn hold(&mut self, displacement: f64, step: f64) -> Result<(), RigError> {
-        self.1.lock().unwrap().push(Drive { displacement, ..Drive::default() });
-        self.0.hold(displacement, step)
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.1.lock().unwrap().push(drive);
+        self.0.hold(drive, step)
     }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {

@@ -52,7 +52,8 @@ fn held_samples_cross_the_network_with_the_same_bits_and_ramp_to_zero() {
     server.sessions(1);
     let mut rig = NetRig::connect(server.address, scene.sample_time(), None).unwrap();
     rig.sense().unwrap();
-    rig.hold(1e-3, scene.sample_time()).unwrap();
+    rig.hold(Drive { displacement: 1e-3, ..Drive::default() }, scene.sample_time())
+        .unwrap();
     rig.sense().unwrap();
     drop(rig);
     server.sessions(2);

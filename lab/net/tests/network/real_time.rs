@@ -11,7 +11,7 @@ use std::time::Duration;
 use vines_net::frame::{Frame, Kind};
 use vines_net::{Counters, Ended, LinkError, NetController, NetRig, RAMP_SAMPLES, ReportLost, Session, Timing};
 use vines_testbench::experiment::{self, ExperimentError, Plan};
-use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Rig, Sensors, Simulated};
+use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Rig, Sensors, Simulated};
 
 use crate::bench::{drive, real_time_rig, scene, serve_controller, shake, socket};
 use crate::proxy::{Fate, Proxy};
@@ -130,6 +130,37 @@ fn the_readings_of_a_blackout_repeat_the_period_before() {
     }
     println!("largest error {worst:e} m of 1e-4 m");
     assert!(worst < 5e-6, "{worst}");
+}
+
+#[test]
+fn a_gap_of_30_ms_is_no_failed_sensor_and_is_counted() {
+    // Twice the default frequency: shorter runs.
+    let scene = scene(&[
+        "plant.k=46720",
+        "plant.c=5.06",
+        "start.dq2=1.0",
+        "controller.samples_per_period=50",
+        "controller.bandwidth=0.3",
+        "controller.amplitude_tolerance=4e-3",
+        "record.hold_periods=3",
+        "record.decay_periods=3",
+    ]);
+    let (server, _) = real_time_rig(&scene, PATIENT);
+    let proxy = Proxy::before(socket(server.address), |kind, n| match kind {
+        Kind::Sensors | Kind::Drive if (1500..1527).contains(&n) => Fate::Lose,
+        _ => Fate::Pass,
+    });
+    let mut rig = NetRig::connect(proxy.address, scene.sample_time(), None).unwrap();
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let outcome = experiment::run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {});
+    let client = rig.counters();
+    drop(rig);
+    let session = server.sessions(1).remove(0);
+    println!("{client}\n{session}");
+    outcome.unwrap();
+    assert!(client.held >= 27 && client.longest >= 27 && session.counters.unwrap().longest >= 27);
+    let text = format!("at most {} in a row", client.longest);
+    assert!(client.to_string().contains(&text), "{client}");
 }
 
 #[test]

@@ -1,4 +1,9 @@
 use std::f64::consts::TAU;
+use std::ops::Range;
+
+use vines_testbench::experiment::{self, Plan};
+use vines_testbench::rig::{BuiltIn, Chain, Drive, Rig, RigError, Simulated};
+use vines_testbench::scene::{Override, PAPER, Scene};
 
 use super::*;
 
@@ -41,4 +46,102 @@ fn without_a_period_before_it_a_gap_is_bridged_by_a_line() {
     (0..5).for_each(|_| bridge.keep(0.0, Sensors { response: 1.0, reference: None }));
     let next = Sensors { response: 3.0, reference: None };
     assert_eq!(bridge.fill(0.0, &next, 1, 0.0).response, 2.0);
+}
+
+/// A rig whose readings and drives are lost in a gap. Until its end the rig has the last drive; a base of held samples stands still.
+struct Interrupted {
+    rig: Box<dyn Rig>,
+    bridge: Bridge,
+    gap: Range<u64>,
+    at: u64,
+    phase: f64,
+    drive: (Drive, bool, f64),
+    /// The first reading after the gap.
+    next: Sensors,
+}
+
+impl Interrupted {
+    fn apply(&mut self) -> Result<(), RigError> {
+        let (drive, holds, step) = self.drive;
+        if holds {
+            self.rig.hold(drive, step)
+        } else {
+            self.rig.advance(drive, step)
+        }
+    }
+
+    fn step(&mut self, drive: Drive, holds: bool, step: f64) -> Result<(), RigError> {
+        self.drive = (drive, holds, step);
+        self.phase += drive.omega * step / TAU;
+        if !self.gap.contains(&self.at) {
+            self.apply()?;
+        }
+        self.at += 1;
+        Ok(())
+    }
+}
+
+impl Rig for Interrupted {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        if self.at == self.gap.start {
+            for _ in self.gap.clone() {
+                self.rig.sense()?;
+                self.apply()?;
+            }
+            self.next = self.rig.sense()?;
+        }
+        let reading = if self.gap.contains(&self.at) {
+            let turn = self.drive.0.omega * self.drive.2 / TAU;
+            self.bridge.fill(self.phase, &self.next, self.gap.end - self.at, turn)
+        } else {
+            self.rig.sense()?
+        };
+        self.bridge.keep(self.phase, reading);
+        Ok(reading)
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.step(drive, false, step)
+    }
+
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.step(drive, true, step)
+    }
+}
+
+#[test]
+fn a_run_rides_through_a_gap_of_30_ms_at_any_phase_whoever_makes_the_sine_of_the_base() {
+    for settings in [
+        &[][..],
+        &["chain.hold=true"],
+        &["chain.hold=true", "chain.dac_bits=16", "chain.snr=40"],
+        &["resonance.sensor=acceleration", "record.hold_periods=5"],
+    ] {
+        let overrides: Vec<Override> = settings.iter().map(|one| one.parse().unwrap()).collect();
+        let scene = Scene::parse("paper.toml", PAPER, &overrides).unwrap();
+        let lost = (0.03 / scene.sample_time()).ceil() as u64;
+        let run = |from: u64| {
+            let plant = Simulated::new(scene.plant, scene.start).unwrap();
+            let rig = Interrupted {
+                rig: Box::new(plant.with_sensors(scene.resonance)),
+                bridge: Bridge::default(),
+                gap: from..from + lost,
+                at: 0,
+                phase: 0.0,
+                drive: (Drive::default(), false, scene.sample_time()),
+                next: Sensors::default(),
+            };
+            let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+            let mut rig = Chain::around(Box::new(rig), &scene);
+            experiment::run(&mut *rig, &mut controller, &Plan::of(&scene), |_, _, _| {})
+                .unwrap_or_else(|error| panic!("{settings:?}, {lost} samples from {from} on: {error}"))
+        };
+        let whole = run(u64::MAX / 2);
+        for [from, to] in [[0, whole.settled], [whole.settled, whole.released]] {
+            // Phases that fill the period evenly.
+            for n in 0..8 {
+                run((from + (to - from) * n / 8 + 37 * n % 100) as u64);
+            }
+        }
+    }
 }
