@@ -47,8 +47,8 @@ const DEPARTURE: f64 = 0.2;
 /// Largest amplitude of the second harmonic of a symmetric motion over that of the third: 0.1 is found where it is symmetric, from 2 on
 /// where it is irregular.
 const SYMMETRIC: f64 = 0.5;
-/// Growth of this ratio while the lock settles that is no loss of the symmetry: it scatters by 0.005.
-const STILL: f64 = 0.025;
+/// Legs in which this ratio grows one after the other: beside symmetry breaking the symmetry is lost slowly, and noise does this in one of 24 cases.
+const GROWN: u32 = 3;
 /// Standard uncertainties from which on a difference is not noise.
 const SIGNIFICANT: f64 = 3.0;
 /// Smallest slope of the holding drive under a constant drive, over that of the linear response: with less, it takes ten times as long
@@ -95,6 +95,8 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     /// Setpoint of the response, m.
     setpoint: f64,
     last: Command,
+    /// Whether the symmetric motions were seen to end above.
+    ends_above: bool,
     /// The symmetric motions of the smallest and the largest holding drive: response and drive, m.
     extremes: Option<[[f64; 2]; 2]>,
 }
@@ -120,6 +122,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             period: d.natural_period(),
             setpoint: 0.0,
             last: Command::default(),
+            ends_above: false,
             extremes: None,
         }
     }
@@ -134,7 +137,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         for search in 0..SEARCHES {
             let step = STEP / f64::from(1 << search);
             seen = self.symmetric(seen, step)?;
-            if let Some(held) = self.solve(&mut seen, step)? {
+            if let Some(held) = self.solve(&mut seen, step, search >= SEARCHES / 2)? {
                 return Ok(Some(held));
             }
         }
@@ -190,15 +193,17 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     }
 
     /// Follows the symmetric motion to the response that the requested drive holds. Returns whether it stays under control there; `None` if
-    /// the motion is lost.
-    fn solve(&mut self, seen: &mut Leg, step: f64) -> Result<Option<bool>, ExperimentError> {
-        let mut way = if seen.drive < self.asked { step } else { -step };
+    /// the motion is lost. `any`: also one that a constant drive does not hold.
+    fn solve(&mut self, seen: &mut Leg, step: f64, any: bool) -> Result<Option<bool>, ExperimentError> {
         let (mut known, mut passed, mut legs) = (Known::from(*seen), false, 0);
+        let mut upwards = seen.drive < self.asked && !self.ends_above;
         while seen.symmetric && self.setpoint > LOWEST * self.b && legs < LEGS {
             let most = step * seen.last;
+            let way = if upwards { most } else { -most };
             // From where the response is: it follows its setpoint late.
+            let wanted = known.slope().is_some_and(|slope| any || slope > 0.0);
             let predicted = known.at(self.asked).map(|to| to - seen.last);
-            let change = predicted.filter(|change| passed || change * way > 0.0);
+            let change = predicted.filter(|change| wanted && (passed || change * way > 0.0));
             *seen = match change {
                 Some(change) if change.abs() < most => {
                     legs += 1;
@@ -206,20 +211,22 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                     self.leg(to, self.periods(change, seen) / 2, 0.0)?;
                     self.leg(0.0, LEG, 0.0)?
                 }
-                change => self.sweep(seen, change.map_or(way * seen.last, |change| change.clamp(-most, most)))?,
+                change => self.sweep(seen, change.map_or(way, |change| change.clamp(-most, most)))?,
             };
             if !seen.symmetric {
                 // A change may disturb the symmetry for a while.
                 *seen = self.leg(0.0, LEG, 0.0)?;
             }
             if !seen.symmetric {
-                // Above the symmetric motion, the way is down.
-                *seen = self.fall(*seen, step, LOST * seen.response)?;
-                (known, way, passed) = (Known::from(*seen), -step, false);
+                (known, passed, upwards) = (self.below(seen, step)?, false, false);
                 continue;
             }
-            passed |= known.add(*seen, 0.5 * step, self.asked);
-            let Some(slope) = known.slope() else { continue };
+            let between = known.add(*seen, 0.5 * step, self.asked);
+            let Some(slope) = known.slope().filter(|slope| any || *slope > 0.0) else {
+                passed = false;
+                continue;
+            };
+            passed |= between;
             let scale = (slope.abs() * seen.response).clamp(FIRM * self.asked, self.asked);
             let found = (self.asked - seen.drive).abs() < (FOUND * scale).max(seen.noise);
             // The condition of stability under a constant drive.
@@ -231,20 +238,27 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
                 if self.settle(seen)? {
                     return Ok(Some(!firm));
                 }
-                *seen = self.fall(*seen, step, LOST * seen.response)?;
+                (known, passed, upwards) = (self.below(seen, step)?, false, false);
             }
         }
         Ok(None)
     }
 
+    /// Goes down to the symmetric motion from where it was lost: above it is a motion without symmetry.
+    fn below(&mut self, seen: &mut Leg, step: f64) -> Result<Known, ExperimentError> {
+        *seen = self.fall(*seen, step, LOST * seen.response)?;
+        self.ends_above |= seen.symmetric;
+        Ok(Known::from(*seen))
+    }
+
     /// Waits until the lock has settled. Returns whether it has; if not, the motion has lost its symmetry.
     fn settle(&mut self, seen: &mut Leg) -> Result<bool, ExperimentError> {
-        let (mut other, mut least) = (0, f64::INFINITY);
+        let (mut other, mut grown) = (0, 0);
         while other < 2 {
+            let before = seen.asymmetry;
             *seen = self.measure(LEG)?;
-            least = seen.asymmetry.min(least);
-            // Beside symmetry breaking the symmetry is lost slowly.
-            if self.last.settled && seen.asymmetry <= least + STILL {
+            grown = if seen.asymmetry > before { grown + 1 } else { 0 };
+            if self.last.settled && grown < GROWN {
                 return Ok(true);
             }
             other = if seen.symmetric { 0 } else { other + 1 };
@@ -332,6 +346,26 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             let [least, most] = self.extremes.unwrap_or([point, point]);
             let least = if point[1] < least[1] { point } else { least };
             self.extremes = Some([least, if point[1] > most[1] { point } else { most }]);
+        }
+        if std::env::var_os("TRACE").is_some() {
+            eprintln!(
+                "{:7.1} set {:.4} C {:.4}..{:.4} E/asked {:.5} u {:.1e} omega {:.5} departed {departed} sym {symmetric} odd {:.1e} even {:.1e} doubtful {:.1e} excess {:.1} n {} {:?} {} tones {}",
+                self.bench.periods,
+                self.setpoint / self.b,
+                response / self.b,
+                all[all.len() - 1].amplitude() / self.b,
+                drive.value / self.asked,
+                drive.uncertainty / self.asked,
+                omega.value / self.linear.omega0,
+                odd / response / response,
+                even / response / response,
+                doubtful / response / response,
+                fit.excess,
+                all.len(),
+                self.last.state,
+                self.last.settled,
+                cleaned.is_some()
+            );
         }
         Ok(Leg {
             response,
