@@ -40,7 +40,7 @@ const DRAWING: f64 = 0.1;
 const UNREACHED: f64 = 1.5;
 /// Response over the half-width below which no motion is searched for: the fold is above, up to r = 0.9.
 const LOWEST: f64 = 0.05;
-/// Fall of the response, from where the symmetry was lost, after which the motion is lost: its stable range is wider.
+/// Change of the response, from where the symmetry was lost or the lock was found, after which the motion is lost: its stable range is wider.
 const LOST: f64 = 0.8;
 /// Departure from the linear response that shows impacts, as a share of the drive: twice the uncertainty of damping and stiffness.
 const DEPARTURE: f64 = 0.2;
@@ -253,7 +253,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Waits until the lock has settled. Returns whether it has; if not, the motion has lost its symmetry.
     fn settle(&mut self, seen: &mut Leg) -> Result<bool, ExperimentError> {
-        let (mut other, mut grown) = (0, 0);
+        let (mut other, mut grown, first) = (0, 0, seen.response);
         while other < 2 {
             let before = seen.asymmetry;
             *seen = self.measure(LEG)?;
@@ -261,7 +261,9 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             if self.last.settled && grown < GROWN {
                 return Ok(true);
             }
-            other = if seen.symmetric { 0 } else { other + 1 };
+            // Noise may hide an asymmetry, but not where the motion goes.
+            let is_there = (LOST..1.0 / LOST).contains(&(seen.response / first));
+            other = if seen.symmetric && is_there { 0 } else { other + 1 };
             self.setpoint = seen.last;
         }
         Ok(false)
@@ -332,15 +334,16 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let [drive, omega] = fit.at(0.0);
         let response = fit.response.value;
         let linear = self.damping() * response;
-        let detuning = 2.0 * response * (omega.value / self.linear.omega0 - 1.0);
-        let departure = (drive.value - linear).hypot(detuning);
-        let departed = departure > (DEPARTURE * linear.max(drive.value)).max(SIGNIFICANT * drive.uncertainty);
+        let detuning = omega.scaled(2.0 * response / self.linear.omega0);
+        let departure = (drive.value - linear).hypot(detuning.value - 2.0 * response);
+        let by_noise = SIGNIFICANT * drive.uncertainty.hypot(detuning.uncertainty);
+        let departed = departure > (DEPARTURE * linear.max(drive.value)).max(by_noise);
         // Noise itself scatters by a share of sqrt(2/n): each window has half of the next one.
         let [even, odd, noise] = [0, 1, 2].map(|k| mean(harmonics.iter().map(|squares: &[f64; 3]| squares[k])));
         let (even, odd) = (even - noise, odd - noise);
         let doubtful = SIGNIFICANT * noise / (0.5 * all.len() as f64).sqrt();
-        let symmetric =
-            departed && self.setpoint > LOWEST * self.b && even <= (SYMMETRIC * SYMMETRIC * odd).max(doubtful);
+        let possible = self.setpoint > LOWEST * self.b && response < UNREACHED * self.b;
+        let symmetric = departed && possible && even <= (SYMMETRIC * SYMMETRIC * odd).max(doubtful);
         if symmetric {
             let point = [response, drive.value];
             let [least, most] = self.extremes.unwrap_or([point, point]);
