@@ -95,8 +95,6 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     /// Setpoint of the response, m.
     setpoint: f64,
     last: Command,
-    /// Whether the symmetric motions were seen to end above.
-    ends_above: bool,
     /// The symmetric motions of the smallest and the largest holding drive: response and drive, m.
     extremes: Option<[[f64; 2]; 2]>,
 }
@@ -122,7 +120,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             period: d.natural_period(),
             setpoint: 0.0,
             last: Command::default(),
-            ends_above: false,
             extremes: None,
         }
     }
@@ -174,7 +171,14 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let largest = self.scene.controller_config().amplitude_max.unwrap_or(f64::INFINITY);
         let spare = SHARE * self.gain() * (largest - self.damping() * (1.0 + DRAWING) * self.b);
         let rate = (self.b / (RISE * self.period)).min(spare);
-        while !(seen.symmetric || seen.departed && seen.response > (1.0 - DRAWING) * self.b) {
+        while !seen.departed || seen.response < (1.0 - DRAWING) * self.b {
+            if seen.symmetric {
+                // A rise may resemble impacts; at rest the setpoint tells them apart.
+                seen = self.leg(0.0, LEG, 0.0)?;
+                if seen.symmetric {
+                    return Ok(seen);
+                }
+            }
             let change = rate * LEG as f64 * self.period;
             if seen.last + change > UNREACHED * self.b || rate <= 0.0 {
                 return Ok(seen);
@@ -196,7 +200,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// the motion is lost. `any`: also one that a constant drive does not hold.
     fn solve(&mut self, seen: &mut Leg, step: f64, any: bool) -> Result<Option<bool>, ExperimentError> {
         let (mut known, mut passed, mut legs) = (Known::from(*seen), false, 0);
-        let mut upwards = seen.drive < self.asked && !self.ends_above;
+        let mut upwards = seen.drive < self.asked;
         while seen.symmetric && self.setpoint > LOWEST * self.b && legs < LEGS {
             let most = step * seen.last;
             let way = if upwards { most } else { -most };
@@ -247,7 +251,6 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Goes down to the symmetric motion from where it was lost: above it is a motion without symmetry.
     fn below(&mut self, seen: &mut Leg, step: f64) -> Result<Known, ExperimentError> {
         *seen = self.fall(*seen, step, LOST * seen.response)?;
-        self.ends_above |= seen.symmetric;
         Ok(Known::from(*seen))
     }
 
@@ -331,12 +334,14 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let Some(fit) = Balance::of(&all, &self.linear, 0.0, Slopes::Unknown) else {
             return self.measure(periods);
         };
+        // Harmonics above the third count as noise of a period, but do not scatter.
+        let scatter = fit.excess.min(1.0);
         let [drive, omega] = fit.at(0.0);
         let response = fit.response.value;
         let linear = self.damping() * response;
         let detuning = omega.scaled(2.0 * response / self.linear.omega0);
         let departure = (drive.value - linear).hypot(detuning.value - 2.0 * response);
-        let by_noise = SIGNIFICANT * drive.uncertainty.hypot(detuning.uncertainty);
+        let by_noise = SIGNIFICANT * scatter * drive.uncertainty.hypot(detuning.uncertainty);
         let departed = departure > (DEPARTURE * linear.max(drive.value)).max(by_noise);
         // Noise itself scatters by a share of sqrt(2/n): each window has half of the next one.
         let [even, odd, noise] = [0, 1, 2].map(|k| mean(harmonics.iter().map(|squares: &[f64; 3]| squares[k])));
@@ -350,31 +355,11 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             let least = if point[1] < least[1] { point } else { least };
             self.extremes = Some([least, if point[1] > most[1] { point } else { most }]);
         }
-        if std::env::var_os("TRACE").is_some() {
-            eprintln!(
-                "{:7.1} set {:.4} C {:.4}..{:.4} E/asked {:.5} u {:.1e} omega {:.5} departed {departed} sym {symmetric} odd {:.1e} even {:.1e} doubtful {:.1e} excess {:.1} n {} {:?} {} tones {}",
-                self.bench.periods,
-                self.setpoint / self.b,
-                response / self.b,
-                all[all.len() - 1].amplitude() / self.b,
-                drive.value / self.asked,
-                drive.uncertainty / self.asked,
-                omega.value / self.linear.omega0,
-                odd / response / response,
-                even / response / response,
-                doubtful / response / response,
-                fit.excess,
-                all.len(),
-                self.last.state,
-                self.last.settled,
-                cleaned.is_some()
-            );
-        }
         Ok(Leg {
             response,
             last: all[all.len() - 1].amplitude(),
             drive: drive.value,
-            noise: drive.uncertainty,
+            noise: scatter * drive.uncertainty,
             departed,
             symmetric,
             asymmetry: ((even - doubtful).max(0.0) / odd.max(doubtful)).sqrt(),
