@@ -33,7 +33,12 @@ pub fn default_scene() -> Scene {
         amplitude: Dimensionless::of(&plant, 0.0).amplitude(EXCITATION[0]),
         controller: Controller::default(),
         record: Record::default(),
-        backbone: Backbone::default(),
+        backbone: Backbone {
+            c_from: Some(0.7),
+            c_to: Some(0.14),
+            g_max: Some(4.0),
+            ..Backbone::default()
+        },
         phase_lock: PhaseLock::default(),
         rig_names: Names::default(),
         controller_names: Names::default(),
