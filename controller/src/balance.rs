@@ -80,13 +80,13 @@ pub struct Powers {
     pub reading: Real,
     /// Phase of a sample, rad.
     pub turn: Real,
-    /// Drive, m, and the drive with the lag of the detectors.
+    /// Drive, m.
     pub drive: Real,
-    /// As above.
+    /// The drive with the lag of the detectors, m.
     pub lagging: Real,
-    /// Measured amplitude of the base, m, and of the response.
+    /// Measured amplitude of the base, m.
     pub base: Real,
-    /// As above.
+    /// That of the response, m.
     pub response: Real,
     /// Cosine of the phase error; 1 if it is not known.
     pub cosine: Real,

@@ -49,13 +49,14 @@ class Identification(Result):
     Attributes
     ----------
     lock : dict
-        The locked point: f_Hz, A_m, E_m, G, sigma, C, B, phase_error_deg, their standard uncertainties u_*, regime and others.
+        The locked point: f_Hz, A_m, E_m, G, sigma, C, B, phase_error_deg, their standard uncertainties u_*, regime
+        and others.
     exact : Orbit or None
         The exact phase-resonant orbit nearest to the lock.
     decay : dict of ndarray
-        Points along the free decay: t_s, f_Hz, A_m, tau, C, B, sigma, standard uncertainties, and at the same C sigma_theory and
-        sigma_exact of steady motions, and sigma_slow_flow and sigma_predicted of the decay that theory and the exact
-        plant predict.
+        Points along the free decay: t_s, f_Hz, A_m, tau, C, B, sigma, standard uncertainties, and at the same C
+        sigma_theory and sigma_exact of steady motions, and sigma_slow_flow and sigma_predicted of the decay that theory
+        and the exact plant predict.
     decay_end : str
         What ended the points.
     rms_sigma_error, rms_sigma_exact, rms_sigma_predicted : float or None

@@ -57,9 +57,9 @@ pub enum IdentificationError {
          {tolerance} degrees. A channel may have become late: `vines check` measures its delay"
     )]
     OffTarget {
-        /// Mean phase error of the hold, degrees, and its standard uncertainty.
+        /// Mean phase error of the hold, degrees.
         error: f64,
-        /// See above.
+        /// Its standard uncertainty, degrees.
         uncertainty: f64,
         /// Degrees.
         tolerance: f64,

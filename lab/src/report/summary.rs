@@ -87,10 +87,15 @@ pub fn identification(found: &Comparison) -> String {
     });
     let [hertz, response, base] = in_si([(lock.f_hz, lock.u_f_hz), (lock.a_m, lock.u_a_m), (lock.e_m, lock.u_e_m)]);
     format!(
-        "Measured: {hertz} Hz, response {response} m, base {base} m\n{}, G = {}\nLocked after {:.0} periods: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{phase}{ripple}{tone}{}\n{}\n{}\n",
+        "Measured: {hertz} Hz, response {response} m, base {base} m\n{}, G = {}\nLocked after {:.0} periods{}: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{phase}{ripple}{tone}{}\n{}\n{}\n",
         rig(&found.parameters),
         with_uncertainty(lock.g, lock.u_g),
         lock.periods_to_lock,
+        if lock.held {
+            " (the response is held by control: a constant drive would not hold it)"
+        } else {
+            ""
+        },
         lock.regime,
         lock.impacts(),
         lock.phase_error_deg,

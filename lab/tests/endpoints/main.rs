@@ -218,7 +218,7 @@ fn a_backbone_without_a_single_impact_is_a_failure() {
 }
 
 #[test]
-fn a_controller_at_a_network_address_captures_from_rest_if_the_rig_shows_its_sensors_only() {
+fn a_controller_at_a_network_address_locks_from_rest_if_the_rig_shows_its_sensors_only() {
     let rig = Server::start(&["rig", "--lock-step", "--sensors-only"]);
     let peer = Server::start(&["controller"]);
     let found = identified(&["--rig", &rig.1, "--controller", &peer.1]);

@@ -16,9 +16,9 @@ use crate::scene::LinearResponse;
 pub struct Criterion {
     /// Linear response of the rig.
     pub linear: LinearResponse,
-    /// Largest standard uncertainty of the drive E, as a share of it, and of the frequency, as a share of `omega0 E/A` at the largest level A, m.
+    /// Largest standard uncertainty of the drive E, as a share of it, and of the frequency, as a share of `omega0 E/A` at the largest level A.
     pub precision: f64,
-    /// See above.
+    /// The largest level, m.
     pub largest: f64,
     /// Whether the point serves to find the peak of the response, which needs more of the drive.
     pub is_peak: bool,

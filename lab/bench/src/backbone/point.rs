@@ -80,13 +80,13 @@ pub struct Point {
     /// Base amplitude, m.
     #[serde(rename = "E_m")]
     pub e_m: f64,
-    /// Standard uncertainties of the amplitude, and of frequency and base at this amplitude.
+    /// Standard uncertainty of the frequency at this amplitude, Hz.
     #[serde(rename = "u_f_Hz")]
     pub u_f_hz: f64,
-    /// See above.
+    /// Standard uncertainty of the amplitude, m.
     #[serde(rename = "u_A_m")]
     pub u_a_m: f64,
-    /// See above.
+    /// Standard uncertainty of the base amplitude at this amplitude, m.
     #[serde(rename = "u_E_m")]
     pub u_e_m: f64,
     /// Target level, over b.
@@ -101,12 +101,12 @@ pub struct Point {
     pub g: f64,
     /// Mean phase error, degrees; of a peak, its phase less the phase target.
     pub phase_error_deg: f64,
-    /// Standard uncertainties of C, and of sigma and G at this C.
+    /// Standard uncertainty of C.
     #[serde(rename = "u_C")]
     pub u_c: f64,
-    /// See above.
+    /// Standard uncertainty of sigma at this C.
     pub u_sigma: f64,
-    /// See above.
+    /// Standard uncertainty of G at this C.
     #[serde(rename = "u_G")]
     pub u_g: f64,
     /// Standard uncertainty of the phase error, degrees.

@@ -65,6 +65,8 @@ pub struct Lock {
     pub averaged: usize,
     /// From the start to the settled lock, in periods of the locked motion.
     pub periods_to_lock: f64,
+    /// Whether control holds the response, because a constant drive would not.
+    pub held: bool,
     /// Impacts per period; NaN if the rig does not report them.
     pub impacts_per_period: f64,
     /// The regime: from the impacts, or from the response alone if the rig does not report them.
@@ -153,6 +155,7 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
         u_phase_deg: phase_error.uncertainty.to_degrees(),
         averaged: approach.len(),
         periods_to_lock: record.settled as f64 * dt * omega.value / TAU,
+        held: record.held,
         impacts_per_period,
         regime,
         tone,

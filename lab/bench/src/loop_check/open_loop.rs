@@ -5,11 +5,11 @@ use std::f64::consts::TAU;
 use crate::rig::{Drive, Rig, RigError};
 use vines_model::numerics::standard_deviation;
 
-/// Periods between looks at a response that falls, how often, and the share of it that is left at most.
+/// Periods between looks at a response that falls.
 pub(super) const DECAY: usize = 10;
-/// As above.
+/// Most looks.
 const PAUSES: usize = 40;
-/// As above.
+/// Share of the response that is left at most from look to look.
 const FALLS: f64 = 0.98;
 /// Looks in succession at which the response has not fallen: a particle that still hits the walls now and then makes it rise for a while.
 const PATIENCE: usize = 4;
