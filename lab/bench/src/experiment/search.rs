@@ -44,7 +44,7 @@ const LOWEST: f64 = 0.05;
 const LOST: f64 = 0.8;
 /// Departure from the linear response that shows impacts, as a share of the drive: twice the uncertainty of damping and stiffness.
 const DEPARTURE: f64 = 0.2;
-/// Largest amplitude of the second harmonic of a symmetric motion over that of the third: 0.1 is found where it is symmetric, from 2 on
+/// Largest amplitude of the second harmonic of a symmetric motion over that of the third: 0.01 is found where it is symmetric, from 2 on
 /// where it is irregular.
 const SYMMETRIC: f64 = 0.5;
 /// Legs in which this ratio grows one after the other: beside symmetry breaking the symmetry is lost slowly, and noise does this in one of 24 cases.
