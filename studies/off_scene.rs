@@ -20,26 +20,11 @@ use vines_testbench::{
     backbone::track,
     comparison::ExactCurve,
     identification::Regime,
-    rig::{BuiltIn, Chain, Drive, Rig, RigError, Sensors, Simulated},
+    rig::{BuiltIn, Chain, SensorsOnly, Simulated},
     scene::{LinearResponse, Override, Scene},
 };
 
 type Failure = Box<dyn std::error::Error + Send + Sync>;
-
-/// A rig without its ground truth.
-struct SensorsOnly(Box<dyn Rig>);
-
-impl Rig for SensorsOnly {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.0.sense()
-    }
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.0.advance(drive, step)
-    }
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.0.hold(drive, step)
-    }
-}
 
 /// Errors over their uncertainties and errors at equal C of the settled points, points, and periods.
 struct Found {
@@ -191,7 +176,7 @@ fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, [k, c, m, b, dr]: 
         gain: LinearResponse::of(&scene).gain,
     });
     let rig = Simulated::new(truth, scene.start)?;
-    let mut rig = SensorsOnly(Chain::around(Box::new(rig), &scene));
+    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let tracked = track(&mut rig, &mut controller, &scene, |_, _| {})?;
     let own = scene.dimensionless();

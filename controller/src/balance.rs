@@ -19,13 +19,13 @@ use crate::real::{Real, larger};
 /// Largest growth without work: multiples of the largest drive and of the response. 1.6 times the largest of 2400 random rigs, half of
 /// which started with a particle that moves.
 const GROWTH: [Real; 2] = [3.0, 0.5];
-/// Largest loss beyond damping and impacts, as above; the response is that before the loss. Four times the largest of the 1200 rigs that
-/// started at rest; one of the others exceeds it.
+/// Largest loss beyond damping and impacts: multiples of the largest drive and of the response before the loss. Four times the largest of 1200
+/// random rigs that started at rest; one of 1200 with a particle that moves exceeds it.
 const LOSS: [Real; 2] = [0.4, 0.12];
 /// Largest distance below the linear response in the first periods: multiples of the largest drive and of the linear response. Four and
-/// 1.4 times the largest of these rigs.
+/// 1.4 times the largest of 2400 random rigs.
 const FIRST: [Real; 2] = [1.0, 0.5];
-/// The same if the damping is not known: a fifth is left after eight periods with a damping ratio of 0.1.
+/// Largest distance below the linear response if the damping is not known: a fifth is left after eight periods with a damping ratio of 0.1.
 const FIRST_UNKNOWN: [Real; 2] = [1.0, 0.8];
 /// Length of the first periods: turns, and time constants of the detector, whose lag they include.
 const FIRST_TIMES: [Real; 2] = [3.0, 3.0];
@@ -86,7 +86,7 @@ pub struct Powers {
     pub lagging: Real,
     /// Measured amplitude of the base, m.
     pub base: Real,
-    /// That of the response, m.
+    /// Measured amplitude of the response, m.
     pub response: Real,
     /// Cosine of the phase error; 1 if it is not known.
     pub cosine: Real,

@@ -5,7 +5,9 @@ use vines::comparison::{ExactCurve, TrackedComparison, TrackedPoint};
 use vines::experiment::ExperimentError;
 use vines::identification::Regime;
 use vines::loop_check::check;
-use vines::rig::{BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, Simulated};
+use vines::rig::{
+    BuiltIn, Chain, Command, Controller, ControllerError, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated,
+};
 use vines::scene::{Override, Parameters, Scene};
 
 fn scene(settings: &[&str]) -> Scene {
@@ -157,19 +159,6 @@ fn a_rig_at_rest_is_tracked_with_impacts() {
     }
 }
 
-/// A rig that shows its sensors only, through the measurement chain of a scene.
-struct SensorsOnly(Box<dyn Rig>);
-
-impl Rig for SensorsOnly {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.0.sense()
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.0.advance(drive, step)
-    }
-}
-
 /// The backbone of a rig with other parameters than those of the scene, from its sensors, after the loop check if `checked`.
 fn tracked_from_sensors(
     settings: &[&str],
@@ -188,7 +177,7 @@ fn tracked_from_sensors(
     let plant = Simulated::new(plant, scene.start)
         .unwrap()
         .with_sensors(scene.resonance);
-    let mut rig = SensorsOnly(Chain::around(Box::new(plant), &scene));
+    let mut rig = SensorsOnly::around(Chain::around(Box::new(plant), &scene));
     if checked {
         let found = check(&mut rig, &scene).unwrap();
         scene.measured = found.linear.map(|linear| linear.response());

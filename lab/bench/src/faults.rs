@@ -92,14 +92,14 @@ fn reason(error: &ExperimentError) -> String {
     }
 }
 
-/// What a real rig shows of itself: its sensors.
-struct SensorsOnly<F: FnMut(Option<f64>)> {
+/// A rig that shows its sensors only, and says when it is dropped how long its fault was driven.
+struct Rehearsal<F: FnMut(Option<f64>)> {
     rig: Box<dyn Rig>,
     log: Log,
     ended: F,
 }
 
-impl<F: FnMut(Option<f64>)> Drop for SensorsOnly<F> {
+impl<F: FnMut(Option<f64>)> Drop for Rehearsal<F> {
     fn drop(&mut self) {
         if self.log.has_begun() {
             (self.ended)(self.log.times().map(|(detection, shutdown)| detection + shutdown));
@@ -107,7 +107,7 @@ impl<F: FnMut(Option<f64>)> Drop for SensorsOnly<F> {
     }
 }
 
-impl<F: FnMut(Option<f64>)> Rig for SensorsOnly<F> {
+impl<F: FnMut(Option<f64>)> Rig for Rehearsal<F> {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         self.rig.sense()
     }
@@ -132,7 +132,7 @@ pub fn rehearsal_rig(
 ) -> Box<dyn Rig> {
     let step = scene.sample_time();
     let log = Log::new((seconds / step).min(usize::MAX as f64) as usize, step);
-    Box::new(SensorsOnly { rig: failing(scene, kind, &log), log, ended })
+    Box::new(Rehearsal { rig: failing(scene, kind, &log), log, ended })
 }
 
 fn failing(scene: &Scene, kind: Kind, log: &Log) -> Box<dyn Rig> {

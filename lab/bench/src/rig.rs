@@ -5,6 +5,7 @@ mod chain;
 mod error;
 mod measured;
 mod phase_lock;
+mod sensors_only;
 mod simulated;
 mod stoppable;
 
@@ -14,6 +15,7 @@ pub(crate) use chain::NormalDistribution;
 pub use error::{ControllerError, RigError};
 pub use measured::Measured;
 pub use phase_lock::BuiltIn;
+pub use sensors_only::SensorsOnly;
 pub use simulated::Simulated;
 pub use stoppable::{Interrupted, Stoppable};
 

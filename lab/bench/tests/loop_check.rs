@@ -81,6 +81,13 @@ impl Rig for Moving {
     }
 }
 
+/// The default scene with these settings, at rest.
+fn at_rest(settings: &[&str]) -> Scene {
+    let settings = settings.iter().chain(&["start.dq2=0"]);
+    let overrides: Vec<_> = settings.map(|one| one.parse().unwrap()).collect();
+    Scene::parse("paper.toml", PAPER, &overrides).unwrap()
+}
+
 #[test]
 fn the_check_measures_the_linear_response_and_states_gains_with_a_phase_margin() {
     for (settings, tolerance) in [
@@ -90,12 +97,7 @@ fn the_check_measures_the_linear_response_and_states_gains_with_a_phase_margin()
             0.15,
         ),
     ] {
-        let overrides: Vec<_> = settings
-            .iter()
-            .chain(&["start.dq2=0"])
-            .map(|one| one.parse().unwrap())
-            .collect();
-        let scene = Scene::parse("paper.toml", PAPER, &overrides).unwrap();
+        let scene = at_rest(settings);
         let d = scene.dimensionless();
         let plant = Simulated::new(scene.plant, scene.start).unwrap();
         let mut rig = Chain::around(Box::new(plant), &scene);
@@ -195,12 +197,7 @@ fn what_would_falsify_a_measurement_is_refused_with_and_without_noise() {
         &["chain.snr=30", "chain.seed=9"],
         &["resonance.reference='force'"],
     ] {
-        let overrides: Vec<_> = settings
-            .iter()
-            .chain(&["start.dq2=0"])
-            .map(|one| one.parse().unwrap())
-            .collect();
-        let scene = Scene::parse("paper.toml", PAPER, &overrides).unwrap();
+        let scene = at_rest(settings);
         for (alter, expected) in cases {
             let mut rig = Altered::new(Simulated::of(&scene).unwrap());
             alter(&mut rig);

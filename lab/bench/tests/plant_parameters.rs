@@ -5,21 +5,8 @@ use vines_testbench::backbone::track;
 use vines_testbench::experiment::{Plan, run};
 use vines_testbench::identification::identify;
 use vines_testbench::loop_check::check;
-use vines_testbench::rig::{BuiltIn, Drive, Rig, RigError, Sensors, Simulated};
+use vines_testbench::rig::{BuiltIn, SensorsOnly, Simulated};
 use vines_testbench::scene::{LinearResponse, Override, Scene};
-
-/// A rig that shows its sensors only.
-struct SensorsOnly(Box<dyn Rig>);
-
-impl Rig for SensorsOnly {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.0.sense()
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.0.advance(drive, step)
-    }
-}
 
 /// Drive, limits and levels in metres: G = 1.1, and C from 0.6 to 0.3 of the default scene.
 const IN_METRES: [&str; 6] = [
@@ -39,7 +26,7 @@ fn scene(settings: &[&str]) -> Scene {
 
 /// The rig of the true scene.
 fn rig(settings: &[&str]) -> SensorsOnly {
-    SensorsOnly(Simulated::of(&scene(settings)).unwrap())
+    SensorsOnly::around(Simulated::of(&scene(settings)).unwrap())
 }
 
 /// Everything measured in SI units, bit by bit, and what was said of it.
@@ -61,7 +48,7 @@ fn tracked(settings: &[&str], falsified: &[&str]) -> Vec<([u64; 9], bool, String
     tracked.points.iter().map(bits).collect()
 }
 
-/// The same of an identification: the lock, and the points along the decay.
+/// An identification in SI units, bit by bit: the lock, and the points along the decay.
 fn identified(settings: &[&str], falsified: &[&str]) -> Vec<[u64; 6]> {
     let mut scene = scene(&[settings, falsified].concat());
     // As a loop check finds it: without, noise hides the regime.

@@ -7,7 +7,7 @@ use vines::comparison::Comparison;
 use vines::experiment::{self, Plan, Record};
 use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
 use vines::rig::{
-    BuiltIn, Chain, Command, Controller, ControllerError, Drive, GroundTruth, Rig, RigError, Sensors, Simulated,
+    BuiltIn, Chain, Command, Controller, ControllerError, GroundTruth, Rig, Sensors, SensorsOnly, Simulated,
 };
 use vines::scene::{LinearResponse, Override, PhaseOrigin, PhaseTarget, Scene};
 
@@ -155,22 +155,9 @@ fn the_default_lock_takes_at_most_150_periods() {
     assert!((found.lock.sigma - exact.sigma).abs() < 1.2e-4);
 }
 
-/// A rig that does not report its impacts, as hardware would not.
-struct WithoutGroundTruth(Simulated);
-
-impl Rig for WithoutGroundTruth {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        self.0.sense()
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.0.advance(drive, step)
-    }
-}
-
 /// What is identified on a rig that does not report its impacts.
 fn identified_without_ground_truth(scene: &Scene) -> Result<Comparison, IdentificationError> {
-    let mut rig = WithoutGroundTruth(Simulated::new(scene.plant, scene.start).unwrap());
+    let mut rig = SensorsOnly::around(Box::new(Simulated::new(scene.plant, scene.start).unwrap()));
     assert_eq!(rig.ground_truth().unwrap(), None::<GroundTruth>);
     let record = if scene.start.dq2 == 0.0 {
         experiment::run(&mut rig, &mut ConstantDrive::new(scene), &plan(scene), |_, _, _| {}).unwrap()

@@ -278,7 +278,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         self.leg(change, periods, change / (periods as f64 * self.period))
     }
 
-    /// Moves the setpoint by `change`, m, in so many periods, with the growth `onward`, m/s, at the end and after it, and measures.
+    /// Moves the setpoint by `change`, m, in so many periods and measures meanwhile. The setpoint ends, and goes on, with the growth `onward`,
+    /// m/s.
     fn leg(&mut self, change: f64, periods: usize, onward: f64) -> Result<Leg, ExperimentError> {
         let to = Move {
             response: (self.setpoint + change).max(LOWEST * self.b),

@@ -61,7 +61,7 @@ pub struct Balance {
     within: [f64; 2],
 }
 
-/// Size of the neglected terms of the second order relative to those that are kept: they have the same form, and a factor below 1.
+/// Largest factor of the neglected terms of the second order: those that are kept have the same form with the factor 1.
 const REMAINDER: f64 = 0.7;
 /// A slope weighs integrated noise by a parabola, whose variance is 6/5 of that of a mean.
 const PARABOLA: f64 = 1.2;

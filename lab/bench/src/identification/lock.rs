@@ -92,7 +92,8 @@ impl Lock {
 const MOST: f64 = 240.0;
 /// Largest relative deviation of the amplitude from that of the hold, unless it is noise.
 const SPREAD: f64 = 0.008;
-/// The same of the periods that give the slopes of drive and frequency, and the relative uncertainty of these because the backbone is curved.
+/// Largest relative deviation of the amplitude in the periods that give the slopes of drive and frequency, and the relative uncertainty of these
+/// slopes because the backbone is curved.
 const WIDE: f64 = 0.1;
 const BENT: f64 = 0.3;
 /// Largest phase error of a period, rad, for the same.

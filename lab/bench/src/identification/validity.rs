@@ -7,7 +7,7 @@ use vines_model::numerics::standard_deviation;
 
 /// Standard uncertainties of the phase that count as noise.
 const RANDOM: f64 = 3.0;
-/// Share of a free response that is left after two periods at least. Impacts take the share pi epsilon G_imp/C in each, with
+/// Share of a free response that impacts leave in two periods at least. They take the share pi epsilon G_imp/C in each, with
 /// G_imp = (4/pi) R B^2/C: 0.14 at epsilon = 0.05, r = 0.65, C = 0.5.
 const LEFT: f64 = 0.1;
 /// Steps of a converter below which the scatter of a response says nothing.
@@ -40,7 +40,9 @@ pub(super) fn sensors_after_release(record: &Record, scene: &Scene) -> Result<()
     let changes = response.windows(2).map(|pair| (pair[1] - pair[0]).abs());
     let step = changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min);
     let scatters: Vec<f64> = response.chunks_exact(period).map(standard_deviation).collect();
-    let is_lost = |n: &usize| scatters[*n] > STEPS * step && scatters[n + 2] < LEFT * scatters[*n];
+    let linear = scene.linear();
+    let left = LEFT * (-2.0 * std::f64::consts::TAU * linear.damping_rate / linear.omega0).exp();
+    let is_lost = |n: &usize| scatters[*n] > STEPS * step && scatters[n + 2] < left * scatters[*n];
     match (0..scatters.len().saturating_sub(2)).find(is_lost) {
         Some(n) => failed((n + 1) * period, "stops reading the response"),
         None => Ok(()),

@@ -144,7 +144,7 @@ impl Run {
         ]
     }
 
-    /// Follows the motion to the end of so many periods, in one step of the plant, or in [`STRETCH`]es.
+    /// Follows the motion to the end of so many periods, in steps of the plant of at most [`STRETCH`].
     pub(super) fn follow(&mut self, periods: usize) -> Result<(), InvalidValue> {
         if periods <= self.periods {
             return Ok(());
