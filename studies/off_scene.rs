@@ -158,7 +158,6 @@ fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, [k, c, m, b, dr]: 
         format!("backbone.C_from={:?}", from / width),
         format!("backbone.C_to={:?}", to / width),
         "backbone.G_max=20".into(),
-        format!("backbone.dwell_min={}", std::env::var("DWELL").unwrap_or("8".into())),
     ];
     let mut settings: Vec<String> = settings.into();
     if snr != "none" {
@@ -189,11 +188,11 @@ fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, [k, c, m, b, dr]: 
     {
         settled += 1;
         // In units of the rig.
-        let (c, omega, e) = (point.c * width, own.omega(point.sigma), own.amplitude(point.g));
+        let (c, omega, e) = (point.at.c * width, own.omega(point.at.sigma), own.amplitude(point.at.g));
         let [sigma, g] = [(omega - 1.0) / epsilon, e / epsilon];
         let [u_sigma, u_g] = [
-            own.omega_change(point.u_sigma) / epsilon,
-            own.amplitude(point.u_g) / epsilon,
+            own.omega_change(point.at.u_sigma) / epsilon,
+            own.amplitude(point.at.u_g) / epsilon,
         ];
         let Some([exact_sigma, exact_g]) = curve.at(c) else {
             continue;

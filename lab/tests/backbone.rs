@@ -1,7 +1,7 @@
 //! The backbone, tracked with the response held by the loop.
 
 use vines::backbone::track;
-use vines::comparison::{ExactCurve, TrackedComparison, TrackedPoint};
+use vines::comparison::{TrackedComparison, TrackedPoint};
 use vines::experiment::ExperimentError;
 use vines::identification::Regime;
 use vines::loop_check::check;
@@ -48,7 +48,7 @@ fn clean_points_lie_within_1e_3_in_the_median_and_3e_3_at_worst_of_the_exact_orb
             let (sigma, g) = (exact.sigma.unwrap().abs(), exact.g.unwrap().abs());
             assert!(sigma <= 3e-3 && g <= 3e-3, "{one:?}");
             // A transient that happens to stand still in one window looks steady (docs/measuring.md).
-            assert!(sigma <= 6.0 * point.u_sigma && g <= 6.0 * point.u_g, "{one:?}");
+            assert!(sigma <= 6.0 * point.at.u_sigma && g <= 6.0 * point.at.u_g, "{one:?}");
         }
         let errors = report
             .points
@@ -65,7 +65,7 @@ fn clean_points_lie_within_1e_3_in_the_median_and_3e_3_at_worst_of_the_exact_orb
         assert_eq!(one.point.regime_by_impacts, Some(Regime::Symmetric));
         // The level asked for is the level held.
         assert!(
-            one.point.reached && (one.point.c - one.point.level).abs() < 8e-3,
+            one.point.reached && (one.point.at.c - one.point.level).abs() < 8e-3,
             "{one:?}"
         );
     }
@@ -119,9 +119,9 @@ fn tracked_points_through_noise_state_how_far_off_they_are() {
     ]);
     for one in report.points.iter().filter(|one| one.point.settled) {
         let (exact, point) = (one.exact.unwrap(), one.point);
-        assert!(exact.sigma.unwrap().abs() <= 4.0 * point.u_sigma, "{one:?}");
-        assert!(exact.g.unwrap().abs() <= 4.0 * point.u_g, "{one:?}");
-        assert!(point.u_sigma < 0.01 && point.u_g < 0.01, "{one:?}");
+        assert!(exact.sigma.unwrap().abs() <= 4.0 * point.at.u_sigma, "{one:?}");
+        assert!(exact.g.unwrap().abs() <= 4.0 * point.at.u_g, "{one:?}");
+        assert!(point.at.u_sigma < 0.01 && point.at.u_g < 0.01, "{one:?}");
     }
 }
 
@@ -132,7 +132,8 @@ fn beyond_symmetry_breaking_both_ways_of_telling_the_regime_say_so() {
         "backbone.C_from=0.6",
         "backbone.C_to=0.8",
         "backbone.points=3",
-        "backbone.dwell_min=50",
+        "backbone.precision=1e-6",
+        "backbone.dwell_max=60",
     ]);
     let regimes: Vec<_> = report
         .points
@@ -283,23 +284,6 @@ fn below_the_fold_the_motion_is_reported_as_another_and_an_irregular_one_as_not_
     assert_eq!(last.settled, last.regime == Regime::NoImpacts, "{last:?}");
 }
 
-#[test]
-fn peaks_of_the_response_are_tracked_apart_from_phase_resonance() {
-    for sensor in ["v", "q1"] {
-        let sensor = format!("resonance.sensor=\"{sensor}\"");
-        let settings = ["backbone.C_to=0.3", "backbone.points=6", &sensor];
-        let report = tracked(&[&settings[..], &["resonance.definition=\"peak\""]].concat());
-        assert!(report.worst().unwrap().at_equal_c <= 1.5e-3);
-        let phase = ExactCurve::of(&scene(&settings).dimensionless());
-        for TrackedPoint { point, exact } in &report.points {
-            let error = exact.unwrap().sigma.unwrap();
-            assert!(point.settled && error.abs() < 4.0 * point.u_sigma, "{point:?}: {error}");
-            // The two curves are half of the theory's own error apart.
-            assert!((point.sigma - phase.at(point.c).unwrap()[0]).abs() > 0.01, "{point:?}");
-        }
-    }
-}
-
 /// A controller that only ever holds a drive.
 struct Steady;
 
@@ -373,7 +357,7 @@ fn a_sensor_that_stops_ends_tracking_and_keeps_the_points_before() {
     assert!((5..15).contains(&tracked.points.len()), "{}", tracked.points.len());
     for point in &tracked.points {
         assert!(
-            point.g > 0.5 && point.settled && (point.c / point.level - 1.0).abs() < 0.01,
+            point.at.g > 0.5 && point.settled && (point.at.c / point.level - 1.0).abs() < 0.01,
             "{point:?}"
         );
     }

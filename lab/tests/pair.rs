@@ -178,7 +178,7 @@ fn own_sigma(scene: &Scene) -> f64 {
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
     let plan = Plan::of(scene);
     let record = experiment::run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
-    identify(&record, scene).unwrap().lock.sigma
+    identify(&record, scene).unwrap().lock.at.sigma
 }
 
 /// Writes an FMU whose variables have other names.
@@ -224,7 +224,7 @@ impl Rig for NoBase {
 /// Detuning at which a run has locked.
 fn locked(rig: &mut impl Rig, controller: &mut impl Controller, scene: &Scene) -> f64 {
     let record = experiment::run(rig, controller, &Plan::of(scene), |_, _, _| {}).unwrap();
-    identify(&record, scene).unwrap().lock.sigma
+    identify(&record, scene).unwrap().lock.at.sigma
 }
 
 #[test]

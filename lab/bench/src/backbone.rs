@@ -6,10 +6,7 @@
 //! so that the loops have little to correct.
 
 mod level;
-mod peak;
-mod point;
 mod track;
 
 pub use level::{Criterion, Found};
-pub use point::{Point, Tracked};
-pub use track::{track, track_into};
+pub use track::{Point, Tracked, track, track_into};

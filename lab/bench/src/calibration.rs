@@ -185,7 +185,7 @@ fn locked(scene: &Scene, snr: f64) -> Result<Vec<Outcome>, RunError> {
     )?;
     let found = identify(&record, scene)?;
     let ideal = identify(&with_ideal_sensors(record, &log), scene)?;
-    let phase = ideal.lock.phase_error_deg;
+    let phase = ideal.lock.at.phase_error_deg;
     let lock = found.lock;
     let orbits = orbit::phase_resonant(&scene.dimensionless());
     let exact = nearest(&orbits, &lock).ok_or("no exact orbit at this G")?;
@@ -193,7 +193,7 @@ fn locked(scene: &Scene, snr: f64) -> Result<Vec<Outcome>, RunError> {
     let outcome = |kind, quantity, error, uncertainty| Outcome {
         epsilon,
         snr,
-        c: lock.c,
+        c: lock.at.c,
         kind,
         quantity,
         error,
@@ -201,10 +201,15 @@ fn locked(scene: &Scene, snr: f64) -> Result<Vec<Outcome>, RunError> {
         bound: None,
     };
     let mut outcomes = vec![
-        outcome(Kind::Lock, "sigma", lock.sigma - exact.sigma, lock.u_sigma),
-        outcome(Kind::Lock, "C", lock.c - exact.c, lock.u_c),
-        outcome(Kind::Lock, "G", lock.g - exact.g, lock.u_g),
-        outcome(Kind::Lock, "phase", lock.phase_error_deg - phase, lock.u_phase_deg),
+        outcome(Kind::Lock, "sigma", lock.at.sigma - exact.sigma, lock.at.u_sigma),
+        outcome(Kind::Lock, "C", lock.at.c - exact.c, lock.at.u_c),
+        outcome(Kind::Lock, "G", lock.at.g - exact.g, lock.at.u_g),
+        outcome(
+            Kind::Lock,
+            "phase",
+            lock.at.phase_error_deg - phase,
+            lock.at.u_phase_deg,
+        ),
     ];
     if let (Some(b), Some(u)) = (lock.b, lock.u_b) {
         outcomes.push(outcome(Kind::Lock, "B", b - exact.b, u));
@@ -235,7 +240,7 @@ fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<TrackedOutcome
     let ended = found.ended.map(|why| (Part::Levels, why.to_string()));
     let (mut outcomes, mut missing) = (Vec::new(), Vec::from_iter(ended));
     for point in &found.points {
-        let Some([sigma, g]) = curve.at(point.c).filter(|_| point.settled) else {
+        let Some([sigma, g]) = curve.at(point.at.c).filter(|_| point.settled) else {
             missing.push((Part::Settled, format!("not settled at C = {:.3}", point.level)));
             continue;
         };
@@ -248,15 +253,15 @@ fn tracked(scene: &Scene, snr: f64, curve: &ExactCurve) -> Result<TrackedOutcome
         let outcome = |quantity, error, uncertainty, bound| Outcome {
             epsilon: scene.dimensionless().epsilon,
             snr,
-            c: point.c,
+            c: point.at.c,
             kind: Kind::Tracked,
             quantity,
             error,
             uncertainty,
             bound: Some(bound),
         };
-        outcomes.push(outcome("sigma", point.sigma - sigma, point.u_sigma, slope));
-        outcomes.push(outcome("G", point.g - g, point.u_g, 2.0 * point.c * slope));
+        outcomes.push(outcome("sigma", point.at.sigma - sigma, point.at.u_sigma, slope));
+        outcomes.push(outcome("G", point.at.g - g, point.at.u_g, 2.0 * point.at.c * slope));
     }
     Ok((outcomes, missing))
 }

@@ -11,7 +11,7 @@ use vines_model::orbit::{self, Orbit};
 use vines_model::theory::{BackbonePoint, free_sigma, resonant};
 
 use crate::identification::{DecayEnd, DecayPoint, Identification, Lock};
-use crate::scene::{PhaseTarget, Scene};
+use crate::scene::Scene;
 
 pub use exact_curve::{Distance, ExactCurve};
 pub use tracked::{TrackedComparison, TrackedPoint, Worst};
@@ -26,9 +26,8 @@ pub const COMPARED_ABOVE: f64 = 0.2;
 pub struct Comparison {
     /// The numbers all of this belongs to.
     pub parameters: Dimensionless,
-    /// The phase that the lock held.
-    #[serde(flatten)]
-    pub phase: PhaseTarget,
+    /// The phase of the response relative to the reference that the lock held, degrees.
+    pub phase_target_deg: f64,
     /// The locked point as measured.
     pub lock: Lock,
     /// First-order theory at the same G: the stable solution nearest to the lock; absent if the phase target is not
@@ -70,8 +69,8 @@ impl Comparison {
     /// Compares what was identified on `scene`.
     pub fn of(found: &Identification, scene: &Scene) -> Self {
         let (parameters, lock) = (found.parameters, found.lock);
-        let at_resonance = scene.is_at_resonance();
-        let distance = |sigma: f64, c: f64| (sigma - lock.sigma).hypot(c - lock.c);
+        let at_resonance = scene.controller.is_at_phase_resonance();
+        let distance = |sigma: f64, c: f64| (sigma - lock.at.sigma).hypot(c - lock.at.c);
         let theory = resonant(&parameters)
             .into_iter()
             .filter(|point| at_resonance && point.stable())
@@ -101,7 +100,7 @@ impl Comparison {
             rms_sigma_exact: rms(&decay, |one| Some(one.point.sigma - one.sigma_exact?)),
             rms_sigma_predicted: rms(&decay, |one| Some(one.point.sigma - one.sigma_predicted?)),
             parameters,
-            phase: scene.phase_target(),
+            phase_target_deg: scene.controller.phase_target,
             lock,
             theory,
             exact,
@@ -121,7 +120,7 @@ impl Comparison {
 
 /// The orbit that is nearest to a lock.
 pub(crate) fn nearest(orbits: &[Orbit], lock: &Lock) -> Option<Orbit> {
-    let distance = |one: &Orbit| (one.sigma - lock.sigma).hypot(one.c - lock.c);
+    let distance = |one: &Orbit| (one.sigma - lock.at.sigma).hypot(one.c - lock.at.c);
     orbits
         .iter()
         .copied()

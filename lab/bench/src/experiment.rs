@@ -12,7 +12,7 @@ use std::fmt::{self, Display, Formatter};
 use thiserror::Error;
 
 use crate::rig::{Controller, ControllerError, Drive, Fault, Rig, RigError};
-use crate::scene::Scene;
+use crate::scene::{Resonance, Scene};
 
 pub(crate) use bench::Bench;
 pub use evidence::Evidence;
@@ -149,6 +149,11 @@ pub enum ExperimentError {
         b: f64,
         regime: crate::identification::Regime,
     },
+    #[error(
+        "resonance.definition = \"peak\" is for theory and exact orbits (`vines theory`, `vines orbit`): the loop holds a phase, and measures the \
+         backbone with resonance.definition = \"phase\""
+    )]
+    Peak,
     #[error("the controller asked for omega = {} rad/s and E = {} m, which is refused; the drive is off", .0.omega, .0.amplitude)]
     NotANumber(Drive),
 }
@@ -171,6 +176,7 @@ pub fn run_into(
     plan: &Plan,
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
+    holds_a_phase(plan.scene)?;
     let mut bench = Bench::new(rig, controller, plan.scene, samples);
     let held = if plan.scene.controller.is_at_phase_resonance() {
         let mut searched = |taken| progress(Stage::Locking, taken, plan.lock);
@@ -199,6 +205,14 @@ pub fn run_into(
         settled,
         held,
     })
+}
+
+/// Refuses a scene whose resonance is no phase that a loop can hold.
+pub(crate) fn holds_a_phase(scene: &Scene) -> Result<(), ExperimentError> {
+    match scene.resonance.resonance {
+        Resonance::Phase => Ok(()),
+        Resonance::Peak => Err(ExperimentError::Peak),
+    }
 }
 
 /// Waits for the lock under the constant drive, for a controller that cannot control the response.

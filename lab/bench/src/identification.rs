@@ -6,6 +6,7 @@ mod cycle;
 mod decay;
 mod fit;
 mod lock;
+mod measured;
 mod regime;
 mod response;
 mod tone;
@@ -20,6 +21,7 @@ pub use balance::{Balance, Slopes};
 pub use cycle::Cycle;
 pub use decay::{DecayEnd, DecayPoint, DecayPoints, decay_points};
 pub use lock::Lock;
+pub use measured::Measured;
 use regime::longer_after;
 pub use regime::{classify, impacts};
 pub(crate) use response::without_tones;
@@ -107,8 +109,8 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
     if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
         return Err(IdentificationError::Regime {
             regime: lock.regime,
-            sigma: lock.sigma,
-            c: lock.c,
+            sigma: lock.at.sigma,
+            c: lock.at.c,
             longer: (lock.regime == Regime::Asymmetric)
                 .then(|| longer_after(record.hold()))
                 .flatten(),

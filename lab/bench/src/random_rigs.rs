@@ -147,10 +147,10 @@ fn of_lock(lock: &Lock, off: [f64; 2], reason: impl FnOnce() -> String) -> (Outc
     if largest <= CORRECT {
         return (Outcome::Locked, None);
     }
-    if off[0] <= NOISE * lock.u_sigma && off[1] <= NOISE * lock.u_c {
+    if off[0] <= NOISE * lock.at.u_sigma && off[1] <= NOISE * lock.at.u_c {
         let why = format!(
             "the standard uncertainties are {:.1e} in sigma and {:.1e} in C",
-            lock.u_sigma, lock.u_c
+            lock.at.u_sigma, lock.at.u_c
         );
         return (Outcome::Uncertain, Some(why));
     }
@@ -206,10 +206,10 @@ fn judge(scene: &Scene, stable: &[Orbit], outcome: Result<Record, (ExperimentErr
     match identification::identify(&record, scene) {
         Ok(found) => {
             let lock = found.lock;
-            let off = distance(lock.sigma, lock.c);
+            let off = distance(lock.at.sigma, lock.at.c);
             let row = Row { distance: Some(off[0].max(off[1])), ..row };
             let (outcome, why) = of_lock(&lock, off, || reason(lock.regime));
-            let message = why.and_then(|why| message(lock.sigma, lock.c, &why));
+            let message = why.and_then(|why| message(lock.at.sigma, lock.at.c, &why));
             Row { outcome, message, ..row }
         }
         Err(IdentificationError::Regime { regime, sigma, c, .. }) => {

@@ -23,7 +23,6 @@ use serde::Serialize;
 
 pub use backbone::Backbone;
 pub use chain::{Chain, RatioOf};
-pub use configuration::{PhaseOrigin, PhaseTarget};
 pub use controller::Controller;
 pub use error::{SceneError, SyntaxError};
 pub use family::Family;

@@ -54,9 +54,6 @@ fn every_parameter_of_the_controller_has_exactly_one_key_of_the_scene() {
 fn an_option_of_the_controller_is_switched_off_by_none_or_false_and_not_by_zero() {
     for (key, name) in [
         ("controller.C_max", "response_max"),
-        ("controller.omega_rate", "omega_rate"),
-        ("controller.silence_periods", "signal_timeout"),
-        ("controller.residual_max", "residual_max"),
         ("phase_lock.base_bandwidth", "base_bandwidth"),
         ("phase_lock.damping_rate", "damping_rate"),
     ] {

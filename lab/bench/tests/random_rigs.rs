@@ -39,7 +39,7 @@ fn assert_locks(rigs: &[([&str; 4], f64)]) {
     for (settings, c) in rigs {
         let lock = lock(*settings);
         assert_eq!(lock.regime, Regime::Symmetric);
-        assert!((lock.c - c).abs() < 2e-3, "{lock:?}");
+        assert!((lock.at.c - c).abs() < 2e-3, "{lock:?}");
     }
 }
 

@@ -86,8 +86,8 @@ fn a_backbone_is_tracked_through_mains_hum_and_ripple_and_its_points_say_so() {
             );
             let tone = point.tone.unwrap();
             assert!((tone.hertz - tones[0].0).abs() < 0.01);
-            assert!((tone.share / (tones[0].1 * 0.55 / point.c) - 1.0).abs() < 0.02);
-            assert!((point.sigma - clean.sigma).abs() < 3.0 * clean.u_sigma.hypot(point.u_sigma));
+            assert!((tone.share / (tones[0].1 * 0.55 / point.at.c) - 1.0).abs() < 0.02);
+            assert!((point.at.sigma - clean.at.sigma).abs() < 3.0 * clean.at.u_sigma.hypot(point.at.u_sigma));
             assert!(clean.tone.is_none());
         }
     }
@@ -110,7 +110,7 @@ fn a_lock_is_identified_through_mains_hum_and_ripple() {
             said.starts_with(&format!("a foreign tone of {:.1} Hz, ", tones[0].0)),
             "{said}"
         );
-        assert!((found.sigma - clean.sigma).abs() < 3.0 * clean.u_sigma.hypot(found.u_sigma));
+        assert!((found.at.sigma - clean.at.sigma).abs() < 3.0 * clean.at.u_sigma.hypot(found.at.u_sigma));
         assert!(clean.tone.is_none());
     }
 }
@@ -152,7 +152,7 @@ fn no_motion_of_a_particle_is_a_foreign_tone() {
         // The first of these windows contains the transient.
         for window in [&samples[1000..3000], &samples[4000..]] {
             assert_eq!(foreign_tone(window, &scene, drive.omega), None, "{settings:?}");
-            let phase = scene.phase_target().radians();
+            let phase = scene.controller.phase_target_radians();
             let regime = regime_by_response(window, &scene, drive.amplitude, phase, drive.omega);
             irregular += usize::from(regime == Regime::Other);
         }

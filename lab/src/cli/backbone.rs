@@ -16,8 +16,6 @@ Leads the response from level to level, and measures the drive and the frequency
   off target  phase of the response relative to the reference, less controller.phase_target
   averaged    periods at the end of the dwell that the point is averaged over
   error       difference in sigma or G, whichever is larger, from the exact backbone at the same C
-With resonance.definition = \"peak\" each level is held at three phases, controller.phase_target and 14 degrees on both sides of it: at a
-constant response, the drive is smallest at the peak. `off target` is then the phase of the peak less controller.phase_target.
 Numbers after ± are standard uncertainties; those of sigma and G hold at the C of the same line. A level that the response does not
 reach, because the drive is at a limit, is marked as not reached.
 
@@ -25,7 +23,6 @@ Examples:
   vines backbone                                          29 levels from C = 0.7 down to 0.14
   vines backbone --set backbone.C_to=0.2 --set backbone.points=11
   vines backbone --set chain.snr=40 --set chain.seed=7    with sensor noise
-  vines backbone --set resonance.definition=peak     the backbone of the peaks of the response
   vines backbone --rig LoViNes.fmu --out out/fmu          another rig: an FMU, or a network address
 
 Writes tracked.json, tracked.csv and tracked.svg.";

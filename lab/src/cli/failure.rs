@@ -49,7 +49,7 @@ impl From<ExperimentError> for Failure {
     fn from(error: ExperimentError) -> Self {
         match &error {
             // The plant refuses a drive that comes from the scene.
-            ExperimentError::Rig(RigError::Refused(_)) => Self::input(error),
+            ExperimentError::Peak | ExperimentError::Rig(RigError::Refused(_)) => Self::input(error),
             ExperimentError::Rig(cause) if cause.cause::<Interrupted>().is_some() => Self::new(INTERRUPTED, error),
             _ => Self::run(error),
         }

@@ -10,6 +10,7 @@ use thiserror::Error;
 use super::figure::FigureError;
 use super::figures::{backbone, coverage, manifold, regimes, tracked};
 use super::theme::dark;
+use crate::backbone::Point;
 use crate::calibration::Calibration;
 use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
 use crate::experiment::{Sample, table};
@@ -149,23 +150,51 @@ pub fn decay_csv(found: &Comparison) -> Result<String, ReportError> {
 /// The points of a tracked backbone.
 pub(super) fn tracked_csv(found: &TrackedComparison) -> Result<String, ReportError> {
     #[derive(Serialize)]
-    struct Compared {
+    struct Row {
+        level: f64,
+        periods: f64,
+        averaged: usize,
+        settled: bool,
+        reached: bool,
+        regime: Regime,
+        regime_by_impacts: Option<Regime>,
+        #[serde(rename = "tone_Hz")]
+        tone_hz: Option<f64>,
+        tone_share: Option<f64>,
         distance: Option<f64>,
         sigma_less_exact: Option<f64>,
         #[serde(rename = "G_less_exact")]
         g_less_exact: Option<f64>,
     }
-    csv(
-        &[],
-        found.points.iter().map(|TrackedPoint { point, exact }| {
-            let compared = Compared {
-                distance: exact.map(|exact| exact.nearest),
-                sigma_less_exact: exact.and_then(|exact| exact.sigma),
-                g_less_exact: exact.and_then(|exact| exact.g),
-            };
-            (point, compared)
-        }),
-    )
+    let row = |TrackedPoint { point, exact }: &TrackedPoint| {
+        let Point {
+            at,
+            level,
+            periods,
+            averaged,
+            settled,
+            reached,
+            regime,
+            regime_by_impacts,
+            tone,
+        } = *point;
+        let row = Row {
+            level,
+            periods,
+            averaged,
+            settled,
+            reached,
+            regime,
+            regime_by_impacts,
+            tone_hz: tone.map(|tone| tone.hertz),
+            tone_share: tone.map(|tone| tone.share),
+            distance: exact.map(|exact| exact.nearest),
+            sigma_less_exact: exact.and_then(|exact| exact.sigma),
+            g_less_exact: exact.and_then(|exact| exact.g),
+        };
+        (at, row)
+    };
+    csv(&[], found.points.iter().map(row))
 }
 
 /// The cells of a map, as CSV.

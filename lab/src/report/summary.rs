@@ -4,7 +4,7 @@ use super::table::{Table, number, with_uncertainty};
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
 use crate::identification::{DecayEnd, Regime};
 use crate::map::Map;
-use crate::scene::{Definition, Dimensionless, PhaseOrigin, Sensor};
+use crate::scene::{Definition, Dimensionless, Sensor};
 
 /// Periods over which the ripple of an acceleration averages out.
 const RIPPLE: usize = 200;
@@ -55,7 +55,8 @@ pub fn identification(found: &Comparison) -> String {
         [name.to_string(), number(sigma), number(c), b.map_or("-".into(), number)]
     };
     let b = lock.b.zip(lock.u_b).map_or("-".into(), |(b, u)| with_uncertainty(b, u));
-    let [sigma, c] = [(lock.sigma, lock.u_sigma), (lock.c, lock.u_c)].map(|(value, u)| with_uncertainty(value, u));
+    let [sigma, c] =
+        [(lock.at.sigma, lock.at.u_sigma), (lock.at.c, lock.at.u_c)].map(|(value, u)| with_uncertainty(value, u));
     let measured = ["measured at the lock".to_string(), sigma, c, b];
     let exact = found.exact.iter();
     let exact = exact.map(|one| row("exact orbit", one.sigma, one.c, Some(one.b)));
@@ -68,15 +69,6 @@ pub fn identification(found: &Comparison) -> String {
     } else {
         ""
     };
-    let phase = match found.phase.origin {
-        PhaseOrigin::Scene => String::new(),
-        PhaseOrigin::ExactOrbit => format!(
-            "  (held at {:.3} degrees, the phase of the exact orbit of these parameters at the peak; on a rig with other parameters the peak \
-             is elsewhere, and `vines backbone` measures it)\n",
-            found.phase.degrees
-        ),
-        PhaseOrigin::Theory => "  (held at -90 degrees, where first-order theory has the peak)\n".into(),
-    };
     let ripple = if found.parameters.definition.sensor == Sensor::Acceleration && lock.averaged < RIPPLE {
         "  (the impacts leave a ripple on an acceleration: hold 200 periods, record.hold_periods, for 1e-3 in sigma and C)\n"
     } else {
@@ -85,11 +77,15 @@ pub fn identification(found: &Comparison) -> String {
     let tone = lock.tone.map_or_else(String::new, |tone| {
         format!("  ({tone}: more than the particle can cause, so it is no part of the motion; check the cable of the sensor)\n")
     });
-    let [hertz, response, base] = in_si([(lock.f_hz, lock.u_f_hz), (lock.a_m, lock.u_a_m), (lock.e_m, lock.u_e_m)]);
+    let [hertz, response, base] = in_si([
+        (lock.at.f_hz, lock.at.u_f_hz),
+        (lock.at.a_m, lock.at.u_a_m),
+        (lock.at.e_m, lock.at.u_e_m),
+    ]);
     format!(
-        "Measured: {hertz} Hz, response {response} m, base {base} m\n{}, G = {}\nLocked after {:.0} periods{}: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{phase}{ripple}{tone}{}\n{}\n{}\n",
+        "Measured: {hertz} Hz, response {response} m, base {base} m\n{}, G = {}\nLocked after {:.0} periods{}: {}, {}, phase error {:.1e} ± {:.1e} degrees\n\n{}{note}{ripple}{tone}{}\n{}\n{}\n",
         rig(&found.parameters),
-        with_uncertainty(lock.g, lock.u_g),
+        with_uncertainty(lock.at.g, lock.at.u_g),
         lock.periods_to_lock,
         if lock.held {
             " (the response is held by control: a constant drive would not hold it)"
@@ -98,8 +94,8 @@ pub fn identification(found: &Comparison) -> String {
         },
         lock.regime,
         lock.impacts(),
-        lock.phase_error_deg,
-        lock.u_phase_deg,
+        lock.at.phase_error_deg,
+        lock.at.u_phase_deg,
         table.text(),
         others(found),
         decay(found),
@@ -175,19 +171,23 @@ pub fn tracked(found: &TrackedComparison) -> String {
             format!("; level {:.3} not reached", point.level)
         };
         let tone = point.tone.map_or_else(String::new, |tone| format!("; {tone}"));
-        let pairs = [(point.c, point.u_c), (point.sigma, point.u_sigma), (point.g, point.u_g)];
+        let pairs = [
+            (point.at.c, point.at.u_c),
+            (point.at.sigma, point.at.u_sigma),
+            (point.at.g, point.at.u_g),
+        ];
         let mut cells = Vec::new();
         if on_a_rig {
             cells.extend(in_si([
-                (point.f_hz, point.u_f_hz),
-                (point.a_m, point.u_a_m),
-                (point.e_m, point.u_e_m),
+                (point.at.f_hz, point.at.u_f_hz),
+                (point.at.a_m, point.at.u_a_m),
+                (point.at.e_m, point.at.u_e_m),
             ]));
         }
         cells.extend(pairs.map(|(value, u)| with_uncertainty(value, u)));
         let equal = exact.and_then(|exact| Some(exact.sigma?.abs().max(exact.g?.abs())));
         cells.extend([
-            format!("{:+.2}°", point.phase_error_deg),
+            format!("{:+.2}°", point.at.phase_error_deg),
             format!("{:.1}", point.periods),
             point.averaged.to_string(),
             equal.map_or("-".into(), |error| format!("{error:.1e}")),

@@ -50,8 +50,8 @@ fn noise_is_never_locked_and_ends_the_experiment_with_its_reason() {
 fn a_sensor_of_two_bits_has_no_phase_rather_than_a_phase_error_of_zero() {
     let scene = scene(&[
         "chain.adc_bits=2",
-        "controller.silence_periods='none'",
-        "controller.residual_max='none'",
+        "phase_lock.signal_timeout='none'",
+        "phase_lock.residual_max='none'",
         "record.lock_periods=5",
     ]);
     let plant = Simulated::new(scene.plant, scene.start).unwrap();

@@ -19,7 +19,7 @@ fn of_two_stable_orbits_the_one_that_was_not_followed_is_named() {
     let stable: Vec<_> = found.orbits.iter().filter(|orbit| orbit.stable).collect();
     assert_eq!(stable.len(), 2);
     let followed = found.exact.unwrap();
-    assert!((found.lock.c - followed.c).abs() < 2e-3, "{:?}", found.lock);
+    assert!((found.lock.at.c - followed.c).abs() < 2e-3, "{:?}", found.lock);
     let other = stable.into_iter().find(|orbit| **orbit != followed).unwrap();
     let table = vines::report::summary::identification(&found);
     let line = format!(

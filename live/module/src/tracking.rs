@@ -87,9 +87,9 @@ pub fn track(scene: &Scene, rig: &NoisyRig, lock: PhaseLock, state: State, sampl
     let points = points.map(|(point, (sample, omega))| Point {
         sample,
         omega,
-        sigma: point.sigma,
-        c: point.c,
-        g: point.g,
+        sigma: point.at.sigma,
+        c: point.at.c,
+        g: point.at.g,
         settled: point.settled,
     });
     controller.moves.reverse();

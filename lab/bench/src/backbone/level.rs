@@ -7,7 +7,6 @@
 
 use vines_model::numerics::Estimate;
 
-use super::peak;
 use crate::identification::{Balance, Cycle, Slopes};
 use crate::scene::LinearResponse;
 
@@ -20,12 +19,6 @@ pub struct Criterion {
     pub precision: f64,
     /// The largest level, m.
     pub largest: f64,
-    /// Whether the point serves to find the peak of the response, which needs more of the drive.
-    pub is_peak: bool,
-    /// Phase error at which the level is held, rad.
-    pub phase: f64,
-    /// Fewest periods of a window.
-    pub fewest: usize,
     /// The last two points before, the nearest last: amplitude of the response, m, drive, m, and frequency, rad/s.
     pub before: [Option<[f64; 3]>; 2],
 }
@@ -45,7 +38,7 @@ pub struct Found {
     pub steady: bool,
 }
 
-/// Largest deviation of the mean phase, rad, from that which is held: the balances are of the first order in it. At epsilon = 0.02 beside the
+/// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 beside the
 /// fold, 0.03 rad change sigma at equal C by 1.1e-3.
 const BESIDE: f64 = 0.02;
 /// Difference of the halves, in its standard uncertainties, that still counts as noise.
@@ -57,6 +50,8 @@ const LAG: f64 = 1.6;
 const EXCESS: f64 = 2.0;
 /// Relative standard uncertainty of the slope of a straight line through two points: away from the fold it changes by less from level to level.
 const SLOPE: f64 = 0.5;
+/// Fewest periods of a window: two halves of four, the fewest of a fit.
+const FEWEST: usize = 8;
 /// Shares of the periods that are considered, from the last one backwards.
 const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
 
@@ -66,36 +61,31 @@ impl Criterion {
     pub fn best(&self, cycles: &[Cycle]) -> Option<Found> {
         let n = cycles.len();
         let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
-        let considered = counts.into_iter().filter(|count| *count >= self.fewest);
+        let considered = counts.into_iter().filter(|count| *count >= FEWEST);
         considered
             .filter_map(|count| self.of(&cycles[n - count..]))
             .filter(|found| found.at.iter().all(|one| (one.value + one.uncertainty).is_finite()))
             .min_by(|one, other| self.size(one).total_cmp(&self.size(other)))
     }
 
-    /// Whether the uncertainties are small enough, and the phase is near the one that is held.
+    /// Whether the uncertainties are small enough, and the phase is near its target.
     #[must_use]
     pub fn is_met(&self, found: &Found) -> bool {
         let Estimate { value, uncertainty } = found.phase_error;
-        self.size(found) <= 1.0 && (value - self.phase).abs() <= BESIDE + RANDOM * uncertainty
+        self.size(found) <= 1.0 && value.abs() <= BESIDE + RANDOM * uncertainty
     }
 
     /// Largest uncertainty over the largest allowed.
     fn size(&self, found: &Found) -> f64 {
-        let allowed = self.allowed(found.at[0].value, found.response.value);
+        let allowed = self.allowed(found.at[0].value);
         let [base, omega] = [0, 1].map(|i| found.at[i].uncertainty / allowed[i]);
         base.max(omega)
     }
 
-    /// Largest uncertainties allowed of the drive, m, and of the frequency, rad/s, at this drive and response, m.
-    fn allowed(&self, drive: f64, response: f64) -> [f64; 2] {
+    /// Largest uncertainties allowed of the drive, m, and of the frequency, rad/s, at this drive, m.
+    fn allowed(&self, drive: f64) -> [f64; 2] {
         let (base, omega0) = (self.precision * drive.abs(), self.linear.omega0);
-        let omega = omega0 * base / self.largest;
-        if self.is_peak {
-            [base.min(peak::drive_for(omega, response, omega0)), omega]
-        } else {
-            [base, omega]
-        }
+        [base, omega0 * base / self.largest]
     }
 
     /// Slopes of drive and frequency over the amplitude at a point: of the parabola through it and the two before, with its distance from the
@@ -116,7 +106,7 @@ impl Criterion {
 
     /// The point of a window.
     fn of(&self, cycles: &[Cycle]) -> Option<Found> {
-        let fit = |cycles: &[Cycle], slopes| Balance::of(cycles, &self.linear, self.phase, slopes);
+        let fit = |cycles: &[Cycle], slopes| Balance::of(cycles, &self.linear, slopes);
         let whole = fit(cycles, Slopes::Unknown)?;
         let [base, omega] = whole.at(0.0).map(|one| one.value);
         let known = self.slopes([whole.response.value, base, omega]);
@@ -148,7 +138,7 @@ impl Criterion {
                 &[one.uncertainty, aside, systematic / units[i], whole.remainders[i]],
             )
         });
-        let allowed = self.allowed(at[0].value, amplitude);
+        let allowed = self.allowed(at[0].value);
         Some(Found {
             periods: cycles.len(),
             response: whole.response,

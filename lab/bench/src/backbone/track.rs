@@ -2,15 +2,56 @@
 
 use std::f64::consts::TAU;
 
+use serde::Serialize;
 use vines_model::numerics::Estimate;
 
 use super::level::{Criterion, Found};
-use super::peak;
-use super::point::{Held, Known, Point, Tracked};
 use crate::experiment::{self, ExperimentError, Sample, Search, Stage};
-use crate::identification::{Cycle, Regime, classify, foreign_tone, regime_by_response};
+use crate::identification::{Cycle, Measured, Regime, Tone, classify, foreign_tone, regime_by_response};
 use crate::rig::{Controller, Move, Rig};
-use crate::scene::{Definition, Resonance, Scene};
+use crate::scene::Scene;
+
+/// One point of the backbone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Point {
+    /// Where it is; frequency and base amplitude are those of phase resonance at this response amplitude.
+    #[serde(flatten)]
+    pub at: Measured,
+    /// Target level, over b.
+    pub level: f64,
+    /// Periods of the move to this level and at this level.
+    pub periods: f64,
+    /// Periods averaged.
+    pub averaged: usize,
+    /// The motion was steady within these uncertainties, on the level, and neither irregular nor asymmetric; otherwise the point was taken at the
+    /// time limit.
+    pub settled: bool,
+    /// The response reached the level; otherwise the drive was at a limit, or the time too short.
+    pub reached: bool,
+    /// The regime determined from the response alone, as on a real rig.
+    pub regime: Regime,
+    /// The regime determined from the impacts, if the rig is a simulation.
+    pub regime_by_impacts: Option<Regime>,
+    /// A tone in the response that is not part of the motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tone: Option<Tone>,
+}
+
+/// The tracked backbone.
+#[derive(Debug)]
+pub struct Tracked {
+    /// The points, in the order in which they were taken.
+    pub points: Vec<Point>,
+    /// Periods from the start to the closed loop.
+    pub periods_to_lock: f64,
+    /// All periods, from the start to the last point.
+    pub periods: f64,
+    /// Why tracking ended before the last level; absent if it did not.
+    pub ended: Option<ExperimentError>,
+}
+
+/// Where the loop holds the rig: response amplitude, m, drive amplitude, m, frequency, rad/s.
+type State = [f64; 3];
 
 /// Periods between a move and the first that is measured: the loops and the particle follow late.
 const LATE: usize = 8;
@@ -20,6 +61,8 @@ const FIRST: usize = 24;
 const CONFIRMED: usize = 3;
 /// Share of the drive that a move may need in addition to the drive that holds the response.
 const MOVE_SHARE: f64 = 0.8;
+/// Duration of a move, periods.
+const MOVE: f64 = 4.0;
 /// Largest relative difference of the response from its level that counts as reached.
 const REACHED: f64 = 0.01;
 
@@ -28,19 +71,13 @@ struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
     run: experiment::Bench<'a, R, C>,
     scene: &'a Scene,
     stage: Stage,
+    /// Phase target, rad.
     target: f64,
     /// Where the loop was closed.
-    present: Option<Known>,
-}
-
-/// What is to be held next.
-struct Order<'a> {
-    /// Response amplitude, m.
-    level: f64,
-    /// Phase error, rad.
-    phase: f64,
-    /// The points before, at this phase.
-    known: &'a [Known],
+    closed: State,
+    /// The points so far.
+    states: Vec<State>,
+    points: Vec<Point>,
 }
 
 /// Tracks the backbone of `scene`.
@@ -67,34 +104,25 @@ pub fn track_into(
     scene: &Scene,
     progress: impl FnMut(usize, usize),
 ) -> Result<Tracked, ExperimentError> {
+    experiment::holds_a_phase(scene)?;
     let mut bench = Bench {
         run: experiment::Bench::new(rig, controller, scene, samples),
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
-        present: None,
+        closed: [0.0; 3],
+        states: Vec::new(),
+        points: Vec::new(),
     };
     bench.approach()?;
     let periods_to_lock = bench.run.periods;
     bench.stage = Stage::Tracking;
-    let phases: &[f64] = if scene.resonance.is_peak() {
-        &peak::PHASES
-    } else {
-        &[0.0]
-    };
-    let mut scans = vec![Vec::new(); phases.len()];
-    let mut ended = bench.follow(phases, &mut scans, progress).err();
+    let mut ended = bench.follow(progress).err();
     // What was measured is kept.
-    if let Some(error) = ended.take_if(|_| scans.iter().all(Vec::is_empty)) {
+    if let Some(error) = ended.take_if(|_| bench.points.is_empty()) {
         return Err(error);
     }
-    let held = if scene.resonance.is_peak() {
-        peak::peaks(&scans, scene.linear().omega0)
-    } else {
-        scans.swap_remove(0)
-    };
-    let (periods, d) = (bench.run.periods, scene.dimensionless());
-    let points = held.iter().map(|one| Point::of(one, &d)).collect();
+    let (points, periods) = (std::mem::take(&mut bench.points), bench.run.periods);
     Ok(Tracked { points, periods_to_lock, periods, ended })
 }
 
@@ -118,92 +146,71 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
     fn approach(&mut self) -> Result<(), ExperimentError> {
         let scene = self.scene;
         let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
-        // The levels are held about phase resonance; the phase of the peak is measured.
-        let definition = Definition { resonance: Resonance::Phase, ..scene.resonance };
-        let at_resonance = Scene { resonance: definition, ..scene.clone() };
-        Search::new(&mut self.run, &at_resonance, limit, &mut |_| {}).impacts()?;
+        Search::new(&mut self.run, scene, limit, &mut |_| {}).impacts()?;
         let cycle = self.cycle()?;
-        self.present = Some(Known {
-            response: cycle.amplitude(),
-            drive: cycle.base.norm(),
-            omega: cycle.omega,
-        });
+        self.closed = [cycle.amplitude(), cycle.base.norm(), cycle.omega];
         Ok(())
     }
 
-    /// Goes through the levels, and holds each at all `phases`: `scans` gets the points of each phase.
-    fn follow(
-        &mut self,
-        phases: &[f64],
-        scans: &mut [Vec<Held>],
-        mut progress: impl FnMut(usize, usize),
-    ) -> Result<(), ExperimentError> {
+    /// Goes through the levels.
+    fn follow(&mut self, mut progress: impl FnMut(usize, usize)) -> Result<(), ExperimentError> {
         let levels = self.scene.levels();
-        // The last point, and the phase at which it was held.
-        let mut last = self.present.map(|present| (present, 0.0));
         for (n, &level) in levels.iter().enumerate() {
             progress(n, levels.len());
-            for k in 0..phases.len() {
-                // The next level begins at the phase at which this one ends.
-                let scan = if n % 2 == 0 { k } else { phases.len() - 1 - k };
-                let known: Vec<Known> = scans[scan].iter().filter_map(Held::known).collect();
-                let order = Order { level, phase: phases[scan], known: &known };
-                let point = self.hold(&order, last)?;
-                last = point.known().map(|known| (known, order.phase)).or(last);
-                let held = scans[scan]
-                    .last()
-                    .filter(|before: &&Held| is_one_to_one(before.regime))
-                    .map(|before| before.level);
-                scans[scan].push(point);
-                if let Some(held) = held.filter(|_| matches!(point.regime, Regime::NoImpacts | Regime::Other)) {
-                    let b = self.scene.plant.half_width;
-                    return Err(ExperimentError::MotionLost { held, level, b, regime: point.regime });
-                }
+            let before = n
+                .checked_sub(1)
+                .map(|before| (levels[before], self.points[before].regime));
+            let point = self.hold(level)?;
+            self.points.push(point);
+            if let Some((held, Regime::Symmetric | Regime::Unresolved)) = before
+                && matches!(point.regime, Regime::NoImpacts | Regime::Other)
+            {
+                let b = self.scene.plant.half_width;
+                return Err(ExperimentError::MotionLost { held, level, b, regime: point.regime });
             }
         }
         Ok(())
     }
 
-    /// Goes to a level and phase, and holds them until the point has settled, or for the longest time allowed.
-    fn hold(&mut self, order: &Order, last: Option<(Known, f64)>) -> Result<Held, ExperimentError> {
+    /// Goes to a level, m, and holds it until the point has settled, or for the longest time allowed.
+    fn hold(&mut self, level: f64) -> Result<Point, ExperimentError> {
         let (start, settings) = (self.run.periods, &self.scene.backbone);
-        let (to, periods) = self.step(order, last);
-        self.run.controller.hold_response(to, self.target + order.phase)?;
+        let (to, periods) = self.step(level);
+        self.run.controller.hold_response(to, self.target)?;
         self.run.samples.clear();
-        let late = if order.known.is_empty() { FIRST + LATE } else { LATE };
+        let late = if self.states.is_empty() { FIRST + LATE } else { LATE };
         while self.run.periods - start < periods + late as f64 {
             self.cycle()?;
         }
-        let criterion = order.criterion(self.scene);
+        let criterion = self.criterion();
         let mut cycles: Vec<Cycle> = Vec::new();
         let mut confirmed = 0;
         let found = loop {
             cycles.push(self.cycle()?);
             let found = criterion.best(&cycles);
-            let is_met = found.is_some_and(|found| criterion.is_met(&found) && order.is_reached(found.response));
+            let is_met = found.is_some_and(|found| criterion.is_met(&found) && is_reached(found.response, level));
             confirmed = if is_met { confirmed + 1 } else { 0 };
             if cycles.len() >= settings.dwell_max as usize || confirmed >= CONFIRMED {
                 break found;
             }
         };
-        let said = found.unwrap_or_else(|| Found::means(&cycles[cycles.len() / 2..]));
-        Ok(self.point(order, start, &said, &cycles, &criterion))
+        let found = found.unwrap_or_else(|| Found::means(&cycles[cycles.len() / 2..]));
+        let [drive, omega] = found.at.map(|one| one.value);
+        if drive.is_finite() && omega.is_finite() {
+            self.states.push([found.response.value, drive, omega]);
+        }
+        Ok(self.point(level, start, &found, &cycles, &criterion))
     }
 
-    /// The move to a level and phase, and its periods: those of the scene, or as many as the drive needs to change the response that much.
-    fn step(&self, order: &Order, last: Option<(Known, f64)>) -> (Move, f64) {
+    /// The move to a level, m, and its periods: those of the scene, or as many as the drive needs to change the response that much.
+    fn step(&self, level: f64) -> (Move, f64) {
         let omega0 = self.scene.linear().omega0;
-        let Order { level, phase, known } = *order;
-        let slowest = last.map_or(0.0, |(last, _)| {
-            (level - last.response).abs() / (MOVE_SHARE * 0.5 * last.drive * TAU)
-        });
+        let [response, drive, omega] = *self.states.last().unwrap_or(&self.closed);
+        let slowest = (level - response).abs() / (MOVE_SHARE * 0.5 * drive * TAU);
         // A smooth move is twice as fast in its middle as on average.
-        let periods = self.scene.backbone.move_periods.max(2.0 * slowest);
-        let change = extrapolated(known, level).zip(last).map(|(expected, (last, held))| {
-            let [then, now] = [(expected, phase), (last, held)].map(|(one, phase)| peak::at_phase(&one, phase, omega0));
-            [then[0] - now[0], then[1] - now[1]]
-        });
-        let [amplitude, omega] = change.unwrap_or_default();
+        let periods = MOVE.max(2.0 * slowest);
+        let expected = extrapolated(&self.states, level);
+        let [amplitude, omega] = expected.map_or([0.0; 2], |there| [there[0] - drive, there[1] - omega]);
         let to = Move {
             response: level,
             duration: periods * TAU / omega0,
@@ -215,73 +222,60 @@ impl<R: Rig + ?Sized, C: Controller + ?Sized> Bench<'_, R, C> {
     }
 
     /// The point of an estimate from the last of some periods, for a move that began at `start`, in periods.
-    fn point(&self, order: &Order, start: f64, said: &Found, cycles: &[Cycle], criterion: &Criterion) -> Held {
-        let samples = cycles[cycles.len() - said.periods..].iter().map(|cycle| cycle.samples);
+    fn point(&self, level: f64, start: f64, found: &Found, cycles: &[Cycle], criterion: &Criterion) -> Point {
+        let d = self.scene.dimensionless();
+        let samples = cycles[cycles.len() - found.periods..].iter().map(|cycle| cycle.samples);
         let averaged = &self.run.samples[self.run.samples.len() - samples.sum::<usize>()..];
-        let [base, omega] = said.at;
+        let [base, omega] = found.at;
         let regime = regime_by_response(averaged, self.scene, base.value, self.target, omega.value);
-        let reached = order.is_reached(said.response);
-        Held {
+        let reached = is_reached(found.response, level);
+        Point {
+            at: Measured::new([found.response, base, omega, found.phase_error], &d),
+            // The level as a person would write it.
+            level: (1e9 * level / d.b).round() / 1e9,
             periods: self.run.periods - start,
+            averaged: found.periods,
+            // An irregular motion can seem steady for a while; an asymmetric one is no point of this backbone.
+            settled: reached
+                && !matches!(regime, Regime::Other | Regime::Asymmetric)
+                && (found.steady || criterion.is_met(found)),
+            reached,
             regime,
             regime_by_impacts: self.run.samples[0]
                 .ground_truth
                 .map(|_| classify(averaged, self.run.sample_time, omega.value).1),
             tone: foreign_tone(averaged, self.scene, omega.value),
-            // An irregular motion can seem steady for a while; an asymmetric one is no point of this backbone.
-            settled: reached
-                && !matches!(regime, Regime::Other | Regime::Asymmetric)
-                && (said.steady || criterion.is_met(said)),
-            reached,
-            ..Held::new(order.level, said)
         }
     }
-}
 
-impl Order<'_> {
     /// The criterion for a settled point.
-    fn criterion(&self, scene: &Scene) -> Criterion {
-        let before = |back: usize| {
-            let Known { response, drive, omega } = *self.known.iter().nth_back(back)?;
-            Some([response, drive, omega])
-        };
+    fn criterion(&self) -> Criterion {
+        let before = |back: usize| self.states.iter().nth_back(back).copied();
         Criterion {
-            linear: scene.linear(),
-            precision: scene.backbone.precision,
-            largest: scene.levels().into_iter().fold(0.0, f64::max),
-            is_peak: scene.resonance.is_peak(),
-            fewest: scene.backbone.dwell_min as usize,
-            phase: self.phase,
+            linear: self.scene.linear(),
+            precision: self.scene.backbone.precision,
+            largest: self.scene.levels().into_iter().fold(0.0, f64::max),
             before: [before(1), before(0)],
         }
     }
-
-    /// Whether a response, m, is at the level.
-    fn is_reached(&self, response: Estimate) -> bool {
-        let Estimate { value, uncertainty } = response;
-        (value - self.level).abs() <= (REACHED * self.level).max(4.0 * uncertainty)
-    }
 }
 
-fn is_one_to_one(regime: Regime) -> bool {
-    matches!(regime, Regime::Symmetric | Regime::Unresolved)
+/// Whether a response, m, is at the level, m.
+fn is_reached(Estimate { value, uncertainty }: Estimate, level: f64) -> bool {
+    (value - level).abs() <= (REACHED * level).max(4.0 * uncertainty)
 }
 
-/// Drive and frequency at the amplitude `response`, m, on the polynomial through the last points, three at most; `None` without any.
-pub(super) fn extrapolated(known: &[Known], response: f64) -> Option<Known> {
-    let points = &known[known.len().saturating_sub(3)..];
+/// Drive, m, and frequency, rad/s, at the amplitude `response`, m, on the polynomial through the last points, three at most; `None` without any.
+fn extrapolated(states: &[State], response: f64) -> Option<[f64; 2]> {
+    let points = &states[states.len().saturating_sub(3)..];
     let weights = points.iter().enumerate().map(|(i, point)| {
         let others = points.iter().enumerate().filter(|(j, _)| *j != i);
-        (
-            point,
-            others
-                .map(|(_, other)| (response - other.response) / (point.response - other.response))
-                .product::<f64>(),
-        )
+        others
+            .map(|(_, other)| (response - other[0]) / (point[0] - other[0]))
+            .product::<f64>()
     });
-    let [drive, omega] = weights.fold([0.0; 2], |[drive, omega], (point, weight)| {
-        [drive + weight * point.drive, omega + weight * point.omega]
+    let expected = points.iter().zip(weights).fold([0.0; 2], |sum, (point, weight)| {
+        [sum[0] + weight * point[1], sum[1] + weight * point[2]]
     });
-    let known = Known { response, drive, omega };
-    (!points.is_empty() && drive.is_finite() && omega.is_finite()).then_some(known)
+    (!points.is_empty() && expected.iter().all(|one| one.is_finite())).then_some(expected)
 }

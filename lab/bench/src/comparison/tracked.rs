@@ -39,10 +39,12 @@ impl TrackedComparison {
     pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
         let parameters = scene.dimensionless();
         let curve = ExactCurve::of(&parameters);
-        let exact = |point: &Point| curve.distance(point.c, point.sigma, point.g);
+        let exact = |point: &Point| curve.distance(point.at.c, point.at.sigma, point.at.g);
         let compare = |point: &Point| TrackedPoint {
             point: *point,
-            exact: Some(point).filter(|_| scene.is_at_resonance()).and_then(exact),
+            exact: Some(point)
+                .filter(|_| scene.controller.is_at_phase_resonance())
+                .and_then(exact),
         };
         Self {
             points: tracked.points.iter().map(compare).collect(),

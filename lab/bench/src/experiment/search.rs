@@ -116,7 +116,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             progress,
             b: d.b,
             asked: scene.amplitude,
-            target: scene.phase_target().radians(),
+            target: scene.controller.phase_target_radians(),
             period: d.natural_period(),
             setpoint: 0.0,
             last: Command::default(),
@@ -332,7 +332,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             harmonics.extend(even_and_odd(two, step * cycle.omega));
             all.push(cycle);
         }
-        let Some(fit) = Balance::of(&all, &self.linear, 0.0, Slopes::Unknown) else {
+        let Some(fit) = Balance::of(&all, &self.linear, Slopes::Unknown) else {
             return self.measure(periods);
         };
         // Harmonics above the third count as noise of a period, but do not scatter.

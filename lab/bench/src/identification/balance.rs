@@ -70,10 +70,9 @@ const PARABOLA: f64 = 1.2;
 const WIDE: f64 = 3.0;
 
 impl Balance {
-    /// From at least four periods of a rig whose linear response is `linear`, held at the phase error `held`, rad. `slopes`: what is
-    /// known of the slopes of `E_R` and `omega_R` over the amplitude.
+    /// From at least four periods of a rig whose linear response is `linear`. `slopes`: what is known of the slopes of `E_R` and `omega_R` over the amplitude.
     #[must_use]
-    pub fn of(cycles: &[Cycle], linear: &LinearResponse, held: f64, slopes: Slopes) -> Option<Self> {
+    pub fn of(cycles: &[Cycle], linear: &LinearResponse, slopes: Slopes) -> Option<Self> {
         let n = cycles.len() as f64;
         if cycles.len() < 4 {
             return None;
@@ -95,7 +94,7 @@ impl Balance {
         let drives = drives(cycles, &motion, calibration);
         // The damper's force on the base leads it by twice the damping ratio.
         let lead = 2.0 * linear.damping_rate / omega0;
-        let beyond = |drive: Complex<f64>| lead * (drive * Complex::from_polar(1.0, -held)).im;
+        let beyond = |drive: Complex<f64>| lead * drive.im;
         // The integral of A' is A. Terms of the second order: z' of the complex amplitude z contains i z''/(2 omega).
         let inertia = 0.25 * (omega0 * omega0) / (omega * omega);
         let balanced = motion.into_iter().zip(&drives).map(|(one, Drive { force, work })| {

@@ -10,57 +10,22 @@ use vines_model::regime::Regime;
 use super::regime::classify;
 use super::response::{foreign_tone, regime_by_response};
 use super::tone::Tone;
-use super::{Balance, Cycle, Slopes};
+use super::{Balance, Cycle, Measured, Slopes};
 use crate::experiment::Record;
 use crate::scene::{LinearResponse, Scene};
 
-/// The locked point as measured over the hold, in hertz and metres, and dimensionless with the parameters of the scene.
+/// The locked point as measured over the hold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Lock {
-    /// Frequency, Hz.
-    #[serde(rename = "f_Hz")]
-    pub f_hz: f64,
-    /// Amplitude of the fundamental of the response, m.
-    #[serde(rename = "A_m")]
-    pub a_m: f64,
-    /// Base amplitude, m, measured if a sensor reads the base, otherwise commanded.
-    #[serde(rename = "E_m")]
-    pub e_m: f64,
-    /// Standard uncertainty of the frequency, Hz.
-    #[serde(rename = "u_f_Hz")]
-    pub u_f_hz: f64,
-    /// Standard uncertainty of the response, m.
-    #[serde(rename = "u_A_m")]
-    pub u_a_m: f64,
-    /// Standard uncertainty of the base amplitude, m.
-    #[serde(rename = "u_E_m")]
-    pub u_e_m: f64,
-    /// Base amplitude over `b epsilon`.
-    #[serde(rename = "G")]
-    pub g: f64,
-    /// Detuning.
-    pub sigma: f64,
-    /// Amplitude of the fundamental of v over b.
-    #[serde(rename = "C")]
-    pub c: f64,
+    /// Where it is.
+    #[serde(flatten)]
+    pub at: Measured,
     /// Mean particle speed over `b omega0`; absent if the rig does not report it.
     #[serde(rename = "B")]
     pub b: Option<f64>,
-    /// Phase of v relative to the base, minus the target, degrees.
-    pub phase_error_deg: f64,
-    /// Standard uncertainty of G.
-    #[serde(rename = "u_G")]
-    pub u_g: f64,
-    /// Standard uncertainty of sigma.
-    pub u_sigma: f64,
-    /// Standard uncertainty of C.
-    #[serde(rename = "u_C")]
-    pub u_c: f64,
     /// Standard uncertainty of B; absent as above.
     #[serde(rename = "u_B")]
     pub u_b: Option<f64>,
-    /// Standard uncertainty of the phase error, degrees.
-    pub u_phase_deg: f64,
     /// Periods that sigma and C are estimated from: those of the hold, and those before it in which the motion was as near.
     pub averaged: usize,
     /// From the start to the settled lock, in periods of the locked motion.
@@ -106,7 +71,7 @@ const RANDOM: f64 = 2.0;
 pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let d = scene.dimensionless();
     let (dt, hold) = (record.sample_time, record.hold());
-    let target = scene.phase_target().radians();
+    let target = scene.controller.phase_target_radians();
     let held = Cycle::all(hold, dt, target);
     let (wide, approach) = (
         approached(record, scene, target, &held, WIDE),
@@ -138,22 +103,9 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
         .then(|| foreign_tone(hold, scene, omega.value))
         .flatten();
     Some(Lock {
-        f_hz: omega.value / TAU,
-        a_m: limit.value,
-        e_m: base.value,
-        u_f_hz: omega.uncertainty / TAU,
-        u_a_m: limit.uncertainty,
-        u_e_m: base.uncertainty,
-        g: d.excitation(base.value),
-        sigma: d.sigma(omega.value),
-        c: limit.value / d.b,
+        at: Measured::new([limit, base, omega, phase_error], &d),
         b: b.map(|b| b.value),
-        phase_error_deg: phase_error.value.to_degrees(),
-        u_g: d.excitation(base.uncertainty),
-        u_sigma: omega.uncertainty / d.omega_change(1.0),
-        u_c: limit.uncertainty / d.b,
         u_b: b.map(|b| b.uncertainty),
-        u_phase_deg: phase_error.uncertainty.to_degrees(),
         averaged: approach.len(),
         periods_to_lock: record.settled as f64 * dt * omega.value / TAU,
         held: record.held,
@@ -168,9 +120,9 @@ pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
 /// A long window has less noise, a late one is nearer to the end. Where even the shortest disagrees, the difference is a part of the
 /// uncertainty.
 fn limits(approach: &[Cycle], wide: &[Cycle], linear: &LinearResponse, command: f64) -> Option<[Estimate; 2]> {
-    let slopes = Balance::of(wide, linear, 0.0, Slopes::Rising)?.slopes();
+    let slopes = Balance::of(wide, linear, Slopes::Rising)?.slopes();
     let slopes = slopes.map(|one| Estimate::new(one.value, &[one.uncertainty, BENT * one.value]));
-    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, 0.0, Slopes::Known(slopes))?.limit(command));
+    let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, Slopes::Known(slopes))?.limit(command));
     let mut cycles = approach;
     let mut whole = limit(cycles)?;
     while cycles.len() >= 2 * FEWEST {

@@ -15,11 +15,11 @@ const STEPS: f64 = 8.0;
 
 /// Refuses a lock whose phase is farther from its target than the tolerance of the lock.
 pub(super) fn on_target(lock: &Lock, scene: &Scene) -> Result<(), IdentificationError> {
-    let (error, tolerance) = (lock.phase_error_deg, scene.controller.phase_tolerance);
-    if error.abs() <= tolerance + RANDOM * lock.u_phase_deg {
+    let (error, tolerance) = (lock.at.phase_error_deg, scene.controller.phase_tolerance);
+    if error.abs() <= tolerance + RANDOM * lock.at.u_phase_deg {
         return Ok(());
     }
-    Err(IdentificationError::OffTarget { error, uncertainty: lock.u_phase_deg, tolerance })
+    Err(IdentificationError::OffTarget { error, uncertainty: lock.at.u_phase_deg, tolerance })
 }
 
 /// Refuses a decay in which a sensor reads no number, or in which the response is lost within two periods.

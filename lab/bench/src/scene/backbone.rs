@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Controller, Dimensionless, SceneError, validate::Quantity};
+use super::{Dimensionless, SceneError, validate::Quantity};
 
 /// How the response amplitude is stepped with the loop closed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -28,12 +28,6 @@ pub struct Backbone {
     /// The same in m.
     #[serde(rename = "E_max", skip_serializing_if = "Option::is_none")]
     pub e_max: Option<f64>,
-    /// Largest bandwidth of the detector while tracking, in units of omega0; less where the loops of phase and amplitude would be coupled.
-    pub bandwidth: f64,
-    /// Duration of the move from one level to the next, periods.
-    pub move_periods: f64,
-    /// Fewest periods that a point is averaged over.
-    pub dwell_min: u32,
     /// Periods after which a point is taken, settled or not.
     pub dwell_max: u32,
     /// Largest standard uncertainty of the drive E as a share of it, and of the frequency as a share of the half-power bandwidth of a linear rig
@@ -51,9 +45,6 @@ impl Default for Backbone {
             points: 29,
             g_max: None,
             e_max: None,
-            bandwidth: 0.15,
-            move_periods: 4.0,
-            dwell_min: 8,
             dwell_max: 150,
             precision: 9e-4,
         }
@@ -96,7 +87,7 @@ impl Backbone {
         self.e_max.or(by_g).unwrap_or(f64::INFINITY)
     }
 
-    pub(super) fn check(&self, controller: &Controller) -> Result<(), SceneError> {
+    pub(super) fn check(&self) -> Result<(), SceneError> {
         for (key, value, unit) in [
             ("backbone.C_from", self.c_from, "(over b)"),
             ("backbone.C_to", self.c_to, "(over b)"),
@@ -109,23 +100,9 @@ impl Backbone {
         }
         Quantity::new("backbone.points", self.points.into(), "(levels)")
             .check((1..=10_000).contains(&self.points), "must be from 1 to 10000")?;
-        let widest = controller.bandwidth_max();
-        Quantity::new("backbone.bandwidth", self.bandwidth, "(omega0)").check(
-            self.bandwidth > 0.0 && self.bandwidth <= widest,
-            format!("must be above 0 and at most {widest:.3} at that many samples per period"),
-        )?;
-        Quantity::new("backbone.move_periods", self.move_periods, "(periods)").check(
-            (0.0..=1e4).contains(&self.move_periods),
-            "must be from 0 (a jump) to 10000",
-        )?;
-        let (least, most) = (self.dwell_min, self.dwell_max);
-        Quantity::new("backbone.dwell_min", least.into(), "(periods)").check(
-            (8..=1000).contains(&least),
-            "must be from 8 (two halves of four periods) to 1000",
-        )?;
-        Quantity::new("backbone.dwell_max", most.into(), "(periods)").check(
-            (least..=10_000).contains(&most),
-            format!("must be from dwell_min = {least} to 10000"),
+        Quantity::new("backbone.dwell_max", self.dwell_max.into(), "(periods)").check(
+            (8..=10_000).contains(&self.dwell_max),
+            "must be from 8 (two halves of four periods) to 10000",
         )?;
         Quantity::new("backbone.precision", self.precision, "(relative)").positive()
     }

@@ -4,42 +4,8 @@ use std::f64::consts::PI;
 
 use lovines::State;
 use phase_lock::{Config, LockCriterion};
-use serde::Serialize;
-use vines_model::orbit::phase_resonant;
 
-use super::{Resonance, Scene, Sensor, plant::symbols};
-
-/// The phase of the response relative to the reference that a lock holds.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct PhaseTarget {
-    /// Degrees.
-    #[serde(rename = "phase_target_deg")]
-    pub degrees: f64,
-    /// Where it comes from.
-    #[serde(rename = "phase_from")]
-    pub origin: PhaseOrigin,
-}
-
-/// Where a phase target comes from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-pub enum PhaseOrigin {
-    /// `controller.phase_target`.
-    #[serde(rename = "scene")]
-    Scene,
-    /// The exact orbit at the peak of the response at the scene's drive.
-    #[serde(rename = "exact orbit")]
-    ExactOrbit,
-    /// First-order theory, for which the peak is at phase resonance; there is no stable exact orbit.
-    #[serde(rename = "theory")]
-    Theory,
-}
-
-impl PhaseTarget {
-    /// In radians.
-    pub fn radians(&self) -> f64 {
-        self.degrees.to_radians()
-    }
-}
+use super::{Scene, Sensor, plant::symbols};
 
 impl Scene {
     /// Parameters and start of the plant, under the names of the FMU's variables.
@@ -48,28 +14,6 @@ impl Scene {
         let State { q1, dq1, q2, dq2 } = self.start;
         let [q1, dq1] = [("q1", q1), ("der(q1)", dq1)];
         [mass, k, c, m, b, r, q1, dq1, ("q2", q2), ("der(q2)", dq2)]
-    }
-
-    /// Whether the loop holds resonance by the scene's definition, for which theory and exact orbits hold.
-    pub fn is_at_resonance(&self) -> bool {
-        self.resonance.resonance == Resonance::Peak || self.controller.is_at_phase_resonance()
-    }
-
-    /// The phase that a lock at the scene's drive holds. At the peak of the response it depends on the drive: unless the scene states
-    /// another phase than that of phase resonance, it is that of the exact orbit.
-    pub fn phase_target(&self) -> PhaseTarget {
-        let stated = self.controller.phase_target;
-        if !self.resonance.is_peak() || !self.controller.is_at_phase_resonance() {
-            return PhaseTarget { degrees: stated, origin: PhaseOrigin::Scene };
-        }
-        let orbits = phase_resonant(&self.dimensionless());
-        let peak = orbits.iter().rev().find(|orbit| orbit.stable);
-        peak.map_or(PhaseTarget { degrees: stated, origin: PhaseOrigin::Theory }, |peak| {
-            PhaseTarget {
-                degrees: peak.gamma.to_degrees(),
-                origin: PhaseOrigin::ExactOrbit,
-            }
-        })
     }
 
     /// Configuration of the controller for the scene's excitation.
@@ -91,7 +35,7 @@ impl Scene {
             omega_max: c.omega_max * omega0,
             bandwidth: c.bandwidth * omega0,
             damping_rate: Some(self.linear().damping_rate).filter(|rate| *rate > 0.0),
-            phase_target: self.phase_target().radians(),
+            phase_target: c.phase_target_radians(),
             delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0
                 + (c.delay + f64::from(u8::from(self.resonance.is_late()))) * self.sample_time(),
             amplitude_max: Some(amplitude_max),
@@ -102,14 +46,10 @@ impl Scene {
                 None => Some(amplitude_max * omega0),
             },
             release_rate: rate(self.amplitude, c.release_periods),
-            omega_rate: match c.omega_rate {
-                Some(limit) => limit.map(|rate| rate * omega0 / period),
-                // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
-                None => Some((c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period)),
-            },
+            // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
+            omega_rate: Some((c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period)),
             acquire_timeout: Some(self.lock_periods() * period),
-            signal_timeout: c.silence_periods.map(|periods| periods * period),
-            residual_max: c.residual_max.unwrap_or_else(|| Some(self.residual())),
+            residual_max: Some(self.residual()),
             reference_connected: self.chain.reference,
             lock: self.lock_criterion(),
             ..defaults
@@ -179,7 +119,7 @@ impl Scene {
             .unwrap_or((20.0 * relaxation).max(3000.0).min(1e7 / samples_per_period))
     }
 
-    /// Configuration of the controller for tracking: with the largest drive and the bandwidth of `[backbone]`.
+    /// Configuration of the controller for tracking: with the largest drive of `[backbone]`, and a bandwidth at which the loops are not coupled.
     pub fn backbone_config(&self) -> Config {
         let d = self.dimensionless();
         Config {
@@ -188,8 +128,7 @@ impl Scene {
                     .drive_max(&d)
                     .min(self.drive_limit().unwrap_or(f64::INFINITY)),
             ),
-            bandwidth: self.backbone.bandwidth.min(self.coupled_bandwidth()) * d.omega0,
-            phase_target: self.controller.phase_target_radians(),
+            bandwidth: self.controller.bandwidth.min(self.coupled_bandwidth()) * d.omega0,
             ..self.controller_config()
         }
     }

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use phase_lock::Config;
 use serde::{Deserialize, Serialize};
 
-use super::option::{given, option};
+use super::option::option;
 use super::{SceneError, validate::Quantity};
 
 /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
@@ -48,17 +48,6 @@ pub struct Controller {
     pub ramp_periods: Option<f64>,
     /// Duration of the ramp of the drive to zero at the release, natural periods; 0 to switch off at once.
     pub release_periods: f64,
-    /// Largest change of the frequency in a natural period, in units of omega0; by default the distance of the two limits, or
-    /// as much in half a time constant of the detector if that is shorter.
-    #[serde(deserialize_with = "given")]
-    pub omega_rate: Option<Option<f64>>,
-    /// Longest time without a valid measurement, natural periods.
-    #[serde(deserialize_with = "option")]
-    pub silence_periods: Option<f64>,
-    /// Largest difference between a reading and its prediction, as a share of the amplitude, beyond twice those of the last periods; by
-    /// default 0.3, and for an accelerometer what an impact adds.
-    #[serde(deserialize_with = "given")]
-    pub residual_max: Option<Option<f64>>,
     /// Delay of the rig from the drive to the sensors, samples, in addition to that of `[chain]`; used where no sensor reads the base.
     pub delay: f64,
 }
@@ -81,9 +70,6 @@ impl Default for Controller {
             c_max: Some(4.0),
             ramp_periods: None,
             release_periods: 0.0,
-            omega_rate: None,
-            silence_periods: Some(20.0),
-            residual_max: None,
             delay: 0.0,
         }
     }
@@ -165,14 +151,10 @@ impl Controller {
             Quantity::new(key, value, unit).not_negative()?;
         }
         let given = |option: Option<f64>| option.unwrap_or(1.0);
-        let (rate, residual) = (given(self.omega_rate.flatten()), given(self.residual_max.flatten()));
         for (key, value, unit) in [
             ("controller.G_max", given(self.g_max), "(over b epsilon)"),
             ("controller.E_max", given(self.e_max), "m"),
             ("controller.C_max", given(self.c_max), "(over b)"),
-            ("controller.omega_rate", rate, "(omega0 per natural period)"),
-            ("controller.silence_periods", given(self.silence_periods), periods),
-            ("controller.residual_max", residual, "(of the amplitude)"),
         ] {
             Quantity::new(key, value, unit).positive()?;
         }

@@ -20,8 +20,3 @@ pub(super) fn option<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) ->
         Written::Switch(_) | Written::Word(_) => Err(D::Error::custom("expected a number, or false or \"none\"")),
     }
 }
-
-/// Reads an option that has a default of its own.
-pub(super) fn given<'de, D: Deserializer<'de>>(from: D) -> Result<Option<Option<f64>>, D::Error> {
-    option(from).map(Some)
-}

@@ -6,12 +6,11 @@ use toml::{Table, Value};
 use vines_model::ArgumentError;
 
 /// The parameters that other keys of a scene set, in units that suit any plant.
-pub const KEYS: [(&str, &str); 21] = [
+pub const KEYS: [(&str, &str); 18] = [
     ("sample_time", "controller.samples_per_period"),
     ("omega_start", "controller.omega_start"),
     ("omega_min", "controller.omega_min"),
     ("omega_max", "controller.omega_max"),
-    ("omega_rate", "controller.omega_rate"),
     ("amplitude", "excitation.G"),
     ("amplitude_max", "controller.G_max"),
     ("ramp_rate", "controller.ramp_periods"),
@@ -25,8 +24,6 @@ pub const KEYS: [(&str, &str); 21] = [
     ("lock.dwell", "controller.dwell_periods"),
     ("response_max", "controller.C_max"),
     ("acquire_timeout", "record.lock_periods"),
-    ("signal_timeout", "controller.silence_periods"),
-    ("residual_max", "controller.residual_max"),
     ("reference_connected", "chain.reference"),
 ];
 

@@ -106,7 +106,7 @@ impl Sections {
         };
         scene.controller.check()?;
         scene.record.check(&scene.controller, scene.lock_periods())?;
-        scene.backbone.check(&scene.controller)?;
+        scene.backbone.check()?;
         scene.chain.check(&scene.controller)?;
         if scene.resonance.reference == Reference::Force && !scene.chain.reference {
             let message = "resonance.reference = \"force\" with chain.reference = false: the force k e + c e' follows from the base \

@@ -56,7 +56,7 @@ fn a_signal_that_is_missing_is_stated_with_what_a_signal_needs() {
     for part in [
         "read at most 1e-7 m, the base 0 m",
         "0.00084 m (phase_lock.lock.response_min) with a share of 0.5",
-        "controller.silence_periods allows 125.66 s without it",
+        "phase_lock.signal_timeout allows 125.66 s without it",
         "`vines check`",
     ] {
         assert!(text.contains(part), "{part} is not in: {text}");
@@ -65,12 +65,12 @@ fn a_signal_that_is_missing_is_stated_with_what_a_signal_needs() {
 
 #[test]
 fn readings_that_are_refused_are_stated() {
-    let found = evidence(&["controller.residual_max=0.2"], |n| {
+    let found = evidence(&["phase_lock.residual_max=0.2"], |n| {
         (if n == 149 { f64::NAN } else { 0.4 }, None, None)
     });
     let text = found.text(Fault::Sensor);
     assert!(text.starts_with("the response read NaN m. "), "{text}");
     let text = found.text(Fault::Implausible);
-    let expected = "read NaN m; in the last period at most 0.4 m; controller.residual_max allows 0.2 of the amplitude as the difference";
+    let expected = "read NaN m; in the last period at most 0.4 m; phase_lock.residual_max allows 0.2 of the amplitude as the difference";
     assert!(text.contains(expected), "{text}");
 }

@@ -89,12 +89,12 @@ fn the_experiment_on_a_device_gives_the_backbone_of_the_plant() {
         let mut rig = HelicRig::new(direct, Channels::default(), step, 100.0).unwrap();
         let found = run(&mut rig);
         assert!(!rig.counters.is_troubled(), "{}", rig.counters);
-        assert!((found.c - expected.c).abs() < 1e-3);
-        found.sigma - expected.sigma
+        assert!((found.at.c - expected.at.c).abs() < 1e-3);
+        found.at.sigma - expected.at.sigma
     });
     println!(
         "sigma = {}, {coarse} more with 8 and {fine} more with 16 samples of the device",
-        expected.sigma
+        expected.at.sigma
     );
     assert!(
         (coarse / fine - 2.0).abs() < 0.2 && fine.abs() < 0.003,
@@ -140,7 +140,9 @@ fn an_experiment_rides_through_lost_datagrams_and_gives_the_same_backbone() {
     // The first one; one in fifty, and now and then six in a row, 30 ms.
     let (found, counters) = run(|n| usize::from(n != 0 && n * 7919 % 50 != 13 && n % 997 <= 990));
     assert!(counters.held > 300, "{counters}");
-    let distance = (found.sigma - expected.sigma).abs().max((found.c - expected.c).abs());
+    let distance = (found.at.sigma - expected.at.sigma)
+        .abs()
+        .max((found.at.c - expected.at.c).abs());
     assert!(distance < 1e-3, "{distance}");
 }
 

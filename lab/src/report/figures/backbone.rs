@@ -16,7 +16,7 @@ const TOP: f64 = 0.8;
 pub fn figure(found: &Comparison) -> Figure {
     let p = &found.parameters;
     let slow_flow = SlowFlow::new(p.lambda, p.r);
-    let top = (1.25 * found.lock.c).max(TOP);
+    let top = (1.25 * found.lock.at.c).max(TOP);
     let reach = slow_flow.manifold.b(top, BranchSide::Right).unwrap_or(1.0);
     let theory = theory::backbone(p, slow_flow.manifold.b_min(), reach, 400);
     // Below the fold there is no backbone, and the frequency of the remaining motion is arbitrary.
@@ -33,7 +33,7 @@ pub fn figure(found: &Comparison) -> Figure {
         false => format!("Backbone: {}", p.definition.name()),
     };
     let mut panel = Panel::new(((low, high), DETUNING), ((0.0, top), amplitude(p)))
-        .heading(&title, &caption(p, found.lock.g))
+        .heading(&title, &caption(p, found.lock.at.g))
         .legend(Legend::UpperRight);
     add_backbones(&mut panel, p, (low, high), (0.0, top));
     let drawn = decay().step_by(THINNED);
@@ -48,8 +48,8 @@ pub fn figure(found: &Comparison) -> Figure {
         .filter(|(sigma, c)| (low..=high).contains(sigma) && *c > fold)
         .collect();
     panel.curve(predicted, line(LOCK, 12), "free decay, predicted by the exact plant");
-    let place = (found.lock.sigma, found.lock.c);
-    for (u, upright) in [(found.lock.u_sigma, false), (found.lock.u_c, true)] {
+    let place = (found.lock.at.sigma, found.lock.at.c);
+    for (u, upright) in [(found.lock.at.u_sigma, false), (found.lock.at.u_c, true)] {
         error_bars(&mut panel, std::iter::once((place, 1.96 * u)), upright);
     }
     locked_point(&mut panel, place);

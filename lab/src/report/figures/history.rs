@@ -36,7 +36,7 @@ pub fn figure(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
     let flow = SlowFlow::new(found.parameters.lambda, found.parameters.r);
     let per_period = found.parameters.epsilon * TAU;
     let fold = flow.manifold.c_min();
-    let decay = backbone_at_level(&found.parameters, found.lock.c);
+    let decay = backbone_at_level(&found.parameters, found.lock.at.c);
     let decay = decay.and_then(|point| flow.decay(point.b));
     let decay = decay.map(|decay| decay.samples(400)).unwrap_or_default();
     let points = found.decay.iter().map(|one| one.point);
@@ -57,7 +57,7 @@ pub fn figure(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
             .collect(),
     };
     let all = || data.driven.iter().chain(&data.points);
-    let (_, top) = range((0.0, found.lock.c), data.driven.iter().map(|one| one[1]));
+    let (_, top) = range((0.0, found.lock.at.c), data.driven.iter().map(|one| one[1]));
     let (low, high) = range((-1.5, 0.5), all().map(|one| one[2]));
     let margin = 0.1 * (high - low);
     let rows = [
@@ -82,7 +82,7 @@ impl Data<'_> {
         let end = 1.02 * self.driven.last().map_or(1.0, |one| one[0]);
         let mut panel = Panel::new(((0.0, end), "time, in periods of the oscillator alone"), y);
         if row == 1 {
-            let caption = caption(parameters, lock.g);
+            let caption = caption(parameters, lock.at.g);
             panel = panel.heading("Seeking and holding resonance", &caption);
         }
         let measured = self.driven.iter().map(|one| (one[0], one[row])).collect();

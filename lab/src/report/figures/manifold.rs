@@ -14,7 +14,7 @@ pub fn figure(found: &Comparison) -> Figure {
     let p = &found.parameters;
     let flow = SlowFlow::new(p.lambda, p.r);
     let manifold = flow.manifold;
-    let right = (1.25 * found.lock.c).max(0.8);
+    let right = (1.25 * found.lock.at.c).max(0.8);
     let between = |from: f64, to: f64| -> Vec<Place> {
         equally_spaced(from, to, POINTS + 1)
             .map(|b| (manifold.c(b) * reading(p, b, flow.free_detuning(b)), b))
@@ -24,7 +24,7 @@ pub fn figure(found: &Comparison) -> Figure {
     let mut panel = Panel::new(((0.0, right), amplitude(p)), ((0.0, TOP), SPEED))
         .heading(
             "Slow invariant manifold and the free decay on it",
-            &caption(&found.parameters, found.lock.g),
+            &caption(&found.parameters, found.lock.at.g),
         )
         .legend(Legend::UpperLeft);
     let stable = between(manifold.b_min(), B_SYMMETRY_BREAKING);
@@ -36,7 +36,7 @@ pub fn figure(found: &Comparison) -> Figure {
     let decay = decay.filter_map(|point| point.b.map(|b| (point.c, b)));
     decay_points(&mut panel, decay, DECAY_LABEL);
     if let Some(b) = found.lock.b {
-        locked_point(&mut panel, (found.lock.c, b));
+        locked_point(&mut panel, (found.lock.at.c, b));
     }
     Figure::single(panel)
 }

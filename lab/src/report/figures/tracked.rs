@@ -11,7 +11,7 @@ use crate::theory::{self, SlowFlow};
 /// The points, and the top of the axis of their amplitudes.
 fn points(tracked: &TrackedComparison) -> (impl Iterator<Item = Point> + Clone, f64) {
     let all = tracked.points.iter().map(|one| one.point);
-    let top = all.clone().fold(0.5, |most: f64, one| most.max(1.15 * one.c));
+    let top = all.clone().fold(0.5, |most: f64, one| most.max(1.15 * one.at.c));
     (all, top)
 }
 
@@ -30,17 +30,17 @@ pub fn figure_with_drive(tracked: &TrackedComparison) -> Figure {
 fn amplitude_panel(tracked: &TrackedComparison) -> Panel {
     let p = &tracked.parameters;
     let (all, top) = points(tracked);
-    let (low, high) = range((-1.6, 0.6), all.clone().map(|one| one.sigma));
+    let (low, high) = range((-1.6, 0.6), all.clone().map(|one| one.at.sigma));
     let x = (low - 0.1 * (high - low), high + 0.1 * (high - low));
-    let (least, most) = range((f64::MAX, f64::MIN), all.clone().map(|one| one.g));
+    let (least, most) = range((f64::MAX, f64::MIN), all.clone().map(|one| one.at.g));
     let text = caption(p, most).replace(&format!("G = {most:.3}"), &format!("G from {least:.3} to {most:.3}"));
     let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
         .heading("Backbone, tracked with the loop closed", &text)
         .legend(Legend::UpperRight);
     add_backbones(&mut panel, p, x, (0.0, top));
-    let place = |one: Point| (one.sigma, one.c);
+    let place = |one: Point| (one.at.sigma, one.at.c);
     decay_points(&mut panel, all.clone().map(place), "tracked");
-    let bars = all.clone().map(|one| (place(one), 1.96 * one.u_sigma));
+    let bars = all.clone().map(|one| (place(one), 1.96 * one.at.u_sigma));
     error_bars(&mut panel, bars, false);
     let unsettled = all.filter(|one| !one.settled).map(place).collect();
     panel.crosses(unsettled, line(DECAY, 20), "not settled in time");
@@ -54,7 +54,7 @@ fn drive_panel(tracked: &TrackedComparison) -> Panel {
     let theory = theory::backbone(p, flow.manifold.b_min(), 1.3, 600);
     let theory = theory.iter().map(|one| (one.c, one.g));
     let exact = tracked.exact.places().iter().map(|one| (one[0], one[2]));
-    let (_, most) = range((0.0, 0.1), all.clone().map(|one| one.g));
+    let (_, most) = range((0.0, 0.1), all.clone().map(|one| one.at.g));
     let high = 1.3 * most;
     let inside = |place: &(f64, f64)| place.0 <= top && place.1 <= high;
     let mut panel = Panel::new(
@@ -67,7 +67,11 @@ fn drive_panel(tracked: &TrackedComparison) -> Panel {
     panel.dashed(theory, line(THEORY, 20), "first-order theory");
     let exact = exact.filter(inside).collect();
     panel.curve(exact, line(EXACT, 16), "exact orbits");
-    decay_points(&mut panel, all.clone().map(|one| (one.c, one.g)), "tracked");
-    error_bars(&mut panel, all.map(|one| ((one.c, one.g), 1.96 * one.u_g)), true);
+    decay_points(&mut panel, all.clone().map(|one| (one.at.c, one.at.g)), "tracked");
+    error_bars(
+        &mut panel,
+        all.map(|one| ((one.at.c, one.at.g), 1.96 * one.at.u_g)),
+        true,
+    );
     panel
 }

@@ -25,7 +25,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
         Ok(found) => Comparison::of(&found, scene),
         Err(error) => return Ok(without_backbone(section, &error)),
     };
-    describe(&mut section, &found, found.phase.degrees);
+    describe(&mut section, &found, found.phase_target_deg);
     section.figure(
         "history",
         "Amplitude and frequency over time. Left: the loop searches for phase resonance and holds it; measured once per period. Right: \
@@ -80,17 +80,17 @@ fn describe(section: &mut Section, found: &Comparison, target: f64) {
     let lock = &found.lock;
     section.finding = format!(
         "The loop locked after {:.0} periods at σ = {:.4}, C = {:.4}, in the regime {}.",
-        lock.periods_to_lock, lock.sigma, lock.c, lock.regime
+        lock.periods_to_lock, lock.at.sigma, lock.at.c, lock.regime
     );
     section.words(format!(
         "A sampled phase-locked loop drove the base at G = {:.4} and searched for the frequency at which the centre of mass {} the \
          base by {} degrees. It settled after {:.0} periods with {:.3} impacts per period and a phase error of {:.1e} degrees. A phase \
          lock alone is not sufficient evidence, because the linear mode locks as well. Here the impacts alternate between the walls at \
          even intervals: this is the symmetric 1:1 regime.",
-        lock.g,
+        lock.at.g,
         if target <= 0.0 { "lags" } else { "leads" },
         target.abs(),
-        lock.periods_to_lock, lock.impacts_per_period, lock.phase_error_deg
+        lock.periods_to_lock, lock.impacts_per_period, lock.at.phase_error_deg
     ));
     describe_lock(section, found);
     if let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) {
@@ -142,19 +142,19 @@ fn describe_lock(section: &mut Section, found: &Comparison) {
         let b = b.map_or("–".into(), number);
         [name.to_string(), number(sigma), number(c), b]
     };
-    let mut rows = vec![cells("measured at the lock", lock.sigma, lock.c, lock.b)];
+    let mut rows = vec![cells("measured at the lock", lock.at.sigma, lock.at.c, lock.b)];
     let percent = |c: f64, reference: f64| 100.0 * (c / reference - 1.0).abs();
     if let Some(exact) = &found.exact {
         rows.push(cells("exact orbit", exact.sigma, exact.c, Some(exact.b)));
         let others = found.others();
         rows.extend(others.map(|one| cells("another stable orbit, not followed", one.sigma, one.c, Some(one.b))));
-        let sigma = (lock.sigma - exact.sigma).abs();
+        let sigma = (lock.at.sigma - exact.sigma).abs();
         section.budget(
             "lock, measured against the exact orbit",
-            format!("{sigma:.1e} in σ, {:.3} % in C", percent(lock.c, exact.c)),
+            format!("{sigma:.1e} in σ, {:.3} % in C", percent(lock.at.c, exact.c)),
             &format!(
                 "Standard uncertainties: {:.1e} in σ, {:.1e} in C. The rest of the approach is extrapolated.",
-                lock.u_sigma, lock.u_c
+                lock.at.u_sigma, lock.at.u_c
             ),
         );
     }
