@@ -38,10 +38,9 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
                 Given::Paired((list,)) => Values::Paired(list),
                 Given::Design(design, from, to) => match design.as_str() {
                     "random" => Values::Random([from, to]),
-                    "sobol" => Values::Sobol([from, to]),
                     other => {
                         return Err(invalid(format!(
-                            "{name}: unknown design `{other}`; known are random and sobol"
+                            "{name}: unknown design `{other}`; known is random"
                         )));
                     }
                 },

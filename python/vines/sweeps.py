@@ -59,7 +59,7 @@ def linspace(first: float, last: float, number: int) -> Range:
     return Range(real(first), real(last), operator.index(count))
 
 
-#: Values of an axis: a `linspace`, a list or an array, or ("random" or "sobol", first, last).
+#: Values of an axis: a `linspace`, a list or an array, or ("random", first, last).
 Values: TypeAlias = "Range | Sequence[float] | NDArray[Any] | tuple[str, float, float]"
 
 #: Names of the regimes, by their code in a store.
@@ -94,7 +94,7 @@ def sweep(
         None: the default scene.
     axes : mapping of str to values, optional
         By name, `"sigma"` or `"section.key"` of a scene: a list or an array, `linspace(first, last, number)`, or a
-        tuple ("random" or "sobol", first, last).
+        tuple ("random", first, last).
     out : path-like
         Folder of the store.
     paired : mapping of str to sequence of float, optional
@@ -103,7 +103,7 @@ def sweep(
     sigma : float, optional
         Detuning, if it is not an axis. Without it: that of the scene's stable phase-resonant orbit, or 0.
     samples : int, optional
-        Number of samples of random and Sobol axes, which share the dimension `sample`.
+        Number of samples of random axes, which share the dimension `sample`.
     seed : int
         Seed of random axes.
     periods : int
@@ -113,8 +113,8 @@ def sweep(
     chunk : int
         Largest number of cells in a chunk.
     adaptive : int, optional
-        Only the regime: compute every n-th cell of two grids (16 is usual), then where neighbours differ or
-        inferences fail, and infer the rest; `inferred` marks it. Not with `client`.
+        Only the regime: compute every n-th cell of two grids (16 is usual), then where neighbours differ,
+        and infer the rest; `inferred` marks it. Not with `client`.
     confirm : bool
         Confirms a sweep of more than 2 hours or 20 GB.
     progress : bool

@@ -5,7 +5,6 @@
 //! alternating impulses of known size on the oscillator, and their periodic response has a closed form. At a given frequency
 //! one quadratic equation for B remains. There is no first-order approximation.
 
-mod approach;
 mod bifurcations;
 mod bounce;
 mod branch;
@@ -30,7 +29,6 @@ mod settle;
 use crate::Dimensionless;
 use serde::Serialize;
 
-pub use approach::{Symmetric, alternates};
 pub use bifurcations::{BifurcationCurve, bifurcation_curves};
 pub use bounce::Bounce;
 pub use branch::{Branch, Ended, Limits, Special};

@@ -2,7 +2,7 @@
 //! of a plant which follows other steps from the start, so that chaos is another one after some hundred periods.
 //!
 //! The comparison has its own rules: the pattern of the impacts instead of the state, and a disturbed second plant instead of the
-//! linearised disturbance. `CELLS` sets the number of cells per map, `PERIODS` those of the other plant and
+//! linearised disturbance. `CELLS` sets the number of cells per map, `LIMIT` the periods of the map, `PERIODS` those of the other plant and
 //! `CONFIRMATIONS` the number of motions that must agree, `MAP` (1 to 3) selects one map (`scripts/stress --map`).
 
 use std::f64::consts::{PI, TAU};
@@ -15,7 +15,7 @@ use rand_chacha::{
 use rayon::prelude::*;
 use vines_model::{
     Dimensionless,
-    map::{CONFIRMATIONS, LIMIT, Point, Run, observe, observe_confirmed},
+    map::{CONFIRMATIONS, LIMIT, Point, observe_confirmed},
     regime::{Impact, Regime, synchrony},
 };
 
@@ -153,9 +153,9 @@ fn place(case: &Case, seed: u64) -> (f64, Dimensionless) {
 }
 
 /// A random cell, its regime by the map, that of its motion further on, and that of another plant after so many periods.
-fn cell(case: &Case, seed: u64, periods: usize, others: usize) -> (Point, [Regime; 2], String) {
+fn cell(case: &Case, seed: u64, [limit, periods, others]: [usize; 3]) -> (Point, [Regime; 2], String) {
     let (sigma, scene) = place(case, seed);
-    let (mut point, different) = observe_confirmed(&scene, sigma, case.start, LIMIT, others).unwrap();
+    let (mut point, different) = observe_confirmed(&scene, sigma, case.start, limit, others).unwrap();
     if different.is_some() {
         point.regime = Regime::Undecided;
     }
@@ -174,10 +174,11 @@ fn cell(case: &Case, seed: u64, periods: usize, others: usize) -> (Point, [Regim
 fn regimes_agree_with_those_further_on_and_of_another_plant() {
     let (cells, first) = (setting("CELLS", 8), setting("SEED", 1));
     let periods = setting("PERIODS", LIMIT as u64) as usize;
+    let limit = setting("LIMIT", LIMIT as u64) as usize;
     let others = setting("CONFIRMATIONS", CONFIRMATIONS as u64) as usize;
     let only = setting("MAP", 0) as usize;
     for (n, case) in CASES.iter().enumerate().filter(|(n, _)| only == 0 || n + 1 == only) {
-        let one = |seed| cell(case, (first << 32) + seed, periods, others);
+        let one = |seed| cell(case, (first << 32) + seed, [limit, periods, others]);
         let mut found: Vec<_> = (0..cells).into_par_iter().map(one).collect();
         let count = |regime: Regime| found.iter().filter(|one| one.0.regime == regime).count();
         let regimes = Regime::SIMULATED
@@ -217,82 +218,4 @@ fn regimes_agree_with_those_further_on_and_of_another_plant() {
             "{found:?}"
         );
     }
-}
-
-/// Periods per cell of the comparison of early decisions with the full length.
-const SHORT: usize = 400;
-/// Periods after which irregular cells are counted, to see whether they could be stopped.
-const SHORTER: [usize; 3] = [160, 200, 300];
-
-/// Prints how many cells that are modulated or chaotic after fewer periods have another regime after [`SHORT`]; also of the strongest
-/// chaos alone.
-fn print_irregular(case: &Case, cells: &[(f64, f64, Point, Point)]) {
-    let [epsilon, lambda, r] = case.scene;
-    for periods in SHORTER {
-        let irregular: Vec<(Point, bool)> = cells
-            .par_iter()
-            .map(|(sigma, g, _, full)| {
-                let point = observe(&Dimensionless::new(epsilon, lambda, r, *g), *sigma, case.start, periods).unwrap();
-                (point, point.regime != full.regime)
-            })
-            .filter(|(point, _)| matches!(point.regime, Regime::Modulated | Regime::Chaotic))
-            .collect();
-        let is_strong = |point: &Point| point.exponent.is_some_and(|one| one > 0.9) && point.synchrony < 0.05;
-        let strong: Vec<_> = irregular.iter().filter(|(point, _)| is_strong(point)).collect();
-        println!(
-            "  after {periods} periods: {} irregular cells, {} of them have another regime after {SHORT}; with an exponent above 0.9 and a synchrony \
-             below 0.05: {}, {}",
-            irregular.len(),
-            irregular.iter().filter(|one| one.1).count(),
-            strong.len(),
-            strong.iter().filter(|one| one.1).count()
-        );
-    }
-}
-
-#[test]
-fn an_early_decision_is_that_of_the_full_length() {
-    let (cells, first) = (setting("CELLS", 40), setting("SEED", 1));
-    let mut wrong = 0;
-    for (n, case) in CASES.iter().enumerate() {
-        let found: Vec<_> = (0..cells)
-            .into_par_iter()
-            .map(|seed| {
-                let (sigma, scene) = place(case, (first << 32) + seed);
-                let early = observe(&scene, sigma, case.start, SHORT).unwrap();
-                let full = Run::new(&scene, sigma, case.start)
-                    .and_then(|mut run| run.decided(SHORT, SHORT))
-                    .unwrap();
-                (sigma, scene.g, early, full)
-            })
-            .collect();
-        let differ: Vec<_> = found.iter().filter(|one| one.2.regime != one.3.regime).collect();
-        for (sigma, g, early, full) in &differ {
-            println!(
-                "  sigma = {sigma:.4}, G = {g:.4}: {} after {}, {} after {}",
-                early.regime, early.followed, full.regime, full.followed
-            );
-        }
-        let stopped: Vec<_> = found.iter().filter(|one| one.2.followed < SHORT).collect();
-        // Irregular half way to the limit, and periodic at the limit: such a motion cannot be stopped half way.
-        let late = stopped
-            .iter()
-            .filter(|one| one.2.transient > SHORT as f64 / 2.0)
-            .count();
-        let mean = |cells: &[&(f64, f64, Point, Point)]| {
-            cells.iter().map(|one| one.2.followed as f64).sum::<f64>() / cells.len() as f64
-        };
-        println!(
-            "map {}, {SHORT} periods: {} of {cells} regimes differ from those of the full length; {} cells were stopped after {:.0} periods in the \
-             mean, all after {:.0}; {late} became periodic in the second half",
-            n + 1,
-            differ.len(),
-            stopped.len(),
-            mean(&stopped),
-            mean(&found.iter().collect::<Vec<_>>())
-        );
-        print_irregular(case, &found);
-        wrong += differ.len() as u64;
-    }
-    assert!(10_000 * wrong <= 3 * cells, "{wrong} of {} cells differ", 3 * cells);
 }

@@ -1,4 +1,4 @@
-//! `vines sweep`: any parameters of a scene over grids, lists and random or Sobol designs, to a Zarr store.
+//! `vines sweep`: any parameters of a scene over grids, lists and random samples, to a Zarr store.
 
 use std::sync::atomic::{AtomicBool, Ordering::Relaxed};
 use std::{path::PathBuf, thread, time::Duration};
@@ -15,8 +15,8 @@ Axes; a key is sigma (the detuning) or section.key of a scene:
   --axis plant.r=0.3:1:71          first : last : number of values
   --axis plant.r=0.3,0.5,0.8       a list
   --axis start.dq2=random:-1:1     one random number per sample; with --samples and --seed
-  --axis start.dq2=sobol:-1:1      one number of a Sobol sequence per sample; with --samples
-Grids and lists have one dimension each; all random and Sobol axes share the dimension `sample`.
+  --axis plant.r=paired:0.3,0.5    samples of your own, such as a Sobol sequence of scipy.stats.qmc; one value per sample
+Grids and lists have one dimension each; all random and paired axes share the dimension `sample`.
 
 Results; the regime is always computed, as by `vines map`:
   regime     regime, periods to settle, impacts per period, pattern, Lyapunov exponent, synchrony, sticking
@@ -50,7 +50,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "SIGMA", allow_negative_numbers = true)]
     sigma: Option<f64>,
 
-    /// Number of samples of the random and Sobol axes
+    /// Number of samples of the random axes
     #[arg(long, value_name = "N")]
     samples: Option<u64>,
 
@@ -70,7 +70,7 @@ pub(super) struct Arguments {
     #[arg(long, value_name = "CELLS", default_value_t = Settings::default().chunk)]
     chunk: u64,
 
-    /// Only the regime: compute every N-th cell of two grids, then where neighbours differ or inferences fail; `inferred` marks the rest
+    /// Only the regime: compute every N-th cell of two grids, then where neighbours differ; `inferred` marks the rest
     #[arg(long, value_name = "N", num_args = 0..=1, default_missing_value = "16", conflicts_with_all = ["shard", "merge"])]
     adaptive: Option<u64>,
 

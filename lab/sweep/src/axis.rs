@@ -11,8 +11,6 @@ use rand_chacha::{
 
 use vines_model::ArgumentError;
 
-use crate::sobol;
-
 /// The detuning, which belongs to the drive and not to the scene.
 pub const SIGMA: &str = "sigma";
 
@@ -34,12 +32,10 @@ pub enum Values {
     Paired(Vec<f64>),
     /// Independent random numbers from an interval, one per sample.
     Random([f64; 2]),
-    /// A low-discrepancy sequence in an interval, one number per sample.
-    Sobol([f64; 2]),
 }
 
 /// A number of the scene, or [`SIGMA`], with the values it takes. Parse it from `plant.r=0.3:1:71` (first : last : how many),
-/// `plant.r=0.3,0.5,0.8`, `plant.r=paired:0.3,0.5,0.5`, `start.dq2=random:-1:1` or `start.dq2=sobol:-1:1`.
+/// `plant.r=0.3,0.5,0.8`, `plant.r=paired:0.3,0.5,0.5` or `start.dq2=random:-1:1`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Axis {
     /// `section.key` of a scene, or `sigma`.
@@ -79,7 +75,7 @@ impl Axis {
                 list.iter().copied().try_for_each(finite)?;
                 few(name, list.len() as u64, list.first().copied().unwrap_or(f64::NAN))?;
             }
-            Values::Random([from, to]) | Values::Sobol([from, to]) => {
+            Values::Random([from, to]) => {
                 [*from, *to].into_iter().try_for_each(finite)?;
                 if from >= to {
                     return Err(format!("{name} from {from} to {to}: the first must be below the last").into());
@@ -95,7 +91,7 @@ impl Axis {
         match &self.values {
             Values::Grid { points, .. } => Some(*points),
             Values::List(list) => Some(list.len() as u64),
-            Values::Paired(_) | Values::Random(_) | Values::Sobol(_) => None,
+            Values::Paired(_) | Values::Random(_) => None,
         }
     }
 
@@ -151,20 +147,14 @@ fn few(name: &str, points: u64, value: f64) -> Result<(), ArgumentError> {
 pub(crate) struct Sequence {
     values: Values,
     seed: u64,
-    /// Position among the axes of the sequence, and its direction numbers.
+    /// Position among the sampled axes.
     stream: u64,
-    directions: [u32; 32],
 }
 
 impl Sequence {
     /// `sampled`: how many axes before this one have one value per sample.
     pub(crate) fn new(axis: &Axis, seed: u64, sampled: usize) -> Self {
-        Self {
-            values: axis.values.clone(),
-            seed,
-            stream: sampled as u64,
-            directions: sobol::directions(sampled.min(sobol::MOST - 1)),
-        }
+        Self { values: axis.values.clone(), seed, stream: sampled as u64 }
     }
 
     pub(crate) fn at(&self, n: u64) -> f64 {
@@ -179,7 +169,6 @@ impl Sequence {
                 random.set_word_pos(16 * u128::from(n));
                 within(*interval, (random.next_u64() >> 11) as f64 / 2_f64.powi(53))
             }
-            Values::Sobol(interval) => within(*interval, sobol::point(&self.directions, n)),
         }
     }
 }
@@ -193,7 +182,6 @@ impl Display for Axis {
             Values::List(list) => f.write_str(&text(list)),
             Values::Paired(list) => write!(f, "paired:{}", text(list)),
             Values::Random([from, to]) => write!(f, "random:{from}:{to}"),
-            Values::Sobol([from, to]) => write!(f, "sobol:{from}:{to}"),
         }
     }
 }
@@ -202,7 +190,7 @@ impl FromStr for Axis {
     type Err = ArgumentError;
 
     fn from_str(text: &str) -> Result<Self, ArgumentError> {
-        let form = "expected KEY=FIRST:LAST:POINTS, KEY=VALUE,VALUE,..., KEY=paired:VALUE,VALUE,..., KEY=random:FIRST:LAST or KEY=sobol:FIRST:LAST, \
+        let form = "expected KEY=FIRST:LAST:POINTS, KEY=VALUE,VALUE,..., KEY=paired:VALUE,VALUE,... or KEY=random:FIRST:LAST, \
                     for instance plant.r=0.3:1:71";
         let (name, values) = text.split_once('=').ok_or(form)?;
         let number = |text: &str| {
@@ -215,7 +203,6 @@ impl FromStr for Axis {
         let values = match parts[..] {
             ["paired", list] => Values::Paired(listed(list)?),
             ["random", from, to] => Values::Random([number(from)?, number(to)?]),
-            ["sobol", from, to] => Values::Sobol([number(from)?, number(to)?]),
             [from, to, points] => Values::Grid {
                 from: number(from)?,
                 to: number(to)?,

@@ -23,16 +23,16 @@ pub enum StoreError {
     },
     /// The store is of the same sweep, computed by another program.
     #[error(
-        "{} was computed by another build of vines (version and engine {found}, here {here}), and results of both must not be mixed. \
-         It stays as it is; continue it with the build that began it, or write to another folder",
+        "{} was computed by another version of vines ({found}, here {here}), and results of both must not be mixed. \
+         It stays as it is; continue it with the version that began it, or write to another folder",
         folder.display()
     )]
     Build {
         /// The folder.
         folder: PathBuf,
-        /// Version and engine of the store.
+        /// Version of the store.
         found: String,
-        /// Those of this program.
+        /// Version of this program.
         here: String,
     },
     /// Chunks without the file that says to which sweep they belong.

@@ -8,8 +8,6 @@
 mod adaptive;
 mod axis;
 mod cell;
-mod doubt;
-mod engine;
 mod error;
 mod folder;
 mod gzip;
@@ -17,7 +15,6 @@ mod monitor;
 mod plan;
 mod run;
 mod settings;
-mod sobol;
 mod store;
 mod variables;
 

@@ -7,7 +7,6 @@ use vines_testbench::scene::{Family, Scene};
 use crate::{
     axis::{Axis, SIGMA, Sequence},
     cell::{Cell, compute},
-    engine::engine,
     settings::{PlanError, SAMPLE, Settings, dimensions},
     variables::variables,
 };
@@ -20,7 +19,6 @@ pub struct Plan {
     sequences: Vec<Sequence>,
     scene: Scene,
     sigma: f64,
-    engine: String,
     /// Names of the dimensions, their lengths, and those of a chunk.
     pub(crate) dimensions: Vec<String>,
     pub(crate) shape: Vec<u64>,
@@ -67,14 +65,12 @@ impl Plan {
         } else {
             settings.sigma.unwrap_or_else(resonant)
         };
-        let engine = engine(settings.results)?;
         Ok(Self {
             family,
             settings,
             sequences,
             scene,
             sigma,
-            engine,
             dimensions,
             shape,
             chunk,
@@ -204,7 +200,6 @@ impl Plan {
         let scene = serde_json::to_value(&self.scene).unwrap_or_default();
         json!({
             "version": env!("CARGO_PKG_VERSION"),
-            "engine": self.engine,
             "scene": scene,
             "sigma": self.settings.axes.iter().all(|axis| axis.name != SIGMA).then_some(self.sigma),
             "axes": axes,

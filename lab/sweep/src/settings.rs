@@ -5,7 +5,6 @@ use vines_testbench::scene::SceneError;
 use crate::{
     axis::{Axis, SIGMA},
     cell::Results,
-    sobol,
 };
 
 /// Settings of a sweep besides its scene.
@@ -15,7 +14,7 @@ pub struct Settings {
     pub axes: Vec<Axis>,
     /// Detuning, if it is not an axis. Without it: that of the scene's stable phase-resonant orbit, or 0.
     pub sigma: Option<f64>,
-    /// Number of samples of random and Sobol axes; paired values have their own.
+    /// Number of samples of random axes; paired values have their own.
     pub samples: Option<u64>,
     /// Seed of random axes.
     pub seed: u64,
@@ -121,10 +120,10 @@ const ADAPTIVE: u64 = 1_000_000_000;
 const CHUNK: u64 = 1_000_000;
 /// Most cells: their number must be countable in the metadata of the store.
 const MOST: u64 = 1 << 53;
-/// Number of points of a Sobol sequence.
-const SOBOL: u64 = 1 << 32;
+/// Most samples.
+const SAMPLES: u64 = 1 << 32;
 
-/// The dimension that paired, random and Sobol axes share.
+/// The dimension that paired and random axes share.
 pub(crate) const SAMPLE: &str = "sample";
 
 /// Names and lengths of the dimensions.
@@ -158,24 +157,17 @@ pub(crate) fn dimensions(settings: &Settings) -> Result<(Vec<String>, Vec<u64>),
     }
     match samples {
         None if sampled > 0 => {
-            return refused("random and Sobol axes need a number of samples (--samples N, in Python samples=N)".into());
+            return refused("random axes need a number of samples (--samples N, in Python samples=N)".into());
         }
-        Some(_) if sampled == 0 => return refused("a number of samples needs a random or Sobol axis".into()),
-        Some(samples) if !(2..=SOBOL).contains(&samples) => {
-            return refused(format!("{samples} samples: from 2 to {SOBOL} are allowed"));
+        Some(_) if sampled == 0 => return refused("a number of samples needs a random axis".into()),
+        Some(samples) if !(2..=SAMPLES).contains(&samples) => {
+            return refused(format!("{samples} samples: from 2 to {SAMPLES} are allowed"));
         }
         Some(samples) => {
             names.push(SAMPLE.into());
             shape.push(samples);
         }
         None => {}
-    }
-    let drawn = sampled - settings.axes.iter().filter_map(Axis::paired).count();
-    if drawn > sobol::MOST {
-        return refused(format!(
-            "{drawn} random and Sobol axes: at most {} are allowed",
-            sobol::MOST
-        ));
     }
     let cells = shape
         .iter()

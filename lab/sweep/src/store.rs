@@ -62,7 +62,7 @@ enum Repair {
 /// The file of the group. It is written last: where it is, the metadata is complete.
 const GROUP: &str = "zarr.json";
 /// What differs in the metadata if only the program does.
-const BUILD: [&str; 2] = ["version", "engine"];
+const VERSION: &str = "version";
 
 type Failed = Box<dyn std::error::Error + Send + Sync>;
 
@@ -204,10 +204,10 @@ impl Store {
         let folder = self.root.clone();
         match &differs[..] {
             [] => Ok(()),
-            some if some.iter().all(|key| BUILD.contains(key)) => {
+            [VERSION] => {
                 let of = |from: &Map<String, Value>| {
-                    let text = |key: &&str| from.get(*key).and_then(Value::as_str).unwrap_or("unknown").to_string();
-                    BUILD.iter().map(text).collect::<Vec<_>>().join(" ")
+                    let version = from.get(VERSION).and_then(Value::as_str);
+                    version.unwrap_or("unknown").to_string()
                 };
                 Err(StoreError::Build { folder, found: of(found), here: of(&here) })
             }

@@ -11,8 +11,9 @@ use lovines::{Drive, Event, InvalidValue, Plant, State};
 use serde::Serialize;
 
 use crate::Dimensionless;
-use crate::orbit::{Disturbance, Driven, Moment, Periodic, Symmetric};
-use crate::regime::{Impact, Regime};
+use crate::numerics::{mean, standard_deviation};
+use crate::orbit::{Disturbance, Driven, Moment};
+use crate::regime::{Impact, Regime, synchrony};
 
 /// Result at one point.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -73,12 +74,6 @@ pub struct Run {
     pub(super) impacts: Vec<Impact>,
     /// Phases of the base at which the particle came to rest, rad.
     sticks: Vec<f64>,
-    /// The exact motion close to the present state, if it was looked for.
-    pub(super) periodic: OnceCell<Option<Periodic>>,
-    /// Numbers of half periods after which the motion may repeat itself, if they were looked for.
-    pub(super) repetitions: OnceCell<Vec<usize>>,
-    /// The stable symmetric 1:1 orbit, if it was looked for.
-    pub(super) symmetric: OnceCell<Option<Symmetric>>,
     stop: Arc<AtomicBool>,
 }
 
@@ -108,9 +103,6 @@ impl Run {
             growth: Vec::new(),
             impacts: Vec::with_capacity(EXPECTED),
             sticks: Vec::new(),
-            periodic: OnceCell::new(),
-            repetitions: OnceCell::new(),
-            symmetric: OnceCell::new(),
             stop: Arc::default(),
         })
     }
@@ -179,8 +171,6 @@ impl Run {
         moments.push(driven.moment(end, self.plant.state(), self.plant.contact()));
         let State { q1, dq1, q2, dq2 } = self.plant.state();
         self.periods = periods;
-        self.periodic.take();
-        self.repetitions.take();
         self.states.resize_with(2 * periods, OnceCell::new);
         self.states.push(OnceCell::from([q1, dq1, q2, dq2]));
         Ok(())
@@ -206,5 +196,47 @@ impl Run {
         }
         self.passed = self.moments.len() - 1;
         &self.growth[from..]
+    }
+
+    /// Distance between the state at half period `n` and the one `count` half periods earlier, or its mirror image.
+    pub(super) fn distance(&self, n: usize, count: usize) -> f64 {
+        let sign = if count % 2 == 1 { -1.0 } else { 1.0 };
+        let (now, then) = (self.state(n), self.state(n - count));
+        let differences = now.iter().zip(then).map(|(a, b)| (sign * a - b).abs());
+        // Nothing is near a value that cannot be computed: the steady response at an undamped resonance.
+        differences.fold(0.0, |largest, one| if one <= largest { largest } else { one })
+    }
+
+    /// Largest Lyapunov exponent per period from half period `from` on, and its standard error by batch means: as many batches as each
+    /// has periods.
+    pub(super) fn exponent(&mut self, from: usize) -> (f64, f64) {
+        let growth = self.growth(from / 2);
+        let length = ((growth.len() as f64).sqrt() as usize).max(1);
+        let batches: Vec<f64> = growth
+            .chunks_exact(length)
+            .map(|batch| mean(batch.iter().copied()))
+            .collect();
+        let error = standard_deviation(&batches) / (batches.len() as f64).sqrt();
+        (mean(batches.iter().copied()), error)
+    }
+
+    /// What all regimes have, over the half periods from `from` on.
+    pub(super) fn point(&self, regime: Regime, from: usize) -> Point {
+        let periods = 0.5 * (self.halves() - from) as f64;
+        let [[before, rested], [all, rests]] = [self.counts(from), self.counts(self.halves())];
+        Point {
+            regime,
+            followed: self.halves() / 2,
+            transient: 0.5 * from as f64,
+            recurrence: None,
+            exponent: None,
+            exponent_error: None,
+            synchrony: synchrony(&self.impacts[before..]),
+            impacts_per_period: (all - before) as f64 / periods,
+            impacts: 0,
+            periods: 0,
+            sticks_per_period: (rests - rested) as f64 / periods,
+            state: self.state(self.halves()),
+        }
     }
 }

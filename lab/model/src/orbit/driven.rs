@@ -10,7 +10,6 @@ use std::f64::consts::TAU;
 use lovines::{Event, State, Wall};
 use nalgebra::{Complex, Matrix2, Vector2};
 
-use super::bounce::Bounce;
 use super::oscillator::{Oscillator, rough_sin_cos};
 use crate::Dimensionless;
 
@@ -74,17 +73,6 @@ const FAST: f64 = 1e-3;
 impl Moment {
     fn is_fast(&self) -> bool {
         self.velocity.abs() > FAST
-    }
-
-    /// The state after an impact, if it is one.
-    pub(super) fn bounce(&self) -> Option<Bounce> {
-        (self.velocity != 0.0).then(|| Bounce {
-            phase: self.phase,
-            q1: self.primary[0],
-            dq1: self.primary[1],
-            dq2: self.particle[1],
-            wall: self.velocity.signum(),
-        })
     }
 }
 

@@ -61,12 +61,7 @@ pub fn symmetric_orbits(scene: &Dimensionless, sigma: f64) -> Vec<Orbit> {
     driven(scene, sigma).collect()
 }
 
-/// The stable one of [`symmetric_orbits`], the one with the larger B.
-pub(super) fn stable_symmetric(scene: &Dimensionless, sigma: f64) -> Option<Orbit> {
-    driven(scene, sigma).rev().find(|orbit| orbit.stable)
-}
-
-fn driven(scene: &Dimensionless, sigma: f64) -> impl DoubleEndedIterator<Item = Orbit> {
+fn driven(scene: &Dimensionless, sigma: f64) -> impl Iterator<Item = Orbit> {
     Family::new(scene, 1.0 + scene.epsilon * sigma)
         .and_then(|family| family.driven(scene.g))
         .into_iter()
