@@ -1,7 +1,7 @@
 //! How far does each stage of the measurement chain move the lock?
 //!
-//! Each stage alone, and some together: mean detuning and response over 200 periods after 600, less those of the ideal chain; standard
-//! deviation of the frequency from period to period (wander); and why the controller switched the drive off, if it did.
+//! Each stage alone, and some together: sigma and C of the lock less those of the ideal chain, the stated standard uncertainty of sigma,
+//! or why there is no lock.
 //!
 //! ```sh
 //! cargo run --release -p vines-testbench --example chain -- [KEY=VALUE ...]    # of the scene; writes validation/chain.csv
@@ -9,13 +9,10 @@
 
 mod common;
 
-use std::f64::consts::TAU;
-
 use common::{Failure, arguments, scene, write};
-use vines_model::numerics::{mean, standard_deviation};
-use vines_testbench::experiment::Sample;
-use vines_testbench::identification::Cycle;
-use vines_testbench::rig::{BuiltIn, Controller, Fault, Simulated};
+use vines_testbench::experiment::{ExperimentError, Plan, run};
+use vines_testbench::identification::{Measured, identify};
+use vines_testbench::rig::{BuiltIn, Simulated};
 
 /// Settings of `[chain]`; the first is the ideal chain.
 const STAGES: [&str; 18] = [
@@ -38,54 +35,41 @@ const STAGES: [&str; 18] = [
     "jitter=0.01",
     "adc_bits=16 dac_bits=16 hold=true delay=1 reference=false",
 ];
-/// Periods before the measurement, and measured.
-const SETTLE: usize = 600;
-const LOOK: usize = 200;
 
-/// Detuning, response over b, wander, and the reason, if the drive is off.
-fn effect(stage: &str) -> Result<([f64; 3], Option<Fault>), Failure> {
+/// The lock behind a stage, held for 200 periods.
+fn lock(stage: &str) -> Result<Measured, Failure> {
     let stage = stage.split_whitespace().map(|one| format!("chain.{one}"));
-    let scene = scene("", &arguments().into_iter().chain(stage).collect::<Vec<_>>())?;
-    let (d, step) = (scene.dimensionless(), scene.sample_time());
-    let mut rig = Simulated::of(&scene)?;
+    let hold = "record.hold_periods=200".into();
+    let scene = scene(
+        "",
+        &arguments().into_iter().chain(stage).chain([hold]).collect::<Vec<_>>(),
+    )?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let mut sample = || -> Result<Sample, Failure> {
-        let sensors = rig.sense()?;
-        let command = controller.sample(sensors, true)?;
-        rig.advance(command.drive, step)?;
-        Ok(Sample { time: 0.0, sensors, command, ground_truth: None })
-    };
-    for _ in 0..SETTLE * scene.controller.samples_per_period as usize {
-        sample()?;
-    }
-    let (mut turns, mut samples) = (0.0, Vec::new());
-    while turns < LOOK as f64 + 0.5 {
-        let last = sample()?;
-        turns += last.command.drive.omega * step / TAU;
-        samples.push(last);
-    }
-    let cycles = &Cycle::all(&samples, step, 0.0)[..LOOK];
-    let omegas: Vec<f64> = cycles.iter().map(|cycle| cycle.omega).collect();
-    let sigma = d.sigma(mean(omegas.iter().copied()));
-    let wander = standard_deviation(&omegas) / d.omega_change(1.0);
-    let c = mean(cycles.iter().map(Cycle::amplitude)) / d.b;
-    Ok(([sigma, c, wander], samples[samples.len() - 1].command.fault))
+    let record = run(
+        &mut *Simulated::of(&scene)?,
+        &mut controller,
+        &Plan::of(&scene),
+        |_, _, _| {},
+    );
+    let record = record.map_err(|error| match error {
+        ExperimentError::Tripped { fault, .. } => fault.text().into(),
+        other => other.to_string(),
+    })?;
+    Ok(identify(&record, &scene)?.lock.at)
 }
 
 fn main() -> Result<(), Failure> {
-    let (ideal, _) = effect(STAGES[0])?;
-    let row = |stage: &&str| -> Result<String, Failure> {
-        let ([sigma, c, wander], fault) = effect(stage)?;
-        let [sigma, c] = [sigma - ideal[0], c - ideal[1]];
-        let reason = fault.map_or("", Fault::text).replace(',', ";");
+    let ideal = lock(STAGES[0])?;
+    let row = |stage: &&str| {
         let name = if stage.is_empty() { "ideal" } else { stage };
-        Ok(format!("{name},{sigma:.1e},{c:.1e},{wander:.0e},{reason}"))
+        match lock(stage) {
+            Ok(at) => {
+                let [sigma, c] = [at.sigma - ideal.sigma, at.c - ideal.c];
+                format!("{name},{sigma:.1e},{c:.1e},{:.0e},", at.u_sigma)
+            }
+            Err(error) => format!("{name},,,,{}", error.to_string().replace(',', ";")),
+        }
     };
-    let rows = STAGES.iter().map(row).collect::<Result<Vec<_>, _>>()?;
-    write(
-        "chain",
-        "stage,sigma_moves,C_moves,sigma_wanders,switched_off",
-        1,
-        &rows,
-    )
+    let rows: Vec<String> = STAGES.iter().map(row).collect();
+    write("chain", "stage,sigma_moves,C_moves,u_sigma,no_lock", 1, &rows)
 }

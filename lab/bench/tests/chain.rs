@@ -1,7 +1,8 @@
 //! Guards the stages of the measurement chain between rig and controller, and how far they move the lock; `studies/chain.rs` takes all stages.
 
-use vines_model::numerics::mean;
-use vines_testbench::rig::{BuiltIn, Chain, Command, Controller, Drive, Rig, RigError, Sensors, Simulated};
+use vines_testbench::experiment::{self, ExperimentError, Plan};
+use vines_testbench::identification::{Measured, identify};
+use vines_testbench::rig::{BuiltIn, Chain, Drive, Rig, RigError, Sensors, Simulated};
 use vines_testbench::scene::{Override, Scene};
 
 fn scene(settings: &[&str]) -> Scene {
@@ -10,24 +11,13 @@ fn scene(settings: &[&str]) -> Scene {
     Scene::parse("dimensionless.toml", text, &overrides).unwrap()
 }
 
-/// The last of 800 periods, and its 200 before: sigma and the RMS of the response over b.
-fn at(settings: &[&str]) -> ([f64; 2], Command) {
-    let scene = scene(settings);
-    let (d, step) = (scene.dimensionless(), scene.sample_time());
-    let mut rig = Simulated::of(&scene).unwrap();
+/// The lock behind the chain of a scene, held for 200 periods.
+fn at(settings: &[&str]) -> Result<Measured, ExperimentError> {
+    let scene = scene(&[settings, &["record.hold_periods=200"]].concat());
     let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    let samples: Vec<(f64, Command)> = (0..80_000)
-        .map(|_| {
-            let response = rig.sense().unwrap();
-            let command = controller.sample(response, true).unwrap();
-            rig.advance(command.drive, step).unwrap();
-            (response.response, command)
-        })
-        .collect();
-    let last = &samples[60_000..];
-    let sigma = d.sigma(mean(last.iter().map(|(_, command)| command.drive.omega)));
-    let rms = mean(last.iter().map(|(response, _)| response * response)).sqrt() / d.b;
-    ([sigma, rms], samples[samples.len() - 1].1)
+    let mut rig = Simulated::of(&scene).unwrap();
+    let record = experiment::run(&mut *rig, &mut controller, &Plan::of(&scene), |_, _, _| {})?;
+    Ok(identify(&record, &scene).unwrap().lock.at)
 }
 
 fn chained(rig: impl Rig + 'static, scene: &Scene) -> Chain {
@@ -36,31 +26,27 @@ fn chained(rig: impl Rig + 'static, scene: &Scene) -> Chain {
 
 #[test]
 fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most() {
-    let ([sigma, rms], _) = at(&[]);
-    let ([real, real_rms], _) = at(&[
+    let ideal = at(&[]).unwrap();
+    let real = at(&[
         "chain.adc_bits=16",
         "chain.dac_bits=16",
         "chain.hold=true",
         "chain.delay=1",
         "chain.reference=false",
-    ]);
-    println!(
-        "sigma moves by {:.1e}, the RMS of the response by {:.1e} b",
-        real - sigma,
-        real_rms - rms
-    );
-    assert!((real - sigma).abs() <= 2e-3);
-    // An RMS is the amplitude over the root of two.
-    assert!((real_rms - rms).abs() <= 2e-3 / 2_f64.sqrt());
+    ])
+    .unwrap();
+    println!("sigma moves by {:.1e}", real.sigma - ideal.sigma);
+    assert!((real.sigma - ideal.sigma).abs() <= 2e-3);
+    assert!((real.c - ideal.c).abs() <= 2e-3);
 }
 
 #[test]
 fn a_delay_that_nobody_compensates_is_seen_and_one_common_to_both_sensors_is_not() {
-    let ([ideal, _], _) = at(&[]);
-    let ([late, _], _) = at(&["chain.delay=1", "chain.reference=false", "chain.compensate=false"]);
-    assert!((late - ideal + 0.078).abs() < 0.005);
-    let ([both, _], _) = at(&["chain.delay=1"]);
-    assert!((both - ideal).abs() < 1e-6);
+    let ideal = at(&[]).unwrap();
+    let late = at(&["chain.delay=1", "chain.reference=false", "chain.compensate=false"]).unwrap();
+    assert!((late.sigma - ideal.sigma + 0.078).abs() < 0.005);
+    let both = at(&["chain.delay=1"]).unwrap();
+    assert!((both.sigma - ideal.sigma).abs() < 1e-6);
 }
 
 #[test]
@@ -126,8 +112,7 @@ fn settings_that_make_no_sense_are_refused_by_name() {
 
 #[test]
 fn a_response_within_one_step_of_its_converter_switches_the_drive_off() {
-    let (_, coarse) = at(&["chain.adc_bits=6"]);
-    assert!(coarse.fault.is_some());
-    let (_, fine) = at(&["chain.adc_bits=16"]);
-    assert_eq!(fine.fault, None);
+    let coarse = at(&["chain.adc_bits=6"]).unwrap_err();
+    assert!(matches!(coarse, ExperimentError::Tripped { .. }), "{coarse}");
+    at(&["chain.adc_bits=16"]).unwrap();
 }

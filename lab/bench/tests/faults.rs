@@ -134,84 +134,65 @@ fn a_held_drive_that_does_not_reach_the_rig_is_found() {
     assert!(ended && zero.is_some_and(|time| time < 0.06), "{zero:?}");
 }
 
-/// What fails outside the rig, and when, in samples.
-#[derive(Debug, Clone, Copy, PartialEq)]
-enum Outside {
-    RigNotHeard,
-    Panic,
-    ControllerLost,
-    ControllerNan,
-}
-
-/// A rig or a controller that fails at a sample; as a rig it keeps the last drive.
-struct Failing<T> {
-    inner: T,
-    kind: Outside,
+/// A rig that fails outside at a sample; it keeps the amplitude of the last drive, m.
+struct Lost {
+    rig: Simulated,
     left: usize,
-    last: Rc<Cell<f64>>,
+    fails: fn() -> Result<(), RigError>,
+    last: f64,
 }
 
-impl<T> Failing<T> {
-    fn begins(&mut self, kind: Outside) -> bool {
-        self.left = self.left.saturating_sub(1);
-        self.left == 0 && self.kind == kind
-    }
-}
-
-impl Rig for Failing<Simulated> {
+impl Rig for Lost {
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        if self.begins(Outside::RigNotHeard) {
-            return Err(RigError::Failed("the connection is lost".into()));
+        self.left = self.left.saturating_sub(1);
+        if self.left == 0 {
+            (self.fails)()?;
         }
-        assert!(self.left > 0 || self.kind != Outside::Panic, "injected");
-        self.inner.sense()
+        self.rig.sense()
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.last.set(drive.amplitude);
-        self.inner.advance(drive, step)
+        self.last = drive.amplitude;
+        self.rig.advance(drive, step)
     }
 }
 
-impl Controller for Failing<BuiltIn> {
+/// A controller that fails at a sample.
+struct Broken(BuiltIn, usize, fn(Command) -> Result<Command, ControllerError>);
+
+impl Controller for Broken {
     fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
-        let mut command = self.inner.sample(sensors, active)?;
-        if self.begins(Outside::ControllerLost) {
-            return Err(ControllerError::Failed("the connection is lost".into()));
-        }
-        if self.left == 0 && self.kind == Outside::ControllerNan {
-            command.drive.amplitude = f64::NAN;
-        }
-        Ok(command)
+        self.1 = self.1.saturating_sub(1);
+        let command = self.0.sample(sensors, active)?;
+        if self.1 == 0 { (self.2)(command) } else { Ok(command) }
     }
 }
 
 #[test]
 fn the_drive_is_zero_at_once_when_rig_or_controller_is_lost_or_the_lab_panics() {
     let scene = scene(&[]);
-    for kind in [
-        Outside::RigNotHeard,
-        Outside::Panic,
-        Outside::ControllerLost,
-        Outside::ControllerNan,
-    ] {
-        let last = Rc::new(Cell::new(f64::NAN));
+    let ends = |fails: fn() -> Result<(), RigError>, breaks: fn(Command) -> Result<Command, ControllerError>| {
         let plant = Simulated::new(scene.plant, scene.start).unwrap();
-        let mut rig = Failing { inner: plant, kind, left: 2000, last: Rc::clone(&last) };
-        let inner = BuiltIn::new(&scene.controller_config()).unwrap();
-        let mut controller = Failing { inner, kind, left: 2000, last: Rc::clone(&last) };
-        let ended = catch_unwind(AssertUnwindSafe(|| {
-            experiment::run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {})
-        }));
-        let is_error = match &ended {
-            Err(_) => kind == Outside::Panic,
-            Ok(Err(ExperimentError::NotANumber(_))) => kind == Outside::ControllerNan,
-            Ok(ended) => ended.is_err(),
-        };
-        assert!(
-            is_error && last.get() == 0.0,
-            "{kind:?}: the last drive is {} m",
-            last.get()
-        );
-    }
+        let mut rig = Lost { rig: plant, left: 2000, fails, last: f64::NAN };
+        let mut controller = Broken(BuiltIn::new(&scene.controller_config()).unwrap(), 2000, breaks);
+        let run = || experiment::run(&mut rig, &mut controller, &Plan::of(&scene), |_, _, _| {});
+        let ended = catch_unwind(AssertUnwindSafe(run));
+        assert_eq!(rig.last, 0.0);
+        ended
+    };
+    let ended = ends(|| Err(RigError::Failed("the connection is lost".into())), Ok);
+    assert!(matches!(ended, Ok(Err(ExperimentError::Rig(_)))));
+    assert!(ends(|| panic!("injected"), Ok).is_err());
+    let ended = ends(
+        || Ok(()),
+        |_| Err(ControllerError::Failed("the connection is lost".into())),
+    );
+    assert!(matches!(ended, Ok(Err(ExperimentError::Controller(_)))));
+    let nan = |command: Command| {
+        Ok(Command {
+            drive: Drive { amplitude: f64::NAN, ..command.drive },
+            ..command
+        })
+    };
+    assert!(matches!(ends(|| Ok(()), nan), Ok(Err(ExperimentError::NotANumber(_)))));
 }
