@@ -5,14 +5,15 @@
 //! per rig: share of the settled values within 2 u, largest error in u, median and largest error of sigma or G at equal C, periods a point.
 //!
 //! ```sh
-//! cargo run --release --example off_scene -- RIGS SEED SNR SHIFT    # SNR: dB, or none; SHIFT: none, or a random combination
+//! cargo run --release -p vines-testbench --example off_scene -- RIGS SEED SNR SHIFT    # SNR: dB, or none; SHIFT: none, or random
 //! ```
+//!
+//! It writes validation/tracking.csv.
 
-use std::sync::Mutex;
+mod common;
 
+use common::{Failure, Found, STATISTICS, arguments, quantile, scene, statistics, uniform, write};
 use lovines::Parameters;
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 use vines_model::Dimensionless;
 use vines_testbench::{
@@ -21,111 +22,37 @@ use vines_testbench::{
     comparison::ExactCurve,
     identification::Regime,
     rig::{BuiltIn, Chain, SensorsOnly, Simulated},
-    scene::{LinearResponse, Override, Scene},
+    scene::LinearResponse,
 };
 
-type Failure = Box<dyn std::error::Error + Send + Sync>;
-
-/// Errors over their uncertainties and errors at equal C of the settled points, points, and periods.
-struct Found {
-    name: String,
-    ratios: Vec<f64>,
-    errors: Vec<f64>,
-    points: usize,
-    settled: usize,
-    periods: f64,
-    message: Option<String>,
-}
-
 fn main() -> Result<(), Failure> {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
-    let [count, seed, snr, shift] = &arguments[..] else {
+    let [count, seed, snr, shift] = &arguments()[..] else {
         return Err("arguments: RIGS SEED SNR|none none|random".into());
     };
-    let mut random = ChaCha8Rng::seed_from_u64(seed.parse()?);
-    let mut uniform = move |low: f64, high: f64| low + (high - low) * (random.next_u64() as f64 / u64::MAX as f64);
+    let mut uniform = uniform(seed.parse()?);
     let mut rigs = Vec::new();
     for _ in 0..count.parse::<usize>()? {
         let epsilon = uniform(1e-3_f64.ln(), 0.02_f64.ln()).exp();
         let (lambda, r) = (uniform(0.7, 2.5), uniform(0.5, 0.8));
         let noise = uniform(0.0, 1e6);
         let scales = [0.01, 0.3, 0.2, 0.1, 0.2].map(|range| uniform(-range, range));
+        let scales = if shift == "none" { [0.0; 5] } else { scales };
         rigs.push(([epsilon, lambda, r], noise as u64, scales));
     }
-    let lines = Mutex::new(());
-    let found: Vec<Found> = rigs
-        .par_iter()
-        .map(|(rig, noise, scales)| {
-            let scales = if shift == "none" { [0.0; 5] } else { *scales };
-            let found = run(*rig, *noise, snr, scales).unwrap_or_else(|error| failed(*rig, &error));
-            let _lock = lines.lock();
-            println!("{}", line(&found));
-            found
+    let one = |(rig, noise, scales): &([f64; 3], u64, [f64; 5])| {
+        run(*rig, *noise, snr, *scales).unwrap_or_else(|error| {
+            println!("{rig:.4?}: {error}");
+            Found { counts: [0, 0, 1, 0], ..Found::default() }
         })
-        .collect();
-    let gather = |values: fn(&Found) -> &Vec<f64>| {
-        found
-            .iter()
-            .flat_map(|one| values(one).iter().copied())
-            .collect::<Vec<f64>>()
     };
-    let (ratios, errors) = (gather(|one| &one.ratios), gather(|one| &one.errors));
-    let share = |limit: f64| ratios.iter().filter(|ratio| **ratio <= limit).count() as f64 / ratios.len() as f64;
-    let periods: Vec<f64> = found
-        .iter()
-        .filter(|one| one.points > 0)
-        .map(|one| one.periods / one.points as f64)
-        .collect();
-    let count = |value: fn(&Found) -> usize| found.iter().map(value).sum::<usize>();
-    let failures = found.iter().filter(|one| one.message.is_some()).count();
-    println!(
-        "rigs,seed,snr_dB,scene,points,settled,within_1.96u,within_2u,worst_u,median_error,worst_error,median_periods,worst_periods,ended_early"
-    );
-    println!(
-        "{},{seed},{snr},{},{},{},{:.4},{:.4},{:.1},{:.1e},{:.1e},{:.1},{:.1},{failures}",
-        found.len(),
-        if shift == "none" { "the rig" } else { "another" },
-        count(|one| one.points),
-        count(|one| one.settled),
-        share(1.96),
-        share(2.0),
-        largest(&ratios),
-        median(&errors),
-        largest(&errors),
-        median(&periods),
-        largest(&periods),
-    );
-    Ok(())
+    let (text, [points, settled, ended, _]) = statistics(&rigs.par_iter().map(one).collect::<Vec<_>>());
+    let which = if shift == "none" { "the rig" } else { "another" };
+    let row = format!("{count},{seed},{snr},{which},{points},{settled},{text},{ended}");
+    let header = format!("rigs,seed,snr_dB,scene,points,settled,{STATISTICS},ended_early");
+    write("tracking", &header, 4, &[row])
 }
 
-fn failed(rig: [f64; 3], error: &Failure) -> Found {
-    Found {
-        name: format!("{rig:.4?}"),
-        ratios: vec![],
-        errors: vec![],
-        points: 0,
-        settled: 0,
-        periods: 0.0,
-        message: Some(error.to_string()),
-    }
-}
-
-fn line(one: &Found) -> String {
-    let within = one.ratios.iter().filter(|ratio| **ratio <= 2.0).count() as f64 / one.ratios.len() as f64;
-    format!(
-        "{}: {:.2} within 2 u, worst {:.1} u; median {:.1e}, worst {:.1e}; {:.1} periods a point; {} of {} settled {}",
-        one.name,
-        within,
-        largest(&one.ratios),
-        median(&one.errors),
-        largest(&one.errors),
-        one.periods / one.points as f64,
-        one.settled,
-        one.points,
-        one.message.as_deref().unwrap_or(""),
-    )
-}
-
+/// Counts the points, the settled ones, and whether tracking ended early.
 fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, [k, c, m, b, dr]: [f64; 5]) -> Result<Found, Failure> {
     let d = Dimensionless::new(epsilon, lambda, r, 0.0);
     let [low, high] = advice::stable_range(&d).ok_or("no stable orbit")?;
@@ -159,15 +86,8 @@ fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, [k, c, m, b, dr]: 
         format!("backbone.C_to={:?}", to / width),
         "backbone.G_max=20".into(),
     ];
-    let mut settings: Vec<String> = settings.into();
-    if snr != "none" {
-        settings.extend([format!("chain.snr={snr}"), format!("chain.seed={noise}")]);
-    }
-    let overrides = settings
-        .iter()
-        .map(|one| one.parse())
-        .collect::<Result<Vec<Override>, _>>()?;
-    let mut scene = Scene::parse("off scene", "[plant]\n[start]\n[excitation]\n", &overrides)?;
+    let chain = [format!("chain.snr={snr}"), format!("chain.seed={noise}")];
+    let mut scene = scene("[plant]\n[start]\n[excitation]\n", &[&settings[..], &chain].concat())?;
     scene.measured = Some(LinearResponse {
         omega0: 1.0,
         damping_rate: 0.5 * epsilon * lambda,
@@ -197,38 +117,19 @@ fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, [k, c, m, b, dr]: 
         let Some([exact_sigma, exact_g]) = curve.at(c) else {
             continue;
         };
-        if std::env::var_os("POINTS").is_some() {
-            println!(
-                "C {c:.3}: sigma {:+.1e} ({:.1e}), G {:+.1e} ({:.1e}), {:.0} periods, {} averaged, {:?}",
-                sigma - exact_sigma,
-                u_sigma,
-                g - exact_g,
-                u_g,
-                point.periods,
-                point.averaged,
-                point.regime
-            );
-        }
         ratios.extend([(sigma - exact_sigma).abs() / u_sigma, (g - exact_g).abs() / u_g]);
         errors.push((sigma - exact_sigma).abs().max((g - exact_g).abs()));
     }
+    let count = tracked.points.len();
+    let why = tracked.ended.as_ref().map_or_else(String::new, ToString::to_string);
+    println!(
+        "epsilon {epsilon:.4} lambda {lambda:.2} r {r:.2}: worst {:.1} u {why}",
+        quantile(&ratios, 1.0)
+    );
     Ok(Found {
-        name: format!("epsilon {epsilon:.4} lambda {lambda:.2} r {r:.2} G {g:.2} C {from:.2} to {to:.2}"),
         ratios,
         errors,
-        points: tracked.points.len(),
-        settled,
-        periods: tracked.periods,
-        message: tracked.ended.map(|error| error.to_string()),
+        periods: (count > 0).then(|| tracked.periods / count as f64),
+        counts: [count, settled, usize::from(tracked.ended.is_some()), 0],
     })
-}
-
-fn largest(values: &[f64]) -> f64 {
-    values.iter().copied().fold(0.0, f64::max)
-}
-
-fn median(values: &[f64]) -> f64 {
-    let mut sorted = values.to_vec();
-    sorted.sort_by(f64::total_cmp);
-    sorted.get(sorted.len() / 2).copied().unwrap_or(f64::NAN)
 }

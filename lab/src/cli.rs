@@ -1,15 +1,11 @@
 //! The command line: one file per command.
 
 mod backbone;
-mod calibrate;
-mod chain;
 mod check;
 mod controller;
-mod decay;
 mod endpoint;
 mod experiment;
 mod failure;
-mod faults;
 mod identify;
 mod interrupt;
 mod map;
@@ -19,7 +15,6 @@ mod pack;
 mod real_time;
 mod report;
 mod rig;
-mod rigs;
 mod scene_arguments;
 mod serving;
 #[cfg(feature = "sweep")]
@@ -39,7 +34,6 @@ const EXAMPLES: &str = "\
 Examples:
   vines identify                               the whole experiment on the default scene, results in out/
   vines backbone                               the backbone level by level, with the loop closed
-  vines calibrate                              the coverage of the uncertainties over 504 noisy runs
   vines orbit                                  exact orbits of the default scene
   vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
   vines orbit --response                       the exact frequency response, stable and unstable
@@ -64,11 +58,7 @@ struct Cli {
 enum Command {
     Identify(identify::Arguments),
     Backbone(backbone::Arguments),
-    Calibrate(calibrate::Arguments),
-    Chain(chain::Arguments),
     Check(check::Arguments),
-    Decay(decay::Arguments),
-    Faults(faults::Arguments),
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
     Map(map::Arguments),
@@ -76,7 +66,6 @@ enum Command {
     Report(report::Arguments),
     Pack(pack::Arguments),
     Rig(rig::Arguments),
-    Rigs(rigs::Arguments),
     Controller(controller::Arguments),
 }
 
@@ -86,11 +75,7 @@ pub fn run() -> ExitCode {
     let output = match Cli::parse().command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Backbone(arguments) => backbone::run(&arguments),
-        Command::Calibrate(arguments) => calibrate::run(&arguments),
-        Command::Chain(arguments) => chain::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
-        Command::Decay(arguments) => decay::run(&arguments),
-        Command::Faults(arguments) => faults::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),
         Command::Map(arguments) => map::run(&arguments),
@@ -98,7 +83,6 @@ pub fn run() -> ExitCode {
         Command::Report(arguments) => report::run(&arguments),
         Command::Pack(arguments) => pack::run(&arguments),
         Command::Rig(arguments) => rig::run(&arguments),
-        Command::Rigs(arguments) => rigs::run(&arguments),
         Command::Controller(arguments) => controller::run(&arguments),
     };
     match output.and_then(|text| print(&text)) {

@@ -12,10 +12,7 @@ mod table;
 mod theme;
 
 pub use figure::FigureError;
-pub use files::{
-    ReportError, decay_csv, map_csv, write, write_calibration, write_interrupted, write_lateness, write_map,
-    write_tracked,
-};
+pub use files::{ReportError, decay_csv, map_csv, write, write_interrupted, write_lateness, write_map, write_tracked};
 pub use section::{Block, Maker, Section, Subject};
 pub use sections::SECTIONS;
 pub use study::{Report, write_report};

@@ -6,14 +6,9 @@
 
 pub mod advice;
 pub mod backbone;
-pub mod calibration;
-pub mod chain_effects;
 pub mod comparison;
-pub mod estimators;
 pub mod experiment;
-pub mod faults;
 pub mod identification;
 pub mod loop_check;
-pub mod random_rigs;
 pub mod rig;
 pub mod scene;

@@ -4,10 +4,8 @@
 //! (`g`: half the frequency, `d`: damping rate). Response and base are compared with this and with E, by amplitude and phase.
 
 mod linear;
-mod lock_times;
 mod open_loop;
 mod quantity;
-mod trials;
 mod verdict;
 
 use std::f64::consts::{PI, TAU};
@@ -20,9 +18,7 @@ use crate::scene::Scene;
 use vines_model::numerics::{mean, mean_square};
 
 pub use linear::Linear;
-pub use lock_times::{LockTime, lock_times};
 pub use quantity::Quantity;
-pub use trials::{Trials, trials};
 pub use verdict::{Channel, Verdict};
 
 use open_loop::{DECAY, OpenLoop, scatter};

@@ -3,6 +3,7 @@
 
 mod chain;
 mod error;
+mod faulty;
 mod measured;
 mod phase_lock;
 mod sensors_only;
@@ -11,8 +12,8 @@ mod stoppable;
 
 pub use ::phase_lock::{Fault, LoopState, Move};
 pub use chain::Chain;
-pub(crate) use chain::NormalDistribution;
 pub use error::{ControllerError, RigError};
+pub use faulty::{RigFault, SensorFault, faulty};
 pub use measured::Measured;
 pub use phase_lock::BuiltIn;
 pub use sensors_only::SensorsOnly;

@@ -1,7 +1,8 @@
-//! The measurement chain between rig and controller.
+//! Guards the stages of the measurement chain between rig and controller, and how far they move the lock; `studies/chain.rs` takes all stages.
 
-use vines_testbench::chain_effects::{Effect, STAGES, effect, scenes};
-use vines_testbench::rig::{Chain, Drive, Rig, RigError, Sensors, Simulated};
+use vines_testbench::experiment::{self, ExperimentError, Plan};
+use vines_testbench::identification::{Measured, identify};
+use vines_testbench::rig::{BuiltIn, Chain, Drive, Rig, RigError, Sensors, Simulated};
 use vines_testbench::scene::{Override, Scene};
 
 fn scene(settings: &[&str]) -> Scene {
@@ -10,8 +11,13 @@ fn scene(settings: &[&str]) -> Scene {
     Scene::parse("dimensionless.toml", text, &overrides).unwrap()
 }
 
-fn at(settings: &[&str]) -> Effect {
-    effect("", &scene(settings)).unwrap()
+/// The lock behind the chain of a scene, held for 200 periods.
+fn at(settings: &[&str]) -> Result<Measured, ExperimentError> {
+    let scene = scene(&[settings, &["record.hold_periods=200"]].concat());
+    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
+    let mut rig = Simulated::of(&scene).unwrap();
+    let record = experiment::run(&mut *rig, &mut controller, &Plan::of(&scene), |_, _, _| {})?;
+    Ok(identify(&record, &scene).unwrap().lock.at)
 }
 
 fn chained(rig: impl Rig + 'static, scene: &Scene) -> Chain {
@@ -20,14 +26,15 @@ fn chained(rig: impl Rig + 'static, scene: &Scene) -> Chain {
 
 #[test]
 fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most() {
-    let ideal = at(&[]);
+    let ideal = at(&[]).unwrap();
     let real = at(&[
         "chain.adc_bits=16",
         "chain.dac_bits=16",
         "chain.hold=true",
         "chain.delay=1",
         "chain.reference=false",
-    ]);
+    ])
+    .unwrap();
     println!("sigma moves by {:.1e}", real.sigma - ideal.sigma);
     assert!((real.sigma - ideal.sigma).abs() <= 2e-3);
     assert!((real.c - ideal.c).abs() <= 2e-3);
@@ -35,10 +42,10 @@ fn sixteen_bits_held_and_a_sample_late_move_sigma_by_2e_3_at_most() {
 
 #[test]
 fn a_delay_that_nobody_compensates_is_seen_and_one_common_to_both_sensors_is_not() {
-    let ideal = at(&[]);
-    let late = at(&["chain.delay=1", "chain.reference=false", "chain.compensate=false"]);
+    let ideal = at(&[]).unwrap();
+    let late = at(&["chain.delay=1", "chain.reference=false", "chain.compensate=false"]).unwrap();
     assert!((late.sigma - ideal.sigma + 0.078).abs() < 0.005);
-    let both = at(&["chain.delay=1"]);
+    let both = at(&["chain.delay=1"]).unwrap();
     assert!((both.sigma - ideal.sigma).abs() < 1e-6);
 }
 
@@ -104,16 +111,8 @@ fn settings_that_make_no_sense_are_refused_by_name() {
 }
 
 #[test]
-fn each_stage_is_studied_alone_whatever_the_chain_of_the_scene_is() {
-    let own = ["chain.snr=30", "chain.adc_bits=12", "chain.delay=2"].map(|one| one.parse().unwrap());
-    let scenes = scenes(|further: &[Override]| {
-        let overrides: Vec<Override> = own.iter().chain(further).cloned().collect();
-        let text = include_str!("../../../scenes/dimensionless.toml");
-        Scene::parse("dimensionless.toml", text, &overrides)
-    });
-    let seen: Vec<_> = scenes.unwrap().into_iter().map(|(_, scene)| scene.chain).collect();
-    assert_eq!(seen.len(), STAGES.len() + 1);
-    assert!(!seen[0].is_on(), "{:?}", seen[0]);
-    assert_eq!((seen[1].adc_bits, seen[1].snr, seen[1].delay), (Some(16), None, 0));
-    assert_eq!(seen.last().unwrap().snr, Some(30.0));
+fn a_response_within_one_step_of_its_converter_switches_the_drive_off() {
+    let coarse = at(&["chain.adc_bits=6"]).unwrap_err();
+    assert!(matches!(coarse, ExperimentError::Tripped { .. }), "{coarse}");
+    at(&["chain.adc_bits=16"]).unwrap();
 }

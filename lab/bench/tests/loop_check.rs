@@ -1,8 +1,10 @@
-//! The loop check on random rigs; `vines check --trials 1000` takes more.
+//! Guards the verdicts of the loop check, on random rigs, healthy and with faults, and what it measures; `studies/check.rs` takes more rigs.
 
 use lovines::State;
-use vines_testbench::loop_check::{Verdict, check, trials};
-use vines_testbench::rig::{Chain, Drive, Rig, RigError, Sensors, Simulated};
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use rand_distr::{Distribution, Uniform};
+use vines_testbench::loop_check::{Verdict, check};
+use vines_testbench::rig::{Chain, Drive, Rig, RigError, RigFault, SensorFault, Sensors, Simulated, faulty};
 use vines_testbench::scene::{PAPER, Scene};
 
 fn scene() -> Scene {
@@ -11,11 +13,61 @@ fn scene() -> Scene {
 
 #[test]
 fn healthy_rigs_pass_and_faults_are_named() {
-    let found = trials(&scene(), 60, 5).unwrap();
-    assert_eq!((found.healthy, found.faulty), ([60, 60], [60, 60]), "{:?}", found.wrong);
-    // The integral gain, the response gain, and the damping rate in its uncertainty.
-    let [integral, gain, damping] = found.linear.map(|[_, largest]| largest);
-    assert!(integral < 0.01 && gain < 0.03 && damping < 4.0, "{:?}", found.linear);
+    let mut random = ChaCha8Rng::seed_from_u64(5);
+    let mut between = move |low: f64, high: f64| Uniform::new(low, high).unwrap().sample(&mut random);
+    for n in 0..60 {
+        let mut scene = scene();
+        let epsilon = between(0.001_f64.ln(), 0.05_f64.ln()).exp();
+        let lambda = between(0.1_f64.ln(), 3_f64.ln()).exp();
+        scene.plant.particle_mass = epsilon * scene.plant.primary_mass;
+        scene.plant.damping = lambda * scene.plant.particle_mass * scene.plant.natural_frequency();
+        scene.plant.restitution = between(0.2, 0.97);
+        scene.amplitude = epsilon * scene.plant.half_width * between(0.3, 3.0);
+        scene.chain.snr = Some(between(30.0, 80.0));
+        scene.chain.seed = n;
+        scene.chain.delay = between(0.0, 4.0) as u32;
+        scene.chain.filter = Some(between(8.0, 40.0));
+        scene.chain.adc_bits = Some(between(16.0, 25.0) as u32);
+        let mut rig = scene.clone();
+        rig.plant.stiffness *= between(0.99, 1.01);
+        rig.plant.damping *= between(0.8, 1.2);
+        let found = check(&mut *Simulated::of(&rig).unwrap(), &scene).unwrap();
+        assert_eq!(found.verdict, Verdict::Healthy, "{found:?}");
+        let linear = found.linear.unwrap();
+        let damping = 0.5 * rig.plant.damping / rig.plant.primary_mass;
+        assert!(
+            (linear.response_gain / (0.5 * rig.plant.natural_frequency()) - 1.0).abs() < 0.03,
+            "{linear:?}"
+        );
+        assert!(
+            (linear.damping_rate - damping).abs() < 4.0 * linear.u_damping_rate,
+            "{linear:?}"
+        );
+        let gains = phase_lock::Gains::from_bandwidth(linear.bandwidth, damping);
+        assert!((linear.gains[1] / gains.integral - 1.0).abs() < 0.01, "{linear:?}");
+        let (gain, late) = (between(1.15_f64.ln(), 1000_f64.ln()).exp(), between(2.0, 33.0) as usize);
+        let faults = [
+            (Verdict::NotANumber, RigFault::Response(SensorFault::Value(f64::NAN))),
+            (Verdict::NotANumber, RigFault::Base(SensorFault::Value(f64::INFINITY))),
+            (Verdict::ShakerOff, RigFault::Shaker(0.0)),
+            (Verdict::ResponseDead, RigFault::Response(SensorFault::Dead)),
+            (Verdict::BaseDead, RigFault::Base(SensorFault::Dead)),
+            (Verdict::Swapped, RigFault::Swapped),
+            (Verdict::ResponseReversed, RigFault::Response(SensorFault::Reversed)),
+            (Verdict::BaseReversed, RigFault::Base(SensorFault::Reversed)),
+            (Verdict::BothReversed, RigFault::Both(SensorFault::Reversed)),
+            (Verdict::ResponseGain, RigFault::Response(SensorFault::Gain(gain))),
+            (Verdict::BaseGain, RigFault::Base(SensorFault::Gain(gain))),
+            (Verdict::ResponseGain, RigFault::Response(SensorFault::Gain(0.8))),
+            (Verdict::ResponseLate, RigFault::Response(SensorFault::Late(late))),
+            (Verdict::BaseLate, RigFault::Base(SensorFault::Late(late))),
+            (Verdict::ResponseNoisy, RigFault::Response(SensorFault::Noisy)),
+            (Verdict::BaseNoisy, RigFault::Base(SensorFault::Noisy)),
+        ];
+        let (expected, fault) = faults[n as usize % faults.len()];
+        let found = check(&mut faulty(&rig, fault, 0.0, |_| {}).unwrap(), &scene).unwrap();
+        assert_eq!(found.verdict, expected, "{fault:?}: {found:?}");
+    }
 }
 
 /// A rig that records its largest drive and the phase of its oscillator.

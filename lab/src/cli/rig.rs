@@ -4,10 +4,9 @@ use std::{path::PathBuf, str::FromStr};
 
 use clap::{Args, ValueEnum};
 use vines::ArgumentError;
-use vines::faults::{FAULTS, Kind, rehearsal_rig};
 use vines::net::{Address, Role, Served, Service, Session, helic::Device};
 use vines::report;
-use vines::rig::{Rig, RigError, Simulated};
+use vines::rig::{Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
 use vines::scene::Scene;
 
 use super::endpoint::{Endpoint, fmu};
@@ -77,7 +76,7 @@ pub(super) struct Arguments {
     #[arg(long)]
     sensors_only: bool,
 
-    /// Begin a fault of `vines faults` after this many seconds of rig time in each session, such as "response sensor dead@60"
+    /// Begin a fault after this many seconds of rig time in each session, such as "response sensor dead@60"; a wrong name lists them
     #[arg(long, value_name = "NAME@SECONDS", requires = "sensors_only")]
     fault: Option<Fault>,
 
@@ -104,7 +103,7 @@ fn tell(zero: Option<f64>, json: bool) {
 /// A fault of the rig, and when it begins, s of rig time.
 #[derive(Debug, Clone, Copy)]
 struct Fault {
-    kind: Kind,
+    kind: RigFault,
     seconds: f64,
 }
 
@@ -115,13 +114,13 @@ impl FromStr for Fault {
         let (name, seconds) = text
             .rsplit_once('@')
             .ok_or("expected NAME@SECONDS, for instance \"response sensor dead@60\"")?;
-        let of_a_rig = |kind| !matches!(kind, Kind::ControllerLost | Kind::ControllerNan | Kind::PeerLost);
-        let faults = FAULTS.into_iter().filter(|(_, kind)| of_a_rig(*kind));
-        let known = || faults.clone().map(|(name, _)| name).collect::<Vec<_>>().join(", ");
         let seconds = positive(seconds)?;
-        match faults.clone().find(|(one, _)| *one == name) {
+        match RigFault::ALL.into_iter().find(|(one, _)| *one == name) {
             Some((_, kind)) => Ok(Self { kind, seconds }),
-            None => Err(format!("unknown fault; known are: {}", known()).into()),
+            None => {
+                let names = RigFault::ALL.map(|(name, _)| name).join(", ");
+                Err(format!("unknown fault; known are: {names}").into())
+            }
         }
     }
 }
@@ -164,16 +163,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         false => (SILENCE_PACED, "in real time", Address::Udp),
     };
     let max_amplitude = arguments.max_amplitude.unwrap_or(scene.plant.half_width);
-    let fault = arguments
-        .fault
-        .unwrap_or(Fault { kind: Kind::None, seconds: f64::INFINITY });
     let json = arguments.serving.json;
     let make = || -> Result<Box<dyn Rig>, RigError> {
         Ok(match &arguments.rig {
             Endpoint::Fmu(file) => Box::new(fmu(file, &scene)?),
-            _ if arguments.sensors_only => {
-                rehearsal_rig(&scene, fault.kind, fault.seconds, move |zero| tell(zero, json))
-            }
+            _ if arguments.sensors_only => match arguments.fault {
+                Some(Fault { kind, seconds }) => Box::new(faulty(&scene, kind, seconds, move |zero| tell(zero, json))?),
+                None => Box::new(SensorsOnly::around(Simulated::of(&scene)?)),
+            },
             _ => Box::new(first.clone()),
         })
     };

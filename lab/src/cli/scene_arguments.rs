@@ -20,7 +20,7 @@ pub(super) struct SceneArguments {
 
 impl SceneArguments {
     pub(super) fn load(&self) -> Result<Scene, SceneError> {
-        self.load_with(&[])
+        Scene::load(self.scene.as_deref(), &self.set)
     }
 
     /// The scene, of which numbers may vary.
@@ -31,16 +31,5 @@ impl SceneArguments {
         };
         let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.clone(), source })?;
         Family::parse(&path.display().to_string(), Some(&text), &self.set)
-    }
-
-    /// The first replaced value among these sections and keys.
-    pub(super) fn one_of(&self, keys: &[&str]) -> Option<&Override> {
-        self.set.iter().find(|one| one.is_one_of(keys))
-    }
-
-    /// The scene with further values replaced.
-    pub(super) fn load_with(&self, further: &[Override]) -> Result<Scene, SceneError> {
-        let set = [&self.set, further].concat();
-        Scene::load(self.scene.as_deref(), &set)
     }
 }

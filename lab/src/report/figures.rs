@@ -3,7 +3,6 @@
 pub mod approach;
 pub mod backbone;
 pub mod backbones;
-pub mod coverage;
 pub mod history;
 pub mod manifold;
 pub mod period;

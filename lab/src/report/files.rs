@@ -8,10 +8,9 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::figure::FigureError;
-use super::figures::{backbone, coverage, manifold, regimes, tracked};
+use super::figures::{backbone, manifold, regimes, tracked};
 use super::theme::dark;
 use crate::backbone::Point;
-use crate::calibration::Calibration;
 use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
 use crate::experiment::{Sample, table};
 use crate::files::{self, FileError};
@@ -96,11 +95,6 @@ pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf
     let folder = file.parent().filter(|folder| !folder.as_os_str().is_empty());
     let name = file.file_name().unwrap_or_default();
     Ok(files::write(folder.unwrap_or(Path::new(".")), [(name, text)])?)
-}
-
-/// Writes `coverage.svg` into `out` and returns its path, as [`write()`] does.
-pub fn write_calibration(found: &Calibration, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    Ok(files::write(out, [("coverage.svg", coverage::figure(found).svg()?)])?)
 }
 
 pub(super) fn json(found: &impl Serialize) -> Result<String, ReportError> {

@@ -12,7 +12,7 @@ use std::collections::VecDeque;
 
 use converter::Converter;
 use filter::LowPass;
-pub(crate) use noise::NormalDistribution;
+pub(super) use noise::NormalDistribution;
 use noise::Sensor;
 
 use super::{Drive, GroundTruth, Rig, RigError, Sensors};

@@ -51,14 +51,8 @@ impl FromStr for Override {
 
 impl Override {
     /// A refusal of this setting.
-    pub fn error(&self, message: impl Into<String>) -> SceneError {
+    fn error(&self, message: impl Into<String>) -> SceneError {
         SceneError::Override { argument: self.argument.clone(), message: message.into() }
-    }
-
-    /// Whether this sets one of these sections and `section.key`s.
-    pub fn is_one_of(&self, keys: &[&str]) -> bool {
-        let name = format!("{}.{}", self.section, self.key);
-        keys.iter().any(|key| *key == name || *key == self.section)
     }
 
     fn is(&self, section: &str, key: &str) -> bool {

@@ -1,0 +1,265 @@
+//! A simulated rig with a fault, for rehearsals: a sensor, the shaker, the structure or the clock fails after some rig time.
+
+use std::collections::VecDeque;
+
+use lovines::{InvalidValue, Parameters};
+
+use super::chain::NormalDistribution;
+use super::{Chain, Drive, Rig, RigError, Sensors, SensorsOnly, Simulated};
+use crate::scene::Scene;
+
+/// What fails in a rig.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum RigFault {
+    /// The response sensor.
+    Response(SensorFault),
+    /// The sensor of the base.
+    Base(SensorFault),
+    /// Both sensors at once.
+    Both(SensorFault),
+    /// Response and base are exchanged.
+    Swapped,
+    /// The drive that reaches the rig is this many times the one asked for.
+    Shaker(f64),
+    /// The natural frequency rises by a tenth.
+    Structure,
+    /// The rig's clock jumps forward by this many samples.
+    Forward(usize),
+}
+
+/// How a sensor fails.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum SensorFault {
+    /// Reads zero.
+    Dead,
+    /// Reads the last value.
+    Frozen,
+    /// Reads the opposite sign.
+    Reversed,
+    /// Saturates at half the amplitude.
+    Saturated,
+    /// Reads the end of its range, 2 b.
+    Stuck,
+    /// Reads this many times the value.
+    Gain(f64),
+    /// An offset of one amplitude is added.
+    Offset,
+    /// Noise with the RMS of the signal is added.
+    Noisy,
+    /// Reads zero for five of every ten samples.
+    Loose,
+    /// Reads this value, m.
+    Value(f64),
+    /// Reads the value of this many samples ago.
+    Late(usize),
+}
+
+impl RigFault {
+    /// The faults by name, as `vines rig --fault` takes them; the sample numbers are a quarter and 37 % of a default period.
+    pub const ALL: [(&'static str, Self); 27] = [
+        ("response sensor dead", Self::Response(SensorFault::Dead)),
+        ("response sensor frozen", Self::Response(SensorFault::Frozen)),
+        ("response sensor reversed", Self::Response(SensorFault::Reversed)),
+        (
+            "response sensor saturated at half",
+            Self::Response(SensorFault::Saturated),
+        ),
+        (
+            "response sensor at the end of its range",
+            Self::Response(SensorFault::Stuck),
+        ),
+        ("response sensor × 3", Self::Response(SensorFault::Gain(3.0))),
+        ("response sensor × 0.3", Self::Response(SensorFault::Gain(0.3))),
+        ("response sensor with an offset", Self::Response(SensorFault::Offset)),
+        ("response sensor noisy", Self::Response(SensorFault::Noisy)),
+        ("response sensor loose", Self::Response(SensorFault::Loose)),
+        ("response sensor late", Self::Response(SensorFault::Late(25))),
+        ("response NaN", Self::Response(SensorFault::Value(f64::NAN))),
+        ("response infinite", Self::Response(SensorFault::Value(f64::INFINITY))),
+        ("base sensor dead", Self::Base(SensorFault::Dead)),
+        ("base sensor frozen", Self::Base(SensorFault::Frozen)),
+        ("base sensor reversed", Self::Base(SensorFault::Reversed)),
+        ("base sensor saturated at half", Self::Base(SensorFault::Saturated)),
+        ("base sensor noisy", Self::Base(SensorFault::Noisy)),
+        ("base sensor late", Self::Base(SensorFault::Late(25))),
+        ("base NaN", Self::Base(SensorFault::Value(f64::NAN))),
+        ("sensors swapped", Self::Swapped),
+        (
+            "both sensors frozen (clock stands still)",
+            Self::Both(SensorFault::Frozen),
+        ),
+        ("clock jumps back", Self::Both(SensorFault::Late(37))),
+        ("clock jumps forward", Self::Forward(37)),
+        ("shaker off", Self::Shaker(0.0)),
+        ("shaker × 5 (overload)", Self::Shaker(5.0)),
+        ("structure changes (lost lock)", Self::Structure),
+    ];
+}
+
+/// Healthy readings that are kept: more than a default period.
+const KEPT: usize = 128;
+/// A natural frequency that is a tenth higher needs this many times the stiffness.
+const STIFFER: f64 = 1.21;
+
+/// The plant of a scene, whose sensors, shaker, structure or clock fail.
+struct Faulty {
+    rig: Box<dyn Rig>,
+    /// The rig with the changed structure, under the same drive.
+    changed: Option<Box<dyn Rig>>,
+    fault: RigFault,
+    sample_time: f64,
+    /// End of the range of the sensors, m.
+    range: f64,
+    /// Samples that the rig was advanced before the fault begins, and until now.
+    begins: usize,
+    taken: usize,
+    /// Samples until the last drive that was not zero.
+    driven: usize,
+    /// Healthy readings of response and base, m, the newest last.
+    past: VecDeque<[f64; 2]>,
+    normal: NormalDistribution,
+    ended: Box<dyn FnMut(Option<f64>)>,
+}
+
+/// The rig of a scene for a rehearsal: read by the scene's measurement chain, without ground truth, and with a fault that begins after
+/// `seconds` of rig time. When the rig is dropped after that, `ended` gets the time from the fault to a drive of zero, s, or `None` if
+/// the last drive was not zero.
+///
+/// # Errors
+/// A plant or a start that is not allowed.
+pub fn faulty(
+    scene: &Scene,
+    fault: RigFault,
+    seconds: f64,
+    ended: impl FnMut(Option<f64>) + 'static,
+) -> Result<SensorsOnly, InvalidValue> {
+    let plant = |stiffness: f64| -> Result<Box<dyn Rig>, InvalidValue> {
+        let parameters = Parameters { stiffness, ..scene.plant };
+        Ok(Box::new(
+            Simulated::new(parameters, scene.start)?.with_sensors(scene.resonance),
+        ))
+    };
+    let changed = matches!(fault, RigFault::Structure).then(|| plant(STIFFER * scene.plant.stiffness));
+    let begins = (seconds / scene.sample_time()) as usize;
+    let rig = Faulty {
+        rig: plant(scene.plant.stiffness)?,
+        changed: changed.transpose()?,
+        fault,
+        sample_time: scene.sample_time(),
+        range: 2.0 * scene.plant.half_width,
+        begins,
+        taken: 0,
+        driven: begins,
+        past: VecDeque::new(),
+        normal: NormalDistribution::new(1),
+        ended: Box::new(ended),
+    };
+    Ok(SensorsOnly::around(Chain::around(Box::new(rig), scene)))
+}
+
+impl Faulty {
+    /// Samples since the fault began.
+    fn elapsed(&self) -> Option<usize> {
+        self.taken.checked_sub(self.begins)
+    }
+
+    /// The reading, m, of a channel whose sensor fails.
+    fn read(&mut self, channel: usize, sensor: SensorFault, elapsed: usize) -> f64 {
+        let kept = self.past.len();
+        let ago = |samples: usize| self.past[kept.saturating_sub(1 + samples)][channel];
+        let largest = self.past.iter().fold(0.0_f64, |most, one| most.max(one[channel].abs()));
+        let value = ago(0);
+        match sensor {
+            SensorFault::Dead => 0.0,
+            SensorFault::Frozen => ago(elapsed + 1),
+            SensorFault::Reversed => -value,
+            SensorFault::Saturated => value.clamp(-0.5 * largest, 0.5 * largest),
+            SensorFault::Stuck => self.range,
+            SensorFault::Gain(gain) => gain * value,
+            SensorFault::Offset => value + largest,
+            SensorFault::Noisy => value + largest * std::f64::consts::FRAC_1_SQRT_2 * self.normal.next(),
+            SensorFault::Loose if elapsed % 10 < 5 => 0.0,
+            SensorFault::Loose => value,
+            SensorFault::Value(value) => value,
+            SensorFault::Late(samples) => ago(samples),
+        }
+    }
+
+    /// Drives the rig for one sample: `asked`, m, is what is asked for.
+    fn drive(
+        &mut self,
+        asked: f64,
+        mut drive: Drive,
+        apply: impl Fn(&mut dyn Rig, Drive) -> Result<(), RigError>,
+    ) -> Result<(), RigError> {
+        let elapsed = self.elapsed();
+        self.taken += 1;
+        if asked != 0.0 {
+            self.driven = self.driven.max(self.taken);
+        }
+        if let Some(changed) = &mut self.changed {
+            apply(&mut **changed, drive)?;
+        }
+        match (self.fault, elapsed) {
+            (RigFault::Forward(samples), Some(0)) => {
+                for _ in 0..samples {
+                    apply(&mut *self.rig, drive)?;
+                }
+            }
+            (RigFault::Shaker(gain), Some(_)) => {
+                drive.amplitude *= gain;
+                drive.displacement *= gain;
+            }
+            _ => {}
+        }
+        apply(&mut *self.rig, drive)
+    }
+}
+
+impl Rig for Faulty {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        let elapsed = self.elapsed();
+        let mut seen = match (&mut self.changed, elapsed) {
+            (Some(changed), Some(_)) => changed.sense()?,
+            _ => self.rig.sense()?,
+        };
+        self.past.push_back([seen.response, seen.reference.unwrap_or(0.0)]);
+        if self.past.len() > KEPT + elapsed.unwrap_or(0) {
+            self.past.pop_front();
+        }
+        let Some(elapsed) = elapsed else {
+            return Ok(seen);
+        };
+        match self.fault {
+            RigFault::Response(sensor) => seen.response = self.read(0, sensor, elapsed),
+            RigFault::Base(sensor) => seen.reference = Some(self.read(1, sensor, elapsed)),
+            RigFault::Both(sensor) => {
+                seen.response = self.read(0, sensor, elapsed);
+                seen.reference = Some(self.read(1, sensor, elapsed));
+            }
+            RigFault::Swapped => {
+                let base = seen.reference.unwrap_or(0.0);
+                (seen.response, seen.reference) = (base, Some(seen.response));
+            }
+            RigFault::Shaker(_) | RigFault::Structure | RigFault::Forward(_) => {}
+        }
+        Ok(seen)
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.drive(drive.amplitude, drive, |rig, drive| rig.advance(drive, step))
+    }
+
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.drive(drive.displacement, drive, |rig, drive| rig.hold(drive, step))
+    }
+}
+
+impl Drop for Faulty {
+    fn drop(&mut self) {
+        if self.elapsed().is_some() {
+            let samples = (self.driven < self.taken).then(|| self.driven - self.begins);
+            (self.ended)(samples.map(|samples| samples as f64 * self.sample_time));
+        }
+    }
+}

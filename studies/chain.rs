@@ -1,0 +1,75 @@
+//! How far does each stage of the measurement chain move the lock?
+//!
+//! Each stage alone, and some together: sigma and C of the lock less those of the ideal chain, the stated standard uncertainty of sigma,
+//! or why there is no lock.
+//!
+//! ```sh
+//! cargo run --release -p vines-testbench --example chain -- [KEY=VALUE ...]    # of the scene; writes validation/chain.csv
+//! ```
+
+mod common;
+
+use common::{Failure, arguments, scene, write};
+use vines_testbench::experiment::{ExperimentError, Plan, run};
+use vines_testbench::identification::{Measured, identify};
+use vines_testbench::rig::{BuiltIn, Simulated};
+
+/// Settings of `[chain]`; the first is the ideal chain.
+const STAGES: [&str; 18] = [
+    "",
+    "adc_bits=16",
+    "adc_bits=12",
+    "adc_bits=8",
+    "hold=true reference=false",
+    "hold=true reference=false compensate=false",
+    "hold=true",
+    "hold=true reference=false dac_bits=16",
+    "delay=1 reference=false",
+    "delay=1 reference=false compensate=false",
+    "delay=1",
+    "delay=5 reference=false",
+    "filter=10.0",
+    "filter=10.0 reference=false",
+    "snr=60",
+    "snr=40",
+    "jitter=0.01",
+    "adc_bits=16 dac_bits=16 hold=true delay=1 reference=false",
+];
+
+/// The lock behind a stage, held for 200 periods.
+fn lock(stage: &str) -> Result<Measured, Failure> {
+    let stage = stage.split_whitespace().map(|one| format!("chain.{one}"));
+    let hold = "record.hold_periods=200".into();
+    let scene = scene(
+        "",
+        &arguments().into_iter().chain(stage).chain([hold]).collect::<Vec<_>>(),
+    )?;
+    let mut controller = BuiltIn::new(&scene.controller_config())?;
+    let record = run(
+        &mut *Simulated::of(&scene)?,
+        &mut controller,
+        &Plan::of(&scene),
+        |_, _, _| {},
+    );
+    let record = record.map_err(|error| match error {
+        ExperimentError::Tripped { fault, .. } => fault.text().into(),
+        other => other.to_string(),
+    })?;
+    Ok(identify(&record, &scene)?.lock.at)
+}
+
+fn main() -> Result<(), Failure> {
+    let ideal = lock(STAGES[0])?;
+    let row = |stage: &&str| {
+        let name = if stage.is_empty() { "ideal" } else { stage };
+        match lock(stage) {
+            Ok(at) => {
+                let [sigma, c] = [at.sigma - ideal.sigma, at.c - ideal.c];
+                format!("{name},{sigma:.1e},{c:.1e},{:.0e},", at.u_sigma)
+            }
+            Err(error) => format!("{name},,,,{}", error.to_string().replace(',', ";")),
+        }
+    };
+    let rows: Vec<String> = STAGES.iter().map(row).collect();
+    write("chain", "stage,sigma_moves,C_moves,u_sigma,no_lock", 1, &rows)
+}
