@@ -39,9 +39,7 @@ fn plan(scene: &Scene, axes: &Bound<'_, PyDict>, settings: &Bound<'_, PyDict>) -
                 Given::Design(design, from, to) => match design.as_str() {
                     "random" => Values::Random([from, to]),
                     other => {
-                        return Err(invalid(format!(
-                            "{name}: unknown design `{other}`; known is random"
-                        )));
+                        return Err(invalid(format!("{name}: unknown design `{other}`; known is random")));
                     }
                 },
             };

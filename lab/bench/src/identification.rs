@@ -24,7 +24,7 @@ pub use lock::Lock;
 pub use measured::Measured;
 use regime::longer_after;
 pub use regime::{classify, impacts};
-pub(crate) use response::without_tones;
+pub(crate) use response::{ASYMMETRIC, without_tones};
 pub use response::{foreign_tone, regime_by_response};
 pub use tone::Tone;
 pub use vines_model::regime::{Impact, Regime};

@@ -32,7 +32,7 @@ use serde::Serialize;
 pub use bifurcations::{BifurcationCurve, bifurcation_curves};
 pub use bounce::Bounce;
 pub use branch::{Branch, Ended, Limits, Special};
-pub use components::{Component, Exploration, Response, random_state, response};
+pub use components::{Component, DOUBLINGS, Response, response};
 pub use condition::{Bifurcation, Condition};
 pub use continuation::{branch_off, continue_both_ways, continue_from};
 pub use convergence::{Convergence, Difference, convergence};

@@ -7,9 +7,7 @@ use rand_chacha::{
 };
 use vines_model::{
     Dimensionless,
-    orbit::{
-        Bifurcation, BifurcationCurve, Ended, Exploration, Limits, Periodic, Special, bifurcation_curves, response,
-    },
+    orbit::{Bifurcation, BifurcationCurve, Ended, Limits, Periodic, Special, bifurcation_curves, response},
 };
 
 mod common;
@@ -33,7 +31,7 @@ fn off_circle(curve: &BifurcationCurve, motion: &Periodic) -> f64 {
 
 /// The bifurcations of the 1:1 motions at one excitation.
 fn bifurcations(scene: &Dimensionless) -> Vec<Special> {
-    let found = response(scene, &LIMITS, Exploration { starts: 0, seed: 1, doublings: 1 });
+    let found = response(scene, &LIMITS, 1);
     let specials = found.components.into_iter().flat_map(|one| one.branch.special);
     specials.filter(|one| one.motion.pattern.is_one_to_one()).collect()
 }

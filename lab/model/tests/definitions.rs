@@ -2,7 +2,7 @@
 
 use vines_model::{
     Definition, Dimensionless, Reference, Resonance, Sensor,
-    orbit::{Exploration, Limits, Orbit, convergence, phase_resonant, response, symmetric_orbits},
+    orbit::{Limits, Orbit, convergence, phase_resonant, response, symmetric_orbits},
     theory::resonant,
 };
 
@@ -29,11 +29,7 @@ fn the_peak_is_the_largest_amplitude_of_the_frequency_response() {
         let definition = Definition { resonance: Resonance::Peak, sensor, ..Definition::default() };
         let peak = orbit(definition);
         let fine = Limits { step: 0.005, points: 20_000, ..Limits::default() };
-        let found = response(
-            &scene(definition),
-            &fine,
-            Exploration { starts: 0, seed: 1, doublings: 0 },
-        );
+        let found = response(&scene(definition), &fine, 0);
         let motions = found.symmetric().flat_map(|one| &one.points).filter(|one| one.stable);
         let largest = motions.max_by(|one, other| one.c.total_cmp(&other.c)).unwrap();
         println!(

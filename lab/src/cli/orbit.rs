@@ -4,11 +4,11 @@ mod studies;
 mod text;
 
 use clap::Args;
-use vines::orbit::{Condition, Exploration, Limits, backbone, continue_both_ways, phase_resonant, response, settle};
+use vines::orbit::{Condition, DOUBLINGS, Limits, backbone, continue_both_ways, phase_resonant, response, settle};
 use vines::{ArgumentError, scene::Dimensionless};
 
 use studies::{converged, defined};
-use text::{curve, described, listing, searched, shown};
+use text::{SEARCHED, curve, described, listing, shown};
 
 use super::{failure::Failure, scene_arguments::SceneArguments};
 
@@ -20,9 +20,9 @@ Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon
 
 With --backbone or --response, orbits are followed by pseudo-arclength through folds and symmetry breaking, stable and unstable
 ones alike; --json prints all of them. --response lists the components: all of symmetric 1:1 orbits over the whole range, those that
-branch off at symmetry breakings and period doublings, three in a row (mirror images count once), and those of other patterns on
-which random starts settle. There may be further ones, for instance within chaos: the output says how likely that is. A
-branch that is not 1:1 ends after a hundred unstable orbits in a row.
+branch off at symmetry breakings and period doublings, three in a row (mirror images count once). Isolated branches of other patterns,
+for instance within chaos, are missed; --sigma with --response follows the one that a start leads to. A branch that is not 1:1 ends
+after a hundred unstable orbits in a row.
 
 Examples:
   vines orbit
@@ -56,10 +56,6 @@ pub(super) struct Arguments {
     /// Detunings of --response and --backbone
     #[arg(long, value_name = "FIRST:LAST", default_value = "-6:6", allow_hyphen_values = true, value_parser = detunings)]
     range: [f64; 2],
-
-    /// Random starts of --response, from which other patterns are searched for
-    #[arg(long, value_name = "N", default_value_t = Exploration::default().starts)]
-    starts: usize,
 
     /// Theory minus exact orbit at epsilon and its halvings, with the fitted exponent
     #[arg(long, group = "what")]
@@ -120,11 +116,10 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> 
             "--range from sigma = {from} (dimensionless): {rule}"
         )));
     }
-    let exploration = Exploration { starts: arguments.starts, ..Exploration::default() };
-    let found = response(scene, limits, exploration);
+    let found = response(scene, limits, DOUBLINGS);
     if found.components.is_empty() {
         return Err(Failure::run(format!(
-            "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {from} to {to}; raise excitation.G or --starts",
+            "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {from} to {to}; raise excitation.G",
             scene.g
         )));
     }
@@ -134,7 +129,7 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> 
         format!(
             "{count} component{}\n{}\n{}",
             if count == 1 { "" } else { "s" },
-            searched(&found),
+            SEARCHED,
             all.collect::<String>()
         )
     })

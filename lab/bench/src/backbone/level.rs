@@ -5,7 +5,7 @@
 //! uncertainty. A level is settled when the uncertainties are as small as the scene asks: noise lengthens the window, and so does a
 //! transient.
 
-use vines_model::numerics::Estimate;
+use vines_model::numerics::{Estimate, RANDOM};
 
 use crate::identification::{Balance, Cycle, Slopes};
 use crate::scene::LinearResponse;
@@ -41,8 +41,6 @@ pub struct Found {
 /// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 beside the
 /// fold, 0.03 rad change sigma at equal C by 1.1e-3.
 const BESIDE: f64 = 0.02;
-/// Difference of the halves, in its standard uncertainties, that still counts as noise.
-const RANDOM: f64 = 2.0;
 /// Periods by which the impacts follow a change of the amplitude late: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
 /// (studies/off_scene.rs).
 const LAG: f64 = 1.6;
@@ -50,8 +48,6 @@ const LAG: f64 = 1.6;
 const EXCESS: f64 = 2.0;
 /// Relative standard uncertainty of the slope of a straight line through two points: away from the fold it changes by less from level to level.
 const SLOPE: f64 = 0.5;
-/// Fewest periods of a window: two halves of four, the fewest of a fit.
-const FEWEST: usize = 8;
 /// Shares of the periods that are considered, from the last one backwards.
 const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
 
@@ -61,7 +57,7 @@ impl Criterion {
     pub fn best(&self, cycles: &[Cycle]) -> Option<Found> {
         let n = cycles.len();
         let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
-        let considered = counts.into_iter().filter(|count| *count >= FEWEST);
+        let considered = counts.into_iter().filter(|count| *count >= 2 * Balance::FEWEST);
         considered
             .filter_map(|count| self.of(&cycles[n - count..]))
             .filter(|found| found.at.iter().all(|one| (one.value + one.uncertainty).is_finite()))

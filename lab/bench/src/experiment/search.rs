@@ -15,10 +15,10 @@
 use std::f64::consts::TAU;
 
 use nalgebra::DVector;
-use vines_model::numerics::{HarmonicBasis, mean, noise};
+use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, noise};
 
 use super::{Bench, ExperimentError, Sample, Stage};
-use crate::identification::{Balance, Cycle, Slopes, without_tones};
+use crate::identification::{ASYMMETRIC, Balance, Cycle, Slopes, without_tones};
 use crate::rig::{Command, Controller, ControllerError, LoopState, Move, Rig};
 use crate::scene::{LinearResponse, Scene};
 
@@ -27,8 +27,6 @@ const NEAR: f64 = 0.35;
 const NEAR_FOR: usize = 3;
 /// Periods of a leg at least. The loops, whose slowest time constant is five periods, follow within it.
 const LEG: usize = 8;
-/// Fewest periods of the fit.
-const FEWEST: usize = 4;
 /// Largest relative change of the response in a leg: the stable orbits above the fold span a few percent.
 const STEP: f64 = 0.04;
 /// Largest share of the drive that changes the response.
@@ -44,13 +42,8 @@ const LOWEST: f64 = 0.05;
 const LOST: f64 = 0.8;
 /// Departure from the linear response that shows impacts, as a share of the drive: twice the uncertainty of damping and stiffness.
 const DEPARTURE: f64 = 0.2;
-/// Largest amplitude of the second harmonic of a symmetric motion over that of the third: 0.01 is found where it is symmetric, from 2 on
-/// where it is irregular.
-const SYMMETRIC: f64 = 0.5;
 /// Legs in which this ratio grows one after the other: beside symmetry breaking the symmetry is lost slowly, and noise does this in one of 24 cases.
 const GROWN: u32 = 3;
-/// Standard uncertainties from which on a difference is not noise.
-const SIGNIFICANT: f64 = 3.0;
 /// Smallest slope of the holding drive under a constant drive, over that of the linear response: with less, it takes ten times as long
 /// to settle.
 const FIRM: f64 = 0.1;
@@ -311,7 +304,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Measures over so many periods, or until the lock has settled.
     fn measure(&mut self, periods: usize) -> Result<Leg, ExperimentError> {
         let mut begins = Vec::new();
-        while begins.len() < periods.max(FEWEST) && !(self.last.settled && begins.len() >= FEWEST) {
+        while begins.len() < periods.max(Balance::FEWEST) && !(self.last.settled && begins.len() >= Balance::FEWEST) {
             begins.push((self.bench.samples.len(), self.bench.periods));
             self.one_period()?;
         }
@@ -349,7 +342,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
         let (even, odd) = (even - noise, odd - noise);
         let doubtful = SIGNIFICANT * noise / (0.5 * all.len() as f64).sqrt();
         let possible = self.setpoint > LOWEST * self.b && response < UNREACHED * self.b;
-        let symmetric = departed && possible && even <= (SYMMETRIC * SYMMETRIC * odd).max(doubtful);
+        let symmetric = departed && possible && even <= (ASYMMETRIC * ASYMMETRIC * odd).max(doubtful);
         if symmetric {
             let point = [response, drive.value];
             let [least, most] = self.extremes.unwrap_or([point, point]);

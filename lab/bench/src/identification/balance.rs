@@ -70,11 +70,14 @@ const PARABOLA: f64 = 1.2;
 const WIDE: f64 = 3.0;
 
 impl Balance {
+    /// Fewest periods: one more than the coefficients.
+    pub const FEWEST: usize = 4;
+
     /// From at least four periods of a rig whose linear response is `linear`. `slopes`: what is known of the slopes of `E_R` and `omega_R` over the amplitude.
     #[must_use]
     pub fn of(cycles: &[Cycle], linear: &LinearResponse, slopes: Slopes) -> Option<Self> {
         let n = cycles.len() as f64;
-        if cycles.len() < 4 {
+        if cycles.len() < Self::FEWEST {
             return None;
         }
         let (omega, omega0) = (mean(cycles.iter().map(|cycle| cycle.omega)), linear.omega0);

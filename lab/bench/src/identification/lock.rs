@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use serde::Serialize;
 
-use vines_model::numerics::{Estimate, mean};
+use vines_model::numerics::{Estimate, RANDOM, mean};
 use vines_model::regime::Regime;
 
 use super::regime::classify;
@@ -63,10 +63,6 @@ const WIDE: f64 = 0.1;
 const BENT: f64 = 0.3;
 /// Largest phase error of a period, rad, for the same.
 const PHASE_RANGE: f64 = 0.1;
-/// Fewest periods of an estimate.
-const FEWEST: usize = 8;
-/// Difference, in standard uncertainties, that still counts as noise.
-const RANDOM: f64 = 2.0;
 
 pub(super) fn measure(record: &Record, scene: &Scene) -> Option<Lock> {
     let d = scene.dimensionless();
@@ -125,7 +121,7 @@ fn limits(approach: &[Cycle], wide: &[Cycle], linear: &LinearResponse, command: 
     let limit = |cycles: &[Cycle]| Some(Balance::of(cycles, linear, Slopes::Known(slopes))?.limit(command));
     let mut cycles = approach;
     let mut whole = limit(cycles)?;
-    while cycles.len() >= 2 * FEWEST {
+    while cycles.len() >= 4 * Balance::FEWEST {
         cycles = &cycles[cycles.len() / 2..];
         let late = limit(cycles)?;
         let beyond = [0, 1].map(|i| ((whole[i].value - late[i].value).abs() - RANDOM * late[i].uncertainty).max(0.0));

@@ -23,8 +23,9 @@ const NOISE_SHARE: f64 = 0.5;
 const LINES: usize = 8;
 /// Smallest significant harmonic, in standard errors.
 const SIGNIFICANT: f64 = 4.0;
-/// Smallest amplitude of the second harmonic over the third of an asymmetric motion.
-const ASYMMETRIC: f64 = 0.5;
+/// Smallest amplitude of the second harmonic over the third of an asymmetric motion: about 0.01 where it is symmetric, from 2 on where it is
+/// irregular.
+pub(crate) const ASYMMETRIC: f64 = 0.5;
 /// Relative distance from the linear response within which a motion counts as the linear mode, beside the uncertainty of that response.
 const LINEAR: f64 = 0.1;
 /// Degrees of the amplitudes of the harmonics in time: quadratic for the fundamental, constant for the others.

@@ -3,10 +3,8 @@
 use super::{IdentificationError, Lock};
 use crate::experiment::Record;
 use crate::scene::Scene;
-use vines_model::numerics::standard_deviation;
+use vines_model::numerics::{SIGNIFICANT, standard_deviation};
 
-/// Standard uncertainties of the phase that count as noise.
-const RANDOM: f64 = 3.0;
 /// Share of a free response that impacts leave in two periods at least. They take the share pi epsilon G_imp/C in each, with
 /// G_imp = (4/pi) R B^2/C: 0.14 at epsilon = 0.05, r = 0.65, C = 0.5.
 const LEFT: f64 = 0.1;
@@ -16,7 +14,7 @@ const STEPS: f64 = 8.0;
 /// Refuses a lock whose phase is farther from its target than the tolerance of the lock.
 pub(super) fn on_target(lock: &Lock, scene: &Scene) -> Result<(), IdentificationError> {
     let (error, tolerance) = (lock.at.phase_error_deg, scene.controller.phase_tolerance);
-    if error.abs() <= tolerance + RANDOM * lock.at.u_phase_deg {
+    if error.abs() <= tolerance + SIGNIFICANT * lock.at.u_phase_deg {
         return Ok(());
     }
     Err(IdentificationError::OffTarget { error, uncertainty: lock.at.u_phase_deg, tolerance })

@@ -4,12 +4,11 @@ use std::f64::consts::TAU;
 
 use num_complex::Complex64;
 use serde::Serialize;
+use vines_model::numerics::SIGNIFICANT;
 
 use super::{Linear, Verdict};
 use crate::scene::{LinearResponse, Scene};
 
-/// Standard uncertainties that a difference must exceed to count.
-const SIGNIFICANT: f64 = 3.0;
 /// Largest relative error of a factor: amplitudes and drives that are measured later have the same.
 const FACTOR: f64 = 0.05;
 /// Largest phase of the response relative to the base that is not explained, degrees. On the default scene 1 degree shifts sigma by 0.026.

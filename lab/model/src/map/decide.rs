@@ -6,6 +6,7 @@
 use std::f64::consts::PI;
 
 use super::run::{Point, Run};
+use crate::numerics::SIGNIFICANT;
 use crate::orbit::{Periodic, periodic_near};
 use crate::regime::Regime;
 
@@ -15,8 +16,6 @@ const NEAR: f64 = 1e-2;
 const SAME: f64 = 1e-6;
 /// Longest repetition in the search, half periods. The window is a third of that, and at least two repetitions.
 const LONGEST: usize = 192;
-/// Standard errors by which a Lyapunov exponent differs from zero.
-const SIGNIFICANT: f64 = 3.0;
 /// Largest uncertainty of an exponent that is called zero, per period.
 const ZERO: f64 = 2e-3;
 /// Share of captured impacts from which a chaotic motion is called modulated.

@@ -1,6 +1,11 @@
 //! The grid: all points, on all cores.
 
-use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use std::f64::consts::TAU;
+
+use rand_chacha::{
+    ChaCha8Rng,
+    rand_core::{Rng, SeedableRng},
+};
 use rayon::prelude::*;
 use serde::Serialize;
 use thiserror::Error;
@@ -13,7 +18,7 @@ use super::{
     run::Point,
 };
 use crate::Dimensionless;
-use crate::orbit::{BifurcationCurve, Limits, bifurcation_curves, random_state, stable_resonant};
+use crate::orbit::{BifurcationCurve, Limits, bifurcation_curves, stable_resonant};
 use crate::regime::Regime;
 use crate::theory::SlowFlow;
 
@@ -231,4 +236,17 @@ impl Map {
         let cells = || self.cells.iter().filter(|cell| cell.point.regime == regime);
         (cells().count(), cells().filter(|cell| cell.theory_stable).count())
     }
+}
+
+/// A random state with the particle inside its cavity: (q1, q1', q2, q2'), dimensionless.
+fn random_state(random: &mut impl Rng) -> [f64; 4] {
+    let mut uniform = || random.next_u64() as f64 / u64::MAX as f64;
+    let (size, phase) = (1.5 * uniform(), TAU * uniform());
+    let q1 = size * phase.sin();
+    [
+        q1,
+        size * phase.cos(),
+        q1 + 1.98 * (uniform() - 0.5),
+        4.0 * (uniform() - 0.5),
+    ]
 }

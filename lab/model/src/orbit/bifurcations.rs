@@ -2,7 +2,7 @@
 
 use serde::Serialize;
 
-use super::{Bifurcation, Branch, Condition, Exploration, Limits, Special, continue_both_ways, response};
+use super::{Bifurcation, Branch, Condition, Limits, Special, continue_both_ways, response};
 use crate::Dimensionless;
 use crate::numerics::equally_spaced;
 
@@ -23,11 +23,10 @@ const LEVELS: usize = 25;
 /// motions that cross one of 25 levels of G in `limits`.
 pub fn bifurcation_curves(scene: &Dimensionless, limits: &Limits) -> Vec<BifurcationCurve> {
     let mut found: Vec<BifurcationCurve> = Vec::new();
-    let exploration = Exploration { starts: 0, seed: 1, doublings: 1 };
     let [low, high] = limits.g;
     for g in equally_spaced(low, high, LEVELS).filter(|g| *g > 0.0) {
         let scene = Dimensionless { g, ..*scene };
-        for component in response(&scene, limits, exploration).components {
+        for component in response(&scene, limits, 1).components {
             if !component.branch.points[0].pattern.is_one_to_one() {
                 continue;
             }

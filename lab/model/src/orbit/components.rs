@@ -1,16 +1,12 @@
 //! The exact frequency response at one excitation: all of its components.
 //!
 //! Symmetric 1:1 motions have a closed form at every sigma, so that none is missed on the grid of detunings that is searched, both ends of
-//! the range and isolas between two of its detunings included. Motions of other patterns are reached by switching branches at symmetry breakings and period doublings,
-//! and by settling from random starts.
+//! the range and isolas between two of its detunings included. Motions of other patterns are reached by switching branches at symmetry
+//! breakings and period doublings; branches that are not connected with these are missed.
 
-use std::f64::consts::TAU;
-
-use rand_chacha::ChaCha8Rng;
-use rand_chacha::rand_core::{Rng, SeedableRng};
 use serde::Serialize;
 
-use super::settle::{LONGEST, settle};
+use super::settle::LONGEST;
 use super::{
     Bifurcation, Branch, Condition, ImpactPattern, Limits, Periodic, branch_off, continue_both_ways,
     search::least_excitation, symmetric_orbits,
@@ -26,13 +22,6 @@ pub struct Response {
     pub g: f64,
     /// Its components; those of one pattern are consecutive, symmetric 1:1 first.
     pub components: Vec<Component>,
-    /// Random starts from which motions were searched for.
-    pub starts: usize,
-    /// Those of them that settled on a periodic motion.
-    pub settled: usize,
-    /// Components that were found by a random start and by one only. Their number over that of the starts estimates (Good and Turing) the
-    /// probability that another start settles on a motion that is missing here.
-    pub found_once: usize,
 }
 
 /// A curve of motions that continuation follows without a break.
@@ -45,53 +34,19 @@ pub struct Component {
     pub branch: Branch,
 }
 
-/// How components of other patterns are searched for.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Exploration {
-    /// Number of random starts.
-    pub starts: usize,
-    /// Seed of their random numbers.
-    pub seed: u64,
-    /// Number of symmetry breakings and period doublings in a row that are followed.
-    pub doublings: usize,
-}
-
-impl Default for Exploration {
-    fn default() -> Self {
-        Self { starts: 2000, seed: 1, doublings: 3 }
-    }
-}
+/// Number of symmetry breakings and period doublings in a row that [`response`] usually follows.
+pub const DOUBLINGS: usize = 3;
 
 /// Detunings at which symmetric motions are computed, over the range.
 const GRID: usize = 1200;
-/// Periods after which a random start has settled.
-const SETTLED: usize = 600;
 /// Largest difference of two motions that are the same.
 const SAME: f64 = 1e-6;
 
-/// A random state with the particle inside its cavity: (q1, q1', q2, q2'), dimensionless.
-pub fn random_state(random: &mut impl Rng) -> [f64; 4] {
-    let mut uniform = || random.next_u64() as f64 / u64::MAX as f64;
-    let (size, phase) = (1.5 * uniform(), TAU * uniform());
-    let q1 = size * phase.sin();
-    [
-        q1,
-        size * phase.cos(),
-        q1 + 1.98 * (uniform() - 0.5),
-        4.0 * (uniform() - 0.5),
-    ]
-}
-
-/// The exact frequency response at the scene's G over the range of sigma in `limits`.
-pub fn response(scene: &Dimensionless, limits: &Limits, exploration: Exploration) -> Response {
+/// The exact frequency response at the scene's G over the range of sigma in `limits`: symmetric 1:1 motions, and what branches off them at
+/// `doublings` symmetry breakings and period doublings in a row.
+pub fn response(scene: &Dimensionless, limits: &Limits, doublings: usize) -> Response {
     let condition = Condition::Excitation(scene.g);
-    let mut search = Search {
-        scene,
-        limits,
-        condition,
-        doublings: exploration.doublings,
-        found: Vec::new(),
-    };
+    let mut search = Search { scene, limits, condition, doublings, found: Vec::new() };
     let [low, high] = limits.sigma;
     let grid: Vec<f64> = equally_spaced(low, high, GRID).collect();
     let least = |sigma: f64| least_excitation(scene, sigma);
@@ -103,28 +58,11 @@ pub fn response(scene: &Dimensionless, limits: &Limits, exploration: Exploration
     for sigma in grid.iter().copied().chain(narrow) {
         for orbit in symmetric_orbits(scene, sigma) {
             if let Some(motion) = orbit.periodic(scene, [Condition::Sigma(sigma), condition]) {
-                search.add(&motion, None);
+                search.add(&motion);
             }
         }
     }
-    let mut random = ChaCha8Rng::seed_from_u64(exploration.seed);
-    let mut settled = 0;
-    for _ in 0..exploration.starts {
-        let part = random.next_u64() as f64 / u64::MAX as f64;
-        let (sigma, state) = (low + part * (high - low), random_state(&mut random));
-        if let Ok(Some(motion)) = settle(scene, sigma, state, SETTLED) {
-            settled += 1;
-            search.add(&motion, Some(1));
-        }
-    }
-    let found_once = search.found.iter().filter(|one| one.hits == Some(1)).count();
-    Response {
-        g: scene.g,
-        components: search.named(),
-        starts: exploration.starts,
-        settled,
-        found_once,
-    }
+    Response { g: scene.g, components: search.named() }
 }
 
 struct Search<'a> {
@@ -132,31 +70,23 @@ struct Search<'a> {
     limits: &'a Limits,
     condition: Condition,
     doublings: usize,
-    found: Vec<Found>,
-}
-
-struct Found {
-    branch: Branch,
-    /// The starts that settled on it, if one of them found it.
-    hits: Option<usize>,
+    found: Vec<Branch>,
 }
 
 impl Search<'_> {
-    /// Follows the component of a motion, and those that branch off it, unless it is known.
-    fn add(&mut self, motion: &Periodic, hits: Option<usize>) {
-        if let Some(known) = self.found.iter_mut().find(|one| one.branch.passes(self.scene, motion)) {
-            known.hits = known.hits.map(|one| one + 1);
-        } else {
+    /// Follows the component of a motion, and those that branch off it, unless it was found before.
+    fn add(&mut self, motion: &Periodic) {
+        if !self.contains(motion) {
             let branch = continue_both_ways(self.scene, motion, self.condition, self.limits);
-            self.follow(branch, hits, 0);
+            self.follow(branch, 0);
         }
     }
 
-    fn known(&self, motion: &Periodic) -> bool {
-        self.found.iter().any(|one| one.branch.passes(self.scene, motion))
+    fn contains(&self, motion: &Periodic) -> bool {
+        self.found.iter().any(|branch| branch.passes(self.scene, motion))
     }
 
-    fn follow(&mut self, branch: Branch, hits: Option<usize>, depth: usize) {
+    fn follow(&mut self, branch: Branch, depth: usize) {
         let breaking = [Bifurcation::SymmetryBreaking, Bifurcation::PeriodDoubling];
         let specials: Vec<_> = branch
             .special
@@ -167,8 +97,8 @@ impl Search<'_> {
         // One that ended early, where continuation failed, may be a part of this one.
         let impacts = branch.points[0].pattern.impacts();
         let part = |old: &Branch| old.typical().all(|one| branch.passes(self.scene, one));
-        self.found.retain(|old| !part(&old.branch));
-        self.found.push(Found { branch, hits });
+        self.found.retain(|old| !part(old));
+        self.found.push(branch);
         if depth == self.doublings || 2 * impacts > LONGEST {
             return;
         }
@@ -177,14 +107,14 @@ impl Search<'_> {
                 continue;
             };
             // A branch that joins two such points is found from both.
-            if branch.points.len() > 1 && !branch.typical().all(|one| self.known(one)) {
-                self.follow(branch, None, depth + 1);
+            if branch.points.len() > 1 && !branch.typical().all(|motion| self.contains(motion)) {
+                self.follow(branch, depth + 1);
             }
         }
     }
 
     fn named(mut self) -> Vec<Component> {
-        let pattern = |one: &Found| one.branch.points[0].pattern.clone();
+        let pattern = |branch: &Branch| branch.points[0].pattern.clone();
         let order = |pattern: ImpactPattern| {
             (
                 pattern.periods() as usize * pattern.impacts(),
@@ -192,9 +122,9 @@ impl Search<'_> {
                 !pattern.mirrored,
             )
         };
-        self.found.sort_by_key(|one| order(pattern(one)));
-        let names: Vec<String> = self.found.iter().map(|one| pattern(one).name()).collect();
-        let components = self.found.into_iter().enumerate().map(|(n, Found { branch, .. })| {
+        self.found.sort_by_key(|branch| order(pattern(branch)));
+        let names: Vec<String> = self.found.iter().map(|branch| pattern(branch).name()).collect();
+        let components = self.found.into_iter().enumerate().map(|(n, branch)| {
             let of = names.iter().filter(|name| **name == names[n]).count();
             let number = names[..=n].iter().filter(|name| **name == names[n]).count();
             Component { name: format!("{}, {number} of {of}", names[n]), branch }

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use vines::orbit::{Branch, Ended, Orbit, Periodic, Response};
+use vines::orbit::{Branch, Ended, Orbit, Periodic};
 use vines::report::{Table, number, summary::parameters};
 use vines::{numerics::range, scene::Dimensionless};
 
@@ -22,23 +22,9 @@ pub(super) fn shown(
     })
 }
 
-/// What was searched for, and how likely it is that something is missing.
-pub(super) fn searched(found: &Response) -> String {
-    let Response { starts, settled, found_once, .. } = found;
-    let mut text: String =
-        "Complete: symmetric 1:1 motions and what branches off them. Other patterns: only those that random starts lead to.\n"
-            .into();
-    if *starts > 0 {
-        let percent = 100.0 * (*found_once).max(1) as f64 / *starts as f64;
-        let about = if *found_once == 0 { "below" } else { "about" };
-        let _ = writeln!(
-            text,
-            "{settled} of {starts} random starts settle on these; components found by one start only: {found_once}. A further start leads \
-             to a\nmotion that is missing here with a probability of {about} {percent:.2} %."
-        );
-    }
-    text
-}
+/// What `--response` searches for.
+pub(super) const SEARCHED: &str = "Complete: symmetric 1:1 motions and what branches off them. Isolated branches of other patterns are missed; \
+    --sigma follows the\none that a start leads to.\n";
 
 /// The motion and the states after its impacts.
 pub(super) fn described(pattern: &str, motion: &Periodic) -> String {

@@ -1,7 +1,7 @@
 //! Exact frequency responses and backbone, and one period of the locked motion.
 
 use crate::orbit::{
-    Branch, Component, Condition, Exploration, ImpactPattern, Limits, Periodic, Response, backbone, response,
+    Branch, Component, Condition, DOUBLINGS, ImpactPattern, Limits, Periodic, Response, backbone, response,
     stable_resonant,
 };
 use crate::report::figures::{period, responses};
@@ -18,7 +18,7 @@ pub(super) fn make(subject: &Subject, done: &(dyn Fn(f64) + Sync)) -> Result<Sec
     let excitations = excitations(&p);
     let mut found: Vec<Response> = Vec::new();
     for (n, g) in excitations.iter().enumerate() {
-        found.push(response(&Dimensionless { g: *g, ..p }, &limits, Exploration::default()));
+        found.push(response(&Dimensionless { g: *g, ..p }, &limits, DOUBLINGS));
         done((n + 1) as f64 / (excitations.len() + 1) as f64);
     }
     let Some(curve) = backbone(&p, &limits) else {
