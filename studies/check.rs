@@ -77,10 +77,8 @@ fn main() -> Result<(), Failure> {
         let found = check(&mut *Simulated::of(&healthy)?, &scene)?;
         if let Some(linear) = found.linear {
             passed += 1;
-            let (gain, damping) = (
-                0.5 * healthy.plant.natural_frequency(),
-                0.5 * healthy.plant.damping / healthy.plant.primary_mass,
-            );
+            let gain = 0.5 * healthy.plant.natural_frequency();
+            let damping = 0.5 * healthy.plant.damping / healthy.plant.primary_mass;
             let integral = Gains::from_bandwidth(linear.bandwidth, damping).integral;
             errors[0].push((linear.gains[1] / integral - 1.0).abs());
             errors[1].push((linear.response_gain / gain - 1.0).abs());

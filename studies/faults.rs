@@ -59,6 +59,8 @@ fn main() -> Result<(), Failure> {
         (settled, released - settled - 1.0, false),
         (locked, 0.5 * (tracked - locked), true),
     ];
+    let title = Some(settings.join(" ")).filter(|title| !title.is_empty());
+    let title = title.unwrap_or_else(|| "default".into());
     let row = |(name, fault): (&str, RigFault)| {
         let mut missed = 0;
         let times = stages.map(|(from, length, tracks)| {
@@ -73,18 +75,9 @@ fn main() -> Result<(), Failure> {
             }
             format!("{:.1}", 1e3 * longest)
         });
-        let chain = if settings.is_empty() {
-            "default".into()
-        } else {
-            settings.join(" ")
-        };
-        format!("{chain},{instants},{name},{},{missed}", times.join(","))
+        format!("{title},{instants},{name},{},{missed}", times.join(","))
     };
     let rows: Vec<String> = RigFault::ALL.into_par_iter().map(row).collect();
-    write(
-        "faults",
-        "scene,instants,fault,locking_ms,holding_ms,tracking_ms,missed",
-        3,
-        &rows,
-    )
+    let header = "scene,instants,fault,locking_ms,holding_ms,tracking_ms,missed";
+    write("faults", header, 3, &rows)
 }

@@ -119,7 +119,7 @@ impl Comparison {
 }
 
 /// The orbit that is nearest to a lock.
-pub(crate) fn nearest(orbits: &[Orbit], lock: &Lock) -> Option<Orbit> {
+fn nearest(orbits: &[Orbit], lock: &Lock) -> Option<Orbit> {
     let distance = |one: &Orbit| (one.sigma - lock.at.sigma).hypot(one.c - lock.at.c);
     orbits
         .iter()
