@@ -41,7 +41,7 @@ impl Config {
             filter: LoopFilter::new(&self),
             drive,
             amplitude_loop: AmplitudeLoop::new(&self, &drive),
-            stationarity: Stationarity::new(&self.lock),
+            stationarity: Stationarity::new(&self),
             config: self,
         })
     }
@@ -207,7 +207,7 @@ impl PhaseLock {
                 integral: state.frequency.integral.get(),
                 omega: state.frequency.omega,
                 amplitude: state.channels.response.amplitude(),
-                residuals: state.channels.residuals(),
+                residual_power: state.channels.response.residual_power(),
                 valid: measured.valid,
             };
             state.lost = self.stationarity.update(&mut state.dwell, &reading, period_ends);

@@ -49,6 +49,11 @@ impl Estimate {
         self.amplitude
     }
 
+    /// Mean square of the residual, m².
+    pub fn residual_power(&self) -> Real {
+        self.residual_power
+    }
+
     /// Power of the fundamental over the sum of itself and the residual power; 0 for a zero signal.
     pub fn coherence(&self) -> Real {
         let (power, total) = self.powers();

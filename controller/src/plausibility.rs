@@ -10,11 +10,6 @@ use crate::real::{Real, larger, smaller};
 
 /// Time in the closed loop before the check begins, in time constants of the detector, and in turns.
 const WARM_UP: [Real; 2] = [6.0, 10.0];
-/// Ratio of the drive to the drive with the lag of the detector, or its inverse, from which the drive changes fast, and turns for which
-/// its sensor may differ more after that, by this share of the larger amplitude.
-const FAST: Real = 1.2;
-const SETTLES: Real = 4.0;
-const SLACK: Real = 0.8;
 /// Phase, rad, after which a reading that does not change at all needs a smaller difference: this share of the limit. Shorter pauses are
 /// those of a connection that loses a few samples. An implausible reading that no other follows within this phase is a glitch.
 const PAUSE: Real = TAU / 12.0;
@@ -52,8 +47,6 @@ pub struct Differences {
     phase: Real,
     /// Phase for which each channel has been distorted, rad.
     distorted: [Real; 2],
-    /// Phase since the amplitude of each channel changed fast, rad.
-    steady: [Real; 2],
     /// What the last readings of the channels were.
     found: [Found; 2],
     /// Phase since the last implausible reading of each channel, rad.
@@ -112,18 +105,16 @@ impl Plausibility {
             // A fault may have begun at the end of the last period.
             let normal = NORMAL * smaller(*last, *before);
             if let Some(limit) = self.limit {
-                let fast = !(1.0 / FAST..FAST).contains(&change);
-                let [steady, distorted] = [&mut state.steady[n], &mut state.distorted[n]];
-                *steady = if fast { 0.0 } else { *steady + turn };
-                let settled = *steady > SETTLES * TAU;
-                let clear = !settled || estimate.harmonics_within(DISTORTION * limit * amplitude, self.harmonics);
+                // What the drive has changed and the detector has still to learn.
+                let lag = (change - 1.0).abs();
+                let distorted = &mut state.distorted[n];
+                let clear = estimate.harmonics_within((DISTORTION * limit + lag) * amplitude, self.harmonics);
                 *distorted = if clear { 0.0 } else { *distorted + turn };
-                let slack = if settled { 0.0 } else { SLACK * larger(change, 1.0) };
-                let expected = (share * limit * change + slack) * amplitude + normal;
+                let expected = (share * limit * change + lag) * amplitude + normal;
                 // The base follows the drive at once; the response grows, and its detector lags.
                 let is_known = n == BASE || closed > self.warm_up;
                 state.since[n] += turn;
-                if is_known && (difference > expected || *distorted > LASTS * TAU) {
+                if is_known && (difference > expected || state.distorted[n] > LASTS * TAU) {
                     state.found[n] = if state.since[n] > PAUSE {
                         Found::Glitch
                     } else {

@@ -16,10 +16,6 @@ const UNCHANGED: Real = FRAC_PI_3;
 /// Smallest valid amplitude of the reference, as a share of the drive amplitude.
 const REFERENCE_SHARE: Real = 0.1;
 
-/// Samples after which noise has no correlation any more, not even behind an anti-alias filter at ten times the frequency, if there are a
-/// hundred in a period.
-const LAG: usize = 5;
-
 /// Coefficients of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
@@ -52,8 +48,6 @@ pub struct Channels {
     /// Estimate of the response.
     pub response: Estimate,
     reference: Estimate,
-    /// Differences of the last readings of the response from their predictions, m; the present one first.
-    residuals: [Real; LAG + 1],
     /// The drive with the lag of the detector, m.
     drive: Real,
     differences: Differences,
@@ -103,13 +97,6 @@ struct Reference {
     /// m
     amplitude: Real,
     valid: bool,
-}
-
-impl Channels {
-    /// Difference of the last reading of the response from its prediction, m, and that of an earlier one.
-    pub fn residuals(&self) -> [Real; 2] {
-        [self.residuals[0], self.residuals[LAG]]
-    }
 }
 
 impl Sensing {
@@ -248,8 +235,6 @@ impl Sensing {
         );
         // The detectors ignore a glitch.
         let [of_response, of_base] = self.plausibility.glitches(&state.differences);
-        let [a, b, c, d, e, _] = state.residuals;
-        state.residuals = [if of_response { 0.0 } else { difference }, a, b, c, d, e];
         if of_response {
             state.response = before[0];
         }
