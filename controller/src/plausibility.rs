@@ -3,24 +3,19 @@
 
 use crate::real::consts::TAU;
 
-use crate::balance::{Balance, BalanceState, Powers};
+use crate::balance::{Balance, BalanceState, GROWING, Powers};
 use crate::config::Config;
 use crate::detector::Estimate;
+use crate::drive::PresentDrive;
 use crate::real::{Real, larger, smaller};
 
-/// Time in the closed loop before the check begins, in time constants of the detector, and in turns.
-const WARM_UP: [Real; 2] = [6.0, 10.0];
-/// Phase, rad, after which a reading that does not change at all needs a smaller difference: this share of the limit. Shorter pauses are
-/// those of a connection that loses a few samples. An implausible reading that no other follows within this phase is a glitch.
-const PAUSE: Real = TAU / 12.0;
-const PAUSE_SHARE: Real = 0.15;
-/// Differences that count as normal, in units of the largest one of a period.
+/// Phase, rad, after which a reading that has not changed is no gap of a connection, and within which a second implausible reading is no glitch.
+pub const PAUSE: Real = TAU / 12.0;
+/// Differences that count as normal, in units of the largest one of a period: noise of twice the size is too rare.
 const NORMAL: Real = 2.0;
-
-/// Sum of the amplitudes of all harmonics above the fundamental, as a share of the limit, above which a sensor saturates, and turns for
-/// which it must last: a change of the drive disturbs the harmonics for one or two.
+/// Sum of the amplitudes of all harmonics above the fundamental, as a share of the limit, above which a sensor saturates: clipping at half of
+/// the amplitude makes 0.27 of the fundamental.
 const DISTORTION: Real = 0.5;
-const LASTS: Real = 5.0;
 
 /// Number of the channel of the base.
 const BASE: usize = 1;
@@ -31,10 +26,10 @@ const BASE: usize = 1;
 pub struct Plausibility {
     /// Largest difference beyond the normal one, as a share of the amplitude.
     limit: Option<Real>,
-    /// s
+    /// Time in the closed loop before the response is known, s.
     warm_up: Real,
-    /// Harmonics that the detectors use.
-    harmonics: usize,
+    /// Time constant of the detector, s.
+    detector: Real,
     balance: Balance,
 }
 
@@ -45,7 +40,7 @@ pub struct Differences {
     largest: [[Real; 3]; 2],
     /// Phase since the start of the period, rad.
     phase: Real,
-    /// Phase for which each channel has been distorted, rad.
+    /// Time for which each channel has been distorted, s.
     distorted: [Real; 2],
     /// What the last readings of the channels were.
     found: [Found; 2],
@@ -71,24 +66,25 @@ impl Plausibility {
     pub fn new(config: &Config) -> Self {
         Self {
             limit: config.residual_max,
-            warm_up: (WARM_UP[0] / config.bandwidth).max(WARM_UP[1] * TAU / config.omega_start),
-            harmonics: config.harmonics.into(),
+            // A transient of the detector has decayed to exp(-2 pi), 0.2 %.
+            warm_up: larger(TAU / config.bandwidth, GROWING * TAU / config.omega_start),
+            detector: 1.0 / config.bandwidth,
             balance: Balance::new(config),
         }
     }
 
     /// Takes differences between readings and their predictions, m, the estimates, the factors by which the amplitude has
-    /// changed since, and the times for which the readings have not changed, s. `omega` in rad/s; `closed`: time in the closed loop, s.
+    /// changed since, and the times for which the readings have not changed, s. `closed`: time in the closed loop, s.
     pub fn take(
         &self,
         state: &mut Differences,
         differences: [(Real, &Estimate, Real); 2],
         unchanged: [Real; 2],
-        omega: Real,
+        drive: PresentDrive,
         sample_time: Real,
         closed: Real,
     ) {
-        let turn = omega * sample_time;
+        let turn = drive.omega * sample_time;
         state.phase += turn;
         if state.phase >= TAU {
             state.phase = 0.0;
@@ -99,22 +95,21 @@ impl Plausibility {
         state.found = [Found::Plausible; 2];
         for (n, [now, last, before]) in state.largest.iter_mut().enumerate() {
             let (difference, estimate, change) = differences[n];
-            let amplitude = estimate.amplitude();
-            let share = if unchanged[n] * omega > PAUSE { PAUSE_SHARE } else { 1.0 };
+            let amplitude = estimate.amplitude;
+            let share = if unchanged[n] * drive.omega > PAUSE { 0.0 } else { 1.0 };
             let difference = difference.abs();
             // A fault may have begun at the end of the last period.
             let normal = NORMAL * smaller(*last, *before);
             if let Some(limit) = self.limit {
                 // What the drive has changed and the detector has still to learn.
                 let lag = (change - 1.0).abs();
-                let distorted = &mut state.distorted[n];
-                let clear = estimate.harmonics_within((DISTORTION * limit + lag) * amplitude, self.harmonics);
-                *distorted = if clear { 0.0 } else { *distorted + turn };
+                let clear = estimate.harmonics_within((DISTORTION * limit + lag) * amplitude);
+                state.distorted[n] = if clear { 0.0 } else { state.distorted[n] + sample_time };
                 let expected = (share * limit * change + lag) * amplitude + normal;
                 // The base follows the drive at once; the response grows, and its detector lags.
                 let is_known = n == BASE || closed > self.warm_up;
                 state.since[n] += turn;
-                if is_known && (difference > expected || state.distorted[n] > LASTS * TAU) {
+                if is_known && (difference > expected || state.distorted[n] > self.detector) {
                     state.found[n] = if state.since[n] > PAUSE {
                         Found::Glitch
                     } else {

@@ -1,20 +1,14 @@
 //! The measurements of a sample: phase error, amplitudes, and whether they are valid.
 
-use crate::real::consts::FRAC_PI_3;
-
-use crate::angle::Complex;
 use crate::balance::Powers;
 use crate::config::Config;
 use crate::detector::{Estimate, PhaseDetector};
-use crate::plausibility::{Differences, Plausibility};
+use crate::drive::PresentDrive;
+use crate::oscillator::Complex;
+use crate::plausibility::{Differences, PAUSE, Plausibility};
 use crate::real::{self, Real};
 use crate::signals::Input;
 use crate::supervisor::Fault;
-
-/// Phase, rad, for which no signal of more than eight steps of its converter stays the same.
-const UNCHANGED: Real = FRAC_PI_3;
-/// Smallest valid amplitude of the reference, as a share of the drive amplitude.
-const REFERENCE_SHARE: Real = 0.1;
 
 /// Coefficients of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -62,17 +56,6 @@ pub struct Channels {
     seen: bool,
 }
 
-/// The drive in the present sample.
-#[derive(Clone, Copy, Debug)]
-pub struct PresentDrive {
-    /// `exp(i phase)` of the oscillator.
-    pub rotor: Complex,
-    /// Frequency, rad/s.
-    pub omega: Real,
-    /// Amplitude, m.
-    pub amplitude: Real,
-}
-
 /// Measurements of a sample.
 #[derive(Clone, Copy, Debug)]
 pub struct Measurement {
@@ -113,7 +96,7 @@ impl Sensing {
             sample_time: config.sample_time,
             signal_timeout: config.signal_timeout,
             plausibility: Plausibility::new(config),
-            detector_step: -real::expm1(-config.bandwidth * config.sample_time),
+            detector_step: config.step(config.bandwidth),
         }
     }
 
@@ -132,12 +115,12 @@ impl Sensing {
             self.predict(state, input.response, channel, drive);
         }
         let reference = if channel.is_some() {
-            self.measured_reference(&state.reference, drive)
+            self.measured_reference(&state.reference)
         } else {
             self.internal_reference(drive)
         };
         let response = &state.response;
-        let amplitude = response.amplitude();
+        let amplitude = response.amplitude;
         // One function of an angle instead of three: the response in the frame of the reference, turned back by the target.
         let size = amplitude * reference.amplitude;
         let measurable = size >= Real::MIN_POSITIVE;
@@ -188,7 +171,7 @@ impl Sensing {
         state.seen |= measured.valid;
         state.closed += self.sample_time;
         state.invalid = self.longer(state.invalid, !measured.valid);
-        if state.seen && state.unchanged.iter().any(|time| time * omega > UNCHANGED) {
+        if state.seen && state.unchanged.iter().any(|time| time * omega > 2.0 * PAUSE) {
             Some(Fault::Sensor)
         } else if state.seen && self.plausibility.refuses(&state.differences) {
             Some(Fault::Implausible)
@@ -229,7 +212,7 @@ impl Sensing {
             &mut state.differences,
             seen,
             state.unchanged,
-            drive.omega,
+            drive,
             self.sample_time,
             state.closed,
         );
@@ -259,12 +242,12 @@ impl Sensing {
         }
     }
 
-    fn measured_reference(&self, estimate: &Estimate, drive: PresentDrive) -> Reference {
-        let amplitude = estimate.amplitude();
+    fn measured_reference(&self, estimate: &Estimate) -> Reference {
+        let amplitude = estimate.amplitude;
         Reference {
             fundamental: estimate.fundamental(),
             amplitude,
-            valid: amplitude >= REFERENCE_SHARE * drive.amplitude && self.is_coherent(estimate),
+            valid: self.is_coherent(estimate),
         }
     }
 

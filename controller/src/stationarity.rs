@@ -12,8 +12,9 @@ use crate::real::{self, Real, Sum, larger, smaller};
 
 /// Blocks of the dwell, which moves on by one of them.
 const BLOCKS: usize = 4;
-/// Range of noise in a dwell, in standard deviations: twenty normal values exceed it with a probability of 5 % (studentised range).
-const NOISE_RANGE: Real = 5.0;
+/// Range of noise in a dwell, in standard deviations: ten independent normal values exceed it with a probability of 5 % (studentised range).
+/// The detector correlates about two of the twenty periods of a dwell.
+const NOISE_RANGE: Real = 4.5;
 
 /// Coefficients of the criterion.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -18,15 +18,11 @@ fn amplitude_loop(amplitude_max: f64) -> AmplitudeLoop {
         damping_rate: Some(DELTA),
         response_gain: GAIN,
         sample_time: DT,
+        amplitude_max: Some(amplitude_max),
+        ramp_rate: None,
         ..Config::for_resonance(1.0, 0.0)
     };
-    let drive = Drive {
-        amplitude_max,
-        ramp_step: f64::INFINITY,
-        release_step: f64::INFINITY,
-        control_step: 0.0,
-    };
-    AmplitudeLoop::new(&config, &drive)
+    AmplitudeLoop::new(&config)
 }
 
 impl Structure {
