@@ -30,7 +30,7 @@ const SHARE: Real = 0.5;
 const DAMPING: Real = 0.1;
 
 /// Periods in which the response of a rig at rest grows, before impacts have taken half of the work. Then it can be predicted.
-pub const GROWING: Real = 10.0;
+pub const GROWING: Real = 8.0;
 
 /// Coefficients of the balance.
 #[derive(Clone, Copy, Debug, PartialEq)]
