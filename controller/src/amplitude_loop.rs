@@ -110,7 +110,7 @@ pub struct AmplitudeState {
     /// Growth in the last sample, m.
     growth: Real,
     /// Present setpoint of the response amplitude, m.
-    setpoint: Real,
+    pub setpoint: Real,
     /// Reading of the detector that the setpoint leads to, m.
     expected: Real,
     /// Integral part of the drive, m.
@@ -147,11 +147,6 @@ impl AmplitudeState {
             self.setpoint = trajectory.response;
             self.integral += trajectory.amplitude;
         }
-    }
-
-    /// Present setpoint of the response amplitude, m.
-    pub fn setpoint(&self) -> Real {
-        self.setpoint
     }
 
     /// Whether the trajectory has ended.

@@ -366,18 +366,19 @@ impl Range {
     /// Whether the range contains the number.
     #[must_use]
     pub fn contains(self, number: Real) -> bool {
+        let is_positive = number >= 1.0 / LARGEST;
+        let is_whole = |highest: Real| number >= 1.0 && number <= highest;
         number.abs() <= LARGEST
             && match self {
-                Self::Positive => number >= 1.0 / LARGEST,
+                Self::Positive => is_positive,
                 Self::NotNegative => number >= 0.0,
-                Self::Optional => number >= 1.0 / LARGEST || number == NONE,
-                Self::Signed => true,
+                Self::Optional => is_positive || number == NONE,
+                Self::Signed | Self::Boolean => true,
                 Self::Angle => number.abs() <= PI,
                 Self::Share => number > 0.0 && number < 1.0,
                 Self::Detector => number == 1.0 || number == 2.0,
-                Self::Harmonics => (1.0..=MAX_HARMONICS as Real).contains(&number),
-                Self::Dwell => (1.0..=1e6).contains(&number),
-                Self::Boolean => true,
+                Self::Harmonics => is_whole(MAX_HARMONICS as Real),
+                Self::Dwell => is_whole(1e6),
             }
     }
 

@@ -25,7 +25,7 @@ pub struct PhaseLock {
 }
 
 /// The state, which changes with every sample. A copy that is restored later continues with the same bits.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct State {
     oscillator: Oscillator,
@@ -45,26 +45,6 @@ pub struct State {
     acquiring: u64,
     /// Drive amplitude and phase target to which the dwell applies.
     tuning: (Real, Real),
-}
-
-impl State {
-    /// The state before the first sample.
-    fn new(omega_start: Real, tuning: (Real, Real)) -> Self {
-        Self {
-            oscillator: Oscillator::default(),
-            channels: Channels::default(),
-            frequency: Frequency::at(omega_start),
-            drive: DriveState::default(),
-            amplitude_loop: None,
-            dwell: Dwell::default(),
-            loop_state: LoopState::Idle,
-            fault: None,
-            ready: false,
-            lost: false,
-            acquiring: 0,
-            tuning,
-        }
-    }
 }
 
 impl Config {
@@ -95,7 +75,11 @@ impl PhaseLock {
     /// The state before the first sample.
     #[must_use]
     pub fn start(&self) -> State {
-        State::new(self.config.omega_start, self.tuning())
+        State {
+            frequency: Frequency::at(self.config.omega_start),
+            tuning: self.tuning(),
+            ..State::default()
+        }
     }
 
     /// The output before the first sample: no drive, no measurements.
@@ -129,7 +113,7 @@ impl PhaseLock {
                 allowed: "2 (acquiring) or 3 (locked): the response amplitude can be controlled only in a closed loop",
             });
         }
-        let (reading, drive) = (state.channels.response.amplitude, state.drive.amplitude);
+        let (reading, drive) = (state.channels.response.estimate.amplitude, state.drive.amplitude);
         state
             .amplitude_loop
             .get_or_insert(AmplitudeState::constant(reading, drive))
@@ -154,7 +138,7 @@ impl PhaseLock {
         };
         let measured = self.sensing.measure(&mut state.channels, &input, drive);
         let watched = if state.loop_state.is_closed() {
-            self.sensing.watch(&mut state.channels, &measured, drive.omega)
+            self.sensing.watch(&mut state.channels, &measured)
         } else {
             self.sensing.stop_watching(&mut state.channels);
             None
@@ -181,7 +165,7 @@ impl PhaseLock {
             active,
             fault,
             ready: state.ready,
-            settled: state.dwell.settled(),
+            settled: state.dwell.settled,
             lost: state.lost,
             timed_out: timeout.is_some_and(|timeout| elapsed >= timeout),
         });
@@ -237,7 +221,7 @@ impl PhaseLock {
         } else {
             filter.hold(&mut state.frequency);
         }
-        let reading = state.channels.response.amplitude;
+        let reading = state.channels.response.estimate.amplitude;
         // Up to here a larger drive gives a larger response.
         let near = measured.valid && measured.error.abs() < FRAC_PI_2;
         let before = state.drive.amplitude;
@@ -270,8 +254,8 @@ impl PhaseLock {
                 error: measured.error,
                 integral: state.frequency.integral.get(),
                 omega: state.frequency.omega,
-                amplitude: state.channels.response.amplitude,
-                residual_power: state.channels.response.residual_power,
+                amplitude: state.channels.response.estimate.amplitude,
+                residual_power: state.channels.response.estimate.residual_power,
                 valid: measured.valid,
             };
             state.lost = self.stationarity.update(&mut state.dwell, &reading, period_ends);
@@ -281,8 +265,8 @@ impl PhaseLock {
     /// The output of a sample.
     fn output(&self, state: &State, measured: &Measurement, drive: Real) -> Output {
         let omega = state.frequency.omega;
-        let response_amplitude = state.channels.response.amplitude;
-        let means = state.dwell.means();
+        let response_amplitude = state.channels.response.estimate.amplitude;
+        let means = state.dwell.means;
         let (frequency, response_mean) = means.unwrap_or((omega, response_amplitude));
         Output {
             omega,
@@ -290,14 +274,14 @@ impl PhaseLock {
             drive,
             phase_error: measured.measurable.then_some(measured.error),
             response_amplitude,
-            response_target: state.amplitude_loop.map(|l| l.setpoint()),
+            response_target: state.amplitude_loop.map(|l| l.setpoint),
             reference_amplitude: measured.reference_amplitude,
-            coherence: state.channels.response.coherence(),
+            coherence: state.channels.response.estimate.coherence(),
             // Rounding can move the mean of values at a limit beyond the limit.
             frequency: limited(frequency, self.config.omega_min, self.config.omega_max),
             response_mean,
             locked: state.loop_state == LoopState::Locked,
-            settled: state.dwell.settled() && state.tuning == self.tuning(),
+            settled: state.dwell.settled && state.tuning == self.tuning(),
             state: state.loop_state,
             fault: state.fault,
         }

@@ -49,6 +49,7 @@
 
 mod amplitude_loop;
 mod balance;
+mod channel;
 mod config;
 mod controller;
 mod detector;
@@ -56,7 +57,6 @@ mod drive;
 mod gains;
 mod loop_filter;
 mod oscillator;
-mod plausibility;
 mod real;
 mod sensing;
 mod signals;

@@ -20,7 +20,7 @@ pub struct LoopFilter {
 }
 
 /// State of the loop filter.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Frequency {
     /// Centre frequency and integral part, rad/s.

@@ -17,7 +17,7 @@ pub struct Input {
 }
 
 /// Drive until the next sample, and the controller's estimates.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Output {
     /// Drive frequency, rad/s; always between `omega_min` and `omega_max`.
@@ -56,22 +56,7 @@ impl Output {
     /// The output before the first sample: no drive, no measurements.
     #[must_use]
     pub fn idle(omega: Real) -> Self {
-        Self {
-            omega,
-            amplitude: 0.0,
-            drive: 0.0,
-            phase_error: None,
-            response_amplitude: 0.0,
-            response_target: None,
-            reference_amplitude: 0.0,
-            coherence: 0.0,
-            frequency: omega,
-            response_mean: 0.0,
-            locked: false,
-            settled: false,
-            state: LoopState::Idle,
-            fault: None,
-        }
+        Self { omega, frequency: omega, ..Self::default() }
     }
 }
 

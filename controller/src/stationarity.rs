@@ -101,8 +101,10 @@ pub struct Dwell {
     period: Period,
     block: Block,
     complete: [Block; BLOCKS],
-    means: Option<(Real, Real)>,
-    settled: bool,
+    /// Means over the complete blocks: frequency, rad/s, and response amplitude, m.
+    pub means: Option<(Real, Real)>,
+    /// Whether the criterion is met.
+    pub settled: bool,
 }
 
 impl Dwell {
@@ -110,16 +112,6 @@ impl Dwell {
     #[inline(never)]
     pub fn restart(&mut self) {
         *self = Self::default();
-    }
-
-    /// Whether the criterion is met.
-    pub fn settled(&self) -> bool {
-        self.settled
-    }
-
-    /// Means over the complete blocks: frequency, rad/s, and response amplitude, m.
-    pub fn means(&self) -> Option<(Real, Real)> {
-        self.means
     }
 }
 

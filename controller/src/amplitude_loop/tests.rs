@@ -47,7 +47,7 @@ fn worst(to: Move, skipped: usize) -> f64 {
         let (drive, _) = control.follow(&mut state, 0.0, Some(structure.reading));
         structure.advance(drive);
         if n >= skipped {
-            worst = worst.max((structure.a - state.setpoint()).abs());
+            worst = worst.max((structure.a - state.setpoint).abs());
         }
     }
     assert!(state.has_arrived() && (structure.a - to.response).abs() < 1e-9);
@@ -104,9 +104,9 @@ fn a_move_with_a_growth_goes_on_at_that_rate_until_the_next_one() {
         state.start(to, DT);
         let mut rates = [f64::INFINITY, f64::NEG_INFINITY];
         for n in 0..samples {
-            let before = state.setpoint();
+            let before = state.setpoint;
             control.follow(&mut state, 0.0, Some(1.0));
-            let rate = (state.setpoint() - before) / DT;
+            let rate = (state.setpoint - before) / DT;
             if n >= skipped {
                 rates = [rates[0].min(rate), rates[1].max(rate)];
             }

@@ -28,7 +28,7 @@ fn periods_to_settle(reading: impl Fn(f64) -> Reading) -> Option<u32> {
             let periods = f64::from(*period) + f64::from(sample) / 10.0;
             CRITERION.update(&mut dwell, &reading(periods), sample == 9);
         }
-        dwell.settled()
+        dwell.settled
     })
 }
 
