@@ -14,10 +14,7 @@
 
 use crate::real::consts::TAU;
 
-use crate::config::Config;
-use crate::drive::Drive;
-use crate::error::{ConfigError, Quantity};
-use crate::range::Range;
+use crate::config::{Config, ConfigError, Range};
 use crate::real::{self, Real};
 
 /// Lowest drive, as a share of its integral part.
@@ -40,7 +37,7 @@ pub struct AmplitudeLoop {
     /// Largest change of the drive amplitude per sample, m.
     max_change: Real,
     /// s
-    sample_time: Real,
+    pub sample_time: Real,
 }
 
 /// A change of the response amplitude's setpoint.
@@ -65,22 +62,36 @@ impl Move {
     /// # Errors
     /// An invalid value, or a drive without a limit (`amplitude_max`).
     pub fn check(&self, config: &Config) -> Result<(), ConfigError> {
-        Quantity::new("response", self.response, "m").within(Range::Positive)?;
-        Quantity::new("duration", self.duration, "s").within(Range::NotNegative)?;
-        Quantity::new("amplitude", self.amplitude, "m").within(Range::Signed)?;
-        Quantity::new("omega", self.omega, "rad/s").within(Range::Signed)?;
-        Quantity::new("growth", self.growth, "m/s").within(Range::Signed)?;
-        if config.amplitude_max.is_none() {
-            return Err(ConfigError {
+        let values = [
+            (self.response, Range::Positive),
+            (self.duration, Range::NotNegative),
+            (self.amplitude, Range::Signed),
+            (self.omega, Range::Signed),
+            (self.growth, Range::Signed),
+        ];
+        for ((name, unit), (value, range)) in MOVE.into_iter().zip(values) {
+            range.check(name, value, unit)?;
+        }
+        match config.amplitude_max {
+            Some(_) => Ok(()),
+            None => Err(ConfigError {
                 name: "amplitude_max",
                 value: None,
                 unit: "m",
                 allowed: "above 0 to control the response amplitude: the drive needs a limit",
-            });
+            }),
         }
-        Ok(())
     }
 }
+
+/// The fields of a [`Move`], with their units.
+pub const MOVE: [(&str, &str); 5] = [
+    ("response", "m"),
+    ("duration", "s"),
+    ("amplitude", "m"),
+    ("omega", "rad/s"),
+    ("growth", "m/s"),
+];
 
 /// State of the loop while it controls the response.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -99,7 +110,7 @@ pub struct AmplitudeState {
     /// Growth in the last sample, m.
     growth: Real,
     /// Present setpoint of the response amplitude, m.
-    setpoint: Real,
+    pub setpoint: Real,
     /// Reading of the detector that the setpoint leads to, m.
     expected: Real,
     /// Integral part of the drive, m.
@@ -138,11 +149,6 @@ impl AmplitudeState {
         }
     }
 
-    /// Present setpoint of the response amplitude, m.
-    pub fn setpoint(&self) -> Real {
-        self.setpoint
-    }
-
     /// Whether the trajectory has ended.
     pub fn has_arrived(&self) -> bool {
         self.taken == self.samples
@@ -177,31 +183,19 @@ fn smooth(x: Real, [begin, end]: [Real; 2]) -> Real {
 }
 
 impl AmplitudeLoop {
-    /// The loop of a configuration and its drive.
-    pub fn new(config: &Config, drive: &Drive) -> Self {
+    /// The loop of a configuration.
+    pub fn new(config: &Config) -> Self {
         let gains = config.gains();
         let (gain, sample_time) = (config.response_gain, config.sample_time);
         Self {
             proportional: gains.proportional / gain,
             integral: gains.integral * sample_time / gain,
             feedforward: 1.0 / (gain * sample_time),
-            detector_step: -real::expm1(-config.bandwidth * sample_time),
-            amplitude_max: drive.amplitude_max,
-            max_change: drive.ramp_step,
+            detector_step: config.step(config.bandwidth),
+            amplitude_max: config.amplitude_limit(),
+            max_change: config.change(config.ramp_rate),
             sample_time,
         }
-    }
-
-    /// Whether no gain overflows.
-    pub fn is_finite(&self) -> bool {
-        [self.proportional, self.integral, self.feedforward]
-            .iter()
-            .all(|gain| gain.is_finite())
-    }
-
-    /// Sample time, s.
-    pub fn sample_time(&self) -> Real {
-        self.sample_time
     }
 
     /// One sample. `reading` is the measured response amplitude, m, or `None` if it is not valid: then only the feedforward

@@ -1,19 +1,15 @@
 //! The controller: one function per sample.
 
-mod closed_loop;
-mod output;
-
 use crate::amplitude_loop::{AmplitudeLoop, AmplitudeState, Move};
-use crate::config::Config;
-use crate::drive::Drive;
-use crate::error::{ConfigError, Quantity};
-use crate::gains::Gains;
-use crate::loop_filter::LoopFilter;
-use crate::real::Real;
-use crate::sensing::{Measurement, PresentDrive, Sensing};
+use crate::config::{Config, ConfigError};
+use crate::drive::{Drive, DriveState, PresentDrive};
+use crate::loop_filter::{Frequency, LoopFilter};
+use crate::oscillator::Oscillator;
+use crate::real::consts::FRAC_PI_2;
+use crate::real::{Real, limited};
+use crate::sensing::{Channels, Measurement, Sensing};
 use crate::signals::{Input, Output};
-use crate::state::State;
-use crate::stationarity::{Reading, Stationarity};
+use crate::stationarity::{Dwell, Reading, Stationarity};
 use crate::supervisor::{Conditions, Fault, LoopState};
 
 /// A checked configuration and its coefficients; only [`PhaseLock::retune`] changes it.
@@ -28,6 +24,29 @@ pub struct PhaseLock {
     stationarity: Stationarity,
 }
 
+/// The state, which changes with every sample. A copy that is restored later continues with the same bits.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct State {
+    oscillator: Oscillator,
+    channels: Channels,
+    frequency: Frequency,
+    drive: DriveState,
+    /// Present while the response amplitude is controlled instead of the drive amplitude.
+    amplitude_loop: Option<AmplitudeState>,
+    dwell: Dwell,
+    loop_state: LoopState,
+    fault: Option<Fault>,
+    /// Whether the last sample ended a ramp.
+    ready: bool,
+    /// Whether the last sample ended a period in which the lock was lost.
+    lost: bool,
+    /// Samples since acquiring began.
+    acquiring: u64,
+    /// Drive amplitude and phase target to which the dwell applies.
+    tuning: (Real, Real),
+}
+
 impl Config {
     /// Checks all parameters and computes the coefficients.
     ///
@@ -35,13 +54,12 @@ impl Config {
     /// The first parameter with an invalid value, with its unit and the allowed values.
     pub fn build(self) -> Result<PhaseLock, ConfigError> {
         self.check()?;
-        let drive = Drive::new(&self);
         Ok(PhaseLock {
             sensing: Sensing::new(&self),
             filter: LoopFilter::new(&self),
-            drive,
-            amplitude_loop: AmplitudeLoop::new(&self, &drive),
-            stationarity: Stationarity::new(&self.lock),
+            drive: Drive::new(&self),
+            amplitude_loop: AmplitudeLoop::new(&self),
+            stationarity: Stationarity::new(&self),
             config: self,
         })
     }
@@ -54,16 +72,14 @@ impl PhaseLock {
         &self.config
     }
 
-    /// The gains.
-    #[must_use]
-    pub fn gains(&self) -> Gains {
-        self.filter.gains
-    }
-
     /// The state before the first sample.
     #[must_use]
     pub fn start(&self) -> State {
-        State::new(self.config.omega_start, self.tuning())
+        State {
+            frequency: Frequency::at(self.config.omega_start),
+            tuning: self.tuning(),
+            ..State::default()
+        }
     }
 
     /// The output before the first sample: no drive, no measurements.
@@ -89,15 +105,19 @@ impl PhaseLock {
     /// What [`Move::check`] refuses, or an open loop; then nothing changes.
     pub fn hold_response(&self, state: &mut State, to: Move) -> Result<(), ConfigError> {
         to.check(&self.config)?;
-        Quantity::new("state", (state.loop_state as u8) as Real, "").check(
-            matches!(state.loop_state, LoopState::Acquiring | LoopState::Locked),
-            "2 (acquiring) or 3 (locked): the response amplitude can be controlled only in a closed loop",
-        )?;
-        let (reading, drive) = (state.channels.response.amplitude(), state.drive.amplitude);
+        if !state.loop_state.is_closed() {
+            return Err(ConfigError {
+                name: "state",
+                value: Some(Real::from(state.loop_state as u8)),
+                unit: "",
+                allowed: "2 (acquiring) or 3 (locked): the response amplitude can be controlled only in a closed loop",
+            });
+        }
+        let (reading, drive) = (state.channels.response.estimate.amplitude, state.drive.amplitude);
         state
             .amplitude_loop
             .get_or_insert(AmplitudeState::constant(reading, drive))
-            .start(to, self.amplitude_loop.sample_time());
+            .start(to, self.amplitude_loop.sample_time);
         state.dwell.restart();
         Ok(())
     }
@@ -118,7 +138,7 @@ impl PhaseLock {
         };
         let measured = self.sensing.measure(&mut state.channels, &input, drive);
         let watched = if state.loop_state.is_closed() {
-            self.sensing.watch(&mut state.channels, &measured, drive.omega)
+            self.sensing.watch(&mut state.channels, &measured)
         } else {
             self.sensing.stop_watching(&mut state.channels);
             None
@@ -145,7 +165,7 @@ impl PhaseLock {
             active,
             fault,
             ready: state.ready,
-            settled: state.dwell.settled(),
+            settled: state.dwell.settled,
             lost: state.lost,
             timed_out: timeout.is_some_and(|timeout| elapsed >= timeout),
         });
@@ -193,6 +213,34 @@ impl PhaseLock {
         }
     }
 
+    /// One sample of the closed loop.
+    fn close_loop(&self, state: &mut State, measured: &Measurement) {
+        let Self { filter, drive, .. } = self;
+        if measured.valid {
+            filter.follow(&mut state.frequency, measured.error);
+        } else {
+            filter.hold(&mut state.frequency);
+        }
+        let reading = state.channels.response.estimate.amplitude;
+        // Up to here a larger drive gives a larger response.
+        let near = measured.valid && measured.error.abs() < FRAC_PI_2;
+        let before = state.drive.amplitude;
+        if let Some(amplitude_loop) = &mut state.amplitude_loop {
+            let (amplitude, shift) = self
+                .amplitude_loop
+                .follow(amplitude_loop, before, near.then_some(reading));
+            state.drive.amplitude = amplitude;
+            filter.shift(&mut state.frequency, shift);
+            state.ready = amplitude_loop.has_arrived();
+        } else {
+            let setpoint = self.config.amplitude;
+            if measured.valid && measured.has_sensor {
+                drive.control(&mut state.drive, setpoint, measured.reference_amplitude);
+            }
+            state.ready = drive.ramp(&mut state.drive, setpoint);
+        }
+    }
+
     /// Updates the lock criterion. It restarts while the loop is open and when the tuning has changed.
     fn judge(&self, state: &mut State, measured: &Measurement, period_ends: bool) {
         let tuning = self.tuning();
@@ -206,11 +254,36 @@ impl PhaseLock {
                 error: measured.error,
                 integral: state.frequency.integral.get(),
                 omega: state.frequency.omega,
-                amplitude: state.channels.response.amplitude(),
-                residuals: state.channels.residuals(),
+                amplitude: state.channels.response.estimate.amplitude,
+                residual_power: state.channels.response.estimate.residual_power,
                 valid: measured.valid,
             };
             state.lost = self.stationarity.update(&mut state.dwell, &reading, period_ends);
+        }
+    }
+
+    /// The output of a sample.
+    fn output(&self, state: &State, measured: &Measurement, drive: Real) -> Output {
+        let omega = state.frequency.omega;
+        let response_amplitude = state.channels.response.estimate.amplitude;
+        let means = state.dwell.means;
+        let (frequency, response_mean) = means.unwrap_or((omega, response_amplitude));
+        Output {
+            omega,
+            amplitude: state.drive.amplitude,
+            drive,
+            phase_error: measured.measurable.then_some(measured.error),
+            response_amplitude,
+            response_target: state.amplitude_loop.map(|l| l.setpoint),
+            reference_amplitude: measured.reference_amplitude,
+            coherence: state.channels.response.estimate.coherence(),
+            // Rounding can move the mean of values at a limit beyond the limit.
+            frequency: limited(frequency, self.config.omega_min, self.config.omega_max),
+            response_mean,
+            locked: state.loop_state == LoopState::Locked,
+            settled: state.dwell.settled && state.tuning == self.tuning(),
+            state: state.loop_state,
+            fault: state.fault,
         }
     }
 }

@@ -48,41 +48,27 @@
 #![forbid(unsafe_code)]
 
 mod amplitude_loop;
-mod angle;
 mod balance;
-mod check;
+mod channel;
 mod config;
 mod controller;
 mod detector;
 mod drive;
-mod error;
 mod gains;
-mod harmonics;
-mod interface;
 mod loop_filter;
 mod oscillator;
-mod parameters;
-mod plausibility;
-mod range;
 mod real;
-mod sample_clock;
 mod sensing;
 mod signals;
-mod state;
 mod stationarity;
 mod supervisor;
 
-pub use amplitude_loop::Move;
-pub use config::{Config, Detector, LockCriterion};
-pub use controller::PhaseLock;
-pub use error::{ConfigError, Number};
+pub use amplitude_loop::{MOVE, Move};
+pub use config::{
+    Config, ConfigError, Detector, LockCriterion, MAX_HARMONICS, NONE, Number, PARAMETERS, Parameter, Range, Value,
+};
+pub use controller::{PhaseLock, State};
 pub use gains::Gains;
-pub use harmonics::MAX_HARMONICS;
-pub use interface::{INPUTS, MOVE, OUTPUTS, Signal};
-pub use parameters::{PARAMETERS, Parameter};
-pub use range::{NONE, Range, Value};
 pub use real::Real;
-pub use sample_clock::SampleClock;
-pub use signals::{Input, Output};
-pub use state::State;
+pub use signals::{INPUTS, Input, OUTPUTS, Output, Signal};
 pub use supervisor::{Fault, LoopState};

@@ -1,30 +1,23 @@
 //! The measurements of a sample: phase error, amplitudes, and whether they are valid.
 
-use crate::real::consts::FRAC_PI_3;
-
-use crate::angle::Complex;
-use crate::balance::Powers;
+use crate::balance::{Balance, BalanceState, GROWING, Powers};
+use crate::channel::{Channel, ChannelState, longer};
 use crate::config::Config;
-use crate::detector::{Estimate, PhaseDetector};
-use crate::plausibility::{Differences, Plausibility};
-use crate::real::{self, Real};
+use crate::drive::PresentDrive;
+use crate::oscillator::Complex;
+use crate::real::consts::TAU;
+use crate::real::{self, Real, larger};
 use crate::signals::Input;
 use crate::supervisor::Fault;
-
-/// Phase, rad, for which no signal of more than eight steps of its converter stays the same.
-const UNCHANGED: Real = FRAC_PI_3;
-/// Smallest valid amplitude of the reference, as a share of the drive amplitude.
-const REFERENCE_SHARE: Real = 0.1;
-
-/// Samples after which noise has no correlation any more, not even behind an anti-alias filter at ten times the frequency, if there are a
-/// hundred in a period.
-const LAG: usize = 5;
 
 /// Coefficients of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sensing {
-    detector: PhaseDetector,
+    channel: Channel,
+    balance: Balance,
+    /// Whether readings are compared with their predictions, and the response with its drive.
+    is_checked: bool,
     /// `exp(-i phase_target)`
     target: Complex,
     /// s
@@ -40,43 +33,28 @@ pub struct Sensing {
     sample_time: Real,
     /// Longest time without a valid response, s.
     signal_timeout: Option<Real>,
-    plausibility: Plausibility,
+    /// Time in the closed loop before the response can be predicted, s.
+    warm_up: Real,
     /// Share of its error that the detector corrects per sample.
     detector_step: Real,
 }
 
-/// State of both channels.
+/// State of the measurement.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Channels {
-    /// Estimate of the response.
-    pub response: Estimate,
-    reference: Estimate,
-    /// Differences of the last readings of the response from their predictions, m; the present one first.
-    residuals: [Real; LAG + 1],
+    /// Channel of the response.
+    pub response: ChannelState,
+    base: ChannelState,
+    balance: BalanceState,
     /// The drive with the lag of the detector, m.
     drive: Real,
-    differences: Differences,
-    /// The last reading of each channel, m, and the time for which it has not changed, s.
-    last: [Real; 2],
-    unchanged: [Real; 2],
     /// Time in the closed loop, s.
     closed: Real,
     /// Time since the loop was closed or the measurement was last valid, s.
     invalid: Real,
     /// Whether the measurement has been valid since the loop was closed.
     seen: bool,
-}
-
-/// The drive in the present sample.
-#[derive(Clone, Copy, Debug)]
-pub struct PresentDrive {
-    /// `exp(i phase)` of the oscillator.
-    pub rotor: Complex,
-    /// Frequency, rad/s.
-    pub omega: Real,
-    /// Amplitude, m.
-    pub amplitude: Real,
 }
 
 /// Measurements of a sample.
@@ -96,27 +74,13 @@ pub struct Measurement {
     pub has_sensor: bool,
 }
 
-/// The reference of the phase.
-struct Reference {
-    /// Coefficient of its fundamental, m.
-    fundamental: Complex,
-    /// m
-    amplitude: Real,
-    valid: bool,
-}
-
-impl Channels {
-    /// Difference of the last reading of the response from its prediction, m, and that of an earlier one.
-    pub fn residuals(&self) -> [Real; 2] {
-        [self.residuals[0], self.residuals[LAG]]
-    }
-}
-
 impl Sensing {
     /// The coefficients of a configuration.
     pub fn new(config: &Config) -> Self {
         Self {
-            detector: PhaseDetector::new(config),
+            channel: Channel::new(config),
+            balance: Balance::new(config),
+            is_checked: config.residual_max.is_some(),
             target: Complex::unit(-config.phase_target),
             delay: config.delay,
             response_max: config.response_max,
@@ -125,62 +89,81 @@ impl Sensing {
             has_reference: config.reference_connected,
             sample_time: config.sample_time,
             signal_timeout: config.signal_timeout,
-            plausibility: Plausibility::new(config),
-            detector_step: -real::expm1(-config.bandwidth * config.sample_time),
+            // A transient of the detector has decayed to exp(-2 pi), 0.2 %.
+            warm_up: larger(TAU / config.bandwidth, GROWING * TAU / config.omega_start),
+            detector_step: config.step(config.bandwidth),
         }
     }
 
     /// Updates both channels with a sample.
     pub fn measure(&self, state: &mut Channels, input: &Input, drive: PresentDrive) -> Measurement {
-        let channel = input.reference.filter(|_| self.has_reference);
-        let fault = self.fault(input.response, channel);
-        // Without a sensor on the base nothing is expected to change.
-        let readings = [input.response, channel.unwrap_or(Real::NAN)];
-        for (n, reading) in readings.into_iter().enumerate() {
-            state.unchanged[n] = self.longer(state.unchanged[n], reading == state.last[n]);
-        }
-        state.last = readings;
+        let base = input.reference.filter(|_| self.has_reference);
+        let fault = self.fault(input.response, base);
+        let turn = drive.omega * self.sample_time;
         // The detectors ignore an invalid reading and keep their estimates.
         if fault != Some(Fault::Sensor) {
-            self.predict(state, input.response, channel, drive);
+            let rotors = self.channel.rotors(drive.rotor);
+            // The base follows the drive at once; the response grows, and its detector lags.
+            let is_known = state.closed > self.warm_up;
+            let change = if state.drive > 0.0 {
+                drive.amplitude / state.drive
+            } else {
+                1.0
+            };
+            (self.channel).take(
+                &mut state.response,
+                input.response,
+                &rotors,
+                turn,
+                is_known.then_some(1.0),
+            );
+            if let Some(reading) = base {
+                self.channel.take(&mut state.base, reading, &rotors, turn, Some(change));
+            }
+            state.drive += self.detector_step * (drive.amplitude - state.drive);
         }
-        let reference = if channel.is_some() {
-            self.measured_reference(&state.reference, drive)
+        let (reference, reference_amplitude) = if base.is_some() {
+            (state.base.estimate.fundamental(), state.base.estimate.amplitude)
         } else {
-            self.internal_reference(drive)
+            // The internal oscillator as a sensor would read it, with the configured delay. A sine lags a cosine by pi/2.
+            let Complex { re, im } = Complex::unit(-drive.omega * self.delay);
+            (
+                Complex { re: drive.amplitude * im, im: -drive.amplitude * re },
+                drive.amplitude,
+            )
         };
-        let response = &state.response;
-        let amplitude = response.amplitude();
+        let response = &state.response.estimate;
+        let amplitude = response.amplitude;
         // One function of an angle instead of three: the response in the frame of the reference, turned back by the target.
-        let size = amplitude * reference.amplitude;
+        let size = amplitude * reference_amplitude;
         let measurable = size >= Real::MIN_POSITIVE;
-        let relative = (response.fundamental())
-            .times(reference.fundamental.conjugate())
-            .times(self.target);
+        let relative = response.fundamental().times(reference.conjugate()).times(self.target);
         let (error, cosine) = if measurable {
             (relative.argument(), relative.re / size)
         } else {
             (0.0, 1.0)
         };
-        let valid = measurable && reference.valid && amplitude >= self.response_min && self.is_coherent(response);
-        let seen = Powers {
+        let is_large = amplitude >= self.response_min;
+        let is_coherent = response.is_coherent(self.coherence_min)
+            && (base.is_none() || state.base.estimate.is_coherent(self.coherence_min));
+        let powers = Powers {
             reading: if fault == Some(Fault::Sensor) {
                 0.0
             } else {
                 input.response
             },
-            turn: drive.omega * self.sample_time,
+            turn,
             drive: drive.amplitude,
             lagging: state.drive,
-            base: if channel.is_some() {
-                reference.amplitude
+            base: if base.is_some() {
+                reference_amplitude
             } else {
                 state.drive
             },
             response: amplitude,
-            cosine: if amplitude >= self.response_min { cosine } else { 1.0 },
+            cosine: if is_large { cosine } else { 1.0 },
         };
-        let contradicts = self.plausibility.contradicts(&mut state.differences, &seen);
+        let contradicts = self.balance.contradicts(&mut state.balance, &powers) && self.is_checked;
         let reason = if state.seen {
             Fault::Implausible
         } else {
@@ -190,20 +173,23 @@ impl Sensing {
             fault: fault.or(contradicts.then_some(reason)),
             error,
             measurable,
-            reference_amplitude: reference.amplitude,
-            valid,
-            has_sensor: channel.is_some(),
+            reference_amplitude,
+            valid: measurable && is_large && is_coherent,
+            has_sensor: base.is_some(),
         }
     }
 
     /// Watches the signals while the loop is closed: a sensor that has stopped, or a response that cannot be measured.
-    pub fn watch(&self, state: &mut Channels, measured: &Measurement, omega: Real) -> Option<Fault> {
+    pub fn watch(&self, state: &mut Channels, measured: &Measurement) -> Option<Fault> {
         state.seen |= measured.valid;
         state.closed += self.sample_time;
-        state.invalid = self.longer(state.invalid, !measured.valid);
-        if state.seen && state.unchanged.iter().any(|time| time * omega > UNCHANGED) {
+        state.invalid = longer(state.invalid, self.sample_time, !measured.valid);
+        let mut channels = [Some(&state.response), Some(&state.base).filter(|_| measured.has_sensor)]
+            .into_iter()
+            .flatten();
+        if state.seen && channels.clone().any(ChannelState::has_stopped) {
             Some(Fault::Sensor)
-        } else if state.seen && self.plausibility.refuses(&state.differences) {
+        } else if state.seen && channels.any(|channel| channel.is_implausible) {
             Some(Fault::Implausible)
         } else if self.signal_timeout.is_some_and(|limit| state.invalid > limit) {
             Some(Fault::NoSignal)
@@ -217,52 +203,6 @@ impl Sensing {
         (state.invalid, state.closed, state.seen) = (0.0, 0.0, false);
     }
 
-    /// Updates the detectors, and compares the readings with what they predicted.
-    fn predict(&self, state: &mut Channels, response: Real, reference: Option<Real>, drive: PresentDrive) {
-        let rotors = self.detector.rotors(drive.rotor);
-        let before = [state.response, state.reference];
-        let difference = self.detector.update(&mut state.response, response, &rotors);
-        let (mut differences, mut change) = ([difference, 0.0], 1.0);
-        if let Some(reading) = reference {
-            let predicted = reading - self.detector.update(&mut state.reference, reading, &rotors);
-            // The base follows the drive at once, the detector does not.
-            change = if state.drive > 0.0 {
-                drive.amplitude / state.drive
-            } else {
-                1.0
-            };
-            differences[1] = reading - change * predicted;
-        }
-        state.drive += self.detector_step * (drive.amplitude - state.drive);
-        let seen = [
-            (differences[0], &state.response, 1.0),
-            (differences[1], &state.reference, change),
-        ];
-        self.plausibility.take(
-            &mut state.differences,
-            seen,
-            state.unchanged,
-            drive.omega,
-            self.sample_time,
-            state.closed,
-        );
-        // The detectors ignore a glitch.
-        let [of_response, of_base] = self.plausibility.glitches(&state.differences);
-        let [a, b, c, d, e, _] = state.residuals;
-        state.residuals = [if of_response { 0.0 } else { difference }, a, b, c, d, e];
-        if of_response {
-            state.response = before[0];
-        }
-        if of_base {
-            state.reference = before[1];
-        }
-    }
-
-    /// A time, s, after one more sample of a condition.
-    fn longer(&self, time: Real, condition: bool) -> Real {
-        if condition { time + self.sample_time } else { 0.0 }
-    }
-
     fn fault(&self, response: Real, reference: Option<Real>) -> Option<Fault> {
         let is_valid = |reading: Real| reading.abs() <= real::READING_MAX;
         if !is_valid(response) || !reference.is_none_or(is_valid) {
@@ -272,29 +212,5 @@ impl Sensing {
         } else {
             None
         }
-    }
-
-    fn measured_reference(&self, estimate: &Estimate, drive: PresentDrive) -> Reference {
-        let amplitude = estimate.amplitude();
-        Reference {
-            fundamental: estimate.fundamental(),
-            amplitude,
-            valid: amplitude >= REFERENCE_SHARE * drive.amplitude && self.is_coherent(estimate),
-        }
-    }
-
-    /// The internal oscillator as a sensor would read it, with the configured delay.
-    fn internal_reference(&self, drive: PresentDrive) -> Reference {
-        let Complex { re, im } = Complex::unit(-drive.omega * self.delay);
-        Reference {
-            // A sine lags a cosine by pi/2.
-            fundamental: Complex { re: drive.amplitude * im, im: -drive.amplitude * re },
-            amplitude: drive.amplitude,
-            valid: true,
-        }
-    }
-
-    fn is_coherent(&self, estimate: &Estimate) -> bool {
-        estimate.is_coherent(self.coherence_min)
     }
 }

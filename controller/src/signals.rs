@@ -1,5 +1,6 @@
-//! Input and output of a sample.
+//! Input and output of a sample, and the tables of their names and units: with [`PARAMETERS`](crate::PARAMETERS), what every interface offers.
 
+use crate::config::Value;
 use crate::real::Real;
 use crate::supervisor::{Fault, LoopState};
 
@@ -16,7 +17,7 @@ pub struct Input {
 }
 
 /// Drive until the next sample, and the controller's estimates.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Output {
     /// Drive frequency, rad/s; always between `omega_min` and `omega_max`.
@@ -55,21 +56,54 @@ impl Output {
     /// The output before the first sample: no drive, no measurements.
     #[must_use]
     pub fn idle(omega: Real) -> Self {
-        Self {
-            omega,
-            amplitude: 0.0,
-            drive: 0.0,
-            phase_error: None,
-            response_amplitude: 0.0,
-            response_target: None,
-            reference_amplitude: 0.0,
-            coherence: 0.0,
-            frequency: omega,
-            response_mean: 0.0,
-            locked: false,
-            settled: false,
-            state: LoopState::Idle,
-            fault: None,
-        }
+        Self { omega, frequency: omega, ..Self::default() }
     }
+}
+
+/// An output of the controller.
+#[derive(Clone, Copy, Debug)]
+pub struct Signal {
+    /// Name, as in the FMU.
+    pub name: &'static str,
+    /// Unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Name of the Boolean that says whether there is a value, where the interface knows only numbers.
+    pub present: Option<&'static str>,
+    get: fn(&Output) -> Option<Value>,
+}
+
+impl Signal {
+    /// The value, if there is one.
+    #[must_use]
+    pub fn get(&self, output: &Output) -> Option<Value> {
+        (self.get)(output)
+    }
+}
+
+/// The inputs of a sample, with their units.
+pub const INPUTS: [(&str, &str); 3] = [("response", "m"), ("reference", "m"), ("active", "")];
+
+macro_rules! outputs {
+    ($($name:literal, $unit:literal, $present:expr, $get:expr;)*) => {
+        /// All outputs.
+        pub static OUTPUTS: [Signal; [$($name),*].len()] =
+            [$(Signal { name: $name, unit: $unit, present: $present, get: $get },)*];
+    };
+}
+
+outputs! {
+    "omega", "rad/s", None, |o| Some(Value::Real(o.omega));
+    "E", "m", None, |o| Some(Value::Real(o.amplitude));
+    "drive", "m", None, |o| Some(Value::Real(o.drive));
+    "phase_error", "rad", Some("phase_measured"), |o| o.phase_error.map(Value::Real);
+    "response_amplitude", "m", None, |o| Some(Value::Real(o.response_amplitude));
+    "reference_amplitude", "m", None, |o| Some(Value::Real(o.reference_amplitude));
+    "coherence", "", None, |o| Some(Value::Real(o.coherence));
+    "frequency", "rad/s", None, |o| Some(Value::Real(o.frequency));
+    "response_mean", "m", None, |o| Some(Value::Real(o.response_mean));
+    "response_target", "m", Some("response_controlled"), |o| o.response_target.map(Value::Real);
+    "locked", "", None, |o| Some(Value::Boolean(o.locked));
+    "settled", "", None, |o| Some(Value::Boolean(o.settled));
+    "state", "", None, |o| Some(Value::Integer(o.state as i32));
+    "fault", "", None, |o| Some(Value::Integer(o.fault.map_or(0, |fault| fault as i32)));
 }

@@ -1,43 +1,37 @@
-//! Stationarity of phase, frequency and amplitude.
+//! The lock criterion: the motion is steady if no period of the dwell differs from another.
 //!
-//! A motion is stationary if the means over a quarter of the dwell differ by no more than the drift tolerances. Where noise hides so
-//! small a drift, the differences of means over half a dwell are compared with the scatter of the periods within the blocks instead:
-//! a drift makes the range of four consecutive means ten times as large as the scatter, noise about twice.
+//! Means over whole periods are compared, because impacts cause ripple within a period. Frequency and amplitude are steady if the difference
+//! between the largest and the smallest mean of the dwell is at most what the allowed drift and the noise of the sensor explain. A range, unlike
+//! a slope, does not miss the crest of a slow modulation.
 //!
-//! The detector's residual, the difference between readings and their prediction by the odd harmonics, tells noise from motion: noise has
-//! no correlation with itself a few samples before. What is correlated is no noise.
+//! The detector's residual shows the noise: a filter of bandwidth `wLP` passes the share `wLP sample_time` of the power of white noise to
+//! its estimate. The estimate of a modulated motion changes by far more than this share of its residual, so that a modulation is no noise.
 
-use crate::config::LockCriterion;
-use crate::real::{self, Real, Sum};
+use crate::config::Config;
+use crate::real::{self, Real, Sum, larger, smaller};
 
-/// Number of blocks of a dwell.
-const DWELL: usize = 4;
-/// Number of blocks that the criterion for noise needs: two dwells.
-const BLOCKS: usize = 2 * DWELL;
-/// Largest range of four means over two blocks that counts as noise, in units of the scatter.
-const NOISE_RANGE: Real = 5.0;
-/// Smallest sum of the squared differences from period to period over that of the squared deviations from the mean that counts as
-/// noise. A drift over five periods has 0.4, noise about 1.
-const RANDOM: Real = 0.5;
-/// Largest correlation of the residual with itself a few samples before that counts as noise.
-const CORRELATED: Real = 0.5;
-/// Largest scatter of the periods, relative, that counts as noise.
-const NOISE_MAX: Real = 0.03;
+/// Blocks of the dwell, which moves on by one of them.
+const BLOCKS: usize = 4;
+/// Range of noise in a dwell, in standard deviations: ten independent normal values exceed it with a probability of 5 % (studentised range).
+/// The detector correlates about two of the twenty periods of a dwell.
+const NOISE_RANGE: Real = 4.5;
 
-/// The criterion. Impacts cause ripple within a period, so it compares means over whole periods only.
+/// Coefficients of the criterion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Stationarity {
     /// rad
-    pub phase_tolerance: Real,
+    phase_tolerance: Real,
     /// rad
-    pub unlock_tolerance: Real,
-    /// Relative, per period.
-    pub frequency_drift: Real,
-    /// Relative, per period.
-    pub amplitude_drift: Real,
+    unlock_tolerance: Real,
+    /// Largest drifts of frequency and amplitude in a dwell, relative.
+    drifts: [Real; 2],
+    /// Standard deviation of the response amplitude per that of white noise of a reading.
+    passed: Real,
+    /// Standard deviation of the frequency's integral part per that of the phase, 1/s.
+    integral_gain: Real,
     /// Periods in a block.
-    pub block: u32,
+    block: u32,
 }
 
 /// Values of a sample that the criterion uses.
@@ -51,8 +45,8 @@ pub struct Reading {
     pub omega: Real,
     /// Response amplitude, m.
     pub amplitude: Real,
-    /// Differences of two readings, a few samples apart, from their predictions, m.
-    pub residuals: [Real; 2],
+    /// Mean square of the response's residual, m².
+    pub residual_power: Real,
     /// Whether these values are valid.
     pub valid: bool,
 }
@@ -60,65 +54,43 @@ pub struct Reading {
 /// Sums over the samples of a period.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Sums {
+struct Period {
     error: Sum,
     integral: Sum,
     omega: Sum,
     amplitude: Sum,
-    power: Real,
-    common: Real,
     samples: u64,
-    invalid: u64,
+    invalid: bool,
 }
 
-/// Mean of a quantity over the periods of a block, the sum of the squared deviations from it, and that of the squared differences
-/// from period to period.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-struct Scatter {
-    mean: Real,
-    squares: Real,
-    differences: Real,
-    last: Real,
-}
-
-impl Scatter {
-    /// Welford's update with the `n`-th value.
-    fn add(&mut self, value: Real, n: Real) {
-        let before = value - self.mean;
-        self.mean += before / n;
-        self.squares += before * (value - self.mean);
-        if n > 1.0 {
-            self.differences += (value - self.last) * (value - self.last);
-        }
-        self.last = value;
-    }
-}
-
-/// Means over the periods of a block.
+/// Sums over the periods of a block, and the smallest and the largest frequency (integral part) and amplitude.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 struct Block {
     periods: u32,
     error: Real,
     omega: Real,
-    /// Sums over the residual: of its squares, and of the products of samples a few apart, m².
-    power: Real,
-    common: Real,
-    integral: Scatter,
-    amplitude: Scatter,
+    amplitude: Real,
+    residual_power: Real,
+    low: [Real; 2],
+    high: [Real; 2],
 }
 
 impl Block {
-    fn add(&mut self, period: &Sums) {
-        self.periods += 1;
-        let (n, samples) = (self.periods as Real, period.samples as Real);
-        self.error += (period.error.get() / samples - self.error) / n;
-        self.omega += (period.omega.get() / samples - self.omega) / n;
-        self.power += period.power;
-        self.common += period.common;
-        self.integral.add(period.integral.get() / samples, n);
-        self.amplitude.add(period.amplitude.get() / samples, n);
+    /// Both blocks as one.
+    fn joined(self, other: Self) -> Self {
+        if self.periods == 0 {
+            return other;
+        }
+        Self {
+            periods: self.periods + other.periods,
+            error: self.error + other.error,
+            omega: self.omega + other.omega,
+            amplitude: self.amplitude + other.amplitude,
+            residual_power: self.residual_power + other.residual_power,
+            low: [0, 1].map(|n| smaller(self.low[n], other.low[n])),
+            high: [0, 1].map(|n| larger(self.high[n], other.high[n])),
+        }
     }
 }
 
@@ -126,12 +98,13 @@ impl Block {
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Dwell {
-    blocks: [Block; BLOCKS],
-    complete: usize,
-    period: Sums,
+    period: Period,
     block: Block,
-    means: Option<(Real, Real)>,
-    settled: bool,
+    complete: [Block; BLOCKS],
+    /// Means over the complete blocks: frequency, rad/s, and response amplitude, m.
+    pub means: Option<(Real, Real)>,
+    /// Whether the criterion is met.
+    pub settled: bool,
 }
 
 impl Dwell {
@@ -140,31 +113,22 @@ impl Dwell {
     pub fn restart(&mut self) {
         *self = Self::default();
     }
-
-    /// Whether the criterion is met.
-    pub fn settled(&self) -> bool {
-        self.settled
-    }
-
-    /// Means over the complete blocks of the last dwell: frequency, rad/s, and response amplitude, m.
-    pub fn means(&self) -> Option<(Real, Real)> {
-        self.means
-    }
-
-    fn last(&self, count: usize) -> &[Block] {
-        &self.blocks[BLOCKS - count..]
-    }
 }
 
 impl Stationarity {
     /// The criterion of a configuration.
-    pub fn new(lock: &LockCriterion) -> Self {
+    pub fn new(config: &Config) -> Self {
+        let lock = &config.lock;
+        let block = lock.dwell.div_ceil(BLOCKS as u32);
+        let steps = (BLOCKS as u32 * block - 1) as Real;
         Self {
             phase_tolerance: lock.phase_tolerance,
             unlock_tolerance: lock.unlock_tolerance,
-            frequency_drift: lock.frequency_drift,
-            amplitude_drift: lock.amplitude_drift,
-            block: lock.dwell.div_ceil(DWELL as u32),
+            drifts: [lock.frequency_drift * steps, lock.amplitude_drift * steps],
+            passed: real::sqrt(config.bandwidth * config.sample_time),
+            // With three poles at bandwidth/3 it is bandwidth/14.7 for white noise of one channel, and bandwidth/10.4 for that of both.
+            integral_gain: config.bandwidth / 9.0,
+            block,
         }
     }
 
@@ -175,91 +139,54 @@ impl Stationarity {
         period.integral.add(reading.integral);
         period.omega.add(reading.omega);
         period.amplitude.add(reading.amplitude);
-        let [now, before] = reading.residuals;
-        period.power += now * now;
-        period.common += now * before;
         period.samples += 1;
-        period.invalid += u64::from(!reading.valid);
+        period.invalid |= !reading.valid;
         if !period_ends {
             return false;
         }
         let period = core::mem::take(&mut dwell.period);
-        let error = (period.error.get() / period.samples as Real).abs();
-        let lost = period.invalid > 0 || error > self.unlock_tolerance;
+        let lost = period.invalid || period.error.get().abs() > self.unlock_tolerance * period.samples as Real;
         if lost {
             dwell.restart();
         } else {
-            self.end_period(dwell, &period);
+            self.end_period(dwell, &period, reading.residual_power);
         }
         lost
     }
 
     /// (A call: its code is long, and few samples end a period.)
     #[inline(never)]
-    fn end_period(&self, dwell: &mut Dwell, period: &Sums) {
-        dwell.block.add(period);
-        if dwell.block.periods < self.block {
-            return;
+    fn end_period(&self, dwell: &mut Dwell, period: &Period, residual_power: Real) {
+        let mean = |sum: Sum| sum.get() / period.samples as Real;
+        let compared = [period.integral, period.amplitude].map(mean);
+        dwell.block = dwell.block.joined(Block {
+            periods: 1,
+            error: mean(period.error),
+            omega: mean(period.omega),
+            amplitude: mean(period.amplitude),
+            residual_power,
+            low: compared,
+            high: compared,
+        });
+        if dwell.block.periods == self.block {
+            dwell.complete.rotate_left(1);
+            dwell.complete[BLOCKS - 1] = core::mem::take(&mut dwell.block);
+            let all = dwell.complete.into_iter().fold(Block::default(), Block::joined);
+            let periods = all.periods as Real;
+            dwell.means = Some((all.omega / periods, all.amplitude / periods));
+            dwell.settled = dwell.complete[0].periods > 0 && self.is_steady(&all);
         }
-        dwell.blocks.rotate_left(1);
-        dwell.blocks[BLOCKS - 1] = core::mem::take(&mut dwell.block);
-        dwell.complete = (dwell.complete + 1).min(BLOCKS);
-        let last = dwell.last(dwell.complete.min(DWELL));
-        let omega = mean(last, |block| block.omega);
-        dwell.means = Some((omega, mean(last, |block| block.amplitude.mean)));
-        let is_smooth = dwell.complete >= DWELL && self.is_smooth(dwell.last(DWELL));
-        let is_noise = dwell.complete == BLOCKS && self.is_noise(&dwell.blocks);
-        let [power, common] = residual(dwell.last(DWELL));
-        let is_random = common <= CORRELATED * power;
-        dwell.settled = is_smooth || is_noise && is_random;
     }
 
-    fn is_smooth(&self, blocks: &[Block]) -> bool {
-        // Periods between the centres of the first and the last block. A slope would miss the crest of a slow modulation; the
-        // range does not.
-        let distance = self.block as Real * (DWELL - 1) as Real;
-        blocks.iter().all(|block| block.error.abs() <= self.phase_tolerance)
-            && range(blocks, 1, |block| block.integral.mean) <= self.frequency_drift * distance
-            && range(blocks, 1, |block| block.amplitude.mean) <= self.amplitude_drift * distance
+    fn is_steady(&self, dwell: &Block) -> bool {
+        let periods = dwell.periods as Real;
+        // m; relative to the amplitude this is the noise of the phase.
+        let noise = self.passed * real::sqrt(dwell.residual_power / periods);
+        let noises = [self.integral_gain * noise * periods / dwell.amplitude, noise];
+        let is_constant =
+            |n: usize| dwell.high[n] - dwell.low[n] <= self.drifts[n] * dwell.high[n] + NOISE_RANGE * noises[n];
+        dwell.error.abs() <= self.phase_tolerance * periods && is_constant(0) && is_constant(1)
     }
-
-    fn is_noise(&self, blocks: &[Block; BLOCKS]) -> bool {
-        let distance = (2 * self.block) as Real * (DWELL - 1) as Real;
-        let is_constant = |value: fn(&Block) -> Scatter, drift: Real| {
-            let squares = mean(blocks, |block| value(block).squares);
-            let scatter = real::sqrt(squares / self.block as Real) / value(&blocks[BLOCKS - 1]).mean;
-            let largest = (NOISE_RANGE * scatter).max(drift * distance);
-            let differences = mean(blocks, |block| value(block).differences);
-            let random =
-                differences >= RANDOM * squares || range(blocks, 2, |block| value(block).mean) <= drift * distance;
-            random && scatter <= NOISE_MAX && range(blocks, 2, |block| value(block).mean) <= largest
-        };
-        mean(blocks, |block| block.error).abs() <= self.phase_tolerance
-            && is_constant(|block| block.integral, self.frequency_drift)
-            && is_constant(|block| block.amplitude, self.amplitude_drift)
-    }
-}
-
-/// Sums over the residual: of its squares, and of the products.
-fn residual(blocks: &[Block]) -> [Real; 2] {
-    blocks.iter().fold([0.0; 2], |[power, common], block| {
-        [power + block.power, common + block.common]
-    })
-}
-
-fn mean(blocks: &[Block], value: impl Fn(&Block) -> Real) -> Real {
-    blocks.iter().map(value).sum::<Real>() / blocks.len() as Real
-}
-
-/// Difference of the largest and the smallest mean over `group` blocks, relative to the last one.
-fn range(blocks: &[Block], group: usize, value: impl Fn(&Block) -> Real) -> Real {
-    let (mut low, mut high, mut last) = (Real::INFINITY, Real::NEG_INFINITY, 0.0);
-    for group in blocks.chunks(group) {
-        last = mean(group, &value);
-        low = low.min(last);
-        high = high.max(last);
-    }
-    (high - low) / last
 }
 
 #[cfg(all(test, not(feature = "f32")))]

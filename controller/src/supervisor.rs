@@ -42,8 +42,7 @@ pub enum Fault {
 }
 
 impl LoopState {
-    /// All states, by number.
-    pub const ALL: [Self; 7] = [
+    const ALL: [Self; 7] = [
         Self::Idle,
         Self::Ramping,
         Self::Acquiring,
@@ -59,18 +58,10 @@ impl LoopState {
         Self::ALL.into_iter().find(|state| *state as i32 == number)
     }
 
-    /// Its name, for messages.
+    /// Whether the loop is closed.
     #[must_use]
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Idle => "idle",
-            Self::Ramping => "ramping",
-            Self::Acquiring => "acquiring",
-            Self::Locked => "locked",
-            Self::LockLost => "lock lost",
-            Self::Tripped => "tripped",
-            Self::ShutDown => "shut down",
-        }
+    pub fn is_closed(self) -> bool {
+        matches!(self, Self::Acquiring | Self::Locked)
     }
 
     /// Whether a fault has switched the drive off; latched until `active` becomes false.
@@ -78,11 +69,27 @@ impl LoopState {
     pub fn is_latched(self) -> bool {
         matches!(self, Self::LockLost | Self::Tripped)
     }
+
+    /// The next state, and the fault that caused it.
+    pub(crate) fn next(self, conditions: &Conditions) -> (Self, Option<Fault>) {
+        match self {
+            Self::Ramping | Self::Acquiring | Self::Locked if !conditions.active => (Self::ShutDown, None),
+            Self::LockLost | Self::Tripped if !conditions.active => (Self::Idle, None),
+            Self::LockLost | Self::Tripped => (self, None),
+            Self::Idle | Self::ShutDown if !conditions.active => (self, None),
+            _ if conditions.fault.is_some() => (Self::Tripped, conditions.fault),
+            Self::Idle | Self::ShutDown => (Self::Ramping, None),
+            Self::Ramping if conditions.ready => (Self::Acquiring, None),
+            Self::Acquiring if conditions.settled => (Self::Locked, None),
+            Self::Acquiring if conditions.timed_out => (Self::Tripped, Some(Fault::TimedOut)),
+            Self::Locked if conditions.lost => (Self::LockLost, Some(Fault::LockLost)),
+            running => (running, None),
+        }
+    }
 }
 
 impl Fault {
-    /// All faults.
-    pub const ALL: [Self; 6] = [
+    const ALL: [Self; 6] = [
         Self::Sensor,
         Self::ResponseTooLarge,
         Self::TimedOut,
@@ -117,7 +124,15 @@ impl Fault {
 
 impl fmt::Display for LoopState {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(self.name())
+        f.write_str(match self {
+            Self::Idle => "idle",
+            Self::Ramping => "ramping",
+            Self::Acquiring => "acquiring",
+            Self::Locked => "locked",
+            Self::LockLost => "lock lost",
+            Self::Tripped => "tripped",
+            Self::ShutDown => "shut down",
+        })
     }
 }
 
@@ -144,105 +159,5 @@ pub struct Conditions {
     pub timed_out: bool,
 }
 
-impl LoopState {
-    /// Whether the drive is on.
-    #[must_use]
-    pub fn is_driving(self) -> bool {
-        self.is_closed() || self == Self::Ramping
-    }
-
-    /// Whether the loop is closed.
-    #[must_use]
-    pub fn is_closed(self) -> bool {
-        matches!(self, Self::Acquiring | Self::Locked)
-    }
-
-    /// The next state, and the fault that caused it.
-    pub(crate) fn next(self, conditions: &Conditions) -> (Self, Option<Fault>) {
-        match self {
-            Self::Ramping | Self::Acquiring | Self::Locked if !conditions.active => (Self::ShutDown, None),
-            Self::LockLost | Self::Tripped if !conditions.active => (Self::Idle, None),
-            Self::LockLost | Self::Tripped => (self, None),
-            Self::Idle | Self::ShutDown if !conditions.active => (self, None),
-            _ if conditions.fault.is_some() => (Self::Tripped, conditions.fault),
-            Self::Idle | Self::ShutDown => (Self::Ramping, None),
-            Self::Ramping if conditions.ready => (Self::Acquiring, None),
-            Self::Acquiring if conditions.settled => (Self::Locked, None),
-            Self::Acquiring if conditions.timed_out => (Self::Tripped, Some(Fault::TimedOut)),
-            Self::Locked if conditions.lost => (Self::LockLost, Some(Fault::LockLost)),
-            running => (running, None),
-        }
-    }
-}
-
 #[cfg(all(test, not(feature = "f32")))]
-mod tests {
-    use super::*;
-
-    const ACTIVE: Conditions = Conditions {
-        active: true,
-        fault: None,
-        ready: true,
-        settled: true,
-        lost: false,
-        timed_out: false,
-    };
-
-    #[test]
-    fn states_and_faults_are_found_by_their_numbers() {
-        for (number, state) in LoopState::ALL.into_iter().enumerate() {
-            assert_eq!(
-                (state as usize, LoopState::of_number(number as i32)),
-                (number, Some(state))
-            );
-        }
-        for (number, fault) in Fault::ALL.into_iter().enumerate() {
-            assert_eq!(Fault::of_number(number as i32 + 1), Some(fault));
-        }
-        assert_eq!((LoopState::of_number(7), Fault::of_number(0)), (None, None));
-    }
-
-    #[test]
-    fn locking_passes_through_every_state_in_order() {
-        let mut state = LoopState::Idle;
-        for expected in [
-            LoopState::Ramping,
-            LoopState::Acquiring,
-            LoopState::Locked,
-            LoopState::Locked,
-        ] {
-            state = state.next(&ACTIVE).0;
-            assert_eq!(state, expected);
-        }
-    }
-
-    #[test]
-    fn no_state_drives_after_active_becomes_false() {
-        for state in LoopState::ALL {
-            assert!(!state.next(&Conditions { active: false, ..ACTIVE }).0.is_driving());
-        }
-    }
-
-    #[test]
-    fn no_state_drives_on_a_fault() {
-        let conditions = Conditions { fault: Some(Fault::Sensor), ..ACTIVE };
-        for state in LoopState::ALL {
-            assert!(!state.next(&conditions).0.is_driving());
-        }
-    }
-
-    #[test]
-    fn a_latched_state_ends_only_when_active_becomes_false() {
-        for state in [LoopState::LockLost, LoopState::Tripped] {
-            assert_eq!(state.next(&ACTIVE).0, state);
-            assert_eq!(state.next(&Conditions { active: false, ..ACTIVE }).0, LoopState::Idle);
-        }
-    }
-
-    #[test]
-    fn a_lock_is_lost_only_from_locked() {
-        let conditions = Conditions { lost: true, settled: false, ..ACTIVE };
-        assert_eq!(LoopState::Locked.next(&conditions).0, LoopState::LockLost);
-        assert_eq!(LoopState::Acquiring.next(&conditions).0, LoopState::Acquiring);
-    }
-}
+mod tests;

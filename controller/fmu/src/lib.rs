@@ -4,13 +4,13 @@
 #![forbid(unsafe_code)]
 
 use fmi2_component::{Archive, Component, Key, Log, Refusal};
-use phase_lock::{
-    Config, Input, LoopState, Move, OUTPUTS, Output, Parameter, PhaseLock, SampleClock, Signal as Out, State, Value,
-};
+use phase_lock::{Config, Input, LoopState, Move, OUTPUTS, Output, Parameter, PhaseLock, State, Value};
 use variables::{Boolean, Integer, Model, Real, category};
 
+mod sample_clock;
 mod signal;
 
+use sample_clock::SampleClock;
 use signal::{DERIVATIVES, Signal};
 
 mod variables {
@@ -80,7 +80,7 @@ impl Controller {
         let name = variable.variable().name;
         let idle = Output::idle(self.config.omega_start);
         let output = self.running.as_ref().map_or(&idle, |running| &running.output);
-        if let Some(signal) = Out::find(name) {
+        if let Some(signal) = OUTPUTS.iter().find(|one| one.name == name) {
             return signal.get(output).unwrap_or(Value::Real(0.0));
         }
         if let Some(signal) = OUTPUTS.iter().find(|signal| signal.present == Some(name)) {

@@ -18,15 +18,11 @@ fn amplitude_loop(amplitude_max: f64) -> AmplitudeLoop {
         damping_rate: Some(DELTA),
         response_gain: GAIN,
         sample_time: DT,
+        amplitude_max: Some(amplitude_max),
+        ramp_rate: None,
         ..Config::for_resonance(1.0, 0.0)
     };
-    let drive = Drive {
-        amplitude_max,
-        ramp_step: f64::INFINITY,
-        release_step: f64::INFINITY,
-        control_step: 0.0,
-    };
-    AmplitudeLoop::new(&config, &drive)
+    AmplitudeLoop::new(&config)
 }
 
 impl Structure {
@@ -51,7 +47,7 @@ fn worst(to: Move, skipped: usize) -> f64 {
         let (drive, _) = control.follow(&mut state, 0.0, Some(structure.reading));
         structure.advance(drive);
         if n >= skipped {
-            worst = worst.max((structure.a - state.setpoint()).abs());
+            worst = worst.max((structure.a - state.setpoint).abs());
         }
     }
     assert!(state.has_arrived() && (structure.a - to.response).abs() < 1e-9);
@@ -108,9 +104,9 @@ fn a_move_with_a_growth_goes_on_at_that_rate_until_the_next_one() {
         state.start(to, DT);
         let mut rates = [f64::INFINITY, f64::NEG_INFINITY];
         for n in 0..samples {
-            let before = state.setpoint();
+            let before = state.setpoint;
             control.follow(&mut state, 0.0, Some(1.0));
-            let rate = (state.setpoint() - before) / DT;
+            let rate = (state.setpoint - before) / DT;
             if n >= skipped {
                 rates = [rates[0].min(rate), rates[1].max(rate)];
             }

@@ -2,11 +2,13 @@
 
 use super::*;
 
+/// A detector of a tenth of the frequency, with a hundred samples per period.
 const CRITERION: Stationarity = Stationarity {
     phase_tolerance: 0.01,
     unlock_tolerance: 0.1,
-    frequency_drift: 1e-6,
-    amplitude_drift: 1e-4,
+    drifts: [19.0 * 1e-6, 19.0 * 1e-4],
+    passed: 0.08,
+    integral_gain: 0.1,
     block: 5,
 };
 const CONSTANT: Reading = Reading {
@@ -14,7 +16,7 @@ const CONSTANT: Reading = Reading {
     integral: 1.0,
     omega: 1.0,
     amplitude: 1.0,
-    residuals: [0.0; 2],
+    residual_power: 0.0,
     valid: true,
 };
 
@@ -26,7 +28,7 @@ fn periods_to_settle(reading: impl Fn(f64) -> Reading) -> Option<u32> {
             let periods = f64::from(*period) + f64::from(sample) / 10.0;
             CRITERION.update(&mut dwell, &reading(periods), sample == 9);
         }
-        dwell.settled()
+        dwell.settled
     })
 }
 
@@ -59,52 +61,50 @@ fn a_slow_modulation_is_not_stationary_at_its_crest() {
     assert_eq!(periods_to_settle(reading), None);
 }
 
-#[test]
-fn a_scatter_counts_as_noise_only_if_the_residual_has_no_correlation() {
-    for step in [1.0, 0.01] {
-        let reading = |t: f64| {
-            let sample = step * libm::round(10.0 * t);
-            Reading {
-                amplitude: 1.0 + 0.01 * noise(libm::floor(t - 0.05)),
-                residuals: [sample, sample - step]
-                    .map(|one| 0.1 * if step < 1.0 { libm::sin(one) } else { noise(one) }),
-                ..CONSTANT
-            }
-        };
-        assert_eq!(after_40_periods(reading).settled(), step == 1.0);
-    }
-}
-
-fn after_40_periods(reading: impl Fn(f64) -> Reading) -> Dwell {
-    let mut dwell = Dwell::default();
-    for sample in 10..410 {
-        CRITERION.update(&mut dwell, &reading(f64::from(sample) / 10.0), sample % 10 == 9);
-    }
-    dwell
-}
-
 /// A reproducible number between -1 and 1.
 fn noise(n: f64) -> f64 {
     let x = libm::sin(n * 12.9898) * 43_758.547;
     2.0 * (x - libm::floor(x)) - 1.0
 }
 
-#[test]
-fn noise_that_hides_the_tolerances_settles_after_two_dwells() {
-    let noisy = |t: f64| Reading {
-        amplitude: 1.0 + 0.01 * noise(libm::floor(t - 0.05)),
+/// An amplitude with a drift per period and noise of `scatter` in its means, and readings with noise of the power that leads to it.
+fn noisy(drift: f64, scatter: f64) -> impl Fn(f64) -> Reading {
+    move |t| Reading {
+        amplitude: 1.0 + drift * t + scatter * 3_f64.sqrt() * noise(libm::floor(t - 0.05)),
+        residual_power: (scatter / CRITERION.passed) * (scatter / CRITERION.passed),
         ..CONSTANT
-    };
-    assert_eq!(periods_to_settle(noisy), Some(40));
+    }
+}
+
+#[test]
+fn noise_that_hides_the_tolerances_settles() {
+    assert_eq!(periods_to_settle(noisy(0.0, 0.01)), Some(20));
+}
+
+#[test]
+fn a_scatter_without_noise_of_the_readings_does_not_settle() {
+    let reading = |t: f64| Reading { residual_power: 0.0, ..noisy(0.0, 0.01)(t) };
+    assert_eq!(periods_to_settle(reading), None);
+}
+
+#[test]
+fn a_modulation_is_no_noise_although_it_has_a_residual() {
+    for period in [4.0, 10.0, 30.0, 60.0] {
+        let rate = core::f64::consts::TAU / period;
+        let residual = rate / libm::hypot(rate, 0.1 * core::f64::consts::TAU);
+        let estimate = libm::sqrt(1.0 - residual * residual);
+        let reading = |t: f64| Reading {
+            amplitude: 1.0 + 0.02 * estimate * libm::sin(rate * t),
+            residual_power: 0.5 * (0.02 * residual) * (0.02 * residual),
+            ..CONSTANT
+        };
+        assert_eq!(periods_to_settle(reading), None, "{period}");
+    }
 }
 
 #[test]
 fn a_drift_that_exceeds_the_noise_does_not_settle() {
-    let drifting = |t: f64| Reading {
-        amplitude: 1.0 + 2e-3 * t + 0.01 * noise(libm::floor(t - 0.05)),
-        ..CONSTANT
-    };
-    assert_eq!(periods_to_settle(drifting), None);
+    assert_eq!(periods_to_settle(noisy(5e-3, 0.01)), None);
 }
 
 #[test]

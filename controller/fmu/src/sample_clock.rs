@@ -13,8 +13,7 @@ const SLACK_MAX: f64 = 0.25;
 ///
 /// The clock counts samples, so none is lost or taken twice. Steps that are nominally a multiple of the sample time but
 /// deviate from it by up to 1e-9, relative, contain the same number of samples every time.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+#[derive(Clone, Copy, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct SampleClock {
     sample_time: f64,
     taken: u64,
@@ -27,12 +26,6 @@ impl SampleClock {
         Self { sample_time, taken: 0 }
     }
 
-    /// Number of samples taken so far.
-    #[must_use]
-    pub const fn taken(&self) -> u64 {
-        self.taken
-    }
-
     /// Takes the samples before `until` (s since the start) and returns their numbers.
     ///
     /// A long step contains several samples, a short one perhaps none. The range is empty if `until` decreases or is NaN.
@@ -40,19 +33,15 @@ impl SampleClock {
         let end = until / self.sample_time;
         let slack = (SLACK + SLACK_PER_SAMPLE * end).min(SLACK_MAX);
         // The conversion saturates: NaN and negative numbers give 0.
-        let end = libm::ceil(end - slack) as u64;
+        let end = (end - slack).ceil() as u64;
         let first = self.taken;
         self.taken = first.max(end);
         first..self.taken
     }
 }
 
-#[cfg(all(test, not(feature = "f32")))]
+#[cfg(test)]
 mod tests {
-    extern crate std;
-
-    use std::vec::Vec;
-
     use super::*;
 
     fn counts(sample_time: f64, step: f64, steps: u32) -> impl Iterator<Item = usize> {
@@ -92,6 +81,6 @@ mod tests {
                 seen += 1;
             }
         }
-        assert_eq!((seen, clock.taken()), (11, 11));
+        assert_eq!((seen, clock.taken), (11, 11));
     }
 }
