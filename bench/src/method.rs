@@ -4,7 +4,6 @@ use std::time::{Duration, Instant};
 
 use serde::Serialize;
 
-use crate::methods::AsAsked;
 use crate::scene::{Scene, Step};
 use crate::turns;
 
@@ -53,12 +52,18 @@ pub struct Answer {
     pub failure: Option<String>,
 }
 
-/// Runs the scene in turns with the plant for about `budget`, one turn at least; a run that lasts longer than `limit` is given up.
+/// Runs the scene in turns with the plant `P` for about `budget`, one turn at least; a run that lasts longer than `limit` is given up.
 /// `checks` are the steps, counted from 1, after which the state is kept.
-pub fn measure<M: Method>(scene: &Scene, setting: f64, checks: &[usize], budget: Duration, limit: Duration) -> Answer {
+pub fn measure<P: Method, M: Method>(
+    scene: &Scene,
+    setting: f64,
+    checks: &[usize],
+    budget: Duration,
+    limit: Duration,
+) -> Answer {
     let mut answer = Answer::default();
     let began = Instant::now();
-    let mut plant = || run::<AsAsked>(scene, 0.0, checks, limit, &mut Vec::new()).map(|(ns, _)| (ns, 1.0));
+    let mut plant = || run::<P>(scene, 0.0, checks, limit, &mut Vec::new()).map(|(ns, _)| (ns, 1.0));
     let (mut ns, mut plant_ns) = (Vec::new(), Vec::new());
     let mut method = || {
         answer.states.clear();

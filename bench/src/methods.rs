@@ -46,18 +46,18 @@ pub fn measure_named(
     limit: Duration,
 ) -> anyhow::Result<Answer> {
     let measure = match name {
-        "plant" => measure::<plant::AsAsked>,
-        "plant-one-step" => measure::<plant::OneStep>,
-        "plant-100" => measure::<plant::Sampled>,
-        "plant-general" => measure::<plant::General>,
-        "c-interface" => measure::<c_interface::Shell>,
-        "brent" => measure::<brent::Brent>,
-        "rk4" => measure::<rk4::Rk4>,
-        "moreau" => measure::<moreau::Moreau>,
+        "plant" => measure::<AsAsked, plant::AsAsked>,
+        "plant-one-step" => measure::<AsAsked, plant::OneStep>,
+        "plant-100" => measure::<AsAsked, plant::Sampled>,
+        "plant-general" => measure::<AsAsked, plant::General>,
+        "c-interface" => measure::<AsAsked, c_interface::Shell>,
+        "brent" => measure::<AsAsked, brent::Brent>,
+        "rk4" => measure::<AsAsked, rk4::Rk4>,
+        "moreau" => measure::<AsAsked, moreau::Moreau>,
         #[cfg(feature = "diffsol")]
-        "diffsol-tsit45" => measure::<diffsol::Tsit45>,
+        "diffsol-tsit45" => measure::<AsAsked, diffsol::Tsit45>,
         #[cfg(feature = "diffsol")]
-        "diffsol-bdf" => measure::<diffsol::Bdf>,
+        "diffsol-bdf" => measure::<AsAsked, diffsol::Bdf>,
         _ => anyhow::bail!("there is no method {name}; there are {}", NAMES.join(", ")),
     };
     Ok(measure(scene, setting, checks, budget, limit))

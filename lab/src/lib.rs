@@ -12,4 +12,4 @@ pub use vines_model::{ArgumentError, map, numerics, orbit, regime, theory};
 pub use vines_net as net;
 #[cfg(feature = "sweep")]
 pub use vines_sweep as sweep;
-pub use vines_testbench::{advice, backbone, comparison, experiment, identification, loop_check, rig, scene};
+pub use vines_testbench::{advice, backbone, comparison, experiment, identification, loop_check, record, rig, scene};

@@ -3,8 +3,8 @@
 use vines_model::orbit::{Orbit, exact_backbone, phase_resonant};
 use vines_model::regime::Regime;
 
-use crate::experiment::Sample;
 use crate::identification::classify;
+use crate::record::Sample;
 use crate::scene::{Dimensionless, Scene};
 
 /// Detunings at which the backbone is searched for stable orbits, and their distance.

@@ -4,19 +4,18 @@
 
 mod bench;
 mod evidence;
-mod record;
 mod search;
 
 use std::fmt::{self, Display, Formatter};
 
 use thiserror::Error;
 
+use crate::record::{Record, Sample};
 use crate::rig::{Controller, ControllerError, Drive, Fault, Rig, RigError};
 use crate::scene::{Resonance, Scene};
 
 pub(crate) use bench::Bench;
 pub use evidence::Evidence;
-pub use record::{Record, Sample, drive_phases, table};
 pub(crate) use search::Search;
 
 /// Durations of the stages, in samples.

@@ -14,7 +14,7 @@ mod validity;
 
 use thiserror::Error;
 
-use crate::experiment::Record;
+use crate::record::Record;
 use crate::scene::{Dimensionless, Scene};
 
 pub use balance::{Balance, Slopes};

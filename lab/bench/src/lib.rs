@@ -10,5 +10,6 @@ pub mod comparison;
 pub mod experiment;
 pub mod identification;
 pub mod loop_check;
+pub mod record;
 pub mod rig;
 pub mod scene;

@@ -5,8 +5,9 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use vines_model::numerics::mean_square;
 use vines_testbench::comparison::COMPARED_ABOVE;
-use vines_testbench::experiment::{self, Plan, Record};
+use vines_testbench::experiment::{self, Plan};
 use vines_testbench::identification::{DecayPoint, decay_points};
+use vines_testbench::record::Record;
 use vines_testbench::rig::{BuiltIn, Simulated};
 use vines_testbench::scene::{Estimator, Scene};
 

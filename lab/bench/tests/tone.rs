@@ -3,8 +3,9 @@
 use std::f64::consts::TAU;
 
 use vines_testbench::backbone::track;
-use vines_testbench::experiment::{self, Plan, Sample};
+use vines_testbench::experiment::{self, Plan};
 use vines_testbench::identification::{Regime, foreign_tone, identify, regime_by_response};
+use vines_testbench::record::Sample;
 use vines_testbench::rig::{BuiltIn, Chain, Command, Drive, Rig, RigError, Sensors, Simulated};
 use vines_testbench::scene::{LinearResponse, PAPER, Scene};
 

@@ -1,7 +1,8 @@
 //! Records that look complete and are useless.
 
-use vines_testbench::experiment::{self, Plan, Record};
+use vines_testbench::experiment::{self, Plan};
 use vines_testbench::identification::{IdentificationError, identify};
+use vines_testbench::record::Record;
 use vines_testbench::rig::{BuiltIn, RigFault, SensorFault, faulty};
 use vines_testbench::scene::{LinearResponse, PAPER, Scene};
 

@@ -4,8 +4,9 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::experiment::{ExperimentError, Plan, Sample, Stage, run_into};
+use vines::experiment::{ExperimentError, Plan, Stage, run_into};
 use vines::identification::{self, IdentificationError};
+use vines::record::Sample;
 use vines::{
     advice,
     comparison::Comparison,

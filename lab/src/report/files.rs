@@ -12,10 +12,10 @@ use super::figures::{backbone, manifold, regimes, tracked};
 use super::theme::dark;
 use crate::backbone::Point;
 use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
-use crate::experiment::{Sample, table};
 use crate::files::{self, FileError};
 use crate::map::{Cell, Map, MapError};
 use crate::orbit::Periodic;
+use crate::record::{Sample, table};
 use crate::regime::Regime;
 
 /// Why a report could not be computed, or the files of a run could not be written.

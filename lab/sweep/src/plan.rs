@@ -227,3 +227,28 @@ fn position(mut n: u64, shape: &[u64]) -> Vec<u64> {
     index.reverse();
     index
 }
+
+/// The part of a sweep that one process computes.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// Number of this part, from 0.
+    pub number: u64,
+    /// Number of parts.
+    pub of: u64,
+}
+
+impl Shard {
+    /// The whole sweep.
+    pub const ALL: Self = Self { number: 0, of: 1 };
+
+    /// Number of its cells.
+    #[must_use]
+    pub fn cells(self, plan: &Plan) -> u64 {
+        self.chunks(plan).map(|n| plan.chunk_cells(&plan.chunk_index(n))).sum()
+    }
+
+    /// Its chunks.
+    pub(crate) fn chunks(self, plan: &Plan) -> impl Iterator<Item = u64> + Send {
+        (self.number..plan.chunks()).step_by(self.of as usize)
+    }
+}

@@ -16,34 +16,9 @@ use crate::{
     cell::Cell,
     error::StoreError,
     monitor::Monitor,
-    plan::Plan,
+    plan::{Plan, Shard},
     store::{Chunk, Store},
 };
-
-/// The part of a sweep that one process computes.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Shard {
-    /// Number of this part, from 0.
-    pub number: u64,
-    /// Number of parts.
-    pub of: u64,
-}
-
-impl Shard {
-    /// The whole sweep.
-    pub const ALL: Self = Self { number: 0, of: 1 };
-
-    /// Number of its cells.
-    #[must_use]
-    pub fn cells(self, plan: &Plan) -> u64 {
-        self.chunks(plan).map(|n| plan.chunk_cells(&plan.chunk_index(n))).sum()
-    }
-
-    /// Its chunks.
-    fn chunks(self, plan: &Plan) -> impl Iterator<Item = u64> + Send {
-        (self.number..plan.chunks()).step_by(self.of as usize)
-    }
-}
 
 /// Chunks that are computed at the same time for every eight threads: the last cells of one and the first of the next.
 const AT_ONCE: usize = 2;

@@ -21,8 +21,7 @@ use crate::{
     folder::{Folder, PARTIAL},
     gzip::{Fault, LEVEL, pack, unpack},
     monitor::Monitor,
-    plan::Plan,
-    run::Shard,
+    plan::{Plan, Shard},
     variables::{ABSENT, FAILED, Read, UNCOUNTED, Variable, code, count, reason, variables},
 };
 

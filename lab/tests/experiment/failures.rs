@@ -84,7 +84,7 @@ fn a_response_above_its_limit_ends_the_experiment_at_once_and_keeps_what_was_mea
     );
     let last = samples.last().unwrap();
     assert!(last.sensors.response.abs() > 0.3 && samples.len() > 100);
-    assert_eq!(experiment::table(&samples).lines().count(), samples.len() + 1);
+    assert_eq!(vines::record::table(&samples).lines().count(), samples.len() + 1);
 }
 
 #[test]

@@ -4,8 +4,9 @@ mod failures;
 mod orbits;
 
 use vines::comparison::Comparison;
-use vines::experiment::{self, Plan, Record};
+use vines::experiment::{self, Plan};
 use vines::identification::{DecayEnd, IdentificationError, Regime, identify};
+use vines::record::Record;
 use vines::rig::{
     BuiltIn, Chain, Command, Controller, ControllerError, GroundTruth, Rig, Sensors, SensorsOnly, Simulated,
 };

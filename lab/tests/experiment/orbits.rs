@@ -1,7 +1,8 @@
 //! Drives with several stable orbits or with none: which one was followed, and what the messages say about the others.
 
-use vines::experiment::{self, Record};
+use vines::experiment;
 use vines::identification::{IdentificationError, Regime, identify};
+use vines::record::Record;
 use vines::rig::{BuiltIn, Simulated};
 
 use crate::{ConstantDrive, identified, plan, scene};

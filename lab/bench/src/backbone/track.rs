@@ -6,8 +6,9 @@ use serde::Serialize;
 use vines_model::numerics::Estimate;
 
 use super::level::{Criterion, Found};
-use crate::experiment::{self, ExperimentError, Sample, Search, Stage};
+use crate::experiment::{self, ExperimentError, Search, Stage};
 use crate::identification::{Cycle, Measured, Regime, Tone, classify, foreign_tone, regime_by_response};
+use crate::record::Sample;
 use crate::rig::{Controller, Move, Rig};
 use crate::scene::Scene;
 

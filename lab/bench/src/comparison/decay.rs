@@ -4,8 +4,8 @@ use lovines::State;
 use vines_model::orbit::Orbit;
 use vines_model::theory::{BranchSide, SlowFlow, free_sigma};
 
-use crate::experiment::{Record, Sample};
 use crate::identification::{DecayPoint, decay_points};
+use crate::record::{Record, Sample};
 use crate::rig::{Command, Drive, Rig, Simulated};
 use crate::scene::{Dimensionless, Scene};
 

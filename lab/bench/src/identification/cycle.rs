@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use nalgebra::{Complex, DVector};
 use vines_model::numerics::{HarmonicBasis, mean};
 
-use crate::experiment::{Sample, drive_phases};
+use crate::record::{Sample, drive_phases};
 
 /// Harmonics of the sensor signals over one period of the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]

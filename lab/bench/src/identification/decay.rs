@@ -8,7 +8,7 @@ use serde::Serialize;
 use super::crossings;
 use super::fit::harmonic;
 use super::regime::impacts;
-use crate::experiment::{Record, Sample};
+use crate::record::{Record, Sample};
 use crate::scene::{Dimensionless, Estimator, Scene};
 use vines_model::numerics::mean;
 use vines_model::regime::end_of_synchrony;

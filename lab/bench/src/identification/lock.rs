@@ -11,7 +11,7 @@ use super::regime::classify;
 use super::response::{foreign_tone, regime_by_response};
 use super::tone::Tone;
 use super::{Balance, Cycle, Measured, Slopes};
-use crate::experiment::Record;
+use crate::record::Record;
 use crate::scene::{LinearResponse, Scene};
 
 /// The locked point as measured over the hold.

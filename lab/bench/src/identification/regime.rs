@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use vines_model::numerics::mean;
 use vines_model::regime::{Impact, MEASURED, Regime, one_to_one};
 
-use crate::experiment::Sample;
+use crate::record::Sample;
 
 /// The impacts in the samples; of several between two samples, the last one.
 #[must_use]

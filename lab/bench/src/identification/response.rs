@@ -12,7 +12,7 @@ use vines_model::numerics::{HarmonicBasis, noise};
 use vines_model::regime::Regime;
 
 use super::tone::{Line, Tone};
-use crate::experiment::Sample;
+use crate::record::Sample;
 use crate::scene::{Dimensionless, LinearResponse, Scene};
 
 /// Largest residual of a steady motion, relative to the amplitude, unless it is noise.

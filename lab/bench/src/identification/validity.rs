@@ -1,7 +1,7 @@
 //! What makes a record useless: a phase off its target while the lock was held, and a sensor that fails after the release.
 
 use super::{IdentificationError, Lock};
-use crate::experiment::Record;
+use crate::record::Record;
 use crate::scene::Scene;
 use vines_model::numerics::{SIGNIFICANT, standard_deviation};
 

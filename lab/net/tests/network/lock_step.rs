@@ -3,7 +3,8 @@
 use std::time::{Duration, Instant};
 
 use vines_net::{Ended, LinkError, NetController, NetRig, RAMP_SAMPLES, Refusal};
-use vines_testbench::experiment::{self, Plan, Record};
+use vines_testbench::experiment::{self, Plan};
+use vines_testbench::record::Record;
 use vines_testbench::rig::{BuiltIn, Chain, Controller, Drive, Rig, RigError, Simulated};
 use vines_testbench::scene::Scene;
 

@@ -6,8 +6,8 @@ use nalgebra::DVector;
 
 use super::{DECAY_LABEL, THINNED, decay_points};
 use crate::comparison::Comparison;
-use crate::experiment::Record;
 use crate::numerics::{HarmonicBasis, range};
+use crate::record::Record;
 use crate::report::figure::{Axis, Figure, Legend, Panel, Place, amplitude, caption, line};
 use crate::report::theme::{DECAY, EXACT, THEORY};
 use crate::scene::Scene;

@@ -4,8 +4,9 @@ use std::cell::Cell;
 use std::error::Error;
 
 use crate::comparison::{COMPARED_ABOVE, Comparison};
-use crate::experiment::{self, ExperimentError, Plan, Record, Stage};
+use crate::experiment::{self, ExperimentError, Plan, Stage};
 use crate::identification::{DecayEnd, identify};
+use crate::record::Record;
 use crate::report::figures::{backbone, history, manifold};
 use crate::report::files::{ReportError, decay_csv, json};
 use crate::report::section::{Section, Subject};
