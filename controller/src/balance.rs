@@ -75,6 +75,7 @@ pub struct Powers {
 
 impl Balance {
     /// Takes a sample. Returns whether it contradicts the balance.
+    #[inline]
     pub fn contradicts(&mut self, config: &Config, seen: &Powers) -> bool {
         if self.begun < PI {
             self.begun += seen.turn;

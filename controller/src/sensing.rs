@@ -159,12 +159,10 @@ impl Sensing {
         state.seen |= measured.valid;
         state.closed += config.sample_time;
         state.invalid = longer(state.invalid, config.sample_time, !measured.valid);
-        let mut channels = [Some(&state.response), Some(&state.base).filter(|_| measured.has_sensor)]
-            .into_iter()
-            .flatten();
-        if state.seen && channels.clone().any(ChannelState::has_stopped) {
+        let has_sensor = measured.has_sensor;
+        if state.seen && (state.response.has_stopped() || has_sensor && state.base.has_stopped()) {
             Some(Fault::Sensor)
-        } else if state.seen && channels.any(|channel| channel.is_implausible) {
+        } else if state.seen && (state.response.is_implausible || has_sensor && state.base.is_implausible) {
             Some(Fault::Implausible)
         } else if config.signal_timeout.is_some_and(|limit| state.invalid > limit) {
             Some(Fault::NoSignal)
