@@ -91,7 +91,9 @@ impl Channel {
             let share = if state.unchanged > PAUSE { 0.0 } else { limit * factor };
             // A fault may have begun at the end of the last period.
             let expected = (share + lag) * amplitude + NORMAL * smaller(last, earlier);
-            let is_clear = state.estimate.harmonics_within((DISTORTION * limit + lag) * amplitude);
+            let is_clear = self
+                .detector
+                .harmonics_within(&state.estimate, (DISTORTION * limit + lag) * amplitude);
             state.distorted = longer(state.distorted, turn, !is_clear);
             if change.is_some() && (difference > expected || state.distorted > LASTS) {
                 state.is_implausible = state.since <= PAUSE;

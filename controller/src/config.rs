@@ -33,13 +33,13 @@ pub enum Detector {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct LockCriterion {
-    /// Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
+    /// Largest phase error that counts as locked, mean over the dwell, rad.
     pub phase_tolerance: Real,
     /// Phase error, mean over a period, above which the lock is lost, rad; at least `phase_tolerance`.
     pub unlock_tolerance: Real,
-    /// Largest relative drift of the frequency per period; where noise is larger than such a drift, the noise is accepted.
+    /// Largest relative drift of the frequency per period, beyond what the noise of the response explains.
     pub frequency_drift: Real,
-    /// Largest relative drift of the response amplitude per period.
+    /// Largest relative drift of the response amplitude per period, beyond what its noise explains.
     pub amplitude_drift: Real,
     /// Time for which all conditions must hold, periods; rounded up to a multiple of 4.
     pub dwell: u32,

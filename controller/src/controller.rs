@@ -136,9 +136,9 @@ impl PhaseLock {
             omega: state.frequency.omega,
             amplitude: state.drive.amplitude,
         };
-        let measured = self.sensing.measure(&mut state.channels, &input, drive);
+        let measured = self.sensing.measure(&self.config, &mut state.channels, &input, drive);
         let watched = if state.loop_state.is_closed() {
-            self.sensing.watch(&mut state.channels, &measured)
+            self.sensing.watch(&self.config, &mut state.channels, &measured)
         } else {
             self.sensing.stop_watching(&mut state.channels);
             None

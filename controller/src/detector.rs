@@ -43,13 +43,6 @@ impl Estimate {
         self.harmonic[0]
     }
 
-    /// Whether the sum of the amplitudes of the harmonics above the fundamental is at most this, m.
-    pub fn harmonics_within(&self, limit: Real) -> bool {
-        let sum = |size: fn(&Complex) -> Real| self.harmonic[1..].iter().map(size).sum::<Real>();
-        // The bound without roots decides almost always.
-        sum(|c| c.re.abs() + c.im.abs()) <= limit || sum(|c| c.magnitude()) <= limit
-    }
-
     /// Power of the fundamental over the sum of itself and the residual power; 0 for a zero signal.
     pub fn coherence(&self) -> Real {
         let (power, total) = self.powers();
@@ -89,6 +82,14 @@ impl PhaseDetector {
             next = next.times(stride);
         }
         rotors
+    }
+
+    /// Whether the sum of the amplitudes of the harmonics above the fundamental is at most this, m.
+    pub fn harmonics_within(&self, estimate: &Estimate, limit: Real) -> bool {
+        let used = || estimate.harmonic.iter().take(self.harmonics).skip(1);
+        // The bound without roots decides almost always.
+        used().map(|c| c.re.abs() + c.im.abs()).sum::<Real>() <= limit
+            || used().map(|c| c.magnitude()).sum::<Real>() <= limit
     }
 
     /// Updates the estimate with a sample, m. Returns the difference between the sample and its prediction, m.

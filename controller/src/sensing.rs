@@ -1,6 +1,6 @@
 //! The measurements of a sample: phase error, amplitudes, and whether they are valid.
 
-use crate::balance::{Balance, BalanceState, GROWING, Powers};
+use crate::balance::{Balance, GROWING, Powers};
 use crate::channel::{Channel, ChannelState, longer};
 use crate::config::Config;
 use crate::drive::PresentDrive;
@@ -15,24 +15,8 @@ use crate::supervisor::Fault;
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sensing {
     channel: Channel,
-    balance: Balance,
-    /// Whether readings are compared with their predictions, and the response with its drive.
-    is_checked: bool,
     /// `exp(-i phase_target)`
     target: Complex,
-    /// s
-    delay: Real,
-    /// m
-    response_max: Option<Real>,
-    /// Smallest valid response amplitude, m.
-    response_min: Real,
-    coherence_min: Real,
-    /// Whether a sensor measures the base.
-    has_reference: bool,
-    /// s
-    sample_time: Real,
-    /// Longest time without a valid response, s.
-    signal_timeout: Option<Real>,
     /// Time in the closed loop before the response can be predicted, s.
     warm_up: Real,
     /// Share of its error that the detector corrects per sample.
@@ -46,7 +30,7 @@ pub struct Channels {
     /// Channel of the response.
     pub response: ChannelState,
     base: ChannelState,
-    balance: BalanceState,
+    balance: Balance,
     /// The drive with the lag of the detector, m.
     drive: Real,
     /// Time in the closed loop, s.
@@ -79,16 +63,7 @@ impl Sensing {
     pub fn new(config: &Config) -> Self {
         Self {
             channel: Channel::new(config),
-            balance: Balance::new(config),
-            is_checked: config.residual_max.is_some(),
             target: Complex::unit(-config.phase_target),
-            delay: config.delay,
-            response_max: config.response_max,
-            response_min: config.lock.response_min * config.amplitude,
-            coherence_min: config.lock.coherence_min,
-            has_reference: config.reference_connected,
-            sample_time: config.sample_time,
-            signal_timeout: config.signal_timeout,
             // A transient of the detector has decayed to exp(-2 pi), 0.2 %.
             warm_up: larger(TAU / config.bandwidth, GROWING * TAU / config.omega_start),
             detector_step: config.step(config.bandwidth),
@@ -96,10 +71,10 @@ impl Sensing {
     }
 
     /// Updates both channels with a sample.
-    pub fn measure(&self, state: &mut Channels, input: &Input, drive: PresentDrive) -> Measurement {
-        let base = input.reference.filter(|_| self.has_reference);
-        let fault = self.fault(input.response, base);
-        let turn = drive.omega * self.sample_time;
+    pub fn measure(&self, config: &Config, state: &mut Channels, input: &Input, drive: PresentDrive) -> Measurement {
+        let base = input.reference.filter(|_| config.reference_connected);
+        let fault = Self::fault(config, input.response, base);
+        let turn = drive.omega * config.sample_time;
         // The detectors ignore an invalid reading and keep their estimates.
         if fault != Some(Fault::Sensor) {
             let rotors = self.channel.rotors(drive.rotor);
@@ -126,7 +101,7 @@ impl Sensing {
             (state.base.estimate.fundamental(), state.base.estimate.amplitude)
         } else {
             // The internal oscillator as a sensor would read it, with the configured delay. A sine lags a cosine by pi/2.
-            let Complex { re, im } = Complex::unit(-drive.omega * self.delay);
+            let Complex { re, im } = Complex::unit(-drive.omega * config.delay);
             (
                 Complex { re: drive.amplitude * im, im: -drive.amplitude * re },
                 drive.amplitude,
@@ -143,9 +118,9 @@ impl Sensing {
         } else {
             (0.0, 1.0)
         };
-        let is_large = amplitude >= self.response_min;
-        let is_coherent = response.is_coherent(self.coherence_min)
-            && (base.is_none() || state.base.estimate.is_coherent(self.coherence_min));
+        let is_large = amplitude >= config.lock.response_min * config.amplitude;
+        let is_coherent = response.is_coherent(config.lock.coherence_min)
+            && (base.is_none() || state.base.estimate.is_coherent(config.lock.coherence_min));
         let powers = Powers {
             reading: if fault == Some(Fault::Sensor) {
                 0.0
@@ -163,7 +138,7 @@ impl Sensing {
             response: amplitude,
             cosine: if is_large { cosine } else { 1.0 },
         };
-        let contradicts = self.balance.contradicts(&mut state.balance, &powers) && self.is_checked;
+        let contradicts = state.balance.contradicts(config, &powers) && config.residual_max.is_some();
         let reason = if state.seen {
             Fault::Implausible
         } else {
@@ -180,18 +155,16 @@ impl Sensing {
     }
 
     /// Watches the signals while the loop is closed: a sensor that has stopped, or a response that cannot be measured.
-    pub fn watch(&self, state: &mut Channels, measured: &Measurement) -> Option<Fault> {
+    pub fn watch(&self, config: &Config, state: &mut Channels, measured: &Measurement) -> Option<Fault> {
         state.seen |= measured.valid;
-        state.closed += self.sample_time;
-        state.invalid = longer(state.invalid, self.sample_time, !measured.valid);
-        let mut channels = [Some(&state.response), Some(&state.base).filter(|_| measured.has_sensor)]
-            .into_iter()
-            .flatten();
-        if state.seen && channels.clone().any(ChannelState::has_stopped) {
+        state.closed += config.sample_time;
+        state.invalid = longer(state.invalid, config.sample_time, !measured.valid);
+        let has_sensor = measured.has_sensor;
+        if state.seen && (state.response.has_stopped() || has_sensor && state.base.has_stopped()) {
             Some(Fault::Sensor)
-        } else if state.seen && channels.any(|channel| channel.is_implausible) {
+        } else if state.seen && (state.response.is_implausible || has_sensor && state.base.is_implausible) {
             Some(Fault::Implausible)
-        } else if self.signal_timeout.is_some_and(|limit| state.invalid > limit) {
+        } else if config.signal_timeout.is_some_and(|limit| state.invalid > limit) {
             Some(Fault::NoSignal)
         } else {
             None
@@ -203,11 +176,11 @@ impl Sensing {
         (state.invalid, state.closed, state.seen) = (0.0, 0.0, false);
     }
 
-    fn fault(&self, response: Real, reference: Option<Real>) -> Option<Fault> {
+    fn fault(config: &Config, response: Real, reference: Option<Real>) -> Option<Fault> {
         let is_valid = |reading: Real| reading.abs() <= real::READING_MAX;
         if !is_valid(response) || !reference.is_none_or(is_valid) {
             Some(Fault::Sensor)
-        } else if self.response_max.is_some_and(|limit| response.abs() > limit) {
+        } else if config.response_max.is_some_and(|limit| response.abs() > limit) {
             Some(Fault::ResponseTooLarge)
         } else {
             None

@@ -1,8 +1,9 @@
 //! The lock criterion: the motion is steady if no period of the dwell differs from another.
 //!
 //! Means over whole periods are compared, because impacts cause ripple within a period. Frequency and amplitude are steady if the difference
-//! between the largest and the smallest mean of the dwell is at most what the allowed drift and the noise of the sensor explain. A range, unlike
-//! a slope, does not miss the crest of a slow modulation.
+//! between the largest and the smallest mean is at most what the allowed drift explains, and that between the means of the quarters as well. A
+//! range, unlike a slope, does not miss the crest of a slow modulation. Where that fails, twice the dwell is judged, and the noise of the
+//! sensor may explain a part: the longer the quarters, the less of a drift it hides.
 //!
 //! The detector's residual shows the noise: a filter of bandwidth `wLP` passes the share `wLP sample_time` of the power of white noise to
 //! its estimate. The estimate of a modulated motion changes by far more than this share of its residual, so that a modulation is no noise.
@@ -11,10 +12,11 @@ use crate::config::Config;
 use crate::real::{self, Real, Sum, larger, smaller};
 
 /// Blocks of the dwell, which moves on by one of them.
-const BLOCKS: usize = 4;
-/// Range of noise in a dwell, in standard deviations: ten independent normal values exceed it with a probability of 5 % (studentised range).
-/// The detector correlates about two of the twenty periods of a dwell.
+const DWELL: usize = 4;
+/// Range of noise, in standard deviations: ten independent normal values exceed it with a probability of 5 % (studentised range).
 const NOISE_RANGE: Real = 4.5;
+/// Periods that the detector correlates, about.
+const CORRELATED: Real = 2.0;
 
 /// Coefficients of the criterion.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -24,7 +26,7 @@ pub struct Stationarity {
     phase_tolerance: Real,
     /// rad
     unlock_tolerance: Real,
-    /// Largest drifts of frequency and amplitude in a dwell, relative.
+    /// Largest drifts of frequency and amplitude, relative, per period.
     drifts: [Real; 2],
     /// Standard deviation of the response amplitude per that of white noise of a reading.
     passed: Real,
@@ -70,8 +72,9 @@ struct Block {
     periods: u32,
     error: Real,
     omega: Real,
-    amplitude: Real,
     residual_power: Real,
+    /// Frequency (integral part) and amplitude.
+    compared: [Real; 2],
     low: [Real; 2],
     high: [Real; 2],
 }
@@ -86,8 +89,8 @@ impl Block {
             periods: self.periods + other.periods,
             error: self.error + other.error,
             omega: self.omega + other.omega,
-            amplitude: self.amplitude + other.amplitude,
             residual_power: self.residual_power + other.residual_power,
+            compared: [0, 1].map(|n| self.compared[n] + other.compared[n]),
             low: [0, 1].map(|n| smaller(self.low[n], other.low[n])),
             high: [0, 1].map(|n| larger(self.high[n], other.high[n])),
         }
@@ -100,8 +103,8 @@ impl Block {
 pub struct Dwell {
     period: Period,
     block: Block,
-    complete: [Block; BLOCKS],
-    /// Means over the complete blocks: frequency, rad/s, and response amplitude, m.
+    complete: [Block; 2 * DWELL],
+    /// Means over the complete blocks of the last dwell: frequency, rad/s, and response amplitude, m.
     pub means: Option<(Real, Real)>,
     /// Whether the criterion is met.
     pub settled: bool,
@@ -119,12 +122,11 @@ impl Stationarity {
     /// The criterion of a configuration.
     pub fn new(config: &Config) -> Self {
         let lock = &config.lock;
-        let block = lock.dwell.div_ceil(BLOCKS as u32);
-        let steps = (BLOCKS as u32 * block - 1) as Real;
+        let block = lock.dwell.div_ceil(DWELL as u32);
         Self {
             phase_tolerance: lock.phase_tolerance,
             unlock_tolerance: lock.unlock_tolerance,
-            drifts: [lock.frequency_drift * steps, lock.amplitude_drift * steps],
+            drifts: [lock.frequency_drift, lock.amplitude_drift],
             passed: real::sqrt(config.bandwidth * config.sample_time),
             // With three poles at bandwidth/3 it is bandwidth/14.7 for white noise of one channel, and bandwidth/10.4 for that of both.
             integral_gain: config.bandwidth / 9.0,
@@ -163,30 +165,50 @@ impl Stationarity {
             periods: 1,
             error: mean(period.error),
             omega: mean(period.omega),
-            amplitude: mean(period.amplitude),
             residual_power,
+            compared,
             low: compared,
             high: compared,
         });
         if dwell.block.periods == self.block {
             dwell.complete.rotate_left(1);
-            dwell.complete[BLOCKS - 1] = core::mem::take(&mut dwell.block);
-            let all = dwell.complete.into_iter().fold(Block::default(), Block::joined);
+            dwell.complete[2 * DWELL - 1] = core::mem::take(&mut dwell.block);
+            let (before, last) = dwell.complete.split_at(DWELL);
+            let all = joined(last);
             let periods = all.periods as Real;
-            dwell.means = Some((all.omega / periods, all.amplitude / periods));
-            dwell.settled = dwell.complete[0].periods > 0 && self.is_steady(&all);
+            dwell.means = Some((all.omega / periods, all.compared[1] / periods));
+            dwell.settled = last[0].periods > 0 && self.is_steady(last, 0.0)
+                || before[0].periods > 0 && self.is_steady(&dwell.complete, NOISE_RANGE);
         }
     }
 
-    fn is_steady(&self, dwell: &Block) -> bool {
-        let periods = dwell.periods as Real;
+    /// Whether frequency and amplitude are constant but for the allowed drift and noise within this range, in standard deviations.
+    fn is_steady(&self, blocks: &[Block], range: Real) -> bool {
+        let all = joined(blocks);
+        let periods = all.periods as Real;
         // m; relative to the amplitude this is the noise of the phase.
-        let noise = self.passed * real::sqrt(dwell.residual_power / periods);
-        let noises = [self.integral_gain * noise * periods / dwell.amplitude, noise];
-        let is_constant =
-            |n: usize| dwell.high[n] - dwell.low[n] <= self.drifts[n] * dwell.high[n] + NOISE_RANGE * noises[n];
-        dwell.error.abs() <= self.phase_tolerance * periods && is_constant(0) && is_constant(1)
+        let noise = range * self.passed * real::sqrt(all.residual_power / periods);
+        let noises = [self.integral_gain * noise * periods / all.compared[1], noise];
+        let quarter = blocks.len() / DWELL;
+        let share = real::sqrt(CORRELATED * DWELL as Real / periods);
+        let is_constant = |n: usize| {
+            let means = blocks.chunks(quarter).map(|quarter| {
+                let quarter = joined(quarter);
+                quarter.compared[n] / quarter.periods as Real
+            });
+            let (low, high) = means.fold((Real::INFINITY, 0.0), |(low, high), mean| {
+                (smaller(low, mean), larger(high, mean))
+            });
+            let drift = self.drifts[n] * (periods - 1.0) * all.high[n];
+            all.high[n] - all.low[n] <= drift + noises[n] && high - low <= drift + share * noises[n]
+        };
+        all.error.abs() <= self.phase_tolerance * periods && is_constant(0) && is_constant(1)
     }
+}
+
+/// All blocks as one.
+fn joined(blocks: &[Block]) -> Block {
+    blocks.iter().copied().fold(Block::default(), Block::joined)
 }
 
 #[cfg(all(test, not(feature = "f32")))]

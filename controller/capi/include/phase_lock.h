@@ -107,7 +107,7 @@ typedef struct PhaseLockConfig {
   PhaseLockReal delay;
   // Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
   PhaseLockReal response_gain;
-  // Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
+  // Largest phase error that counts as locked, mean over the dwell, rad.
   PhaseLockReal phase_tolerance;
   // Phase error above which the lock is lost, mean over a period, rad.
   PhaseLockReal unlock_tolerance;

@@ -84,7 +84,7 @@ pub struct PhaseLockConfig {
     pub delay: PhaseLockReal,
     /// Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
     pub response_gain: PhaseLockReal,
-    /// Largest phase error that counts as locked, mean over a quarter of the dwell, rad.
+    /// Largest phase error that counts as locked, mean over the dwell, rad.
     pub phase_tolerance: PhaseLockReal,
     /// Phase error above which the lock is lost, mean over a period, rad.
     pub unlock_tolerance: PhaseLockReal,

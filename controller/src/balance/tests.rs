@@ -2,20 +2,21 @@
 
 use super::*;
 
-const SAMPLE_TIME: Real = 1e-3;
-const BALANCE: Balance = Balance {
-    gain: 0.03,
-    damping: 3e-4,
-    is_known: true,
-    sample_time: SAMPLE_TIME,
-    first: 1.0,
-};
+/// Samples of the tests are a hundredth of a period long; the response grows by 0.03 per sample and drive, and loses 3e-4 of itself.
+fn config() -> Config {
+    Config {
+        sample_time: 1e-3,
+        response_gain: 30.0,
+        damping_rate: Some(0.3),
+        ..Config::for_resonance(10.0 * TAU, 1.0)
+    }
+}
 
 /// Samples until a response that grows by `factor` times the work of a drive of 1 contradicts the balance, within ten periods.
 fn samples(factor: Real, base: Real, cosine: Real) -> Option<usize> {
-    let (mut state, mut response) = (BalanceState::default(), 0.0);
+    let (mut state, mut response) = (Balance::default(), 0.0);
     (0..1000).position(|_| {
-        response += BALANCE.gain * factor - BALANCE.damping * response;
+        response += 0.03 * factor - 3e-4 * response;
         let seen = Powers {
             reading: 0.0,
             turn: 0.01 * TAU,
@@ -25,7 +26,7 @@ fn samples(factor: Real, base: Real, cosine: Real) -> Option<usize> {
             response,
             cosine,
         };
-        BALANCE.contradicts(&mut state, &seen)
+        state.contradicts(&config(), &seen)
     })
 }
 

@@ -6,7 +6,7 @@ use super::*;
 const CRITERION: Stationarity = Stationarity {
     phase_tolerance: 0.01,
     unlock_tolerance: 0.1,
-    drifts: [19.0 * 1e-6, 19.0 * 1e-4],
+    drifts: [1e-6, 1e-4],
     passed: 0.08,
     integral_gain: 0.1,
     block: 5,
@@ -77,8 +77,8 @@ fn noisy(drift: f64, scatter: f64) -> impl Fn(f64) -> Reading {
 }
 
 #[test]
-fn noise_that_hides_the_tolerances_settles() {
-    assert_eq!(periods_to_settle(noisy(0.0, 0.01)), Some(20));
+fn noise_that_hides_the_tolerances_settles_after_two_dwells() {
+    assert_eq!(periods_to_settle(noisy(0.0, 0.01)), Some(40));
 }
 
 #[test]
@@ -104,7 +104,9 @@ fn a_modulation_is_no_noise_although_it_has_a_residual() {
 
 #[test]
 fn a_drift_that_exceeds_the_noise_does_not_settle() {
-    assert_eq!(periods_to_settle(noisy(5e-3, 0.01)), None);
+    for drift in [1.5e-3, 5e-3] {
+        assert_eq!(periods_to_settle(noisy(drift, 0.01)), None, "{drift}");
+    }
 }
 
 #[test]
