@@ -1,14 +1,16 @@
-//! A device as a rig of the bench. Its oscillator runs on the device; the host sets frequency and amplitude, step by step.
+//! The host: what a device has, its values by name, and the device as a rig of the bench. The oscillator runs on the device; the host sets
+//! frequency and amplitude, step by step.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
+use std::io;
 
-use super::codec::{Packet, message};
-use super::host::{Host, HostError};
+use thiserror::Error;
+
+use super::codec::{ErrorCode, Frame, Malformed, Packet, Status, VERSION, message, take, take_text, to_bytes};
 use super::registry::{COEFFICIENTS, HARMONICS, WATCHDOG};
 use super::transport::Transport;
-use crate::bridge::Bridge;
-use crate::report::Counters;
+use vines_net::{Bridge, Counters};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 
 /// Largest relative difference between the sample rates: the device states its own with 24 bits.
@@ -18,6 +20,186 @@ const SAME_RATE: f64 = 1e-6;
 const RUNNING: f64 = 0.01;
 /// Share of the longest silence after which the device is asked whether its output is on.
 const SUPERVISION: f64 = 0.25;
+
+/// Why a device cannot be used.
+#[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum HostError {
+    #[error(
+        "no answer from the helic device: {0}; is `vines rig --protocol helic` or the device running, with no other host?"
+    )]
+    Unreachable(#[source] io::Error),
+    #[error("the helic device, {what}: {source}; the drive is stopped as far as the device can still be reached")]
+    Lost { what: String, source: io::Error },
+    #[error(
+        "{samples} samples of the helic device did not arrive, {seconds:.3} s; up to {allowed} s are bridged. Check the network and the \
+         load of this machine"
+    )]
+    Blackout { samples: u32, seconds: f64, allowed: f64 },
+    #[error("the helic device sent an answer that does not match the request: is it another version?")]
+    Malformed(#[from] Malformed),
+    #[error("the helic device has version {0} of the protocol, this program has version {VERSION}")]
+    Version(u8),
+    #[error("the helic device refuses {what}: {code}")]
+    Refused { what: String, code: ErrorCode },
+    #[error(
+        "the helic device has no {what} \"{name}\"; it has: {list}; [rig.names] of the scene maps response and base"
+    )]
+    Missing {
+        what: &'static str,
+        name: String,
+        list: String,
+    },
+    #[error(
+        "the helic device takes {device} samples per second, which is not a multiple of the scene's {scene}: set \
+         controller.samples_per_period to {suggestion} (or that over an integer)"
+    )]
+    Rate { device: f64, scene: f64, suggestion: f64 },
+    #[error("the output of the helic device is off (safety = {0}): it has tripped, or was disarmed; the drive is zero")]
+    Tripped(u8),
+}
+
+impl From<HostError> for RigError {
+    fn from(error: HostError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+/// A device, seen from its host: names and types of its parameters, names and units of its sources.
+#[derive(Debug)]
+struct Host<T> {
+    transport: T,
+    sequence: u8,
+    parameters: Vec<(String, u8)>,
+    sources: Vec<(String, String)>,
+    /// Samples per second.
+    sample_rate: f64,
+}
+
+/// The place of `name` in a list of names with their units.
+fn place<V>(
+    what: &'static str,
+    name: &str,
+    all: &[(String, V)],
+    text: fn(&(String, V)) -> String,
+) -> Result<usize, HostError> {
+    let found = all.iter().position(|(own, _)| own == name);
+    let list = || all.iter().map(text).collect::<Vec<_>>().join(", ");
+    found.ok_or_else(|| HostError::Missing { what, name: name.into(), list: list() })
+}
+
+impl<T: Transport> Host<T> {
+    /// Reads what the device has.
+    fn new(transport: T) -> Result<Self, HostError> {
+        let (parameters, sources) = (Vec::new(), Vec::new());
+        let mut host = Self {
+            transport,
+            sequence: 0,
+            parameters,
+            sources,
+            sample_rate: 0.0,
+        };
+        let answer = match host.request(message::STATUS, Vec::new(), "Status") {
+            Err(HostError::Lost { source, .. }) => return Err(HostError::Unreachable(source)),
+            answer => answer?,
+        };
+        // The version first: everything after it may differ between versions.
+        if let Some(version) = answer.first().filter(|version| **version != VERSION) {
+            return Err(HostError::Version(*version));
+        }
+        let status = Status::decode(&answer)?;
+        host.sample_rate = status.sample_rate.into();
+        while host.parameters.len() < usize::from(status.parameters) {
+            let start = (host.parameters.len() as u16).to_le_bytes();
+            let page = host.request(message::GET_PARAMS, start.into(), "GetParams")?;
+            let mut rest = &page[..];
+            let (echo, next) = (take(&mut rest)?, u16::from_le_bytes(take(&mut rest)?));
+            while !rest.is_empty() {
+                let name = take_text(&mut rest)?;
+                let [code, _, _, _] = take(&mut rest)?;
+                host.parameters.push((name, code));
+            }
+            let count = host.parameters.len();
+            if echo != start || count == usize::from(u16::from_le_bytes(start)) || usize::from(next) != count {
+                return Err(Malformed.into());
+            }
+        }
+        let answer = host.request(message::GET_SOURCES, Vec::new(), "GetSources")?;
+        let mut rest = &answer[..];
+        while !rest.is_empty() {
+            host.sources.push((take_text(&mut rest)?, take_text(&mut rest)?));
+        }
+        let complete = host.sources.len() == usize::from(status.sources);
+        complete.then_some(host).ok_or_else(|| Malformed.into())
+    }
+
+    /// Sends a request and returns the payload of the answer; `what` names it in errors.
+    fn request(&mut self, kind: u8, payload: Vec<u8>, what: &str) -> Result<Vec<u8>, HostError> {
+        self.sequence = self.sequence.wrapping_add(1);
+        let request = Frame { kind, sequence: self.sequence, payload };
+        let answer = self.transport.request(&request);
+        let Frame { kind: answered, sequence, payload } = answer.map_err(lost(what))?;
+        match (answered, &payload[..]) {
+            _ if sequence != self.sequence => {}
+            (message::ERROR, &[code, cause]) if cause == kind => {
+                if let Some(code) = ErrorCode::of_number(code) {
+                    return Err(HostError::Refused { what: what.into(), code });
+                }
+            }
+            _ if answered == kind => return Ok(payload),
+            _ => {}
+        }
+        Err(Malformed.into())
+    }
+
+    fn parameter(&self, name: &str) -> Result<usize, HostError> {
+        place("parameter", name, &self.parameters, |(name, _)| name.clone())
+    }
+
+    /// Id of a source.
+    fn source(&self, name: &str) -> Result<u8, HostError> {
+        let text = |(name, unit): &(String, String)| format!("{name} [{unit}]");
+        Ok(place("source", name, &self.sources, text)? as u8)
+    }
+
+    /// The request that sets a parameter.
+    fn setting(&self, name: &str, values: &[f64]) -> Result<Frame, HostError> {
+        let index = self.parameter(name)?;
+        let payload = [
+            &(index as u16).to_le_bytes()[..],
+            &to_bytes(self.parameters[index].1, values),
+        ]
+        .concat();
+        Ok(Frame { kind: message::SET_PAR, sequence: 0, payload })
+    }
+
+    /// Sets a parameter.
+    fn set(&mut self, name: &str, values: &[f64]) -> Result<(), HostError> {
+        let Frame { kind, payload, .. } = self.setting(name, values)?;
+        self.request(kind, payload, name)?;
+        Ok(())
+    }
+
+    /// Sets the stream up without an end, and starts it.
+    fn stream(&mut self, sources: &[u8], decimation: u16) -> Result<(), HostError> {
+        self.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
+        let setup = [
+            &decimation.to_le_bytes()[..],
+            &0u32.to_le_bytes(),
+            &[sources.len() as u8],
+            sources,
+        ]
+        .concat();
+        self.request(message::STREAM_SETUP, setup, "StreamSetup")?;
+        let port = self.transport.port().map_err(lost("its stream"))?;
+        self.request(message::STREAM_START, port.to_le_bytes().into(), "StreamStart")?;
+        Ok(())
+    }
+}
+
+fn lost(what: &str) -> impl Fn(io::Error) -> HostError {
+    move |source| HostError::Lost { what: what.into(), source }
+}
 
 /// What a host takes from a device, and gives to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -105,7 +287,7 @@ impl<T: Transport> HelicRig<T> {
         if let Some((name, _)) = &channels.reference {
             sources.push(host.source(name)?);
         }
-        sources.push(host.source("phase").map_err(|_| HostError::NoPhase)?);
+        sources.push(host.source("phase")?);
         host.set("arm", &[0.0])?;
         for series in ["target_coeffs", "forcing_coeffs"] {
             host.set(series, &[0.0; COEFFICIENTS])?;
@@ -117,7 +299,7 @@ impl<T: Transport> HelicRig<T> {
             ("freq", 0.0),
             (WATCHDOG, silence),
         ] {
-            if host.has(name) {
+            if host.parameter(name).is_ok() {
                 host.set(name, &[value])?;
             }
         }
@@ -156,7 +338,7 @@ impl<T: Transport> HelicRig<T> {
     fn reading(&mut self) -> Result<Sensors, HostError> {
         if !self.is_streaming {
             // Not earlier: readings that nobody takes only wait.
-            self.host.stream(&self.sources, self.decimation, 0)?;
+            self.host.stream(&self.sources, self.decimation)?;
             self.is_streaming = true;
         }
         loop {
@@ -202,7 +384,7 @@ impl<T: Transport> HelicRig<T> {
     /// Waits for the next packet.
     fn receive(&mut self) -> Result<(), HostError> {
         let datagram = self.host.transport.datagram();
-        let bytes = datagram.map_err(|source| HostError::Lost { what: "its stream".into(), source })?;
+        let bytes = datagram.map_err(lost("its stream"))?;
         let Ok(packet) = Packet::decode(&bytes) else {
             self.counters.malformed += 1;
             return Ok(());
@@ -244,8 +426,11 @@ impl<T: Transport> HelicRig<T> {
     /// The output of the device must be on, if it says whether it is.
     fn supervise(&mut self) -> Result<(), HostError> {
         self.unsupervised = 0.0;
-        let bytes = self.host.get("safety")?;
-        let safety = bytes.first().copied().unwrap_or_default().into();
+        let index = self.host.parameter("safety")? as u16;
+        let bytes = self
+            .host
+            .request(message::GET_PAR, index.to_le_bytes().into(), "safety")?;
+        let safety = bytes.first().copied().unwrap_or_default();
         // Devices without a gate read 0.
         if safety == 0 || safety & 0b11 == 1 {
             Ok(())
@@ -282,7 +467,7 @@ impl<T: Transport> HelicRig<T> {
                 self.host.setting("forcing_coeffs", &[0.0; COEFFICIENTS])?,
                 self.host.setting("arm", &[0.0])?,
             ];
-            self.host.transport.guard(Some(stop.into()))?;
+            self.host.transport.guard(Some(stop.into())).map_err(lost("arm"))?;
         }
         self.host.set("forcing_coeffs", &forcing)?;
         self.parts = parts;
@@ -292,7 +477,7 @@ impl<T: Transport> HelicRig<T> {
         } else if !self.is_driven() {
             self.supervise()?;
             self.host.set("arm", &[0.0])?;
-            self.host.transport.guard(None)?;
+            self.host.transport.guard(None).map_err(lost("arm"))?;
         }
         Ok(())
     }
