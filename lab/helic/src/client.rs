@@ -21,42 +21,15 @@ const RUNNING: f64 = 0.01;
 /// Share of the longest silence after which the device is asked whether its output is on.
 const SUPERVISION: f64 = 0.25;
 
-/// Why a device cannot be used.
+/// Why a device cannot be used, in words.
 #[derive(Debug, Error)]
-#[expect(missing_docs, reason = "the messages explain the variants")]
-pub enum HostError {
-    #[error(
-        "no answer from the helic device: {0}; is `vines rig --protocol helic` or the device running, with no other host?"
-    )]
-    Unreachable(#[source] io::Error),
-    #[error("the helic device, {what}: {source}; the drive is stopped as far as the device can still be reached")]
-    Lost { what: String, source: io::Error },
-    #[error(
-        "{samples} samples of the helic device did not arrive, {seconds:.3} s; up to {allowed} s are bridged. Check the network and the \
-         load of this machine"
-    )]
-    Blackout { samples: u32, seconds: f64, allowed: f64 },
-    #[error("the helic device sent an answer that does not match the request: is it another version?")]
-    Malformed(#[from] Malformed),
-    #[error("the helic device has version {0} of the protocol, this program has version {VERSION}")]
-    Version(u8),
-    #[error("the helic device refuses {what}: {code}")]
-    Refused { what: String, code: ErrorCode },
-    #[error(
-        "the helic device has no {what} \"{name}\"; it has: {list}; [rig.names] of the scene maps response and base"
-    )]
-    Missing {
-        what: &'static str,
-        name: String,
-        list: String,
-    },
-    #[error(
-        "the helic device takes {device} samples per second, which is not a multiple of the scene's {scene}: set \
-         controller.samples_per_period to {suggestion} (or that over an integer)"
-    )]
-    Rate { device: f64, scene: f64, suggestion: f64 },
-    #[error("the output of the helic device is off (safety = {0}): it has tripped, or was disarmed; the drive is zero")]
-    Tripped(u8),
+#[error("{0}")]
+pub struct HostError(String);
+
+impl From<Malformed> for HostError {
+    fn from(_: Malformed) -> Self {
+        Self("the helic device sent an answer that does not match the request: is it another version?".into())
+    }
 }
 
 impl From<HostError> for RigError {
@@ -85,7 +58,13 @@ fn place<V>(
 ) -> Result<usize, HostError> {
     let found = all.iter().position(|(own, _)| own == name);
     let list = || all.iter().map(text).collect::<Vec<_>>().join(", ");
-    found.ok_or_else(|| HostError::Missing { what, name: name.into(), list: list() })
+    found.ok_or_else(|| {
+        let text = "[rig.names] of the scene maps response and base";
+        HostError(format!(
+            "the helic device has no {what} \"{name}\"; it has: {}; {text}",
+            list()
+        ))
+    })
 }
 
 impl<T: Transport> Host<T> {
@@ -99,13 +78,13 @@ impl<T: Transport> Host<T> {
             sources,
             sample_rate: 0.0,
         };
-        let answer = match host.request(message::STATUS, Vec::new(), "Status") {
-            Err(HostError::Lost { source, .. }) => return Err(HostError::Unreachable(source)),
-            answer => answer?,
-        };
+        let advice = "Status (is `vines rig --protocol helic` or the device running, with no other host?)";
+        let answer = host.request(message::STATUS, Vec::new(), advice)?;
         // The version first: everything after it may differ between versions.
         if let Some(version) = answer.first().filter(|version| **version != VERSION) {
-            return Err(HostError::Version(*version));
+            return Err(HostError(format!(
+                "the helic device has version {version} of the protocol, this program has version {VERSION}"
+            )));
         }
         let status = Status::decode(&answer)?;
         host.sample_rate = status.sample_rate.into();
@@ -139,17 +118,17 @@ impl<T: Transport> Host<T> {
         let request = Frame { kind, sequence: self.sequence, payload };
         let answer = self.transport.request(&request);
         let Frame { kind: answered, sequence, payload } = answer.map_err(lost(what))?;
-        match (answered, &payload[..]) {
-            _ if sequence != self.sequence => {}
-            (message::ERROR, &[code, cause]) if cause == kind => {
-                if let Some(code) = ErrorCode::of_number(code) {
-                    return Err(HostError::Refused { what: what.into(), code });
-                }
-            }
-            _ if answered == kind => return Ok(payload),
-            _ => {}
+        if sequence != self.sequence {
+            return Err(Malformed.into());
         }
-        Err(Malformed.into())
+        match (answered, &payload[..]) {
+            (message::ERROR, &[code, cause]) if cause == kind => {
+                let code = ErrorCode::of_number(code).ok_or(Malformed)?;
+                Err(HostError(format!("the helic device refuses {what}: {code}")))
+            }
+            _ if answered == kind => Ok(payload),
+            _ => Err(Malformed.into()),
+        }
     }
 
     fn parameter(&self, name: &str) -> Result<usize, HostError> {
@@ -198,7 +177,11 @@ impl<T: Transport> Host<T> {
 }
 
 fn lost(what: &str) -> impl Fn(io::Error) -> HostError {
-    move |source| HostError::Lost { what: what.into(), source }
+    move |error| {
+        HostError(format!(
+            "the helic device, {what}: {error}; the drive is stopped as far as the device can still be reached"
+        ))
+    }
 }
 
 /// What a host takes from a device, and gives to it.
@@ -277,11 +260,12 @@ impl<T: Transport> HelicRig<T> {
         let ratio = host.sample_rate * sample_time;
         if ratio < 0.5 || (ratio / ratio.round() - 1.0).abs() > SAME_RATE {
             let suggestion = ratio * samples_per_period;
-            return Err(HostError::Rate {
-                device: host.sample_rate,
-                scene: 1.0 / sample_time,
-                suggestion,
-            });
+            return Err(HostError(format!(
+                "the helic device takes {} samples per second, which is not a multiple of the scene's {}: set \
+                 controller.samples_per_period to {suggestion} (or that over an integer)",
+                host.sample_rate,
+                1.0 / sample_time
+            )));
         }
         let mut sources = vec![host.source(&channels.response.0)?];
         if let Some((name, _)) = &channels.reference {
@@ -404,7 +388,10 @@ impl<T: Transport> HelicRig<T> {
         let seconds = f64::from(missed) * self.sample_time;
         let allowed = self.host.transport.silence().as_secs_f64();
         if seconds > allowed {
-            return Err(HostError::Blackout { samples: missed, seconds, allowed });
+            return Err(HostError(format!(
+                "{missed} samples of the helic device did not arrive, {seconds:.3} s; up to {allowed} s are bridged. Check the network and \
+                 the load of this machine"
+            )));
         }
         self.records.extend((0..missed).map(|_| None));
         (0..missed).for_each(|_| self.counters.hold(missed.into()));
@@ -435,7 +422,9 @@ impl<T: Transport> HelicRig<T> {
         if safety == 0 || safety & 0b11 == 1 {
             Ok(())
         } else {
-            Err(HostError::Tripped(safety))
+            Err(HostError(format!(
+                "the output of the helic device is off (safety = {safety}): it has tripped, or was disarmed; the drive is zero"
+            )))
         }
     }
 
