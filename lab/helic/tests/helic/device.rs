@@ -228,6 +228,9 @@ fn the_loop_of_the_device_finds_phase_resonance_and_a_lost_lock_latches() {
     assert_eq!(mean(0), 2.0, "locked");
     assert!((mean(1) - target).abs() < 0.2, "{}", mean(1));
     assert!((mean(2) / resonance - 1.0).abs() < 1e-4, "{} {resonance}", mean(2));
+    // Values that do not fit together are refused while the loop runs, and change nothing.
+    assert_eq!(host.set("pll_freq_min", &[2.0 * resonance]), Err(ErrorCode::BadValue));
+    assert_eq!(host.get("pll_freq_min"), (0.95 * resonance).to_le_bytes());
     let (_, after) = host.capture(&names, 100, 200);
     assert_eq!((after[199][0], after[199][3]), (3.0, 0.0), "{:?}", after[199]);
     assert_eq!(host.number("safety") & 2, 2);
