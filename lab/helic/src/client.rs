@@ -350,7 +350,6 @@ impl<T: Transport> HelicRig<T> {
             };
             self.bridge.keep(self.phase, reading);
             self.now = Some(reading);
-            self.host.transport.beat();
             self.unsupervised += self.sample_time;
             if self.unsupervised > SUPERVISION * self.host.transport.silence().as_secs_f64() && self.is_driven() {
                 self.supervise()?;

@@ -19,12 +19,6 @@ const EPOCH: u32 = 1 << 24;
 /// The value of `mcu_reboot` that restarts a device.
 const REBOOT: u32 = 0x5245_4254;
 
-/// Bits of the parameter `safety`.
-const ARMED: u8 = 1;
-const TRIPPED: u8 = 2;
-const CLAMPED: u8 = 4;
-const QUIETED: u8 = 8;
-
 /// Sources of a stream, with their units. A rig without a reference sensor has no `reference`, which is the last.
 const SOURCES: [(&str, &str); 14] = [
     ("response", "mm"),
@@ -295,12 +289,10 @@ impl Device {
         let largest = self.registry.real("rig_out_max");
         let quiet = !self.is_driven() || !wanted.is_finite();
         let out = if quiet { 0.0 } else { wanted.clamp(-largest, largest) };
-        let bit = |set: bool, bit: u8| if set { bit } else { 0 };
-        let bits = bit(self.is_armed(), ARMED)
-            | bit(self.tripped, TRIPPED)
-            | bit(!quiet && out != wanted, CLAMPED)
-            | bit(quiet, QUIETED);
-        self.registry.put("safety", &[bits.into()]);
+        // Bits 0 to 3: armed, tripped, limited, quiet.
+        let bits = [self.is_armed(), self.tripped, !quiet && out != wanted, quiet];
+        let safety: u8 = bits.iter().rev().fold(0, |bits, bit| 2 * bits + u8::from(*bit));
+        self.registry.put("safety", &[safety.into()]);
         out
     }
 }

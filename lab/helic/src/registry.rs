@@ -34,22 +34,21 @@ enum Rule {
 
 use Rule::{Angle, Frequency, NotNegative, Pulse, Read, Series, Zero, ZeroOrOne, ZeroOrTwo};
 
-/// Name, type (as in Python's `struct`), number of values, rule, and value at the start. The order is that of version 3, then come those of
+/// Names, type (as in Python's `struct`), number of values, rule, and value at the start. The order is that of version 3, then come those of
 /// the rig and of the loop.
 const PARAMETERS: &[(&str, u8, usize, Rule, f64)] = &[
-    ("firmware", b'c', 16, Read, 0.0),
-    ("experiment", b'c', 16, Read, 0.0),
+    ("firmware experiment", b'c', 16, Read, 0.0),
     ("sample_freq", b'f', 1, Read, 0.0),
-    ("ticks", b'I', 1, Read, 0.0),
-    ("loop_time_last", b'I', 1, Read, 0.0),
-    ("loop_time_max", b'I', 1, Read, 0.0),
-    ("clock_jitter", b'I', 1, Read, 0.0),
-    ("overruns", b'I', 1, Read, 0.0),
-    ("tick_timeouts", b'I', 1, Read, 0.0),
-    ("records_dropped", b'I', 1, Read, 0.0),
+    (
+        "ticks loop_time_last loop_time_max clock_jitter overruns",
+        b'I',
+        1,
+        Read,
+        0.0,
+    ),
+    ("tick_timeouts records_dropped", b'I', 1, Read, 0.0),
     ("freq", b'f', 1, Frequency, 0.0),
-    ("target_coeffs", b'f', COEFFICIENTS, Series, 0.0),
-    ("forcing_coeffs", b'f', COEFFICIENTS, Series, 0.0),
+    ("target_coeffs forcing_coeffs", b'f', COEFFICIENTS, Series, 0.0),
     ("table", b'f', 4096, Read, 0.0),
     ("table_len", b'H', 1, Read, 0.0),
     ("table_freq", b'f', 1, Read, 0.0),
@@ -60,24 +59,24 @@ const PARAMETERS: &[(&str, u8, usize, Rule, f64)] = &[
     ("table_phase", b'f', 1, Read, 0.0),
     ("table_trigger", b'I', 1, Pulse, 0.0),
     ("wake_phase_min", b'I', 1, Read, 4_294_967_295.0),
-    ("wake_phase_max", b'I', 1, Read, 0.0),
-    ("t_measure_max", b'I', 1, Read, 0.0),
-    ("t_actuate_max", b'I', 1, Read, 0.0),
-    ("t_rest_max", b'I', 1, Read, 0.0),
+    (
+        "wake_phase_max t_measure_max t_actuate_max t_rest_max",
+        b'I',
+        1,
+        Read,
+        0.0,
+    ),
     ("diag_reset", b'I', 1, Pulse, 0.0),
     ("cmd_backlog_max", b'I', 1, Read, 0.0),
     ("arm", b'I', 1, ZeroOrOne, 0.0),
     ("safety", b'I', 1, Read, 0.0),
     ("mcu_reboot", b'I', 1, Pulse, 0.0),
-    ("rig_gain", b'f', 1, Read, 0.0),
-    ("rig_out_max", b'f', 1, Read, 0.0),
+    ("rig_gain rig_out_max", b'f', 1, Read, 0.0),
     (WATCHDOG, b'f', 1, NotNegative, 0.0),
     ("impacts", b'I', 1, Read, 0.0),
     ("ctrl_reset", b'I', 1, Pulse, 0.0),
     ("control_mode", b'I', 1, ZeroOrTwo, 0.0),
-    ("pll_centre_freq", b'f', 1, Frequency, 0.0),
-    ("pll_freq_min", b'f', 1, Frequency, 0.0),
-    ("pll_freq_max", b'f', 1, Frequency, 0.0),
+    ("pll_centre_freq pll_freq_min pll_freq_max", b'f', 1, Frequency, 0.0),
     ("pll_target_phase", b'f', 1, Angle, -90.0),
     ("pll_demod_tau", b'f', 1, NotNegative, 0.1),
     ("pll_response_min", b'f', 1, NotNegative, 0.0),
@@ -87,24 +86,29 @@ const PARAMETERS: &[(&str, u8, usize, Rule, f64)] = &[
     ("pll_acquire_timeout", b'f', 1, NotNegative, 5.0),
 ];
 
-/// The values of all parameters, in the order of the table.
-#[derive(Debug, Clone)]
-pub struct Registry(Vec<Vec<f64>>);
+#[derive(Debug)]
+struct Parameter {
+    name: &'static str,
+    code: u8,
+    rule: Rule,
+    values: Vec<f64>,
+}
+
+/// All parameters, in the order of the table.
+#[derive(Debug)]
+pub struct Registry(Vec<Parameter>);
 
 impl Registry {
     /// The values at the start, for a rate in Hz, the base displacement per volt in mm, and the largest output in V.
     pub fn new(sample_rate: f64, gain: f64, largest: f64) -> Self {
-        let mut registry = Self(
-            PARAMETERS
-                .iter()
-                .map(|(_, _, count, _, value)| vec![*value; *count])
-                .collect(),
-        );
-        for (values, text) in registry.0.iter_mut().zip([FIRMWARE, EXPERIMENT]) {
-            values
-                .iter_mut()
-                .zip(text.bytes())
-                .for_each(|(to, byte)| *to = byte.into());
+        let rows = PARAMETERS.iter().flat_map(|&(names, code, count, rule, value)| {
+            let parameter = move |name| Parameter { name, code, rule, values: vec![value; count] };
+            names.split(' ').map(parameter)
+        });
+        let mut registry = Self(rows.collect());
+        for (name, text) in [("firmware", FIRMWARE), ("experiment", EXPERIMENT)] {
+            let bytes: Vec<f64> = text.bytes().chain([0; 16]).take(16).map(f64::from).collect();
+            registry.put(name, &bytes);
         }
         for (name, value) in [
             ("sample_freq", sample_rate),
@@ -123,14 +127,14 @@ impl Registry {
 
     /// A page of definitions: those from `start` on that fit into a payload.
     pub fn page(&self, start: u16) -> Result<Vec<u8>, ErrorCode> {
-        let rest = PARAMETERS.get(usize::from(start)..).ok_or(ErrorCode::BadIndex)?;
+        let rest = self.0.get(usize::from(start)..).ok_or(ErrorCode::BadIndex)?;
         let (mut next, mut page) = (start, Vec::new());
-        for (name, code, count, rule, _) in rest {
+        for Parameter { name, code, rule, values } in rest {
             let writable = u8::from(*rule != Read);
             let definition = [
                 name.as_bytes(),
                 &[0, *code],
-                &(*count as u16).to_le_bytes(),
+                &(values.len() as u16).to_le_bytes(),
                 &[writable],
             ]
             .concat();
@@ -150,8 +154,8 @@ impl Registry {
         }
         let mut bytes = Vec::new();
         for index in of_bytes(b'H', indices) {
-            let values = self.0.get(index as usize).ok_or(ErrorCode::BadIndex)?;
-            bytes.extend(to_bytes(PARAMETERS[index as usize].1, values));
+            let parameter = self.0.get(index as usize).ok_or(ErrorCode::BadIndex)?;
+            bytes.extend(to_bytes(parameter.code, &parameter.values));
             if bytes.len() > MAX_PAYLOAD {
                 return Err(ErrorCode::BadLength);
             }
@@ -161,12 +165,12 @@ impl Registry {
 
     /// The name and the values of a write that the table allows. Nothing changes yet.
     pub fn writing(&self, index: u16, bytes: &[u8]) -> Result<(&'static str, Vec<f64>), ErrorCode> {
-        let row = PARAMETERS.get(usize::from(index)).ok_or(ErrorCode::BadIndex)?;
-        let (name, code, count, rule, _) = *row;
+        let parameter = self.0.get(usize::from(index)).ok_or(ErrorCode::BadIndex)?;
+        let (code, rule) = (parameter.code, parameter.rule);
         if rule == Read {
             return Err(ErrorCode::ReadOnly);
         }
-        if bytes.len() != count * size(code) {
+        if bytes.len() != parameter.values.len() * size(code) {
             return Err(ErrorCode::BadLength);
         }
         let values = of_bytes(code, bytes);
@@ -188,22 +192,23 @@ impl Registry {
                 value.abs() + harmonics.sum::<f64>() <= self.real("rig_out_max")
             }
         };
-        allowed.then_some((name, values)).ok_or(ErrorCode::BadValue)
+        allowed.then_some((parameter.name, values)).ok_or(ErrorCode::BadValue)
     }
 
-    fn index(name: &str) -> usize {
-        let found = PARAMETERS.iter().position(|row| row.0 == name);
+    fn index(&self, name: &str) -> usize {
+        let found = self.0.iter().position(|parameter| parameter.name == name);
         found.expect("a name of the table")
     }
 
     /// Sets the values of a parameter.
     pub fn put(&mut self, name: &str, values: &[f64]) {
-        self.0[Self::index(name)].copy_from_slice(values);
+        let index = self.index(name);
+        self.0[index].values.copy_from_slice(values);
     }
 
     /// The values of a parameter.
     pub fn values(&self, name: &str) -> &[f64] {
-        &self.0[Self::index(name)]
+        &self.0[self.index(name)].values
     }
 
     /// The value of a parameter.

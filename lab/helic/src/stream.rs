@@ -6,7 +6,7 @@ use super::codec::{ErrorCode, Packet, take};
 const FLUSH: f64 = 0.005;
 
 /// The stream of a device.
-#[derive(Debug)]
+#[derive(Debug, Default)]
 pub struct Stream {
     /// Largest age of a packet, samples.
     flush: u32,
@@ -26,17 +26,8 @@ pub struct Stream {
 impl Stream {
     /// A stream that is not set up.
     pub fn new(sample_rate: f64) -> Self {
-        Self {
-            flush: ((FLUSH * sample_rate) as u32).max(1),
-            sources: Vec::new(),
-            decimation: 1,
-            count: 0,
-            port: None,
-            samples: 0,
-            records: 0,
-            age: 0,
-            packet: Packet::default(),
-        }
+        let flush = ((FLUSH * sample_rate) as u32).max(1);
+        Self { flush, ..Self::default() }
     }
 
     /// Sets the stream up: `decimation u16, count u32, n u8, source u8 × n`; `all` is the number of sources.

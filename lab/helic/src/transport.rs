@@ -30,14 +30,11 @@ pub trait Transport {
         LONGEST_SILENCE
     }
 
-    /// From now on the device is driven: after a silence of the host, the transport sends these requests, which stop the drive, and closes
+    /// From now on the device is driven: when the host takes no datagram for too long, the transport sends these requests, which stop the drive, and closes
     /// the control channel. With None, it is not driven any more. A transport without a clock does nothing.
     fn guard(&mut self, _stop: Option<Vec<Frame>>) -> io::Result<()> {
         Ok(())
     }
-
-    /// The host has taken a reading.
-    fn beat(&mut self) {}
 
     /// Sends the requests that stop the drive, if there is one, and closes the control channel.
     fn close(&mut self) {}
@@ -129,6 +126,9 @@ impl Transport for Network {
         let size = uninterrupted(|| self.stream.recv(&mut bytes))
             .map_err(|error| self.explained(error, "no packet of its stream has arrived", began))?;
         bytes.truncate(size);
+        if let Some(watchdog) = &self.watchdog {
+            watchdog.state().last = Instant::now();
+        }
         Ok(bytes)
     }
 
@@ -149,12 +149,6 @@ impl Transport for Network {
             self.watchdog = Some(Watchdog::start(control, self.stop.clone(), self.silence)?);
         }
         Ok(())
-    }
-
-    fn beat(&mut self) {
-        if let Some(watchdog) = &self.watchdog {
-            watchdog.state().last = Instant::now();
-        }
     }
 
     fn close(&mut self) {
