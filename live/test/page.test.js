@@ -22,7 +22,8 @@ const BROWSERS = [
 let server, address;
 before(async () => {
   server = createServer(async (request, response) => {
-    const path = request.url.split("?")[0];
+    // In the folder "missing", one script is.
+    const path = request.url.split("?")[0].replace("/missing/record.js", "/none.js").replace(/^\/missing/, "");
     try {
       const file = join(FOLDER, path === "/" ? "index.html" : path);
       const content = await readFile(file);
@@ -280,15 +281,14 @@ for (const { name, options } of BROWSERS) {
     });
 
     test("a page whose script is missing or that is opened as a file says so", async () => {
-      const { page } = await open("", async (page) => {
-        await page.setRequestInterception(true);
-        page.on("request", (request) => (request.url().endsWith("/record.js") ? request.abort() : request.continue()));
-      });
+      const { page } = await open("missing/");
       assert.match(await page.$eval("#fallback", (element) => element.innerText), /a script is missing or blocked/);
       await page.close();
       const file = await browser.newPage();
       await file.goto(`file://${join(FOLDER, "index.html")}`);
-      assert.match(await file.$eval("#fallback", (element) => element.innerText), /opened as a file/);
+      // Chromium refuses the scripts; Firefox runs them with the settings of this test.
+      await file.waitForFunction(() => window.live?.frames > 2 || document.getElementById("fallback")?.innerText.includes("opened as a file"), { timeout: 10000 });
+      if (name === "chromium") assert.notEqual(await file.$("#fallback"), null);
       await file.close();
       const { page: good } = await open();
       await ready(good);
@@ -325,7 +325,8 @@ for (const { name, options } of BROWSERS) {
           const one = document.activeElement;
           return one.id || (one.type === "range" ? `${one.previousElementSibling.id} slider` : one.tagName);
         });
-        if (seen.has(element) && element === "play") break;
+        // Round once: beyond the last control Firefox goes to its own ones.
+        if (seen.has(element)) break;
         seen.add(element);
         if (element.endsWith(" slider") || element === "closed") {
           const key = element.replace(" slider", "");
