@@ -8,6 +8,7 @@ pub mod report;
 
 pub use files::FileError;
 pub use vines_fmu as fmu;
+pub use vines_helic as helic;
 pub use vines_model::{ArgumentError, map, numerics, orbit, regime, theory};
 pub use vines_net as net;
 #[cfg(feature = "sweep")]

@@ -31,7 +31,7 @@ export function control(page, { key, symbol, name, unit, min, max, step, help })
   box.className = "setting";
   label.innerHTML = symbol ? `${name} <i>${symbol}</i>` : name;
   if (unit) label.append(Object.assign(document.createElement("span"), { className: "unit", textContent: ` (${unit})` }));
-  Object.assign(input, { type: "number", min, max, step: "any" });
+  Object.assign(input, { type: "number", min, max, step });
   const slider = Object.assign(document.createElement("input"), { type: "range", min, max, step });
   slider.setAttribute("aria-label", name);
   const set = (value) => {
@@ -65,12 +65,15 @@ export function bind(page) {
     impact: () => { page.play(false); page.toNextImpact(); },
     drive: () => page.change("drive", page.driving ? 0 : 1),
     track: () => page.change("track", 1),
+    defaults: () => { say(""); $("scene").value = 0; page.start({}); },
     restart: () => { say(""); page.start(page.values); },
     link: async () => {
-      const address = link(page);
+      const { address, omitted } = link(page);
       history.replaceState(null, "", address);
-      try { await navigator.clipboard.writeText(address); say(""); $("link").textContent = "Copied"; }
-      catch { $("link").textContent = "In the address bar"; }
+      say(omitted);
+      const what = omitted ? "Settings only: " : "";
+      try { await navigator.clipboard.writeText(address); $("link").textContent = `${what}Copied`; }
+      catch { $("link").textContent = `${what}In the address bar`; }
       setTimeout(() => ($("link").textContent = "Copy link"), 1500);
     },
     csv: () => {
@@ -86,8 +89,9 @@ export function bind(page) {
   for (const [id, action] of Object.entries(actions)) $(id).onclick = action;
   const keys = { " ": "play", ".": "impact", d: "drive", t: "track", r: "restart", "?": "help" };
   document.addEventListener("keydown", (event) => {
-    if (event.ctrlKey || event.metaKey || event.altKey || /^(INPUT|SELECT|TEXTAREA)$/.test(event.target.tagName)) return;
-    if (event.key === " " && event.target.tagName === "BUTTON") return;
+    // Fields take letters, buttons and check boxes the space; sliders take neither.
+    if (event.ctrlKey || event.metaKey || event.altKey || event.target.matches("select, input[type=number]")) return;
+    if (event.key === " " && event.target.matches("button, input[type=checkbox]")) return;
     const change = { "[": -1, "]": 1 }[event.key];
     if (change) {
       const next = SPEEDS[Math.max(0, Math.min(SPEEDS.length - 1, SPEEDS.indexOf(page.speed) + change))];

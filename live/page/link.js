@@ -1,24 +1,32 @@
-// The link, which contains the whole state, and the record as CSV.
+// The link, which contains the settings and, if it fits, the motion; the record as CSV.
 
 // Changes that a link repeats; more would make it too long.
 const MOST_CHANGES = 150;
+// Samples that a link repeats; more would take seconds.
+const MOST_SAMPLES = 3e6;
 
-// The address that repeats the motion of `page`.
+// The address that repeats the motion of `page`. A motion with too many changes or samples is left out, and a sentence says so: the link
+// then has the present settings, from the start.
 export function link(page) {
-  const parts = Object.entries(page.first).filter(([key, value]) => value !== page.bench.defaults[key]);
-  const address = new URL(location.href);
+  const count = page.changes.length;
+  const omitted =
+    count > MOST_CHANGES ? `${count} changes since the start are more than the ${MOST_CHANGES} that fit`
+    : page.samples > MOST_SAMPLES ? `${page.samples} samples since the start are more than the ${MOST_SAMPLES} that a link repeats`
+    : "";
+  const [values, changes] = omitted ? [page.values, page.driving ? [] : [[0, "drive", 0]]] : [page.first, page.changes];
+  const parts = Object.entries(values).filter(([key, value]) => value !== page.bench.defaults[key]);
   const query = new URLSearchParams(parts.map(([key, value]) => [key, String(value)]));
-  if (page.changes.length <= MOST_CHANGES) {
-    if (page.changes.length) query.set("changes", page.changes.map((change) => change.join(":")).join(","));
-    query.set("samples", String(page.samples));
-  }
+  if (changes.length) query.set("changes", changes.map((change) => change.join(":")).join(","));
+  if (!omitted) query.set("samples", String(page.samples));
+  const address = new URL(location.href);
   address.hash = query.toString();
-  return address.href;
+  return { address: address.href, omitted: omitted && `The link has the settings, not the motion: ${omitted}. Restart to begin a new history.` };
 }
 
-export function csv(rows) {
+export function csv(record) {
   const header = "time [s],base [m],response [m],relative displacement [m],phase error [deg],omega [rad/s],base amplitude [m],response amplitude [m]";
-  return `${header}\n${rows.map((row) => row.join(",")).join("\n")}\n`;
+  const rows = Array.from({ length: record.length }, (_, i) => record.row(i).join(","));
+  return `${header}\n${rows.join("\n")}\n`;
 }
 
 // Settings, changes and samples of a link; throws a sentence if it is invalid.
@@ -38,11 +46,11 @@ export function read(hash, table) {
   const values = {};
   let changes = [], samples = 0;
   for (const [key, text] of query) {
-    if (key === "samples") samples = number(text, "samples", 0, 3e6);
+    if (key === "samples") samples = number(text, "samples", 0, MOST_SAMPLES);
     else if (key === "changes") {
       changes = text.split(",").map((one) => {
         const [at, name, value] = one.split(":");
-        return [number(at ?? "", "the time of a change", 0, 3e6), name, setting(name, value ?? "")];
+        return [number(at ?? "", "the time of a change", 0, MOST_SAMPLES), name, setting(name, value ?? "")];
       });
     } else values[key] = setting(key, text);
   }

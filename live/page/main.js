@@ -4,9 +4,8 @@ import { $, SPEEDS, bind, bindScenes, control, say } from "./controls.js";
 import { read } from "./link.js";
 import { load } from "./module.js";
 import { Pictures } from "./pictures.js";
+import { Record } from "./record.js";
 
-// Rows of the record that are kept for the pictures and for CSV: 34 minutes of the default scene.
-const MOST_ROWS = 1 << 20;
 // Most samples in one frame: a slower machine falls behind the clock instead of freezing the page.
 const MOST_SAMPLES = 6000;
 const calm = matchMedia("(prefers-reduced-motion: reduce)");
@@ -19,6 +18,7 @@ class Page {
   constructor(table, bench) {
     this.table = table;
     this.bench = bench;
+    this.rows = new Record(bench.columns.length);
     this.pictures = new Pictures(this, calm);
     this.#controls();
     bindScenes(this);
@@ -36,7 +36,7 @@ class Page {
     this.shown = 0;
     this.driving = true;
     this.points = [];
-    this.rows = [];
+    this.rows.clear();
     this.pictures.restart();
     this.showControls();
     this.#run(1);
@@ -61,7 +61,6 @@ class Page {
       } else if (key === "track") {
         this.bench.track();
         this.driving = true;
-        this.points = this.bench.tracked();
       } else {
         this.values = { ...before, [key]: value };
         this.bench.apply(this.values);
@@ -77,6 +76,7 @@ class Page {
       this.changes.pop();
       say(error.message);
     }
+    this.points = this.bench.tracked();
     this.showControls();
   }
 
@@ -89,13 +89,10 @@ class Page {
         continue;
       }
       const now = Math.min(count, 4000, next ? next[0] - this.samples : Infinity);
-      const values = this.bench.run(now);
-      const width = this.bench.columns.length;
-      for (let i = 0; i < values.length; i += width) this.rows.push(Array.from(values.subarray(i, i + width)));
+      this.rows.push(this.bench.run(now));
       this.samples += now;
       count -= now;
     }
-    if (this.rows.length > MOST_ROWS) this.rows.splice(0, this.rows.length - MOST_ROWS / 2);
   }
 
   // Runs until `time`, s, and shows the plant at that instant.
@@ -140,6 +137,12 @@ class Page {
         input.parentElement.lastElementChild.value = value;
       }
     }
+    // Settings without an effect in the present loop.
+    for (const [key, inert] of [["detuning", this.values.closed !== 0], ["phase_target", this.values.closed === 0], ["bandwidth", this.values.closed === 0]]) {
+      const box = $(key).parentElement;
+      box.classList.toggle("inert", inert);
+      for (const input of box.querySelectorAll("input")) input.disabled = inert;
+    }
     $("drive").textContent = this.driving ? "Drive on" : "Drive off";
     $("drive").setAttribute("aria-pressed", String(this.driving));
     $("play").textContent = this.playing ? "Pause" : "Run";
@@ -161,18 +164,22 @@ async function main() {
   const table = await (await fetch("settings.json")).json();
   const bench = await load("vines_live.wasm", table.settings);
   const page = new Page(table, bench);
-  let wanted = { values: {}, changes: [], samples: 0 };
-  try {
-    wanted = read(location.hash, table);
-  } catch (error) {
-    say(error.message);
-  }
-  page.start(wanted.values, wanted.changes);
+  const follow = () => {
+    let wanted = { values: {}, changes: [], samples: 0 };
+    say("");
+    try {
+      wanted = read(location.hash, table);
+    } catch (error) {
+      say(error.message);
+    }
+    page.start(wanted.values, wanted.changes);
+    if (wanted.samples > 0) page.goTo((wanted.samples - 1) * page.step, wanted.samples);
+    page.play(wanted.samples === 0 && !calm.matches);
+  };
+  follow();
   page.setSpeed(1);
-  if (wanted.samples > 0) {
-    page.goTo((wanted.samples - 1) * page.step, wanted.samples);
-    page.play(false);
-  } else if (calm.matches) page.play(false);
+  // Back, forward, or a link that was pasted.
+  addEventListener("hashchange", follow);
   bind(page);
   window.live = { page, frames: 0 };
   let before = performance.now();
@@ -192,4 +199,5 @@ async function main() {
   requestAnimationFrame(frame);
 }
 
+$("fallback").remove();
 main().catch((error) => say(error.message));

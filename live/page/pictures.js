@@ -66,7 +66,8 @@ export class Pictures {
   // The last four periods of the record.
   #motion(period) {
     const { page, b, plots: { scope } } = this;
-    const rows = page.rows.slice(-Math.ceil(4 * period / page.step) - 1);
+    const count = Math.min(page.rows.length, Math.ceil(4 * period / page.step) + 1);
+    const rows = Array.from({ length: count }, (_, i) => page.rows.row(i - count));
     const begin = rows[0][0], end = rows.at(-1)[0];
     const motion = rows.map((row) => [row[0], row[1] / this.baseUnit, row[2] / b, row[3] / b]);
     const top = 1.05 * motion.reduce((most, row) => Math.max(most, Math.abs(row[1]), Math.abs(row[2]), Math.abs(row[3])), 1.1);
@@ -83,7 +84,7 @@ export class Pictures {
     const { page, plots: { history } } = this;
     const stride = Math.max(1, Math.floor(page.rows.length / 700));
     const past = [];
-    for (let i = (page.rows.length - 1) % stride; i < page.rows.length; i += stride) past.push(page.rows[i]);
+    for (let i = (page.rows.length - 1) % stride; i < page.rows.length; i += stride) past.push(page.rows.row(i));
     const sigma = (omega) => (omega / status.omega0 - 1) / page.values.mass_ratio;
     const late = past.slice(Math.floor(past.length * 0.05));
     const range = extent(late.flatMap((row) => [Math.max(-30, Math.min(30, row[4])), sigma(row[5])]).concat([-2, 2]), 2);
@@ -132,7 +133,7 @@ export class Pictures {
       ["Impacts", `${status.impacts}, ${status.perPeriod.toFixed(3)} per period`],
       ["Dissipated by impacts", `${(status.dissipated * 1e3).toPrecision(4)} mJ`],
     ];
-    if (page.points.length) entries.push(["Tracked points", `${tracked} of ${page.points.length}`]);
+    if (page.points.length) entries.push(["Tracked points", tracked < page.points.length ? `${tracked} of ${page.points.length}` : `${tracked}`]);
     const list = $("numbers");
     if (list.childElementCount !== 2 * entries.length) {
       list.replaceChildren(...entries.flatMap(() => [document.createElement("dt"), document.createElement("dd")]));

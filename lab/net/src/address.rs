@@ -44,6 +44,7 @@ impl Display for Address {
     }
 }
 
-pub(super) fn is_loopback(ip: IpAddr) -> bool {
+/// Whether an address is on this machine.
+pub fn is_loopback(ip: IpAddr) -> bool {
     ip.to_canonical().is_loopback()
 }

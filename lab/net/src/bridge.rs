@@ -11,7 +11,7 @@ const MOST: usize = 1 << 18;
 /// it; for the response plus a straight line that meets the readings on both sides of the gap. Before the end of the first period, or with a
 /// drive without a frequency, only the line is left.
 #[derive(Debug, Clone, Default)]
-pub(super) struct Bridge {
+pub struct Bridge {
     /// Phase of the drive, turns, and the reading, in order.
     past: VecDeque<(f64, Sensors)>,
 }

@@ -94,10 +94,11 @@ impl Display for Punctuality {
 
 /// The clock of a rig in real time.
 #[derive(Debug, Clone)]
-pub(super) struct RealTimeClock {
+pub struct RealTimeClock {
     start: Instant,
     /// s
     period: f64,
+    /// Lateness of the samples.
     pub punctuality: Punctuality,
 }
 

@@ -42,7 +42,7 @@ pub struct Counters {
 
 impl Counters {
     /// Counts a sample for which the last valid value was held, one of at least `row` in a row.
-    pub(super) fn hold(&mut self, row: u64) {
+    pub fn hold(&mut self, row: u64) {
         self.held += 1;
         self.longest = self.longest.max(row);
     }

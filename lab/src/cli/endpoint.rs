@@ -8,7 +8,7 @@ use clap::Args;
 use phase_lock::Config;
 use vines::ArgumentError;
 use vines::fmu::{FmuController, FmuError, FmuRig};
-use vines::net::helic::{Channels, DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
+use vines::helic::{Channels, DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
 use vines::scene::{Name, Names, Scene};

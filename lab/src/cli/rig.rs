@@ -4,7 +4,8 @@ use std::{path::PathBuf, str::FromStr};
 
 use clap::{Args, ValueEnum};
 use vines::ArgumentError;
-use vines::net::{Address, Role, Served, Service, Session, helic::Device};
+use vines::helic::Device;
+use vines::net::{Address, Role, Served, Service, Session};
 use vines::report;
 use vines::rig::{Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
 use vines::scene::Scene;

@@ -5,7 +5,7 @@ use std::time::{Duration, Instant};
 
 use clap::Args;
 use vines::ArgumentError;
-use vines::net::helic::{Device, HelicServer};
+use vines::helic::{Device, HelicServer};
 use vines::net::{Address, LinkError, Served, Server, ServerError, Service, Session, resolve};
 
 use super::endpoint::{ReachArguments, no_key};

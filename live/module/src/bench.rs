@@ -53,7 +53,7 @@ pub struct Bench {
     pub impacts: Vec<Impact>,
     /// Phase of the drive since the start, rad.
     pub phase: f64,
-    /// The tracking of the backbone, while it runs.
+    /// The tracking of the backbone, while it runs, and the points of one that was ended.
     pub tracking: Option<Tracking>,
     rig: NoisyRig,
     /// The plant at the last sample, and the drive from there on.
@@ -111,10 +111,12 @@ impl Bench {
         Ok(())
     }
 
-    /// Switches the drive.
+    /// Switches the drive. A tracking ends; its points up to now stay.
     pub fn drive(&mut self, on: bool) {
         self.active = on;
-        self.tracking = None;
+        if let Some(tracking) = &mut self.tracking {
+            tracking.stop(self.samples);
+        }
     }
 
     /// Tracks the backbone from here on.

@@ -32,11 +32,17 @@ pub struct Point {
 pub struct Tracking {
     /// Moves with their phase targets (rad) and the sample before which each is made, in reverse.
     moves: Vec<(u64, Move, f64)>,
-    /// All points.
+    /// All points, also those that are not yet reached.
     pub points: Vec<Point>,
 }
 
 impl Tracking {
+    /// Ends the tracking before the given sample: only the points that are known then remain.
+    pub fn stop(&mut self, sample: u64) {
+        self.moves.clear();
+        self.points.retain(|point| point.sample <= sample);
+    }
+
     /// The move to be made before the given sample, and its phase target, rad.
     pub fn due(&mut self, sample: u64) -> Option<(Move, f64)> {
         self.moves

@@ -2,7 +2,6 @@
 //!
 //! `scripts/stress --network` runs this with 10^7 frames per connection; FRAMES and SEED set both. The suite takes a small part.
 
-mod helic;
 mod noise;
 mod relay;
 mod vines;

@@ -3,14 +3,13 @@
 use crc::{CRC_16_IBM_3740, Crc};
 use thiserror::Error;
 
-/// First two bytes of every frame and packet.
-pub const MAGIC: [u8; 2] = *b"HL";
+const MAGIC: [u8; 2] = *b"HL";
 /// Version of the protocol.
 pub const VERSION: u8 = 3;
 /// Longest payload of a frame, bytes.
 pub const MAX_PAYLOAD: usize = 1024;
 /// Longest packet of a stream, bytes.
-pub const MAX_PACKET: usize = 1472;
+const MAX_PACKET: usize = 1472;
 /// Request of the discovery beacon.
 pub const BEACON_REQUEST: [u8; 3] = [b'H', b'L', 1];
 
@@ -72,6 +71,62 @@ impl ErrorCode {
 #[error("not a frame of the helic protocol")]
 pub struct Malformed;
 
+/// Takes the first bytes.
+pub(crate) fn take<const N: usize>(bytes: &mut &[u8]) -> Result<[u8; N], Malformed> {
+    let (first, rest) = bytes.split_first_chunk().ok_or(Malformed)?;
+    *bytes = rest;
+    Ok(*first)
+}
+
+/// Takes the text up to its NUL.
+///
+/// # Errors
+/// Text without an end, or not ASCII.
+pub fn take_text(bytes: &mut &[u8]) -> Result<String, Malformed> {
+    let end = bytes.iter().position(|byte| *byte == 0).ok_or(Malformed)?;
+    let text = bytes[..end]
+        .is_ascii()
+        .then(|| String::from_utf8_lossy(&bytes[..end]).into());
+    *bytes = &bytes[end + 1..];
+    text.ok_or(Malformed)
+}
+
+/// Values of a type, as in Python's `struct`: `f`, `I`, `i`, `H`, `h`, `B`, `b` or `c`.
+pub(crate) fn to_bytes(code: u8, values: &[f64]) -> Vec<u8> {
+    let bytes = |value: f64| match code {
+        b'f' => (value as f32).to_le_bytes(),
+        // A conversion from i64 keeps the bits of negative values.
+        _ => (value as i64 as u32).to_le_bytes(),
+    };
+    values
+        .iter()
+        .flat_map(|value| bytes(*value).into_iter().take(size(code)))
+        .collect()
+}
+
+/// The values in `bytes`.
+pub(crate) fn of_bytes(code: u8, bytes: &[u8]) -> Vec<f64> {
+    let value = |bytes: &[u8]| {
+        let mut word = [0; 4];
+        word[..bytes.len()].copy_from_slice(bytes);
+        if code == b'f' {
+            f32::from_le_bytes(word).into()
+        } else {
+            u32::from_le_bytes(word).into()
+        }
+    };
+    bytes.chunks_exact(size(code)).map(value).collect()
+}
+
+/// Size of a value, bytes.
+pub(crate) fn size(code: u8) -> usize {
+    match code {
+        b'H' | b'h' => 2,
+        b'B' | b'b' | b'c' => 1,
+        _ => 4,
+    }
+}
+
 /// A frame of the control channel.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Frame {
@@ -86,14 +141,8 @@ pub struct Frame {
 impl Frame {
     /// The bytes of the frame.
     pub fn encode(&self) -> Vec<u8> {
-        let length = self.payload.len() as u16;
-        let mut bytes = [
-            &MAGIC[..],
-            &[self.kind, self.sequence],
-            &length.to_le_bytes(),
-            &self.payload,
-        ]
-        .concat();
+        let length = (self.payload.len() as u16).to_le_bytes();
+        let mut bytes = [&MAGIC[..], &[self.kind, self.sequence], &length, &self.payload].concat();
         bytes.extend(crc16(&bytes[2..]).to_le_bytes());
         bytes
     }
@@ -116,12 +165,19 @@ impl Frame {
         if crc16(&bytes[2..HEADER + length]).to_le_bytes() != checksum {
             return Err(Malformed);
         }
-        let frame = Self {
-            kind: header[2],
-            sequence: header[3],
-            payload: rest[..length].to_vec(),
-        };
-        Ok(Some((frame, HEADER + length + 2)))
+        let payload = rest[..length].to_vec();
+        Ok(Some((
+            Self { kind: header[2], sequence: header[3], payload },
+            HEADER + length + 2,
+        )))
+    }
+
+    /// Takes the first frame from what has arrived of a connection; None if more bytes are needed.
+    pub(crate) fn take(bytes: &mut Vec<u8>) -> Result<Option<Self>, Malformed> {
+        Ok(Self::decode(bytes)?.map(|(frame, length)| {
+            bytes.drain(..length);
+            frame
+        }))
     }
 }
 
@@ -149,7 +205,7 @@ pub struct Packet {
 
 impl Packet {
     /// Largest number of records of `width` values.
-    pub fn most(width: usize) -> usize {
+    pub(crate) fn most(width: usize) -> usize {
         (MAX_PACKET - PACKET_HEADER) / (4 * width.max(1))
     }
 
@@ -157,39 +213,29 @@ impl Packet {
     pub fn encode(&self) -> Vec<u8> {
         let records = (self.values.len() / usize::from(self.width).max(1)) as u16;
         let mut bytes = [&MAGIC[..], &[VERSION, self.width]].concat();
-        for word in [self.sequence, self.first, self.dropped] {
-            bytes.extend(word.to_le_bytes());
-        }
-        bytes.extend(self.decimation.to_le_bytes());
-        bytes.extend(records.to_le_bytes());
+        bytes.extend(
+            [self.sequence, self.first, self.dropped]
+                .iter()
+                .flat_map(|word| word.to_le_bytes()),
+        );
+        bytes.extend([self.decimation, records].iter().flat_map(|half| half.to_le_bytes()));
         bytes.extend(self.values.iter().flat_map(|value| value.to_le_bytes()));
         bytes
     }
 
     /// Reads a datagram.
-    pub fn decode(bytes: &[u8]) -> Result<Self, Malformed> {
-        let (header, values) = bytes.split_at_checked(PACKET_HEADER).ok_or(Malformed)?;
-        let (half, width) = (|at: usize| u16::from_le_bytes([header[at], header[at + 1]]), header[3]);
-        let expected = 4 * usize::from(width) * usize::from(half(18));
-        if header[..2] != MAGIC || header[2] != VERSION || values.len() != expected || half(16) == 0 {
+    pub fn decode(mut bytes: &[u8]) -> Result<Self, Malformed> {
+        let bytes = &mut bytes;
+        let [h, l, version, width] = take(bytes)?;
+        let [sequence, first, dropped] = [take(bytes)?, take(bytes)?, take(bytes)?].map(u32::from_le_bytes);
+        let [decimation, records] = [take(bytes)?, take(bytes)?].map(u16::from_le_bytes);
+        let expected = 4 * usize::from(width) * usize::from(records);
+        if [h, l] != MAGIC || version != VERSION || bytes.len() != expected || decimation == 0 {
             return Err(Malformed);
         }
-        let word = |at: usize| u32::from(half(at)) | u32::from(half(at + 2)) << 16;
-        Ok(Self {
-            sequence: word(4),
-            first: word(8),
-            dropped: word(12),
-            decimation: half(16),
-            width,
-            values: reals(values),
-        })
+        let values = of_bytes(b'f', bytes).into_iter().map(|value| value as f32).collect();
+        Ok(Self { sequence, first, dropped, decimation, width, values })
     }
-}
-
-/// The numbers in `bytes`; a rest of less than four bytes is ignored.
-pub fn reals(bytes: &[u8]) -> Vec<f32> {
-    let four = |bytes: &[u8]| f32::from_le_bytes([bytes[0], bytes[1], bytes[2], bytes[3]]);
-    bytes.chunks_exact(4).map(four).collect()
 }
 
 /// What a device answers to Status.
@@ -208,61 +254,34 @@ pub struct Status {
 impl Status {
     /// The payload.
     pub fn encode(&self) -> Vec<u8> {
-        let mut bytes = vec![self.version];
-        bytes.extend(self.parameters.to_le_bytes());
-        bytes.push(self.sources);
-        bytes.extend(self.sample_rate.to_le_bytes());
-        bytes.extend(self.uptime.to_le_bytes());
-        bytes
+        let Self { version, parameters, sources, sample_rate, uptime } = *self;
+        let (parameters, sample_rate, uptime) = (
+            parameters.to_le_bytes(),
+            sample_rate.to_le_bytes(),
+            uptime.to_le_bytes(),
+        );
+        [&[version][..], &parameters, &[sources], &sample_rate, &uptime].concat()
     }
 
     /// Reads a payload.
-    ///
-    /// # Errors
-    /// Another length. The version comes first, because everything after it may differ between versions.
-    pub fn decode(payload: &[u8]) -> Result<Self, Malformed> {
-        let &[version, a, b, sources, c, d, e, f, g, h, i, j] = payload else {
-            return Err(Malformed);
-        };
-        Ok(Self {
-            version,
-            parameters: u16::from_le_bytes([a, b]),
-            sources,
-            sample_rate: f32::from_le_bytes([c, d, e, f]),
-            uptime: u32::from_le_bytes([g, h, i, j]),
-        })
+    pub fn decode(mut payload: &[u8]) -> Result<Self, Malformed> {
+        let bytes = &mut payload;
+        let [version] = take(bytes)?;
+        let parameters = u16::from_le_bytes(take(bytes)?);
+        let [sources] = take(bytes)?;
+        let (sample_rate, uptime) = (f32::from_le_bytes(take(bytes)?), u32::from_le_bytes(take(bytes)?));
+        let status = Self { version, parameters, sources, sample_rate, uptime };
+        bytes.is_empty().then_some(status).ok_or(Malformed)
     }
-}
-
-/// The text at the beginning of `bytes` up to its NUL, and what follows.
-///
-/// # Errors
-/// Text without an end, or not ASCII.
-pub fn text(bytes: &[u8]) -> Result<(String, &[u8]), Malformed> {
-    let end = bytes.iter().position(|byte| *byte == 0).ok_or(Malformed)?;
-    let text = bytes[..end]
-        .is_ascii()
-        .then(|| String::from_utf8_lossy(&bytes[..end]).into());
-    Ok((text.ok_or(Malformed)?, &bytes[end + 1..]))
 }
 
 /// The answer to the discovery beacon.
 pub fn beacon(control_port: u16, experiment: &str, firmware: &str) -> Vec<u8> {
     /// A locally administered address: the device is a program.
     const MAC: [u8; 6] = [2, b'H', b'L', 0, 0, 1];
-    let name = |text: &str| {
-        let mut name = [0; 16];
-        name.iter_mut().zip(text.bytes()).for_each(|(to, from)| *to = from);
-        name
-    };
-    let port = control_port.to_le_bytes();
-    [
-        &MAGIC[..],
-        &[2, VERSION],
-        &port,
-        &MAC,
-        &name(experiment),
-        &name(firmware),
-    ]
-    .concat()
+    let mut bytes = [&MAGIC[..], &[2, VERSION], &control_port.to_le_bytes(), &MAC].concat();
+    for text in [experiment, firmware] {
+        bytes.extend(text.bytes().chain([0; 16]).take(16));
+    }
+    bytes
 }

@@ -2,8 +2,8 @@
 
 use std::collections::HashMap;
 
-use vines_net::helic::Device;
-use vines_net::helic::codec::{ErrorCode, Frame, Packet, message, text};
+use vines_helic::Device;
+use vines_helic::codec::{ErrorCode, Frame, Packet, message, take_text};
 use vines_testbench::rig::Simulated;
 use vines_testbench::scene::{PAPER, Scene};
 
@@ -42,10 +42,10 @@ impl Host {
             assert!(answer.payload.len() <= 1024);
             let mut rest = &answer.payload[4..];
             while !rest.is_empty() {
-                let (name, definition) = text(rest).unwrap();
+                let name = take_text(&mut rest).unwrap();
                 assert!(name.len() <= 23, "{name}");
-                parameters.insert(name, (parameters.len() as u16, definition[0]));
-                rest = &definition[4..];
+                parameters.insert(name, (parameters.len() as u16, rest[0]));
+                rest = &rest[4..];
             }
             let next = u16::from_le_bytes([answer.payload[2], answer.payload[3]]);
             assert_eq!(usize::from(next), parameters.len());
@@ -95,10 +95,9 @@ impl Host {
         let answer = self.ask(message::GET_SOURCES, &[]).unwrap();
         let (mut names, mut rest) = (Vec::new(), &answer[..]);
         while !rest.is_empty() {
-            let (name, after) = text(rest).unwrap();
-            assert!(name.len() <= 15);
-            names.push(name);
-            rest = text(after).unwrap().1;
+            names.push(take_text(&mut rest).unwrap());
+            assert!(names.iter().all(|name| name.len() <= 15));
+            take_text(&mut rest).unwrap();
         }
         names
     }

@@ -6,11 +6,9 @@ use std::thread;
 use std::time::{Duration, Instant};
 
 use super::codec::{BEACON_REQUEST, Frame, beacon};
-use super::device::{Device, EXPERIMENT};
-use crate::address::is_loopback;
-use crate::error::ServerError;
-use crate::real_time_clock::RealTimeClock;
-use crate::report::{Ended, Session};
+use super::device::Device;
+use super::registry::{EXPERIMENT, FIRMWARE};
+use vines_net::{Ended, RealTimeClock, ServerError, Session, is_loopback};
 
 /// Port of the control channel; stream and beacon have the next two.
 pub const DEFAULT_PORT: u16 = 2350;
@@ -108,27 +106,14 @@ impl HelicServer {
             self.answer_beacon();
             while Instant::now() >= clock.due(tick + 1) {
                 tick += 1;
-                self.tick(&mut clock, tick, host.as_ref().map(|host| host.peer))?;
+                clock.serve(tick);
+                if let (Some((port, bytes)), Some(host)) = (self.device.tick()?, &host) {
+                    // What cannot be sent now is lost in the network.
+                    let _ = self.stream.send_to(&bytes, (host.peer.ip(), port));
+                }
             }
             thread::sleep(clock.due(tick + 1).saturating_duration_since(Instant::now()).min(POLL));
         }
-    }
-
-    fn tick(&mut self, clock: &mut RealTimeClock, number: u64, host: Option<SocketAddr>) -> Result<(), ServerError> {
-        clock.serve(number);
-        let began = Instant::now();
-        let packet = self.device.tick()?;
-        if let (Some((port, bytes)), Some(host)) = (packet, host) {
-            // What cannot be sent now is lost in the network.
-            let _ = self.stream.send_to(&bytes, (host.ip(), port));
-        }
-        let registry = &mut self.device.registry;
-        let spent = began.elapsed().as_micros() as u32;
-        registry.put_number("loop_time_last", spent);
-        registry.put_number("loop_time_max", registry.number("loop_time_max").max(spent));
-        registry.put_number("clock_jitter", (1e6 * clock.punctuality.worst) as u32);
-        registry.put_number("overruns", clock.punctuality.missed as u32);
-        Ok(())
     }
 
     fn answer_beacon(&self) {
@@ -141,8 +126,7 @@ impl HelicServer {
         while let Ok((size, from)) = beacon_socket.recv_from(&mut bytes) {
             if bytes[..size] == BEACON_REQUEST {
                 let port = self.address().map_or(DEFAULT_PORT, |address| address.port());
-                let firmware = concat!("vines ", env!("CARGO_PKG_VERSION"));
-                let _ = beacon_socket.send_to(&beacon(port, EXPERIMENT, firmware), from);
+                let _ = beacon_socket.send_to(&beacon(port, EXPERIMENT, FIRMWARE), from);
             }
         }
     }
@@ -158,18 +142,15 @@ impl Connection {
             Err(error) if matches!(error.kind(), ErrorKind::WouldBlock | ErrorKind::Interrupted) => return true,
             Err(_) => return false,
         }
-        loop {
-            match Frame::decode(&self.bytes) {
-                Err(_) => return false,
-                Ok(None) => return true,
-                Ok(Some((request, length))) => {
-                    self.bytes.drain(..length);
-                    let answer = device.handle(&request, uptime).encode();
-                    if self.stream.write_all(&answer).is_err() || device.has_rebooted() {
-                        return false;
-                    }
-                }
+        while let Ok(request) = Frame::take(&mut self.bytes) {
+            let Some(request) = request else {
+                return true;
+            };
+            let answer = device.handle(&request, uptime).encode();
+            if self.stream.write_all(&answer).is_err() || device.has_rebooted() {
+                return false;
             }
         }
+        false
     }
 }

@@ -1,6 +1,6 @@
 //! The vectors of the protocol, version 3 (`docs/protocol.md` of helic-daq, "Known-answer vectors").
 
-use vines_net::helic::codec::{BEACON_REQUEST, Frame, Packet, Status, beacon, crc16, message, text};
+use vines_helic::codec::{BEACON_REQUEST, Frame, Packet, Status, beacon, crc16, message, take_text};
 
 use super::host::device;
 
@@ -75,9 +75,11 @@ fn definitions_and_sources_have_the_published_form() {
     let published = bytes("66 72 65 71 00 66 01 00 01");
     assert!(page.payload.windows(published.len()).any(|part| part == published));
     let entries = bytes("61 64 63 30 00 56 00 6C 61 73 65 72 00 6D 6D 00");
-    let (name, rest) = text(&entries).unwrap();
-    let (unit, rest) = text(rest).unwrap();
-    assert_eq!((&*name, &*unit, text(rest).unwrap().0.as_str()), ("adc0", "V", "laser"));
+    let mut rest = &entries[..];
+    for expected in ["adc0", "V", "laser", "mm"] {
+        assert_eq!(take_text(&mut rest).unwrap(), expected);
+    }
+    assert!(rest.is_empty());
 }
 
 #[test]

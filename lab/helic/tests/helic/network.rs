@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::thread::{self, JoinHandle};
 use std::time::Duration;
 
-use vines_net::helic::codec::{Frame, message};
-use vines_net::helic::{Channels, Device, HelicRig, HelicServer, Network, Transport};
+use vines_helic::codec::{Frame, message};
+use vines_helic::{Channels, Device, HelicRig, HelicServer, Network, Transport};
 use vines_net::{Ended, Session};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors, Simulated};
 

@@ -3,8 +3,8 @@
 use std::collections::VecDeque;
 use std::io;
 
-use vines_net::helic::codec::{Frame, message};
-use vines_net::helic::{Channels, Device, HelicRig, Transport};
+use vines_helic::codec::{Frame, message};
+use vines_helic::{Channels, Device, HelicRig, Transport};
 use vines_testbench::experiment::{self, Plan};
 use vines_testbench::identification::identify;
 use vines_testbench::rig::{BuiltIn, Drive, Rig, Simulated};

@@ -1,14 +1,23 @@
-//! The helic protocol: a device that gets mutated frames beside genuine ones does what one does that gets the genuine ones only.
+//! Random and mutated frames: a device that gets mutated frames beside genuine ones does what one does that gets the genuine ones only.
 
+#[path = "../../net/tests/fuzz/noise.rs"]
+mod noise;
+
+use std::env;
 use std::io;
 use std::sync::{Arc, Mutex};
 
-use vines_net::helic::codec::{Frame, Packet, message};
-use vines_net::helic::{Channels, Device, HelicRig, Transport};
+use vines_helic::codec::{Frame, Packet, message};
+use vines_helic::{Channels, Device, HelicRig, Transport};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 
-use super::noise::Noise;
-use super::size;
+use noise::Noise;
+
+/// Number of frames and the seed, as in the tests of the other protocol.
+fn size() -> (u64, u64) {
+    let number = |name, default| env::var(name).map_or(default, |text| text.parse().unwrap());
+    (number("FRAMES", 20_000), number("SEED", 1))
+}
 
 /// m
 const LARGEST: f64 = 5e-3;
@@ -50,12 +59,12 @@ fn request(noise: &mut Noise) -> Frame {
         }
         // SetPar with a small integer or a float.
         1 => [
-            &(noise.below(60) as u16).to_le_bytes()[..],
+            &(noise.below(50) as u16).to_le_bytes()[..],
             &(noise.below(3) as u32).to_le_bytes(),
         ]
         .concat(),
         2 => [
-            &(noise.below(60) as u16).to_le_bytes()[..],
+            &(noise.below(50) as u16).to_le_bytes()[..],
             &(noise.below(9) as f32 / 8.0).to_le_bytes(),
         ]
         .concat(),

@@ -1,12 +1,13 @@
-//! The way to a device: requests and answers over TCP, packets over UDP.
+//! The way to a device: requests and answers over TCP, packets over UDP, and a thread that stops the drive when the host hangs.
 
 use std::io::{self, ErrorKind, Read, Write};
-use std::net::{SocketAddr, TcpStream, UdpSocket};
+use std::net::{Shutdown, SocketAddr, TcpStream, UdpSocket};
+use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::thread;
 use std::time::{Duration, Instant};
 
 use super::codec::Frame;
-use super::watchdog::{Watchdog, stop_and_close};
-use crate::address::is_loopback;
+use vines_net::is_loopback;
 
 /// Longest time for an answer while the device is set up.
 const PATIENCE: Duration = Duration::from_secs(2);
@@ -29,15 +30,11 @@ pub trait Transport {
         LONGEST_SILENCE
     }
 
-    /// From now on the device is driven: after a silence of the host, the transport sends these requests, which stop the drive, and closes
+    /// From now on the device is driven: when the host takes no datagram for too long, the transport sends these requests, which stop the drive, and closes
     /// the control channel. With None, it is not driven any more. A transport without a clock does nothing.
-    fn guard(&mut self, stop: Option<Vec<Frame>>) -> io::Result<()> {
-        let _ = stop;
+    fn guard(&mut self, _stop: Option<Vec<Frame>>) -> io::Result<()> {
         Ok(())
     }
-
-    /// The host has taken a reading.
-    fn beat(&mut self) {}
 
     /// Sends the requests that stop the drive, if there is one, and closes the control channel.
     fn close(&mut self) {}
@@ -65,68 +62,53 @@ impl Network {
         own.set_port(0);
         let stream = UdpSocket::bind(own)?;
         stream.set_read_timeout(Some(silence))?;
-        let port = peer.port().saturating_add(1);
         if !is_loopback(peer.ip()) {
-            stream.send_to(b"vines", SocketAddr::new(peer.ip(), port))?;
+            stream.send_to(b"vines", (peer.ip(), peer.port().saturating_add(1)))?;
         }
-        let mut network = Self {
-            control,
-            stream,
-            bytes: Vec::new(),
-            silence,
-            watchdog: None,
-            stop: Vec::new(),
-        };
+        let (bytes, watchdog, stop) = (Vec::new(), None, Vec::new());
+        let network = Self { control, stream, bytes, silence, watchdog, stop };
         network.patience(PATIENCE)?;
         Ok(network)
     }
 
     /// Sets the longest time for an answer.
-    fn patience(&mut self, patience: Duration) -> io::Result<()> {
+    fn patience(&self, patience: Duration) -> io::Result<()> {
         self.control.set_read_timeout(Some(patience))?;
         self.control.set_write_timeout(Some(patience))
     }
 
-    /// `error` in words: of the two sides, the one that was silent for longer since the last reading is to blame.
-    fn explained(&self, error: io::Error, waited: &str, since: Instant) -> io::Error {
-        let waiting = since.elapsed();
-        let fired = self.watchdog.as_ref().filter(|watchdog| watchdog.has_fired());
-        if fired.is_some_and(|watchdog| since.saturating_duration_since(watchdog.last()) > waiting) {
+    /// `error` in words, after waiting since `began`: a host that the watchdog stopped before is to blame itself.
+    fn explained(&self, error: io::Error, waited: &str, began: Instant) -> io::Error {
+        let said = |message| io::Error::new(ErrorKind::TimedOut, message);
+        let fired = self.watchdog.as_ref().and_then(Watchdog::fired);
+        if fired.is_some_and(|fired| fired < began) {
             let seconds = self.silence.as_secs_f64();
-            let message = format!(
+            return said(format!(
                 "this program took no reading for {seconds} s, so the drive was stopped and the connection closed; is the machine too busy?"
-            );
-            return io::Error::new(ErrorKind::TimedOut, message);
+            ));
         }
-        let said = || {
-            io::Error::new(
-                ErrorKind::TimedOut,
-                format!("{waited} for {:.2} s", waiting.as_secs_f64()),
-            )
-        };
         match error.kind() {
-            ErrorKind::WouldBlock | ErrorKind::TimedOut => said(),
-            _ if fired.is_some() => said(),
+            ErrorKind::WouldBlock | ErrorKind::TimedOut => {}
+            _ if fired.is_some() => {}
             ErrorKind::ConnectionAborted | ErrorKind::BrokenPipe | ErrorKind::ConnectionReset => {
-                io::Error::new(ErrorKind::ConnectionAborted, "the connection is closed")
+                return io::Error::new(ErrorKind::ConnectionAborted, "the connection is closed");
             }
-            _ => error,
+            _ => return error,
         }
+        said(format!("{waited} for {:.2} s", began.elapsed().as_secs_f64()))
     }
 
     fn answer(&mut self, request: &Frame) -> io::Result<Frame> {
         self.control.write_all(&request.encode())?;
         let mut more = [0; 2048];
         loop {
-            match Frame::decode(&self.bytes).map_err(|error| io::Error::new(ErrorKind::InvalidData, error))? {
-                Some((answer, length)) => {
-                    self.bytes.drain(..length);
-                    return Ok(answer);
-                }
-                None => match uninterrupted(|| self.control.read(&mut more))? {
-                    0 => return Err(ErrorKind::ConnectionAborted.into()),
-                    size => self.bytes.extend(&more[..size]),
-                },
+            let answer = Frame::take(&mut self.bytes);
+            if let Some(answer) = answer.map_err(|error| io::Error::new(ErrorKind::InvalidData, error))? {
+                return Ok(answer);
+            }
+            match uninterrupted(|| self.control.read(&mut more))? {
+                0 => return Err(ErrorKind::ConnectionAborted.into()),
+                size => self.bytes.extend(&more[..size]),
             }
         }
     }
@@ -144,6 +126,9 @@ impl Transport for Network {
         let size = uninterrupted(|| self.stream.recv(&mut bytes))
             .map_err(|error| self.explained(error, "no packet of its stream has arrived", began))?;
         bytes.truncate(size);
+        if let Some(watchdog) = &self.watchdog {
+            watchdog.state().last = Instant::now();
+        }
         Ok(bytes)
     }
 
@@ -166,12 +151,6 @@ impl Transport for Network {
         Ok(())
     }
 
-    fn beat(&mut self) {
-        if let Some(watchdog) = &self.watchdog {
-            watchdog.beat();
-        }
-    }
-
     fn close(&mut self) {
         stop_and_close(&mut self.control, &self.stop);
     }
@@ -184,5 +163,59 @@ fn uninterrupted<T>(mut call: impl FnMut() -> io::Result<T>) -> io::Result<T> {
             Err(error) if error.kind() == ErrorKind::Interrupted => {}
             outcome => return outcome,
         }
+    }
+}
+
+/// Sends the requests `stop` without waiting for their answers, and closes the control channel.
+fn stop_and_close(control: &mut TcpStream, stop: &[u8]) {
+    // What cannot be sent does not arrive; the end of the connection may.
+    let _ = control.write_all(stop);
+    let _ = control.shutdown(Shutdown::Both);
+}
+
+/// The watchdog of a host that drives a device: a thread that stops the drive when the host takes no readings any more, whether it waits
+/// for an answer, for a disk or for a terminal. It ends when it is dropped.
+#[derive(Debug)]
+struct Watchdog {
+    state: Arc<Mutex<Beats>>,
+    /// The thread ends when this is dropped.
+    _alive: mpsc::Sender<()>,
+}
+
+/// Times of the last reading, and of the end of the drive.
+#[derive(Debug)]
+struct Beats {
+    last: Instant,
+    fired: Option<Instant>,
+}
+
+impl Watchdog {
+    /// After a silence longer than `silence`, sends `stop` on `control` and closes it.
+    fn start(mut control: TcpStream, stop: Vec<u8>, silence: Duration) -> io::Result<Self> {
+        let state = Arc::new(Mutex::new(Beats { last: Instant::now(), fired: None }));
+        let (alive, dropped) = mpsc::channel();
+        let watchdog = Self { state: Arc::clone(&state), _alive: alive };
+        thread::Builder::new().spawn(move || {
+            let mut left = silence;
+            while dropped.recv_timeout(left) == Err(mpsc::RecvTimeoutError::Timeout) {
+                let mut beats = state.lock().unwrap_or_else(PoisonError::into_inner);
+                left = (beats.last + silence).saturating_duration_since(Instant::now());
+                if left.is_zero() {
+                    beats.fired = Some(Instant::now());
+                    drop(beats);
+                    return stop_and_close(&mut control, &stop);
+                }
+            }
+        })?;
+        Ok(watchdog)
+    }
+
+    fn state(&self) -> std::sync::MutexGuard<'_, Beats> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// When the drive was stopped.
+    fn fired(&self) -> Option<Instant> {
+        self.state().fired
     }
 }

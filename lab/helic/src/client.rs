@@ -1,14 +1,16 @@
-//! A device as a rig of the bench. Its oscillator runs on the device; the host sets frequency and amplitude, step by step.
+//! The host: what a device has, its values by name, and the device as a rig of the bench. The oscillator runs on the device; the host sets
+//! frequency and amplitude, step by step.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
+use std::io;
 
-use super::codec::{Packet, message};
-use super::host::{Host, HostError};
+use thiserror::Error;
+
+use super::codec::{ErrorCode, Frame, Malformed, Packet, Status, VERSION, message, take, take_text, to_bytes};
 use super::registry::{COEFFICIENTS, HARMONICS, WATCHDOG};
 use super::transport::Transport;
-use crate::bridge::Bridge;
-use crate::report::Counters;
+use vines_net::{Bridge, Counters};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 
 /// Largest relative difference between the sample rates: the device states its own with 24 bits.
@@ -18,6 +20,169 @@ const SAME_RATE: f64 = 1e-6;
 const RUNNING: f64 = 0.01;
 /// Share of the longest silence after which the device is asked whether its output is on.
 const SUPERVISION: f64 = 0.25;
+
+/// Why a device cannot be used, in words.
+#[derive(Debug, Error)]
+#[error("{0}")]
+pub struct HostError(String);
+
+impl From<Malformed> for HostError {
+    fn from(_: Malformed) -> Self {
+        Self("the helic device sent an answer that does not match the request: is it another version?".into())
+    }
+}
+
+impl From<HostError> for RigError {
+    fn from(error: HostError) -> Self {
+        Self::Failed(error.into())
+    }
+}
+
+/// A device, seen from its host: names and types of its parameters, names and units of its sources.
+#[derive(Debug)]
+struct Host<T> {
+    transport: T,
+    sequence: u8,
+    parameters: Vec<(String, u8)>,
+    sources: Vec<(String, String)>,
+    /// Samples per second.
+    sample_rate: f64,
+}
+
+/// The place of `name` in a list of names with their units.
+fn place<V>(
+    what: &'static str,
+    name: &str,
+    all: &[(String, V)],
+    text: fn(&(String, V)) -> String,
+) -> Result<usize, HostError> {
+    let found = all.iter().position(|(own, _)| own == name);
+    let list = || all.iter().map(text).collect::<Vec<_>>().join(", ");
+    found.ok_or_else(|| {
+        let text = "[rig.names] of the scene maps response and base";
+        HostError(format!(
+            "the helic device has no {what} \"{name}\"; it has: {}; {text}",
+            list()
+        ))
+    })
+}
+
+impl<T: Transport> Host<T> {
+    /// Reads what the device has.
+    fn new(transport: T) -> Result<Self, HostError> {
+        let (parameters, sources) = (Vec::new(), Vec::new());
+        let mut host = Self {
+            transport,
+            sequence: 0,
+            parameters,
+            sources,
+            sample_rate: 0.0,
+        };
+        let advice = "Status (is `vines rig --protocol helic` or the device running, with no other host?)";
+        let answer = host.request(message::STATUS, Vec::new(), advice)?;
+        // The version first: everything after it may differ between versions.
+        if let Some(version) = answer.first().filter(|version| **version != VERSION) {
+            return Err(HostError(format!(
+                "the helic device has version {version} of the protocol, this program has version {VERSION}"
+            )));
+        }
+        let status = Status::decode(&answer)?;
+        host.sample_rate = status.sample_rate.into();
+        while host.parameters.len() < usize::from(status.parameters) {
+            let start = (host.parameters.len() as u16).to_le_bytes();
+            let page = host.request(message::GET_PARAMS, start.into(), "GetParams")?;
+            let mut rest = &page[..];
+            let (echo, next) = (take(&mut rest)?, u16::from_le_bytes(take(&mut rest)?));
+            while !rest.is_empty() {
+                let name = take_text(&mut rest)?;
+                let [code, _, _, _] = take(&mut rest)?;
+                host.parameters.push((name, code));
+            }
+            let count = host.parameters.len();
+            if echo != start || count == usize::from(u16::from_le_bytes(start)) || usize::from(next) != count {
+                return Err(Malformed.into());
+            }
+        }
+        let answer = host.request(message::GET_SOURCES, Vec::new(), "GetSources")?;
+        let mut rest = &answer[..];
+        while !rest.is_empty() {
+            host.sources.push((take_text(&mut rest)?, take_text(&mut rest)?));
+        }
+        let complete = host.sources.len() == usize::from(status.sources);
+        complete.then_some(host).ok_or_else(|| Malformed.into())
+    }
+
+    /// Sends a request and returns the payload of the answer; `what` names it in errors.
+    fn request(&mut self, kind: u8, payload: Vec<u8>, what: &str) -> Result<Vec<u8>, HostError> {
+        self.sequence = self.sequence.wrapping_add(1);
+        let request = Frame { kind, sequence: self.sequence, payload };
+        let answer = self.transport.request(&request);
+        let Frame { kind: answered, sequence, payload } = answer.map_err(lost(what))?;
+        if sequence != self.sequence {
+            return Err(Malformed.into());
+        }
+        match (answered, &payload[..]) {
+            (message::ERROR, &[code, cause]) if cause == kind => {
+                let code = ErrorCode::of_number(code).ok_or(Malformed)?;
+                Err(HostError(format!("the helic device refuses {what}: {code}")))
+            }
+            _ if answered == kind => Ok(payload),
+            _ => Err(Malformed.into()),
+        }
+    }
+
+    fn parameter(&self, name: &str) -> Result<usize, HostError> {
+        place("parameter", name, &self.parameters, |(name, _)| name.clone())
+    }
+
+    /// Id of a source.
+    fn source(&self, name: &str) -> Result<u8, HostError> {
+        let text = |(name, unit): &(String, String)| format!("{name} [{unit}]");
+        Ok(place("source", name, &self.sources, text)? as u8)
+    }
+
+    /// The request that sets a parameter.
+    fn setting(&self, name: &str, values: &[f64]) -> Result<Frame, HostError> {
+        let index = self.parameter(name)?;
+        let payload = [
+            &(index as u16).to_le_bytes()[..],
+            &to_bytes(self.parameters[index].1, values),
+        ]
+        .concat();
+        Ok(Frame { kind: message::SET_PAR, sequence: 0, payload })
+    }
+
+    /// Sets a parameter.
+    fn set(&mut self, name: &str, values: &[f64]) -> Result<(), HostError> {
+        let Frame { kind, payload, .. } = self.setting(name, values)?;
+        self.request(kind, payload, name)?;
+        Ok(())
+    }
+
+    /// Sets the stream up without an end, and starts it.
+    fn stream(&mut self, sources: &[u8], decimation: u16) -> Result<(), HostError> {
+        self.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
+        let setup = [
+            &decimation.to_le_bytes()[..],
+            &0u32.to_le_bytes(),
+            &[sources.len() as u8],
+            sources,
+        ]
+        .concat();
+        self.request(message::STREAM_SETUP, setup, "StreamSetup")?;
+        let port = self.transport.port().map_err(lost("its stream"))?;
+        self.request(message::STREAM_START, port.to_le_bytes().into(), "StreamStart")?;
+        Ok(())
+    }
+}
+
+fn lost(what: &str) -> impl Fn(io::Error) -> HostError {
+    move |error| {
+        HostError(format!(
+            "the helic device, {what}: {error}; the drive is stopped as far as the device can still be reached"
+        ))
+    }
+}
 
 /// What a host takes from a device, and gives to it.
 #[derive(Debug, Clone, PartialEq)]
@@ -95,17 +260,18 @@ impl<T: Transport> HelicRig<T> {
         let ratio = host.sample_rate * sample_time;
         if ratio < 0.5 || (ratio / ratio.round() - 1.0).abs() > SAME_RATE {
             let suggestion = ratio * samples_per_period;
-            return Err(HostError::Rate {
-                device: host.sample_rate,
-                scene: 1.0 / sample_time,
-                suggestion,
-            });
+            return Err(HostError(format!(
+                "the helic device takes {} samples per second, which is not a multiple of the scene's {}: set \
+                 controller.samples_per_period to {suggestion} (or that over an integer)",
+                host.sample_rate,
+                1.0 / sample_time
+            )));
         }
         let mut sources = vec![host.source(&channels.response.0)?];
         if let Some((name, _)) = &channels.reference {
             sources.push(host.source(name)?);
         }
-        sources.push(host.source("phase").map_err(|_| HostError::NoPhase)?);
+        sources.push(host.source("phase")?);
         host.set("arm", &[0.0])?;
         for series in ["target_coeffs", "forcing_coeffs"] {
             host.set(series, &[0.0; COEFFICIENTS])?;
@@ -117,7 +283,7 @@ impl<T: Transport> HelicRig<T> {
             ("freq", 0.0),
             (WATCHDOG, silence),
         ] {
-            if host.has(name) {
+            if host.parameter(name).is_ok() {
                 host.set(name, &[value])?;
             }
         }
@@ -156,7 +322,7 @@ impl<T: Transport> HelicRig<T> {
     fn reading(&mut self) -> Result<Sensors, HostError> {
         if !self.is_streaming {
             // Not earlier: readings that nobody takes only wait.
-            self.host.stream(&self.sources, self.decimation, 0)?;
+            self.host.stream(&self.sources, self.decimation)?;
             self.is_streaming = true;
         }
         loop {
@@ -184,7 +350,6 @@ impl<T: Transport> HelicRig<T> {
             };
             self.bridge.keep(self.phase, reading);
             self.now = Some(reading);
-            self.host.transport.beat();
             self.unsupervised += self.sample_time;
             if self.unsupervised > SUPERVISION * self.host.transport.silence().as_secs_f64() && self.is_driven() {
                 self.supervise()?;
@@ -202,7 +367,7 @@ impl<T: Transport> HelicRig<T> {
     /// Waits for the next packet.
     fn receive(&mut self) -> Result<(), HostError> {
         let datagram = self.host.transport.datagram();
-        let bytes = datagram.map_err(|source| HostError::Lost { what: "its stream".into(), source })?;
+        let bytes = datagram.map_err(lost("its stream"))?;
         let Ok(packet) = Packet::decode(&bytes) else {
             self.counters.malformed += 1;
             return Ok(());
@@ -222,7 +387,10 @@ impl<T: Transport> HelicRig<T> {
         let seconds = f64::from(missed) * self.sample_time;
         let allowed = self.host.transport.silence().as_secs_f64();
         if seconds > allowed {
-            return Err(HostError::Blackout { samples: missed, seconds, allowed });
+            return Err(HostError(format!(
+                "{missed} samples of the helic device did not arrive, {seconds:.3} s; up to {allowed} s are bridged. Check the network and \
+                 the load of this machine"
+            )));
         }
         self.records.extend((0..missed).map(|_| None));
         (0..missed).for_each(|_| self.counters.hold(missed.into()));
@@ -244,13 +412,18 @@ impl<T: Transport> HelicRig<T> {
     /// The output of the device must be on, if it says whether it is.
     fn supervise(&mut self) -> Result<(), HostError> {
         self.unsupervised = 0.0;
-        let bytes = self.host.get("safety")?;
-        let safety = bytes.first().copied().unwrap_or_default().into();
+        let index = self.host.parameter("safety")? as u16;
+        let bytes = self
+            .host
+            .request(message::GET_PAR, index.to_le_bytes().into(), "safety")?;
+        let safety = bytes.first().copied().unwrap_or_default();
         // Devices without a gate read 0.
         if safety == 0 || safety & 0b11 == 1 {
             Ok(())
         } else {
-            Err(HostError::Tripped(safety))
+            Err(HostError(format!(
+                "the output of the helic device is off (safety = {safety}): it has tripped, or was disarmed; the drive is zero"
+            )))
         }
     }
 
@@ -282,7 +455,7 @@ impl<T: Transport> HelicRig<T> {
                 self.host.setting("forcing_coeffs", &[0.0; COEFFICIENTS])?,
                 self.host.setting("arm", &[0.0])?,
             ];
-            self.host.transport.guard(Some(stop.into()))?;
+            self.host.transport.guard(Some(stop.into())).map_err(lost("arm"))?;
         }
         self.host.set("forcing_coeffs", &forcing)?;
         self.parts = parts;
@@ -292,7 +465,7 @@ impl<T: Transport> HelicRig<T> {
         } else if !self.is_driven() {
             self.supervise()?;
             self.host.set("arm", &[0.0])?;
-            self.host.transport.guard(None)?;
+            self.host.transport.guard(None).map_err(lost("arm"))?;
         }
         Ok(())
     }

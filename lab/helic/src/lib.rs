@@ -1,0 +1,20 @@
+//! The control protocol of [helic-daq](https://github.com/dawbarton/helic-daq), version 3: a rig as one of its devices ([`Device`],
+//! [`HelicServer`]), and its devices as rigs ([`HelicRig`]).
+//!
+//! Source of all facts: `docs/protocol.md` of that project. `docs/helic.md` of this project says what is served, and where it differs.
+
+#![forbid(unsafe_code)]
+
+mod client;
+pub mod codec;
+mod device;
+mod pll;
+mod registry;
+mod server;
+mod stream;
+mod transport;
+
+pub use client::{Channels, HelicRig, HostError};
+pub use device::Device;
+pub use server::{DEFAULT_PORT, HelicServer};
+pub use transport::{LONGEST_SILENCE, Network, Transport};
