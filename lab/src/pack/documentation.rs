@@ -2,7 +2,7 @@
 //!
 //! The tables of the page come from `modelDescription.xml`; equations and explanations are in `pictures/`.
 
-use fmi2_description::{Description, Error, ScalarVariable};
+use fmi2_description::{Causality, Description, Error};
 use maud::{DOCTYPE, PreEscaped, html};
 
 use crate::report::Table;
@@ -85,12 +85,12 @@ fn page(xml: &str, material: Option<&Material>) -> Result<String, Error> {
 }
 
 /// Causalities in the order of the page.
-const SECTIONS: [(&str, &str); 5] = [
-    ("parameter", "Parameters"),
-    ("calculatedParameter", "Calculated parameters"),
-    ("input", "Inputs"),
-    ("output", "Outputs"),
-    ("local", "Local variables"),
+const SECTIONS: [(Causality, &str); 5] = [
+    (Causality::Parameter, "Parameters"),
+    (Causality::CalculatedParameter, "Calculated parameters"),
+    (Causality::Input, "Inputs"),
+    (Causality::Output, "Outputs"),
+    (Causality::Local, "Local variables"),
 ];
 
 /// A number with at most six digits. The description has all digits.
@@ -109,16 +109,17 @@ fn rounded(text: &str) -> String {
 }
 
 /// The variables of one causality.
-fn table(description: &Description, causality: &str) -> Table {
-    let is_one = |one: &&ScalarVariable| one.causality.as_deref().unwrap_or("local") == causality;
-    let rows = description.variables.iter().filter(is_one).map(|one| {
-        let content = one.content.first();
-        let start = content.and_then(|content| content.start.as_deref());
-        let unit = content.and_then(|content| content.unit.as_deref());
-        let texts = [unit, one.variability.as_deref(), Some(one.description.as_str())];
-        let mut cells = vec![one.name.clone(), rounded(start.unwrap_or_default())];
-        cells.extend(texts.map(|text| text.unwrap_or_default().to_string()));
-        cells
+fn table(description: &Description, causality: Causality) -> Table {
+    let variables = description.variables.iter();
+    let rows = variables.filter(|one| one.causality == causality).map(|one| {
+        let content = one.content().map(|(_, content)| content.clone()).unwrap_or_default();
+        vec![
+            one.name.clone(),
+            rounded(&content.start.unwrap_or_default()),
+            content.unit.unwrap_or_default(),
+            format!("{:?}", one.variability).to_lowercase(),
+            one.description.clone(),
+        ]
     });
     Table::new("name | start | unit | variability | meaning").rows(rows)
 }

@@ -54,7 +54,7 @@ fn numbers_have_at_most_six_digits() {
 fn a_component_without_a_picture_gets_a_page() {
     let files = documentation(
         "Tiny",
-        "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"a &lt; b\"/>",
+        "<fmiModelDescription fmiVersion=\"2.0\" modelName=\"a &lt; b\" guid=\"g\"><ModelVariables/></fmiModelDescription>",
     )
     .unwrap();
     assert_eq!(files.len(), 1);

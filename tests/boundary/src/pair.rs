@@ -1,7 +1,7 @@
 //! Plant and controller coupled as a master couples them: the default scene, a digest of every output bit, and the lock.
 
 use fmi2_component::Status;
-use fmi2_description::{Description, Kind};
+use fmi2_description::{Causality, Description, Kind};
 use sha2::{Digest, Sha256};
 
 use crate::fuzz::RandomSource;
@@ -37,9 +37,9 @@ impl References {
             let put_out = description
                 .variables
                 .iter()
-                .filter(|variable| matches!(variable.causality.as_deref(), Some("output" | "local")));
+                .filter(|variable| matches!(variable.causality, Causality::Output | Causality::Local));
             put_out
-                .filter(|variable| kinds.contains(&variable.content[0].kind))
+                .filter(|variable| variable.content().is_some_and(|(kind, _)| kinds.contains(&kind)))
                 .map(|variable| variable.value_reference)
                 .collect()
         };
