@@ -16,7 +16,8 @@ pub struct Description {
     pub fmi_version: String,
     #[serde(rename = "@modelName")]
     pub model_name: String,
-    #[serde(rename = "@guid")]
+    /// Empty if absent, as in FMI 3.0.
+    #[serde(rename = "@guid", default)]
     pub guid: String,
     /// `description`; empty if absent.
     #[serde(rename = "@description", default)]
