@@ -44,6 +44,7 @@ impl Part {
             std::env::consts::DLL_SUFFIX
         );
         let library = library::load(&unpacked.join(name)).unwrap();
+        let guid = std::ffi::CString::new(description.guid.as_str()).unwrap();
         let hear = Box::new(|line| println!("{line:?}"));
         // SAFETY: a library of FMI 2.0, which stays loaded since nobody drops it.
         let master = unsafe {
@@ -51,10 +52,10 @@ impl Part {
             std::mem::forget(library);
             Master::new(
                 functions,
-                c"part",
+                c"part".as_ptr(),
                 Interface::CoSimulation as i32,
-                &description.guid,
-                None,
+                guid.as_ptr(),
+                std::ptr::null(),
                 true,
                 hear,
             )

@@ -99,49 +99,58 @@ macro_rules! functions {
     };
 }
 
-functions! {
-    fmi2GetTypesPlatform() -> *const c_char;
-    fmi2GetVersion() -> *const c_char;
-    fmi2Instantiate(*const c_char, c_int, *const c_char, *const c_char, *const CallbackFunctions, c_int, c_int) -> Raw;
-    fmi2FreeInstance(Raw) -> ();
-    fmi2SetDebugLogging(Raw, c_int, usize, *const *const c_char) -> Answer;
-    fmi2SetupExperiment(Raw, c_int, f64, f64, c_int, f64) -> Answer;
-    fmi2EnterInitializationMode(Raw) -> Answer;
-    fmi2ExitInitializationMode(Raw) -> Answer;
-    fmi2Terminate(Raw) -> Answer;
-    fmi2Reset(Raw) -> Answer;
-    fmi2GetReal(Raw, *const c_uint, usize, *mut f64) -> Answer;
-    fmi2GetInteger(Raw, *const c_uint, usize, *mut c_int) -> Answer;
-    fmi2GetBoolean(Raw, *const c_uint, usize, *mut c_int) -> Answer;
-    fmi2GetString(Raw, *const c_uint, usize, *mut *const c_char) -> Answer;
-    fmi2SetReal(Raw, *const c_uint, usize, *const f64) -> Answer;
-    fmi2SetInteger(Raw, *const c_uint, usize, *const c_int) -> Answer;
-    fmi2SetBoolean(Raw, *const c_uint, usize, *const c_int) -> Answer;
-    fmi2SetString(Raw, *const c_uint, usize, *const *const c_char) -> Answer;
-    fmi2GetFMUstate(Raw, *mut Raw) -> Answer;
-    fmi2SetFMUstate(Raw, Raw) -> Answer;
-    fmi2FreeFMUstate(Raw, *mut Raw) -> Answer;
-    fmi2SerializedFMUstateSize(Raw, Raw, *mut usize) -> Answer;
-    fmi2SerializeFMUstate(Raw, Raw, *mut u8, usize) -> Answer;
-    fmi2DeSerializeFMUstate(Raw, *const u8, usize, *mut Raw) -> Answer;
-    fmi2GetDirectionalDerivative(Raw, *const c_uint, usize, *const c_uint, usize, *const f64, *mut f64) -> Answer;
-    fmi2SetRealInputDerivatives(Raw, *const c_uint, usize, *const c_int, *const f64) -> Answer;
-    fmi2GetRealOutputDerivatives(Raw, *const c_uint, usize, *const c_int, *mut f64) -> Answer;
-    fmi2DoStep(Raw, f64, f64, c_int) -> Answer;
-    fmi2CancelStep(Raw) -> Answer;
-    fmi2GetStatus(Raw, c_int, *mut c_int) -> Answer;
-    fmi2GetRealStatus(Raw, c_int, *mut f64) -> Answer;
-    fmi2GetIntegerStatus(Raw, c_int, *mut c_int) -> Answer;
-    fmi2GetBooleanStatus(Raw, c_int, *mut c_int) -> Answer;
-    fmi2GetStringStatus(Raw, c_int, *mut *const c_char) -> Answer;
-    fmi2EnterEventMode(Raw) -> Answer;
-    fmi2NewDiscreteStates(Raw, *mut EventInfo) -> Answer;
-    fmi2EnterContinuousTimeMode(Raw) -> Answer;
-    fmi2CompletedIntegratorStep(Raw, c_int, *mut c_int, *mut c_int) -> Answer;
-    fmi2SetTime(Raw, f64) -> Answer;
-    fmi2SetContinuousStates(Raw, *const f64, usize) -> Answer;
-    fmi2GetDerivatives(Raw, *mut f64, usize) -> Answer;
-    fmi2GetEventIndicators(Raw, *mut f64, usize) -> Answer;
-    fmi2GetContinuousStates(Raw, *mut f64, usize) -> Answer;
-    fmi2GetNominalsOfContinuousStates(Raw, *mut f64, usize) -> Answer;
+/// Calls a macro with the functions of the standard and their types: a test of a component that is linked declares them.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! fmi2_functions {
+    ($with:ident) => {
+        $with! {
+            fmi2GetTypesPlatform() -> *const c_char;
+            fmi2GetVersion() -> *const c_char;
+            fmi2Instantiate(*const c_char, c_int, *const c_char, *const c_char, *const CallbackFunctions, c_int, c_int) -> Raw;
+            fmi2FreeInstance(Raw) -> ();
+            fmi2SetDebugLogging(Raw, c_int, usize, *const *const c_char) -> Answer;
+            fmi2SetupExperiment(Raw, c_int, f64, f64, c_int, f64) -> Answer;
+            fmi2EnterInitializationMode(Raw) -> Answer;
+            fmi2ExitInitializationMode(Raw) -> Answer;
+            fmi2Terminate(Raw) -> Answer;
+            fmi2Reset(Raw) -> Answer;
+            fmi2GetReal(Raw, *const c_uint, usize, *mut f64) -> Answer;
+            fmi2GetInteger(Raw, *const c_uint, usize, *mut c_int) -> Answer;
+            fmi2GetBoolean(Raw, *const c_uint, usize, *mut c_int) -> Answer;
+            fmi2GetString(Raw, *const c_uint, usize, *mut *const c_char) -> Answer;
+            fmi2SetReal(Raw, *const c_uint, usize, *const f64) -> Answer;
+            fmi2SetInteger(Raw, *const c_uint, usize, *const c_int) -> Answer;
+            fmi2SetBoolean(Raw, *const c_uint, usize, *const c_int) -> Answer;
+            fmi2SetString(Raw, *const c_uint, usize, *const *const c_char) -> Answer;
+            fmi2GetFMUstate(Raw, *mut Raw) -> Answer;
+            fmi2SetFMUstate(Raw, Raw) -> Answer;
+            fmi2FreeFMUstate(Raw, *mut Raw) -> Answer;
+            fmi2SerializedFMUstateSize(Raw, Raw, *mut usize) -> Answer;
+            fmi2SerializeFMUstate(Raw, Raw, *mut u8, usize) -> Answer;
+            fmi2DeSerializeFMUstate(Raw, *const u8, usize, *mut Raw) -> Answer;
+            fmi2GetDirectionalDerivative(Raw, *const c_uint, usize, *const c_uint, usize, *const f64, *mut f64) -> Answer;
+            fmi2SetRealInputDerivatives(Raw, *const c_uint, usize, *const c_int, *const f64) -> Answer;
+            fmi2GetRealOutputDerivatives(Raw, *const c_uint, usize, *const c_int, *mut f64) -> Answer;
+            fmi2DoStep(Raw, f64, f64, c_int) -> Answer;
+            fmi2CancelStep(Raw) -> Answer;
+            fmi2GetStatus(Raw, c_int, *mut c_int) -> Answer;
+            fmi2GetRealStatus(Raw, c_int, *mut f64) -> Answer;
+            fmi2GetIntegerStatus(Raw, c_int, *mut c_int) -> Answer;
+            fmi2GetBooleanStatus(Raw, c_int, *mut c_int) -> Answer;
+            fmi2GetStringStatus(Raw, c_int, *mut *const c_char) -> Answer;
+            fmi2EnterEventMode(Raw) -> Answer;
+            fmi2NewDiscreteStates(Raw, *mut EventInfo) -> Answer;
+            fmi2EnterContinuousTimeMode(Raw) -> Answer;
+            fmi2CompletedIntegratorStep(Raw, c_int, *mut c_int, *mut c_int) -> Answer;
+            fmi2SetTime(Raw, f64) -> Answer;
+            fmi2SetContinuousStates(Raw, *const f64, usize) -> Answer;
+            fmi2GetDerivatives(Raw, *mut f64, usize) -> Answer;
+            fmi2GetEventIndicators(Raw, *mut f64, usize) -> Answer;
+            fmi2GetContinuousStates(Raw, *mut f64, usize) -> Answer;
+            fmi2GetNominalsOfContinuousStates(Raw, *mut f64, usize) -> Answer;
+        }
+    };
 }
+
+fmi2_functions!(functions);

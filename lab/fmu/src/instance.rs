@@ -126,13 +126,21 @@ impl Fmu {
                 };
                 log::log!(target: &target, level, "{text}");
             };
-            let (name, resources) = (c_string(name), c_string(&uri(&inside("resources"))));
+            let [name, guid, resources] = [name, &description.guid, &uri(&inside("resources"))].map(c_string);
             let kind = Interface::CoSimulation as _;
             // SAFETY: the library is one of FMI 2.0, and is unloaded after the instance.
             unsafe {
                 let functions = Functions::of(&library);
                 let hear = Box::new(hear);
-                Master::new(functions, &name, kind, &description.guid, Some(&resources), true, hear)
+                Master::new(
+                    functions,
+                    name.as_ptr(),
+                    kind,
+                    guid.as_ptr(),
+                    resources.as_ptr(),
+                    true,
+                    hear,
+                )
             }
         };
         if master.c.is_null() {

@@ -1,8 +1,7 @@
 //! A master that makes no other use of an instance than it is told to, and passes on what the instance logs.
 
-use std::ffi::{CStr, CString, c_char, c_int, c_void};
+use std::ffi::{CStr, c_char, c_int, c_void};
 use std::fmt;
-use std::ptr::null;
 
 use fmi2_component::abi::CallbackFunctions;
 use fmi2_component::{Logger, Status};
@@ -85,15 +84,15 @@ impl Master {
     /// An instance, or the refusal of one: `fmi2Instantiate` with these arguments, invisible. `hear` takes its log.
     ///
     /// # Safety
-    /// The library of the functions must stay loaded until this is dropped. Where `c` is NULL, only such libraries may be
+    /// The texts end with NUL or are NULL. The library of the functions must stay loaded until this is dropped. Where `c` is NULL, only such libraries may be
     /// called as check their arguments.
     #[must_use]
     pub unsafe fn new(
         f: Functions,
-        name: &CStr,
+        name: *const c_char,
         kind: c_int,
-        guid: &str,
-        location: Option<&CStr>,
+        guid: *const c_char,
+        location: *const c_char,
         logging: bool,
         hear: Hear,
     ) -> Self {
@@ -105,20 +104,8 @@ impl Master {
             step_finished: None,
             component_environment: hear.cast(),
         });
-        let guid = CString::new(guid.replace('\0', "")).unwrap_or_default();
-        let location = location.map_or(null(), CStr::as_ptr);
-        // SAFETY: the texts outlive the call; the callbacks and their environment outlive the instance.
-        let c = unsafe {
-            (f.fmi2Instantiate)(
-                name.as_ptr(),
-                kind,
-                guid.as_ptr(),
-                location,
-                &*callbacks,
-                0,
-                logging.into(),
-            )
-        };
+        // SAFETY: as promised by the caller; the callbacks and their environment outlive the instance.
+        let c = unsafe { (f.fmi2Instantiate)(name, kind, guid, location, &*callbacks, 0, logging.into()) };
         Self { c, f, hear, _callbacks: callbacks }
     }
 

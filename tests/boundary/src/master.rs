@@ -1,8 +1,8 @@
 //! The master of `vines-fmu`, which keeps what the instance logs and panics where a call is refused that should not be.
 
-use std::ffi::{CStr, c_int};
+use std::ffi::{CStr, CString, c_int};
 use std::ops::Deref;
-use std::ptr::null_mut;
+use std::ptr::{null, null_mut};
 use std::sync::{Arc, Mutex};
 
 use fmi2_component::Status;
@@ -33,13 +33,27 @@ impl Master {
     }
 
     /// An instance, or the refusal of one, of that type, GUID and resource location.
+    ///
+    /// # Panics
+    /// If the GUID has a NUL inside.
     #[must_use]
     pub fn at(fmu: &Fmu, kind: c_int, guid: &str, location: Option<&CStr>) -> Self {
         let lines = Arc::<Mutex<Vec<Line>>>::default();
         let heard = Arc::clone(&lines);
         let hear = Box::new(move |line| heard.lock().unwrap().push(line));
+        let (guid, location) = (CString::new(guid).unwrap(), location.map_or(null(), CStr::as_ptr));
         // SAFETY: the library is never unloaded.
-        let master = unsafe { vines_fmu::Master::new(fmu.functions, c"rig", kind, guid, location, false, hear) };
+        let master = unsafe {
+            vines_fmu::Master::new(
+                fmu.functions,
+                c"rig".as_ptr(),
+                kind,
+                guid.as_ptr(),
+                location,
+                false,
+                hear,
+            )
+        };
         Self { master, lines }
     }
 
