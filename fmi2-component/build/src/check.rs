@@ -4,7 +4,7 @@ use std::collections::HashMap;
 
 use fmi2_description::{Causality, Description, Initial, Variability};
 
-use crate::identifier::identifier;
+use crate::source::identifier;
 use crate::table::{Kind, Table, Variable};
 
 /// Appends every fault that it finds.

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use uuid::Uuid;
 
-use crate::error::Error;
+use crate::Error;
 use crate::table::Table;
 
 /// The namespace of these GUIDs: any fixed one will do.
