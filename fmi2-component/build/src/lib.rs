@@ -81,7 +81,7 @@ pub fn guid_of(xml: &str) -> Result<String, Error> {
 /// # Errors
 /// A description that FMI 2.0 does not allow.
 pub fn describe(xml: &str) -> Result<String, Error> {
-    guid::replace(xml, &guid_of(xml)?)
+    guid::replace(xml, &Description::parse(xml)?.guid, &guid_of(xml)?)
 }
 
 fn read(xml: &str) -> Result<Table, Error> {
