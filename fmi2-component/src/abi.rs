@@ -11,11 +11,9 @@ mod entry;
 mod experiment;
 mod fmu_state;
 mod instantiate;
-mod logging;
 mod model_exchange;
 mod pointers;
 mod status;
-mod strings;
 mod types;
 mod values;
 
@@ -26,18 +24,16 @@ pub use experiment::{
 pub use fmu_state::{
     deserialize_fmu_state, free_fmu_state, get_fmu_state, serialize_fmu_state, serialized_fmu_state_size, set_fmu_state,
 };
-pub use instantiate::{free_instance, instantiate};
-pub use logging::set_debug_logging;
+pub use instantiate::{free_instance, instantiate, set_debug_logging};
 pub use model_exchange::{
     completed_integrator_step, enter_continuous_time_mode, enter_event_mode, get_continuous_states, get_derivatives,
     get_event_indicators, get_nominals_of_continuous_states, new_discrete_states, not_for_co_simulation,
     set_continuous_states, set_time,
 };
 pub use status::{get_boolean_status, get_integer_status, get_real_status, get_status, get_string_status};
-pub use strings::{get_string, set_string};
 pub use types::{
     CBoolean, CComponent, CFmuState, CString, CValueReference, CallbackFunctions, EventInfo, TYPES_PLATFORM, VERSION,
 };
-pub use values::{get_boolean, get_integer, get_real, set_boolean, set_integer, set_real};
+pub use values::{get_boolean, get_integer, get_real, get_string, set_boolean, set_integer, set_real, set_string};
 
-pub use crate::status::Status;
+pub use crate::refusal::Status;

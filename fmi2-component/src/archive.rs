@@ -26,11 +26,6 @@ impl<'a> Archive<'a> {
         Self(Mode::Read(bytes))
     }
 
-    /// Whether values are being read: values that follow from them must then be computed again.
-    pub fn is_reading(&self) -> bool {
-        matches!(self.0, Mode::Read(_))
-    }
-
     /// Writes a whole value, or reads it: the component itself, or one field after the other.
     ///
     /// # Errors

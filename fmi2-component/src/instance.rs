@@ -6,10 +6,9 @@ use crate::component::{Component, RealOf};
 use crate::life_cycle::{Interface, State};
 use crate::log::Log;
 use crate::model::Key;
-use crate::occasion::Occasions;
 use crate::refusal::{Refusal, Severity};
-use crate::session::{Select, Session};
-use crate::snapshots::Snapshots;
+use crate::session::{Select, Session, Snapshots};
+use crate::variable::Occasions;
 use crate::variable::Variable;
 
 /// How far, relatively, a master's clock may be from ours, and a step may lead past the stop time: both round.

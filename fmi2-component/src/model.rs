@@ -1,6 +1,6 @@
 //! The shape of what the build step generates from `modelDescription.xml`.
 
-use crate::occasion::Occasions;
+use crate::variable::Occasions;
 use crate::variable::Variable;
 
 /// A model's identity and its variables; implemented by the generated type `Model`.

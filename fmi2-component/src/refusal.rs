@@ -1,8 +1,22 @@
-//! Why a call was refused, and how bad that is.
+//! What a call answers (FMI 2.0, clause 2.1.3), and why it was refused.
 
-use std::fmt::Display;
-
-use crate::status::Status;
+/// `fmi2Status`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[repr(C)]
+pub enum Status {
+    /// All is well.
+    Ok = 0,
+    /// Something is not quite right, but the call was done.
+    Warning = 1,
+    /// The call was not done; the component is as it was before.
+    Discard = 2,
+    /// The call was wrong.
+    Error = 3,
+    /// The component can only be freed.
+    Fatal = 4,
+    /// The call continues in the background. This shell never returns it.
+    Pending = 5,
+}
 
 /// How bad a refusal is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,17 +86,10 @@ impl<E: std::error::Error> From<E> for Refusal {
 
 /// The error and what caused it, on one line.
 fn describe(error: &dyn std::error::Error) -> String {
-    let mut text = error.to_string();
-    let mut source = error.source();
-    while let Some(cause) = source {
-        text = join(&text, cause);
-        source = cause.source();
+    match error.source() {
+        Some(cause) => format!("{error}: {}", describe(cause)),
+        None => error.to_string(),
     }
-    text
-}
-
-fn join(text: &str, cause: impl Display) -> String {
-    format!("{text}: {cause}")
 }
 
 #[cfg(test)]

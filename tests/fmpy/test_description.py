@@ -68,7 +68,8 @@ def test_the_fmu_is_a_co_simulation_component_for_this_platform(fmus, name):
     assert description.coSimulation.canGetAndSetFMUstate
     assert description.coSimulation.canSerializeFMUstate
     assert description.coSimulation.canHandleVariableCommunicationStepSize
-    assert (description.modelExchange is not None) == (name == "LoViNes")
+    exchange = description.modelExchange
+    assert (exchange and exchange.modelIdentifier) == (name if name == "LoViNes" else None)
     assert description.variableNamingConvention == "structured"
     assert "linux64" in supported_platforms(str(fmus[name].path))
 

@@ -4,7 +4,7 @@ use std::fmt::Write;
 
 use uuid::Uuid;
 
-use crate::error::Error;
+use crate::Error;
 use crate::table::Table;
 
 /// The namespace of these GUIDs: any fixed one will do.
@@ -36,40 +36,15 @@ pub(crate) fn guid(table: &Table) -> String {
     Uuid::new_v5(&NAMESPACE, text.as_bytes()).to_string()
 }
 
-/// The description with another GUID; every other byte stays.
-pub(crate) fn replace(xml: &str, guid: &str) -> Result<String, Error> {
-    let value =
-        guid_value(xml).ok_or_else(|| Error::Faults(vec!["fmiModelDescription has no attribute guid".into()]))?;
-    Ok([&xml[..value.start], guid, &xml[value.end..]].concat())
-}
-
-/// Where the value of the root's attribute `guid` stands.
-fn guid_value(xml: &str) -> Option<std::ops::Range<usize>> {
-    let mut at = root(xml)? + "<fmiModelDescription".len();
-    loop {
-        let rest = &xml[at..];
-        let equals = rest.find('=')?;
-        let name = rest[..equals].trim();
-        let open = equals + rest[equals..].find(['"', '\''])?;
-        let quote = char::from(rest.as_bytes()[open]);
-        let close = open + 1 + rest[open + 1..].find(quote)?;
-        if name == "guid" {
-            return Some(at + open + 1..at + close);
-        }
-        at += close + 1;
+/// The description with the GUID `new` instead of `old`; every other byte stays.
+pub(crate) fn replace(xml: &str, old: &str, new: &str) -> Result<String, Error> {
+    let before = format!(" guid=\"{old}\"");
+    if xml.matches(&before).count() != 1 {
+        let fault =
+            "fmiModelDescription needs an attribute guid=\"…\", in this spelling, and no other element the same";
+        return Err(Error::Faults(vec![fault.into()]));
     }
-}
-
-/// Where the root element begins: not inside a comment before it.
-fn root(xml: &str) -> Option<usize> {
-    let mut at = 0;
-    loop {
-        let element = at + xml[at..].find("<fmiModelDescription")?;
-        match xml[at..element].find("<!--") {
-            None => return Some(element),
-            Some(comment) => at += comment + xml[at + comment..].find("-->")? + 3,
-        }
-    }
+    Ok(xml.replacen(&before, &format!(" guid=\"{new}\""), 1))
 }
 
 #[cfg(test)]
@@ -77,15 +52,16 @@ mod tests {
     use super::replace;
 
     #[test]
-    fn only_the_guid_of_the_root_changes() {
-        let xml = r#"<!-- <fmiModelDescription guid="no"> -->
-            <fmiModelDescription modelName="guid='a'" guid = 'derived' x="1"><A guid="derived"/></fmiModelDescription>"#;
-        let expected = xml.replacen("'derived'", "'42'", 1);
-        assert_eq!(replace(xml, "42").unwrap(), expected);
+    fn only_the_guid_changes() {
+        let xml = r#"<!-- guid="no" --><fmiModelDescription modelName="guid='a'" guid="derived" x="1"/>"#;
+        let expected = xml.replacen("derived", "42", 1);
+        assert_eq!(replace(xml, "derived", "42").unwrap(), expected);
     }
 
     #[test]
-    fn a_missing_guid_is_a_fault() {
-        assert!(replace("<fmiModelDescription a='1'/>", "42").is_err());
+    fn a_guid_that_is_missing_or_not_the_only_one_is_a_fault() {
+        for xml in ["<a b='1'/>", r#"<a guid="derived"><b guid="derived"/></a>"#] {
+            assert!(replace(xml, "derived", "42").is_err());
+        }
     }
 }

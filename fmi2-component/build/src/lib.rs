@@ -8,7 +8,7 @@
 //! }
 //! ```
 //!
-//! They check the description and write `$OUT_DIR/variables.rs`, which the component includes:
+//! They check what the variable table needs and write `$OUT_DIR/variables.rs`, which the component includes:
 //!
 //! ```ignore
 //! mod variables {
@@ -24,18 +24,15 @@
 //! gives it the GUID that follows from the variables; whoever packs the FMU puts that text into it.
 #![forbid(unsafe_code)]
 
-mod attributes;
 mod check;
-mod error;
 mod guid;
-mod identifier;
 mod source;
 mod table;
 
+use std::fmt;
 use std::path::{Path, PathBuf};
 
-pub use error::Error;
-use fmi2_description::{Description, unknown_names};
+use fmi2_description::Description;
 use table::Table;
 
 /// Reads the description at `path`, relative to the package, and writes `$OUT_DIR/variables.rs`. For `build.rs`.
@@ -84,17 +81,59 @@ pub fn guid_of(xml: &str) -> Result<String, Error> {
 /// # Errors
 /// A description that FMI 2.0 does not allow.
 pub fn describe(xml: &str) -> Result<String, Error> {
-    guid::replace(xml, &guid_of(xml)?)
+    guid::replace(xml, &Description::parse(xml)?.guid, &guid_of(xml)?)
 }
 
 fn read(xml: &str) -> Result<Table, Error> {
     let description = Description::parse(xml)?;
-    let mut faults = unknown_names(xml)?;
+    let mut faults = Vec::new();
     let table = Table::new(&description, &mut faults);
     check::check(&description, &table, &mut faults);
     if faults.is_empty() {
         Ok(table)
     } else {
         Err(Error::Faults(faults))
+    }
+}
+
+/// Reason why a description is refused.
+#[derive(Debug)]
+pub enum Error {
+    /// The file cannot be read or written.
+    File {
+        /// Which file.
+        path: PathBuf,
+        /// Reason.
+        source: std::io::Error,
+    },
+    /// The text is not a model description.
+    Description(fmi2_description::Error),
+    /// The description violates FMI 2.0; one line per fault.
+    Faults(Vec<String>),
+}
+
+impl fmt::Display for Error {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::File { path, .. } => write!(f, "{} cannot be read or written", path.display()),
+            Self::Description(_) => f.write_str("the text is not a model description of FMI 2.0"),
+            Self::Faults(faults) => f.write_str(&faults.join("\n")),
+        }
+    }
+}
+
+impl std::error::Error for Error {
+    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
+        match self {
+            Self::File { source, .. } => Some(source),
+            Self::Description(source) => Some(source),
+            Self::Faults(_) => None,
+        }
+    }
+}
+
+impl From<fmi2_description::Error> for Error {
+    fn from(error: fmi2_description::Error) -> Self {
+        Self::Description(error)
     }
 }

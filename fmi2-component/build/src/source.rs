@@ -3,7 +3,6 @@
 use std::fmt::Write;
 
 use crate::guid::guid;
-use crate::identifier::identifier as identifier_of;
 use crate::table::{Kind, Literal, Table, Variable};
 
 /// The contents of `variables.rs`.
@@ -21,11 +20,18 @@ pub(crate) fn source(table: &Table) -> String {
 
 fn identity(out: &mut String, table: &Table) -> std::fmt::Result {
     let guid = guid(table);
-    let Table { name, identifier, version, event_indicators, categories, .. } = table;
+    let Table {
+        name,
+        identifier: model,
+        version,
+        event_indicators,
+        categories,
+        ..
+    } = table;
     let keys = |pick: fn(&(usize, usize)) -> usize| {
         let names = table.states.iter().map(pick).map(|place| {
             let name = table.variables.get(place).map_or("", |v| v.name.as_str());
-            format!("Real::{}", identifier_of(name))
+            format!("Real::{}", identifier(name))
         });
         names.collect::<Vec<_>>().join(", ")
     };
@@ -37,7 +43,7 @@ fn identity(out: &mut String, table: &Table) -> std::fmt::Result {
 pub const MODEL_NAME: &str = {name:?};
 /// `modelIdentifier`.
 #[allow(dead_code)]
-pub const MODEL_IDENTIFIER: &str = {identifier:?};
+pub const MODEL_IDENTIFIER: &str = {model:?};
 /// Derived from the variable table.
 #[allow(dead_code)]
 pub const GUID: &str = {guid:?};
@@ -71,7 +77,7 @@ fn key(out: &mut String, kind: Kind, variables: &[&Variable]) -> std::fmt::Resul
         Kind::Boolean => "bool",
         Kind::String => "&'static str",
     };
-    let variants: Vec<_> = variables.iter().map(|v| identifier_of(&v.name)).collect();
+    let variants: Vec<_> = variables.iter().map(|v| identifier(&v.name)).collect();
 
     writeln!(
         out,
@@ -224,4 +230,50 @@ pub mod category {{"
         )?;
     }
     writeln!(out, "}}")
+}
+
+/// The Rust identifier of a structured name (FMI 2.0, clause 2.2.9): the name itself, with every run of other characters
+/// than letters, digits and `_` made one `_`, and none at the end:
+/// `der(q1)` becomes `der_q1`. `M` and `m` remain two. A keyword gets a trailing `_`.
+pub(crate) fn identifier(name: &str) -> String {
+    let parts = name.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_'));
+    let parts: Vec<_> = parts.filter(|part| !part.is_empty()).collect();
+    let mut identifier = parts.join("_");
+    if !identifier.starts_with(|c: char| c.is_ascii_alphabetic() || c == '_') {
+        identifier.insert(0, '_');
+    }
+    if identifier == "_" || KEYWORDS.contains(&identifier.as_str()) {
+        identifier.push('_');
+    }
+    identifier
+}
+
+const KEYWORDS: &[&str] = &[
+    "Self", "abstract", "as", "async", "await", "become", "box", "break", "const", "continue", "crate", "do", "dyn",
+    "else", "enum", "extern", "false", "final", "fn", "for", "gen", "if", "impl", "in", "let", "loop", "macro",
+    "match", "mod", "move", "mut", "override", "priv", "pub", "ref", "return", "self", "static", "struct", "super",
+    "trait", "true", "try", "type", "typeof", "unsafe", "unsized", "use", "virtual", "where", "while", "yield",
+];
+
+#[cfg(test)]
+mod tests {
+    use super::identifier;
+
+    #[test]
+    fn a_variant_is_named_as_its_variable() {
+        for (name, expected) in [
+            ("M", "M"),
+            ("m", "m"),
+            ("impact_time", "impact_time"),
+            ("der(q1)", "der_q1"),
+            ("der(x[2],3)", "der_x_2_3"),
+            ("rig.motor.speed", "rig_motor_speed"),
+            ("loop", "loop_"),
+            ("2nd", "_2nd"),
+            ("_", "__"),
+            ("'+'", "__"),
+        ] {
+            assert_eq!(identifier(name), expected);
+        }
+    }
 }

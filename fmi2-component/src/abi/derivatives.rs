@@ -10,8 +10,7 @@ use crate::component::{BooleanOf, Component, IntegerOf, RealOf};
 use crate::instance::Instance;
 use crate::life_cycle::Function;
 use crate::model::Key;
-use crate::refusal::Refusal;
-use crate::status::Status;
+use crate::refusal::{Refusal, Status};
 use crate::variable::Causality;
 
 /// `fmi2SetRealInputDerivatives`.

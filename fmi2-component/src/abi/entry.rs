@@ -8,8 +8,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use crate::abi::types::CComponent;
 use crate::instance::Instance;
 use crate::life_cycle::{Function, State};
+use crate::refusal::Status;
 use crate::refusal::{Refusal, Severity};
-use crate::status::Status;
 
 /// Target of an `fmi2Component`.
 pub(super) struct Handle<C> {

@@ -5,7 +5,7 @@ use super::types::{CBoolean, CComponent};
 use crate::component::Component;
 use crate::instance::Instance;
 use crate::life_cycle::{Function, State};
-use crate::status::Status;
+use crate::refusal::Status;
 
 /// `fmi2SetupExperiment`. The tolerance is checked and not used: what a component cannot do exactly it decides for itself.
 pub unsafe fn setup_experiment<C: Component>(

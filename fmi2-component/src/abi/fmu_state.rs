@@ -9,9 +9,8 @@ use crate::component::Component;
 use crate::instance::Instance;
 use crate::life_cycle::Function::FMUstate;
 use crate::refusal::Refusal;
-use crate::serial::{deserialise, serialise};
-use crate::session::Session;
-use crate::status::Status;
+use crate::refusal::Status;
+use crate::session::{Session, deserialise, serialise};
 
 /// `fmi2GetFMUstate`. A state given on entry is overwritten.
 pub unsafe fn get_fmu_state<C: Component>(component: CComponent, state: *mut CFmuState) -> Status {

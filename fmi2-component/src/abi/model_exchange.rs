@@ -8,8 +8,7 @@ use crate::instance::Instance;
 use crate::life_cycle::{Function, State};
 use crate::model::Model;
 use crate::model_exchange::ModelExchange;
-use crate::refusal::Refusal;
-use crate::status::Status;
+use crate::refusal::{Refusal, Status};
 
 /// Any function of model exchange, for a component without: an error with a reason.
 pub unsafe fn not_for_co_simulation<C: Component>(component: CComponent, name: &str) -> Status {

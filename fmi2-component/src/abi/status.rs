@@ -9,8 +9,8 @@ use crate::component::Component;
 use crate::instance::Instance;
 use crate::life_cycle::{Function, State};
 use crate::refusal::Refusal;
+use crate::refusal::Status;
 use crate::session::Session;
-use crate::status::Status;
 
 /// `fmi2StatusKind`.
 const DO_STEP_STATUS: c_int = 0;

@@ -6,7 +6,7 @@ use crate::log::Logger;
 
 /// `fmi2Component`.
 pub type CComponent = *mut c_void;
-/// `fmi2FMUstate`: a number, see `snapshots.rs`.
+/// `fmi2FMUstate`: a number, see `session.rs`.
 pub type CFmuState = *mut c_void;
 /// `fmi2ValueReference`.
 pub type CValueReference = c_uint;

@@ -1,18 +1,17 @@
-//! `fmi2GetReal`, `fmi2SetReal`, and the same for integers and Booleans (FMI 2.0, clause 2.1.7).
+//! `fmi2GetReal`, `fmi2SetReal`, and the same for integers, Booleans and strings (FMI 2.0, clause 2.1.7).
 
 use std::any::TypeId;
-use std::ffi::c_int;
+use std::ffi::{CString as OwnedCString, c_int};
 
 use super::entry::enter;
-use super::pointers::{input_and_output, inputs};
-use super::types::{CBoolean, CComponent, CValueReference};
-use crate::component::Component;
+use super::pointers::{input, input_and_output, inputs, output, text};
+use super::types::{CBoolean, CComponent, CString, CValueReference};
+use crate::component::{Component, StringOf};
 use crate::instance::Instance;
 use crate::life_cycle::Function;
 use crate::model::Key;
-use crate::occasion::Occasions;
-use crate::refusal::Refusal;
-use crate::status::Status;
+use crate::refusal::{Refusal, Status};
+use crate::variable::Occasions;
 
 /// Declares a getter and a setter of the ABI.
 macro_rules! values {
@@ -143,6 +142,64 @@ unsafe fn set<C: Component, K: Key, T>(
     };
     // SAFETY: the contract is passed on.
     unsafe { enter(component, function, name, body) }
+}
+
+/// `fmi2GetString`. The strings live until it is called again, which is longer than the standard asks for.
+pub unsafe fn get_string<C: Component>(
+    component: CComponent,
+    references: *const CValueReference,
+    count: usize,
+    values: *mut CString,
+) -> Status {
+    let body = |instance: &mut Instance<C>| {
+        // SAFETY: the arrays are as long as their count, by contract.
+        let (references, values) = unsafe { (input(references, count, "vr")?, output(values, count, "value")?) };
+        if instance.session.stale {
+            refresh_for::<C, StringOf<C>>(instance, references)?;
+        }
+        instance.strings.clear();
+        for (&reference, value) in references.iter().zip(values) {
+            let string = instance.session.component.get_string(find(reference)?);
+            let string = OwnedCString::new(string.replace('\0', "\u{fffd}"))?;
+            value.write(string.as_ptr());
+            instance.strings.push(string);
+        }
+        Ok(())
+    };
+    // SAFETY: the contract is passed on.
+    unsafe { enter(component, Function::GetValues, "fmi2GetString", body) }
+}
+
+/// `fmi2SetString`. What is not UTF-8 is replaced.
+pub unsafe fn set_string<C: Component>(
+    component: CComponent,
+    references: *const CValueReference,
+    count: usize,
+    values: *const CString,
+) -> Status {
+    let body = |instance: &mut Instance<C>| {
+        // SAFETY: the arrays are as long as their count, by contract.
+        let (references, values) = unsafe { (input(references, count, "vr")?, input(values, count, "value")?) };
+        let mut settings = Vec::with_capacity(count);
+        for (&reference, &value) in references.iter().zip(values) {
+            let key = find::<StringOf<C>>(reference)?;
+            instance.check_settable(key)?;
+            // SAFETY: NULL or a C string, by the standard.
+            let value = unsafe { text(value) }
+                .ok_or_else(|| Refusal::error(format!("{} = NULL; expected text", key.variable().name)))?;
+            settings.push((key, value));
+        }
+        instance.change(|component| {
+            for (key, value) in settings {
+                component.set_string(key, &value)?;
+            }
+            Ok(())
+        })?;
+        instance.values_change();
+        Ok(())
+    };
+    // SAFETY: the contract is passed on.
+    unsafe { enter(component, Function::SetDiscrete, "fmi2SetString", body) }
 }
 
 #[inline]

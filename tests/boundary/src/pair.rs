@@ -1,12 +1,11 @@
 //! Plant and controller coupled as a master couples them: the default scene, a digest of every output bit, and the lock.
 
-use fmi2_component::Status;
-use fmi2_description::{Description, Kind};
+use fmi2_description::{Causality, Description, Kind};
 use sha2::{Digest, Sha256};
 
 use crate::fuzz::RandomSource;
 use crate::library::Fmu;
-use crate::master::{Interface, Master};
+use crate::{Interface, Master};
 
 /// The controller's sample time, s: a hundredth of the natural period.
 pub const SAMPLE_TIME: f64 = 0.001_134_357_339_553_793_8;
@@ -37,9 +36,9 @@ impl References {
             let put_out = description
                 .variables
                 .iter()
-                .filter(|variable| matches!(variable.causality.as_deref(), Some("output" | "local")));
+                .filter(|variable| matches!(variable.causality, Causality::Output | Causality::Local));
             put_out
-                .filter(|variable| kinds.contains(&variable.content[0].kind))
+                .filter(|variable| variable.content().is_some_and(|(kind, _)| kinds.contains(&kind)))
                 .map(|variable| variable.value_reference)
                 .collect()
         };
@@ -95,9 +94,7 @@ impl Pair {
         plant.well(plant.set_real(references[0].start, 0.5));
         plant.start();
         let controller = Master::new(controller, Interface::CoSimulation);
-        // SAFETY: one reference, one value.
-        let armed = unsafe { (controller.f.fmi2SetBoolean)(controller.c, &references[1].start, 1, &1) };
-        controller.well(armed);
+        controller.well(controller.set_booleans(&[references[1].start], &[1]));
         controller.start();
         let digest = Sha256::new();
         Self { plant, controller, references, locked, time: 0.0, digest }
@@ -180,29 +177,23 @@ pub fn irregular(from: f64, to: f64, seed: u64) -> impl FnMut() -> f64 {
 
 fn reals(m: &Master, references: &[u32]) -> Vec<f64> {
     let mut values = vec![f64::NAN; references.len()];
-    // SAFETY: arrays of the same length; so below.
-    m.well(unsafe { (m.f.fmi2GetReal)(m.c, references.as_ptr(), references.len(), values.as_mut_ptr()) });
+    m.well(m.get_reals(references, &mut values));
     values
 }
 
 fn integers(m: &Master, references: &[u32]) -> Vec<i32> {
     let mut values = vec![-1; references.len()];
-    // SAFETY: as above.
-    m.well(unsafe { (m.f.fmi2GetInteger)(m.c, references.as_ptr(), references.len(), values.as_mut_ptr()) });
+    m.well(m.get_integers(references, &mut values));
     values
 }
 
 fn booleans(m: &Master, references: &[u32]) -> Vec<i32> {
     let mut values = vec![-1; references.len()];
-    // SAFETY: as above.
-    m.well(unsafe { (m.f.fmi2GetBoolean)(m.c, references.as_ptr(), references.len(), values.as_mut_ptr()) });
+    m.well(m.get_booleans(references, &mut values));
     values
 }
 
 #[track_caller]
 fn set(m: &Master, references: &[u32], values: &[f64]) {
-    assert_eq!(references.len(), values.len());
-    // SAFETY: as above.
-    let status: Status = unsafe { (m.f.fmi2SetReal)(m.c, references.as_ptr(), references.len(), values.as_ptr()) };
-    m.well(status);
+    m.well(m.set_reals(references, values));
 }

@@ -7,21 +7,14 @@ use std::collections::{BTreeMap, BTreeSet};
 
 use fmi2_boundary::{Fmu, Interface, Master};
 use fmi2_component::abi::EventInfo;
-use roxmltree::Document;
+use fmi2_description::{Causality, Initial, Kind, ScalarVariable, Unknown};
 
 /// Unknowns and what they depend on, by place in the list of variables; with each dependency its kind.
 type Structure = BTreeMap<(usize, usize), String>;
 
-/// One variable as the description has it.
-struct Variable {
-    vr: u32,
-    kind: String,
-    start: Option<f64>,
-}
-
 struct Description {
     /// The first is at index 1.
-    variables: Vec<Variable>,
+    variables: Vec<ScalarVariable>,
     outputs: Vec<usize>,
     derivatives: Vec<usize>,
     initial: Vec<usize>,
@@ -33,72 +26,74 @@ struct Description {
 }
 
 fn read(xml: &str) -> Description {
-    let document = Document::parse(xml).unwrap();
-    let nodes = |name: &'static str| document.descendants().filter(move |n| n.has_tag_name(name));
-    let places = |wanted: &dyn Fn(roxmltree::Node) -> bool| -> Vec<usize> {
-        let numbered = nodes("ScalarVariable").zip(1..);
-        numbered.filter(|(n, _)| wanted(*n)).map(|(_, i)| i).collect()
+    let fmi2_description::Description { variables, structure, .. } = fmi2_description::Description::parse(xml).unwrap();
+    let places = |wanted: fn(&ScalarVariable) -> bool| -> Vec<usize> {
+        let numbered = variables.iter().zip(1..);
+        numbered.filter(|(v, _)| wanted(v)).map(|(_, i)| i).collect()
     };
-    let list = |name| nodes(name).flat_map(|n| n.children().filter(|c| c.has_tag_name("Unknown")));
-    let index = |n: roxmltree::Node| n.attribute("index").unwrap().parse().unwrap();
-    let mut declared = BTreeMap::new();
-    for name in ["Outputs", "Derivatives", "InitialUnknowns"] {
-        let mut structure = Structure::new();
-        for unknown in list(name) {
-            let words = |what| unknown.attribute(what).unwrap_or_default().split_whitespace();
-            let kinds = words("dependenciesKind").chain(std::iter::repeat("dependent"));
-            for (known, kind) in words("dependencies").zip(kinds) {
-                structure.insert((index(unknown), known.parse().unwrap()), kind.to_owned());
+    let indices = |unknowns: &[Unknown]| unknowns.iter().map(|unknown| unknown.index).collect();
+    let declared = |unknowns: &[Unknown]| {
+        let mut declared = Structure::new();
+        for Unknown { index, dependencies, dependencies_kind } in unknowns {
+            let words = |text: &Option<String>| -> Vec<String> {
+                let words = text.as_deref().unwrap_or_default().split_whitespace();
+                words.map(str::to_owned).collect()
+            };
+            let kinds = words(dependencies_kind).into_iter();
+            let kinds = kinds.chain(std::iter::repeat("dependent".to_owned()));
+            for (known, kind) in words(dependencies).into_iter().zip(kinds) {
+                declared.insert((*index, known.parse().unwrap()), kind);
             }
         }
-        declared.insert(name, structure);
-    }
-    let causality = |n: roxmltree::Node, what| n.attribute("causality") == Some(what);
+        declared
+    };
     Description {
-        variables: nodes("ScalarVariable")
-            .map(|n| {
-                let content = n.first_element_child().unwrap();
-                let start = content.attribute("start");
-                Variable {
-                    vr: n.attribute("valueReference").unwrap().parse().unwrap(),
-                    kind: content.tag_name().name().to_owned(),
-                    start: start.map(|s| s.parse().unwrap_or(f64::from(u8::from(s == "true")))),
-                }
-            })
-            .collect(),
-        outputs: list("Outputs").map(index).collect(),
-        derivatives: list("Derivatives").map(index).collect(),
-        initial: list("InitialUnknowns").map(index).collect(),
-        declared,
-        parameters: places(&|n| causality(n, "parameter")),
-        inputs: places(&|n| causality(n, "input")),
-        starts: places(&|n| causality(n, "output") && n.attribute("initial") == Some("exact")),
+        outputs: indices(&structure.outputs),
+        derivatives: indices(&structure.derivatives),
+        initial: indices(&structure.initial_unknowns),
+        declared: BTreeMap::from([
+            ("Outputs", declared(&structure.outputs)),
+            ("Derivatives", declared(&structure.derivatives)),
+            ("InitialUnknowns", declared(&structure.initial_unknowns)),
+        ]),
+        parameters: places(|v| v.causality == Causality::Parameter),
+        inputs: places(|v| v.causality == Causality::Input),
+        starts: places(|v| v.causality == Causality::Output && v.initial == Some(Initial::Exact)),
+        variables,
     }
 }
 
 impl Description {
-    fn variable(&self, place: usize) -> &Variable {
-        &self.variables[place - 1]
+    /// Type and value reference.
+    fn variable(&self, place: usize) -> (Kind, &u32) {
+        let variable = &self.variables[place - 1];
+        (variable.content().unwrap().0, &variable.value_reference)
+    }
+
+    fn start(&self, place: usize) -> f64 {
+        let (_, content) = self.variables[place - 1].content().unwrap();
+        let start = content.start.as_deref().unwrap();
+        start.parse().unwrap_or(f64::from(u8::from(start == "true")))
     }
 
     fn get(&self, m: &Master, place: usize) -> f64 {
-        let Variable { vr, kind, .. } = self.variable(place);
+        let (kind, vr) = self.variable(place);
         let mut whole = 0;
         // SAFETY: one reference, one place; so below.
-        match kind.as_str() {
-            "Real" => return m.real(*vr),
-            "Integer" => m.well(unsafe { (m.f.fmi2GetInteger)(m.c, vr, 1, &mut whole) }),
+        match kind {
+            Kind::Real => return m.real(*vr),
+            Kind::Integer | Kind::Enumeration => m.well(unsafe { (m.f.fmi2GetInteger)(m.c, vr, 1, &mut whole) }),
             _ => m.well(unsafe { (m.f.fmi2GetBoolean)(m.c, vr, 1, &mut whole) }),
         }
         f64::from(whole)
     }
 
     fn set(&self, m: &Master, place: usize, value: f64) {
-        let Variable { vr, kind, .. } = self.variable(place);
+        let (kind, vr) = self.variable(place);
         let whole = value as i32;
-        m.well(match kind.as_str() {
-            "Real" => m.set_real(*vr, value),
-            "Integer" => unsafe { (m.f.fmi2SetInteger)(m.c, vr, 1, &whole) },
+        m.well(match kind {
+            Kind::Real => m.set_real(*vr, value),
+            Kind::Integer | Kind::Enumeration => unsafe { (m.f.fmi2SetInteger)(m.c, vr, 1, &whole) },
             _ => unsafe { (m.f.fmi2SetBoolean)(m.c, vr, 1, &whole) },
         });
     }
@@ -268,14 +263,13 @@ fn unknowns_of_the_controller() {
     let look = |unknowns: &[usize], knowns: &[usize]| {
         let mut seen = BTreeSet::new();
         for &known in knowns {
-            let Variable { kind, start, .. } = d.variable(known);
-            let value = start.unwrap();
-            let change = match kind.as_str() {
-                "Real" if value == 0.0 => 1e-2,
+            let ((kind, _), value) = (d.variable(known), d.start(known));
+            let change = match kind {
+                Kind::Real if value == 0.0 => 1e-2,
                 // -1 is "none": the next value that is allowed.
-                "Real" if value == -1.0 => 2.0,
-                "Real" => 1e-3 * value.abs(),
-                "Boolean" => 1.0 - 2.0 * value,
+                Kind::Real if value == -1.0 => 2.0,
+                Kind::Real => 1e-3 * value.abs(),
+                Kind::Boolean => 1.0 - 2.0 * value,
                 _ => 1.0,
             };
             let set = |value| d.set(&m, known, value);

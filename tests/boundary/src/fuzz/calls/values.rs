@@ -3,14 +3,13 @@
 use std::ffi::{c_char, c_int};
 use std::ptr::{null, null_mut};
 
-use fmi2_component::Status;
-
 use super::Caller;
 use super::arguments::{MOST, count, numbers, pointer};
+use crate::Answer;
 use crate::fuzz::RandomSource;
 
 impl Caller<'_> {
-    pub(super) fn values(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
+    pub(super) fn values(&mut self, random: &mut RandomSource) -> (&'static str, Answer) {
         let (c, f) = (self.master.c, &self.master.f);
         let function = random.below(12);
         let kind = match function {
@@ -52,7 +51,7 @@ impl Caller<'_> {
         }
     }
 
-    pub(super) fn derivatives(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
+    pub(super) fn derivatives(&mut self, random: &mut RandomSource) -> (&'static str, Answer) {
         let (c, f) = (self.master.c, &self.master.f);
         let (unknowns, knowns) = (self.references(random, 0), self.references(random, 0));
         let mut values = numbers(random);
