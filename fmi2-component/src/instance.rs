@@ -8,8 +8,7 @@ use crate::log::Log;
 use crate::model::Key;
 use crate::refusal::{Refusal, Severity};
 use crate::session::{Select, Session, Snapshots};
-use crate::variable::Occasions;
-use crate::variable::Variable;
+use crate::variable::{Occasions, Variable};
 
 /// How far, relatively, a master's clock may be from ours, and a step may lead past the stop time: both round.
 const CLOCK_TOLERANCE: f64 = 1e-9;

@@ -8,8 +8,7 @@ use super::types::{CComponent, CFmuState};
 use crate::component::Component;
 use crate::instance::Instance;
 use crate::life_cycle::Function::FMUstate;
-use crate::refusal::Refusal;
-use crate::refusal::Status;
+use crate::refusal::{Refusal, Status};
 use crate::session::{Session, deserialise, serialise};
 
 /// `fmi2GetFMUstate`. A state given on entry is overwritten.

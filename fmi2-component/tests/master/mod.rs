@@ -48,7 +48,10 @@ impl Master {
     pub fn at(name: *const c_char, kind: c_int, guid: *const c_char, location: *const c_char) -> Self {
         let lines = Arc::<Mutex<Vec<Line>>>::default();
         let heard = Arc::clone(&lines);
-        let hear = Box::new(move |line| heard.lock().unwrap().push(line));
+        let hear = Box::new(move |line: Line| {
+            assert!(!line.category.is_empty());
+            heard.lock().unwrap().push(line);
+        });
         // SAFETY: the functions are part of this program, and the texts end with NUL.
         let master = unsafe { vines_fmu::Master::new(FUNCTIONS, name, kind, guid, location, false, hear) };
         Self { master, lines }

@@ -40,7 +40,10 @@ impl Master {
     pub fn at(fmu: &Fmu, kind: c_int, guid: &str, location: Option<&CStr>) -> Self {
         let lines = Arc::<Mutex<Vec<Line>>>::default();
         let heard = Arc::clone(&lines);
-        let hear = Box::new(move |line| heard.lock().unwrap().push(line));
+        let hear = Box::new(move |line: Line| {
+            assert!(!line.category.is_empty());
+            heard.lock().unwrap().push(line);
+        });
         let (guid, location) = (CString::new(guid).unwrap(), location.map_or(null(), CStr::as_ptr));
         // SAFETY: the library is never unloaded.
         let master = unsafe {
