@@ -37,7 +37,7 @@ const NUMBERS: [f64; 9] = [
     f64::MIN_POSITIVE,
 ];
 
-fn call(c: Raw, random: &mut RandomSource, states: &mut [Raw; 2], time: &mut f64) -> Answer {
+fn call(c: Raw, random: &mut RandomSource, states: &mut [Raw; 2], time: &mut f64) -> Status {
     let mut reals = [random.pick(&NUMBERS), random.pick(&NUMBERS)];
     let vr = [random.below(7) as u32, random.below(7) as u32];
     let count = random.pick(&[0, 1, 2, 2, 2, usize::MAX]);

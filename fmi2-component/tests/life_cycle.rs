@@ -7,7 +7,7 @@ use fmi2_example_tank::variables::GUID;
 use master::*;
 use std::ptr::null_mut;
 
-type Call = (&'static str, fn(Raw) -> Answer);
+type Call = (&'static str, fn(Raw) -> Status);
 
 /// Every function that depends on the state, called with arguments that are in order.
 fn calls() -> Vec<Call> {
@@ -27,7 +27,7 @@ fn calls() -> Vec<Call> {
             ("GetRealOutputDerivatives", |c| {
                 fmi2GetRealOutputDerivatives(c, &3, 1, &1, &mut 0.0)
             }),
-            ("GetStatus", |c| fmi2GetStatus(c, 0, &mut 0)),
+            ("GetStatus", |c| fmi2GetStatus(c, 0, &mut Status::Ok)),
             ("GetRealStatus", |c| fmi2GetRealStatus(c, 2, &mut 0.0)),
             ("GetBooleanStatus", |c| fmi2GetBooleanStatus(c, 3, &mut 0)),
             ("GetStringStatus", |c| fmi2GetStringStatus(c, 1, &mut std::ptr::null())),
@@ -146,20 +146,20 @@ fn a_discarded_step_changes_nothing_and_wants_to_end() {
     assert_eq!(master.step(1.0, 1.0), Status::Discard);
     master.heard_one(&["fmi2DoStep", "runs dry before 2 s"]);
     assert_eq!(master.real(3), level);
-    let (mut time, mut wants_to_end, mut status) = (f64::NAN, 0, 0);
+    let (mut time, mut wants_to_end, mut status) = (f64::NAN, 0, Status::Ok);
     unsafe {
         assert_eq!(fmi2GetRealStatus(master.c, 2, &mut time), Status::Ok);
         assert_eq!(fmi2GetBooleanStatus(master.c, 3, &mut wants_to_end), Status::Ok);
         assert_eq!(fmi2GetStatus(master.c, 0, &mut status), Status::Ok);
     }
-    assert_eq!((time, wants_to_end, status), (1.0, 1, Status::Discard as i32));
+    assert_eq!((time, wants_to_end, status), (1.0, 1, Status::Discard));
 }
 
 #[test]
 fn a_status_of_the_wrong_type_is_discarded() {
     let master = Master::ready(GUID);
     unsafe {
-        assert_eq!(fmi2GetStatus(master.c, 2, &mut 0), Status::Discard);
+        assert_eq!(fmi2GetStatus(master.c, 2, &mut Status::Ok), Status::Discard);
         assert_eq!(fmi2GetIntegerStatus(master.c, 0, &mut 0), Status::Discard);
         assert_eq!(fmi2GetRealStatus(master.c, 2, null_mut()), Status::Error);
     }

@@ -4,14 +4,13 @@ mod documentation;
 mod system;
 
 use std::collections::BTreeMap;
-use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
+use std::env::consts::{ARCH, DLL_PREFIX, DLL_SUFFIX, OS};
 use std::io::{self, Cursor, Write};
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use chrono::{DateTime, SecondsFormat};
 use fmi2_description::Description;
-use vines_fmu::library;
 use vines_model::ArgumentError;
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
@@ -60,6 +59,20 @@ pub fn components() -> [Component; 2] {
 
 /// Folders below `binaries/`. FMI 2.0 names none for ARM except `darwin64`: the others are those of FMI 3.0.
 const FOLDERS: &str = "linux64, linux32, aarch64-linux, win64, win32, aarch64-windows, darwin64, aarch64-darwin";
+
+/// The folders for this machine. On Apple silicon, masters look into either.
+fn own_folders() -> &'static [&'static str] {
+    match (OS, ARCH) {
+        ("windows", "x86") => &["win32"],
+        ("windows", "aarch64") => &["aarch64-windows"],
+        ("windows", _) => &["win64"],
+        ("macos", "aarch64") => &["aarch64-darwin", "darwin64"],
+        ("macos", _) => &["darwin64"],
+        (_, "x86") => &["linux32"],
+        (_, "aarch64") => &["aarch64-linux"],
+        _ => &["linux64"],
+    }
+}
 
 /// A library for the platform of a folder below `binaries/`; parse it from `win64=PATH`.
 #[derive(Debug, Clone)]
@@ -227,14 +240,14 @@ fn binaries<'a>(
             );
             refused(&path, problem)
         };
-        library::load(&path).map_err(refused)?;
+        vines_fmu::check(&path).map_err(refused)?;
         let content = read(&path)?;
         if !mentions(&content, guids[n]) {
             return Err(refused(format!(
                 "it was built from other variables than {identifier} has now"
             )));
         }
-        for folder in library::folders() {
+        for folder in own_folders() {
             binaries.entry((n, *folder)).or_insert_with(|| content.clone());
         }
     }

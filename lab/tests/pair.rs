@@ -1,4 +1,4 @@
-//! Both FMUs coupled in co-simulation, with the delay of one sample that co-simulation has.
+//! Both FMUs coupled in co-simulation through the `fmi` crate, with the delay of one sample that co-simulation has.
 
 use std::{
     fs,
@@ -6,9 +6,11 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use fmi2_description::Description;
+use fmi::fmi2::import::Fmi2Import;
+use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
+use fmi::traits::FmiImport;
 use vines::experiment::{self, Plan};
-use vines::fmu::{FmuController, FmuRig, Functions, Interface, Master, library};
+use vines::fmu::{FmuController, FmuRig};
 use vines::identification::identify;
 use vines::pack::pack_bench;
 use vines::rig::{BuiltIn, Controller, Drive, GroundTruth, Move, Rig, RigError, Sensors, Simulated};
@@ -25,58 +27,38 @@ fn libraries() -> PathBuf {
 
 /// One FMU of the pair.
 struct Part {
-    master: Master,
-    description: Description,
+    instance: InstanceCS,
+    import: Fmi2Import,
 }
 
 impl Part {
     /// Loads the FMU and starts it with the values that the system file binds to it.
     fn start(out: &Path, file: &str, bound: &str) -> Self {
-        let mut archive = zip::ZipArchive::new(fs::File::open(out.join(file)).unwrap()).unwrap();
-        let unpacked = out.join(file.trim_end_matches(".fmu"));
-        archive.extract(&unpacked).unwrap();
-        let description =
-            Description::parse(&fs::read_to_string(unpacked.join("modelDescription.xml")).unwrap()).unwrap();
-        let identifier = &description.co_simulation.as_ref().unwrap().model_identifier;
-        let name = format!(
-            "binaries/{}/{identifier}{}",
-            library::folders()[0],
-            std::env::consts::DLL_SUFFIX
-        );
-        let library = library::load(&unpacked.join(name)).unwrap();
-        let guid = std::ffi::CString::new(description.guid.as_str()).unwrap();
-        let hear = Box::new(|line| println!("{line:?}"));
-        // SAFETY: a library of FMI 2.0, which stays loaded since nobody drops it.
-        let master = unsafe {
-            let functions = Functions::of(&library);
-            std::mem::forget(library);
-            Master::new(
-                functions,
-                c"part".as_ptr(),
-                Interface::CoSimulation as i32,
-                guid.as_ptr(),
-                std::ptr::null(),
-                true,
-                hear,
-            )
+        let import: Fmi2Import = fmi::import::from_path(out.join(file)).unwrap();
+        let mut part = Self {
+            instance: import.instantiate_cs(file, false, true).unwrap(),
+            import,
         };
-        assert!(!master.c.is_null());
-        let part = Self { master, description };
         for (name, kind, value) in values(&out.join("bench.ssp"), bound) {
             let reference = [part.find(&name)];
-            let done = match kind.as_str() {
-                "Real" => part.master.set_reals(&reference, &[value.parse().unwrap()]),
-                "Integer" => part.master.set_integers(&reference, &[value.parse().unwrap()]),
-                _ => part.master.set_booleans(&reference, &[i32::from(value == "true")]),
-            };
-            assert!(done.is_done());
+            let instance = &mut part.instance;
+            match kind.as_str() {
+                "Real" => instance.set_real(&reference, &[value.parse().unwrap()]),
+                "Integer" => instance.set_integer(&reference, &[value.parse().unwrap()]),
+                _ => instance.set_boolean(&reference, &[i32::from(value == "true")]),
+            }
+            .unwrap();
         }
-        assert!(part.master.start().is_done());
+        let instance = &mut part.instance;
+        instance.setup_experiment(None, 0.0, None).unwrap();
+        instance.enter_initialization_mode().unwrap();
+        instance.exit_initialization_mode().unwrap();
         part
     }
 
     fn find(&self, name: &str) -> u32 {
-        let variable = self.description.variable(name);
+        let variables = &self.import.model_description().model_variables.variables;
+        let variable = variables.iter().find(|variable| variable.name == name);
         variable.expect("the FMU has the variable").value_reference
     }
 
@@ -84,15 +66,15 @@ impl Part {
         names.map(|name| self.find(name))
     }
 
-    fn read(&self, references: [u32; 2]) -> [f64; 2] {
+    fn read(&mut self, references: [u32; 2]) -> [f64; 2] {
         let mut values = [0.0; 2];
-        assert!(self.master.get_reals(&references, &mut values).is_done());
+        self.instance.get_real(&references, &mut values).unwrap();
         values
     }
 
-    fn advance(&self, inputs: [u32; 2], values: [f64; 2], time: f64, step: f64) {
-        assert!(self.master.set_reals(&inputs, &values).is_done());
-        assert!(self.master.step(time, step).is_done());
+    fn advance(&mut self, inputs: [u32; 2], values: [f64; 2], time: f64, step: f64) {
+        self.instance.set_real(&inputs, &values).unwrap();
+        self.instance.do_step(time, step, true).unwrap();
     }
 }
 
@@ -118,8 +100,8 @@ fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path();
     pack_bench(&scene, &libraries().as_path().into(), out).unwrap();
-    let plant = Part::start(out, "LoViNes.fmu", "resources/plant.ssv");
-    let controller = Part::start(out, "PhaseLock.fmu", "resources/controller.ssv");
+    let mut plant = Part::start(out, "LoViNes.fmu", "resources/plant.ssv");
+    let mut controller = Part::start(out, "PhaseLock.fmu", "resources/controller.ssv");
 
     let sensed = plant.find_two(["v", "base"]);
     let driven = plant.find_two(["omega", "E"]);
@@ -134,7 +116,7 @@ fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
     for n in 0..samples(PERIODS) {
         let (readings, command) = (plant.read(sensed), controller.read(drive));
         if n + hold == samples(PERIODS) {
-            assert!(plant.master.get_integers(&impacts, &mut before).is_done());
+            plant.instance.get_integer(&impacts, &mut before).unwrap();
         }
         if n + hold >= samples(PERIODS) {
             omega += command[0] / hold as f64;
@@ -143,11 +125,11 @@ fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
         controller.advance(sensors, readings, time, step);
         plant.advance(driven, command, time, step);
     }
-    assert!(plant.master.get_integers(&impacts, &mut after).is_done());
+    plant.instance.get_integer(&impacts, &mut after).unwrap();
 
     let mut locked = [0];
     let flag = [controller.find("locked")];
-    assert!(controller.master.get_booleans(&flag, &mut locked).is_done());
+    controller.instance.get_boolean(&flag, &mut locked).unwrap();
     assert_eq!(locked, [1]);
 
     let sigma = scene.dimensionless().sigma(omega);

@@ -16,8 +16,7 @@ pub struct Description {
     pub fmi_version: String,
     #[serde(rename = "@modelName")]
     pub model_name: String,
-    /// Empty if absent, as in FMI 3.0.
-    #[serde(rename = "@guid", default)]
+    #[serde(rename = "@guid")]
     pub guid: String,
     /// `description`; empty if absent.
     #[serde(rename = "@description", default)]

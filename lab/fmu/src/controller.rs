@@ -2,6 +2,7 @@
 
 use std::path::Path;
 
+use fmi::fmi2::instance::Common;
 use phase_lock::{Config, MOVE, PARAMETERS};
 use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Fault, LoopState, Move, Sensors};
 use vines_testbench::scene::Names;
@@ -124,7 +125,7 @@ impl FmuController {
     fn boolean(&mut self, reference: Reference) -> Result<bool, FmuError> {
         let (reference, mut value) = ([reference], [0]);
         self.fmu
-            .ask("give its outputs", |m| m.get_booleans(&reference, &mut value))?;
+            .ask("give its outputs", |i| i.get_boolean(&reference, &mut value))?;
         Ok(value != [0])
     }
 
@@ -138,7 +139,7 @@ impl FmuController {
         self.fmu.write("take its inputs", &self.sensors, &readings)?;
         let reference = [self.active];
         self.fmu
-            .ask("take its inputs", |m| m.set_booleans(&reference, &[active.into()]))?;
+            .ask("take its inputs", |i| i.set_boolean(&reference, &[active.into()]))?;
         self.fmu.step(self.sample_time)?;
         let [omega, amplitude] = self.fmu.read("give its outputs", self.drive)?;
         let told = match self.settled {
@@ -187,7 +188,7 @@ impl Controller for FmuController {
         self.fmu.write("take its inputs", &inputs.reals, &values)?;
         let hold = [inputs.hold];
         self.fmu
-            .ask("take its inputs", |m| m.set_booleans(&hold, &[true.into()]))?;
+            .ask("take its inputs", |i| i.set_boolean(&hold, &[true.into()]))?;
         Ok(())
     }
 
@@ -195,7 +196,7 @@ impl Controller for FmuController {
         let inputs = self.response_loop.as_ref().ok_or(ControllerError::NoResponseLoop)?;
         let hold = [inputs.hold];
         self.fmu
-            .ask("take its inputs", |m| m.set_booleans(&hold, &[false.into()]))?;
+            .ask("take its inputs", |i| i.set_boolean(&hold, &[false.into()]))?;
         Ok(())
     }
 }

@@ -1,35 +1,51 @@
 //! Reasons why an FMU cannot be loaded, and why it did not perform a call.
 
-use std::io;
+use std::path::PathBuf;
 
-use fmi2_component::Status;
+use fmi::fmi2::Fmi2Error;
 use thiserror::Error;
-
-use crate::functions::Answer;
 
 /// Reason why a file cannot be loaded as an FMU.
 #[derive(Debug, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum LoadError {
-    #[error(transparent)]
-    File(#[from] io::Error),
     #[error("the file is not an FMU, which is a zip archive: {0}")]
     Archive(String),
     #[error("modelDescription.xml: {0}")]
-    Description(#[from] fmi2_description::Error),
+    Description(fmi::schema::Error),
     #[error("the FMU has FMI version {0}; version 2.0 is needed")]
     Version(String),
     #[error("the FMU does not support co-simulation")]
     NoCoSimulation,
-    #[error("the FMU has no library for this platform ({0})")]
-    NoLibrary(String),
+    #[error("FMUs of FMI 2.0 cannot be loaded on {os} with the processor {architecture}")]
+    Platform { os: String, architecture: String },
+    #[error("the FMU has no library for this platform ({})", .0.display())]
+    NoLibrary(PathBuf),
     #[error("the FMU cannot be instantiated; its own message has been logged")]
     Instantiate,
     #[error("the library of the FMU cannot be loaded: {0}")]
-    Library(String),
+    Library(fmi::Error),
+    #[error(transparent)]
+    Fmi(fmi::Error),
 }
 
-/// Status of a call that was not done (FMI 2.0, clause 2.1.3).
+impl From<fmi::Error> for LoadError {
+    fn from(error: fmi::Error) -> Self {
+        use fmi::Error;
+        match error {
+            Error::Zip(source) => Self::Archive(source.to_string()),
+            Error::ArchiveStructure(text) => Self::Archive(text),
+            Error::Schema(source) => Self::Description(source),
+            Error::UnsupportedFmuType(_) => Self::NoCoSimulation,
+            Error::UnsupportedPlatform { os, arch } => Self::Platform { os, architecture: arch },
+            Error::Instantiation => Self::Instantiate,
+            Error::LibLoading { .. } => Self::Library(error),
+            _ => Self::Fmi(error),
+        }
+    }
+}
+
+/// Status of a call that failed (FMI 2.0, clause 2.1.3).
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum CallError {
@@ -39,17 +55,15 @@ pub enum CallError {
     Error,
     #[error("the FMU reported a fatal error (fmi2Fatal)")]
     Fatal,
-    #[error("the FMU continues in the background (fmi2Pending), which the bench does not support")]
-    Pending,
 }
 
-/// The reason why a call was not done.
-pub(crate) fn done(answer: Answer) -> Result<(), CallError> {
-    match answer.into() {
-        Status::Ok | Status::Warning => Ok(()),
-        Status::Discard => Err(CallError::Discard),
-        Status::Error => Err(CallError::Error),
-        Status::Fatal => Err(CallError::Fatal),
-        Status::Pending => Err(CallError::Pending),
+impl From<Fmi2Error> for CallError {
+    fn from(error: Fmi2Error) -> Self {
+        match error {
+            Fmi2Error::Discard => Self::Discard,
+            Fmi2Error::Error => Self::Error,
+            // The other one, a wrong `fmi2GetTypesPlatform`, is not a status: the bench does not call that function.
+            Fmi2Error::Fatal | Fmi2Error::TypesPlatformMismatch(_) => Self::Fatal,
+        }
     }
 }

@@ -1,24 +1,18 @@
-//! An FMU as part of the bench: its variables are found by name, and its time is kept.
+//! An FMU as part of the bench: the `fmi` crate loads it; its variables are found by name, and its time is kept.
 
-use std::ffi::CString;
-use std::fs::File;
 use std::path::{Path, PathBuf};
 
-use fmi2_component::Status;
-use fmi2_description::Description;
-use libloading::Library;
-use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
+use fmi::fmi2::Fmi2Error;
+use fmi::fmi2::import::Fmi2Import;
+use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
+use fmi::schema::fmi2::ScalarVariableElement;
+use fmi::traits::FmiImport;
 use phase_lock::Value;
-use tempfile::TempDir;
 use thiserror::Error;
 use vines_testbench::rig::{ControllerError, RigError};
 use vines_testbench::scene::{Name, Names};
-use zip::ZipArchive;
 
-use crate::error::{CallError, LoadError, done};
-use crate::functions::{Answer, Functions};
-use crate::library;
-use crate::master::{Interface, Line, Master};
+use crate::error::{CallError, LoadError};
 
 /// Reason why an FMU cannot be used, or cannot continue.
 #[derive(Debug, Error)]
@@ -62,6 +56,18 @@ pub enum Kind {
     Boolean,
 }
 
+impl Kind {
+    /// The type of a variable, if it is one of the three.
+    fn of(element: &ScalarVariableElement) -> Option<Self> {
+        match element {
+            ScalarVariableElement::Real(_) => Some(Self::Real),
+            ScalarVariableElement::Integer(_) => Some(Self::Integer),
+            ScalarVariableElement::Boolean(_) => Some(Self::Boolean),
+            _ => None,
+        }
+    }
+}
+
 impl From<Value> for Kind {
     fn from(value: Value) -> Self {
         match value {
@@ -76,15 +82,14 @@ impl From<Value> for Kind {
 pub(super) type Named = (Reference, f64);
 
 /// Value reference of a variable.
-pub(super) type Reference = u32;
+pub(super) type Reference = <Fmi2Import as FmiImport>::ValueRef;
 
 /// A loaded FMU at its simulated time.
 pub(super) struct Fmu {
-    // Dropped in this order.
-    master: Master,
-    _library: Library,
-    _unpacked: TempDir,
-    description: Description,
+    // Dropped before the unpacked library.
+    instance: InstanceCS,
+    /// The description, and the folder with the unpacked FMU.
+    import: Fmi2Import,
     path: PathBuf,
     time: f64,
 }
@@ -92,80 +97,15 @@ pub(super) struct Fmu {
 impl Fmu {
     /// Loads the FMU at `path`; `name` is its name in log messages.
     pub fn load(path: &Path, name: &str) -> Result<Self, FmuError> {
-        Self::open(path, name).map_err(|source| FmuError::Load { path: path.into(), source })
-    }
-
-    /// Unpacks the FMU and instantiates it for co-simulation, with logging on.
-    fn open(path: &Path, name: &str) -> Result<Self, LoadError> {
-        let archive = |error: zip::result::ZipError| LoadError::Archive(error.to_string());
-        let unpacked = tempfile::tempdir()?;
-        let mut zip = ZipArchive::new(File::open(path)?).map_err(archive)?;
-        zip.extract(&unpacked).map_err(archive)?;
-        let inside = |name: &str| unpacked.path().join(name);
-        let description = Description::parse(&std::fs::read_to_string(inside("modelDescription.xml"))?)?;
-        if description.fmi_version != "2.0" {
-            return Err(LoadError::Version(description.fmi_version));
-        }
-        let interface = description.co_simulation.as_ref().ok_or(LoadError::NoCoSimulation)?;
-        let library = format!("{}{}", interface.model_identifier, std::env::consts::DLL_SUFFIX);
-        let libraries = library::folders()
-            .iter()
-            .map(|folder| format!("binaries/{folder}/{library}"));
-        let libraries: Vec<String> = libraries.collect();
-        let library = libraries.iter().map(|name| inside(name)).find(|path| path.is_file());
-        let library = library.ok_or_else(|| LoadError::NoLibrary(libraries.join(", ")))?;
-        let library = library::load(&library).map_err(LoadError::Library)?;
-        let master = {
-            let target = name.to_owned();
-            let hear = move |Line { status, text, .. }| {
-                let level = match status {
-                    Status::Ok => log::Level::Info,
-                    Status::Warning => log::Level::Warn,
-                    Status::Discard => log::Level::Trace,
-                    _ => log::Level::Error,
-                };
-                log::log!(target: &target, level, "{text}");
-            };
-            let [name, guid, resources] = [name, &description.guid, &uri(&inside("resources"))].map(c_string);
-            let kind = Interface::CoSimulation as _;
-            // SAFETY: the library is one of FMI 2.0, and is unloaded after the instance.
-            unsafe {
-                let functions = Functions::of(&library);
-                let hear = Box::new(hear);
-                Master::new(
-                    functions,
-                    name.as_ptr(),
-                    kind,
-                    guid.as_ptr(),
-                    resources.as_ptr(),
-                    true,
-                    hear,
-                )
-            }
-        };
-        if master.c.is_null() {
-            return Err(LoadError::Instantiate);
-        }
-        Ok(Self {
-            master,
-            _library: library,
-            _unpacked: unpacked,
-            description,
-            path: path.into(),
-            time: 0.0,
-        })
+        let (import, instance) = open(path, name).map_err(|source| FmuError::Load { path: path.into(), source })?;
+        Ok(Self { instance, import, path: path.into(), time: 0.0 })
     }
 
     /// The variable of that name and kind, if there is one.
     pub fn find(&self, kind: Kind, name: &str) -> Option<Reference> {
-        let variable = self.description.variable(name)?;
-        let found = match variable.content()?.0 {
-            fmi2_description::Kind::Real => Kind::Real,
-            fmi2_description::Kind::Integer => Kind::Integer,
-            fmi2_description::Kind::Boolean => Kind::Boolean,
-            _ => return None,
-        };
-        (found == kind).then_some(variable.value_reference)
+        let variables = &self.import.model_description().model_variables.variables;
+        let variable = variables.iter().find(|variable| variable.name == name)?;
+        (Kind::of(&variable.elem) == Some(kind)).then_some(variable.value_reference)
     }
 
     /// The variable of that name and kind.
@@ -204,23 +144,28 @@ impl Fmu {
                 continue;
             };
             let reference = [reference];
-            self.ask("take its parameters", |m| match value {
-                Value::Real(x) => m.set_reals(&reference, &[x / factor]),
-                Value::Integer(n) => m.set_integers(&reference, &[n]),
-                Value::Boolean(b) => m.set_booleans(&reference, &[b.into()]),
+            self.ask("take its parameters", |i| match value {
+                Value::Real(x) => i.set_real(&reference, &[x / factor]),
+                Value::Integer(n) => i.set_integer(&reference, &[n]),
+                Value::Boolean(b) => i.set_boolean(&reference, &[b.into()]),
             })?;
         }
         if !missing.is_empty() {
             let path = self.path.display();
             log::warn!("{path} has no {}; it uses its own values instead", missing.join(", "));
         }
-        self.ask("start", Master::start)
+        self.ask("start", |i| {
+            i.setup_experiment(None, 0.0, None)?;
+            i.enter_initialization_mode()?;
+            i.exit_initialization_mode()?;
+            Ok(())
+        })
     }
 
     /// One step of `step` seconds.
     pub fn step(&mut self, step: f64) -> Result<(), FmuError> {
         let time = self.time;
-        self.ask("advance", |m| m.step(time, step))?;
+        self.ask("advance", |i| i.do_step(time, step, true))?;
         self.time += step;
         Ok(())
     }
@@ -228,7 +173,7 @@ impl Fmu {
     /// Values of real variables, SI units.
     pub fn read<const N: usize>(&mut self, action: &'static str, variables: [Named; N]) -> Result<[f64; N], FmuError> {
         let (references, mut values) = (variables.map(|(reference, _)| reference), [0.0; N]);
-        self.ask(action, |m| m.get_reals(&references, &mut values))?;
+        self.ask(action, |i| i.get_real(&references, &mut values))?;
         Ok(std::array::from_fn(|n| values[n] * variables[n].1))
     }
 
@@ -240,23 +185,27 @@ impl Fmu {
             .zip(factors)
             .map(|(value, factor)| value / factor)
             .collect();
-        self.ask(action, |m| m.set_reals(&references, &values))
+        self.ask(action, |i| i.set_real(&references, &values)).map(drop)
     }
 
     /// Value of an integer variable.
     pub fn integer(&mut self, action: &'static str, reference: Reference) -> Result<i32, FmuError> {
         let mut value = [0];
-        self.ask(action, |m| m.get_integers(&[reference], &mut value))?;
+        self.ask(action, |i| i.get_integer(&[reference], &mut value))?;
         Ok(value[0])
     }
 
     /// Calls the FMU; `action` completes the message "refused to …".
-    pub fn ask(&mut self, action: &'static str, call: impl FnOnce(&Master) -> Answer) -> Result<(), FmuError> {
-        done(call(&self.master)).map_err(|source| FmuError::Refused {
+    pub fn ask<T>(
+        &mut self,
+        action: &'static str,
+        call: impl FnOnce(&mut InstanceCS) -> Result<T, Fmi2Error>,
+    ) -> Result<T, FmuError> {
+        call(&mut self.instance).map_err(|error| FmuError::Refused {
             path: self.path.clone(),
             action,
             time: self.time,
-            source,
+            source: error.into(),
         })
     }
 }
@@ -269,21 +218,22 @@ pub(super) fn names_are_known(names: &Names, known: &str) -> Result<(), FmuError
     })
 }
 
-fn c_string(text: &str) -> CString {
-    CString::new(text.replace('\0', "")).unwrap_or_default()
-}
-
-/// The address of a file (RFC 8089).
-fn uri(path: &Path) -> String {
-    const RESERVED: &AsciiSet = &NON_ALPHANUMERIC
-        .remove(b'/')
-        .remove(b':')
-        .remove(b'.')
-        .remove(b'-')
-        .remove(b'_');
-    let path = path.to_string_lossy().replace('\\', "/");
-    let path = utf8_percent_encode(&path, RESERVED).to_string();
-    format!("file:///{}", path.trim_start_matches('/'))
+/// Unpacks the FMU at `path` and instantiates it for co-simulation, with logging on.
+fn open(path: &Path, name: &str) -> Result<(Fmi2Import, InstanceCS), LoadError> {
+    // The crate would report another version as an error of the XML.
+    let version = fmi::import::peek_descr_path(path)?.fmi_version;
+    if version != "2.0" {
+        return Err(LoadError::Version(version));
+    }
+    let import: Fmi2Import = fmi::import::from_path(path)?;
+    let co_simulation = import.model_description().co_simulation.as_ref();
+    let identifier = &co_simulation.ok_or(LoadError::NoCoSimulation)?.model_identifier;
+    let library = import.shared_lib_path(identifier)?;
+    if !import.archive_path().join(&library).is_file() {
+        return Err(LoadError::NoLibrary(library));
+    }
+    let instance = import.instantiate_cs(name, false, true)?;
+    Ok((import, instance))
 }
 
 #[cfg(test)]

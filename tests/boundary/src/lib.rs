@@ -3,11 +3,12 @@
 //! This is a crate of its own because both libraries export the same names: they can be loaded into one program, but
 //! not linked into one.
 
+mod functions;
 pub mod fuzz;
 mod library;
 mod master;
 pub mod pair;
 
+pub use functions::{Functions, Raw};
 pub use library::{CONTROLLER, Fmu, PLANT};
-pub use master::Master;
-pub use vines_fmu::{Answer, Functions, Interface, Line, Raw};
+pub use master::{Interface, Line, Master};

@@ -3,7 +3,9 @@
 use std::env::consts::{DLL_PREFIX, DLL_SUFFIX};
 use std::path::{Path, PathBuf};
 
-use vines_fmu::Functions;
+use libloading::Library;
+
+use crate::functions::Functions;
 
 /// The plant's description.
 pub const PLANT: &str = include_str!("../../../modelDescription.xml");
@@ -56,16 +58,26 @@ impl Fmu {
     /// If they cannot be loaded.
     #[must_use]
     pub fn packed(folder: &Path) -> [Self; 2] {
-        let load = |name, description| Self::load(name, description, &folder.join(format!("{name}{DLL_SUFFIX}")));
+        let load = |name, description| {
+            // An absolute path: a loader looks for a bare name elsewhere.
+            let path = std::path::absolute(folder.join(format!("{name}{DLL_SUFFIX}")));
+            Self::load(name, description, &path.expect("a folder has a path"))
+        };
         [load("LoViNes", PLANT), load("PhaseLock", CONTROLLER)]
     }
 
     fn load(name: &'static str, description: &'static str, path: &Path) -> Self {
-        let library = vines_fmu::library::load(path).unwrap_or_else(|error| panic!("{error}"));
+        // SAFETY: it is ours, and loading it runs no code of its own.
+        let library = unsafe { Library::new(path) };
+        let library = library.unwrap_or_else(|error| panic!("{}: {error}", path.display()));
         // SAFETY: an FMI 2.0 library, which stays loaded since nobody drops it.
-        let functions = unsafe { Functions::of(&library) };
+        let functions = unsafe { Functions::load(&library) };
         std::mem::forget(library);
-        Self { name, functions, description }
+        Self {
+            name,
+            functions: functions.unwrap_or_else(|error| panic!("{}: {error}", path.display())),
+            description,
+        }
     }
 
     /// The GUID that the library was built with.

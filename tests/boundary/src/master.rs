@@ -1,29 +1,77 @@
-//! The master of `vines-fmu`, which keeps what the instance logs and panics where a call is refused that should not be.
+//! A master that keeps what its logger hears, and makes no other use of an instance than it is told to.
 
-use std::ffi::{CStr, CString, c_int};
-use std::ops::Deref;
+use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::ptr::{null, null_mut};
-use std::sync::{Arc, Mutex};
 
-use fmi2_component::Status;
-use vines_fmu::{Answer, Interface, Line};
+use fmi2_component::abi::CallbackFunctions;
+use fmi2_component::{Logger, Status};
 
+use crate::functions::{Functions, Raw};
 use crate::library::Fmu;
+
+/// `fmi2Type`.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Interface {
+    /// `fmi2ModelExchange`.
+    ModelExchange = 0,
+    /// `fmi2CoSimulation`.
+    CoSimulation = 1,
+}
+
+/// A line that the logger has heard.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Line {
+    /// How the call ends.
+    pub status: Status,
+    /// The log category.
+    pub category: String,
+    /// The text, as a printf format.
+    pub text: String,
+}
+
+unsafe extern "C" fn hear(
+    environment: *mut c_void,
+    name: *const c_char,
+    status: Status,
+    category: *const c_char,
+    message: *const c_char,
+) {
+    assert!(!name.is_null() && !category.is_null() && !message.is_null());
+    // SAFETY: none is NULL, and the environment is the list that `callbacks` was given.
+    unsafe {
+        let text = |pointer| CStr::from_ptr(pointer).to_str().unwrap().to_owned();
+        (*environment.cast::<Vec<Line>>()).push(Line { status, category: text(category), text: text(message) });
+    }
+}
+
+/// Callbacks whose logger appends to `lines`.
+fn callbacks(lines: *mut Vec<Line>) -> CallbackFunctions {
+    let hear: unsafe extern "C" fn(_, _, _, _, _) = hear;
+    // SAFETY: a variadic function cannot be written in stable Rust. The named arguments travel alike, and the shell
+    // passes no others.
+    let logger = unsafe { std::mem::transmute::<*const (), Logger>(hear as *const ()) };
+    CallbackFunctions {
+        logger: Some(logger),
+        allocate_memory: None,
+        free_memory: None,
+        step_finished: None,
+        component_environment: lines.cast(),
+    }
+}
 
 /// An instance and its log.
 #[derive(Debug)]
 pub struct Master {
-    master: vines_fmu::Master,
-    lines: Arc<Mutex<Vec<Line>>>,
+    /// The instance; NULL where it was refused.
+    pub c: Raw,
+    /// The library's functions.
+    pub f: Functions,
+    lines: *mut Vec<Line>,
+    _callbacks: Box<CallbackFunctions>,
 }
 
-impl Deref for Master {
-    type Target = vines_fmu::Master;
-
-    fn deref(&self) -> &Self::Target {
-        &self.master
-    }
-}
+// SAFETY: an instance may be called from changing threads, one at a time.
+unsafe impl Send for Master {}
 
 impl Master {
     /// An instance with debug logging off.
@@ -35,29 +83,17 @@ impl Master {
     /// An instance, or the refusal of one, of that type, GUID and resource location.
     ///
     /// # Panics
-    /// If the GUID has a NUL inside.
+    /// If the texts have a NUL inside.
     #[must_use]
     pub fn at(fmu: &Fmu, kind: c_int, guid: &str, location: Option<&CStr>) -> Self {
-        let lines = Arc::<Mutex<Vec<Line>>>::default();
-        let heard = Arc::clone(&lines);
-        let hear = Box::new(move |line: Line| {
-            assert!(!line.category.is_empty());
-            heard.lock().unwrap().push(line);
-        });
-        let (guid, location) = (CString::new(guid).unwrap(), location.map_or(null(), CStr::as_ptr));
-        // SAFETY: the library is never unloaded.
-        let master = unsafe {
-            vines_fmu::Master::new(
-                fmu.functions,
-                c"rig".as_ptr(),
-                kind,
-                guid.as_ptr(),
-                location,
-                false,
-                hear,
-            )
-        };
-        Self { master, lines }
+        let lines: *mut Vec<Line> = Box::into_raw(Box::default());
+        let guid = CString::new(guid).unwrap();
+        let functions = Box::new(callbacks(lines));
+        let location = location.map_or(null(), CStr::as_ptr);
+        let f = fmu.functions;
+        // SAFETY: as the standard asks.
+        let c = unsafe { (f.fmi2Instantiate)(c"rig".as_ptr(), kind, guid.as_ptr(), location, &*functions, 0, 0) };
+        Self { c, f, lines, _callbacks: functions }
     }
 
     /// A co-simulation instance that is ready to step.
@@ -71,12 +107,17 @@ impl Master {
         master
     }
 
-    /// Takes the instance from its instantiation through initialisation.
+    /// Takes the instance from its instantiation through initialization.
     ///
     /// # Panics
     /// If a call is refused.
     pub fn start(&self) {
-        self.well(self.master.start());
+        // SAFETY: the instance is alive; so below.
+        unsafe {
+            self.well((self.f.fmi2SetupExperiment)(self.c, 0, 0.0, 0.0, 0, 0.0));
+            self.well((self.f.fmi2EnterInitializationMode)(self.c));
+            self.well((self.f.fmi2ExitInitializationMode)(self.c));
+        }
     }
 
     /// Switches on these categories of the log and no other.
@@ -94,14 +135,15 @@ impl Master {
     /// # Panics
     /// If it was not.
     #[track_caller]
-    pub fn well(&self, answer: Answer) {
-        assert_eq!(answer, Status::Ok, "{:?}", self.heard());
+    pub fn well(&self, status: Status) {
+        assert_eq!(status, Status::Ok, "{:?}", self.heard());
     }
 
     /// What was logged since the last call.
     #[must_use]
     pub fn heard(&self) -> Vec<Line> {
-        std::mem::take(&mut self.lines.lock().unwrap())
+        // SAFETY: the list lives as long as the master, and no call is under way.
+        unsafe { std::mem::take(&mut *self.lines) }
     }
 
     /// The value of a real variable.
@@ -120,14 +162,15 @@ impl Master {
     /// If it cannot be read.
     #[must_use]
     pub fn impacts(&self) -> i32 {
-        let mut value = [-1];
-        self.well(self.get_integers(&[18], &mut value));
-        value[0]
+        let mut value = -1;
+        // SAFETY: one reference, one place.
+        self.well(unsafe { (self.f.fmi2GetInteger)(self.c, &18, 1, &mut value) });
+        value
     }
 
     /// Sets a real variable.
     #[must_use]
-    pub fn set_real(&self, vr: u32, value: f64) -> Answer {
+    pub fn set_real(&self, vr: u32, value: f64) -> Status {
         self.set_reals(&[vr], &[value])
     }
 
@@ -138,8 +181,23 @@ impl Master {
     #[must_use]
     pub fn reals<const N: usize>(&self, vrs: &[u32; N]) -> [f64; N] {
         let mut values = [f64::NAN; N];
-        self.well(self.get_reals(vrs, &mut values));
+        // SAFETY: as many places as references.
+        self.well(unsafe { (self.f.fmi2GetReal)(self.c, vrs.as_ptr(), N, values.as_mut_ptr()) });
         values
+    }
+
+    /// Sets several real variables in one call.
+    #[must_use]
+    pub fn set_reals<const N: usize>(&self, vrs: &[u32; N], values: &[f64; N]) -> Status {
+        // SAFETY: as many values as references.
+        unsafe { (self.f.fmi2SetReal)(self.c, vrs.as_ptr(), N, values.as_ptr()) }
+    }
+
+    /// Takes a step.
+    #[must_use]
+    pub fn step(&self, time: f64, step: f64) -> Status {
+        // SAFETY: the instance is alive.
+        unsafe { (self.f.fmi2DoStep)(self.c, time, step, 1) }
     }
 
     /// The whole state as bytes, for comparison.
@@ -158,6 +216,16 @@ impl Master {
             self.well((f.fmi2SerializeFMUstate)(self.c, state, bytes.as_mut_ptr(), size));
             self.well((f.fmi2FreeFMUstate)(self.c, &mut state));
             bytes
+        }
+    }
+}
+
+impl Drop for Master {
+    fn drop(&mut self) {
+        // SAFETY: the list came out of a box, and after the instance nobody writes to it.
+        unsafe {
+            (self.f.fmi2FreeInstance)(self.c);
+            drop(Box::from_raw(self.lines));
         }
     }
 }

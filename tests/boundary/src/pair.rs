@@ -1,11 +1,12 @@
 //! Plant and controller coupled as a master couples them: the default scene, a digest of every output bit, and the lock.
 
+use fmi2_component::Status;
 use fmi2_description::{Causality, Description, Kind};
 use sha2::{Digest, Sha256};
 
 use crate::fuzz::RandomSource;
 use crate::library::Fmu;
-use crate::{Interface, Master};
+use crate::master::{Interface, Master};
 
 /// The controller's sample time, s: a hundredth of the natural period.
 pub const SAMPLE_TIME: f64 = 0.001_134_357_339_553_793_8;
@@ -94,7 +95,9 @@ impl Pair {
         plant.well(plant.set_real(references[0].start, 0.5));
         plant.start();
         let controller = Master::new(controller, Interface::CoSimulation);
-        controller.well(controller.set_booleans(&[references[1].start], &[1]));
+        // SAFETY: one reference, one value.
+        let armed = unsafe { (controller.f.fmi2SetBoolean)(controller.c, &references[1].start, 1, &1) };
+        controller.well(armed);
         controller.start();
         let digest = Sha256::new();
         Self { plant, controller, references, locked, time: 0.0, digest }
@@ -177,23 +180,29 @@ pub fn irregular(from: f64, to: f64, seed: u64) -> impl FnMut() -> f64 {
 
 fn reals(m: &Master, references: &[u32]) -> Vec<f64> {
     let mut values = vec![f64::NAN; references.len()];
-    m.well(m.get_reals(references, &mut values));
+    // SAFETY: arrays of the same length; so below.
+    m.well(unsafe { (m.f.fmi2GetReal)(m.c, references.as_ptr(), references.len(), values.as_mut_ptr()) });
     values
 }
 
 fn integers(m: &Master, references: &[u32]) -> Vec<i32> {
     let mut values = vec![-1; references.len()];
-    m.well(m.get_integers(references, &mut values));
+    // SAFETY: as above.
+    m.well(unsafe { (m.f.fmi2GetInteger)(m.c, references.as_ptr(), references.len(), values.as_mut_ptr()) });
     values
 }
 
 fn booleans(m: &Master, references: &[u32]) -> Vec<i32> {
     let mut values = vec![-1; references.len()];
-    m.well(m.get_booleans(references, &mut values));
+    // SAFETY: as above.
+    m.well(unsafe { (m.f.fmi2GetBoolean)(m.c, references.as_ptr(), references.len(), values.as_mut_ptr()) });
     values
 }
 
 #[track_caller]
 fn set(m: &Master, references: &[u32], values: &[f64]) {
-    m.well(m.set_reals(references, values));
+    assert_eq!(references.len(), values.len());
+    // SAFETY: as above.
+    let status: Status = unsafe { (m.f.fmi2SetReal)(m.c, references.as_ptr(), references.len(), values.as_ptr()) };
+    m.well(status);
 }

@@ -2,7 +2,7 @@
 
 use std::ptr::{null, null_mut};
 
-use fmi2_boundary::{Answer, Fmu, Interface, Master};
+use fmi2_boundary::{Fmu, Interface, Master};
 use fmi2_component::Status;
 
 const E: u32 = 6;
@@ -11,7 +11,7 @@ const Q1: u32 = 9;
 
 /// Asserts that `call` on a plant ready to step is an error with a reason that holds `word`, and does no harm.
 #[track_caller]
-fn refused(word: &str, call: impl Fn(&Master) -> Answer) {
+fn refused(word: &str, call: impl Fn(&Master) -> Status) {
     let master = Master::ready(&Fmu::plant());
     let before = master.bytes();
     let _ = master.heard();
@@ -179,9 +179,9 @@ fn text_that_is_no_utf_8_is_taken_as_text() {
     // SAFETY: two categories, one of them NULL.
     let status = unsafe { (m.f.fmi2SetDebugLogging)(m.c, 1, 2, names.as_ptr()) };
     assert_eq!(status, Status::Warning);
-    // The logger has formatted the message as printf does.
-    let heard = m.heard();
-    assert!(heard.iter().any(|line| line.text.contains("%n%s\"")), "{heard:?}");
+    for line in m.heard() {
+        assert!(!line.text.replace("%%", "").contains('%'), "{line:?}");
+    }
 }
 
 #[test]

@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 use std::time::{Duration, Instant};
 
-use fmi2_boundary::{Answer, Fmu, Interface, Master};
+use fmi2_boundary::{Fmu, Interface, Master};
 use fmi2_component::Status;
 
 /// No call may take longer, on a busy machine and with nothing optimised but the plant.
@@ -19,7 +19,7 @@ fn with(values: &[(u32, f64)]) -> Master {
 }
 
 /// Takes a step; answers its status and says how long it took.
-fn timed(m: &Master, what: &str, step: f64) -> Answer {
+fn timed(m: &Master, what: &str, step: f64) -> Status {
     let began = Instant::now();
     let status = m.step(0.0, step);
     let took = began.elapsed();

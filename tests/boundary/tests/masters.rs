@@ -1,6 +1,6 @@
 //! What masters do that this project had not met: findings of seven of them, a test for each.
 
-use fmi2_boundary::{Answer, Fmu, Interface, Line, Master};
+use fmi2_boundary::{Fmu, Interface, Line, Master};
 use fmi2_component::Status;
 
 /// Value references of the plant.
@@ -12,7 +12,7 @@ const START_PARAMETERS: [u32; 4] = [29, 30, 31, 32];
 /// Value references of the controller.
 const SAMPLE_TIME: u32 = 0;
 
-fn set_input_derivative(m: &Master, reference: u32, order: i32, value: f64) -> Answer {
+fn set_input_derivative(m: &Master, reference: u32, order: i32, value: f64) -> Status {
     // SAFETY: one element each.
     unsafe { (m.f.fmi2SetRealInputDerivatives)(m.c, &reference, 1, &order, &value) }
 }

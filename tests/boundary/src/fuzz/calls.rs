@@ -7,8 +7,11 @@ mod values;
 
 use std::ptr::null_mut;
 
+use fmi2_component::Status;
+
 use super::RandomSource;
-use crate::{Answer, Interface, Master, Raw};
+use crate::functions::Raw;
+use crate::master::{Interface, Master};
 use arguments::MOST;
 
 /// What a master has in its hands.
@@ -52,7 +55,7 @@ impl<'a> Caller<'a> {
     }
 
     /// Makes a call; answers which, and its status.
-    pub fn call(&mut self, random: &mut RandomSource) -> (&'static str, Answer) {
+    pub fn call(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         // Now and then the other interface's.
         let exchange = (self.interface == Interface::ModelExchange) != random.one_in(12);
         match random.below(16) {

@@ -7,11 +7,10 @@ use fmi2_component::Status;
 
 use super::Caller;
 use super::arguments::WILD;
-use crate::Answer;
 use crate::fuzz::RandomSource;
 
 impl Caller<'_> {
-    pub(super) fn life(&mut self, random: &mut RandomSource) -> (&'static str, Answer) {
+    pub(super) fn life(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
         let categories = [c"logAll".as_ptr(), c"\xfe%s".as_ptr(), null()];
         let number = |random: &mut RandomSource| {
@@ -43,7 +42,7 @@ impl Caller<'_> {
                 _ => ("fmi2Reset", (f.fmi2Reset)(c)),
             }
         };
-        self.stage = match (name, Status::from(status)) {
+        self.stage = match (name, status) {
             ("fmi2Reset", Status::Ok) => 0,
             (_, Status::Ok) if wanted == self.stage => (wanted + 1).min(5),
             // Something is amiss: begin anew.
@@ -53,7 +52,7 @@ impl Caller<'_> {
         (name, status)
     }
 
-    pub(super) fn states(&mut self, random: &mut RandomSource) -> (&'static str, Answer) {
+    pub(super) fn states(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
         let known = &mut self.states[random.below(3)];
         let made_up = random.pick(&[*known, *known, null_mut(), without_provenance_mut(3)]);
@@ -91,10 +90,10 @@ impl Caller<'_> {
         }
     }
 
-    pub(super) fn status(&mut self, random: &mut RandomSource) -> (&'static str, Answer) {
+    pub(super) fn status(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
         let kind = random.below(6) as c_int - 1;
-        let (mut real, mut integer, mut string, mut status) = (0.0, 0, null(), 0);
+        let (mut real, mut integer, mut string, mut status) = (0.0, 0, null(), Status::Ok);
         // SAFETY: one place each.
         unsafe {
             match random.below(5) {

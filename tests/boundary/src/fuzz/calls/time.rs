@@ -7,11 +7,10 @@ use fmi2_component::abi::EventInfo;
 
 use super::Caller;
 use super::arguments::{WILD, numbers};
-use crate::Answer;
 use crate::fuzz::RandomSource;
 
 impl Caller<'_> {
-    pub(super) fn step(&mut self, random: &mut RandomSource) -> (&'static str, Answer) {
+    pub(super) fn step(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
         if random.one_in(20) {
             // SAFETY: the instance is alive; so below.
@@ -34,7 +33,7 @@ impl Caller<'_> {
         ("fmi2DoStep", status)
     }
 
-    pub(super) fn exchange(&mut self, random: &mut RandomSource) -> (&'static str, Answer) {
+    pub(super) fn exchange(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
         let count = random.pick(&[5, 5, 5, 5, 3, 0, usize::MAX]);
         let mut values = numbers(random);

@@ -3,13 +3,14 @@
 use std::ffi::{c_char, c_int};
 use std::ptr::{null, null_mut};
 
+use fmi2_component::Status;
+
 use super::Caller;
 use super::arguments::{MOST, count, numbers, pointer};
-use crate::Answer;
 use crate::fuzz::RandomSource;
 
 impl Caller<'_> {
-    pub(super) fn values(&mut self, random: &mut RandomSource) -> (&'static str, Answer) {
+    pub(super) fn values(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
         let function = random.below(12);
         let kind = match function {
@@ -51,7 +52,7 @@ impl Caller<'_> {
         }
     }
 
-    pub(super) fn derivatives(&mut self, random: &mut RandomSource) -> (&'static str, Answer) {
+    pub(super) fn derivatives(&mut self, random: &mut RandomSource) -> (&'static str, Status) {
         let (c, f) = (self.master.c, &self.master.f);
         let (unknowns, knowns) = (self.references(random, 0), self.references(random, 0));
         let mut values = numbers(random);

@@ -3,11 +3,12 @@
 #include <stdio.h>
 #include <stdlib.h>
 
-extern void vines_fmi2_line(void *environment, int status, const char *category, const char *text);
+extern void vines_fmi2_log(const char *instance, int status, const char *message);
 
-void vines_fmi2_logger(void *environment, const char *instance, int status, const char *category, const char *message,
-                       ...) {
-    (void)instance;
+void callback_logger_handler(void *environment, const char *instance, int status, const char *category,
+                             const char *message, ...) {
+    (void)environment;
+    (void)category;
     va_list arguments;
     va_start(arguments, message);
     int length = message ? vsnprintf(NULL, 0, message, arguments) : 0;
@@ -20,6 +21,6 @@ void vines_fmi2_logger(void *environment, const char *instance, int status, cons
     va_start(arguments, message);
     vsnprintf(text, (size_t)length + 1, message, arguments);
     va_end(arguments);
-    vines_fmi2_line(environment, status, category, text);
+    vines_fmi2_log(instance, status, text);
     free(text);
 }

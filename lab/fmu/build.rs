@@ -1,6 +1,0 @@
-//! Compiles the logger.
-
-fn main() {
-    println!("cargo::rerun-if-changed=src/logger.c");
-    cc::Build::new().file("src/logger.c").compile("vines_fmi2_logger");
-}
