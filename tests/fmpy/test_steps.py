@@ -69,7 +69,7 @@ def test_an_experiment_may_start_later_than_zero(instance, name):
 
 def test_the_controller_counts_its_own_samples(instance):
     drives = []
-    for length, count in ((0.01, 30), (0.005, 60), (0.1, 3), (0.3, 1)):
+    for length, count in ((0.01, 10), (0.005, 20), (0.05, 2), (0.1, 1)):
         controller = instance("PhaseLock").start({"sample_time": 0.001, "bandwidth": 5.0})
         controller.set({"active": True})
         controller.step(length, count)
