@@ -4,17 +4,118 @@ mod figure;
 mod figures;
 mod files;
 mod page;
-mod section;
 mod sections;
-mod study;
 pub mod summary;
 mod table;
 mod theme;
 
+use std::path::{Path, PathBuf};
+
 pub use figure::FigureError;
 pub use files::{ReportError, decay_csv, map_csv, write, write_interrupted, write_lateness, write_map, write_tracked};
-pub use section::{Block, Maker, Section, Subject};
-pub use sections::SECTIONS;
-pub use study::{Report, write_report};
 pub use table::{Table, number, with_uncertainty};
-pub use theme::dark;
+
+use crate::map::Range;
+use crate::scene::Scene;
+
+/// The subject of a report.
+#[derive(Debug, Clone)]
+pub struct Subject {
+    /// The scene.
+    pub scene: Scene,
+    /// Axes of the regime map.
+    pub map: [Range; 2],
+}
+
+/// One part of a section. A figure is SVG for white paper; its name is that of its files, without ending.
+#[derive(Debug, Clone, PartialEq)]
+enum Block {
+    Words(String),
+    Figure { name: String, caption: String, svg: String },
+    Table { caption: String, table: Table },
+}
+
+/// A section of the page, with its finding in a sentence or two.
+#[derive(Debug, Clone, Default, PartialEq)]
+struct Section {
+    title: String,
+    finding: String,
+    blocks: Vec<Block>,
+    /// Lines of the error budget: what is uncertain, by how much, and where that number comes from.
+    budget: Vec<[String; 3]>,
+    /// Tables for programs: name and content of a file.
+    attachments: Vec<(String, String)>,
+}
+
+impl Section {
+    fn new(title: &str) -> Self {
+        Self { title: title.into(), ..Self::default() }
+    }
+
+    /// States the finding, in the summary and as a paragraph.
+    fn found(&mut self, finding: impl Into<String>) {
+        self.finding = finding.into();
+        self.words(self.finding.clone());
+    }
+
+    fn words(&mut self, text: impl Into<String>) {
+        self.blocks.push(Block::Words(text.into()));
+    }
+
+    fn figure(&mut self, name: &str, caption: impl Into<String>, svg: String) {
+        self.blocks
+            .push(Block::Figure { name: name.into(), caption: caption.into(), svg });
+    }
+
+    fn table(&mut self, caption: &str, table: Table) {
+        self.blocks.push(Block::Table { caption: caption.into(), table });
+    }
+
+    fn budget(&mut self, what: &str, size: String, why: &str) {
+        self.budget.push([what.into(), size, why.into()]);
+    }
+
+    fn attach(&mut self, name: &str, text: String) {
+        self.attachments.push((name.into(), text));
+    }
+}
+
+/// The finished report.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Report {
+    /// Files written; the page is the first.
+    pub written: Vec<PathBuf>,
+    /// The findings, one sentence per section.
+    pub findings: Vec<String>,
+}
+
+/// Writes the report on `subject` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. `progress` gets the
+/// name of the section being made, and the fraction of all sections that is done, from 0 to 1.
+pub fn write_report(
+    subject: &Subject,
+    out: &Path,
+    progress: &(dyn Fn(&str, f64) + Sync),
+) -> Result<Report, ReportError> {
+    let mut sections = Vec::new();
+    for (n, (name, make)) in sections::SECTIONS.into_iter().enumerate() {
+        let at = |part: f64| progress(name, (n as f64 + part) / sections::SECTIONS.len() as f64);
+        at(0.0);
+        sections.push(make(subject, &at)?);
+    }
+    let mut files = vec![("report.html".to_string(), page::page(&subject.scene, &sections))];
+    let mut findings = Vec::new();
+    for section in sections {
+        for block in section.blocks {
+            if let Block::Figure { name, svg, .. } = block {
+                files.push((format!("{name}-dark.svg"), theme::dark(&svg)));
+                files.push((format!("{name}.svg"), svg));
+            }
+        }
+        files.extend(section.attachments);
+        findings.push(section.finding);
+    }
+    match crate::files::write(out, files) {
+        Ok(written) => Ok(Report { written, findings }),
+        Err(source) => Err(ReportError::Unwritten { findings, source }),
+    }
+}

@@ -14,12 +14,10 @@ Runs the experiment, tracks the backbone, follows the exact curves, studies the 
 report.html: one file that opens offline in any browser and prints well, with text, figures, tables, the scene and an error budget.
 The figures (SVG, for light and dark backgrounds) and tables are also written as files.
 
-Sections of an earlier run in the folder are reused if scene, version and axes are the same.
-
 Examples:
   vines report --out report
   vines report --out r07 --set plant.r=0.7
-  vines report --out report --x sigma=-2:1:121 --y G=0.8:1.8:101    a finer map; the rest is reused";
+  vines report --out report --x sigma=-2:1:121 --y G=0.8:1.8:101    a finer map";
 
 /// Write a report on a scene: all results on one page
 #[derive(Debug, Args)]
@@ -39,14 +37,6 @@ pub(super) struct Arguments {
     /// Vertical axis of the regime map
     #[arg(long, value_name = "AXIS=FIRST:LAST:POINTS", default_value = "G=0.1:3:59")]
     y: Range,
-
-    /// Recompute everything, without the results of earlier runs
-    #[arg(long)]
-    fresh: bool,
-
-    /// Figure of run time against error to include, if the file exists
-    #[arg(long, value_name = "SVG", default_value = "docs/work-precision.svg")]
-    work_precision: PathBuf,
 }
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
@@ -62,19 +52,12 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     writable(&arguments.out)?;
     let subject = Subject { scene, map: [arguments.x, arguments.y] };
     let bar = progress_bar(1000, "{msg:10} [{wide_bar}] {percent} %");
-    let precision = std::fs::read_to_string(&arguments.work_precision).ok();
-    let report = write_report(
-        &subject,
-        &arguments.out,
-        arguments.fresh,
-        precision.as_deref(),
-        &|section, done| {
-            if bar.message() != section {
-                bar.set_message(section.to_string());
-            }
-            bar.set_position((1000.0 * done) as u64);
-        },
-    );
+    let report = write_report(&subject, &arguments.out, &|section, done| {
+        if bar.message() != section {
+            bar.set_message(section.to_string());
+        }
+        bar.set_position((1000.0 * done) as u64);
+    });
     bar.finish_and_clear();
     let listed = |findings: &[String]| {
         findings
@@ -91,13 +74,10 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         }
         other => other.map_err(Failure::run)?,
     };
-    let mut text = listed(&report.findings);
-    if !report.kept.is_empty() {
-        text += &format!("\nReused from an earlier run: {}\n", report.kept.join(", "));
-    }
     let page = report.written.first().map(|page| page.display().to_string());
     Ok(format!(
-        "{text}\nWritten: {} and {} figures and tables\n",
+        "{}\nWritten: {} and {} figures and tables\n",
+        listed(&report.findings),
         page.unwrap_or_default(),
         report.written.len() - 1
     ))

@@ -1,7 +1,6 @@
 //! Figures as data: panels with axes, series and labels, drawn as SVG. Colours are in [`super::theme`].
 
 mod draw;
-mod stability;
 
 pub use plotters::chart::SeriesLabelPosition as Legend;
 use plotters::style::ShapeStyle;
@@ -10,7 +9,11 @@ use thiserror::Error;
 
 use crate::scene::{Dimensionless, Sensor};
 
-pub use stability::{Marked, Place, clipped, thinned};
+/// A place in a panel, in the units of its axes.
+pub type Place = (f64, f64);
+
+/// A place, and whether the motion there is stable.
+pub type Marked = (Place, bool);
 
 /// Axis labels that several figures share.
 pub const DETUNING: &str = "detuning σ = (ω/ω₀ − 1)/ε";
@@ -181,11 +184,27 @@ impl Panel {
 
     /// A curve, dashed where it is unstable, with a style and a label for each of its two kinds of pieces.
     pub fn pieces(&mut self, points: &[Marked], styles: [ShapeStyle; 2], labels: [&str; 2]) {
-        for run in stability::runs(points, false) {
+        for run in runs(points, false) {
             self.dashed(run, styles[1], labels[1]);
         }
-        for run in stability::runs(points, true) {
+        for run in runs(points, true) {
             self.curve(run, styles[0], labels[0]);
+        }
+    }
+
+    /// A curve as by [`Panel::pieces`], cut where it leaves the panel.
+    pub fn clipped_pieces(&mut self, points: &[Marked], styles: [ShapeStyle; 2], labels: [&str; 2]) {
+        let [x, y] = self.ranges;
+        for piece in clipped(points, x, y) {
+            self.pieces(&piece, styles, labels);
+        }
+    }
+
+    /// A curve as by [`Panel::clipped_pieces`], with points far enough apart that dashes stay dashes.
+    pub fn thinned_pieces(&mut self, points: &[Marked], styles: [ShapeStyle; 2], labels: [&str; 2]) {
+        let [x, y] = self.ranges;
+        for piece in clipped(points, x, y) {
+            self.pieces(&thinned(&piece, x, y), styles, labels);
         }
     }
 }
@@ -207,4 +226,47 @@ pub fn caption(p: &Dimensionless, g: f64) -> String {
 /// The numbers of a rig, for captions.
 pub fn rig(p: &Dimensionless) -> String {
     format!("ε = {:.5}, λ = {:.3}, r = {}", p.epsilon, p.lambda, p.r)
+}
+
+/// Consecutive points of one kind, each run with the point after it so that the curve has no holes.
+fn runs(points: &[Marked], wanted: bool) -> Vec<Vec<Place>> {
+    let mut start = 0;
+    points
+        .chunk_by(|one, next| one.1 == next.1)
+        .filter_map(|run| {
+            let from = start;
+            start += run.len();
+            let to = (start + 1).min(points.len());
+            (run[0].1 == wanted).then(|| points[from..to].iter().map(|one| one.0).collect())
+        })
+        .collect()
+}
+
+/// Points inside the ranges; where a curve leaves them it is cut into pieces.
+pub fn clipped(points: &[Marked], x: (f64, f64), y: (f64, f64)) -> Vec<Vec<Marked>> {
+    let inside = |((a, b), _): &Marked| (x.0..=x.1).contains(a) && (y.0..=y.1).contains(b);
+    points
+        .chunk_by(|one, next| inside(one) == inside(next))
+        .filter(|run| inside(&run[0]))
+        .map(<[Marked]>::to_vec)
+        .collect()
+}
+
+/// Smallest distance of thinned points, as a fraction of the ranges: two pixels of a usual figure.
+const APART: f64 = 0.004;
+
+/// Points at least [`APART`] from each other, with the last and every change of stability.
+pub fn thinned(points: &[Marked], x: (f64, f64), y: (f64, f64)) -> Vec<Marked> {
+    let mut kept: Vec<Marked> = Vec::new();
+    for (n, point) in points.iter().enumerate() {
+        let far = kept.last().is_none_or(|last| {
+            let dx = (point.0.0 - last.0.0) / (x.1 - x.0);
+            let dy = (point.0.1 - last.0.1) / (y.1 - y.0);
+            dx.hypot(dy) >= APART || point.1 != last.1
+        });
+        if far || n + 1 == points.len() {
+            kept.push(*point);
+        }
+    }
+    kept
 }

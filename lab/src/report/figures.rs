@@ -1,38 +1,536 @@
-//! The figures of the report, one file each.
+//! The figures of the report: what they show, and with which axes, colours and labels.
 
-pub mod approach;
-pub mod backbone;
-pub mod backbones;
-pub mod history;
-pub mod manifold;
-pub mod period;
 pub mod regimes;
-pub mod responses;
-pub mod tracked;
 
-use super::figure::{Panel, Place, line};
-use super::theme::{DECAY, LOCK};
+use std::f64::consts::{FRAC_PI_2, TAU};
 
-/// One of this many points along the decay is drawn.
+use nalgebra::DVector;
+
+use super::figure::{
+    AMPLITUDE_OF_V, BLACK, Color, DETUNING, Figure, Legend, Marked, Panel, Place, SIZE, SPEED, amplitude, caption,
+    line, rig,
+};
+use super::theme::{DECAY, EXACT, FAINT, LOCK, THEORY, UNSTABLE};
+use crate::comparison::{Comparison, TrackedComparison};
+use crate::numerics::{HarmonicBasis, equally_spaced, range};
+use crate::orbit::{self, Limits, Periodic, Response};
+use crate::record::Record;
+use crate::scene::{Definition, Dimensionless, Scene};
+use crate::theory::{self, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, SlowFlow, Waveform, reading};
+
+/// Points of a computed curve: at this figure size, neighbours are at most a few pixels apart.
+const POINTS: usize = 400;
+/// Only every fourth point along the decay is drawn, so that the circles do not overlap.
 const THINNED: usize = 4;
-const DECAY_LABEL: &str = "free decay, identified";
+
+const IDENTIFIED: &str = "free decay, identified";
+const FIRST_ORDER: &str = "first-order theory";
+const ON_MANIFOLD: &str = "manifold, 1:1 impacts stable";
+const OFF_MANIFOLD: &str = "manifold, unstable";
 
 fn decay_points(panel: &mut Panel, points: impl Iterator<Item = Place>, label: &str) {
     panel.circles(points.collect(), 4, line(DECAY, 16), label);
 }
 
-fn locked_point(panel: &mut Panel, place: Place) {
-    panel.square(place, LOCK, "locked, measured");
-}
-
-/// Error bars of 95 %: places with the half width of the interval, upright or level.
-fn error_bars(panel: &mut Panel, bars: impl Iterator<Item = (Place, f64)>, upright: bool) {
-    let ends = |((x, y), half): (Place, f64)| {
-        if upright {
-            [(x, y - half), (x, y + half)]
-        } else {
-            [(x - half, y), (x + half, y)]
+/// Error bars of 95 %: places with their standard uncertainties, vertical or horizontal.
+fn error_bars(panel: &mut Panel, bars: impl Iterator<Item = (Place, f64)>, vertical: bool) {
+    let ends = |((x, y), uncertainty): (Place, f64)| {
+        let half = 1.96 * uncertainty;
+        match vertical {
+            true => [(x, y - half), (x, y + half)],
+            false => [(x - half, y), (x + half, y)],
         }
     };
     panel.segments(bars.map(ends).collect(), line(DECAY, 12));
+}
+
+/// The right branch of first-order theory's backbone, from the fold up to an amplitude.
+fn theory_backbone(p: &Dimensionless, top: f64) -> Vec<Marked> {
+    let manifold = SlowFlow::new(p.lambda, p.r).manifold;
+    let last = manifold.b(top, BranchSide::Right).unwrap_or(1.0);
+    let points = theory::backbone(p, manifold.b_min(), last, POINTS);
+    let places = points.iter().map(|point| ((point.sigma, point.c), point.stable()));
+    places.collect()
+}
+
+/// Adds the right branch of the backbone, by theory and exact, each with its stability.
+fn add_backbones(panel: &mut Panel, p: &Dimensionless, theory: &[Marked]) {
+    let fold = SlowFlow::new(p.lambda, p.r).manifold.b_min();
+    let branch = orbit::backbone(p, &Limits::default());
+    let exact: Vec<Marked> = branch
+        .iter()
+        .flat_map(|branch| &branch.points)
+        .filter(|motion| motion.b >= fold)
+        .map(|motion| ((motion.sigma, motion.c), motion.stable))
+        .collect();
+    let labels = ["first-order theory, stable", "first-order theory, unstable"];
+    panel.clipped_pieces(theory, [line(THEORY, 20), line(UNSTABLE, 20)], labels);
+    let labels = ["exact orbits, stable", "exact orbits, unstable"];
+    panel.thinned_pieces(&exact, [line(EXACT, 16), line(FAINT, 16)], labels);
+}
+
+/// The identified backbone beside theory and exact orbits: amplitude over detuning.
+pub fn backbone(found: &Comparison) -> Figure {
+    let (p, lock) = (&found.parameters, &found.lock.at);
+    let top = (1.25 * lock.c).max(0.8);
+    let theory = theory_backbone(p, top);
+    // Below the fold there is no backbone, and the frequency of the remaining motion is arbitrary.
+    let fold = SlowFlow::new(p.lambda, p.r).manifold.c_min();
+    let decay = || found.decay.iter().map(|one| one.point);
+    let sigmas = theory.iter().map(|((sigma, _), _)| *sigma);
+    let sigmas = sigmas.chain(decay().filter(|point| point.c >= fold).map(|point| point.sigma));
+    let (low, high) = range((f64::MAX, f64::MIN), sigmas);
+    let margin = 0.06 * (high - low);
+    let (low, high) = (low - margin, high + margin);
+
+    let title = match p.definition == Definition::default() {
+        true => "Backbone: phase resonance of the centre of mass".into(),
+        false => format!("Backbone: {}", p.definition.name()),
+    };
+    let mut panel = Panel::new(((low, high), DETUNING), ((0.0, top), amplitude(p)))
+        .heading(&title, &caption(p, lock.g))
+        .legend(Legend::UpperRight);
+    add_backbones(&mut panel, p, &theory);
+    let inside = |(sigma, _): &Place| (low..=high).contains(sigma);
+    let identified = decay().step_by(THINNED).map(|point| (point.sigma, point.c));
+    decay_points(&mut panel, identified.filter(inside), IDENTIFIED);
+    let predicted = found.decay.iter();
+    let predicted = predicted.filter_map(|one| Some((one.sigma_predicted?, one.point.c)));
+    let predicted = predicted.filter(|place| inside(place) && place.1 > fold).collect();
+    panel.curve(predicted, line(LOCK, 12), "free decay, predicted by the exact plant");
+    let place = (lock.sigma, lock.c);
+    for (uncertainty, vertical) in [(lock.u_sigma, false), (lock.u_c, true)] {
+        error_bars(&mut panel, std::iter::once((place, uncertainty)), vertical);
+    }
+    panel.square(place, LOCK, "locked, measured");
+    Figure::single(panel)
+}
+
+/// The slow invariant manifold with the decay on it: particle speed over amplitude.
+pub fn manifold(found: &Comparison) -> Figure {
+    let p = &found.parameters;
+    let flow = SlowFlow::new(p.lambda, p.r);
+    let manifold = flow.manifold;
+    // Of the particle speed, beyond the stable range.
+    let top = 1.4;
+    let right = (1.25 * found.lock.at.c).max(0.8);
+    let between = |from: f64, to: f64| -> Vec<Place> {
+        equally_spaced(from, to, 301)
+            .map(|b| (manifold.c(b) * reading(p, b, flow.free_detuning(b)), b))
+            .filter(|(c, _)| *c <= right)
+            .collect()
+    };
+    let mut panel = Panel::new(((0.0, right), amplitude(p)), ((0.0, top), SPEED))
+        .heading(
+            "Slow invariant manifold and the free decay on it",
+            &caption(p, found.lock.at.g),
+        )
+        .legend(Legend::UpperLeft);
+    let stable = between(manifold.b_min(), B_SYMMETRY_BREAKING);
+    panel.curve(stable, line(THEORY, 20), ON_MANIFOLD);
+    for unstable in [between(0.0, manifold.b_min()), between(B_SYMMETRY_BREAKING, top)] {
+        panel.dashed(unstable, line(UNSTABLE, 20), OFF_MANIFOLD);
+    }
+    let decay = found.decay.iter().map(|one| one.point).step_by(THINNED);
+    let decay = decay.filter_map(|point| point.b.map(|b| (point.c, b)));
+    decay_points(&mut panel, decay, IDENTIFIED);
+    if let Some(b) = found.lock.b {
+        panel.square((found.lock.at.c, b), LOCK, "locked, measured");
+    }
+    Figure::single(panel)
+}
+
+/// The tracked backbone on the exact curve and that of theory; points that are not settled are crossed.
+pub fn tracked(tracked: &TrackedComparison) -> Figure {
+    Figure::single(tracked_amplitude(tracked))
+}
+
+/// The tracked backbone, and beside it the drive over amplitude.
+pub fn tracked_with_drive(tracked: &TrackedComparison) -> Figure {
+    let (width, height) = SIZE;
+    let drive = tracked_drive(tracked).at([width, 0, width, height]);
+    Figure::new((2 * width, height), vec![tracked_amplitude(tracked), drive])
+}
+
+/// The top of the axis of the tracked amplitudes.
+fn top_of(tracked: &TrackedComparison) -> f64 {
+    let amplitudes = tracked.points.iter().map(|one| one.point.at.c);
+    amplitudes.fold(0.5, |most: f64, c| most.max(1.15 * c))
+}
+
+fn tracked_amplitude(tracked: &TrackedComparison) -> Panel {
+    let (p, top) = (&tracked.parameters, top_of(tracked));
+    let points = || tracked.points.iter().map(|one| one.point);
+    let (low, high) = range((-1.6, 0.6), points().map(|one| one.at.sigma));
+    let x = (low - 0.1 * (high - low), high + 0.1 * (high - low));
+    let (least, most) = range((f64::MAX, f64::MIN), points().map(|one| one.at.g));
+    let text = caption(p, most).replace(&format!("G = {most:.3}"), &format!("G from {least:.3} to {most:.3}"));
+    let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
+        .heading("Backbone, tracked with the loop closed", &text)
+        .legend(Legend::UpperRight);
+    add_backbones(&mut panel, p, &theory_backbone(p, top));
+    let places = || points().map(|one| (one.at.sigma, one.at.c));
+    decay_points(&mut panel, places(), "tracked");
+    error_bars(&mut panel, places().zip(points().map(|one| one.at.u_sigma)), false);
+    let unsettled = places().zip(points()).filter(|(_, one)| !one.settled);
+    let unsettled = unsettled.map(|(place, _)| place).collect();
+    panel.crosses(unsettled, line(DECAY, 20), "not settled in time");
+    panel
+}
+
+fn tracked_drive(tracked: &TrackedComparison) -> Panel {
+    let (p, top) = (&tracked.parameters, top_of(tracked));
+    let points = || tracked.points.iter().map(|one| one.point);
+    let (_, most) = range((0.0, 0.1), points().map(|one| one.at.g));
+    let high = 1.3 * most;
+    let inside = |place: &Place| place.0 <= top && place.1 <= high;
+    let mut panel = Panel::new(
+        ((0.0, top), amplitude(p)),
+        ((0.0, high), "drive G, base amplitude over b ε"),
+    )
+    .heading("The drive that holds each level", "")
+    .legend(Legend::LowerRight);
+    let theory = theory::backbone(p, SlowFlow::new(p.lambda, p.r).manifold.b_min(), 1.3, 600);
+    let theory = theory.iter().map(|one| (one.c, one.g)).filter(inside).collect();
+    panel.dashed(theory, line(THEORY, 20), FIRST_ORDER);
+    let exact = tracked.exact.places().iter().map(|one| (one[0], one[2]));
+    panel.curve(exact.filter(inside).collect(), line(EXACT, 16), "exact orbits");
+    let places = || points().map(|one| (one.at.c, one.at.g));
+    decay_points(&mut panel, places(), "tracked");
+    error_bars(&mut panel, places().zip(points().map(|one| one.at.u_g)), true);
+    panel
+}
+
+/// A time (periods), an amplitude and a detuning.
+type Triple = [f64; 3];
+
+/// Amplitude and frequency over time: left while the loop seeks and holds phase resonance, right as the motion decays.
+pub fn history(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
+    let Comparison { parameters: p, lock, .. } = found;
+    let flow = SlowFlow::new(p.lambda, p.r);
+    let driven = driven(record, scene);
+    let theory = backbone_decay(p, lock.at.c);
+    let points = found.decay.iter().map(|one| one.point);
+    let points = points.filter(|one| one.c >= 0.9 * flow.manifold.c_min());
+    let points = points.step_by(THINNED / 2).map(|one| [one.tau / TAU, one.c, one.sigma]);
+    let points: Vec<Triple> = points.collect();
+
+    let (_, top) = range((0.0, lock.at.c), driven.iter().map(|one| one[1]));
+    let (low, high) = range((-1.5, 0.5), driven.iter().chain(&points).map(|one| one[2]));
+    let margin = 0.1 * (high - low);
+    let (width, upper, lower, left) = (980, 400, 360, 520);
+    let rows = [
+        (1, (0.0, top * 1.35), amplitude(p), [0, upper]),
+        (2, (low - margin, high + margin), "detuning σ", [upper, lower]),
+    ];
+    let panels = rows.into_iter().flat_map(|(row, range, label, [y, height])| {
+        [
+            driven_panel(found, &driven, row, (range, label)).at([0, y, left, height]),
+            decay_panel(&theory, &points, row, range).at([left, y, width - left, height]),
+        ]
+    });
+    Figure::new((width, upper + lower), panels.collect())
+}
+
+/// The decay along the manifold by first-order theory, from an amplitude.
+fn backbone_decay(p: &Dimensionless, from: f64) -> Vec<Triple> {
+    let start = theory::backbone_at_level(p, from);
+    let decay = start.and_then(|point| SlowFlow::new(p.lambda, p.r).decay(point.b));
+    let samples = decay.map(|decay| decay.samples(POINTS)).unwrap_or_default();
+    let samples = samples.iter().map(|one| {
+        let c = one.c * reading(p, one.b, one.sigma);
+        [one.tau1 / (p.epsilon * TAU), c, one.sigma]
+    });
+    samples.collect()
+}
+
+fn driven_panel(found: &Comparison, driven: &[Triple], row: usize, y: ((f64, f64), &str)) -> Panel {
+    let end = 1.02 * driven.last().map_or(1.0, |one| one[0]);
+    let mut panel = Panel::new(((0.0, end), "time, in periods of the oscillator alone"), y);
+    if row == 1 {
+        let caption = caption(&found.parameters, found.lock.at.g);
+        panel = panel.heading("Seeking and holding resonance", &caption);
+    }
+    let measured = driven.iter().map(|one| (one[0], one[row])).collect();
+    panel.curve(measured, line(DECAY, 16), "measured");
+    let level = |value: [f64; 2]| vec![(0.0, value[row - 1]), (end, value[row - 1])];
+    if let Some(exact) = &found.exact {
+        panel.curve(level([exact.c, exact.sigma]), line(EXACT, 14), "exact orbit");
+    }
+    if let Some(theory) = &found.theory {
+        panel.dashed(level([theory.c, theory.sigma]), line(THEORY, 14), FIRST_ORDER);
+    }
+    panel.legend(if row == 1 {
+        Legend::LowerRight
+    } else {
+        Legend::UpperRight
+    })
+}
+
+fn decay_panel(theory: &[Triple], points: &[Triple], row: usize, y: (f64, f64)) -> Panel {
+    let last = points.last().map_or(1.0, |one| one[0]);
+    let end = theory.last().map_or(last, |one| last.max(one[0]));
+    let mut panel = Panel::new(((0.0, 1.02 * end), "time since the release, likewise"), (y, ""));
+    if row == 1 {
+        panel = panel.heading("Free decay", "the drive is off from 0 on");
+    }
+    let place = |one: &Triple| (one[0], one[row]);
+    let inside = |place: &Place| (y.0..=y.1).contains(&place.1);
+    let theory = theory.iter().map(place).filter(inside).collect();
+    panel.dashed(theory, line(THEORY, 16), FIRST_ORDER);
+    decay_points(&mut panel, points.iter().map(place), IDENTIFIED);
+    panel.legend(Legend::UpperRight)
+}
+
+/// Amplitude and commanded frequency up to the release, from windows of two periods: least squares of the response by the commanded
+/// harmonic and a constant. At most 800 windows: more than there are pixels.
+fn driven(record: &Record, scene: &Scene) -> Vec<Triple> {
+    let d = scene.dimensionless();
+    let dt = record.sample_time;
+    let window = 2 * (d.natural_period() / dt).round().max(4.0) as usize;
+    let samples = &record.samples[..record.released];
+    let step = (samples.len() / 800).max(window / 2);
+    (0..samples.len().saturating_sub(window))
+        .step_by(step)
+        .filter_map(|from| {
+            let part = &samples[from..from + window];
+            let omega = part[window / 2].command.drive.omega;
+            let phases: Vec<f64> = (0..window).map(|n| omega * dt * n as f64).collect();
+            let values = part.iter().map(|sample| sample.sensors.response);
+            let values = DVector::from_iterator(window, values);
+            let fit = HarmonicBasis::new(&phases, 0, &[Some(0)]).fit(&values)?;
+            let periods = d.omega0 * part[window / 2].time / TAU;
+            Some([periods, fit.harmonic(1).norm() / d.b, d.sigma(omega)])
+        })
+        .collect()
+}
+
+/// The approach to the slow invariant manifold by first-order theory, impact by impact: sequences with the drive on, which end at the
+/// locked point, and one without it, from there down to the fold.
+pub fn approach(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
+    let flow = SlowFlow::new(p.lambda, p.r);
+    let lock = &flow.backbone_at(lock.b);
+    let gamma = -FRAC_PI_2;
+    // The legend is above the manifold.
+    let (x, y) = ((0.0, 1.6 * lock.c), (0.0, 1.75 * lock.b));
+    let inside = |place: &Place| place.0 <= x.1 && (y.0..=y.1).contains(&place.1);
+    let sequence = |g: f64, (c, b): Place| -> Vec<Place> {
+        let phases = (b, flow.psi(lock.b, gamma));
+        let impacts = flow.modulation(p.epsilon, (g, lock.sigma), (c, gamma), phases);
+        let places = impacts.take(POINTS).map(|one| (one.c, one.b));
+        std::iter::once((c, b)).chain(places).take_while(inside).collect()
+    };
+    let mut panel = Panel::new((x, AMPLITUDE_OF_V), (y, SPEED))
+        .heading(
+            "Approach to the slow invariant manifold, impact by impact",
+            &caption(p, lock.g),
+        )
+        .legend(Legend::UpperLeft);
+    let manifold: Vec<Marked> = equally_spaced(0.0, y.1, 301)
+        .map(|b| {
+            let stable = theory::impacts_stable(&flow.manifold, b);
+            ((flow.manifold.c(b), b), stable)
+        })
+        .filter(|(place, _)| inside(place))
+        .collect();
+    let styles = [line(THEORY, 30), line(UNSTABLE, 20)];
+    panel.pieces(&manifold, styles, [ON_MANIFOLD, OFF_MANIFOLD]);
+    // Starts on all sides of the manifold: C and B in parts of those at the locked point.
+    for (c, b) in [(1.35, 0.93), (0.65, 1.07), (0.75, 0.8), (1.2, 1.14)] {
+        let places = sequence(lock.g, (c * lock.c, b * lock.b));
+        panel.curve(places.clone(), line(EXACT, 6), "");
+        let label = "driven at phase resonance, from off the manifold";
+        panel.circles(places, 3, EXACT.filled(), label);
+    }
+    let free = sequence(0.0, (lock.c, lock.b));
+    panel.circles(free, 4, line(DECAY, 16), "without drive, until synchrony is lost");
+    panel.square((lock.c, lock.b), LOCK, "phase resonance");
+    Figure::single(panel)
+}
+
+/// Backbones of first-order theory for several coefficients of restitution, the scene's own emphasised.
+pub fn backbones(p: &Dimensionless) -> Figure {
+    let (x, top) = ((-4.0, 4.0), 1.2);
+    let others = [0.3, 0.5, 0.8, 1.0].into_iter();
+    let mut values: Vec<f64> = others.filter(|r| (r - p.r).abs() > 0.09).collect();
+    values.push(p.r);
+    values.sort_by(f64::total_cmp);
+    let caption = format!(
+        "λ = {:.3}; amplitudes over b; first order in ε; {}",
+        p.lambda,
+        p.definition.name()
+    );
+    let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
+        .heading("Backbones for several coefficients of restitution r", &caption)
+        .legend(Legend::UpperRight);
+    for r in values {
+        let (colour, width, size) = if r == p.r { (EXACT, 34, 17) } else { (THEORY, 18, 14) };
+        let points: Vec<Marked> = theory::backbone(&Dimensionless { r, ..*p }, 1e-3, 1.5 * B_SYMMETRY_BREAKING, 500)
+            .into_iter()
+            .filter(|point| point.c <= top && (x.0..=x.1).contains(&point.sigma))
+            .map(|point| ((point.sigma, point.c), point.stable()))
+            .collect();
+        // Without loss at the impacts C vanishes at the fold, and sigma jumps from one side to the other there.
+        for piece in points.chunk_by(|one, next| (one.0.0 - next.0.0).abs() < 1.0) {
+            panel.pieces(piece, [line(colour, width), line(UNSTABLE, 14)], ["stable", "unstable"]);
+        }
+        // The label is beside the fold, where the curves are distinct; for a fold near the axis, where its curve enters from the left.
+        let flow = SlowFlow::new(p.lambda, r);
+        let fold = flow.backbone_at(flow.manifold.b_min());
+        let entry = points.iter().map(|(place, _)| *place);
+        let entry = entry.filter(|(sigma, _)| *sigma > x.0 + 0.2 && *sigma < 0.0);
+        let place = match entry.min_by(|one, next| one.0.total_cmp(&next.0)) {
+            _ if fold.c > 0.05 => (fold.sigma.max(0.1) - 0.2, fold.c + 0.045),
+            Some((sigma, c)) => (sigma, c + 0.045),
+            None => (0.0, 0.1),
+        };
+        panel.text(format!("r = {r}"), place, size);
+    }
+    Figure::single(panel)
+}
+
+/// Frequency responses at several excitations, exact and first-order, with the backbone near their maxima.
+pub fn responses(p: &Dimensionless, responses: &[Response]) -> Figure {
+    let fold = SlowFlow::new(p.lambda, p.r).manifold.b_min();
+    let symmetric = responses.iter().flat_map(Response::symmetric);
+    let top = symmetric
+        .flat_map(|branch| &branch.points)
+        .filter(|one| one.b > fold)
+        .fold(0.6, |most: f64, one| most.max(1.08 * one.c));
+    let x = (-5.0, 5.0);
+    let list: Vec<String> = responses.iter().map(|one| format!("{:.3}", one.g)).collect();
+    let caption = format!("{}; G = {}; amplitudes over b", rig(p), list.join(", "));
+    let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
+        .heading("Frequency responses and backbone", &caption)
+        .legend(Legend::UpperRight);
+    for response in responses {
+        add_response(&mut panel, p, response);
+        // The label is beside the left end of the curve, or above its end at the axis.
+        let stable = response.symmetric().flat_map(|branch| &branch.points);
+        let stable = stable.filter(|one| one.stable);
+        if let Some(end) = stable.min_by(|one, next| one.sigma.total_cmp(&next.sigma)) {
+            let place = match end.sigma > x.0 + 0.9 {
+                true => (end.sigma - 0.45, end.c),
+                false => (end.sigma.max(x.0) + 0.5, end.c + 0.14 * top),
+            };
+            panel.centred_text(format!("G = {:.3}", response.g), place, 14, BLACK);
+        }
+    }
+    let backbone = theory::backbone(p, fold, 1.4 * B_SYMMETRY_BREAKING, 600);
+    let backbone: Vec<Marked> = backbone.iter().map(|one| ((one.sigma, one.c), true)).collect();
+    panel.clipped_pieces(&backbone, [line(BLACK, 24); 2], ["backbone, theory", ""]);
+    Figure::single(panel)
+}
+
+/// One frequency response, by theory and exact.
+fn add_response(panel: &mut Panel, p: &Dimensionless, response: &Response) {
+    let (styles, labels) = (
+        [line(THEORY, 12), line(UNSTABLE, 8)],
+        ["theory, stable", "theory, unstable"],
+    );
+    for curve in SlowFlow::new(p.lambda, p.r).frequency_responses(response.g, 600) {
+        let points = curve.iter().map(|one| {
+            let stable = one.motion.impacts_stable && one.motion.slow_flow_stable;
+            let c = one.motion.c * reading(p, one.motion.b, one.sigma);
+            ((one.sigma, c), stable)
+        });
+        panel.thinned_pieces(&points.collect::<Vec<_>>(), styles, labels);
+    }
+    let (styles, labels) = ([line(EXACT, 30), line(FAINT, 14)], ["exact, stable", "exact, unstable"]);
+    for component in &response.components {
+        let points = component.branch.points.iter();
+        let points: Vec<Marked> = points.map(|one| ((one.sigma, one.c), one.stable)).collect();
+        panel.thinned_pieces(&points, styles, labels);
+    }
+}
+
+/// An impact: part of the period, displacement of the particle, wall.
+type Impact = (f64, f64, f64);
+
+/// One period of the motion with its impacts, exact, and as first-order theory reconstructs it.
+pub fn period(p: &Dimensionless, motion: &Periodic, theory: Option<&BackbonePoint>) -> Figure {
+    let rows = motion.motion(p, POINTS);
+    let impacts = impacts(motion);
+    let (width, upper, lower) = (SIZE.0, 390, 370);
+    let panels = vec![
+        displacements(p, motion, &rows, &impacts).at([0, 0, width, upper]),
+        coordinates(p, &rows, &impacts, theory).at([0, upper, width, lower]),
+    ];
+    Figure::new((width, upper + lower), panels)
+}
+
+fn part(n: usize) -> f64 {
+    n as f64 / POINTS as f64
+}
+
+/// A function of (tau, q1, q1', q2, q2') over the period.
+fn over_period(rows: &[[f64; 5]], value: impl Fn(&[f64; 5]) -> f64) -> Vec<Place> {
+    let rows = rows.iter().enumerate();
+    rows.map(|(n, row)| (part(n), value(row))).collect()
+}
+
+/// Primary mass with its walls, and the particle between them.
+fn displacements(p: &Dimensionless, motion: &Periodic, rows: &[[f64; 5]], impacts: &[Impact]) -> Panel {
+    let caption = format!(
+        "{}, G = {:.3}, exact orbit at σ = {:.4}; lengths over b",
+        rig(p),
+        motion.g,
+        motion.sigma
+    );
+    let (q1, q2) = (over_period(rows, |row| row[1]), over_period(rows, |row| row[3]));
+    let farthest = q1.iter().chain(&q2).map(|(_, value)| value.abs() + 1.0);
+    let (_, most) = range((0.0, 1.0), farthest);
+    let mut panel = Panel::new(((0.0, 1.0), ""), ((-1.05 * most, 1.7 * most), "displacements, over b"))
+        .heading("One period of the locked motion", &caption)
+        .legend(Legend::UpperRight);
+    for side in [1.0, -1.0] {
+        let wall = over_period(rows, |row| row[1] + side);
+        panel.curve(wall, line(LOCK, 24), "walls, q₁ ± 1");
+    }
+    panel.curve(q1, line(EXACT, 24), "primary mass q₁");
+    panel.dashed(q2, line(DECAY, 24), "particle q₂");
+    let marks = impacts.iter().map(|(t, q2, _)| (*t, *q2)).collect();
+    panel.circles(marks, 6, line(LOCK, 20), "impacts");
+    panel
+}
+
+/// Centre of mass and relative displacement.
+fn coordinates(p: &Dimensionless, rows: &[[f64; 5]], impacts: &[Impact], theory: Option<&BackbonePoint>) -> Panel {
+    let w = over_period(rows, |row| row[1] - row[3]);
+    let v = over_period(rows, |row| row[1] + p.epsilon * row[3]);
+    let (_, high) = range((0.0, 1.0), v.iter().map(|(_, value)| value.abs()));
+    let mut panel = Panel::new(
+        ((0.0, 1.0), "time since the base passed zero upwards, in periods"),
+        ((-1.15 * high, 1.9 * high), "v and w, over b"),
+    )
+    .legend(Legend::UpperRight);
+    for side in [-1.0, 1.0] {
+        panel.curve(vec![(0.0, side), (1.0, side)], line(LOCK, 10), "");
+    }
+    panel.curve(w, line(EXACT, 30), "w = q₁ − q₂, exact");
+    panel.curve(v, line(DECAY, 30), "v = q₁ + ε q₂, exact");
+    if let Some(point) = theory {
+        let scene = Dimensionless { omega0: 1.0, b: 1.0, ..*p };
+        let wave = Waveform::new(&scene, point.sigma, point.b, -FRAC_PI_2);
+        for value in [Waveform::w, Waveform::v] {
+            let places = (0..=POINTS).map(|n| (part(n), value(&wave, part(n) * TAU / wave.omega)));
+            panel.dashed(places.collect(), line(THEORY, 12), FIRST_ORDER);
+        }
+    }
+    let marks = impacts.iter().map(|(t, _, wall)| (*t, *wall)).collect();
+    panel.circles(marks, 6, line(LOCK, 20), "");
+    panel
+}
+
+/// The impacts of one period of the base.
+fn impacts(motion: &Periodic) -> Vec<Impact> {
+    let part = |phase: f64| (phase / TAU).rem_euclid(1.0);
+    let first = motion.bounces.iter();
+    let mut impacts: Vec<Impact> = first.map(|one| (part(one.phase), one.q2(), one.wall)).collect();
+    if motion.pattern.mirrored {
+        let half = f64::from(motion.pattern.half_periods) / 2.0;
+        let second = motion.bounces.iter();
+        impacts.extend(second.map(|one| (part(one.phase + half * TAU), -one.q2(), -one.wall)));
+    }
+    impacts
 }

@@ -8,7 +8,7 @@ use serde::Serialize;
 use thiserror::Error;
 
 use super::figure::FigureError;
-use super::figures::{backbone, manifold, regimes, tracked};
+use super::figures::{backbone, manifold, regimes, tracked_with_drive};
 use super::theme::dark;
 use crate::backbone::Point;
 use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
@@ -50,8 +50,8 @@ pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, ReportError
     ];
     let mut paths = files::write(out, results)?;
     let figures = [
-        ("backbone.svg", backbone::figure(found).svg()?),
-        ("sim.svg", manifold::figure(found).svg()?),
+        ("backbone.svg", backbone(found).svg()?),
+        ("sim.svg", manifold(found).svg()?),
     ];
     paths.extend(files::write(out, figures)?);
     Ok(paths)
@@ -76,10 +76,7 @@ pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
 pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let results = [("tracked.json", json(found)?), ("tracked.csv", tracked_csv(found)?)];
     let mut paths = files::write(out, results)?;
-    paths.extend(files::write(
-        out,
-        [("tracked.svg", tracked::figure_with_drive(found).svg()?)],
-    )?);
+    paths.extend(files::write(out, [("tracked.svg", tracked_with_drive(found).svg()?)])?);
     Ok(paths)
 }
 

@@ -1,19 +1,15 @@
 //! The page: one file of HTML that needs nothing else.
 
 use maud::{DOCTYPE, Markup, PreEscaped, html};
-use percent_encoding::{AsciiSet, NON_ALPHANUMERIC, utf8_percent_encode};
 
-use super::section::{Block, Section};
 use super::table::Table;
-use super::theme;
+use super::{Block, Section, theme};
 use crate::scene::Scene;
 
 const STYLE: &str = include_str!("page.css");
-/// All characters but those that an address may contain (RFC 3986, section 2.3).
-const UNRESERVED: &AsciiSet = &NON_ALPHANUMERIC.remove(b'-').remove(b'_').remove(b'.').remove(b'~');
 
-/// Puts the sections together. `work_precision` is a figure of run time against error, as SVG, where there is one.
-pub fn page(scene: &Scene, sections: &[Section], work_precision: Option<&str>) -> String {
+/// Puts the sections together.
+pub fn page(scene: &Scene, sections: &[Section]) -> String {
     let dark = theme::dark_rules();
     let style = format!("{STYLE}\n@media screen and (prefers-color-scheme: dark){{{dark}}}\n");
     let page = html! {
@@ -31,7 +27,7 @@ pub fn page(scene: &Scene, sections: &[Section], work_precision: Option<&str>) -
             "\n"
             body {
                 "\n"
-                (body(scene, sections, work_precision))
+                (body(scene, sections))
             }
             "\n"
         }
@@ -40,7 +36,7 @@ pub fn page(scene: &Scene, sections: &[Section], work_precision: Option<&str>) -
     page.into_string()
 }
 
-fn body(scene: &Scene, sections: &[Section], work_precision: Option<&str>) -> Markup {
+fn body(scene: &Scene, sections: &[Section]) -> Markup {
     let p = scene.dimensionless();
     let mut figures = 0;
     let json = serde_json::to_string_pretty(scene).unwrap_or_default();
@@ -61,19 +57,6 @@ fn body(scene: &Scene, sections: &[Section], work_precision: Option<&str>) -> Ma
             section {
                 h2 { (section.title) } "\n"
                 @for block in &section.blocks { (rendered(block, &mut figures)) }
-            }
-            "\n"
-        }
-        @if let Some(svg) = work_precision {
-            section {
-                h2 { "Run time against error" } "\n"
-                figure {
-                    img alt="Run time against error" src=(format!("data:image/svg+xml,{}", utf8_percent_encode(svg, UNRESERVED)));
-                    figcaption {
-                        "Figure " (figures + 1) ". Run time against error, measured by the project's benchmark on its own machine; \
-                         not part of this run."
-                    }
-                }
             }
             "\n"
         }
@@ -129,7 +112,3 @@ fn budget(sections: &[Section]) -> Markup {
         "\n"
     }
 }
-
-#[cfg(test)]
-#[path = "../../tests/unit/report_page.rs"]
-mod tests;

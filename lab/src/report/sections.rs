@@ -1,18 +1,496 @@
-//! The sections of the report: each computes its results and describes them.
+//! The sections of the report: each computes its results, describes them, and adds its figures, tables and lines of the error budget.
 
-mod curves;
-mod experiment;
-mod regimes;
-mod theory;
-mod tracking;
+use std::cell::Cell;
+use std::error::Error;
+use std::sync::atomic::{AtomicUsize, Ordering};
 
-use super::section::Maker;
+use super::figures;
+use super::files::{ReportError, bifurcations_csv, csv, decay_csv, json, map_csv, tracked_csv};
+use super::table::{Table, number};
+use super::{Section, Subject, summary};
+use crate::backbone::track;
+use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
+use crate::experiment::{self, ExperimentError, Plan, Stage};
+use crate::identification::{DecayEnd, identify};
+use crate::map::{self, LIMIT, Map};
+use crate::orbit::{
+    Branch, Component, Condition, DOUBLINGS, ImpactPattern, Limits, Periodic, Response, backbone, convergence,
+    response, stable_resonant,
+};
+use crate::record::Record;
+use crate::regime::Regime;
+use crate::rig::{BuiltIn, Rig, Simulated};
+use crate::scene::Dimensionless;
+use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, resonant};
 
-/// All sections in order, each with the name under which it is cached.
-pub const SECTIONS: [(&str, Maker); 5] = [
-    ("experiment", experiment::make),
-    ("tracking", tracking::make),
-    ("theory", theory::make),
-    ("curves", curves::make),
-    ("regimes", regimes::make),
+/// Gets the fraction of a section that is done, from 0 to 1.
+type Progress<'a> = &'a (dyn Fn(f64) + Sync);
+
+/// Computes one section.
+type Maker = fn(&Subject, Progress) -> Result<Section, ReportError>;
+
+/// All sections in order, with the names that the progress bar shows.
+pub(super) const SECTIONS: [(&str, Maker); 5] = [
+    ("experiment", experiment),
+    ("tracking", tracking),
+    ("theory", theory),
+    ("curves", curves),
+    ("regimes", regimes),
 ];
+
+/// Lock, hold, release, decay.
+fn experiment(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
+    let mut section = Section::new("The experiment");
+    let scene = &subject.scene;
+    let mut rig = Simulated::of(scene)?;
+    let mut controller = BuiltIn::new(&scene.controller_config())?;
+    let record = match recorded(rig.as_mut(), &mut controller, &Plan::of(scene), done) {
+        Ok(record) => record,
+        Err(error) => return Ok(without_backbone(section, &error)),
+    };
+    let found = match identify(&record, scene) {
+        Ok(found) => Comparison::of(&found, scene),
+        Err(error) => return Ok(without_backbone(section, &error)),
+    };
+    describe(&mut section, &found);
+    section.figure(
+        "history",
+        "Amplitude and frequency over time. Left: the loop searches for phase resonance and holds it; measured once per period. Right: \
+         the drive is off, and the motion decays along the backbone until the impacts lose synchrony at the fold. \
+         Times are in periods 2π/ω₀ of the oscillator alone.",
+        figures::history(&record, scene, &found).svg()?,
+    );
+    section.figure(
+        "decay-on-sim",
+        "The decay on the slow invariant manifold, from the locked point (square) down the right branch to its fold.",
+        figures::manifold(&found).svg()?,
+    );
+    section.figure(
+        "identified-backbone",
+        "The identified backbone: points along the decay (circles), the locked point (square), the exact curve and first-order theory.",
+        figures::backbone(&found).svg()?,
+    );
+    section.attach("backbone.csv", decay_csv(&found)?);
+    section.attach("identification.json", json(&found)?);
+    Ok(section)
+}
+
+/// Runs the experiment and reports its progress in steps of a hundredth.
+fn recorded(
+    rig: &mut dyn Rig,
+    controller: &mut BuiltIn,
+    plan: &Plan,
+    done: Progress,
+) -> Result<Record, ExperimentError> {
+    let reported = Cell::new(0.0);
+    experiment::run(rig, controller, plan, |stage, at, of| {
+        let part = at as f64 / of.max(1) as f64;
+        // Most locks come long before the time limit.
+        let part = match stage {
+            Stage::Locking => 0.6 * part,
+            Stage::Holding | Stage::Tracking => 0.6 + 0.1 * part,
+            Stage::Decaying => 0.7 + 0.2 * part,
+        };
+        if part > reported.get() + 0.01 {
+            reported.set(part);
+            done(part);
+        }
+    })
+}
+
+fn without_backbone(mut section: Section, error: &dyn Error) -> Section {
+    section.found(format!("The experiment gave no backbone: {error}."));
+    section
+}
+
+fn describe(section: &mut Section, found: &Comparison) {
+    let (lock, target) = (&found.lock, found.phase_target_deg);
+    section.finding = format!(
+        "The loop locked after {:.0} periods at σ = {:.4}, C = {:.4}, in the regime {}.",
+        lock.periods_to_lock, lock.at.sigma, lock.at.c, lock.regime
+    );
+    section.words(format!(
+        "A sampled phase-locked loop drove the base at G = {:.4} and searched for the frequency at which the centre of mass {} the \
+         base by {} degrees. It settled after {:.0} periods with {:.3} impacts per period and a phase error of {:.1e} degrees. A phase \
+         lock alone is not sufficient evidence, because the linear mode locks as well. Here the impacts alternate between the walls at \
+         even intervals: this is the symmetric 1:1 regime.",
+        lock.at.g,
+        if target <= 0.0 { "lags" } else { "leads" },
+        target.abs(),
+        lock.periods_to_lock, lock.impacts_per_period, lock.at.phase_error_deg
+    ));
+    describe_lock(section, found);
+    if let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) {
+        section.words(format!(
+            "Then the drive was switched off. The motion decayed from C = {:.4} to C = {:.4} ({} ended the points). \
+             During the decay it moved along the backbone, and {} points of the backbone were identified.",
+            first.point.c,
+            last.point.c,
+            match found.decay_end {
+                DecayEnd::Synchrony => "the loss of synchrony",
+                DecayEnd::Linear => "the end of the impacts",
+                DecayEnd::Record => "the end of the record",
+            },
+            found.decay.len()
+        ));
+    }
+    if let Some((raw, predicted)) = found.rms_sigma_exact.zip(found.rms_sigma_predicted) {
+        section.budget(
+            "decay against the exact backbone",
+            format!("RMS {raw:.4} in σ over C > {COMPARED_ABOVE}"),
+            "The backbone is made of steady motions. The impacts follow a falling amplitude late.",
+        );
+        section.budget(
+            "decay against its prediction",
+            format!("RMS {predicted:.4} in σ over C > {COMPARED_ABOVE}"),
+            "The exact plant is released on the exact orbit and evaluated alike.",
+        );
+    }
+    if let Some(rms) = found.rms_sigma_error {
+        section.budget(
+            "decay against theory",
+            format!("RMS {rms:.4} in σ over C > {COMPARED_ABOVE}"),
+            "Theory and exact orbits describe steady motions; this one loses several per cent of its amplitude in every period. \
+             This difference is also of first order in ε.",
+        );
+    }
+    section.budget(
+        "plant",
+        "1e-13 relative".into(),
+        "Between events the motion is computed in closed form, without a step-size error. Tests compare it with 40-digit arithmetic \
+         (8e-14 over 200 periods and 400 impacts).",
+    );
+}
+
+/// The locked point beside exact orbit and theory.
+fn describe_lock(section: &mut Section, found: &Comparison) {
+    let lock = &found.lock;
+    let cells = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
+        let b = b.map_or("–".into(), number);
+        [name.to_string(), number(sigma), number(c), b]
+    };
+    let mut rows = vec![cells("measured at the lock", lock.at.sigma, lock.at.c, lock.b)];
+    let percent = |c: f64, reference: f64| 100.0 * (c / reference - 1.0).abs();
+    if let Some(exact) = &found.exact {
+        rows.push(cells("exact orbit", exact.sigma, exact.c, Some(exact.b)));
+        let others = found.others();
+        rows.extend(others.map(|one| cells("another stable orbit, not followed", one.sigma, one.c, Some(one.b))));
+        let sigma = (lock.at.sigma - exact.sigma).abs();
+        section.budget(
+            "lock, measured against the exact orbit",
+            format!("{sigma:.1e} in σ, {:.3} % in C", percent(lock.at.c, exact.c)),
+            &format!(
+                "Standard uncertainties: {:.1e} in σ, {:.1e} in C. The rest of the approach is extrapolated.",
+                lock.at.u_sigma, lock.at.u_c
+            ),
+        );
+    }
+    if let Some(theory) = &found.theory {
+        let (sigma, c, b) = (theory.sigma, theory.c, theory.b);
+        rows.push(cells("first-order theory", sigma, c, Some(b)));
+    }
+    if let (Some(theory), Some(exact)) = (&found.theory, &found.exact) {
+        let sigma = (theory.sigma - exact.sigma).abs();
+        section.budget(
+            "theory against the exact orbit, at the lock",
+            format!("{sigma:.3} in σ, {:.1} % in C", percent(theory.c, exact.c)),
+            "The theory is of first order in ε; the convergence study below shows that the difference shrinks as ε.",
+        );
+    }
+    section.table(
+        "The locked point. σ: detuning, C: amplitude of v over b, B: particle speed over b ω₀.",
+        Table::new(" | σ | C | B").rows(rows),
+    );
+}
+
+/// The backbone tracked with the loop closed, level by level.
+fn tracking(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
+    let mut section = Section::new("The backbone, tracked with the loop closed");
+    let scene = &subject.scene;
+    let mut controller = BuiltIn::new(&scene.backbone_config())?;
+    let mut rig = Simulated::of(scene)?;
+    let found = track(rig.as_mut(), &mut controller, scene, |at, of| {
+        done(at as f64 / of.max(1) as f64);
+    });
+    let tracked = match found {
+        Ok(found) if !found.points.is_empty() => TrackedComparison::of(&found, scene),
+        Ok(_) => {
+            section.found("Tracking gave no point.");
+            return Ok(section);
+        }
+        Err(error) => {
+            section.found(format!("Tracking gave no backbone: {error}."));
+            return Ok(section);
+        }
+    };
+    let symmetric = |one: &&TrackedPoint| one.point.regime_by_impacts == Some(Regime::Symmetric);
+    let in_regime = tracked.points.iter().filter(symmetric).count();
+    section.finding = format!(
+        "Tracked with the loop closed, the backbone took {} points in {:.0} periods, {:.1} a point.",
+        tracked.points.len(),
+        tracked.periods,
+        tracked.periods_per_point()
+    );
+    section.words(format!(
+        "A decay is not a steady motion, so its points lie off the backbone. Here the loop holds the response at one level after \
+         another until it has settled, and the amplitude of the drive follows. {} Of these points, {in_regime} are in the symmetric 1:1 regime.",
+        section.finding
+    ));
+    section.figure(
+        "tracked-backbone",
+        "The backbone tracked with the loop closed, the exact curve and first-order theory.",
+        figures::tracked(&tracked).svg()?,
+    );
+    if let Some(worst) = tracked.worst() {
+        section.budget(
+            "tracked backbone against the exact one",
+            format!("at most {:.1e} in σ and G", worst.at_equal_c),
+            "Largest difference from the exact curve at the same C, over all settled points.",
+        );
+    }
+    section.attach("tracked.csv", tracked_csv(&tracked)?);
+    Ok(section)
+}
+
+/// First-order theory: the backbones of several r, activation, and how it approaches the exact orbits.
+fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
+    let mut section = Section::new("First-order theory and its accuracy");
+    let p = subject.scene.dimensionless();
+    let flow = SlowFlow::new(p.lambda, p.r);
+    let stable = resonant(&p).into_iter().find(|one| one.stable());
+    section.words(format!(
+        "In the theory, the motions lie on the slow invariant manifold C² = R²B² + (1 − πB/2)², R = (1 − r)/(1 + r). Its fold is at \
+         C = {:.4}, B = {:.4}. Two symmetric impacts per period are stable from there to B = {B_SYMMETRY_BREAKING:.4}, for every r. \
+         docs/theory.md has the derivation and notes two misprints of the published study.",
+        flow.manifold.c_min(),
+        flow.manifold.b_min()
+    ));
+    describe_activation(&mut section, &p, stable.map_or(0.0, |one| one.sigma));
+    if let Some(point) = &stable {
+        section.figure(
+            "approach",
+            "The modulation off the manifold by the theory, one dot per impact. Driven at phase resonance, motions that start off the \
+             manifold reach it within a few impacts and move along it to the locked point (square). Without drive, the motion moves \
+             down to the fold and loses its synchrony there. It lies a little below the manifold, as the measured decay does: the \
+             drift along the manifold is not infinitely slow compared with the approach to it.",
+            figures::approach(&p, point).svg()?,
+        );
+    }
+    section.figure(
+        "backbones",
+        "Backbones of first-order theory. Their shape does not depend on λ, but their stability does. The smaller the loss at the \
+         impacts, the lower the amplitude at the fold.",
+        figures::backbones(&p).svg()?,
+    );
+    match convergence(&p, 6) {
+        Some(study) => {
+            let [s, c, b] = study.slopes;
+            section.finding = format!(
+                "The difference between first-order theory and exact orbit shrinks as ε to the power {s:.2} in σ, {c:.2} in C and {b:.2} in B."
+            );
+            let rows = study
+                .rows
+                .iter()
+                .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}")));
+            section.table(
+                "Theory minus exact orbit at phase resonance; λ, r and G as in the scene.",
+                Table::new("ε | in σ | in C | in B").rows(rows),
+            );
+            section.words(section.finding.clone());
+            section.attach("convergence.csv", csv(&[], &study.rows)?);
+        }
+        None => {
+            section.found("Theory and exact orbits have no common stable phase-resonant motion here.");
+        }
+    }
+    Ok(section)
+}
+
+fn describe_activation(section: &mut Section, scene: &Dimensionless, sigma: f64) {
+    let activation = SlowFlow::new(scene.lambda, scene.r).activation(scene.epsilon, sigma);
+    let stable = activation.stable.map_or("exists at no G".into(), |g| {
+        format!("needs less, G = {g:.4}, but only a particle that is already moving reaches it")
+    });
+    section.words(format!(
+        "How much base motion is needed? At σ = {sigma:.4}, the steady linear response reaches the wall at G = {:.4}. When the drive is \
+         switched on at rest, the first beat is larger than that: impacts start at G = {:.4}, or at G = {:.4} with the phase of the base \
+         that needs the least. A stable 1:1 motion {stable}.",
+        activation.steady_linear, activation.from_rest, activation.from_rest_any_phase
+    ));
+}
+
+/// Exact frequency responses and backbone, and one period of the locked motion.
+fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
+    let mut section = Section::new("Exact periodic motions");
+    let p = subject.scene.dimensionless();
+    let limits = Limits::default();
+    let excitations = excitations(&p);
+    let mut found: Vec<Response> = Vec::new();
+    for (n, g) in excitations.iter().enumerate() {
+        found.push(response(&Dimensionless { g: *g, ..p }, &limits, DOUBLINGS));
+        done((n + 1) as f64 / (excitations.len() + 1) as f64);
+    }
+    let Some(curve) = backbone(&p, &limits) else {
+        section.found("There is no exact phase-resonant 1:1 motion at this excitation.");
+        return Ok(section);
+    };
+    describe_backbone(&mut section, &curve);
+    if found.iter().any(|one| !one.components.is_empty()) {
+        section.figure(
+            "responses",
+            "Frequency responses at several excitations: exact, first-order, and the backbone of the theory near their maxima. \
+             Where a response loses its symmetry, the asymmetric motions (blue, beside the dashed curve) take over.",
+            figures::responses(&p, &found).svg()?,
+        );
+    }
+    let changes = changes(&found);
+    if !changes.is_empty() {
+        section.table(
+            "Where the symmetric motions on the exact frequency responses change stability.",
+            changes,
+        );
+    }
+    if let Some(motion) = locked(&p) {
+        let flow = SlowFlow::new(p.lambda, p.r);
+        let theory = flow.phase_resonant(p.g);
+        let theory = theory.iter().find(|one| one.stable());
+        section.figure(
+            "period",
+            "One period of the locked motion. Above: the primary mass with its walls, and the particle between them; circles \
+             mark the impacts. Below: centre of mass and relative displacement, exact and by first-order theory.",
+            figures::period(&p, &motion, theory).svg()?,
+        );
+    }
+    section.attach("curves.csv", table(&curve, &found)?);
+    Ok(section)
+}
+
+fn describe_backbone(section: &mut Section, curve: &Branch) {
+    let special: Vec<String> = curve
+        .special
+        .iter()
+        .map(|one| {
+            let Periodic { sigma, c, g, .. } = one.motion;
+            format!("{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}", one.name())
+        })
+        .collect();
+    section.finding = format!(
+        "The exact backbone was followed through {} motions; its stability changes in {} place{}.",
+        curve.points.len(),
+        special.len(),
+        if special.len() == 1 { "" } else { "s" }
+    );
+    section.words(
+        "These motions are exact: periodic orbits of the full equations, found by shooting on the impact map. Pseudo-arclength \
+         continuation follows them through folds and symmetry breaking, stable or not. There is no first-order approximation.",
+    );
+    let places = match special.len() {
+        0 => "nowhere".into(),
+        _ => special.join("; "),
+    };
+    section.words(format!(
+        "Along the exact backbone, stability changes here: {places}. The theory predicts symmetry breaking at \
+         B = {B_SYMMETRY_BREAKING:.4} for every r."
+    ));
+}
+
+/// Where stability changes on the responses.
+fn changes(found: &[Response]) -> Table {
+    let all = found.iter().flat_map(|one| {
+        one.symmetric()
+            .flat_map(|branch| &branch.special)
+            .map(|special| (one.g, special))
+    });
+    Table::new("G | what | σ | C | B").rows(all.map(|(g, special)| {
+        let Periodic { sigma, c, b, .. } = special.motion;
+        let mut cells = vec![format!("{g:.4}"), special.name().into()];
+        cells.extend([sigma, c, b].map(|one| format!("{one:.5}")));
+        cells
+    }))
+}
+
+/// The stable resonant motion at the scene's excitation.
+fn locked(p: &Dimensionless) -> Option<Periodic> {
+    let orbit = stable_resonant(p)?;
+    let conditions = [Condition::Excitation(p.g), Condition::backbone(p)];
+    Periodic::find(p, &ImpactPattern::symmetric(), &orbit.unknowns(), conditions)
+}
+
+/// The scene's excitation, and others from just above the onset of stable motions to beyond symmetry breaking.
+fn excitations(p: &Dimensionless) -> Vec<f64> {
+    let flow = SlowFlow::new(p.lambda, p.r);
+    let breaking = flow.backbone_at(B_SYMMETRY_BREAKING).g;
+    let mut list = vec![p.g, 1.12 * breaking];
+    if p.g < 0.85 * breaking {
+        list.push(0.5 * (p.g + breaking));
+    }
+    list.sort_by(f64::total_cmp);
+    list.dedup_by(|one, other| (*one - *other).abs() < 0.03 * breaking);
+    list
+}
+
+/// The orbits of all curves, as CSV.
+fn table(backbone: &Branch, responses: &[Response]) -> Result<String, ReportError> {
+    let headings = ["curve", "sigma", "G", "C", "gamma", "B", "largest_multiplier", "stable"];
+    let components = responses.iter().flat_map(|response| {
+        let name = |one: &Component| format!("G={:.4}: {}", response.g, one.name);
+        response.components.iter().map(move |one| (name(one), &one.branch))
+    });
+    let curves = std::iter::once(("backbone".to_string(), backbone)).chain(components);
+    let rows = curves.flat_map(|(curve, branch)| {
+        let row = move |one: &Periodic| {
+            let Periodic { sigma, g, c, gamma, b, stable, .. } = *one;
+            (curve.clone(), sigma, g, c, gamma, b, one.moduli()[3], stable)
+        };
+        branch.points.iter().map(row)
+    });
+    csv(&headings, rows)
+}
+
+/// The regime map.
+fn regimes(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
+    let mut section = Section::new("Regimes of the driven response");
+    let (scene, [x, y]) = (&subject.scene, subject.map);
+    let plan = map::Plan::new(scene.dimensionless(), scene.dimensionless_start(), x, y);
+    let (count, all) = (AtomicUsize::new(0), plan.cells());
+    let map = plan.run(|| {
+        let n = count.fetch_add(1, Ordering::Relaxed) + 1;
+        done(n as f64 / all as f64);
+    })?;
+    describe_map(&mut section, &map);
+    section.figure(
+        "regimes",
+        "The regime map. The black line is the border of the island in which first-order theory has a stable symmetric 1:1 motion. The \
+         coloured curves are exact bifurcations of the 1:1 motions, solid where they bound the stability of one.",
+        figures::regimes::svg(&map)?,
+    );
+    section.budget(
+        "regime map",
+        "one start per cell".into(),
+        "Where several regimes are stable, the start decides. Chaos that ends only after more periods than were simulated counts \
+         as lasting; docs/regimes.md says how often that happens.",
+    );
+    section.attach("regimes.csv", map_csv(&map)?);
+    section.attach("bifurcations.csv", bifurcations_csv(&map)?);
+    Ok(section)
+}
+
+fn describe_map(section: &mut Section, map: &Map) {
+    let all = map.cells.len();
+    let inside = map.cells.iter().filter(|one| one.theory_stable).count();
+    let (_, agree) = map.count(Regime::Symmetric);
+    let percent = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
+    section.finding = format!(
+        "Of {all} cells of the map, {inside} lie where the theory has a stable symmetric 1:1 motion; {:.0} % of these show it.",
+        percent(agree, inside)
+    );
+    section.words(format!(
+        "Each cell of the map over {} and {} is one plant, driven from the scene's start at a fixed frequency until it repeats itself, \
+         at most for {} periods. A motion that has not repeated itself by then is chaotic if its largest Lyapunov exponent exceeds zero by \
+         four standard errors, modulated if also a fifth of its impacts or more are captured into 1:1 resonance for a while, \
+         quasi-periodic if the exponent is zero within its uncertainty, and otherwise undecided.",
+        map.plan.x, map.plan.y, LIMIT
+    ));
+    section.table("How often each regime occurs.", summary::regimes(map));
+    section.words(section.finding.clone());
+}

@@ -1,10 +1,9 @@
 //! Tables: as text for a terminal, as Markdown for the documentation, as HTML for the page.
 
 use maud::{Markup, html};
-use serde::{Deserialize, Serialize};
 
 /// Headings and rows of cells.
-#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+#[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
     headings: Vec<String>,
     rows: Vec<Vec<String>>,
