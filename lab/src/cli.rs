@@ -2,21 +2,16 @@
 
 mod backbone;
 mod check;
-mod controller;
-mod endpoint;
 mod experiment;
 mod failure;
 mod identify;
-mod interrupt;
 mod map;
+mod options;
 mod orbit;
 mod output;
 mod pack;
-mod real_time;
 mod report;
-mod rig;
-mod scene_arguments;
-mod serving;
+mod serve;
 #[cfg(feature = "sweep")]
 mod sweep;
 #[cfg(not(feature = "sweep"))]
@@ -65,8 +60,8 @@ enum Command {
     Sweep(sweep::Arguments),
     Report(report::Arguments),
     Pack(pack::Arguments),
-    Rig(rig::Arguments),
-    Controller(controller::Arguments),
+    Rig(serve::RigArguments),
+    Controller(serve::ControllerArguments),
 }
 
 /// Runs the program: exit code 0, 1 for a failure, 2 for bad usage or input, 3 for results of a rig that missed deadlines,
@@ -82,8 +77,8 @@ pub fn run() -> ExitCode {
         Command::Sweep(arguments) => sweep::run(&arguments),
         Command::Report(arguments) => report::run(&arguments),
         Command::Pack(arguments) => pack::run(&arguments),
-        Command::Rig(arguments) => rig::run(&arguments),
-        Command::Controller(arguments) => controller::run(&arguments),
+        Command::Rig(arguments) => serve::rig(&arguments),
+        Command::Controller(arguments) => serve::controller(&arguments),
     };
     match output.and_then(|text| print(&text)) {
         Ok(()) => ExitCode::SUCCESS,

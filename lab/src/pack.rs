@@ -1,7 +1,5 @@
-//! Packing: a description and shared libraries become an FMU; two FMUs and a scene become a coupled system.
-
-mod documentation;
-mod system;
+//! Packing: a description and shared libraries become an FMU, a zip archive; two FMUs and a scene become a coupled system in the format of
+//! SSP 1.0, System Structure and Parameterization.
 
 use std::collections::BTreeMap;
 use std::env::consts::{ARCH, DLL_PREFIX, DLL_SUFFIX, OS};
@@ -10,11 +8,13 @@ use std::path::{Path, PathBuf};
 use std::str::FromStr;
 
 use chrono::{DateTime, SecondsFormat};
-use fmi2_description::Description;
+use fmi2_description::{Causality, Description};
+use maud::{DOCTYPE, PreEscaped, html};
+use phase_lock::{PARAMETERS, Value};
 use vines_model::ArgumentError;
 use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
-use crate::{files, scene::Scene};
+use crate::{files, report::Table, scene::Scene};
 
 /// One FMU to be.
 #[derive(Debug, Clone)]
@@ -33,45 +33,53 @@ pub struct Component {
     pub text: &'static str,
 }
 
+macro_rules! component {
+    ($identifier:literal, $package:literal, $xml:literal) => {
+        Component {
+            identifier: $identifier,
+            package: $package,
+            // With the GUID of the library.
+            xml: fmi2_component_build::describe(include_str!($xml))
+                .expect("build.rs of the component has accepted this text"),
+            svg: include_str!(concat!("pack/pictures/", $identifier, ".svg")),
+            png: include_bytes!(concat!("pack/pictures/", $identifier, ".png")),
+            text: include_str!(concat!("pack/pictures/", $identifier, ".html")),
+        }
+    };
+}
+
 /// The plant and the controller.
 pub fn components() -> [Component; 2] {
-    // The GUID is that of the library.
-    let describe = |xml| fmi2_component_build::describe(xml).expect("build.rs of the component has accepted this text");
     [
-        Component {
-            identifier: "LoViNes",
-            package: "lovines-fmu",
-            xml: describe(include_str!("../../modelDescription.xml")),
-            svg: include_str!("pack/pictures/LoViNes.svg"),
-            png: include_bytes!("pack/pictures/LoViNes.png"),
-            text: include_str!("pack/pictures/LoViNes.html"),
-        },
-        Component {
-            identifier: "PhaseLock",
-            package: "phase-lock-fmu",
-            xml: describe(include_str!("../../controller/fmu/modelDescription.xml")),
-            svg: include_str!("pack/pictures/PhaseLock.svg"),
-            png: include_bytes!("pack/pictures/PhaseLock.png"),
-            text: include_str!("pack/pictures/PhaseLock.html"),
-        },
+        component!("LoViNes", "lovines-fmu", "../../modelDescription.xml"),
+        component!(
+            "PhaseLock",
+            "phase-lock-fmu",
+            "../../controller/fmu/modelDescription.xml"
+        ),
     ]
 }
 
-/// Folders below `binaries/`. FMI 2.0 names none for ARM except `darwin64`: the others are those of FMI 3.0.
-const FOLDERS: &str = "linux64, linux32, aarch64-linux, win64, win32, aarch64-windows, darwin64, aarch64-darwin";
+/// Folders below `binaries/`, with their system, processor and suffix of a library. FMI 2.0 names none for ARM except `darwin64`: the others
+/// are those of FMI 3.0.
+const PLATFORMS: [(&str, &str, &str, &str); 8] = [
+    ("linux64", "linux", "x86_64", ".so"),
+    ("linux32", "linux", "x86", ".so"),
+    ("aarch64-linux", "linux", "aarch64", ".so"),
+    ("win64", "windows", "x86_64", ".dll"),
+    ("win32", "windows", "x86", ".dll"),
+    ("aarch64-windows", "windows", "aarch64", ".dll"),
+    ("darwin64", "macos", "x86_64", ".dylib"),
+    ("aarch64-darwin", "macos", "aarch64", ".dylib"),
+];
 
 /// The folders for this machine. On Apple silicon, masters look into either.
-fn own_folders() -> &'static [&'static str] {
-    match (OS, ARCH) {
-        ("windows", "x86") => &["win32"],
-        ("windows", "aarch64") => &["aarch64-windows"],
-        ("windows", _) => &["win64"],
-        ("macos", "aarch64") => &["aarch64-darwin", "darwin64"],
-        ("macos", _) => &["darwin64"],
-        (_, "x86") => &["linux32"],
-        (_, "aarch64") => &["aarch64-linux"],
-        _ => &["linux64"],
-    }
+fn own_folders() -> impl Iterator<Item = &'static str> {
+    let own = PLATFORMS.into_iter().filter(|(_, os, arch, _)| {
+        let either = OS == "macos" && ARCH == "aarch64";
+        *os == OS && (*arch == ARCH || either)
+    });
+    own.map(|(folder, ..)| folder)
 }
 
 /// A library for the platform of a folder below `binaries/`; parse it from `win64=PATH`.
@@ -88,10 +96,11 @@ impl FromStr for Binary {
         let (folder, path) = argument
             .split_once('=')
             .ok_or("expected PLATFORM=PATH, for instance win64=lovines_fmu.dll")?;
-        if !FOLDERS.split(", ").any(|known| known == folder) {
-            return Err(format!("`{folder}` is not a platform; known are {FOLDERS}").into());
+        let folders = PLATFORMS.map(|(folder, ..)| folder);
+        match folders.contains(&folder) {
+            true => Ok(Self { folder: folder.into(), path: path.into() }),
+            false => Err(format!("`{folder}` is not a platform; known are {}", folders.join(", ")).into()),
         }
-        Ok(Self { folder: folder.into(), path: path.into() })
     }
 }
 
@@ -147,43 +156,87 @@ pub fn pack(components: &[Component], libraries: &Libraries, out: &Path) -> Resu
 /// Packs plant and controller into `out`, and the two of them coupled as `bench.ssp` with the parameters of the scene.
 pub fn pack_bench(scene: &Scene, libraries: &Libraries, out: &Path) -> Result<Vec<PathBuf>, PackError> {
     let mut files = fmus(&components(), libraries)?;
-    files.push(system::file(scene, &files, date()?)?);
+    files.push(system(scene, &files, date()?)?);
     Ok(files::write(out, files)?)
 }
 
 fn fmus(components: &[Component], libraries: &Libraries) -> Result<Vec<File>, PackError> {
     let date = date()?.map_or(String::new(), |date| format!(" generationDateAndTime=\"{date}\""));
-    let descriptions = components.iter().map(|one| Description::parse(&one.xml));
+    let descriptions = components.iter().map(|component| Description::parse(&component.xml));
     let descriptions = descriptions.collect::<Result<Vec<_>, _>>()?;
-    let guids: Vec<&str> = descriptions.iter().map(|one| one.guid.as_str()).collect();
-    let binaries = binaries(components, &guids, libraries)?;
-    let fmus = components.iter().zip(&descriptions).enumerate();
-    let fmus = fmus.map(|(n, (component, description))| {
+    let others = libraries.others.iter();
+    let others = others.map(|binary| Ok((binary, read(&binary.path)?)));
+    let others = others.collect::<Result<Vec<_>, PackError>>()?;
+    // The GUID in a library determines its component.
+    let belongs = |content: &[u8]| {
+        descriptions
+            .iter()
+            .any(|description| mentions(content, &description.guid))
+    };
+    if let Some((binary, _)) = others.iter().find(|(_, content)| !belongs(content)) {
+        let names: Vec<_> = components.iter().map(|component| component.identifier).collect();
+        let problem = format!(
+            "belongs to none of {}: it contains the GUID of none of them, because it was built from other variables; build it again",
+            names.join(", ")
+        );
+        return Err(PackError::Library { path: binary.path.clone(), problem });
+    }
+    let fmus = components.iter().zip(&descriptions).map(|(component, description)| {
         let identifier = component.identifier;
+        let mut binaries = BTreeMap::new();
+        for (Binary { folder, path }, content) in &others {
+            if mentions(content, &description.guid) && binaries.insert(folder.as_str(), content.clone()).is_some() {
+                let problem = format!("would be the second {folder} library of {identifier}");
+                return Err(PackError::Library { path: path.clone(), problem });
+            }
+        }
+        if libraries.own {
+            let content = own_library(component, &description.guid, &libraries.folder)?;
+            for folder in own_folders() {
+                binaries.entry(folder).or_insert_with(|| content.clone());
+            }
+        }
+        if binaries.is_empty() {
+            return Err(PackError::Unserved(identifier));
+        }
         let xml = component.xml.replacen(" guid=", &format!("{date} guid="), 1);
+        let page = documentation(component, description);
         let mut entries = vec![
             ("modelDescription.xml".to_owned(), xml.into_bytes()),
-            (
-                "documentation/index.html".to_owned(),
-                documentation::page(component, description).into_bytes(),
-            ),
+            ("documentation/index.html".to_owned(), page.into_bytes()),
             ("model.png".to_owned(), component.png.to_vec()),
         ];
-        let others = entries.len();
-        for ((_, folder), content) in binaries.iter().filter(|((index, _), _)| *index == n) {
-            let suffix = match folder {
-                _ if folder.contains("darwin") => ".dylib",
-                _ if folder.contains("win") => ".dll",
-                _ => ".so",
-            };
-            entries.push((format!("binaries/{folder}/{identifier}{suffix}"), content.clone()));
+        for (folder, content) in binaries {
+            let suffix = PLATFORMS
+                .iter()
+                .find(|platform| platform.0 == folder)
+                .map_or("", |platform| platform.3);
+            entries.push((format!("binaries/{folder}/{identifier}{suffix}"), content));
         }
-        match entries.len() == others {
-            true => Err(PackError::Unserved(identifier)),
-            false => archive(format!("{identifier}.fmu"), &entries),
-        }
+        archive(format!("{identifier}.fmu"), &entries)
     });
     fmus.collect()
+}
+
+/// The library of a component for this machine.
+fn own_library(component: &Component, guid: &str, folder: &Path) -> Result<Vec<u8>, PackError> {
+    let Component { identifier, package, .. } = component;
+    let path = folder.join(format!("{DLL_PREFIX}{}{DLL_SUFFIX}", package.replace('-', "_")));
+    let refused = |reason: &str| PackError::Library {
+        path: path.clone(),
+        problem: format!(
+            "is not the library of {identifier} for this machine: {reason}; build it with `cargo build --release -p {package}`, \
+             or name its folder with --libraries"
+        ),
+    };
+    vines_fmu::check(&path).map_err(|reason| refused(&reason))?;
+    let content = read(&path)?;
+    match mentions(&content, guid) {
+        true => Ok(content),
+        false => Err(refused(&format!(
+            "it was built from other variables than {identifier} has now"
+        ))),
+    }
 }
 
 /// The date of the sources by the convention of reproducible builds. No clock is read: the same input gives the same
@@ -204,54 +257,6 @@ fn format_date(seconds: &str) -> Result<String, PackError> {
         .and_then(|seconds| DateTime::from_timestamp(seconds, 0));
     let date = date.ok_or_else(|| PackError::Date(seconds.to_owned()))?;
     Ok(date.to_rfc3339_opts(SecondsFormat::Secs, true))
-}
-
-/// The libraries, by the index of their component and the folder of their platform.
-fn binaries<'a>(
-    components: &[Component],
-    guids: &[&str],
-    libraries: &'a Libraries,
-) -> Result<BTreeMap<(usize, &'a str), Vec<u8>>, PackError> {
-    let mut binaries = BTreeMap::new();
-    let refused = |path: &Path, problem| PackError::Library { path: path.into(), problem };
-    for Binary { folder, path } in &libraries.others {
-        let content = read(path)?;
-        // The GUID in a library determines its component.
-        let Some(n) = guids.iter().position(|guid| mentions(&content, guid)) else {
-            let names: Vec<_> = components.iter().map(|one| one.identifier).collect();
-            let problem = format!(
-                "belongs to none of {}: it contains the GUID of none of them, because it was built from other variables; build it again",
-                names.join(", ")
-            );
-            return Err(refused(path, problem));
-        };
-        if binaries.insert((n, folder.as_str()), content).is_some() {
-            let problem = format!("would be the second {folder} library of {}", components[n].identifier);
-            return Err(refused(path, problem));
-        }
-    }
-    for (n, Component { identifier, package, .. }) in components.iter().enumerate().filter(|_| libraries.own) {
-        let path = format!("{DLL_PREFIX}{}{DLL_SUFFIX}", package.replace('-', "_"));
-        let path = libraries.folder.join(path);
-        let refused = |reason| {
-            let problem = format!(
-                "is not the library of {identifier} for this machine: {reason}; build it with `cargo build --release -p {package}`, \
-                 or name its folder with --libraries"
-            );
-            refused(&path, problem)
-        };
-        vines_fmu::check(&path).map_err(refused)?;
-        let content = read(&path)?;
-        if !mentions(&content, guids[n]) {
-            return Err(refused(format!(
-                "it was built from other variables than {identifier} has now"
-            )));
-        }
-        for folder in own_folders() {
-            binaries.entry((n, *folder)).or_insert_with(|| content.clone());
-        }
-    }
-    Ok(binaries)
 }
 
 fn read(path: &Path) -> Result<Vec<u8>, PackError> {
@@ -286,6 +291,236 @@ fn archive(name: String, entries: &[File]) -> Result<File, PackError> {
     }
 }
 
+/// The page inside an FMU: its tables come from `modelDescription.xml`, figure, equations and explanations from `pictures/`.
+fn documentation(component: &Component, description: &Description) -> String {
+    let interfaces = [
+        description.co_simulation.as_ref().map(|_| "co-simulation"),
+        description.model_exchange.as_ref().map(|_| "model exchange"),
+    ];
+    let interfaces: Vec<_> = interfaces.into_iter().flatten().collect();
+    let experiment = &description.default_experiment;
+    let [start, stop, step] = [&experiment.start_time, &experiment.stop_time, &experiment.step_size]
+        .map(|time| time.as_deref().map_or("?".into(), rounded));
+    let page = html! {
+        (DOCTYPE)
+        html lang="en" {
+            head {
+                meta charset="utf-8";
+                title { (description.model_name) }
+                style { (PreEscaped(include_str!("pack/pictures/style.css"))) }
+            }
+            body {
+                h1 { (description.model_name) }
+                p { (description.description) "." }
+                (PreEscaped(component.svg)) (PreEscaped(component.text))
+                p {
+                    "Version " (description.version) "; FMI " (description.fmi_version) "; " (interfaces.join(" and "))
+                    ". Default experiment: " (start) " s to " (stop) " s in steps of " (step) " s."
+                }
+                @for (causality, heading) in SECTIONS {
+                    @let table = table(description, causality);
+                    @if !table.is_empty() { (table.html(heading)) }
+                }
+            }
+        }
+    };
+    page.into_string()
+}
+
+/// Causalities in the order of the page.
+const SECTIONS: [(Causality, &str); 5] = [
+    (Causality::Parameter, "Parameters"),
+    (Causality::CalculatedParameter, "Calculated parameters"),
+    (Causality::Input, "Inputs"),
+    (Causality::Output, "Outputs"),
+    (Causality::Local, "Local variables"),
+];
+
+/// A number with at most six digits. The description has all digits.
+fn rounded(text: &str) -> String {
+    match text.parse::<f64>() {
+        Ok(number) if text.len() > 8 => {
+            let six: f64 = format!("{number:.5e}").parse().unwrap_or(number);
+            if (1e-3..1e6).contains(&six.abs()) {
+                format!("{six}")
+            } else {
+                format!("{six:e}")
+            }
+        }
+        _ => text.to_owned(),
+    }
+}
+
+/// The variables of one causality.
+fn table(description: &Description, causality: Causality) -> Table {
+    let variables = description.variables.iter();
+    let rows = variables.filter(|one| one.causality == causality).map(|one| {
+        let content = one.content().map(|(_, content)| content.clone()).unwrap_or_default();
+        vec![
+            one.name.clone(),
+            rounded(&content.start.unwrap_or_default()),
+            content.unit.unwrap_or_default(),
+            format!("{:?}", one.variability).to_lowercase(),
+            one.description.clone(),
+        ]
+    });
+    Table::new("name | start | unit | variability | meaning").rows(rows)
+}
+
+/// The structure of the coupled system; step size and end of the default experiment, and the date, are filled in.
+const STRUCTURE: &str = include_str!("pack/SystemStructure.ssd");
+
+/// The end of the default experiment, natural periods: the default scene has been locked for nearly a hundred by then.
+const PERIODS: f64 = 400.0;
+
+/// The system file of the FMUs, with the parameters of the scene and the date of generation.
+fn system(scene: &Scene, fmus: &[File], date: Option<String>) -> Result<File, PackError> {
+    // The communication step is the controller's.
+    let step = scene.sample_time().to_string();
+    let stop = PERIODS * scene.dimensionless().natural_period();
+    let mut structure = STRUCTURE.to_owned();
+    for (attribute, value) in [
+        ("stopTime", Some(stop.to_string())),
+        ("stepSize", Some(step.clone())),
+        ("baseStepSize", Some(step)),
+        ("generationDateAndTime", date),
+    ] {
+        let filled = value.map_or(String::new(), |value| format!(" {attribute}=\"{value}\""));
+        structure = structure.replace(&format!(" {attribute}=\"derived\""), &filled);
+    }
+    let mut entries = vec![
+        ("SystemStructure.ssd".to_owned(), structure.into_bytes()),
+        ("resources/plant.ssv".to_owned(), parameter_set("plant", plant(scene))),
+        (
+            "resources/controller.ssv".to_owned(),
+            parameter_set("controller", controller(scene)?),
+        ),
+    ];
+    entries.extend(
+        fmus.iter()
+            .map(|(name, content)| (format!("resources/{name}"), content.clone())),
+    );
+    archive("bench.ssp".into(), &entries)
+}
+
+/// Parameters and start of the plant. The start goes by its parameters: some masters set no start value of an output.
+fn plant(scene: &Scene) -> impl Iterator<Item = (&str, Value)> {
+    scene.start_values().into_iter().map(|(name, value)| {
+        let parameter = match name {
+            "q1" => "q1_start",
+            "der(q1)" => "der_q1_start",
+            "q2" => "q2_start",
+            "der(q2)" => "der_q2_start",
+            other => other,
+        };
+        (parameter, Value::Real(value))
+    })
+}
+
+/// Parameters of the controller, which is armed from the start.
+fn controller(scene: &Scene) -> Result<impl Iterator<Item = (&str, Value)>, PackError> {
+    let config = scene.controller_config();
+    config.build()?;
+    let parameters = PARAMETERS.iter();
+    Ok(parameters
+        .map(move |parameter| (parameter.name, parameter.get(&config)))
+        .chain([("active", Value::Boolean(true))]))
+}
+
+/// A file of parameter values. Each has a name of its own, since some masters merge sets of one name.
+fn parameter_set<'a>(name: &str, values: impl Iterator<Item = (&'a str, Value)>) -> Vec<u8> {
+    let mut text = format!(
+        "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<ssv:ParameterSet version=\"1.0\" name=\"{name}\" \
+         generationTool=\"vines\"\n  xmlns:ssv=\"http://ssp-standard.org/SSP1/SystemStructureParameterValues\">\n  \
+         <ssv:Parameters>\n",
+    );
+    for (name, value) in values {
+        let value = match value {
+            Value::Real(number) => format!("<ssv:Real value=\"{number}\"/>"),
+            Value::Integer(number) => format!("<ssv:Integer value=\"{number}\"/>"),
+            Value::Boolean(truth) => format!("<ssv:Boolean value=\"{truth}\"/>"),
+        };
+        text += &format!("    <ssv:Parameter name=\"{name}\">{value}</ssv:Parameter>\n");
+    }
+    (text + "  </ssv:Parameters>\n</ssv:ParameterSet>\n").into_bytes()
+}
+
 #[cfg(test)]
-#[path = "../tests/unit/pack.rs"]
-mod tests;
+mod tests {
+    use std::io::Read;
+
+    use super::*;
+
+    #[test]
+    fn what_goes_in_comes_out_again_and_the_same_entries_give_the_same_bytes() {
+        let entries = [
+            ("a.xml".to_owned(), b"<a/>".to_vec()),
+            ("binaries/x/a.so".to_owned(), vec![7; 5000]),
+            ("resources/a.fmu".to_owned(), vec![8; 50]),
+        ];
+        let bytes = || archive("a.ssp".into(), &entries).unwrap().1;
+        assert_eq!(bytes(), bytes());
+        let mut archive = zip::ZipArchive::new(Cursor::new(bytes())).unwrap();
+        for (name, content) in entries {
+            let mut read = Vec::new();
+            archive.by_name(&name).unwrap().read_to_end(&mut read).unwrap();
+            assert_eq!(read, content);
+        }
+    }
+
+    #[test]
+    fn seconds_become_a_date_in_universal_time() {
+        assert_eq!(format_date("1700000000").unwrap(), "2023-11-14T22:13:20Z");
+    }
+
+    #[test]
+    fn what_is_no_number_of_seconds_is_refused() {
+        for text in ["yesterday", "1.5", "99999999999999999"] {
+            let message = format_date(text).expect_err("no date").to_string();
+            assert!(message.contains(text) && message.contains("1700000000"), "{message}");
+        }
+    }
+
+    #[test]
+    fn the_page_has_every_variable_and_the_picture() {
+        for component in components() {
+            let description = Description::parse(&component.xml).unwrap();
+            let page = documentation(&component, &description);
+            for variable in description.variables {
+                let name = &variable.name;
+                assert!(page.contains(&format!("<tr><td>{name}</td>")), "{name}");
+                let description = html! { (variable.description) }.into_string();
+                assert!(page.contains(&description), "{name}");
+            }
+            assert!(page.contains("<svg") && component.png.starts_with(b"\x89PNG"));
+        }
+    }
+
+    #[test]
+    fn every_real_variable_shows_its_unit() {
+        for component in components() {
+            let page = documentation(&component, &Description::parse(&component.xml).unwrap());
+            for row in page.lines().filter(|line| line.starts_with("<tr><td>")) {
+                let cells: Vec<_> = row.split("</td>").collect();
+                let whole = ["impacts", "contact"].map(|name| format!("<tr><td>{name}"));
+                let is_real = component.identifier == "LoViNes" && !whole.contains(&cells[0].into());
+                assert!(!is_real || !cells[2].ends_with('>'), "{row}");
+            }
+        }
+    }
+
+    #[test]
+    fn numbers_have_at_most_six_digits() {
+        for (exact, shown) in [
+            ("0.0011343573395537938", "0.00113436"),
+            ("9.246125558182298e-05", "9.24613e-5"),
+            ("-1.5707963267948966", "-1.5708"),
+            ("11680", "11680"),
+            ("1e-6", "1e-6"),
+            ("true", "true"),
+            ("", ""),
+        ] {
+            assert_eq!(rounded(exact), shown);
+        }
+    }
+}

@@ -2,10 +2,12 @@
 
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::{backbone::track_into, comparison::TrackedComparison, report, rig::BuiltIn};
+use vines::{backbone::track_into, comparison::TrackedComparison, report};
 
-use super::output::{output, print, result, saved, writable, written};
-use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, identify::interrupted};
+use super::experiment::{ExperimentArguments, interrupted};
+use super::failure::Failure;
+use super::options::Endpoint;
+use super::output::{output, print, saved, written};
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:
@@ -41,21 +43,15 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let experiment = &arguments.experiment;
-    let (mut scene, reach) = experiment.begin()?;
-    BuiltIn::new(&scene.backbone_config())?;
-    writable(&experiment.out)?;
-    let mut open = arguments.rig.rig(&scene, reach)?;
-    experiment.check_loop(&mut open.rig, &mut scene)?;
-    let (endpoint, config) = (&experiment.controller, scene.backbone_config());
-    let mut controller = endpoint.controller(&config, &scene.controller_names, reach, open.pace)?;
+    let (scene, mut session) = experiment.start(Some(&arguments.rig), |scene| scene.backbone_config())?;
     let bar = ProgressBar::new(scene.backbone.points.into());
     let mut samples = Vec::new();
-    let tracked = track_into(&mut samples, &mut open.rig, controller.as_mut(), &scene, |done, _| {
+    let (rig, controller) = (&mut session.open.rig, session.controller.as_mut());
+    let tracked = track_into(&mut samples, rig, controller, &scene, |done, _| {
         bar.set_position(done as u64);
     });
     bar.finish_and_clear();
-    drop(controller);
-    let timing = open.close();
+    let timing = session.close();
     let tracked = tracked.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let found = TrackedComparison::of(&tracked, &scene);
     let summary = report::summary::tracked(&found);
@@ -73,7 +69,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         return Err(failure);
     }
     let files = saved?;
-    let text = result(experiment.json, &found, &summary, &files, timing)?;
+    let text = experiment.result(&found, &summary, &files, timing)?;
     match found.doubt() {
         Some(reason) => {
             print(&text)?;

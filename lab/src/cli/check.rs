@@ -5,9 +5,9 @@ use vines::experiment::ExperimentError;
 use vines::loop_check::{Channel, LoopCheck, Verdict, check};
 use vines::report::{Table, number, with_uncertainty};
 
-use super::endpoint::{Endpoint, ReachArguments};
+use super::failure::Failure;
+use super::options::{Endpoint, ReachArguments, SceneArguments};
 use super::output::{log_warnings, output, print};
-use super::{failure::Failure, scene_arguments::SceneArguments};
 
 const HELP: &str = "\
 Drives the rig at a hundredth of the drive for 24 periods with the loop open, and compares amplitude and phase of response and base with

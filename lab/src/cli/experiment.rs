@@ -1,12 +1,23 @@
-//! What the commands share that drive a rig through an experiment.
+//! What the commands share that drive a rig through an experiment: options, loop check, doubtful results, and what is kept of a failure.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use vines::{experiment::ExperimentError, loop_check, net::BindScope, rig::Rig, scene::Scene};
+use phase_lock::Config;
+use serde::Serialize;
+use vines::experiment::{ExperimentError, Stage};
+use vines::net::{ReportLost, Timing};
+use vines::record::Sample;
+use vines::rig::{BuiltIn, Controller, Fault, Rig};
+use vines::{advice, loop_check, report, scene::Scene};
 
-use super::endpoint::{Endpoint, ReachArguments};
-use super::{check, failure::Failure, output::log_warnings, scene_arguments::SceneArguments};
+use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
+use super::output::{log_warnings, output, print, writable, written};
+use super::{check, failure::Failure, pack::fmus};
+
+/// Share of late samples of a rig in real time above which its results are doubtful, and the exit code for it.
+const TOLERATED: f64 = 0.01;
+const LATE: u8 = 3;
 
 #[derive(Debug, Args)]
 pub(super) struct ExperimentArguments {
@@ -20,7 +31,7 @@ pub(super) struct ExperimentArguments {
     /// The controller: `built-in`, an FMU (for `vines backbone` with the inputs `hold_response` and `move.*` of PhaseLock.fmu), or
     /// tcp://HOST:PORT
     #[arg(long, value_name = "ENDPOINT", default_value = "built-in")]
-    pub controller: Endpoint,
+    controller: Endpoint,
 
     #[command(flatten)]
     reach: ReachArguments,
@@ -34,16 +45,41 @@ pub(super) struct ExperimentArguments {
     pub json: bool,
 }
 
+/// A rig that has passed its loop check, and a controller, both connected.
+pub(super) struct Session {
+    pub controller: Box<dyn Controller>,
+    pub open: OpenRig,
+}
+
 impl ExperimentArguments {
-    /// The scene, and the network addresses that are allowed.
-    pub(super) fn begin(&self) -> Result<(Scene, BindScope), Failure> {
-        let scene = self.scene.load()?;
+    /// Loads the scene and connects rig and controller; without a rig, it is this program's FMU. Invalid settings and a folder that
+    /// cannot be written to are refused before anything is driven.
+    pub(super) fn start(
+        &self,
+        rig: Option<&Endpoint>,
+        config: impl Fn(&Scene) -> Config,
+    ) -> Result<(Scene, Session), Failure> {
+        let mut scene = self.scene.load()?;
         log_warnings();
-        Ok((scene, self.reach.reach()?))
+        let scope = self.reach.reach()?;
+        BuiltIn::new(&config(&scene))?;
+        writable(&self.out)?;
+        let mut open = match rig {
+            Some(endpoint) => endpoint.rig(&scene, scope)?,
+            None => {
+                let folder = tempfile::tempdir().map_err(Failure::run)?;
+                Endpoint::Fmu(fmus(folder.path())?.swap_remove(0)).rig(&scene, scope)?
+            }
+        };
+        self.check_loop(&mut open.rig, &mut scene)?;
+        let controller = self
+            .controller
+            .controller(&config(&scene), &scene.controller_names, scope, open.pace)?;
+        Ok((scene, Session { controller, open }))
     }
 
     /// Checks a rig that is not a simulation, and refuses one that is not as expected. Such a rig starts at rest.
-    pub(super) fn check_loop(&self, rig: &mut impl Rig, scene: &mut Scene) -> Result<(), Failure> {
+    fn check_loop(&self, rig: &mut impl Rig, scene: &mut Scene) -> Result<(), Failure> {
         rig.sense().map_err(ExperimentError::from)?;
         if rig.ground_truth().map_err(ExperimentError::from)?.is_some() {
             return Ok(());
@@ -52,20 +88,78 @@ impl ExperimentArguments {
         if self.no_check {
             return Ok(());
         }
-        let found = loop_check::check(rig, scene).map_err(ExperimentError::from)?;
-        eprint!("{}", check::described(&found));
-        scene.measured = found.linear.map(|linear| linear.response());
+        let checked = loop_check::check(rig, scene).map_err(ExperimentError::from)?;
+        eprint!("{}", check::described(&checked));
+        scene.measured = checked.linear.map(|linear| linear.response());
         if let Some(measured) = &scene.measured {
             eprintln!(
                 "All values of sigma share a standard uncertainty of {:.1e}, that of the natural frequency.",
                 measured.uncertainty / scene.dimensionless().omega_change(1.0)
             );
         }
-        match found.verdict {
+        match checked.verdict {
             loop_check::Verdict::Healthy => Ok(()),
             verdict => Err(Failure::run(format!(
                 "the loop check failed, and the drive is off: {verdict}; --no-check skips it"
             ))),
         }
     }
+
+    /// The result, as JSON or as a summary with the paths that were written. If a rig in real time missed deadlines, or did not get its
+    /// drives in time, stderr says so; more than a few make the results doubtful, and so does a rig that does not report.
+    pub(super) fn result(
+        &self,
+        result: &impl Serialize,
+        summary: &str,
+        paths: &[PathBuf],
+        timing: Option<Result<Timing, ReportLost>>,
+    ) -> Result<String, Failure> {
+        let text = output(self.json, result, || format!("{summary}\n{}", written(paths)))?;
+        let doubt = match &timing {
+            None => None,
+            Some(Ok(timing)) => timing.doubt(TOLERATED),
+            Some(Err(lost)) => Some(lost.to_string()),
+        };
+        if let Some(doubt) = doubt {
+            print(&text)?;
+            return Err(Failure::new(LATE, format!("these results are doubtful: {doubt}")));
+        }
+        if let Some(reason) = timing.and_then(|timing| timing.ok()?.doubt(0.0)) {
+            eprintln!("warning: {reason}");
+        }
+        Ok(text)
+    }
+}
+
+impl Session {
+    /// Ends the session; a rig in real time reports its missed deadlines.
+    pub(super) fn close(self) -> Option<Result<Timing, ReportLost>> {
+        drop(self.controller);
+        self.open.close()
+    }
+}
+
+/// The failure of an experiment that ended early, with the reason that the exact orbits know, and what was measured in a file.
+pub(super) fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &Path) -> Failure {
+    let reason = matches!(
+        error,
+        ExperimentError::NoLock { .. }
+            | ExperimentError::NotReached { .. }
+            | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. }
+    )
+    .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
+    .flatten();
+    kept(Failure::from(error), reason, samples, out)
+}
+
+/// The failure with its reason, and what was measured in a file.
+pub(super) fn kept(mut failure: Failure, reason: Option<String>, samples: &[Sample], out: &Path) -> Failure {
+    let file = (!samples.is_empty()).then(|| match report::write_interrupted(samples, out) {
+        Ok(files) => written(&files).trim_end().to_string(),
+        Err(error) => error.to_string(),
+    });
+    for line in [reason, file].into_iter().flatten() {
+        failure.message += &format!("\n{line}");
+    }
+    failure
 }

@@ -1,6 +1,9 @@
-//! The failure of a command: one message and an exit code.
+//! How a command ends early: the failure with its message and exit code, and the signals Ctrl-C and SIGTERM.
 
 use std::fmt::Display;
+use std::process;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, OnceLock};
 
 use phase_lock::ConfigError;
 use vines::rig::{Interrupted, RigError};
@@ -74,8 +77,20 @@ impl From<PackError> for Failure {
     }
 }
 
-impl From<serde_json::Error> for Failure {
-    fn from(error: serde_json::Error) -> Self {
-        Self::run(format!("cannot write JSON: {error}"))
+/// A flag that Ctrl-C and SIGTERM set: a driven rig stops, and the session ends before the program does. A second signal ends the program
+/// at once.
+pub(super) fn stop_flag() -> Result<Arc<AtomicBool>, Failure> {
+    static FLAG: OnceLock<Arc<AtomicBool>> = OnceLock::new();
+    if let Some(flag) = FLAG.get() {
+        return Ok(Arc::clone(flag));
     }
+    let flag = Arc::clone(FLAG.get_or_init(Arc::default));
+    let signal = Arc::clone(&flag);
+    ctrlc::set_handler(move || {
+        if signal.swap(true, Ordering::Relaxed) {
+            process::exit(INTERRUPTED.into());
+        }
+    })
+    .map_err(|error| Failure::run(format!("cannot wait for Ctrl-C: {error}")))?;
+    Ok(flag)
 }

@@ -1,22 +1,15 @@
 //! `vines identify`: the whole experiment.
 
-use std::path::{Path, PathBuf};
-
 use clap::Args;
 use indicatif::ProgressBar;
-use vines::experiment::{ExperimentError, Plan, Stage, run_into};
+use vines::experiment::{Plan, Stage, run_into};
 use vines::identification::{self, IdentificationError};
-use vines::record::Sample;
-use vines::{
-    advice,
-    comparison::Comparison,
-    pack, report,
-    rig::{BuiltIn, Fault},
-    scene::Scene,
-};
+use vines::{advice, comparison::Comparison, report};
 
-use super::output::{output, print, progress_bar, result, saved, writable, written};
-use super::{endpoint::Endpoint, experiment::ExperimentArguments, failure::Failure, pack::beside_this_program};
+use super::experiment::{ExperimentArguments, interrupted, kept};
+use super::options::Endpoint;
+use super::output::{output, print, progress_bar, saved, written};
+use super::{failure::Failure, pack::fmus};
 
 const HELP: &str = "\
 Examples:
@@ -44,40 +37,17 @@ pub(super) struct Arguments {
 
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let experiment = &arguments.experiment;
-    let (mut scene, reach) = experiment.begin()?;
-    // Invalid settings are refused before anything is written or driven.
-    BuiltIn::new(&scene.controller_config())?;
-    let mut open = match &arguments.rig {
-        // A rig that is refused leaves no folder.
-        Some(endpoint) => endpoint.rig(&scene, reach)?,
-        None => {
-            writable(&experiment.out)?;
-            // The folder of the results gets the FMUs if the run succeeds.
-            let folder = tempfile::tempdir().map_err(Failure::run)?;
-            Endpoint::Fmu(fmus(folder.path())?.swap_remove(0)).rig(&scene, reach)?
-        }
-    };
-    writable(&experiment.out)?;
-    experiment.check_loop(&mut open.rig, &mut scene)?;
-    let (endpoint, config) = (&experiment.controller, scene.controller_config());
-    let mut controller = endpoint.controller(&config, &scene.controller_names, reach, open.pace)?;
+    let (scene, mut session) = experiment.start(arguments.rig.as_ref(), |scene| scene.controller_config())?;
     let plan = Plan::of(&scene);
     let bar = progress_bar(plan.lock as u64, "{msg:29} [{wide_bar}] {pos}/{len} samples");
     let mut samples = Vec::new();
-    let record = run_into(
-        &mut samples,
-        &mut open.rig,
-        controller.as_mut(),
-        &plan,
-        |stage, done, of| show(&bar, stage, done, of),
-    );
+    let (rig, controller) = (&mut session.open.rig, session.controller.as_mut());
+    let record = run_into(&mut samples, rig, controller, &plan, |stage, done, of| {
+        show(&bar, stage, done, of)
+    });
     bar.finish_and_clear();
-    drop(controller);
-    let timing = open.close();
-    let record = match record {
-        Ok(record) => record,
-        Err(error) => return Err(interrupted(error, &samples, &scene, &experiment.out)),
-    };
+    let timing = session.close();
+    let record = record.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
     let found = identification::identify(&record, &scene).map_err(|error| {
         let reason = match error {
             IdentificationError::Regime { regime, .. } => advice::reason(&scene, Some(regime)),
@@ -102,38 +72,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
             }
         }
     }
-    result(experiment.json, &found, &summary, &files, timing)
-}
-
-/// The failure of an experiment that ended early, with the reason that the exact orbits know, and what was measured in a file.
-pub(super) fn interrupted(error: ExperimentError, samples: &[Sample], scene: &Scene, out: &Path) -> Failure {
-    let reason = matches!(
-        error,
-        ExperimentError::NoLock { .. }
-            | ExperimentError::NotReached { .. }
-            | ExperimentError::Tripped { stage: Stage::Locking, fault: Fault::ResponseTooLarge, .. }
-    )
-    .then(|| advice::reason(scene, advice::last_regime(samples, scene)))
-    .flatten();
-    kept(Failure::from(error), reason, samples, out)
-}
-
-/// The failure with its reason, and what was measured in a file.
-fn kept(mut failure: Failure, reason: Option<String>, samples: &[Sample], out: &Path) -> Failure {
-    let kept = match report::write_interrupted(samples, out) {
-        Ok(files) => written(&files).trim_end().to_string(),
-        Err(error) => error.to_string(),
-    };
-    for line in [reason, (!samples.is_empty()).then_some(kept)].into_iter().flatten() {
-        failure.message += &format!("\n{line}");
-    }
-    failure
-}
-
-/// Packs this program's FMUs into a folder; the plant is the first.
-fn fmus(out: &Path) -> Result<Vec<PathBuf>, Failure> {
-    let libraries = beside_this_program()?.as_path().into();
-    Ok(pack::pack(&pack::components(), &libraries, out)?)
+    experiment.result(&found, &summary, &files, timing)
 }
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {

@@ -9,8 +9,9 @@ use vines::report;
 use vines::report::summary::{parameters, regimes};
 use vines::{orbit::Branch, scene::Scene};
 
+use super::failure::Failure;
+use super::options::{SceneArguments, count};
 use super::output::{progress_bar, saved, writable, written};
-use super::{failure::Failure, scene_arguments::SceneArguments, serving::count};
 
 const HELP: &str = "\
 Every cell is one plant, driven at a fixed frequency from the scene's start:

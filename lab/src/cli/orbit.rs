@@ -1,16 +1,21 @@
 //! `vines orbit`: exact orbits at resonance, and their curves.
 
 mod studies;
-mod text;
+
+use std::fmt::Write;
 
 use clap::Args;
-use vines::orbit::{Condition, DOUBLINGS, Limits, backbone, continue_both_ways, phase_resonant, response, settle};
-use vines::{ArgumentError, scene::Dimensionless};
+use vines::orbit::{
+    Branch, Condition, DOUBLINGS, Ended, Limits, Orbit, Periodic, backbone, continue_both_ways, phase_resonant,
+    response, settle,
+};
+use vines::report::{Table, number, summary::parameters};
+use vines::{ArgumentError, numerics::range, scene::Dimensionless};
 
 use studies::{converged, defined};
-use text::{SEARCHED, curve, described, listing, shown};
 
-use super::{failure::Failure, scene_arguments::SceneArguments};
+use super::output::{output, yes_no};
+use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
 Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon sigma:
@@ -85,7 +90,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     if arguments.backbone {
         let branch = backbone(&scene, &limits).ok_or_else(|| {
             Failure::run(format!(
-                "there is no phase-resonant orbit to start from at G = {} (dimensionless); see `vines orbit`",
+                "there is no phase-resonant orbit to start from at G = {:.4} (dimensionless); see `vines orbit`",
                 scene.g
             ))
         })?;
@@ -119,7 +124,7 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> 
     let found = response(scene, limits, DOUBLINGS);
     if found.components.is_empty() {
         return Err(Failure::run(format!(
-            "no periodic motion with impacts was found at G = {} (dimensionless) from sigma = {from} to {to}; raise excitation.G",
+            "no periodic motion with impacts was found at G = {:.4} (dimensionless) from sigma = {from} to {to}; raise excitation.G",
             scene.g
         )));
     }
@@ -178,4 +183,98 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
     shown(scene, "Exact orbit", &motion, arguments.json, || {
         described(&pattern, &motion)
     })
+}
+
+/// What was found as JSON, or as text under a title and the parameters of the scene.
+fn shown(
+    scene: &Dimensionless,
+    title: &str,
+    found: &impl serde::Serialize,
+    json: bool,
+    text: impl FnOnce() -> String,
+) -> Result<String, Failure> {
+    output(json, found, || {
+        format!("{title}\n  {}\n\n{}", parameters(scene), text())
+    })
+}
+
+/// What `--response` searches for.
+const SEARCHED: &str = "Complete: symmetric 1:1 motions and what branches off them. Isolated branches of other patterns are missed; \
+    --sigma follows the\none that a start leads to.\n";
+
+/// The motion and the states after its impacts.
+fn described(pattern: &str, motion: &Periodic) -> String {
+    let Periodic { sigma, c, b, gamma, .. } = motion;
+    let multipliers = motion.multipliers.map(|[re, im]| format!("{re:.5}{im:+.5}i"));
+    let rows = motion.bounces.iter().map(|one| {
+        let phase = one.phase.to_degrees().rem_euclid(360.0);
+        let mut cells = vec![format!("{:+}", one.wall)];
+        cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
+        cells
+    });
+    let table = Table::new("wall | phase, degrees | q1 | q1' after | q2' after").rows(rows);
+    format!(
+        "{pattern}\n  sigma = {sigma:.6}, C = {c:.6}, phase {:.4} degrees, B = {b:.6}\n  multipliers {}\n\n{}",
+        gamma.to_degrees(),
+        multipliers.join(", "),
+        table.text()
+    )
+}
+
+/// Rows of a curve in a text table.
+const ROWS: usize = 24;
+
+/// A curve: its ends, some of its orbits, its bifurcations.
+fn curve(name: &str, branch: &Branch) -> String {
+    let stable = branch.points.iter().filter(|one| one.stable).count();
+    let sigmas = || branch.points.iter().map(|one| one.sigma);
+    let (low, high) = range((f64::MAX, f64::MIN), sigmas());
+    let ends = match branch.ended {
+        [Ended::Closed, _] => "closed".into(),
+        [one, other] => format!("ends: {}; {}", one.name(), other.name()),
+    };
+    let mut text = format!(
+        "{name}: sigma from {low:.4} to {high:.4}, {} orbits, {stable} of them stable; {ends}\n",
+        branch.points.len()
+    );
+    let row = |motion: &Periodic| -> Vec<String> {
+        let largest = motion.moduli()[3];
+        let numbers = [motion.sigma, motion.g, motion.c, motion.gamma.to_degrees(), motion.b];
+        let mut cells: Vec<String> = numbers.map(number).into();
+        cells.extend([number(largest), yes_no(motion.stable)]);
+        cells
+    };
+    let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
+    let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(ROWS));
+    text += &table.rows(thinned.map(row)).text();
+    for special in &branch.special {
+        let what = special.name();
+        let Periodic { sigma, g, c, b, .. } = special.motion;
+        let _ = writeln!(
+            text,
+            "  {what} at sigma = {sigma:.6}, G = {g:.6}, C = {c:.6}, B = {b:.6}"
+        );
+    }
+    text + "\n"
+}
+
+/// Orbits, a line each.
+fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
+    if orbits.is_empty() {
+        return if scene.g == 0.0 {
+            "  none: without excitation (G = 0) there is no resonance\n".into()
+        } else {
+            "  none between 0.2 and 3 omega0 at this excitation\n".into()
+        };
+    }
+    let rows = orbits.iter().map(|orbit| {
+        let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.gamma.to_degrees(), orbit.b];
+        let mut row: Vec<String> = numbers.map(number).into();
+        row.extend(orbit.multipliers.map(|one| format!("{one:.4}")));
+        row.push(yes_no(orbit.stable));
+        row
+    });
+    Table::new("sigma | Omega | C | phase, degrees | B | mult1 | mult2 | mult3 | mult4 | stable")
+        .rows(rows)
+        .text()
 }

@@ -5,17 +5,12 @@ use std::path::{Path, PathBuf};
 
 use indicatif::{ProgressBar, ProgressStyle};
 use serde::Serialize;
-use vines::net::{ReportLost, Timing};
 use vines::report::ReportError;
 
 use super::failure::Failure;
 
-/// Share of late samples of a rig in real time above which its results are doubtful, and the exit code that says so.
-const TOLERATED: f64 = 0.01;
-const LATE: u8 = 3;
-
 /// Prints; a reader that closes early, such as `head`, is not a failure.
-pub fn print(text: &str) -> Result<(), Failure> {
+pub(super) fn print(text: &str) -> Result<(), Failure> {
     let mut out = io::stdout().lock();
     match out.write_all(text.as_bytes()).and_then(|()| out.flush()) {
         Err(error) if error.kind() != io::ErrorKind::BrokenPipe => {
@@ -25,18 +20,28 @@ pub fn print(text: &str) -> Result<(), Failure> {
     }
 }
 
-pub fn yes_no(value: bool) -> String {
+/// A result as JSON, or as text.
+pub(super) fn output(as_json: bool, result: &impl Serialize, text: impl FnOnce() -> String) -> Result<String, Failure> {
+    match as_json {
+        true => serde_json::to_string_pretty(result)
+            .map(|json| json + "\n")
+            .map_err(|error| Failure::run(format!("cannot write JSON: {error}"))),
+        false => Ok(text()),
+    }
+}
+
+pub(super) fn yes_no(value: bool) -> String {
     if value { "yes" } else { "no" }.into()
 }
 
 /// The paths that were written, in one line.
-pub fn written(paths: &[PathBuf]) -> String {
+pub(super) fn written(paths: &[PathBuf]) -> String {
     let files: Vec<String> = paths.iter().map(|path| path.display().to_string()).collect();
     format!("Written: {}\n", files.join(", "))
 }
 
 /// The files of a result. If they cannot be written, the result is printed as `text` instead.
-pub fn saved(
+pub(super) fn saved(
     files: Result<Vec<PathBuf>, ReportError>,
     text: impl FnOnce() -> Result<String, Failure>,
 ) -> Result<Vec<PathBuf>, Failure> {
@@ -48,57 +53,25 @@ pub fn saved(
     })
 }
 
-/// Creates a folder for results, and checks that files can be written to it before anything is driven.
-pub fn writable(folder: &Path) -> Result<(), Failure> {
-    std::fs::create_dir_all(folder)
-        .and_then(|()| tempfile::tempfile_in(folder))
-        .map_err(|error| Failure::input(format!("cannot write to {}: {error}", folder.display())))?;
-    Ok(())
+/// Checks that files can be written to a folder before anything runs. A folder that does not exist is not created yet: that its parent
+/// can be written to is enough.
+pub(super) fn writable(folder: &Path) -> Result<(), Failure> {
+    let existing = folder.ancestors().find(|path| path.exists());
+    tempfile::tempfile_in(existing.unwrap_or(Path::new(".")))
+        .map(drop)
+        .map_err(|error| Failure::input(format!("cannot write to {}: {error}", folder.display())))
 }
 
 /// Warnings go to stderr: those of connections, and what an FMU logs.
-pub fn log_warnings() {
+pub(super) fn log_warnings() {
     env_logger::Builder::new()
         .filter_level(log::LevelFilter::Warn)
         .format_timestamp(None)
         .init();
 }
 
-/// The result of an experiment, as JSON or as a summary with the paths that were written. If a rig in real time missed deadlines, or did not
-/// get its drives in time, stderr says so; more than a few make the results doubtful, and so does a rig that does not report.
-pub fn result(
-    as_json: bool,
-    found: &impl Serialize,
-    summary: &str,
-    paths: &[PathBuf],
-    timing: Option<Result<Timing, ReportLost>>,
-) -> Result<String, Failure> {
-    let text = output(as_json, found, || format!("{summary}\n{}", written(paths)))?;
-    let doubt = match &timing {
-        None => None,
-        Some(Ok(timing)) => timing.doubt(TOLERATED),
-        Some(Err(lost)) => Some(lost.to_string()),
-    };
-    if let Some(doubt) = doubt {
-        print(&text)?;
-        return Err(Failure::new(LATE, format!("these results are doubtful: {doubt}")));
-    }
-    if let Some(reason) = timing.and_then(|timing| timing.ok()?.doubt(0.0)) {
-        eprintln!("warning: {reason}");
-    }
-    Ok(text)
-}
-
-/// What was found as JSON, or as text.
-pub fn output(as_json: bool, found: &impl Serialize, text: impl FnOnce() -> String) -> Result<String, Failure> {
-    if as_json {
-        return Ok(serde_json::to_string_pretty(found)? + "\n");
-    }
-    Ok(text())
-}
-
 /// A progress bar on stderr; indicatif hides it if that is not a terminal.
-pub fn progress_bar(length: u64, template: &str) -> ProgressBar {
+pub(super) fn progress_bar(length: u64, template: &str) -> ProgressBar {
     let style = ProgressStyle::with_template(template).unwrap_or_else(|_| ProgressStyle::default_bar());
     ProgressBar::new(length).with_style(style)
 }

@@ -1,11 +1,11 @@
 //! `vines pack`: the two FMUs, and the two of them coupled.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
-use vines::pack::{Binary, Libraries, pack_bench};
+use vines::pack::{Binary, Libraries, components, pack, pack_bench};
 
-use super::{failure::Failure, scene_arguments::SceneArguments};
+use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
 Examples:
@@ -55,7 +55,13 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     Ok(written.iter().map(|path| format!("{}\n", path.display())).collect())
 }
 
-pub(super) fn beside_this_program() -> Result<PathBuf, Failure> {
+/// Packs this program's FMUs into a folder; the plant is the first.
+pub(super) fn fmus(out: &Path) -> Result<Vec<PathBuf>, Failure> {
+    let libraries = beside_this_program()?.as_path().into();
+    Ok(pack(&components(), &libraries, out)?)
+}
+
+fn beside_this_program() -> Result<PathBuf, Failure> {
     let program =
         std::env::current_exe().map_err(|error| Failure::run(format!("cannot tell where this program is: {error}")))?;
     Ok(program.parent().map(PathBuf::from).unwrap_or_default())

@@ -7,7 +7,7 @@ use vines::report::{ReportError, Subject, write_report};
 use vines::{map::Range, rig::BuiltIn};
 
 use super::output::{print, progress_bar, writable};
-use super::{failure::Failure, scene_arguments::SceneArguments};
+use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
 Runs the experiment, tracks the backbone, follows the exact curves, studies the convergence, maps the regimes, and writes

@@ -7,8 +7,8 @@ use clap::Args;
 use vines::ArgumentError;
 use vines::sweep::{self, Axis, Estimate, Monitor, Plan, Results, Settings, Shard, StoreError};
 
-use super::failure::{Failure, INTERRUPTED};
-use super::{interrupt::stop_flag, output::progress_bar, scene_arguments::SceneArguments};
+use super::failure::{Failure, INTERRUPTED, stop_flag};
+use super::{options::SceneArguments, output::progress_bar};
 
 const HELP: &str = "\
 Axes; a key is sigma (the detuning) or section.key of a scene:

@@ -9,7 +9,7 @@ use vines::{
 };
 
 use super::output::{output, yes_no};
-use super::{failure::Failure, scene_arguments::SceneArguments};
+use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
 Everything is of first order in epsilon, except the thresholds from rest. Both branches of the slow invariant manifold

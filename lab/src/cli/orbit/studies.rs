@@ -4,14 +4,14 @@ use vines::orbit::{Convergence, convergence};
 use vines::report::{Table, number};
 use vines::scene::{Definition, Dimensionless};
 
-use super::text::shown;
+use super::shown;
 use crate::cli::failure::Failure;
 
 /// The convergence of the theory towards the exact orbits.
 pub(super) fn converged(scene: &Dimensionless, json: bool) -> Result<String, Failure> {
     let study = convergence(scene, HALVINGS).ok_or_else(|| {
         Failure::run(format!(
-            "theory or exact orbits have no stable phase-resonant solution at G = {} (dimensionless)",
+            "theory or exact orbits have no stable phase-resonant solution at G = {:.4} (dimensionless)",
             scene.g
         ))
     })?;

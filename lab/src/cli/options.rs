@@ -1,5 +1,6 @@
-//! `--rig` and `--controller`: the implementations of the two sides of the bench.
+//! Options that several commands share: the scene, rigs and controllers, what the network may reach, and real time.
 
+use std::io;
 use std::path::{Path, PathBuf};
 use std::str::FromStr;
 use std::sync::{Arc, OnceLock};
@@ -11,9 +12,38 @@ use vines::fmu::{FmuController, FmuError, FmuRig};
 use vines::helic::{Channels, DEFAULT_PORT, HelicRig, LONGEST_SILENCE, Network};
 use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Timing, resolve};
 use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
-use vines::scene::{Name, Names, Scene};
+#[cfg(feature = "sweep")]
+use vines::scene::Family;
+use vines::scene::{Name, Names, Override, Scene, SceneError};
 
-use super::{failure::Failure, interrupt::stop_flag, real_time::RealTimeArguments};
+use super::failure::{Failure, stop_flag};
+
+#[derive(Debug, Args)]
+pub(super) struct SceneArguments {
+    /// Scene file (TOML); without it, the default scene
+    #[arg(long, value_name = "FILE")]
+    scene: Option<PathBuf>,
+
+    /// Replace one value of the scene, such as plant.r=0.7; may be repeated
+    #[arg(long, value_name = "KEY=VALUE")]
+    set: Vec<Override>,
+}
+
+impl SceneArguments {
+    pub(super) fn load(&self) -> Result<Scene, SceneError> {
+        Scene::load(self.scene.as_deref(), &self.set)
+    }
+
+    /// The scene, of which numbers may vary.
+    #[cfg(feature = "sweep")]
+    pub(super) fn family(&self) -> Result<Family, SceneError> {
+        let Some(path) = &self.scene else {
+            return Family::parse("", None, &self.set);
+        };
+        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.clone(), source })?;
+        Family::parse(&path.display().to_string(), Some(&text), &self.set)
+    }
+}
 
 /// An implementation, as written on the command line.
 #[derive(Debug, Clone, PartialEq)]
@@ -203,4 +233,104 @@ impl ReachArguments {
         let short = || refused("16 bytes or more are needed; `openssl rand -hex 32` writes a good key".into());
         Key::of(&secret).map(BindScope::Keyed).ok_or_else(short)
     }
+}
+
+#[derive(Debug, Args)]
+struct RealTimeArguments {
+    /// Real-time priority (SCHED_FIFO), from 1 to 99
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=99))]
+    priority: Option<u8>,
+
+    /// Lock all memory, so that nothing is paged out
+    #[arg(long)]
+    lock_memory: bool,
+
+    /// Run on this processor only, from 0
+    #[arg(long, value_name = "N")]
+    cpu: Option<usize>,
+}
+
+impl RealTimeArguments {
+    /// Asks the system for what the user wants.
+    fn apply(&self) -> Result<(), Failure> {
+        if let Some(priority) = self.priority {
+            let help = "allow it with `ulimit -r 99`, rtprio in /etc/security/limits.conf, or CAP_SYS_NICE";
+            asked(&format!("--priority {priority}"), system::priority(priority), help)?;
+        }
+        if self.lock_memory {
+            let help = "allow it with `ulimit -l unlimited`, memlock in /etc/security/limits.conf, or CAP_IPC_LOCK";
+            asked("--lock-memory", system::lock_memory(), help)?;
+        }
+        if let Some(cpu) = self.cpu {
+            let help = "`nproc` prints how many processors there are; the first is 0";
+            asked(&format!("--cpu {cpu}"), system::processor(cpu), help)?;
+        }
+        Ok(())
+    }
+}
+
+fn asked(option: &str, answer: io::Result<()>, help: &str) -> Result<(), Failure> {
+    answer.map_err(|error| Failure::run(format!("{option}: the system refuses: {error}; {help}")))
+}
+
+#[cfg(target_os = "linux")]
+mod system {
+    use std::io;
+
+    use rustix::{mm, thread};
+    use thread_priority::{
+        RealtimeThreadSchedulePolicy, ThreadPriority, ThreadSchedulePolicy, set_thread_priority_and_policy,
+        thread_native_id,
+    };
+
+    pub fn priority(priority: u8) -> io::Result<()> {
+        let policy = ThreadSchedulePolicy::Realtime(RealtimeThreadSchedulePolicy::Fifo);
+        let value = ThreadPriority::Crossplatform(priority.try_into().map_err(io::Error::other)?);
+        set_thread_priority_and_policy(thread_native_id(), value, policy).map_err(io::Error::other)
+    }
+
+    pub fn lock_memory() -> io::Result<()> {
+        let all = mm::MlockAllFlags::CURRENT | mm::MlockAllFlags::FUTURE;
+        Ok(mm::mlockall(all)?)
+    }
+
+    pub fn processor(number: usize) -> io::Result<()> {
+        if number >= thread::CpuSet::MAX_CPU {
+            return Err(io::Error::other("there is no such processor"));
+        }
+        let mut set = thread::CpuSet::new();
+        set.set(number);
+        Ok(thread::sched_setaffinity(None, &set)?)
+    }
+}
+
+#[cfg(not(target_os = "linux"))]
+mod system {
+    use std::io;
+
+    pub fn priority<T>(_: T) -> io::Result<()> {
+        Err(io::Error::other("this option exists on Linux only"))
+    }
+    pub use priority as processor;
+
+    pub fn lock_memory() -> io::Result<()> {
+        priority(())
+    }
+}
+
+/// A number above 0 and at most 1e8, for seconds and metres.
+pub(super) fn positive(text: &str) -> Result<f64, ArgumentError> {
+    let value: f64 = text.parse().map_err(|_| "expected a number")?;
+    if value > 0.0 && value <= 1e8 {
+        Ok(value)
+    } else {
+        Err("must be above 0 and at most 1e8".into())
+    }
+}
+
+/// A number of runs, seeds or the like.
+pub(super) fn count<T: TryFrom<u64>>(text: &str) -> Result<T, ArgumentError> {
+    let value = text.parse().ok().filter(|count| (1..=1_000_000_000).contains(count));
+    let value = value.and_then(|count: u64| count.try_into().ok());
+    value.ok_or_else(|| "expected a whole number from 1 to 1000000000".into())
 }

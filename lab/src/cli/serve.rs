@@ -1,20 +1,20 @@
-//! `vines rig`: the plant at a network address.
+//! Servers: `vines rig`, the plant at a network address, and `vines controller`, the phase-locked loop.
 
+use std::sync::{Arc, atomic::Ordering};
+use std::time::{Duration, Instant};
 use std::{path::PathBuf, str::FromStr};
 
 use clap::{Args, ValueEnum};
-use vines::ArgumentError;
-use vines::helic::Device;
-use vines::net::{Address, Role, Served, Service, Session};
-use vines::report;
-use vines::rig::{Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
-use vines::scene::Scene;
+use vines::helic::{Device, HelicServer};
+use vines::net::{Address, LinkError, Role, Served, Server, ServerError, Service, Session, resolve};
+use vines::rig::{BuiltIn, Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
+use vines::{ArgumentError, report, scene::Scene};
 
-use super::endpoint::{Endpoint, fmu};
-use super::serving::{ServingArguments, positive};
-use super::{failure::Failure, output::print, scene_arguments::SceneArguments};
+use super::failure::{Failure, stop_flag};
+use super::options::{Endpoint, ReachArguments, SceneArguments, count, fmu, no_key, positive};
+use super::output::print;
 
-const HELP: &str = "\
+const RIG_HELP: &str = "\
 Examples:
   vines rig --listen 127.0.0.1:5510                 in real time; then: vines identify --rig udp://127.0.0.1:5510
   vines rig --listen 127.0.0.1:5510 --lock-step     as fast as the drives arrive, with the bits of the built-in plant;
@@ -40,8 +40,8 @@ const SILENCE_LOCK_STEP: f64 = 5.0;
 
 /// Serve the plant to a controller or an experiment across the network
 #[derive(Debug, Args)]
-#[command(after_help = HELP)]
-pub(super) struct Arguments {
+#[command(after_help = RIG_HELP)]
+pub(super) struct RigArguments {
     #[command(flatten)]
     scene: SceneArguments,
 
@@ -133,7 +133,7 @@ enum Protocol {
 }
 
 /// Refuses what cannot be served before a client comes.
-fn refuse(arguments: &Arguments, scene: &Scene) -> Result<(), Failure> {
+fn refuse(arguments: &RigArguments, scene: &Scene) -> Result<(), Failure> {
     match &arguments.rig {
         Endpoint::Network(address) => Err(Failure::input(format!(
             "--rig {address}: only `built-in` or an FMU can be served"
@@ -146,7 +146,7 @@ fn refuse(arguments: &Arguments, scene: &Scene) -> Result<(), Failure> {
     }
 }
 
-pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
+pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
     let helic = arguments.protocol == Protocol::Helic;
     if arguments.sensors_only || helic {
@@ -198,4 +198,130 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     arguments
         .serving
         .serve(&what, transport, service, || Ok(Served::Rig(make()?)), keep)
+}
+
+const CONTROLLER_HELP: &str = "\
+Examples:
+  vines controller --listen 127.0.0.1:5511      then: vines identify --controller tcp://127.0.0.1:5511
+
+Answers every reading with a drive. After --silence the session ends. See docs/network-protocol.md.
+
+The server listens on this machine only, unless --key or --allow-remote is given. With --key, every frame is authenticated; nothing is
+encrypted. Without it, everyone who can reach the address can drive the rig.";
+
+/// Serve the phase-locked loop to a rig or an experiment across the network
+#[derive(Debug, Args)]
+#[command(after_help = CONTROLLER_HELP)]
+pub(super) struct ControllerArguments {
+    #[command(flatten)]
+    scene: SceneArguments,
+
+    #[command(flatten)]
+    serving: ServingArguments,
+
+    /// Longest silence before the session is shut down, s
+    #[arg(long, value_name = "SECONDS", default_value_t = 5.0, value_parser = positive)]
+    silence: f64,
+}
+
+pub(super) fn controller(arguments: &ControllerArguments) -> Result<String, Failure> {
+    let scene = arguments.scene.load()?;
+    let controller = BuiltIn::new(&scene.controller_config())?;
+    let service = Service {
+        role: Role::Controller,
+        sample_time: scene.sample_time(),
+        silence: arguments.silence,
+    };
+    let make = || Ok(Served::Controller(Box::new(controller.clone())));
+    arguments
+        .serving
+        .serve("controller", Address::Tcp, service, make, |_| {})
+}
+
+#[derive(Debug, Args)]
+struct ServingArguments {
+    /// Address of the server, such as 127.0.0.1:5510; with port 0 the system chooses a free port
+    #[arg(long, value_name = "HOST:PORT")]
+    listen: String,
+
+    #[command(flatten)]
+    reach: ReachArguments,
+
+    /// End after this time, s [default: at Ctrl-C]
+    #[arg(long, value_name = "SECONDS", value_parser = positive)]
+    duration: Option<f64>,
+
+    /// End after this many sessions
+    #[arg(long, value_name = "N", value_parser = count::<u64>)]
+    sessions: Option<u64>,
+
+    /// Print a line of JSON per session instead of text
+    #[arg(long)]
+    json: bool,
+}
+
+impl ServingArguments {
+    /// Serves `what` at a TCP or UDP address: prints the address, then a report per session, which `keep` gets, too.
+    fn serve(
+        &self,
+        what: &str,
+        transport: fn(std::net::SocketAddr) -> Address,
+        service: Service,
+        make: impl FnMut() -> Result<Served, ServerError>,
+        keep: impl Fn(&Session),
+    ) -> Result<String, Failure> {
+        let scope = self.reach.reach()?;
+        let mut server = Server::listen(transport(resolve(&self.listen, scope)?), service, scope.key())?;
+        let address = server.address().map_err(Failure::run)?;
+        self.run(&format!("{what} on {address}"), keep, |stop, tell| {
+            server.serve(make, stop, tell)
+        })
+    }
+
+    /// Serves `device` as a device of helic-daq, sampled every `sample_time`, s.
+    fn serve_helic(&self, device: Device, sample_time: f64, keep: impl Fn(&Session)) -> Result<String, Failure> {
+        let scope = self.reach.reach()?;
+        no_key(scope)?;
+        let address = resolve(&self.listen, scope)?;
+        let listen = |source| LinkError::Listen { address: Address::Tcp(address), source };
+        let mut server = HelicServer::listen(address, device, sample_time).map_err(listen)?;
+        let what = format!("helic device, {:.1} samples per second, on", 1.0 / sample_time);
+        let address = server.address().map_err(Failure::run)?;
+        self.run(&format!("{what} helic://{address}"), keep, |stop, tell| {
+            server.serve(stop, tell)
+        })
+    }
+
+    /// Runs a server: prints `what`, then a report per session.
+    fn run(
+        &self,
+        what: &str,
+        keep: impl Fn(&Session),
+        serve: impl FnOnce(&mut dyn FnMut() -> bool, &mut dyn FnMut(&Session)) -> Result<(), ServerError>,
+    ) -> Result<String, Failure> {
+        let stop = stop_flag()?;
+        print(&format!("{what}\n"))?;
+        let enough = Arc::clone(&stop);
+        let end = self
+            .duration
+            .map(|seconds| Instant::now() + Duration::from_secs_f64(seconds));
+        let mut stop = move || stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end);
+        let (json, sessions, mut served) = (self.json, self.sessions, 0);
+        let mut tell = move |session: &Session| {
+            let text = if json {
+                serde_json::to_string(session).map_or_else(|e| e.to_string(), |line| line + "\n")
+            } else {
+                session.to_string()
+            };
+            keep(session);
+            // A closed output does not stop the server.
+            let _ = print(&text);
+            served += 1;
+            if sessions == Some(served) {
+                enough.store(true, Ordering::Relaxed);
+            }
+        };
+        serve(&mut stop, &mut tell).map_err(Failure::run)?;
+        Ok(String::new())
+    }
 }
