@@ -13,7 +13,7 @@ use std::path::{Path, PathBuf};
 
 pub use figure::FigureError;
 pub use files::{ReportError, decay_csv, map_csv, write, write_interrupted, write_lateness, write_map, write_tracked};
-pub use table::{Table, number, with_uncertainty};
+pub use table::{Table, number, row, with_uncertainty};
 
 use crate::map::Range;
 use crate::scene::Scene;
@@ -52,10 +52,11 @@ impl Section {
         Self { title: title.into(), ..Self::default() }
     }
 
-    /// States the finding, in the summary and as a paragraph.
-    fn found(&mut self, finding: impl Into<String>) {
+    /// Ends with a finding, in the summary and as a paragraph.
+    fn concluded(mut self, finding: impl Into<String>) -> Self {
         self.finding = finding.into();
         self.words(self.finding.clone());
+        self
     }
 
     fn words(&mut self, text: impl Into<String>) {

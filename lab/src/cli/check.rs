@@ -50,62 +50,57 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     log_warnings();
     scene.start = Default::default();
     let mut open = arguments.rig.rig(&scene, arguments.reach.reach()?)?;
-    let found = check(&mut open.rig, &scene).map_err(ExperimentError::from)?;
+    let checked = check(&mut open.rig, &scene).map_err(ExperimentError::from)?;
     open.close();
-    let text = output(arguments.json, &found, || described(&found))?;
-    if found.verdict == Verdict::Healthy {
+    let text = output(arguments.json, &checked, || described(&checked))?;
+    if checked.verdict == Verdict::Healthy {
         return Ok(text);
     }
     print(&text)?;
-    Err(Failure::run(format!("the loop check failed: {}", found.verdict)))
+    Err(Failure::run(format!("the loop check failed: {}", checked.verdict)))
 }
 
-pub(super) fn described(found: &LoopCheck) -> String {
-    let row = |name: &str, channel: &Channel| {
-        [
+pub(super) fn described(checked: &LoopCheck) -> String {
+    let channels = [("response", Some(&checked.response)), ("base", checked.base.as_ref())];
+    let rows = channels.into_iter().filter_map(|(name, channel)| {
+        let Channel { gain, phase, delay, noise, floor, .. } = channel?;
+        Some([
             name.to_string(),
-            format!("{:.3}", channel.gain),
-            format!("{:.1}", channel.phase),
-            format!("{:.1}", channel.delay),
-            format!("{:.1e}", channel.noise),
-            format!("{:.1e}", channel.floor),
-        ]
-    };
-    let rows = [("response", Some(&found.response)), ("base", found.base.as_ref())];
-    let rows = rows.into_iter().filter_map(|(name, channel)| Some(row(name, channel?)));
+            format!("{gain:.3}"),
+            format!("{phase:.1}"),
+            format!("{delay:.1}"),
+            format!("{noise:.1e}"),
+            format!("{floor:.1e}"),
+        ])
+    });
     let table = Table::new("channel | gain | phase | delay | noise | floor").rows(rows);
     let mut text = format!("{}\n", table.markdown());
-    if !found.quantities.is_empty() {
-        let rows = found.quantities.iter().map(|one| {
-            let name = format!(
-                "{}{}{}",
-                one.name,
-                if one.unit.is_empty() { "" } else { ", " },
-                one.unit
-            );
+    if !checked.quantities.is_empty() {
+        let rows = checked.quantities.iter().map(|quantity| {
+            let separator = if quantity.unit.is_empty() { "" } else { ", " };
             [
-                name,
-                with_uncertainty(one.measured, one.uncertainty),
-                number(one.expected),
+                format!("{}{separator}{}", quantity.name, quantity.unit),
+                with_uncertainty(quantity.measured, quantity.uncertainty),
+                number(quantity.expected),
             ]
         });
         text += &format!("{}\n", Table::new("measured | value | scene").rows(rows).markdown());
     }
-    for one in found.quantities.iter().filter(|one| one.differs()) {
-        let consequence = match one.verdict {
-            Some(_) => format!("more than {} off is refused", one.tolerance),
+    for quantity in checked.quantities.iter().filter(|quantity| quantity.differs()) {
+        let consequence = match quantity.verdict {
+            Some(_) => format!("more than {} off is refused", quantity.tolerance),
             None => "`vines identify` and `vines backbone` use the measured value".into(),
         };
         text += &format!(
             "Different from the scene: {} is {} {}, not {}; {consequence}.\n",
-            one.name,
-            with_uncertainty(one.measured, one.uncertainty),
-            one.unit,
-            number(one.expected)
+            quantity.name,
+            with_uncertainty(quantity.measured, quantity.uncertainty),
+            quantity.unit,
+            number(quantity.expected)
         );
     }
-    text += &format!("At E = {:.2e} m: {}\n", found.amplitude, found.verdict);
-    if let Some(linear) = &found.linear {
+    text += &format!("At E = {:.2e} m: {}\n", checked.amplitude, checked.verdict);
+    if let Some(linear) = &checked.linear {
         text += &format!(
             "Gains at a bandwidth of {:.3} rad/s: {:.4} 1/s and {:.4} 1/s²; phase margin {:.0} degrees.\n",
             linear.bandwidth, linear.gains[0], linear.gains[1], linear.phase_margin,

@@ -2,14 +2,12 @@
 
 mod studies;
 
-use std::fmt::Write;
-
 use clap::Args;
 use vines::orbit::{
     Branch, Condition, DOUBLINGS, Ended, Limits, Orbit, Periodic, backbone, continue_both_ways, phase_resonant,
     response, settle,
 };
-use vines::report::{Table, number, summary::parameters};
+use vines::report::{Table, number, row, summary::parameters};
 use vines::{ArgumentError, numerics::range, scene::Dimensionless};
 
 use studies::{converged, defined};
@@ -121,21 +119,23 @@ fn components(arguments: &Arguments, scene: &Dimensionless, limits: &Limits) -> 
             "--range from sigma = {from} (dimensionless): {rule}"
         )));
     }
-    let found = response(scene, limits, DOUBLINGS);
-    if found.components.is_empty() {
+    let response = response(scene, limits, DOUBLINGS);
+    if response.components.is_empty() {
         return Err(Failure::run(format!(
             "no periodic motion with impacts was found at G = {:.4} (dimensionless) from sigma = {from} to {to}; raise excitation.G",
             scene.g
         )));
     }
-    shown(scene, "Exact frequency response", &found, arguments.json, || {
-        let count = found.components.len();
-        let all = found.components.iter().map(|one| curve(&one.name, &one.branch));
+    shown(scene, "Exact frequency response", &response, arguments.json, || {
+        let count = response.components.len();
+        let curves = response.components.iter();
+        let curves: String = curves
+            .map(|component| curve(&component.name, &component.branch))
+            .collect();
+        let plural = if count == 1 { "" } else { "s" };
         format!(
-            "{count} component{}\n{}\n{}",
-            if count == 1 { "" } else { "s" },
-            SEARCHED,
-            all.collect::<String>()
+            "{count} component{plural}\nComplete: symmetric 1:1 motions and what branches off them. Isolated branches of other patterns are missed; \
+             --sigma follows the\none that a start leads to.\n\n{curves}"
         )
     })
 }
@@ -150,7 +150,7 @@ fn detunings(text: &str) -> Result<[f64; 2], ArgumentError> {
     }
 }
 
-/// Periods before the motion is evaluated.
+/// Periods before the motion is evaluated: ten decay times of the default scene.
 const SETTLE: usize = 1000;
 
 /// The motion that the start leads to at one detuning, or its frequency response.
@@ -169,13 +169,8 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
     })?;
     let pattern = motion.pattern.name();
     if arguments.response {
-        let condition = Condition::Excitation(scene.g);
-        let branch = continue_both_ways(
-            scene,
-            &motion,
-            condition,
-            &Limits { sigma: arguments.range, ..Limits::default() },
-        );
+        let limits = Limits { sigma: arguments.range, ..Limits::default() };
+        let branch = continue_both_ways(scene, &motion, Condition::Excitation(scene.g), &limits);
         return shown(scene, "Exact frequency response", &branch, arguments.json, || {
             curve(&pattern, &branch)
         });
@@ -185,32 +180,29 @@ fn settled(arguments: &Arguments, scene: &Dimensionless, sigma: f64, start: [f64
     })
 }
 
-/// What was found as JSON, or as text under a title and the parameters of the scene.
+/// A result as JSON, or as text under a title and the parameters of the scene.
 fn shown(
     scene: &Dimensionless,
     title: &str,
-    found: &impl serde::Serialize,
+    result: &impl serde::Serialize,
     json: bool,
     text: impl FnOnce() -> String,
 ) -> Result<String, Failure> {
-    output(json, found, || {
+    output(json, result, || {
         format!("{title}\n  {}\n\n{}", parameters(scene), text())
     })
 }
-
-/// What `--response` searches for.
-const SEARCHED: &str = "Complete: symmetric 1:1 motions and what branches off them. Isolated branches of other patterns are missed; \
-    --sigma follows the\none that a start leads to.\n";
 
 /// The motion and the states after its impacts.
 fn described(pattern: &str, motion: &Periodic) -> String {
     let Periodic { sigma, c, b, gamma, .. } = motion;
     let multipliers = motion.multipliers.map(|[re, im]| format!("{re:.5}{im:+.5}i"));
-    let rows = motion.bounces.iter().map(|one| {
-        let phase = one.phase.to_degrees().rem_euclid(360.0);
-        let mut cells = vec![format!("{:+}", one.wall)];
-        cells.extend([phase, one.q1, one.dq1, one.dq2].map(number));
-        cells
+    let rows = motion.bounces.iter().map(|impact| {
+        let phase = impact.phase.to_degrees().rem_euclid(360.0);
+        row(
+            &format!("{:+}", impact.wall),
+            [phase, impact.q1, impact.dq1, impact.dq2],
+        )
     });
     let table = Table::new("wall | phase, degrees | q1 | q1' after | q2' after").rows(rows);
     format!(
@@ -221,39 +213,30 @@ fn described(pattern: &str, motion: &Periodic) -> String {
     )
 }
 
-/// Rows of a curve in a text table.
-const ROWS: usize = 24;
-
-/// A curve: its ends, some of its orbits, its bifurcations.
+/// A curve: its ends, at most 24 of its orbits, its bifurcations.
 fn curve(name: &str, branch: &Branch) -> String {
-    let stable = branch.points.iter().filter(|one| one.stable).count();
-    let sigmas = || branch.points.iter().map(|one| one.sigma);
-    let (low, high) = range((f64::MAX, f64::MIN), sigmas());
+    let stable = branch.points.iter().filter(|motion| motion.stable).count();
+    let sigmas = branch.points.iter().map(|motion| motion.sigma);
+    let (low, high) = range((f64::MAX, f64::MIN), sigmas);
     let ends = match branch.ended {
         [Ended::Closed, _] => "closed".into(),
-        [one, other] => format!("ends: {}; {}", one.name(), other.name()),
+        [first, last] => format!("ends: {}; {}", first.name(), last.name()),
     };
     let mut text = format!(
         "{name}: sigma from {low:.4} to {high:.4}, {} orbits, {stable} of them stable; {ends}\n",
         branch.points.len()
     );
-    let row = |motion: &Periodic| -> Vec<String> {
-        let largest = motion.moduli()[3];
-        let numbers = [motion.sigma, motion.g, motion.c, motion.gamma.to_degrees(), motion.b];
-        let mut cells: Vec<String> = numbers.map(number).into();
-        cells.extend([number(largest), yes_no(motion.stable)]);
-        cells
-    };
+    let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(24));
+    let rows = thinned.map(|motion| {
+        let Periodic { sigma, g, c, gamma, b, .. } = *motion;
+        let numbers = [sigma, g, c, gamma.to_degrees(), b, motion.moduli()[3]].map(number);
+        [numbers.to_vec(), vec![yes_no(motion.stable)]].concat()
+    });
     let table = Table::new("sigma | G | C | phase, degrees | B | largest mult. | stable");
-    let thinned = branch.points.iter().step_by(branch.points.len().div_ceil(ROWS));
-    text += &table.rows(thinned.map(row)).text();
+    text += &table.rows(rows).text();
     for special in &branch.special {
-        let what = special.name();
-        let Periodic { sigma, g, c, b, .. } = special.motion;
-        let _ = writeln!(
-            text,
-            "  {what} at sigma = {sigma:.6}, G = {g:.6}, C = {c:.6}, B = {b:.6}"
-        );
+        let (name, Periodic { sigma, g, c, b, .. }) = (special.name(), &special.motion);
+        text += &format!("  {name} at sigma = {sigma:.6}, G = {g:.6}, C = {c:.6}, B = {b:.6}\n");
     }
     text + "\n"
 }
@@ -269,10 +252,8 @@ fn listing(scene: &Dimensionless, orbits: &[Orbit]) -> String {
     }
     let rows = orbits.iter().map(|orbit| {
         let numbers = [orbit.sigma, orbit.omega, orbit.c, orbit.gamma.to_degrees(), orbit.b];
-        let mut row: Vec<String> = numbers.map(number).into();
-        row.extend(orbit.multipliers.map(|one| format!("{one:.4}")));
-        row.push(yes_no(orbit.stable));
-        row
+        let multipliers = orbit.multipliers.map(|modulus| format!("{modulus:.4}"));
+        [&numbers.map(number)[..], &multipliers, &[yes_no(orbit.stable)]].concat()
     });
     Table::new("sigma | Omega | C | phase, degrees | B | mult1 | mult2 | mult3 | mult4 | stable")
         .rows(rows)

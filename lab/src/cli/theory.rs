@@ -3,7 +3,7 @@
 use clap::Args;
 use serde::Serialize;
 use vines::{
-    report::{Table, number, summary::parameters},
+    report::{Table, row, summary::parameters},
     scene::Dimensionless,
     theory::{Activation, B_SYMMETRY_BREAKING, BackbonePoint, BranchSide, Equilibrium, SlowFlow, backbone, resonant},
 };
@@ -70,20 +70,18 @@ struct Constants {
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?.dimensionless();
     let flow = SlowFlow::new(scene.lambda, scene.r);
-    let points = arguments.points as usize;
-    // From near the end of the left branch, where the particle is at rest, to a little beyond the stable range.
-    let highest = 1.2 * B_SYMMETRY_BREAKING;
-    let solutions = resonant(&scene);
     if let Some(sigma) = arguments.sigma.filter(|sigma| !sigma.is_finite()) {
         return Err(Failure::input(format!(
             "--sigma = {sigma} (dimensionless) is not a finite number"
         )));
     }
+    let solutions = resonant(&scene);
     let stable = solutions.iter().find(|point| point.stable());
-    let sigma = arguments
-        .sigma
-        .unwrap_or_else(|| stable.map_or(0.0, |point| point.sigma));
+    let sigma = arguments.sigma.or(stable.map(|point| point.sigma)).unwrap_or(0.0);
     let at_sigma = arguments.sigma.map(|sigma| flow.equilibria(scene.g, sigma));
+    let points = arguments.points as usize;
+    // From near the end of the left branch, where the particle is at rest, to a little beyond the stable range.
+    let highest = 1.2 * B_SYMMETRY_BREAKING;
     let report = Report {
         scene,
         manifold: Constants {
@@ -98,79 +96,66 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         equilibria: at_sigma.unwrap_or_default(),
         backbone: backbone(&scene, highest / points as f64, highest, points),
     };
-    output(arguments.json, &report, || readable(&report, arguments.sigma.is_some()))
+    output(arguments.json, &report, || text(&report, arguments.sigma.is_some()))
 }
 
-fn readable(report: &Report, listed: bool) -> String {
-    let equilibria = if listed {
-        format!(
-            "\nEquilibria at sigma = {}\n{}",
-            report.sigma,
-            equilibria(&report.equilibria)
-        )
-    } else {
-        String::new()
-    };
+fn text(report: &Report, with_equilibria: bool) -> String {
     let Constants { dissipation, b_min, c_min, b_symmetry_breaking } = report.manifold;
-    format!(
+    let solutions = report.solutions.iter().map(|point| {
+        let stable = [point.impacts_stable, point.slow_flow_stable];
+        cells(point.branch, [point.sigma, point.c, point.b], stable)
+    });
+    let mut text = format!(
         "First-order theory\n  {}\n\n\
          Slow invariant manifold: R = {dissipation:.6}, fold at B = {b_min:.6}, C = {c_min:.6}\n\
          Symmetric impacts are stable for {b_min:.6} < B < {b_symmetry_breaking:.6}\n\n\
-         Resonance: {}\n{}\n{}{equilibria}",
+         Resonance: {}\n{}\n{}",
         parameters(&report.scene),
         report.scene.definition.name(),
-        solutions(&report.solutions),
+        table("branch | sigma | C | B", solutions),
         thresholds(report),
-    )
+    );
+    if with_equilibria {
+        let equilibria = report.equilibria.iter().map(|point| {
+            let stable = [point.impacts_stable, point.slow_flow_stable];
+            cells(point.branch, [point.c, point.b, point.gamma.to_degrees()], stable)
+        });
+        let equilibria = table("branch | C | B | phase, degrees", equilibria);
+        text += &format!("\nEquilibria at sigma = {}\n{equilibria}", report.sigma);
+    }
+    text
 }
 
 fn thresholds(report: &Report) -> String {
-    let Activation {
-        steady_linear,
-        from_rest,
-        from_rest_any_phase,
-        existence,
-        stable,
-    } = report.activation;
-    let stable = stable.map_or("none at any G".into(), |g| format!("G = {g:.6}"));
+    let activation = &report.activation;
+    let stable = activation
+        .stable
+        .map_or("none at any G".into(), |g| format!("G = {g:.6}"));
     format!(
-        "Activation at sigma = {:.6}\n  steady linear response reaches the wall      G = {steady_linear:.6}\n  \
-         impacts begin from rest, e = E sin(omega t)  G = {from_rest:.6} (exact)\n  \
-         the same with the best phase of e            G = {from_rest_any_phase:.6} (exact)\n  \
-         some 1:1 motion exists                       G = {existence:.6}\n  \
+        "Activation at sigma = {:.6}\n  steady linear response reaches the wall      G = {:.6}\n  \
+         impacts begin from rest, e = E sin(omega t)  G = {:.6} (exact)\n  \
+         the same with the best phase of e            G = {:.6} (exact)\n  \
+         some 1:1 motion exists                       G = {:.6}\n  \
          a stable one exists                          {stable}\n",
-        report.sigma
+        report.sigma,
+        activation.steady_linear,
+        activation.from_rest,
+        activation.from_rest_any_phase,
+        activation.existence
     )
 }
 
-fn equilibria(found: &[Equilibrium]) -> String {
-    let row = |one: &Equilibrium| {
-        let numbers = [one.c, one.b, one.gamma.to_degrees()];
-        row(one.branch, numbers, [one.impacts_stable, one.slow_flow_stable])
-    };
-    listed("branch | C | B | phase, degrees", found.iter().map(row))
-}
-
-fn solutions(points: &[BackbonePoint]) -> String {
-    let row = |one: &BackbonePoint| {
-        let numbers = [one.sigma, one.c, one.b];
-        row(one.branch, numbers, [one.impacts_stable, one.slow_flow_stable])
-    };
-    listed("branch | sigma | C | B", points.iter().map(row))
-}
-
-fn row(branch: BranchSide, numbers: [f64; 3], stable: [bool; 2]) -> Vec<String> {
+fn cells(branch: BranchSide, numbers: [f64; 3], stable: [bool; 2]) -> Vec<String> {
     let side = match branch {
         BranchSide::Left => "left",
         BranchSide::Right => "right",
     };
-    let mut cells = vec![side.to_string()];
-    cells.extend(numbers.map(number));
+    let mut cells = row(side, numbers);
     cells.extend(stable.map(yes_no));
     cells
 }
 
-fn listed(headings: &str, rows: impl Iterator<Item = Vec<String>>) -> String {
+fn table(headings: &str, rows: impl Iterator<Item = Vec<String>>) -> String {
     let table = Table::new(&format!("{headings} | impacts stable | slow flow stable")).rows(rows);
     match table.is_empty() {
         true => "  none at this excitation\n".into(),

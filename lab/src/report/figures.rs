@@ -70,13 +70,13 @@ fn add_backbones(panel: &mut Panel, p: &Dimensionless, theory: &[Marked]) {
 }
 
 /// The identified backbone beside theory and exact orbits: amplitude over detuning.
-pub fn backbone(found: &Comparison) -> Figure {
-    let (p, lock) = (&found.parameters, &found.lock.at);
+pub fn backbone(result: &Comparison) -> Figure {
+    let (p, lock) = (&result.parameters, &result.lock.at);
     let top = (1.25 * lock.c).max(0.8);
     let theory = theory_backbone(p, top);
     // Below the fold there is no backbone, and the frequency of the remaining motion is arbitrary.
     let fold = SlowFlow::new(p.lambda, p.r).manifold.c_min();
-    let decay = || found.decay.iter().map(|one| one.point);
+    let decay = || result.decay.iter().map(|compared| compared.point);
     let sigmas = theory.iter().map(|((sigma, _), _)| *sigma);
     let sigmas = sigmas.chain(decay().filter(|point| point.c >= fold).map(|point| point.sigma));
     let (low, high) = range((f64::MAX, f64::MIN), sigmas);
@@ -94,8 +94,8 @@ pub fn backbone(found: &Comparison) -> Figure {
     let inside = |(sigma, _): &Place| (low..=high).contains(sigma);
     let identified = decay().step_by(THINNED).map(|point| (point.sigma, point.c));
     decay_points(&mut panel, identified.filter(inside), IDENTIFIED);
-    let predicted = found.decay.iter();
-    let predicted = predicted.filter_map(|one| Some((one.sigma_predicted?, one.point.c)));
+    let predicted = result.decay.iter();
+    let predicted = predicted.filter_map(|compared| Some((compared.sigma_predicted?, compared.point.c)));
     let predicted = predicted.filter(|place| inside(place) && place.1 > fold).collect();
     panel.curve(predicted, line(LOCK, 12), "free decay, predicted by the exact plant");
     let place = (lock.sigma, lock.c);
@@ -107,13 +107,13 @@ pub fn backbone(found: &Comparison) -> Figure {
 }
 
 /// The slow invariant manifold with the decay on it: particle speed over amplitude.
-pub fn manifold(found: &Comparison) -> Figure {
-    let p = &found.parameters;
+pub fn manifold(result: &Comparison) -> Figure {
+    let p = &result.parameters;
     let flow = SlowFlow::new(p.lambda, p.r);
     let manifold = flow.manifold;
     // Of the particle speed, beyond the stable range.
     let top = 1.4;
-    let right = (1.25 * found.lock.at.c).max(0.8);
+    let right = (1.25 * result.lock.at.c).max(0.8);
     let between = |from: f64, to: f64| -> Vec<Place> {
         equally_spaced(from, to, 301)
             .map(|b| (manifold.c(b) * reading(p, b, flow.free_detuning(b)), b))
@@ -123,7 +123,7 @@ pub fn manifold(found: &Comparison) -> Figure {
     let mut panel = Panel::new(((0.0, right), amplitude(p)), ((0.0, top), SPEED))
         .heading(
             "Slow invariant manifold and the free decay on it",
-            &caption(p, found.lock.at.g),
+            &caption(p, result.lock.at.g),
         )
         .legend(Legend::UpperLeft);
     let stable = between(manifold.b_min(), B_SYMMETRY_BREAKING);
@@ -131,11 +131,11 @@ pub fn manifold(found: &Comparison) -> Figure {
     for unstable in [between(0.0, manifold.b_min()), between(B_SYMMETRY_BREAKING, top)] {
         panel.dashed(unstable, line(UNSTABLE, 20), OFF_MANIFOLD);
     }
-    let decay = found.decay.iter().map(|one| one.point).step_by(THINNED);
+    let decay = result.decay.iter().map(|compared| compared.point).step_by(THINNED);
     let decay = decay.filter_map(|point| point.b.map(|b| (point.c, b)));
     decay_points(&mut panel, decay, IDENTIFIED);
-    if let Some(b) = found.lock.b {
-        panel.square((found.lock.at.c, b), LOCK, "locked, measured");
+    if let Some(b) = result.lock.b {
+        panel.square((result.lock.at.c, b), LOCK, "locked, measured");
     }
     Figure::single(panel)
 }
@@ -154,25 +154,25 @@ pub fn tracked_with_drive(tracked: &TrackedComparison) -> Figure {
 
 /// The top of the axis of the tracked amplitudes.
 fn top_of(tracked: &TrackedComparison) -> f64 {
-    let amplitudes = tracked.points.iter().map(|one| one.point.at.c);
+    let amplitudes = tracked.points.iter().map(|compared| compared.point.at.c);
     amplitudes.fold(0.5, |most: f64, c| most.max(1.15 * c))
 }
 
 fn tracked_amplitude(tracked: &TrackedComparison) -> Panel {
     let (p, top) = (&tracked.parameters, top_of(tracked));
-    let points = || tracked.points.iter().map(|one| one.point);
-    let (low, high) = range((-1.6, 0.6), points().map(|one| one.at.sigma));
+    let points = || tracked.points.iter().map(|compared| compared.point);
+    let (low, high) = range((-1.6, 0.6), points().map(|point| point.at.sigma));
     let x = (low - 0.1 * (high - low), high + 0.1 * (high - low));
-    let (least, most) = range((f64::MAX, f64::MIN), points().map(|one| one.at.g));
+    let (least, most) = range((f64::MAX, f64::MIN), points().map(|point| point.at.g));
     let text = caption(p, most).replace(&format!("G = {most:.3}"), &format!("G from {least:.3} to {most:.3}"));
     let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
         .heading("Backbone, tracked with the loop closed", &text)
         .legend(Legend::UpperRight);
     add_backbones(&mut panel, p, &theory_backbone(p, top));
-    let places = || points().map(|one| (one.at.sigma, one.at.c));
+    let places = || points().map(|point| (point.at.sigma, point.at.c));
     decay_points(&mut panel, places(), "tracked");
-    error_bars(&mut panel, places().zip(points().map(|one| one.at.u_sigma)), false);
-    let unsettled = places().zip(points()).filter(|(_, one)| !one.settled);
+    error_bars(&mut panel, places().zip(points().map(|point| point.at.u_sigma)), false);
+    let unsettled = places().zip(points()).filter(|(_, point)| !point.settled);
     let unsettled = unsettled.map(|(place, _)| place).collect();
     panel.crosses(unsettled, line(DECAY, 20), "not settled in time");
     panel
@@ -180,8 +180,8 @@ fn tracked_amplitude(tracked: &TrackedComparison) -> Panel {
 
 fn tracked_drive(tracked: &TrackedComparison) -> Panel {
     let (p, top) = (&tracked.parameters, top_of(tracked));
-    let points = || tracked.points.iter().map(|one| one.point);
-    let (_, most) = range((0.0, 0.1), points().map(|one| one.at.g));
+    let points = || tracked.points.iter().map(|compared| compared.point);
+    let (_, most) = range((0.0, 0.1), points().map(|point| point.at.g));
     let high = 1.3 * most;
     let inside = |place: &Place| place.0 <= top && place.1 <= high;
     let mut panel = Panel::new(
@@ -191,13 +191,13 @@ fn tracked_drive(tracked: &TrackedComparison) -> Panel {
     .heading("The drive that holds each level", "")
     .legend(Legend::LowerRight);
     let theory = theory::backbone(p, SlowFlow::new(p.lambda, p.r).manifold.b_min(), 1.3, 600);
-    let theory = theory.iter().map(|one| (one.c, one.g)).filter(inside).collect();
+    let theory = theory.iter().map(|point| (point.c, point.g)).filter(inside).collect();
     panel.dashed(theory, line(THEORY, 20), FIRST_ORDER);
-    let exact = tracked.exact.places().iter().map(|one| (one[0], one[2]));
+    let exact = tracked.exact.places().iter().map(|place| (place[0], place[2]));
     panel.curve(exact.filter(inside).collect(), line(EXACT, 16), "exact orbits");
-    let places = || points().map(|one| (one.at.c, one.at.g));
+    let places = || points().map(|point| (point.at.c, point.at.g));
     decay_points(&mut panel, places(), "tracked");
-    error_bars(&mut panel, places().zip(points().map(|one| one.at.u_g)), true);
+    error_bars(&mut panel, places().zip(points().map(|point| point.at.u_g)), true);
     panel
 }
 
@@ -205,18 +205,20 @@ fn tracked_drive(tracked: &TrackedComparison) -> Panel {
 type Triple = [f64; 3];
 
 /// Amplitude and frequency over time: left while the loop seeks and holds phase resonance, right as the motion decays.
-pub fn history(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
-    let Comparison { parameters: p, lock, .. } = found;
+pub fn history(record: &Record, scene: &Scene, result: &Comparison) -> Figure {
+    let Comparison { parameters: p, lock, .. } = result;
     let flow = SlowFlow::new(p.lambda, p.r);
     let driven = driven(record, scene);
     let theory = backbone_decay(p, lock.at.c);
-    let points = found.decay.iter().map(|one| one.point);
-    let points = points.filter(|one| one.c >= 0.9 * flow.manifold.c_min());
-    let points = points.step_by(THINNED / 2).map(|one| [one.tau / TAU, one.c, one.sigma]);
+    let points = result.decay.iter().map(|compared| compared.point);
+    let points = points.filter(|point| point.c >= 0.9 * flow.manifold.c_min());
+    let points = points
+        .step_by(THINNED / 2)
+        .map(|point| [point.tau / TAU, point.c, point.sigma]);
     let points: Vec<Triple> = points.collect();
 
-    let (_, top) = range((0.0, lock.at.c), driven.iter().map(|one| one[1]));
-    let (low, high) = range((-1.5, 0.5), driven.iter().chain(&points).map(|one| one[2]));
+    let (_, top) = range((0.0, lock.at.c), driven.iter().map(|triple| triple[1]));
+    let (low, high) = range((-1.5, 0.5), driven.iter().chain(&points).map(|triple| triple[2]));
     let margin = 0.1 * (high - low);
     let (width, upper, lower, left) = (980, 400, 360, 520);
     let rows = [
@@ -225,7 +227,7 @@ pub fn history(record: &Record, scene: &Scene, found: &Comparison) -> Figure {
     ];
     let panels = rows.into_iter().flat_map(|(row, range, label, [y, height])| {
         [
-            driven_panel(found, &driven, row, (range, label)).at([0, y, left, height]),
+            driven_panel(result, &driven, row, (range, label)).at([0, y, left, height]),
             decay_panel(&theory, &points, row, range).at([left, y, width - left, height]),
         ]
     });
@@ -237,27 +239,27 @@ fn backbone_decay(p: &Dimensionless, from: f64) -> Vec<Triple> {
     let start = theory::backbone_at_level(p, from);
     let decay = start.and_then(|point| SlowFlow::new(p.lambda, p.r).decay(point.b));
     let samples = decay.map(|decay| decay.samples(POINTS)).unwrap_or_default();
-    let samples = samples.iter().map(|one| {
-        let c = one.c * reading(p, one.b, one.sigma);
-        [one.tau1 / (p.epsilon * TAU), c, one.sigma]
+    let samples = samples.iter().map(|point| {
+        let c = point.c * reading(p, point.b, point.sigma);
+        [point.tau1 / (p.epsilon * TAU), c, point.sigma]
     });
     samples.collect()
 }
 
-fn driven_panel(found: &Comparison, driven: &[Triple], row: usize, y: ((f64, f64), &str)) -> Panel {
-    let end = 1.02 * driven.last().map_or(1.0, |one| one[0]);
+fn driven_panel(result: &Comparison, driven: &[Triple], row: usize, y: ((f64, f64), &str)) -> Panel {
+    let end = 1.02 * driven.last().map_or(1.0, |triple| triple[0]);
     let mut panel = Panel::new(((0.0, end), "time, in periods of the oscillator alone"), y);
     if row == 1 {
-        let caption = caption(&found.parameters, found.lock.at.g);
+        let caption = caption(&result.parameters, result.lock.at.g);
         panel = panel.heading("Seeking and holding resonance", &caption);
     }
-    let measured = driven.iter().map(|one| (one[0], one[row])).collect();
+    let measured = driven.iter().map(|triple| (triple[0], triple[row])).collect();
     panel.curve(measured, line(DECAY, 16), "measured");
     let level = |value: [f64; 2]| vec![(0.0, value[row - 1]), (end, value[row - 1])];
-    if let Some(exact) = &found.exact {
+    if let Some(exact) = &result.exact {
         panel.curve(level([exact.c, exact.sigma]), line(EXACT, 14), "exact orbit");
     }
-    if let Some(theory) = &found.theory {
+    if let Some(theory) = &result.theory {
         panel.dashed(level([theory.c, theory.sigma]), line(THEORY, 14), FIRST_ORDER);
     }
     panel.legend(if row == 1 {
@@ -268,13 +270,13 @@ fn driven_panel(found: &Comparison, driven: &[Triple], row: usize, y: ((f64, f64
 }
 
 fn decay_panel(theory: &[Triple], points: &[Triple], row: usize, y: (f64, f64)) -> Panel {
-    let last = points.last().map_or(1.0, |one| one[0]);
-    let end = theory.last().map_or(last, |one| last.max(one[0]));
+    let last = points.last().map_or(1.0, |triple| triple[0]);
+    let end = theory.last().map_or(last, |triple| last.max(triple[0]));
     let mut panel = Panel::new(((0.0, 1.02 * end), "time since the release, likewise"), (y, ""));
     if row == 1 {
         panel = panel.heading("Free decay", "the drive is off from 0 on");
     }
-    let place = |one: &Triple| (one[0], one[row]);
+    let place = |triple: &Triple| (triple[0], triple[row]);
     let inside = |place: &Place| (y.0..=y.1).contains(&place.1);
     let theory = theory.iter().map(place).filter(inside).collect();
     panel.dashed(theory, line(THEORY, 16), FIRST_ORDER);
@@ -317,7 +319,7 @@ pub fn approach(p: &Dimensionless, lock: &BackbonePoint) -> Figure {
     let sequence = |g: f64, (c, b): Place| -> Vec<Place> {
         let phases = (b, flow.psi(lock.b, gamma));
         let impacts = flow.modulation(p.epsilon, (g, lock.sigma), (c, gamma), phases);
-        let places = impacts.take(POINTS).map(|one| (one.c, one.b));
+        let places = impacts.take(POINTS).map(|impact| (impact.c, impact.b));
         std::iter::once((c, b)).chain(places).take_while(inside).collect()
     };
     let mut panel = Panel::new((x, AMPLITUDE_OF_V), (y, SPEED))
@@ -371,7 +373,7 @@ pub fn backbones(p: &Dimensionless) -> Figure {
             .map(|point| ((point.sigma, point.c), point.stable()))
             .collect();
         // Without loss at the impacts C vanishes at the fold, and sigma jumps from one side to the other there.
-        for piece in points.chunk_by(|one, next| (one.0.0 - next.0.0).abs() < 1.0) {
+        for piece in points.chunk_by(|place, next| (place.0.0 - next.0.0).abs() < 1.0) {
             panel.pieces(piece, [line(colour, width), line(UNSTABLE, 14)], ["stable", "unstable"]);
         }
         // The label is beside the fold, where the curves are distinct; for a fold near the axis, where its curve enters from the left.
@@ -379,7 +381,7 @@ pub fn backbones(p: &Dimensionless) -> Figure {
         let fold = flow.backbone_at(flow.manifold.b_min());
         let entry = points.iter().map(|(place, _)| *place);
         let entry = entry.filter(|(sigma, _)| *sigma > x.0 + 0.2 && *sigma < 0.0);
-        let place = match entry.min_by(|one, next| one.0.total_cmp(&next.0)) {
+        let place = match entry.min_by(|place, next| place.0.total_cmp(&next.0)) {
             _ if fold.c > 0.05 => (fold.sigma.max(0.1) - 0.2, fold.c + 0.045),
             Some((sigma, c)) => (sigma, c + 0.045),
             None => (0.0, 0.1),
@@ -395,10 +397,10 @@ pub fn responses(p: &Dimensionless, responses: &[Response]) -> Figure {
     let symmetric = responses.iter().flat_map(Response::symmetric);
     let top = symmetric
         .flat_map(|branch| &branch.points)
-        .filter(|one| one.b > fold)
-        .fold(0.6, |most: f64, one| most.max(1.08 * one.c));
+        .filter(|point| point.b > fold)
+        .fold(0.6, |most: f64, point| most.max(1.08 * point.c));
     let x = (-5.0, 5.0);
-    let list: Vec<String> = responses.iter().map(|one| format!("{:.3}", one.g)).collect();
+    let list: Vec<String> = responses.iter().map(|response| format!("{:.3}", response.g)).collect();
     let caption = format!("{}; G = {}; amplitudes over b", rig(p), list.join(", "));
     let mut panel = Panel::new((x, DETUNING), ((0.0, top), amplitude(p)))
         .heading("Frequency responses and backbone", &caption)
@@ -407,8 +409,8 @@ pub fn responses(p: &Dimensionless, responses: &[Response]) -> Figure {
         add_response(&mut panel, p, response);
         // The label is beside the left end of the curve, or above its end at the axis.
         let stable = response.symmetric().flat_map(|branch| &branch.points);
-        let stable = stable.filter(|one| one.stable);
-        if let Some(end) = stable.min_by(|one, next| one.sigma.total_cmp(&next.sigma)) {
+        let stable = stable.filter(|point| point.stable);
+        if let Some(end) = stable.min_by(|motion, next| motion.sigma.total_cmp(&next.sigma)) {
             let place = match end.sigma > x.0 + 0.9 {
                 true => (end.sigma - 0.45, end.c),
                 false => (end.sigma.max(x.0) + 0.5, end.c + 0.14 * top),
@@ -417,7 +419,7 @@ pub fn responses(p: &Dimensionless, responses: &[Response]) -> Figure {
         }
     }
     let backbone = theory::backbone(p, fold, 1.4 * B_SYMMETRY_BREAKING, 600);
-    let backbone: Vec<Marked> = backbone.iter().map(|one| ((one.sigma, one.c), true)).collect();
+    let backbone: Vec<Marked> = backbone.iter().map(|point| ((point.sigma, point.c), true)).collect();
     panel.clipped_pieces(&backbone, [line(BLACK, 24); 2], ["backbone, theory", ""]);
     Figure::single(panel)
 }
@@ -429,17 +431,17 @@ fn add_response(panel: &mut Panel, p: &Dimensionless, response: &Response) {
         ["theory, stable", "theory, unstable"],
     );
     for curve in SlowFlow::new(p.lambda, p.r).frequency_responses(response.g, 600) {
-        let points = curve.iter().map(|one| {
-            let stable = one.motion.impacts_stable && one.motion.slow_flow_stable;
-            let c = one.motion.c * reading(p, one.motion.b, one.sigma);
-            ((one.sigma, c), stable)
+        let points = curve.iter().map(|point| {
+            let stable = point.motion.impacts_stable && point.motion.slow_flow_stable;
+            let c = point.motion.c * reading(p, point.motion.b, point.sigma);
+            ((point.sigma, c), stable)
         });
         panel.thinned_pieces(&points.collect::<Vec<_>>(), styles, labels);
     }
     let (styles, labels) = ([line(EXACT, 30), line(FAINT, 14)], ["exact, stable", "exact, unstable"]);
     for component in &response.components {
         let points = component.branch.points.iter();
-        let points: Vec<Marked> = points.map(|one| ((one.sigma, one.c), one.stable)).collect();
+        let points: Vec<Marked> = points.map(|point| ((point.sigma, point.c), point.stable)).collect();
         panel.thinned_pieces(&points, styles, labels);
     }
 }
@@ -526,11 +528,13 @@ fn coordinates(p: &Dimensionless, rows: &[[f64; 5]], impacts: &[Impact], theory:
 fn impacts(motion: &Periodic) -> Vec<Impact> {
     let part = |phase: f64| (phase / TAU).rem_euclid(1.0);
     let first = motion.bounces.iter();
-    let mut impacts: Vec<Impact> = first.map(|one| (part(one.phase), one.q2(), one.wall)).collect();
+    let mut impacts: Vec<Impact> = first
+        .map(|impact| (part(impact.phase), impact.q2(), impact.wall))
+        .collect();
     if motion.pattern.mirrored {
         let half = f64::from(motion.pattern.half_periods) / 2.0;
         let second = motion.bounces.iter();
-        impacts.extend(second.map(|one| (part(one.phase + half * TAU), -one.q2(), -one.wall)));
+        impacts.extend(second.map(|impact| (part(impact.phase + half * TAU), -impact.q2(), -impact.wall)));
     }
     impacts
 }

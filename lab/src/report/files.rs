@@ -10,8 +10,7 @@ use thiserror::Error;
 use super::figure::FigureError;
 use super::figures::{backbone, manifold, regimes, tracked_with_drive};
 use super::theme::dark;
-use crate::backbone::Point;
-use crate::comparison::{ComparedPoint, Comparison, TrackedComparison, TrackedPoint};
+use crate::comparison::{Comparison, TrackedComparison, TrackedPoint};
 use crate::files::{self, FileError};
 use crate::map::{Cell, Map, MapError};
 use crate::orbit::Periodic;
@@ -40,44 +39,48 @@ pub enum ReportError {
     Json(#[from] serde_json::Error),
 }
 
-/// Writes `identification.json`, `backbone.csv`, `backbone.svg` and `sim.svg` into `out` and returns their paths.
-///
-/// The results are written before a figure is made, and each file is complete or absent.
-pub fn write(found: &Comparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let results = [
-        ("identification.json", json(found)?),
-        ("backbone.csv", decay_csv(found)?),
-    ];
-    let mut paths = files::write(out, results)?;
-    let figures = [
-        ("backbone.svg", backbone(found).svg()?),
-        ("sim.svg", manifold(found).svg()?),
-    ];
-    paths.extend(files::write(out, figures)?);
+/// Writes tables and figures into a folder and returns their paths. The tables are written before a figure is made, and each file is
+/// complete or absent.
+fn write_all<const N: usize>(
+    out: &Path,
+    tables: Vec<(&str, String)>,
+    figures: impl FnOnce() -> Result<[(&'static str, String); N], FigureError>,
+) -> Result<Vec<PathBuf>, ReportError> {
+    let mut paths = files::write(out, tables)?;
+    paths.extend(files::write(out, figures()?)?);
     Ok(paths)
 }
 
-/// Writes `map.csv`, `map.svg`, `map-dark.svg` and, over sigma and G, `bifurcations.csv` into `out` and returns their paths, as [`write()`] does.
+/// Writes `identification.json`, `backbone.csv`, `backbone.svg` and `sim.svg` into `out` and returns their paths.
+pub fn write(result: &Comparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
+    let tables = vec![
+        ("identification.json", json(result)?),
+        ("backbone.csv", decay_csv(result)?),
+    ];
+    write_all(out, tables, || {
+        Ok([
+            ("backbone.svg", backbone(result).svg()?),
+            ("sim.svg", manifold(result).svg()?),
+        ])
+    })
+}
+
+/// Writes `map.csv`, `map.svg`, `map-dark.svg` and, over sigma and G, `bifurcations.csv` into `out` and returns their paths.
 pub fn write_map(map: &Map, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
     let mut tables = vec![("map.csv", map_csv(map)?)];
     if !map.curves.is_empty() {
         tables.push(("bifurcations.csv", bifurcations_csv(map)?));
     }
-    let mut paths = files::write(out, tables)?;
-    let figure = regimes::svg(map)?;
-    paths.extend(files::write(
-        out,
-        [("map-dark.svg", dark(&figure)), ("map.svg", figure)],
-    )?);
-    Ok(paths)
+    write_all(out, tables, || {
+        let figure = regimes::svg(map)?;
+        Ok([("map-dark.svg", dark(&figure)), ("map.svg", figure)])
+    })
 }
 
-/// Writes `tracked.json`, `tracked.csv` and `tracked.svg` into `out` and returns their paths, as [`write()`] does.
-pub fn write_tracked(found: &TrackedComparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
-    let results = [("tracked.json", json(found)?), ("tracked.csv", tracked_csv(found)?)];
-    let mut paths = files::write(out, results)?;
-    paths.extend(files::write(out, [("tracked.svg", tracked_with_drive(found).svg()?)])?);
-    Ok(paths)
+/// Writes `tracked.json`, `tracked.csv` and `tracked.svg` into `out` and returns their paths.
+pub fn write_tracked(result: &TrackedComparison, out: &Path) -> Result<Vec<PathBuf>, ReportError> {
+    let tables = vec![("tracked.json", json(result)?), ("tracked.csv", tracked_csv(result)?)];
+    write_all(out, tables, || Ok([("tracked.svg", tracked_with_drive(result).svg()?)]))
 }
 
 /// Writes `interrupted.csv`: the samples of an experiment that ended early, or without a motion that can be identified.
@@ -94,8 +97,8 @@ pub fn write_lateness(classes: &[(f64, u64)], file: &Path) -> Result<Vec<PathBuf
     Ok(files::write(folder.unwrap_or(Path::new(".")), [(name, text)])?)
 }
 
-pub(super) fn json(found: &impl Serialize) -> Result<String, ReportError> {
-    Ok(serde_json::to_string_pretty(found)? + "\n")
+pub(super) fn json(result: &impl Serialize) -> Result<String, ReportError> {
+    Ok(serde_json::to_string_pretty(result)? + "\n")
 }
 
 /// A table, one row an item, with the names of its fields or, for tuples, these headings.
@@ -114,7 +117,7 @@ pub(super) fn csv<T: Serialize>(headings: &[&str], rows: impl IntoIterator<Item 
 }
 
 /// The points along a decay, as CSV.
-pub fn decay_csv(found: &Comparison) -> Result<String, ReportError> {
+pub fn decay_csv(result: &Comparison) -> Result<String, ReportError> {
     #[derive(Serialize)]
     struct Compared {
         sigma_theory: Option<f64>,
@@ -122,24 +125,20 @@ pub fn decay_csv(found: &Comparison) -> Result<String, ReportError> {
         sigma_slow_flow: Option<f64>,
         sigma_predicted: Option<f64>,
     }
-    csv(
-        &[],
-        found.decay.iter().map(|one| {
-            let ComparedPoint {
-                point,
-                sigma_theory,
-                sigma_exact,
-                sigma_slow_flow,
-                sigma_predicted,
-            } = *one;
-            let compared = Compared { sigma_theory, sigma_exact, sigma_slow_flow, sigma_predicted };
-            (point, compared)
-        }),
-    )
+    let rows = result.decay.iter().map(|compared| {
+        let row = Compared {
+            sigma_theory: compared.sigma_theory,
+            sigma_exact: compared.sigma_exact,
+            sigma_slow_flow: compared.sigma_slow_flow,
+            sigma_predicted: compared.sigma_predicted,
+        };
+        (compared.point, row)
+    });
+    csv(&[], rows)
 }
 
 /// The points of a tracked backbone.
-pub(super) fn tracked_csv(found: &TrackedComparison) -> Result<String, ReportError> {
+pub(super) fn tracked_csv(result: &TrackedComparison) -> Result<String, ReportError> {
     #[derive(Serialize)]
     struct Row {
         level: f64,
@@ -158,34 +157,23 @@ pub(super) fn tracked_csv(found: &TrackedComparison) -> Result<String, ReportErr
         g_less_exact: Option<f64>,
     }
     let row = |TrackedPoint { point, exact }: &TrackedPoint| {
-        let Point {
-            at,
-            level,
-            periods,
-            averaged,
-            settled,
-            reached,
-            regime,
-            regime_by_impacts,
-            tone,
-        } = *point;
         let row = Row {
-            level,
-            periods,
-            averaged,
-            settled,
-            reached,
-            regime,
-            regime_by_impacts,
-            tone_hz: tone.map(|tone| tone.hertz),
-            tone_share: tone.map(|tone| tone.share),
+            level: point.level,
+            periods: point.periods,
+            averaged: point.averaged,
+            settled: point.settled,
+            reached: point.reached,
+            regime: point.regime,
+            regime_by_impacts: point.regime_by_impacts,
+            tone_hz: point.tone.map(|tone| tone.hertz),
+            tone_share: point.tone.map(|tone| tone.share),
             distance: exact.map(|exact| exact.nearest),
             sigma_less_exact: exact.and_then(|exact| exact.sigma),
             g_less_exact: exact.and_then(|exact| exact.g),
         };
-        (at, row)
+        (point.at, row)
     };
-    csv(&[], found.points.iter().map(row))
+    csv(&[], result.points.iter().map(row))
 }
 
 /// The cells of a map, as CSV.

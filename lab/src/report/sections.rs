@@ -1,25 +1,22 @@
 //! The sections of the report: each computes its results, describes them, and adds its figures, tables and lines of the error budget.
 
-use std::cell::Cell;
-use std::error::Error;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 use super::figures;
 use super::files::{ReportError, bifurcations_csv, csv, decay_csv, json, map_csv, tracked_csv};
-use super::table::{Table, number};
+use super::table::{Table, number, row};
 use super::{Section, Subject, summary};
 use crate::backbone::track;
 use crate::comparison::{COMPARED_ABOVE, Comparison, TrackedComparison, TrackedPoint};
-use crate::experiment::{self, ExperimentError, Plan, Stage};
+use crate::experiment::{self, Plan};
 use crate::identification::{DecayEnd, identify};
 use crate::map::{self, LIMIT, Map};
 use crate::orbit::{
-    Branch, Component, Condition, DOUBLINGS, ImpactPattern, Limits, Periodic, Response, backbone, convergence,
-    response, stable_resonant,
+    Branch, Condition, DOUBLINGS, ImpactPattern, Limits, Periodic, Response, backbone, convergence, response,
+    stable_resonant,
 };
-use crate::record::Record;
 use crate::regime::Regime;
-use crate::rig::{BuiltIn, Rig, Simulated};
+use crate::rig::{BuiltIn, Simulated};
 use crate::scene::Dimensionless;
 use crate::theory::{B_SYMMETRY_BREAKING, SlowFlow, resonant};
 
@@ -39,72 +36,45 @@ pub(super) const SECTIONS: [(&str, Maker); 5] = [
 ];
 
 /// Lock, hold, release, decay.
-fn experiment(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
+fn experiment(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("The experiment");
     let scene = &subject.scene;
     let mut rig = Simulated::of(scene)?;
     let mut controller = BuiltIn::new(&scene.controller_config())?;
-    let record = match recorded(rig.as_mut(), &mut controller, &Plan::of(scene), done) {
-        Ok(record) => record,
-        Err(error) => return Ok(without_backbone(section, &error)),
+    let record = experiment::run(rig.as_mut(), &mut controller, &Plan::of(scene), |_, _, _| {});
+    let identified = record.map_err(|error| error.to_string()).and_then(|record| {
+        let identification = identify(&record, scene).map_err(|error| error.to_string())?;
+        Ok((record, Comparison::of(&identification, scene)))
+    });
+    let (record, result) = match identified {
+        Ok(identified) => identified,
+        Err(error) => return Ok(section.concluded(format!("The experiment gave no backbone: {error}."))),
     };
-    let found = match identify(&record, scene) {
-        Ok(found) => Comparison::of(&found, scene),
-        Err(error) => return Ok(without_backbone(section, &error)),
-    };
-    describe(&mut section, &found);
+    describe(&mut section, &result);
     section.figure(
         "history",
         "Amplitude and frequency over time. Left: the loop searches for phase resonance and holds it; measured once per period. Right: \
          the drive is off, and the motion decays along the backbone until the impacts lose synchrony at the fold. \
          Times are in periods 2π/ω₀ of the oscillator alone.",
-        figures::history(&record, scene, &found).svg()?,
+        figures::history(&record, scene, &result).svg()?,
     );
     section.figure(
         "decay-on-sim",
         "The decay on the slow invariant manifold, from the locked point (square) down the right branch to its fold.",
-        figures::manifold(&found).svg()?,
+        figures::manifold(&result).svg()?,
     );
     section.figure(
         "identified-backbone",
         "The identified backbone: points along the decay (circles), the locked point (square), the exact curve and first-order theory.",
-        figures::backbone(&found).svg()?,
+        figures::backbone(&result).svg()?,
     );
-    section.attach("backbone.csv", decay_csv(&found)?);
-    section.attach("identification.json", json(&found)?);
+    section.attach("backbone.csv", decay_csv(&result)?);
+    section.attach("identification.json", json(&result)?);
     Ok(section)
 }
 
-/// Runs the experiment and reports its progress in steps of a hundredth.
-fn recorded(
-    rig: &mut dyn Rig,
-    controller: &mut BuiltIn,
-    plan: &Plan,
-    done: Progress,
-) -> Result<Record, ExperimentError> {
-    let reported = Cell::new(0.0);
-    experiment::run(rig, controller, plan, |stage, at, of| {
-        let part = at as f64 / of.max(1) as f64;
-        // Most locks come long before the time limit.
-        let part = match stage {
-            Stage::Locking => 0.6 * part,
-            Stage::Holding | Stage::Tracking => 0.6 + 0.1 * part,
-            Stage::Decaying => 0.7 + 0.2 * part,
-        };
-        if part > reported.get() + 0.01 {
-            reported.set(part);
-            done(part);
-        }
-    })
-}
-
-fn without_backbone(mut section: Section, error: &dyn Error) -> Section {
-    section.found(format!("The experiment gave no backbone: {error}."));
-    section
-}
-
-fn describe(section: &mut Section, found: &Comparison) {
-    let (lock, target) = (&found.lock, found.phase_target_deg);
+fn describe(section: &mut Section, result: &Comparison) {
+    let (lock, target) = (&result.lock, result.phase_target_deg);
     section.finding = format!(
         "The loop locked after {:.0} periods at σ = {:.4}, C = {:.4}, in the regime {}.",
         lock.periods_to_lock, lock.at.sigma, lock.at.c, lock.regime
@@ -119,22 +89,22 @@ fn describe(section: &mut Section, found: &Comparison) {
         target.abs(),
         lock.periods_to_lock, lock.impacts_per_period, lock.at.phase_error_deg
     ));
-    describe_lock(section, found);
-    if let (Some(first), Some(last)) = (found.decay.first(), found.decay.last()) {
+    describe_lock(section, result);
+    if let (Some(first), Some(last)) = (result.decay.first(), result.decay.last()) {
         section.words(format!(
             "Then the drive was switched off. The motion decayed from C = {:.4} to C = {:.4} ({} ended the points). \
              During the decay it moved along the backbone, and {} points of the backbone were identified.",
             first.point.c,
             last.point.c,
-            match found.decay_end {
+            match result.decay_end {
                 DecayEnd::Synchrony => "the loss of synchrony",
                 DecayEnd::Linear => "the end of the impacts",
                 DecayEnd::Record => "the end of the record",
             },
-            found.decay.len()
+            result.decay.len()
         ));
     }
-    if let Some((raw, predicted)) = found.rms_sigma_exact.zip(found.rms_sigma_predicted) {
+    if let Some((raw, predicted)) = result.rms_sigma_exact.zip(result.rms_sigma_predicted) {
         section.budget(
             "decay against the exact backbone",
             format!("RMS {raw:.4} in σ over C > {COMPARED_ABOVE}"),
@@ -146,7 +116,7 @@ fn describe(section: &mut Section, found: &Comparison) {
             "The exact plant is released on the exact orbit and evaluated alike.",
         );
     }
-    if let Some(rms) = found.rms_sigma_error {
+    if let Some(rms) = result.rms_sigma_error {
         section.budget(
             "decay against theory",
             format!("RMS {rms:.4} in σ over C > {COMPARED_ABOVE}"),
@@ -163,18 +133,23 @@ fn describe(section: &mut Section, found: &Comparison) {
 }
 
 /// The locked point beside exact orbit and theory.
-fn describe_lock(section: &mut Section, found: &Comparison) {
-    let lock = &found.lock;
-    let cells = |name: &str, sigma: f64, c: f64, b: Option<f64>| {
-        let b = b.map_or("–".into(), number);
-        [name.to_string(), number(sigma), number(c), b]
-    };
-    let mut rows = vec![cells("measured at the lock", lock.at.sigma, lock.at.c, lock.b)];
+fn describe_lock(section: &mut Section, result: &Comparison) {
+    let lock = &result.lock;
+    let measured = [
+        number(lock.at.sigma),
+        number(lock.at.c),
+        lock.b.map_or("–".into(), number),
+    ];
+    let mut rows = vec![[vec!["measured at the lock".into()], measured.into()].concat()];
     let percent = |c: f64, reference: f64| 100.0 * (c / reference - 1.0).abs();
-    if let Some(exact) = &found.exact {
-        rows.push(cells("exact orbit", exact.sigma, exact.c, Some(exact.b)));
-        let others = found.others();
-        rows.extend(others.map(|one| cells("another stable orbit, not followed", one.sigma, one.c, Some(one.b))));
+    if let Some(exact) = &result.exact {
+        rows.push(row("exact orbit", [exact.sigma, exact.c, exact.b]));
+        for orbit in result.others() {
+            rows.push(row(
+                "another stable orbit, not followed",
+                [orbit.sigma, orbit.c, orbit.b],
+            ));
+        }
         let sigma = (lock.at.sigma - exact.sigma).abs();
         section.budget(
             "lock, measured against the exact orbit",
@@ -185,17 +160,16 @@ fn describe_lock(section: &mut Section, found: &Comparison) {
             ),
         );
     }
-    if let Some(theory) = &found.theory {
-        let (sigma, c, b) = (theory.sigma, theory.c, theory.b);
-        rows.push(cells("first-order theory", sigma, c, Some(b)));
-    }
-    if let (Some(theory), Some(exact)) = (&found.theory, &found.exact) {
-        let sigma = (theory.sigma - exact.sigma).abs();
-        section.budget(
-            "theory against the exact orbit, at the lock",
-            format!("{sigma:.3} in σ, {:.1} % in C", percent(theory.c, exact.c)),
-            "The theory is of first order in ε; the convergence study below shows that the difference shrinks as ε.",
-        );
+    if let Some(theory) = &result.theory {
+        rows.push(row("first-order theory", [theory.sigma, theory.c, theory.b]));
+        if let Some(exact) = &result.exact {
+            let sigma = (theory.sigma - exact.sigma).abs();
+            section.budget(
+                "theory against the exact orbit, at the lock",
+                format!("{sigma:.3} in σ, {:.1} % in C", percent(theory.c, exact.c)),
+                "The theory is of first order in ε; the convergence study below shows that the difference shrinks as ε.",
+            );
+        }
     }
     section.table(
         "The locked point. σ: detuning, C: amplitude of v over b, B: particle speed over b ω₀.",
@@ -209,21 +183,15 @@ fn tracking(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
     let scene = &subject.scene;
     let mut controller = BuiltIn::new(&scene.backbone_config())?;
     let mut rig = Simulated::of(scene)?;
-    let found = track(rig.as_mut(), &mut controller, scene, |at, of| {
+    let tracked = track(rig.as_mut(), &mut controller, scene, |at, of| {
         done(at as f64 / of.max(1) as f64);
     });
-    let tracked = match found {
-        Ok(found) if !found.points.is_empty() => TrackedComparison::of(&found, scene),
-        Ok(_) => {
-            section.found("Tracking gave no point.");
-            return Ok(section);
-        }
-        Err(error) => {
-            section.found(format!("Tracking gave no backbone: {error}."));
-            return Ok(section);
-        }
+    let tracked = match tracked {
+        Ok(tracked) if !tracked.points.is_empty() => TrackedComparison::of(&tracked, scene),
+        Ok(_) => return Ok(section.concluded("Tracking gave no point.")),
+        Err(error) => return Ok(section.concluded(format!("Tracking gave no backbone: {error}."))),
     };
-    let symmetric = |one: &&TrackedPoint| one.point.regime_by_impacts == Some(Regime::Symmetric);
+    let symmetric = |tracked: &&TrackedPoint| tracked.point.regime_by_impacts == Some(Regime::Symmetric);
     let in_regime = tracked.points.iter().filter(symmetric).count();
     section.finding = format!(
         "Tracked with the loop closed, the backbone took {} points in {:.0} periods, {:.1} a point.",
@@ -257,7 +225,7 @@ fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
     let mut section = Section::new("First-order theory and its accuracy");
     let p = subject.scene.dimensionless();
     let flow = SlowFlow::new(p.lambda, p.r);
-    let stable = resonant(&p).into_iter().find(|one| one.stable());
+    let stable = resonant(&p).into_iter().find(|point| point.stable());
     section.words(format!(
         "In the theory, the motions lie on the slow invariant manifold C² = R²B² + (1 − πB/2)², R = (1 − r)/(1 + r). Its fold is at \
          C = {:.4}, B = {:.4}. Two symmetric impacts per period are stable from there to B = {B_SYMMETRY_BREAKING:.4}, for every r. \
@@ -265,7 +233,7 @@ fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
         flow.manifold.c_min(),
         flow.manifold.b_min()
     ));
-    describe_activation(&mut section, &p, stable.map_or(0.0, |one| one.sigma));
+    describe_activation(&mut section, &p, stable.map_or(0.0, |point| point.sigma));
     if let Some(point) = &stable {
         section.figure(
             "approach",
@@ -291,7 +259,7 @@ fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
             let rows = study
                 .rows
                 .iter()
-                .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|one| format!("{one:.3e}")));
+                .map(|row| [row.epsilon, row.sigma, row.c, row.b].map(|value| format!("{value:.3e}")));
             section.table(
                 "Theory minus exact orbit at phase resonance; λ, r and G as in the scene.",
                 Table::new("ε | in σ | in C | in B").rows(rows),
@@ -300,7 +268,7 @@ fn theory(subject: &Subject, _: Progress) -> Result<Section, ReportError> {
             section.attach("convergence.csv", csv(&[], &study.rows)?);
         }
         None => {
-            section.found("Theory and exact orbits have no common stable phase-resonant motion here.");
+            return Ok(section.concluded("Theory and exact orbits have no common stable phase-resonant motion here."));
         }
     }
     Ok(section)
@@ -325,25 +293,24 @@ fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
     let p = subject.scene.dimensionless();
     let limits = Limits::default();
     let excitations = excitations(&p);
-    let mut found: Vec<Response> = Vec::new();
+    let mut responses: Vec<Response> = Vec::new();
     for (n, g) in excitations.iter().enumerate() {
-        found.push(response(&Dimensionless { g: *g, ..p }, &limits, DOUBLINGS));
+        responses.push(response(&Dimensionless { g: *g, ..p }, &limits, DOUBLINGS));
         done((n + 1) as f64 / (excitations.len() + 1) as f64);
     }
     let Some(curve) = backbone(&p, &limits) else {
-        section.found("There is no exact phase-resonant 1:1 motion at this excitation.");
-        return Ok(section);
+        return Ok(section.concluded("There is no exact phase-resonant 1:1 motion at this excitation."));
     };
     describe_backbone(&mut section, &curve);
-    if found.iter().any(|one| !one.components.is_empty()) {
+    if responses.iter().any(|response| !response.components.is_empty()) {
         section.figure(
             "responses",
             "Frequency responses at several excitations: exact, first-order, and the backbone of the theory near their maxima. \
              Where a response loses its symmetry, the asymmetric motions (blue, beside the dashed curve) take over.",
-            figures::responses(&p, &found).svg()?,
+            figures::responses(&p, &responses).svg()?,
         );
     }
-    let changes = changes(&found);
+    let changes = changes(&responses);
     if !changes.is_empty() {
         section.table(
             "Where the symmetric motions on the exact frequency responses change stability.",
@@ -353,7 +320,7 @@ fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
     if let Some(motion) = locked(&p) {
         let flow = SlowFlow::new(p.lambda, p.r);
         let theory = flow.phase_resonant(p.g);
-        let theory = theory.iter().find(|one| one.stable());
+        let theory = theory.iter().find(|point| point.stable());
         section.figure(
             "period",
             "One period of the locked motion. Above: the primary mass with its walls, and the particle between them; circles \
@@ -361,7 +328,7 @@ fn curves(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
             figures::period(&p, &motion, theory).svg()?,
         );
     }
-    section.attach("curves.csv", table(&curve, &found)?);
+    section.attach("curves.csv", curves_csv(&curve, &responses)?);
     Ok(section)
 }
 
@@ -369,9 +336,9 @@ fn describe_backbone(section: &mut Section, curve: &Branch) {
     let special: Vec<String> = curve
         .special
         .iter()
-        .map(|one| {
-            let Periodic { sigma, c, g, .. } = one.motion;
-            format!("{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}", one.name())
+        .map(|special| {
+            let Periodic { sigma, c, g, .. } = special.motion;
+            format!("{} at σ = {sigma:.4}, C = {c:.4}, G = {g:.4}", special.name())
         })
         .collect();
     section.finding = format!(
@@ -395,18 +362,16 @@ fn describe_backbone(section: &mut Section, curve: &Branch) {
 }
 
 /// Where stability changes on the responses.
-fn changes(found: &[Response]) -> Table {
-    let all = found.iter().flat_map(|one| {
-        one.symmetric()
-            .flat_map(|branch| &branch.special)
-            .map(|special| (one.g, special))
+fn changes(responses: &[Response]) -> Table {
+    let rows = responses.iter().flat_map(|response| {
+        let changes = response.symmetric().flat_map(|branch| &branch.special);
+        changes.map(|special| {
+            let Periodic { sigma, c, b, .. } = special.motion;
+            let [sigma, c, b] = [sigma, c, b].map(|value| format!("{value:.5}"));
+            [format!("{:.4}", response.g), special.name().into(), sigma, c, b]
+        })
     });
-    Table::new("G | what | σ | C | B").rows(all.map(|(g, special)| {
-        let Periodic { sigma, c, b, .. } = special.motion;
-        let mut cells = vec![format!("{g:.4}"), special.name().into()];
-        cells.extend([sigma, c, b].map(|one| format!("{one:.5}")));
-        cells
-    }))
+    Table::new("G | what | σ | C | B").rows(rows)
 }
 
 /// The stable resonant motion at the scene's excitation.
@@ -425,24 +390,23 @@ fn excitations(p: &Dimensionless) -> Vec<f64> {
         list.push(0.5 * (p.g + breaking));
     }
     list.sort_by(f64::total_cmp);
-    list.dedup_by(|one, other| (*one - *other).abs() < 0.03 * breaking);
+    list.dedup_by(|g, before| (*g - *before).abs() < 0.03 * breaking);
     list
 }
 
 /// The orbits of all curves, as CSV.
-fn table(backbone: &Branch, responses: &[Response]) -> Result<String, ReportError> {
+fn curves_csv(backbone: &Branch, responses: &[Response]) -> Result<String, ReportError> {
     let headings = ["curve", "sigma", "G", "C", "gamma", "B", "largest_multiplier", "stable"];
     let components = responses.iter().flat_map(|response| {
-        let name = |one: &Component| format!("G={:.4}: {}", response.g, one.name);
-        response.components.iter().map(move |one| (name(one), &one.branch))
+        let components = response.components.iter();
+        components.map(|component| (format!("G={:.4}: {}", response.g, component.name), &component.branch))
     });
     let curves = std::iter::once(("backbone".to_string(), backbone)).chain(components);
     let rows = curves.flat_map(|(curve, branch)| {
-        let row = move |one: &Periodic| {
-            let Periodic { sigma, g, c, gamma, b, stable, .. } = *one;
-            (curve.clone(), sigma, g, c, gamma, b, one.moduli()[3], stable)
-        };
-        branch.points.iter().map(row)
+        branch.points.iter().map(move |motion| {
+            let Periodic { sigma, g, c, gamma, b, stable, .. } = *motion;
+            (curve.clone(), sigma, g, c, gamma, b, motion.moduli()[3], stable)
+        })
     });
     csv(&headings, rows)
 }
@@ -477,7 +441,7 @@ fn regimes(subject: &Subject, done: Progress) -> Result<Section, ReportError> {
 
 fn describe_map(section: &mut Section, map: &Map) {
     let all = map.cells.len();
-    let inside = map.cells.iter().filter(|one| one.theory_stable).count();
+    let inside = map.cells.iter().filter(|cell| cell.theory_stable).count();
     let (_, agree) = map.count(Regime::Symmetric);
     let percent = |count: usize, of: usize| 100.0 * count as f64 / of.max(1) as f64;
     section.finding = format!(

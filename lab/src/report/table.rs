@@ -91,6 +91,13 @@ pub fn number(value: f64) -> String {
     format!("{value:.6}")
 }
 
+/// A row of a table: a name, then numbers.
+pub fn row(name: &str, numbers: impl IntoIterator<Item = f64>) -> Vec<String> {
+    std::iter::once(name.into())
+        .chain(numbers.into_iter().map(number))
+        .collect()
+}
+
 /// A number of a table with its standard uncertainty.
 pub fn with_uncertainty(value: f64, uncertainty: f64) -> String {
     format!("{value:.6} ± {uncertainty:.1e}")
