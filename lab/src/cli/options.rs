@@ -66,15 +66,15 @@ impl FromStr for Endpoint {
             return Ok(Self::Network(text.into()));
         }
         let file = PathBuf::from(text);
-        if file.is_file() {
-            Ok(Self::Fmu(file))
-        } else {
-            Err(format!(
+        let missing = || {
+            format!(
                 "{text} does not exist; give `built-in`, the path of an FMU, tcp://HOST:PORT, or for a rig in real time \
                  udp://HOST:PORT or helic://HOST[:PORT]"
             )
-            .into())
-        }
+        };
+        file.is_file()
+            .then_some(Self::Fmu(file))
+            .ok_or_else(|| missing().into())
     }
 }
 
@@ -129,17 +129,13 @@ impl Endpoint {
         Ok(match self {
             Self::BuiltIn => Box::new(BuiltIn::new(config)?),
             Self::Fmu(file) => Box::new(FmuController::load(file, config, names).map_err(Failure::run)?),
-            Self::Network(address) => match Address::parse(address, scope)? {
-                Address::Tcp(peer) => {
-                    let connected = NetController::connect(peer, config.sample_time, pace, scope.key())?;
-                    Box::new(connected)
-                }
-                Address::Udp(_) => {
-                    return Err(Failure::input(format!(
-                        "{address}: a controller has an address tcp://HOST:PORT"
-                    )));
-                }
-            },
+            Self::Network(address) => {
+                let Address::Tcp(peer) = Address::parse(address, scope)? else {
+                    let rule = "a controller has an address tcp://HOST:PORT";
+                    return Err(Failure::input(format!("{address}: {rule}")));
+                };
+                Box::new(NetController::connect(peer, config.sample_time, pace, scope.key())?)
+            }
         })
     }
 }
@@ -158,14 +154,8 @@ pub(super) fn fmu(file: &Path, scene: &Scene) -> Result<Measured<FmuRig>, FmuErr
 fn helic(address: &str, scene: &Scene, scope: BindScope) -> Result<HelicRig<Network>, Failure> {
     no_key(scope)?;
     let place = address.trim_start_matches("helic://");
-    let has_port = place
-        .rsplit_once(':')
-        .is_some_and(|(_, port)| port.parse::<u16>().is_ok());
-    let place = if has_port {
-        place.into()
-    } else {
-        format!("{place}:{DEFAULT_PORT}")
-    };
+    let port = place.rsplit_once(':').and_then(|(_, port)| port.parse::<u16>().ok());
+    let place = port.map_or_else(|| format!("{place}:{DEFAULT_PORT}"), |_| place.into());
     let network = Network::connect(resolve(&place, scope)?, LONGEST_SILENCE).map_err(|error| {
         let advice = "is `vines rig --protocol helic` or a device running there?";
         Failure::run(format!("no answer from {address}: {error}; {advice}"))
@@ -202,41 +192,8 @@ pub(super) fn no_key(scope: BindScope) -> Result<(), Failure> {
     scope.key().map_or(Ok(()), |_| Err(Failure::input(message)))
 }
 
-/// Options of every command that may use a network.
 #[derive(Debug, Args)]
 pub(super) struct ReachArguments {
-    #[command(flatten)]
-    real_time: RealTimeArguments,
-
-    /// Allow network addresses beyond this machine without a key: anyone who can reach the address can drive the rig
-    #[arg(long)]
-    allow_remote: bool,
-
-    /// File with a shared key of 16 bytes or more, the same on both sides; allows network addresses beyond this machine
-    #[arg(long, value_name = "FILE")]
-    key: Option<PathBuf>,
-}
-
-impl ReachArguments {
-    /// Asks the system for what keeping time needs; what the network may reach.
-    pub(super) fn reach(&self) -> Result<BindScope, Failure> {
-        self.real_time.apply()?;
-        let Some(file) = &self.key else {
-            return Ok(if self.allow_remote {
-                BindScope::Remote
-            } else {
-                BindScope::Loopback
-            });
-        };
-        let refused = |reason: String| Failure::input(format!("--key {}: {reason}", file.display()));
-        let secret = std::fs::read(file).map_err(|error| refused(error.to_string()))?;
-        let short = || refused("16 bytes or more are needed; `openssl rand -hex 32` writes a good key".into());
-        Key::of(&secret).map(BindScope::Keyed).ok_or_else(short)
-    }
-}
-
-#[derive(Debug, Args)]
-struct RealTimeArguments {
     /// Real-time priority (SCHED_FIFO), from 1 to 99
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u8).range(1..=99))]
     priority: Option<u8>,
@@ -248,29 +205,45 @@ struct RealTimeArguments {
     /// Run on this processor only, from 0
     #[arg(long, value_name = "N")]
     cpu: Option<usize>,
+
+    /// Allow network addresses beyond this machine without a key: anyone who can reach the address can drive the rig
+    #[arg(long)]
+    allow_remote: bool,
+
+    /// File with a shared key of 16 bytes or more, the same on both sides; allows network addresses beyond this machine
+    #[arg(long, value_name = "FILE")]
+    key: Option<PathBuf>,
 }
 
-impl RealTimeArguments {
-    /// Asks the system for what the user wants.
-    fn apply(&self) -> Result<(), Failure> {
+impl ReachArguments {
+    /// Asks the system for priority, memory and processor, and returns which addresses the network may use.
+    pub(super) fn reach(&self) -> Result<BindScope, Failure> {
+        let asked = |option: String, answer: io::Result<()>, help: &str| {
+            answer.map_err(|error| Failure::run(format!("{option}: the system refuses: {error}; {help}")))
+        };
         if let Some(priority) = self.priority {
             let help = "allow it with `ulimit -r 99`, rtprio in /etc/security/limits.conf, or CAP_SYS_NICE";
-            asked(&format!("--priority {priority}"), system::priority(priority), help)?;
+            asked(format!("--priority {priority}"), system::priority(priority), help)?;
         }
         if self.lock_memory {
             let help = "allow it with `ulimit -l unlimited`, memlock in /etc/security/limits.conf, or CAP_IPC_LOCK";
-            asked("--lock-memory", system::lock_memory(), help)?;
+            asked("--lock-memory".into(), system::lock_memory(), help)?;
         }
         if let Some(cpu) = self.cpu {
             let help = "`nproc` prints how many processors there are; the first is 0";
-            asked(&format!("--cpu {cpu}"), system::processor(cpu), help)?;
+            asked(format!("--cpu {cpu}"), system::processor(cpu), help)?;
         }
-        Ok(())
+        let Some(file) = &self.key else {
+            return Ok(match self.allow_remote {
+                true => BindScope::Remote,
+                false => BindScope::Loopback,
+            });
+        };
+        let refused = |reason: String| Failure::input(format!("--key {}: {reason}", file.display()));
+        let secret = std::fs::read(file).map_err(|error| refused(error.to_string()))?;
+        let short = || refused("16 bytes or more are needed; `openssl rand -hex 32` writes a good key".into());
+        Key::of(&secret).map(BindScope::Keyed).ok_or_else(short)
     }
-}
-
-fn asked(option: &str, answer: io::Result<()>, help: &str) -> Result<(), Failure> {
-    answer.map_err(|error| Failure::run(format!("{option}: the system refuses: {error}; {help}")))
 }
 
 #[cfg(target_os = "linux")]
@@ -321,10 +294,9 @@ mod system {
 /// A number above 0 and at most 1e8, for seconds and metres.
 pub(super) fn positive(text: &str) -> Result<f64, ArgumentError> {
     let value: f64 = text.parse().map_err(|_| "expected a number")?;
-    if value > 0.0 && value <= 1e8 {
-        Ok(value)
-    } else {
-        Err("must be above 0 and at most 1e8".into())
+    match value > 0.0 && value <= 1e8 {
+        true => Ok(value),
+        false => Err("must be above 0 and at most 1e8".into()),
     }
 }
 

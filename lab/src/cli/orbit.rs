@@ -150,7 +150,7 @@ fn detunings(text: &str) -> Result<[f64; 2], ArgumentError> {
     }
 }
 
-/// Periods before the motion is evaluated: ten decay times of the default scene.
+/// Periods before the motion is evaluated: nearly forty decay times, 1/(π ε λ) periods each, of the default scene's linear oscillator.
 const SETTLE: usize = 1000;
 
 /// The motion that the start leads to at one detuning, or its frequency response.

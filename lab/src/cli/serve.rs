@@ -8,7 +8,7 @@ use clap::{Args, ValueEnum};
 use vines::helic::{Device, HelicServer};
 use vines::net::{Address, LinkError, Role, Served, Server, ServerError, Service, Session, resolve};
 use vines::rig::{BuiltIn, Rig, RigError, RigFault, SensorsOnly, Simulated, faulty};
-use vines::{ArgumentError, report, scene::Scene};
+use vines::{ArgumentError, report};
 
 use super::failure::{Failure, stop_flag};
 use super::options::{Endpoint, ReachArguments, SceneArguments, count, fmu, no_key, positive};
@@ -116,7 +116,7 @@ impl FromStr for Fault {
             .rsplit_once('@')
             .ok_or("expected NAME@SECONDS, for instance \"response sensor dead@60\"")?;
         let seconds = positive(seconds)?;
-        match RigFault::ALL.into_iter().find(|(one, _)| *one == name) {
+        match RigFault::ALL.into_iter().find(|(fault, _)| *fault == name) {
             Some((_, kind)) => Ok(Self { kind, seconds }),
             None => {
                 let names = RigFault::ALL.map(|(name, _)| name).join(", ");
@@ -132,20 +132,6 @@ enum Protocol {
     Helic,
 }
 
-/// Refuses what cannot be served before a client comes.
-fn refuse(arguments: &RigArguments, scene: &Scene) -> Result<(), Failure> {
-    match &arguments.rig {
-        Endpoint::Network(address) => Err(Failure::input(format!(
-            "--rig {address}: only `built-in` or an FMU can be served"
-        ))),
-        _ if arguments.lock_step && arguments.protocol == Protocol::Helic => Err(Failure::input(
-            "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic",
-        )),
-        Endpoint::Fmu(file) => fmu(file, scene).map(drop).map_err(Failure::run),
-        Endpoint::BuiltIn => Ok(()),
-    }
-}
-
 pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
     let mut scene = arguments.scene.load()?;
     let helic = arguments.protocol == Protocol::Helic;
@@ -156,26 +142,34 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
     if helic {
         scene.controller.samples_per_period *= f64::from(arguments.oversampling);
     }
-    let first = Simulated::new(scene.plant, scene.start)
+    let plant = Simulated::new(scene.plant, scene.start)
         .map_err(Failure::input)?
         .with_sensors(scene.resonance);
-    let (silence, mode, transport): (_, _, fn(_) -> _) = match arguments.lock_step {
-        true => (SILENCE_LOCK_STEP, "in lock-step", Address::Tcp),
-        false => (SILENCE_PACED, "in real time", Address::Udp),
-    };
-    let max_amplitude = arguments.max_amplitude.unwrap_or(scene.plant.half_width);
-    let json = arguments.serving.json;
+    // What cannot be served is refused before a client comes.
+    match &arguments.rig {
+        Endpoint::Network(address) => {
+            let rule = "only `built-in` or an FMU can be served";
+            return Err(Failure::input(format!("--rig {address}: {rule}")));
+        }
+        _ if arguments.lock_step && helic => {
+            return Err(Failure::input(
+                "--lock-step: a helic device samples on its own clock; drop --lock-step, or --protocol helic",
+            ));
+        }
+        Endpoint::Fmu(file) => drop(fmu(file, &scene).map_err(Failure::run)?),
+        Endpoint::BuiltIn => {}
+    }
+    let (serving, json) = (&arguments.serving, arguments.serving.json);
     let make = || -> Result<Box<dyn Rig>, RigError> {
-        Ok(match &arguments.rig {
-            Endpoint::Fmu(file) => Box::new(fmu(file, &scene)?),
-            _ if arguments.sensors_only => match arguments.fault {
-                Some(Fault { kind, seconds }) => Box::new(faulty(&scene, kind, seconds, move |zero| tell(zero, json))?),
-                None => Box::new(SensorsOnly::around(Simulated::of(&scene)?)),
-            },
-            _ => Box::new(first.clone()),
+        Ok(match (&arguments.rig, arguments.fault) {
+            (Endpoint::Fmu(file), _) => Box::new(fmu(file, &scene)?),
+            (_, Some(Fault { kind, seconds })) => {
+                Box::new(faulty(&scene, kind, seconds, move |zero| tell(zero, json))?)
+            }
+            _ if arguments.sensors_only => Box::new(SensorsOnly::around(Simulated::of(&scene)?)),
+            _ => Box::new(plant.clone()),
         })
     };
-    refuse(arguments, &scene)?;
     let keep = |session: &Session| {
         let (Some(file), Some(all)) = (&arguments.histogram, &session.punctuality) else {
             return;
@@ -184,20 +178,23 @@ pub(super) fn rig(arguments: &RigArguments) -> Result<String, Failure> {
             eprintln!("warning: {error}");
         }
     };
+    let step = scene.sample_time();
+    let max_amplitude = arguments.max_amplitude.unwrap_or(scene.plant.half_width);
     if helic {
-        let step = scene.sample_time();
         let device = Device::new(make().map_err(Failure::run)?, step, max_amplitude).map_err(Failure::run)?;
-        return arguments.serving.serve_helic(device, step, keep);
+        return serving.serve_helic(device, step, keep);
     }
+    let (silence, mode, transport): (_, _, fn(_) -> _) = match arguments.lock_step {
+        true => (SILENCE_LOCK_STEP, "in lock-step", Address::Tcp),
+        false => (SILENCE_PACED, "in real time", Address::Udp),
+    };
     let service = Service {
         role: Role::Rig { max_amplitude, sensors: scene.resonance },
-        sample_time: scene.sample_time(),
+        sample_time: step,
         silence: arguments.silence.unwrap_or(silence),
     };
-    let what = format!("rig, {mode}, {:.1} samples per second,", 1.0 / service.sample_time);
-    arguments
-        .serving
-        .serve(&what, transport, service, || Ok(Served::Rig(make()?)), keep)
+    let name = format!("rig, {mode}, {:.1} samples per second,", 1.0 / step);
+    serving.serve(&name, transport, service, || Ok(Served::Rig(make()?)), keep)
 }
 
 const CONTROLLER_HELP: &str = "\
@@ -227,15 +224,11 @@ pub(super) struct ControllerArguments {
 pub(super) fn controller(arguments: &ControllerArguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     let controller = BuiltIn::new(&scene.controller_config())?;
-    let service = Service {
-        role: Role::Controller,
-        sample_time: scene.sample_time(),
-        silence: arguments.silence,
-    };
+    let (sample_time, silence) = (scene.sample_time(), arguments.silence);
+    let service = Service { role: Role::Controller, sample_time, silence };
     let make = || Ok(Served::Controller(Box::new(controller.clone())));
-    arguments
-        .serving
-        .serve("controller", Address::Tcp, service, make, |_| {})
+    let serving = &arguments.serving;
+    serving.serve("controller", Address::Tcp, service, make, |_| {})
 }
 
 #[derive(Debug, Args)]
@@ -308,10 +301,9 @@ impl ServingArguments {
         let mut stop = move || stop.load(Ordering::Relaxed) || end.is_some_and(|end| Instant::now() >= end);
         let (json, sessions, mut served) = (self.json, self.sessions, 0);
         let mut tell = move |session: &Session| {
-            let text = if json {
-                serde_json::to_string(session).map_or_else(|e| e.to_string(), |line| line + "\n")
-            } else {
-                session.to_string()
+            let text = match json {
+                true => serde_json::to_string(session).map_or_else(|error| error.to_string(), |line| line + "\n"),
+                false => session.to_string(),
             };
             keep(session);
             // A closed output does not stop the server.
