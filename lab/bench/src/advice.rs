@@ -1,4 +1,4 @@
-//! What the exact orbits of a scene say about a run without the expected lock.
+//! Advice after a run without the expected lock, from the exact orbits of the scene.
 
 use vines_model::orbit::{Orbit, exact_backbone, phase_resonant};
 use vines_model::regime::Regime;
@@ -50,14 +50,13 @@ pub fn stable_range(d: &Dimensionless) -> Option<[f64; 2]> {
     })
 }
 
-/// The same without the gaps that are wider than `GAP`.
+/// The ranges of drives with a stable symmetric 1:1 orbit at phase resonance, without gaps wider than `GAP`.
 fn stable_ranges(d: &Dimensionless) -> Vec<[f64; 2]> {
     let mut drives: Vec<f64> = stable_orbits(d).into_iter().map(|orbit| orbit.g).collect();
     drives.sort_by(f64::total_cmp);
     let is_stable = |g: f64| {
-        phase_resonant(&Dimensionless { g, ..*d })
-            .iter()
-            .any(|orbit| orbit.stable)
+        let orbits = phase_resonant(&Dimensionless { g, ..*d });
+        orbits.iter().any(|orbit| orbit.stable)
     };
     let mut ranges: Vec<[f64; 2]> = Vec::new();
     for g in drives {
@@ -69,14 +68,16 @@ fn stable_ranges(d: &Dimensionless) -> Vec<[f64; 2]> {
     ranges
 }
 
-/// Why a run that was expected to lock the symmetric 1:1 motion may not have done so: `regime` is that of its last periods, if they show
-/// one. `None` where the exact orbits know no reason.
+/// Why a run that was expected to lock the symmetric 1:1 motion may not have done so, from the scene and the regime of the last periods.
+/// `None` where the exact orbits give no reason.
 pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     let d = scene.dimensionless();
-    let stable: Vec<Orbit> = phase_resonant(&d).into_iter().filter(|orbit| orbit.stable).collect();
-    let Some(last) = stable.last() else {
-        let ranges: Vec<String> = stable_ranges(&d)
-            .into_iter()
+    let mut stable = phase_resonant(&d);
+    stable.retain(|orbit| orbit.stable);
+    if stable.is_empty() {
+        let ranges = stable_ranges(&d);
+        let ranges: Vec<String> = ranges
+            .iter()
             .map(|[low, high]| format!("from {low:.3} to {high:.3}"))
             .collect();
         let range = match ranges[..] {
@@ -87,23 +88,21 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
             "there is no stable symmetric 1:1 orbit at G = {:.4}; it is stable {range}",
             d.g
         ));
-    };
+    }
     let places: Vec<String> = stable
         .iter()
         .map(|orbit| format!("sigma = {:.4}, C = {:.4}", orbit.sigma, orbit.c))
         .collect();
-    let name = if stable.len() == 1 {
+    let plural = if stable.len() == 1 {
         "orbit of this G is"
     } else {
         "orbits of this G are"
     };
-    let place = format!("the stable symmetric 1:1 {name} at {}", places.join(" and at "));
-    let omega = 1.0 + d.epsilon * last.sigma;
+    let place = format!("the stable symmetric 1:1 {plural} at {}", places.join(" and at "));
+    let omegas = || stable.iter().map(|orbit| 1.0 + d.epsilon * orbit.sigma);
     let [low, high] = [scene.controller.omega_min, scene.controller.omega_max];
-    if !stable
-        .iter()
-        .any(|orbit| (low..=high).contains(&(1.0 + d.epsilon * orbit.sigma)))
-    {
+    if !omegas().any(|omega| (low..=high).contains(&omega)) {
+        let omega = omegas().last()?;
         return Some(format!(
             "{place}, thus at omega = {omega:.4} omega0, which controller.omega_min = {low} and controller.omega_max = {high} exclude"
         ));
@@ -114,11 +113,7 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
             "the particle does not reach the walls: under a constant drive, impacts begin at G = {:.3}; give it a velocity in [start]; {place}",
             d.lambda
         )),
-        Regime::Symmetric => Some(format!(
-            "the motion is symmetric but on no stable orbit: {place}. A symmetric orbit of larger amplitude may be unstable and lose \
-             its symmetry slowly. Near the end of its stable range the loop may need a smaller \
-controller.frequency_tolerance or more record.lock_periods"
-        )),
+        Regime::Symmetric => Some(place),
         regime => Some(format!(
             "the motion is {}, and coexists with the wanted one: {place}. Try another G or another [start]",
             regime.name()
