@@ -16,7 +16,7 @@ use zip::{CompressionMethod, ZipWriter, write::SimpleFileOptions};
 
 use crate::{files, report::Table, scene::Scene};
 
-/// One FMU to be.
+/// What an FMU is packed from.
 #[derive(Debug, Clone)]
 pub struct Component {
     /// `modelIdentifier`: the name of the FMU and of the library inside it.
@@ -60,8 +60,8 @@ pub fn components() -> [Component; 2] {
     ]
 }
 
-/// Folders below `binaries/`, with their system, processor and suffix of a library. FMI 2.0 names none for ARM except `darwin64`: the others
-/// are those of FMI 3.0.
+/// Folders below `binaries/`, with their system, processor and suffix of a library. FMI 2.0 names none for ARM except `darwin64`; the names
+/// for ARM are from FMI 3.0.
 const PLATFORMS: [(&str, &str, &str, &str); 8] = [
     ("linux64", "linux", "x86_64", ".so"),
     ("linux32", "linux", "x86", ".so"),
@@ -107,11 +107,11 @@ impl FromStr for Binary {
 /// Where the libraries come from.
 #[derive(Debug, Clone)]
 pub struct Libraries {
-    /// Folder with those for this machine, under the names that cargo gives them.
+    /// Folder with the libraries for this machine, under the names that cargo gives them.
     pub folder: PathBuf,
-    /// Whether those for this machine are packed at all.
+    /// Whether the libraries in the folder are packed.
     pub own: bool,
-    /// Those given with their platforms; one for this machine takes the place of that in the folder.
+    /// Libraries given with their platforms; one for this machine replaces the library in the folder.
     pub others: Vec<Binary>,
 }
 
@@ -354,16 +354,21 @@ fn rounded(text: &str) -> String {
 /// The variables of one causality.
 fn table(description: &Description, causality: Causality) -> Table {
     let variables = description.variables.iter();
-    let rows = variables.filter(|one| one.causality == causality).map(|one| {
-        let content = one.content().map(|(_, content)| content.clone()).unwrap_or_default();
-        vec![
-            one.name.clone(),
-            rounded(&content.start.unwrap_or_default()),
-            content.unit.unwrap_or_default(),
-            format!("{:?}", one.variability).to_lowercase(),
-            one.description.clone(),
-        ]
-    });
+    let rows = variables
+        .filter(|variable| variable.causality == causality)
+        .map(|variable| {
+            let content = variable
+                .content()
+                .map(|(_, content)| content.clone())
+                .unwrap_or_default();
+            vec![
+                variable.name.clone(),
+                rounded(&content.start.unwrap_or_default()),
+                content.unit.unwrap_or_default(),
+                format!("{:?}", variable.variability).to_lowercase(),
+                variable.description.clone(),
+            ]
+        });
     Table::new("name | start | unit | variability | meaning").rows(rows)
 }
 
@@ -411,7 +416,7 @@ fn plant(scene: &Scene) -> impl Iterator<Item = (&str, Value)> {
             "der(q1)" => "der_q1_start",
             "q2" => "q2_start",
             "der(q2)" => "der_q2_start",
-            other => other,
+            name => name,
         };
         (parameter, Value::Real(value))
     })
@@ -427,7 +432,7 @@ fn controller(scene: &Scene) -> Result<impl Iterator<Item = (&str, Value)>, Pack
         .chain([("active", Value::Boolean(true))]))
 }
 
-/// A file of parameter values. Each has a name of its own, since some masters merge sets of one name.
+/// A file of parameter values. Every set has its own name, since some masters merge sets of the same name.
 fn parameter_set<'a>(name: &str, values: impl Iterator<Item = (&'a str, Value)>) -> Vec<u8> {
     let mut text = format!(
         "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<ssv:ParameterSet version=\"1.0\" name=\"{name}\" \

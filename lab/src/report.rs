@@ -28,7 +28,7 @@ pub struct Subject {
     pub map: [Range; 2],
 }
 
-/// One part of a section. A figure is SVG for white paper; its name is that of its files, without ending.
+/// One part of a section. A figure is SVG for white paper; its name is the name of its files, without ending.
 #[derive(Debug, Clone, PartialEq)]
 enum Block {
     Words(String),
@@ -83,12 +83,12 @@ impl Section {
 }
 
 /// The finished report.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug)]
 pub struct Report {
-    /// Files written; the page is the first.
-    pub written: Vec<PathBuf>,
     /// The findings, one sentence per section.
     pub findings: Vec<String>,
+    /// Files written; the page is the first.
+    pub written: Result<Vec<PathBuf>, ReportError>,
 }
 
 /// Writes the report on `subject` into `out`: `report.html`, each figure for light and dark backgrounds, and tables. `progress` gets the
@@ -116,10 +116,8 @@ pub fn write_report(
         files.extend(section.attachments);
         findings.push(section.finding);
     }
-    match crate::files::write(out, files) {
-        Ok(written) => Ok(Report { written, findings }),
-        Err(source) => Err(ReportError::Unwritten { findings, source }),
-    }
+    let written = crate::files::write(out, files).map_err(ReportError::from);
+    Ok(Report { findings, written })
 }
 
 /// The page: one file of HTML that needs nothing else.

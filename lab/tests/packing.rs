@@ -1,4 +1,4 @@
-//! FMUs from libraries built here, and the refusal of everything else.
+//! Guards packing: FMUs from libraries built here, and the refusal of everything else.
 
 use std::{
     env::consts::{DLL_PREFIX, DLL_SUFFIX},
@@ -203,12 +203,4 @@ fn a_library_that_belongs_to_no_component_is_refused() {
     libraries.folder = folder.path().into();
     let message = complaint_of(folder.path(), &libraries);
     assert!(message.contains("belongs to none of Tiny"), "{message}");
-}
-
-#[test]
-fn an_unknown_platform_is_named_with_those_there_are() {
-    for (argument, part) in [("win64", "PLATFORM=PATH"), ("amiga=x.so", "linux64, linux32")] {
-        let message = argument.parse::<Binary>().expect_err("a mistake").to_string();
-        assert!(message.contains(part), "{message}");
-    }
 }

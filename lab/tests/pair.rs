@@ -1,4 +1,4 @@
-//! Both FMUs coupled in co-simulation through the `fmi` crate, with the delay of one sample that co-simulation has.
+//! Guards both FMUs as the `fmi` crate couples them in co-simulation, with its delay of one sample, and FMUs with other names and signs.
 
 use std::{
     fs,
@@ -127,13 +127,14 @@ fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
     }
     plant.instance.get_integer(&impacts, &mut after).unwrap();
 
-    let mut locked = [0];
-    let flag = [controller.find("locked")];
-    controller.instance.get_boolean(&flag, &mut locked).unwrap();
-    assert_eq!(locked, [1]);
+    let mut flag = [0];
+    let reference = [controller.find("locked")];
+    controller.instance.get_boolean(&reference, &mut flag).unwrap();
+    assert_eq!(flag, [1]);
 
     let sigma = scene.dimensionless().sigma(omega);
-    let off = sigma - own_sigma(&scene);
+    let mut own = (Simulated::new(scene.plant, scene.start).unwrap(), built_in(&scene));
+    let off = sigma - locked(&mut own.0, &mut own.1, &scene);
     println!("sigma = {sigma:.6}, off the own loop by {off:.1e}");
     assert!(off.abs() < 1e-4);
     let hits = after[0] - before[0];
@@ -170,15 +171,6 @@ fn the_fmu_moves_the_response_with_the_bits_of_the_built_in_controller() {
         moved = command.drive.amplitude;
     }
     assert!(moved != config.amplitude);
-}
-
-/// Where the lab's own loop locks.
-fn own_sigma(scene: &Scene) -> f64 {
-    let mut rig = Simulated::new(scene.plant, scene.start).unwrap();
-    let mut controller = BuiltIn::new(&scene.controller_config()).unwrap();
-    let plan = Plan::of(scene);
-    let record = experiment::run(&mut rig, &mut controller, &plan, |_, _, _| {}).unwrap();
-    identify(&record, scene).unwrap().lock.at.sigma
 }
 
 /// Writes an FMU whose variables have other names.
@@ -219,6 +211,10 @@ impl Rig for NoBase {
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
         self.0.ground_truth()
     }
+}
+
+fn built_in(scene: &Scene) -> BuiltIn {
+    BuiltIn::new(&scene.controller_config()).unwrap()
 }
 
 /// Detuning at which a run has locked.

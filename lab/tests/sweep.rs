@@ -1,4 +1,4 @@
-//! `vines sweep` as a program: kills, signals, a full disk and folders that cannot be written.
+//! Guards `vines sweep` as a program: kills, signals, a full disk and folders that cannot be written.
 
 use std::{
     collections::BTreeMap,

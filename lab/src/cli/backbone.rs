@@ -11,14 +11,14 @@ use super::output::{output, print, saved, written};
 
 const HELP: &str = "\
 Leads the response from level to level, and measures the drive and the frequency:
-  frequency, response, base   the same in Hz and m, on a rig that does not report impacts; in the files always (f_Hz, A_m, E_m)
+  frequency, response, base   in Hz and m, on a rig that does not report impacts; in the files always (f_Hz, A_m, E_m)
   C           amplitude of the first harmonic of the response that the scene's sensor reads, over b
   sigma       detuning (Omega - 1)/epsilon of resonance as [resonance] defines it
   G           base amplitude over b epsilon
   off target  phase of the response relative to the reference, less controller.phase_target
-  averaged    periods at the end of the dwell that the point is averaged over
+  averaged    periods, at the end of the dwell, over which the point is averaged
   error       difference in sigma or G, whichever is larger, from the exact backbone at the same C
-Numbers after ± are standard uncertainties; those of sigma and G hold at the C of the same line. A level that the response does not
+Numbers after ± are standard uncertainties; for sigma and G they hold at the C of the same line. A level that the response does not
 reach, because the drive is at a limit, is marked as not reached.
 
 Examples:
@@ -53,24 +53,24 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     bar.finish_and_clear();
     let timing = session.close();
     let tracked = tracked.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
-    let found = TrackedComparison::of(&tracked, &scene);
-    let summary = report::summary::tracked(&found);
-    let saved = saved(report::write_tracked(&found, &experiment.out), || {
-        output(experiment.json, &found, || summary.clone())
+    let result = TrackedComparison::of(&tracked, &scene);
+    let summary = report::summary::tracked(&result);
+    let saved = saved(report::write_tracked(&result, &experiment.out), || {
+        output(experiment.json, &result, || summary.clone())
     });
     if let Some(ended) = tracked.ended {
         let mut failure = Failure::from(ended);
         let files = saved.map_or_else(|error| error.message, |files| written(&files));
         failure.message += &format!(
             "\n{} points were measured before. {}",
-            found.points.len(),
+            result.points.len(),
             files.trim_end()
         );
         return Err(failure);
     }
     let files = saved?;
-    let text = experiment.result(&found, &summary, &files, timing)?;
-    match found.doubt() {
+    let text = experiment.result(&result, &summary, &files, timing)?;
+    match result.doubt() {
         Some(reason) => {
             print(&text)?;
             Err(Failure::run(reason))

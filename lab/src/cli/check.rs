@@ -12,13 +12,13 @@ use super::output::{log_warnings, output, print};
 const HELP: &str = "\
 Drives the rig at a hundredth of the drive for 24 periods with the loop open, and compares amplitude and phase of response and base with
 those of the scene's linear resonator at rest:
-  gain   over the expected one; a wrong unit shows as a power of ten
-  phase  less the expected one, degrees; 180 for a reversed sensor
-  delay  the same in samples; that of the response includes the effect of a wrong natural frequency
+  gain   measured over expected amplitude; a wrong unit shows as a power of ten
+  phase  measured minus expected phase, degrees; 180 for a reversed sensor
+  delay  the difference of phase in samples; in the response it includes the effect of a wrong natural frequency
   noise  RMS of everything else, and the RMS without a drive (floor), m
 From the growth of the response follow its natural frequency and damping, and its phase and amplitude beside an oscillator that has both.
-The second table compares what was measured with the scene. Amplitudes 5 %, phases 1 degree and clocks 0.1 % off are refused, beyond three
-standard uncertainties: what is measured later would be wrong by as much. A natural frequency or a damping that differs is only said.
+The second table compares the measured values with the scene. Amplitudes 5 %, phases 1 degree and clocks 0.1 % off are refused, beyond three
+standard uncertainties: later measurements would be wrong by as much. A different natural frequency or damping is reported, not refused.
 At the end: the gains that follow from controller.bandwidth, the only tuning parameter, with their phase margin.
 The exit code is 1 if anything is refused. `vines identify` and `vines backbone` check every rig that is not a simulation first, and use
 the natural frequency and the damping that the check has measured.

@@ -3,12 +3,12 @@
 use clap::Args;
 use indicatif::ProgressBar;
 use vines::experiment::{Plan, Stage, run_into};
-use vines::identification::{self, IdentificationError};
+use vines::identification::{IdentificationError, identify};
 use vines::{advice, comparison::Comparison, report};
 
 use super::experiment::{ExperimentArguments, interrupted, kept};
 use super::options::Endpoint;
-use super::output::{output, print, progress_bar, saved, written};
+use super::output::{output, progress_bar, saved};
 use super::{failure::Failure, pack::fmus};
 
 const HELP: &str = "\
@@ -48,31 +48,23 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     bar.finish_and_clear();
     let timing = session.close();
     let record = record.map_err(|error| interrupted(error, &samples, &scene, &experiment.out))?;
-    let found = identification::identify(&record, &scene).map_err(|error| {
+    let identification = identify(&record, &scene).map_err(|error| {
         let reason = match error {
             IdentificationError::Regime { regime, .. } => advice::reason(&scene, Some(regime)),
             _ => None,
         };
         kept(Failure::run(error), reason, &record.samples, &experiment.out)
     })?;
-    let found = Comparison::of(&found, &scene);
-    let summary = report::summary::identification(&found);
-    let mut files = saved(report::write(&found, &experiment.out), || {
-        let points = report::decay_csv(&found).map_err(Failure::run)?;
-        output(experiment.json, &found, || format!("{summary}\n{points}"))
+    let result = Comparison::of(&identification, &scene);
+    let summary = report::summary::identification(&result);
+    let mut files = saved(report::write(&result, &experiment.out), || {
+        let points = report::decay_csv(&result).map_err(Failure::run)?;
+        output(experiment.json, &result, || format!("{summary}\n{points}"))
     })?;
     if arguments.rig.is_none() {
-        match fmus(&experiment.out) {
-            Ok(fmus) => files.extend(fmus),
-            Err(failure) => {
-                print(&output(experiment.json, &found, || {
-                    format!("{summary}\n{}", written(&files))
-                })?)?;
-                return Err(failure);
-            }
-        }
+        files.extend(fmus(&experiment.out)?);
     }
-    experiment.result(&found, &summary, &files, timing)
+    experiment.result(&result, &summary, &files, timing)
 }
 
 fn show(bar: &ProgressBar, stage: Stage, done: usize, of: usize) {

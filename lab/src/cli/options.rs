@@ -48,7 +48,7 @@ impl SceneArguments {
 /// An implementation, as written on the command line.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) enum Endpoint {
-    /// `built-in`: that of this program.
+    /// `built-in`: the implementation in this program.
     BuiltIn,
     Fmu(PathBuf),
     /// `tcp://HOST:PORT` or `udp://HOST:PORT`.

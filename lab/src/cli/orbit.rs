@@ -21,11 +21,11 @@ Lengths are over b, velocities over b omega0, Omega = omega/omega0 = 1 + epsilon
   B            speed of the particle in flight
   multipliers  moduli of the multipliers of the half-period map; stable if all are below 1
 
-With --backbone or --response, orbits are followed by pseudo-arclength through folds and symmetry breaking, stable and unstable
-ones alike; --json prints all of them. --response lists the components: all of symmetric 1:1 orbits over the whole range, those that
-branch off at symmetry breakings and period doublings, three in a row (mirror images count once). Isolated branches of other patterns,
-for instance within chaos, are missed; --sigma with --response follows the one that a start leads to. A branch that is not 1:1 ends
-after a hundred unstable orbits in a row.
+With --backbone or --response, stable and unstable orbits are followed by pseudo-arclength through folds and symmetry breaking; --json
+prints all of them. --response lists the components: all symmetric 1:1 orbits over the whole range, and the branches from symmetry
+breakings and period doublings, up to three in a row (mirror images count once). Isolated branches of other patterns, for instance
+within chaos, are missed; --sigma with --response follows the branch that a start leads to. A branch that is not 1:1 ends after a
+hundred unstable orbits in a row.
 
 Examples:
   vines orbit

@@ -62,7 +62,7 @@ pub(super) fn writable(folder: &Path) -> Result<(), Failure> {
         .map_err(|error| Failure::input(format!("cannot write to {}: {error}", folder.display())))
 }
 
-/// Warnings go to stderr: those of connections, and what an FMU logs.
+/// Warnings go to stderr: warnings of connections, and what an FMU logs.
 pub(super) fn log_warnings() {
     env_logger::Builder::new()
         .filter_level(log::LevelFilter::Warn)

@@ -3,10 +3,10 @@
 use std::path::PathBuf;
 
 use clap::Args;
-use vines::report::{ReportError, Subject, write_report};
+use vines::report::{Subject, write_report};
 use vines::{map::Range, rig::BuiltIn};
 
-use super::output::{print, progress_bar, writable};
+use super::output::{progress_bar, saved, writable};
 use super::{failure::Failure, options::SceneArguments};
 
 const HELP: &str = "\
@@ -59,26 +59,14 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         bar.set_position((1000.0 * done) as u64);
     });
     bar.finish_and_clear();
-    let listed = |findings: &[String]| {
-        findings
-            .iter()
-            .map(|finding| format!("- {finding}\n"))
-            .collect::<String>()
-    };
-    let report = match report {
-        Err(ReportError::Unwritten { findings, source }) => {
-            print(&listed(&findings))?;
-            return Err(Failure::run(format!(
-                "{source}; standard output has the findings instead"
-            )));
-        }
-        other => other.map_err(Failure::run)?,
-    };
-    let page = report.written.first().map(|page| page.display().to_string());
+    let report = report.map_err(Failure::run)?;
+    let findings = report.findings.iter().map(|finding| format!("- {finding}\n"));
+    let findings: String = findings.collect();
+    let written = saved(report.written, || Ok(findings.clone()))?;
+    let page = written.first().map(|page| page.display().to_string());
     Ok(format!(
-        "{}\nWritten: {} and {} figures and tables\n",
-        listed(&report.findings),
+        "{findings}\nWritten: {} and {} figures and tables\n",
         page.unwrap_or_default(),
-        report.written.len() - 1
+        written.len() - 1
     ))
 }

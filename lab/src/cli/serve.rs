@@ -35,7 +35,7 @@ encrypted. Without it, everyone who can reach the address can drive the rig.";
 
 /// Longest silence in real time, s: about one period of the default scene.
 const SILENCE_PACED: f64 = 0.1;
-/// Longest silence in lock-step, s. The rig does not move in the meantime.
+/// Longest silence in lock-step, s: the rig does not move in the meantime, and only a peer that has ended is silent for so long.
 const SILENCE_LOCK_STEP: f64 = 5.0;
 
 /// Serve the plant to a controller or an experiment across the network
@@ -77,7 +77,7 @@ pub(super) struct RigArguments {
     #[arg(long)]
     sensors_only: bool,
 
-    /// Begin a fault after this many seconds of rig time in each session, such as "response sensor dead@60"; a wrong name lists them
+    /// Begin a fault after this many seconds of rig time in each session, such as "response sensor dead@60"; a wrong name lists all faults
     #[arg(long, value_name = "NAME@SECONDS", requires = "sensors_only")]
     fault: Option<Fault>,
 

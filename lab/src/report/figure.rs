@@ -35,7 +35,7 @@ pub fn line(colour: RGBColor, tenths: u32) -> ShapeStyle {
     colour.stroke_width(tenths * FINE / 10)
 }
 
-/// A figure: its panels, and a key beside them where it has one.
+/// A figure: panels, and a key beside them if it has one.
 pub struct Figure {
     size: (u32, u32),
     panels: Vec<Panel>,
@@ -228,16 +228,16 @@ pub fn rig(p: &Dimensionless) -> String {
     format!("ε = {:.5}, λ = {:.3}, r = {}", p.epsilon, p.lambda, p.r)
 }
 
-/// Consecutive points of one kind, each run with the point after it so that the curve has no holes.
+/// Runs of consecutive points that are stable, or unstable, as wanted; each with the point after it, so that the curve has no holes.
 fn runs(points: &[Marked], wanted: bool) -> Vec<Vec<Place>> {
     let mut start = 0;
     points
-        .chunk_by(|one, next| one.1 == next.1)
+        .chunk_by(|point, next| point.1 == next.1)
         .filter_map(|run| {
             let from = start;
             start += run.len();
             let to = (start + 1).min(points.len());
-            (run[0].1 == wanted).then(|| points[from..to].iter().map(|one| one.0).collect())
+            (run[0].1 == wanted).then(|| points[from..to].iter().map(|point| point.0).collect())
         })
         .collect()
 }
@@ -246,7 +246,7 @@ fn runs(points: &[Marked], wanted: bool) -> Vec<Vec<Place>> {
 pub fn clipped(points: &[Marked], x: (f64, f64), y: (f64, f64)) -> Vec<Vec<Marked>> {
     let inside = |((a, b), _): &Marked| (x.0..=x.1).contains(a) && (y.0..=y.1).contains(b);
     points
-        .chunk_by(|one, next| inside(one) == inside(next))
+        .chunk_by(|point, next| inside(point) == inside(next))
         .filter(|run| inside(&run[0]))
         .map(<[Marked]>::to_vec)
         .collect()

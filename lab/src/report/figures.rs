@@ -140,7 +140,7 @@ pub fn manifold(result: &Comparison) -> Figure {
     Figure::single(panel)
 }
 
-/// The tracked backbone on the exact curve and that of theory; points that are not settled are crossed.
+/// The tracked backbone on the exact and the first-order curve; points that are not settled are crossed.
 pub fn tracked(tracked: &TrackedComparison) -> Figure {
     Figure::single(tracked_amplitude(tracked))
 }

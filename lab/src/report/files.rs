@@ -29,8 +29,6 @@ pub enum ReportError {
     Map(#[from] MapError),
     #[error(transparent)]
     File(#[from] FileError),
-    #[error("{source}")]
-    Unwritten { findings: Vec<String>, source: FileError },
     #[error(transparent)]
     Figure(#[from] FigureError),
     #[error("cannot write a table as CSV: {0}")]
@@ -101,7 +99,7 @@ pub(super) fn json(result: &impl Serialize) -> Result<String, ReportError> {
     Ok(serde_json::to_string_pretty(result)? + "\n")
 }
 
-/// A table, one row an item, with the names of its fields or, for tuples, these headings.
+/// A CSV table with a line per row. The headings are the names of the fields; tuples have none, and need `headings`.
 pub(super) fn csv<T: Serialize>(headings: &[&str], rows: impl IntoIterator<Item = T>) -> Result<String, ReportError> {
     let own = headings.is_empty();
     let mut writer = csv::WriterBuilder::new().has_headers(own).from_writer(Vec::new());
@@ -203,11 +201,10 @@ pub fn map_csv(map: &Map) -> Result<String, ReportError> {
 pub(super) fn bifurcations_csv(map: &Map) -> Result<String, ReportError> {
     let headings = ["curve", "bifurcation", "sigma", "G", "C", "B", "bounds_stability"];
     let rows = map.curves.iter().enumerate().flat_map(|(n, curve)| {
-        let row = move |one: &Periodic| {
-            let Periodic { sigma, g, c, b, .. } = *one;
-            (n + 1, curve.name(), sigma, g, c, b, one.bounds_stability())
-        };
-        curve.branch.points.iter().map(row)
+        curve.branch.points.iter().map(move |motion| {
+            let Periodic { sigma, g, c, b, .. } = *motion;
+            (n + 1, curve.name(), sigma, g, c, b, motion.bounds_stability())
+        })
     });
     csv(&headings, rows)
 }

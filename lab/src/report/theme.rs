@@ -15,8 +15,8 @@ pub const FAINT: RGBColor = RGBColor(120, 170, 210);
 pub const DECAY: RGBColor = RGBColor(213, 94, 0);
 pub const LOCK: RGBColor = RGBColor(0, 0, 0);
 
-/// A regime in the map: its colour (the darker, the less orderly its impacts), its letter, and the colour of the letter. Where the cell
-/// colour is the same on dark screens, so is that of the letter.
+/// A regime in the map: its colour (the darker, the less orderly its impacts), its letter, and the colour of the letter. The letter changes
+/// its colour on dark screens only if the cell does.
 pub fn regime(regime: Regime) -> (RGBColor, &'static str, RGBColor) {
     const DARK: RGBColor = RGBColor(10, 10, 10);
     const LIGHT: RGBColor = RGBColor(254, 254, 254);
@@ -68,7 +68,7 @@ pub fn dark(svg: &str) -> String {
         .join("\"")
 }
 
-/// Style rules that do the same for figures inside a page.
+/// Style rules that give figures inside a page their dark colours.
 pub fn dark_rules() -> String {
     DARK.iter()
         .flat_map(|(light, dark)| ["fill", "stroke"].map(|what| format!("svg [{what}=\"{light}\"]{{{what}:{dark}}}")))
@@ -83,8 +83,8 @@ mod tests {
     fn regimes_differ_in_lightness() {
         let mut lightness: Vec<f64> = Regime::SIMULATED
             .iter()
-            .map(|one| {
-                let (RGBColor(r, g, b), ..) = regime(*one);
+            .map(|shown| {
+                let (RGBColor(r, g, b), ..) = regime(*shown);
                 0.2126 * f64::from(r) + 0.7152 * f64::from(g) + 0.0722 * f64::from(b)
             })
             .collect();

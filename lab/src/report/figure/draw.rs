@@ -21,7 +21,7 @@ const fn px(px: u32) -> u32 {
     px * FINE
 }
 
-/// The same, as a place.
+/// Units of the drawing, as a coordinate.
 const fn at(px: i32) -> i32 {
     px * FINE as i32
 }
@@ -71,7 +71,7 @@ impl Panel {
         for series in &self.series {
             let drawn = series.draw(&mut chart, area)?;
             let label = series.label.as_deref();
-            if let Some(label) = label.filter(|one| !labelled.contains(one)) {
+            if let Some(label) = label.filter(|label| !labelled.contains(label)) {
                 labelled.push(label);
                 series.name(drawn, label);
             }
@@ -159,7 +159,9 @@ impl Series {
                 let path = |pair: &[Place; 2]| PathElement::new(pair.to_vec(), style);
                 chart.draw_series(pairs.iter().map(path))?
             }
-            Kind::Rectangles(corners) => chart.draw_series(corners.iter().map(|one| Rectangle::new(*one, style)))?,
+            Kind::Rectangles(corners) => {
+                chart.draw_series(corners.iter().map(|corners| Rectangle::new(*corners, style)))?
+            }
             Kind::Text(text, place, size, centred) => {
                 let mut font = (FONT, px(*size)).into_text_style(area);
                 if *centred {

@@ -1,6 +1,4 @@
-//! The program as its users meet it: output, exit codes and messages.
-
-mod packing;
+//! Guards the program as its users meet it: output, exit codes and messages.
 
 use std::process::{Command, Output};
 use std::time::{Duration, Instant};
@@ -237,9 +235,15 @@ fn absurd_curves_and_maps_are_refused() {
 fn a_folder_that_is_a_file_is_refused_as_wrong_usage_before_anything_runs() {
     let file = tempfile::NamedTempFile::new().unwrap();
     let path = file.path().to_str().unwrap();
-    for command in ["identify", "backbone", "map", "report"] {
+    let nobody = ["--rig", "udp://127.0.0.1:9"];
+    for (command, rig) in [
+        ("identify", &nobody[..]),
+        ("backbone", &nobody),
+        ("map", &[]),
+        ("report", &[]),
+    ] {
         let start = Instant::now();
-        fails(&[command, "--out", path], 2, path);
+        fails(&[&[command, "--out", path], rig].concat(), 2, path);
         assert!(start.elapsed() < Duration::from_secs(5), "{command}");
     }
 }
@@ -279,4 +283,16 @@ fn results_that_cannot_be_written_are_printed() {
             assert!(results.contains(&true));
         }
     }
+}
+
+#[test]
+fn packing_refuses_what_it_cannot_pack_before_it_writes() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let out = out.to_str().unwrap();
+    let pack = |option: &[&'static str]| [&["pack", "--out", out], option].concat();
+    fails(&pack(&["--binary", "win64"]), 2, "PLATFORM=PATH");
+    fails(&pack(&["--binary", "amiga=x.so"]), 2, "linux64, linux32");
+    fails(&pack(&["--set", "plant.r=2"]), 2, "r (coefficient of restitution) = 2");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }
