@@ -102,7 +102,7 @@ pub fn reason(scene: &Scene, regime: Option<Regime>) -> Option<String> {
     let omegas = || stable.iter().map(|orbit| 1.0 + d.epsilon * orbit.sigma);
     let [low, high] = [scene.controller.omega_min, scene.controller.omega_max];
     if !omegas().any(|omega| (low..=high).contains(&omega)) {
-        let omega = omegas().last()?;
+        let omega = omegas().next_back()?;
         return Some(format!(
             "{place}, thus at omega = {omega:.4} omega0, which controller.omega_min = {low} and controller.omega_max = {high} exclude"
         ));

@@ -15,8 +15,8 @@ use super::options::{Endpoint, OpenRig, ReachArguments, SceneArguments};
 use super::output::{log_warnings, output, print, writable, written};
 use super::{check, failure::Failure, pack::fmus};
 
-/// Share of late samples of a rig in real time above which its results are doubtful. A late sample holds the drive for one more sample, so
-/// that at this share every second period of 50 samples has one.
+/// Share of late samples of a rig in real time above which its results are doubtful. A late sample holds the drive for one more sample: at
+/// this share, the default scene has one in every period.
 const TOLERATED: f64 = 0.01;
 /// Exit code for doubtful results.
 const LATE: u8 = 3;
