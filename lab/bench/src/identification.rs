@@ -1,7 +1,6 @@
 //! What a record says: the locked point, its regime, and the backbone along the free decay.
 
 mod balance;
-mod crossings;
 mod cycle;
 mod decay;
 mod fit;

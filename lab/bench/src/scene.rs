@@ -30,7 +30,7 @@ pub use linear_response::LinearResponse;
 pub use names::{Name, Names};
 pub use overrides::Override;
 pub use phase_lock::{KEYS, PhaseLock, key, refusal};
-pub use record::{Estimator, Record};
+pub use record::Record;
 pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
 
 /// The default scene, embedded so that the program works from any folder.

@@ -271,7 +271,7 @@ fn limits_follow_from_the_numbers_of_the_rig() {
 fn a_number_in_place_of_a_word_lists_the_words_of_a_scene_file() {
     for (section, words) in [
         ("[chain]\nsnr_of = 3", "`signal` or `range`"),
-        ("[record]\nestimator = 1.5", "`fit` or `crossings`"),
+        ("[resonance]\nreference = 1.5", "`base` or `force`"),
         ("[resonance]\nsensor = true", "`v`, `q1`"),
     ] {
         let message = complaint(Scene::parse("mine.toml", section, &[]));

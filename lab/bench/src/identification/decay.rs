@@ -5,11 +5,10 @@ use std::ops::Range;
 
 use serde::Serialize;
 
-use super::crossings;
 use super::fit::harmonic;
 use super::regime::impacts;
 use crate::record::{Record, Sample};
-use crate::scene::{Dimensionless, Estimator, Scene};
+use crate::scene::{Dimensionless, Scene};
 use vines_model::numerics::mean;
 use vines_model::regime::end_of_synchrony;
 
@@ -98,10 +97,7 @@ pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
         f64::INFINITY
     };
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
-    let pieces = match scene.record.estimator {
-        Estimator::Fit => fitted(&values, dt, omega, scene.record.window_periods),
-        Estimator::Crossings => crossed(&values, dt),
-    };
+    let pieces = fitted(&values, dt, omega, scene.record.window_periods);
     // What the impacts alone take away, m/s; the mean over the first period is that of the 1:1 motion.
     let damping = scene.linear().damping_rate;
     let taken = |piece: &Piece| -piece.rate - damping * piece.amplitude;
@@ -181,26 +177,4 @@ fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<Piece> {
         });
     }
     pieces
-}
-
-/// One estimate per period between zero crossings; the differences of its neighbours give rate and scatter.
-fn crossed(values: &[f64], dt: f64) -> Vec<Piece> {
-    let periods = crossings::periods(values, dt);
-    let last = periods.len().saturating_sub(1);
-    let piece = |n: usize| {
-        let (from, here, to) = (&periods[n.saturating_sub(1)], &periods[n], &periods[(n + 1).min(last)]);
-        let scatter = |value: fn(&crossings::Period) -> f64| {
-            // White noise of variance 1 gives second differences the variance 6.
-            (value(from) - 2.0 * value(here) + value(to)).abs() / 6f64.sqrt()
-        };
-        Piece {
-            samples: here.samples.clone(),
-            time: here.middle * dt,
-            amplitude: here.amplitude,
-            omega: here.omega,
-            rate: (to.amplitude - from.amplitude) / ((to.middle - from.middle) * dt),
-            uncertainties: [scatter(|period| period.amplitude), scatter(|period| period.omega)],
-        }
-    };
-    (0..periods.len()).map(piece).collect()
 }

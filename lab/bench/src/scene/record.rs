@@ -4,16 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::{Controller, SceneError, validate::Quantity};
 
-/// How frequency and amplitude along the decay are estimated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Estimator {
-    /// Least squares over a sliding window: a fundamental and its third harmonic, their amplitudes and phases drifting linearly.
-    Fit,
-    /// Zero crossings, one estimate per period: for clean data.
-    Crossings,
-}
-
 /// Durations of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
@@ -26,8 +16,6 @@ pub struct Record {
     pub decay_periods: Option<f64>,
     /// Window of the fit along the decay, periods of the motion.
     pub window_periods: f64,
-    /// How frequency and amplitude along the decay are estimated.
-    pub estimator: Estimator,
 }
 
 impl Default for Record {
@@ -37,7 +25,6 @@ impl Default for Record {
             hold_periods: 20.0,
             decay_periods: None,
             window_periods: 2.5,
-            estimator: Estimator::Fit,
         }
     }
 }
