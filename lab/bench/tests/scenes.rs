@@ -231,7 +231,7 @@ fn a_plant_without_damping_is_accepted() {
 
 #[test]
 fn levels_are_round_numbers() {
-    let levels = paper(&[]).unwrap().backbone.levels(1.0);
+    let levels = paper(&["plant.b=1"]).unwrap().levels();
     assert_eq!(levels[..3], [0.7, 0.68, 0.66]);
 }
 

@@ -27,18 +27,14 @@ pub fn default_scene() -> Scene {
         restitution,
     };
     let [q1, dq1, q2, dq2] = START;
+    let d = Dimensionless::of(&plant, 0.0);
     Scene {
         plant,
         start: State { q1, dq1, q2, dq2 },
-        amplitude: Dimensionless::of(&plant, 0.0).amplitude(EXCITATION[0]),
+        amplitude: d.amplitude(EXCITATION[0]),
         controller: Controller::default(),
         record: Record::default(),
-        backbone: Backbone {
-            c_from: Some(0.7),
-            c_to: Some(0.14),
-            g_max: Some(4.0),
-            ..Backbone::default()
-        },
+        backbone: Backbone::of(&d),
         phase_lock: PhaseLock::default(),
         rig_names: Names::default(),
         controller_names: Names::default(),
@@ -90,6 +86,7 @@ pub fn changed(mut scene: Scene, values: &Settings) -> Scene {
         .any(differs)
     {
         scene.amplitude = d.amplitude(values[index::EXCITATION]);
+        scene.backbone = Backbone::of(&d);
     }
     if differs(index::START_SPEED) || differs(index::GAP) {
         scene.start.dq2 = values[index::START_SPEED] * d.b * d.omega0;

@@ -3,14 +3,14 @@
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
+use nalgebra::DVector;
 use serde::Serialize;
+use vines_model::numerics::{HarmonicBasis, mean};
+use vines_model::regime::end_of_synchrony;
 
-use super::fit::harmonic;
-use super::regime::impacts;
+use super::response::impacts;
 use crate::record::{Record, Sample};
 use crate::scene::{Dimensionless, Scene};
-use vines_model::numerics::mean;
-use vines_model::regime::end_of_synchrony;
 
 /// One point along the decay, in SI units, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -177,4 +177,108 @@ fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<Piece> {
         });
     }
     pieces
+}
+
+// --- Least squares of a harmonic whose amplitude and phase drift linearly across the window.
+
+/// A harmonic fitted to a window of samples; everything holds at the middle of the window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Harmonic {
+    /// Amplitude of the fundamental, in the unit of the samples.
+    pub amplitude: f64,
+    /// Phase of the fundamental, rad: the samples are `amplitude sin(phase)` there.
+    pub phase: f64,
+    /// Angular frequency, rad/s.
+    pub omega: f64,
+    /// Rate of change of the amplitude, 1/s times its unit.
+    pub rate: f64,
+    /// Standard uncertainties of amplitude and frequency by the noise of the samples.
+    pub uncertainties: [f64; 2],
+}
+
+/// Rounds of refitting about the frequency found; each reduces the error by orders of magnitude.
+const ROUNDS: usize = 6;
+/// Fewest samples of a window.
+const FEWEST: usize = 16;
+/// Largest relative distance of the frequency from the guess: beyond that, the rounds diverge.
+const FARTHEST: f64 = 0.5;
+
+/// Fits `values`, sampled every `sample_time` seconds, by a fundamental near `omega` (rad/s) and its third harmonic, both
+/// with linear drift, and a constant.
+///
+/// The drift of the fitted phase corrects the frequency, and the fit is repeated about that. `None` for a window that is too
+/// short or contains no motion of about that frequency.
+pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic> {
+    if values.len() < FEWEST {
+        return None;
+    }
+    let middle = 0.5 * (values.len() - 1) as f64;
+    let right = DVector::from_column_slice(values);
+    // Half a window, s.
+    let half = middle * sample_time;
+    let (guess, mut omega, mut last) = (omega, omega, None);
+    for _ in 0..ROUNDS {
+        let phases: Vec<f64> = (0..values.len())
+            .map(|n| (n as f64 - middle) * sample_time * omega)
+            .collect();
+        let basis = HarmonicBasis::new(&phases, 0, &[Some(2), None, Some(1)]);
+        let fit = basis.fit(&right)?;
+        let a = fit.harmonic(1);
+        let square = a.norm_sqr();
+        if square == 0.0 || !square.is_finite() {
+            return None;
+        }
+        // The phase of a turns by Im(drift/a) per half window.
+        let change = fit.drift(1) * a.conj() / half;
+        omega += change.im / square;
+        if (omega / guess - 1.0).abs() > FARTHEST {
+            return None;
+        }
+        last = Some((basis, fit, a, change.re));
+    }
+    let (basis, fit, a, growth) = last?;
+    let amplitude = a.norm_sqr().sqrt();
+    let degrees = (values.len() - basis.terms()) as f64;
+    let noise = (basis.residual(&right, &fit).norm_squared() / degrees).sqrt();
+    let largest = |degree: usize| basis.variances(1, degree).into_iter().fold(0.0, f64::max).sqrt();
+    Some(Harmonic {
+        amplitude,
+        phase: a.arg(),
+        omega,
+        rate: growth / amplitude,
+        uncertainties: [
+            noise * largest(0),
+            noise * largest(1) / (amplitude * middle * sample_time),
+        ],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_drifting_harmonic_is_found_from_a_poor_guess(
+            amplitude in 0.1..2.0f64, phase in -3.0..3.0f64, decay in 0.0..0.02f64, guess in 0.98..1.02f64,
+        ) {
+            let (dt, n) = (0.063, 151);
+            let middle = 75.0;
+            let values: Vec<f64> = (0..n).map(|i| {
+                let t = (f64::from(i) - middle) * dt;
+                let theta = phase + t;
+                amplitude * (1.0 - decay * t) * theta.sin() + 0.02 * (3.0 * theta + 0.3).sin() + 0.01
+            }).collect();
+            let fit = harmonic(&values, dt, guess).unwrap();
+            prop_assert!((fit.omega - 1.0).abs() < 1e-9, "{fit:?}");
+            prop_assert!((fit.amplitude - amplitude).abs() < 1e-9);
+            prop_assert!((fit.phase - phase).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn silence_has_no_harmonic() {
+        assert_eq!(harmonic(&[0.0; 100], 0.1, 1.0), None);
+    }
 }

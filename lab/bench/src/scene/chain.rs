@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Controller, SceneError, option::option, validate::Quantity};
+use super::{Controller, Quantity, SceneError, option};
 
 /// Reference of a signal-to-noise ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
