@@ -18,7 +18,7 @@ use crate::record::Sample;
 use crate::rig::{Controller, Move, Rig};
 use crate::scene::{LinearResponse, Scene};
 
-// --- One level: the window of the fit, and the judge of whether the motion is steady.
+// One level: the window of the fit, and the judge of whether the motion is steady.
 //
 // The balances ([`Balance`]) give drive and frequency of phase resonance from any window of periods, with their standard uncertainties.
 // What is not noise shows as a difference between the two halves of the window beyond their noise; it counts as a part of the
@@ -175,7 +175,7 @@ impl LevelEstimate {
     }
 }
 
-// --- The tracking of the backbone.
+// The tracking of the backbone.
 
 /// One point of the backbone.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -217,7 +217,7 @@ pub struct Tracked {
 }
 
 /// Where the loop holds the rig: response amplitude, m, drive amplitude, m, frequency, rad/s.
-type State = [f64; 3];
+type Held = [f64; 3];
 
 /// Periods between a move and the first that is measured: the loops and the particle follow late.
 const LATE: usize = 8;
@@ -234,15 +234,15 @@ const REACHED: f64 = 0.01;
 
 /// Rig and controller, read period by period.
 struct Tracker<'a, R: Rig + ?Sized, C: ?Sized> {
-    run: experiment::Bench<'a, R, C>,
+    run: experiment::ControlLoop<'a, R, C>,
     scene: &'a Scene,
     stage: Stage,
     /// Phase target, rad.
     target: f64,
     /// Where the loop was closed.
-    closed: State,
+    closed: Held,
     /// The points so far.
-    states: Vec<State>,
+    states: Vec<Held>,
     points: Vec<Point>,
 }
 
@@ -272,7 +272,7 @@ pub fn track_into(
 ) -> Result<Tracked, ExperimentError> {
     experiment::holds_a_phase(scene)?;
     let mut tracker = Tracker {
-        run: experiment::Bench::new(rig, controller, scene, samples),
+        run: experiment::ControlLoop::new(rig, controller, scene, samples),
         scene,
         stage: Stage::Locking,
         target: scene.controller.phase_target_radians(),
@@ -442,7 +442,7 @@ fn is_reached(Estimate { value, uncertainty }: Estimate, level: f64) -> bool {
 }
 
 /// Drive, m, and frequency, rad/s, at the amplitude `response`, m, on the polynomial through the last points, three at most; `None` without any.
-fn extrapolated(states: &[State], response: f64) -> Option<[f64; 2]> {
+fn extrapolated(states: &[Held], response: f64) -> Option<[f64; 2]> {
     let points = &states[states.len().saturating_sub(3)..];
     let weights = points.iter().enumerate().map(|(i, point)| {
         let others = points.iter().enumerate().filter(|(j, _)| *j != i);

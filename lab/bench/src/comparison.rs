@@ -133,7 +133,7 @@ fn rms(points: &[ComparedPoint], error: impl Fn(&ComparedPoint) -> Option<f64>) 
     (!mean_square.is_nan()).then(|| mean_square.sqrt())
 }
 
-// --- Distance of measured points from the exact backbone.
+// Distance of measured points from the exact backbone.
 
 /// Largest step along the curve, which bounds the error of the polygon to 1e-5.
 const STEP: f64 = 4e-3;
@@ -225,7 +225,7 @@ fn to_segment(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
         .fold(f64::INFINITY, f64::min)
 }
 
-// --- A tracked backbone beside the exact one.
+// A tracked backbone beside the exact one.
 
 /// A tracked backbone beside the exact one.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -324,7 +324,7 @@ pub struct Worst {
     pub nearest: f64,
 }
 
-// --- The decay as theory and the exact plant predict it, integrated forward.
+// The decay as theory and the exact plant predict it, integrated forward.
 
 /// The decay of the scene's plant from `orbit` on, over `samples` samples, as it would be identified without noise; without points if the plant
 /// refuses the scene.

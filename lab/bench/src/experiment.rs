@@ -174,7 +174,7 @@ pub fn run_into(
     mut progress: impl FnMut(Stage, usize, usize),
 ) -> Result<Record, ExperimentError> {
     holds_a_phase(plan.scene)?;
-    let mut bench = Bench::new(rig, controller, plan.scene, samples);
+    let mut bench = ControlLoop::new(rig, controller, plan.scene, samples);
     let held = if plan.scene.controller.is_at_phase_resonance() {
         let mut searched = |taken| progress(Stage::Locking, taken, plan.lock);
         Search::new(&mut bench, plan.scene, plan.lock, &mut searched).lock()?
@@ -214,7 +214,7 @@ pub(crate) fn holds_a_phase(scene: &Scene) -> Result<(), ExperimentError> {
 
 /// Waits for the lock under the constant drive, for a controller that cannot control the response.
 fn wait<R: Rig + ?Sized, C: Controller + ?Sized>(
-    bench: &mut Bench<R, C>,
+    bench: &mut ControlLoop<R, C>,
     plan: &Plan,
     progress: &mut impl FnMut(Stage, usize, usize),
 ) -> Result<(), ExperimentError> {
@@ -230,10 +230,10 @@ fn wait<R: Rig + ?Sized, C: Controller + ?Sized>(
     }
 }
 
-// --- Rig and controller, sample by sample. Whatever fails, the rig is left with a drive of zero as far as it still takes one.
+// Rig and controller, sample by sample. Whatever fails, the rig is left with a drive of zero as far as it still takes one.
 
 /// Rig and controller, and the samples so far.
-pub(crate) struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
+pub(crate) struct ControlLoop<'a, R: Rig + ?Sized, C: ?Sized> {
     rig: &'a mut R,
     pub controller: &'a mut C,
     scene: &'a Scene,
@@ -248,7 +248,7 @@ pub(crate) struct Bench<'a, R: Rig + ?Sized, C: ?Sized> {
     driven: bool,
 }
 
-impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> Bench<'a, R, C> {
+impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> ControlLoop<'a, R, C> {
     /// Before the first sample.
     pub fn new(rig: &'a mut R, controller: &'a mut C, scene: &'a Scene, samples: &'a mut Vec<Sample>) -> Self {
         Self {
@@ -339,7 +339,7 @@ impl<'a, R: Rig + ?Sized, C: Controller + ?Sized> Bench<'a, R, C> {
 }
 
 /// An error or a panic must not leave the rig driven.
-impl<R: Rig + ?Sized, C: ?Sized> Drop for Bench<'_, R, C> {
+impl<R: Rig + ?Sized, C: ?Sized> Drop for ControlLoop<'_, R, C> {
     fn drop(&mut self) {
         if self.driven {
             // The run has ended; an error of the rig would not change its result.
@@ -358,7 +358,7 @@ fn checked(command: Command) -> Result<Command, ExperimentError> {
     }
 }
 
-// --- What the sensors read when the controller switched the drive off, beside the limits of the scene.
+// What the sensors read when the controller switched the drive off, beside the limits of the scene.
 
 /// The last readings before a fault, and the limits that the scene gives the controller.
 #[derive(Debug, Clone, Copy)]

@@ -62,7 +62,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
     let OpenLoop { mut readings, has_base, .. } = rig;
     without_drift(&mut readings[begins..]);
     let mut channels = [0, 1].map(|n| {
-        let signal = Signal::of(&readings[begins + driven - window..], n + 1);
+        let signal = SineFit::of(&readings[begins + driven - window..], n + 1);
         let ratio = signal.phasor / expected[n];
         let floor = scatter(&readings[begins - quiet..begins], n + 1);
         let channel = Channel { noise: signal.noise, floor, ..Channel::default() };
@@ -82,7 +82,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
     let waits = moved < 0.5 * expected_move;
     // Without a sensor, the base moves as expected.
     let base = if has_base {
-        let signal = Signal::of(&readings[begins + driven - window..], 2);
+        let signal = SineFit::of(&readings[begins + driven - window..], 2);
         (
             signal.phasor,
             signal.noise / signal.phasor.norm() * (2.0 / window as f64).sqrt(),
@@ -93,7 +93,7 @@ pub fn check(rig: &mut (impl Rig + ?Sized), scene: &Scene) -> Result<LoopCheck, 
     let period = samples(1);
     let phasors = |of: usize| -> Vec<Complex64> {
         let periods = readings[begins..].chunks_exact(period);
-        periods.map(|readings| Signal::of(readings, of).phasor).collect()
+        periods.map(|readings| SineFit::of(readings, of).phasor).collect()
     };
     let linear = Linear::of(&phasors(1), base, omega, period, scene);
     let mut quantities = Vec::new();
@@ -145,12 +145,12 @@ fn expected(scene: &Scene) -> [Complex64; 2] {
 }
 
 /// A signal at the frequency of the drive, m, and the rest of it, RMS.
-struct Signal {
+struct SineFit {
     phasor: Complex64,
     noise: f64,
 }
 
-impl Signal {
+impl SineFit {
     fn of(readings: &[[f64; 3]], channel: usize) -> Self {
         let n = readings.len() as f64;
         let mean = mean(readings.iter().map(|reading| reading[channel]));
@@ -163,7 +163,7 @@ impl Signal {
     }
 }
 
-// --- A rig that is driven with its loop open.
+// A rig that is driven with its loop open.
 
 /// Periods between looks at a response that falls.
 const DECAY: usize = 10;
@@ -233,7 +233,7 @@ fn scatter(readings: &[[f64; 3]], of: usize) -> f64 {
     standard_deviation(&readings.iter().map(|reading| reading[of]).collect::<Vec<f64>>())
 }
 
-// --- What the check of a loop measures, beside what the scene says.
+// What the check of a loop measures, beside what the scene says.
 
 /// Largest relative error of a factor: amplitudes and drives that are measured later have the same.
 const FACTOR: f64 = 0.05;
@@ -358,7 +358,7 @@ fn factor(name: &'static str, measured: f64, uncertainty: f64, verdict: Verdict,
     }
 }
 
-// --- What the check of a loop says of its channels.
+// What the check of a loop says of its channels.
 
 /// Largest RMS of what is not the drive's frequency, as a share of the amplitude.
 const NOISE: f64 = 0.15;

@@ -184,7 +184,7 @@ pub trait Controller {
     }
 }
 
-// --- Why one side of the bench cannot go on.
+// Why one side of the bench cannot go on.
 
 /// The error of an implementation: of an FMU, or of a link to a peer.
 type Cause = Box<dyn Error + Send + Sync>;
@@ -238,7 +238,7 @@ impl ControllerError {
     }
 }
 
-// --- The simulated plant as a rig, without an FMU.
+// The simulated plant as a rig, without an FMU.
 
 /// The plant, stepped directly.
 #[derive(Clone)]
@@ -299,7 +299,7 @@ impl Rig for Simulated {
     }
 }
 
-// --- The built-in phase-locked loop as a controller of the bench.
+// The built-in phase-locked loop as a controller of the bench.
 
 /// The built-in controller: coefficients and state.
 #[derive(Clone)]

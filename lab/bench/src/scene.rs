@@ -13,9 +13,9 @@ use lovines::{InvalidValue, State};
 use phase_lock::{ConfigError, Number};
 use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error, ser::SerializeMap};
 
-pub use backbone::Backbone;
-pub use chain::{Chain, RatioOf};
-pub use controller::{Controller, KEYS, LinearResponse, PhaseLock, key, refusal};
+pub use backbone::BackboneSettings;
+pub use chain::{ChainSettings, RatioOf};
+pub use controller::{ControllerSettings, KEYS, LinearResponse, PhaseLock, key, refusal};
 pub use lovines::Parameters;
 pub use names::{Name, Names};
 pub use overrides::{Family, Override};
@@ -35,15 +35,15 @@ pub struct Scene {
     /// Amplitude E of the base displacement, m.
     pub amplitude: f64,
     /// The phase-locked loop, in units of omega0 and of the natural period.
-    pub controller: Controller,
+    pub controller: ControllerSettings,
     /// Further parameters of the loop.
     pub phase_lock: PhaseLock,
     /// How long to drive and to record, in periods.
-    pub record: Record,
+    pub record: RecordSettings,
     /// How the backbone is tracked, in units of b and in periods.
-    pub backbone: Backbone,
+    pub backbone: BackboneSettings,
     /// The measurement chain between rig and controller.
-    pub chain: Chain,
+    pub chain: ChainSettings,
     /// What counts as resonance, and what is measured.
     pub resonance: Definition,
     /// What a rig other than the simulated one calls its variables.
@@ -93,7 +93,7 @@ impl Scene {
     }
 }
 
-// --- The sections of a scene as written, before they are completed and checked.
+// The sections of a scene as written, before they are completed and checked.
 
 /// The file; sections left out count as empty.
 #[derive(Debug, Clone, Default, Deserialize)]
@@ -102,11 +102,11 @@ struct Sections {
     plant: PlantSection,
     start: StartSection,
     excitation: Excitation,
-    controller: Controller,
+    controller: ControllerSettings,
     phase_lock: PhaseLock,
-    record: Record,
-    backbone: Backbone,
-    chain: Chain,
+    record: RecordSettings,
+    backbone: BackboneSettings,
+    chain: ChainSettings,
     resonance: Definition,
     rig: RigSection,
     controller_names: Names,
@@ -134,11 +134,11 @@ impl Excitation {
     fn in_metres(&self, origin: &str, d: &Dimensionless) -> Result<f64, SceneError> {
         match (self.g, self.e) {
             (Some(g), None) => {
-                Quantity::new("excitation.G", g, "(dimensionless)").not_negative()?;
+                Checked::new("excitation.G", g, "(dimensionless)").not_negative()?;
                 Ok(d.amplitude(g))
             }
             (None, Some(e)) => {
-                Quantity::new("excitation.E", e, "m").not_negative()?;
+                Checked::new("excitation.E", e, "m").not_negative()?;
                 Ok(e)
             }
             (given, _) => Err(SceneError::Keys {
@@ -168,7 +168,7 @@ impl Length<'_> {
         let Self { origin, section, keys: [key, in_metres], .. } = self;
         let check = |key: &str, value, unit| {
             let key = format!("{section}.{key}").into();
-            Quantity { key, value, unit }.positive()
+            Checked { key, value, unit }.positive()
         };
         match (self.over_unit, self.in_metres) {
             (Some(_), Some(_)) => Err(SceneError::Keys {
@@ -202,11 +202,11 @@ impl Sections {
             "plant" => self.plant = PlantSection::deserialize(table)?,
             "start" => self.start = StartSection::deserialize(table)?,
             "excitation" => self.excitation = Excitation::deserialize(table)?,
-            "controller" => self.controller = Controller::deserialize(table)?,
+            "controller" => self.controller = ControllerSettings::deserialize(table)?,
             "phase_lock" => self.phase_lock = PhaseLock::deserialize(table)?,
-            "record" => self.record = Record::deserialize(table)?,
-            "backbone" => self.backbone = Backbone::deserialize(table)?,
-            "chain" => self.chain = Chain::deserialize(table)?,
+            "record" => self.record = RecordSettings::deserialize(table)?,
+            "backbone" => self.backbone = BackboneSettings::deserialize(table)?,
+            "chain" => self.chain = ChainSettings::deserialize(table)?,
             _ => self.resonance = Definition::deserialize(table)?,
         }
         Ok(())
@@ -245,7 +245,7 @@ impl Sections {
     }
 }
 
-// --- Scenes read from files and texts.
+// Scenes read from files and texts.
 
 impl Scene {
     /// Reads the scene file at `path`, or the default scene without one, with the overrides applied in order.
@@ -265,7 +265,7 @@ impl Scene {
     }
 }
 
-// --- The `[plant]` section, in SI units or dimensionless, and the `[start]` section.
+// The `[plant]` section, in SI units or dimensionless, and the `[start]` section.
 
 /// Keys that only the SI form has.
 const SI_KEYS: [&str; 5] = ["M", "k", "c", "m", "b"];
@@ -317,8 +317,8 @@ impl PlantSection {
             }
         } else {
             let (epsilon, lambda) = (need(self.epsilon, "epsilon")?, need(self.lambda, "lambda")?);
-            Quantity::new("plant.epsilon", epsilon, "(dimensionless)").positive()?;
-            Quantity::new("plant.lambda", lambda, "(dimensionless)").not_negative()?;
+            Checked::new("plant.epsilon", epsilon, "(dimensionless)").positive()?;
+            Checked::new("plant.lambda", lambda, "(dimensionless)").not_negative()?;
             Parameters::dimensionless(epsilon, lambda, need(self.r, "r")?)
         };
         plant.validate()?;
@@ -367,12 +367,12 @@ fn serialize<S: Serializer>(plant: &Parameters, serializer: S) -> Result<S::Ok, 
     map.end()
 }
 
-// --- The `[record]` section: how long to drive, to record and to average.
+// The `[record]` section: how long to drive, to record and to average.
 
 /// Durations of an experiment.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Record {
+pub struct RecordSettings {
     /// Time limit for the lock, natural periods; by default at least 3000, and 20 relaxation times.
     pub lock_periods: Option<f64>,
     /// How long the settled lock is held and measured, natural periods.
@@ -383,7 +383,7 @@ pub struct Record {
     pub window_periods: f64,
 }
 
-impl Default for Record {
+impl Default for RecordSettings {
     fn default() -> Self {
         Self {
             lock_periods: None,
@@ -397,36 +397,36 @@ impl Default for Record {
 /// Most samples of one record: about 2 GiB in memory.
 const MOST_SAMPLES: f64 = 2e7;
 
-impl Record {
+impl RecordSettings {
     /// `lock_periods` is the time limit for the lock, as set or by default.
-    fn check(&self, controller: &Controller, lock_periods: f64) -> Result<(), SceneError> {
+    fn check(&self, controller: &ControllerSettings, lock_periods: f64) -> Result<(), SceneError> {
         let unit = "(natural periods)";
-        Quantity::new("record.lock_periods", lock_periods, unit).positive()?;
-        Quantity::new("record.hold_periods", self.hold_periods, unit).check(
+        Checked::new("record.lock_periods", lock_periods, unit).positive()?;
+        Checked::new("record.hold_periods", self.hold_periods, unit).check(
             (3.0..=1e6).contains(&self.hold_periods),
             "must be from 3 (to count impacts and measure) to 1000000",
         )?;
         if let Some(decay_periods) = self.decay_periods {
-            Quantity::new("record.decay_periods", decay_periods, unit).positive()?;
+            Checked::new("record.decay_periods", decay_periods, unit).positive()?;
         }
         let longest = self.decay_periods.unwrap_or(1000.0);
-        Quantity::new("record.window_periods", self.window_periods, "(periods)").check(
+        Checked::new("record.window_periods", self.window_periods, "(periods)").check(
             (0.5..=longest).contains(&self.window_periods),
             format!("must be from 0.5 to {longest} (decay_periods, or 1000)"),
         )?;
         let samples =
             controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods.unwrap_or(0.0));
-        Quantity::new("samples_per_period times all periods of [record]", samples, "samples")
+        Checked::new("samples_per_period times all periods of [record]", samples, "samples")
             .check(samples <= MOST_SAMPLES, "must be at most 20 million")
     }
 }
 
-// --- Options of a scene: a number, or `false` or "none". Zero is a number like every other.
+// Options of a scene: a number, or `false` or "none". Zero is a number like every other.
 
 /// What the file says.
 #[derive(Deserialize)]
 #[serde(untagged, expecting = "expected a number, or false or \"none\"")]
-enum Written<T> {
+enum WrittenOption<T> {
     Value(T),
     Switch(bool),
     Word(String),
@@ -434,24 +434,26 @@ enum Written<T> {
 
 /// Reads an option.
 fn option<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Option<T>, D::Error> {
-    match Written::deserialize(from)? {
-        Written::Value(value) => Ok(Some(value)),
-        Written::Switch(false) => Ok(None),
-        Written::Word(word) if word == "none" => Ok(None),
-        Written::Switch(_) | Written::Word(_) => Err(D::Error::custom("expected a number, or false or \"none\"")),
+    match WrittenOption::deserialize(from)? {
+        WrittenOption::Value(value) => Ok(Some(value)),
+        WrittenOption::Switch(false) => Ok(None),
+        WrittenOption::Word(word) if word == "none" => Ok(None),
+        WrittenOption::Switch(_) | WrittenOption::Word(_) => {
+            Err(D::Error::custom("expected a number, or false or \"none\""))
+        }
     }
 }
 
-// --- Range checks that name the value, its unit and what is allowed.
+// Range checks that name the value, its unit and what is allowed.
 
 /// One number of a scene, under the name that the file gives it.
-struct Quantity {
+struct Checked {
     pub key: Cow<'static, str>,
     pub value: f64,
     pub unit: &'static str,
 }
 
-impl Quantity {
+impl Checked {
     fn new(key: &'static str, value: f64, unit: &'static str) -> Self {
         Self { key: key.into(), value, unit }
     }
@@ -480,7 +482,7 @@ impl Quantity {
     }
 }
 
-// --- Errors of a scene.
+// Errors of a scene.
 
 /// Why a scene cannot be used.
 #[derive(Debug, thiserror::Error)]

@@ -48,8 +48,8 @@ fn a_dimensionless_scene_is_its_own_model() {
 #[test]
 fn every_key_of_the_paper_file_has_its_default() {
     let scene = paper(&[]).unwrap();
-    assert_eq!(scene.controller, vines_testbench::scene::Controller::default());
-    assert_eq!(scene.record, vines_testbench::scene::Record::default());
+    assert_eq!(scene.controller, vines_testbench::scene::ControllerSettings::default());
+    assert_eq!(scene.record, vines_testbench::scene::RecordSettings::default());
 }
 
 #[test]

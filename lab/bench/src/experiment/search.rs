@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 use nalgebra::DVector;
 use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, noise};
 
-use super::{Bench, ExperimentError, Sample, Stage};
+use super::{ControlLoop, ExperimentError, Sample, Stage};
 use crate::identification::{ASYMMETRIC, Balance, Cycle, Slopes, without_tones};
 use crate::rig::{Command, Controller, ControllerError, LoopState, Move, Rig};
 use crate::scene::{LinearResponse, Scene};
@@ -72,7 +72,7 @@ struct Leg {
 
 /// The search.
 pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
-    bench: &'b mut Bench<'a, R, C>,
+    bench: &'b mut ControlLoop<'a, R, C>,
     scene: &'b Scene,
     linear: LinearResponse,
     /// Time limit, samples.
@@ -95,7 +95,7 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
 impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// The search on a bench, for at most `limit` samples; `progress` receives their number.
     pub fn new(
-        bench: &'b mut Bench<'a, R, C>,
+        bench: &'b mut ControlLoop<'a, R, C>,
         scene: &'b Scene,
         limit: usize,
         progress: &'b mut dyn FnMut(usize),

@@ -186,7 +186,7 @@ impl Balance {
 }
 
 /// The response of a period.
-struct Motion {
+struct PeriodResponse {
     /// m
     amplitude: f64,
     /// rad
@@ -199,7 +199,7 @@ struct Motion {
 ///
 /// Over one period from the phase 0 on, a drift z' of the complex amplitude per radian changes the fitted amplitude by
 /// -i conj(z')/2.
-fn motion(cycles: &[Cycle]) -> Vec<Motion> {
+fn motion(cycles: &[Cycle]) -> Vec<PeriodResponse> {
     let mut before = cycles[0].response;
     let mut turned = before.arg();
     let phases: Vec<f64> = cycles
@@ -222,7 +222,7 @@ fn motion(cycles: &[Cycle]) -> Vec<Motion> {
             let z = cycles[n].response;
             let drift = Complex::new(growth, turning) * z / amplitude;
             let correction = Complex::new(0.0, 0.5) * drift.conj() / z;
-            Motion {
+            PeriodResponse {
                 amplitude: amplitude * (1.0 + correction.re),
                 phase: phases[n] + correction.im,
                 correction: correction.im,
@@ -264,7 +264,7 @@ fn total(cycles: &[Cycle], value: fn(&Cycle) -> f64) -> f64 {
     cycles.iter().map(value).sum()
 }
 
-fn drives(cycles: &[Cycle], motion: &[Motion], calibration: f64) -> Vec<DriveIntegrals> {
+fn drives(cycles: &[Cycle], motion: &[PeriodResponse], calibration: f64) -> Vec<DriveIntegrals> {
     let relative = |cycle: &Cycle| {
         let turned = cycle.response * cycle.commanded[0].conj();
         turned / turned.norm()
@@ -293,7 +293,7 @@ fn drives(cycles: &[Cycle], motion: &[Motion], calibration: f64) -> Vec<DriveInt
         .collect()
 }
 
-// --- Harmonics of one period of the drive.
+// Harmonics of one period of the drive.
 
 /// Harmonics of the sensor signals over one period of the drive.
 #[derive(Debug, Clone, Copy, PartialEq)]

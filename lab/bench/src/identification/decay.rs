@@ -179,7 +179,7 @@ fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<Piece> {
     pieces
 }
 
-// --- Least squares of a harmonic whose amplitude and phase drift linearly across the window.
+// Least squares of a harmonic whose amplitude and phase drift linearly across the window.
 
 /// A harmonic fitted to a window of samples; everything holds at the middle of the window.
 #[derive(Debug, Clone, Copy, PartialEq)]

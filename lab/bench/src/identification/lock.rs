@@ -164,7 +164,7 @@ fn means(held: &[Cycle]) -> [Estimate; 3] {
     ]
 }
 
-// --- A measured point of phase resonance.
+// A measured point of phase resonance.
 
 /// A point of phase resonance as measured, in hertz and metres, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -231,7 +231,7 @@ impl Measured {
     }
 }
 
-// --- What makes a record useless: a phase off its target while the lock was held, and a sensor that fails after the release.
+// What makes a record useless: a phase off its target while the lock was held, and a sensor that fails after the release.
 
 /// Share of a free response that impacts leave in two periods at least. They take the share pi epsilon G_imp/C in each, with
 /// G_imp = (4/pi) R B^2/C: 0.14 at epsilon = 0.05, r = 0.65, C = 0.5.

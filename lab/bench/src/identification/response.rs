@@ -164,7 +164,7 @@ fn is_linear(linear: &LinearResponse, measured: Complex64, omega: f64) -> bool {
     (linear.at(omega) / measured - 1.0).norm() <= tolerance
 }
 
-// --- Foreign tones: lines in the response that no motion of the particle produces.
+// Foreign tones: lines in the response that no motion of the particle produces.
 //
 // The response is that of a linear oscillator, which only its base and the particle excite. The particle stays in its cavity: a line of its
 // relative position has at most the amplitude 4b/π, that of a square wave. With x = ω/ω0, a line of the response v therefore has at most
@@ -268,7 +268,7 @@ fn transform(values: &[f64], turn: f64) -> [f64; 2] {
     sums
 }
 
-// --- The regime, from the impacts that a simulated rig reports.
+// The regime, from the impacts that a simulated rig reports.
 
 /// The impacts in the samples; of several between two samples, the last one.
 #[must_use]

@@ -19,8 +19,8 @@ const JITTER_MAX: f64 = 4.0;
 /// A rig behind its measurement chain.
 pub struct Chain {
     rig: Box<dyn Rig>,
-    response: Channel,
-    base: Option<Channel>,
+    response: InputChannel,
+    base: Option<InputChannel>,
     /// For an output that is held: its converter, unless that is ideal.
     output: Option<Option<Converter>>,
     normal: NormalDistribution,
@@ -35,13 +35,13 @@ pub struct Chain {
 }
 
 /// The stages of one input.
-struct Channel {
-    sensor: Option<Sensor>,
+struct InputChannel {
+    sensor: Option<NoisySensor>,
     filter: Option<LowPass>,
     converter: Option<Converter>,
 }
 
-impl Channel {
+impl InputChannel {
     fn read(&mut self, value: f64, elapsed: f64, normal: &mut NormalDistribution) -> f64 {
         let noisy = match &mut self.sensor {
             Some(sensor) => sensor.read(value, normal),
@@ -74,10 +74,10 @@ impl Chain {
     pub fn new(rig: Box<dyn Rig>, scene: &Scene) -> Self {
         let (settings, d) = (&scene.chain, scene.dimensionless());
         // The power of a signal is averaged over about one period.
-        let channel = |range: f64| Channel {
+        let channel = |range: f64| InputChannel {
             sensor: settings
                 .snr
-                .map(|snr| Sensor::new(snr, settings.snr_of, range, scene.controller.samples_per_period)),
+                .map(|snr| NoisySensor::new(snr, settings.snr_of, range, scene.controller.samples_per_period)),
             filter: settings.filter.map(|cut_off| LowPass::new(cut_off * d.omega0)),
             converter: settings.adc_bits.map(|bits| Converter::new(bits, range)),
         };
@@ -150,7 +150,7 @@ impl RigStage for Chain {
     }
 }
 
-// --- The anti-alias filter.
+// The anti-alias filter.
 
 /// A Butterworth low pass of second order, `y'' + sqrt(2) wc y' + wc^2 y = wc^2 u`, exact for a signal that is
 /// linear between samples.
@@ -189,7 +189,7 @@ impl LowPass {
     }
 }
 
-// --- A converter between volts and numbers: a step and a range.
+// A converter between volts and numbers: a step and a range.
 
 /// Rounds to steps within a range.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -212,7 +212,7 @@ impl Converter {
     }
 }
 
-// --- Sensor noise; reproducible on every machine for the same seed.
+// Sensor noise; reproducible on every machine for the same seed.
 
 pub struct NormalDistribution(ChaCha8Rng);
 
@@ -228,7 +228,7 @@ impl NormalDistribution {
 }
 
 /// Adds white noise to a signal.
-pub struct Sensor {
+pub struct NoisySensor {
     /// Standard deviation of the noise relative to the RMS of the signal.
     ratio: f64,
     /// Mean square of the signal.
@@ -237,7 +237,7 @@ pub struct Sensor {
     follow: f64,
 }
 
-impl Sensor {
+impl NoisySensor {
     /// A sensor with the signal-to-noise ratio `snr` (dB), relative to the mean power of about the last `memory` samples, or to
     /// a sine that fills `range`.
     pub fn new(snr: f64, of: RatioOf, range: f64, memory: f64) -> Self {
@@ -294,7 +294,7 @@ mod tests {
 
     /// Power of the noise on a sine of amplitude 3, relative to that of the sine, dB.
     fn measured(of: RatioOf) -> f64 {
-        let (mut sensor, mut normal) = (Sensor::new(40.0, of, 30.0, 100.0), NormalDistribution::new(7));
+        let (mut sensor, mut normal) = (NoisySensor::new(40.0, of, 30.0, 100.0), NormalDistribution::new(7));
         let mut noise = 0.0;
         for n in 0..200_000 {
             let value = 3.0 * (f64::from(n) * 0.0628).sin();

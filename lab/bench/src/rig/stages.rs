@@ -1,4 +1,4 @@
-//! A rig read by the sensors of a definition of resonance.
+//! Stages of a rig: the sensors of a definition of resonance, no ground truth, a stop on a flag.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -87,7 +87,7 @@ impl<R: Rig> RigStage for Measured<R> {
     }
 }
 
-// --- A rig that shows its sensors only, as a real one does.
+// A rig that shows its sensors only, as a real one does.
 
 /// A rig without its ground truth.
 pub struct SensorsOnly(Box<dyn Rig>);
@@ -110,7 +110,7 @@ impl RigStage for SensorsOnly {
     }
 }
 
-// --- A rig that stops on a flag, which a signal or another thread sets.
+// A rig that stops on a flag, which a signal or another thread sets.
 
 /// The flag was set.
 #[derive(Debug, Error)]

@@ -2,12 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Dimensionless, Length, Quantity, SceneError};
+use super::{Checked, Dimensionless, Length, SceneError};
 
 /// How the response amplitude is stepped with the loop closed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Backbone {
+pub struct BackboneSettings {
     /// First level over b, in a file only: [`Scene`](super::Scene) has it as `a_from`.
     #[serde(rename = "C_from", skip_serializing)]
     pub c_from: Option<f64>,
@@ -39,7 +39,7 @@ pub struct Backbone {
 const LEVELS: [f64; 2] = [0.7, 0.14];
 const G_MAX: f64 = 4.0;
 
-impl Default for Backbone {
+impl Default for BackboneSettings {
     fn default() -> Self {
         Self {
             c_from: None,
@@ -55,7 +55,7 @@ impl Default for Backbone {
     }
 }
 
-impl Backbone {
+impl BackboneSettings {
     /// The default levels and the default largest drive, in metres.
     pub fn of(d: &Dimensionless) -> Self {
         let [a_from, a_to] = LEVELS.map(|level| Some(level * d.b));
@@ -86,13 +86,13 @@ impl Backbone {
         self.e_max = length(["G_max", "E_max"], &mut self.g_max, self.e_max)
             .resolve(d.amplitude(1.0))?
             .or(default.e_max);
-        Quantity::new("backbone.points", self.points.into(), "(levels)")
+        Checked::new("backbone.points", self.points.into(), "(levels)")
             .check((1..=10_000).contains(&self.points), "must be from 1 to 10000")?;
-        Quantity::new("backbone.dwell_max", self.dwell_max.into(), "(periods)").check(
+        Checked::new("backbone.dwell_max", self.dwell_max.into(), "(periods)").check(
             (8..=10_000).contains(&self.dwell_max),
             "must be from 8 (two halves of four periods) to 10000",
         )?;
-        Quantity::new("backbone.precision", self.precision, "(relative)").positive()?;
+        Checked::new("backbone.precision", self.precision, "(relative)").positive()?;
         Ok(self)
     }
 

@@ -9,12 +9,12 @@ use serde::{Deserialize, Serialize, Serializer};
 use toml::{Table, Value};
 use vines_model::ArgumentError;
 
-use super::{Dimensionless, Length, Quantity, Scene, SceneError, Sensor, option, symbols};
+use super::{Checked, Dimensionless, Length, Scene, SceneError, Sensor, option, symbols};
 
 /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Controller {
+pub struct ControllerSettings {
     /// Samples per natural period `2 pi/omega0`.
     pub samples_per_period: f64,
     /// Bandwidth of the phase detector, in units of omega0: the only tuning parameter; the gains of the loop follow from it.
@@ -54,7 +54,7 @@ pub struct Controller {
     pub delay: f64,
 }
 
-impl Default for Controller {
+impl Default for ControllerSettings {
     fn default() -> Self {
         Self {
             samples_per_period: 100.0,
@@ -77,7 +77,7 @@ impl Default for Controller {
     }
 }
 
-impl Controller {
+impl ControllerSettings {
     /// The phase target in radians.
     pub fn phase_target_radians(&self) -> f64 {
         self.phase_target.to_radians()
@@ -120,7 +120,7 @@ impl Controller {
             ("controller.release_periods", self.release_periods, "(natural periods)"),
             ("controller.delay", self.delay, "samples"),
         ] {
-            Quantity::new(key, value, unit).not_negative()?;
+            Checked::new(key, value, unit).not_negative()?;
         }
         for (key, value, unit) in [
             ("controller.C_max", self.c_max.unwrap_or(1.0), "(over b)"),
@@ -133,7 +133,7 @@ impl Controller {
             ),
             ("controller.amplitude_tolerance", self.amplitude_tolerance, "(relative)"),
         ] {
-            Quantity::new(key, value, unit).positive()?;
+            Checked::new(key, value, unit).positive()?;
         }
         let samples = self.samples_per_period;
         let highest = self.detector().highest_harmonic();
@@ -185,13 +185,13 @@ impl Controller {
                 "must be from 4 to 400".into(),
             ),
         ] {
-            Quantity::new(key, value, unit).check(is_allowed, allowed)?;
+            Checked::new(key, value, unit).check(is_allowed, allowed)?;
         }
         Ok(())
     }
 }
 
-// --- The linear response of a rig, without impacts.
+// The linear response of a rig, without impacts.
 
 /// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -224,7 +224,7 @@ impl LinearResponse {
     }
 }
 
-// --- A scene's settings in SI units, in the form that plant and controller use.
+// A scene's settings in SI units, in the form that plant and controller use.
 
 impl Scene {
     /// Parameters and start of the plant, under the names of the FMU's variables.
@@ -355,7 +355,7 @@ const RESIDUAL: f64 = 0.3;
 /// Response amplitude over b at which impacts certainly occur: a particle at rest in the middle is hit at 1.
 const IMPACTS: f64 = 1.1;
 
-// --- The `[phase_lock]` section: parameters of the controller that no other key sets, in SI units and by their names in `PhaseLock.fmu`.
+// The `[phase_lock]` section: parameters of the controller that no other key sets, in SI units and by their names in `PhaseLock.fmu`.
 
 /// The parameters that other keys of a scene set, in units that suit any plant.
 pub const KEYS: [(&str, &str); 18] = [

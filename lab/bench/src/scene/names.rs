@@ -24,7 +24,7 @@ const UNITS: [(&str, f64); 12] = [
 
 /// A variable of a rig or a controller.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Written")]
+#[serde(try_from = "NameSection")]
 pub struct Name {
     /// Its name there.
     pub name: String,
@@ -35,7 +35,7 @@ pub struct Name {
 /// As written: `"name"`, or a table with `name` and one of `unit` and `factor`.
 #[derive(Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
-enum Written {
+enum NameSection {
     Plain(String),
     Full {
         name: String,
@@ -44,13 +44,13 @@ enum Written {
     },
 }
 
-impl TryFrom<Written> for Name {
+impl TryFrom<NameSection> for Name {
     type Error = ArgumentError;
 
-    fn try_from(written: Written) -> Result<Self, ArgumentError> {
+    fn try_from(written: NameSection) -> Result<Self, ArgumentError> {
         let (name, unit, factor) = match written {
-            Written::Plain(name) => (name, None, None),
-            Written::Full { name, unit, factor } => (name, unit, factor),
+            NameSection::Plain(name) => (name, None, None),
+            NameSection::Full { name, unit, factor } => (name, unit, factor),
         };
         let of = |unit: &str| {
             UNITS

@@ -147,7 +147,7 @@ pub(super) fn read(origin: &str, text: &str, overrides: &[Override]) -> Result<(
     Ok((Sections::deserialize(table.clone()).map_err(syntax)?, table))
 }
 
-// --- A scene some of whose numbers vary.
+// A scene some of whose numbers vary.
 
 /// A scene in which the numbers under some keys vary; the other values are read once.
 #[derive(Debug, Clone)]
