@@ -121,6 +121,12 @@ impl Quantity {
         }
     }
 
+    /// The value of a plant.
+    #[must_use]
+    pub fn of_plant(self, plant: &Parameters) -> f64 {
+        self.of(&unknowns(plant))
+    }
+
     /// The gradient over the unknowns.
     fn gradient(self, x: &Unknowns) -> Unknowns {
         Unknowns::from_fn(|i, _| {
@@ -193,6 +199,17 @@ const REJECTED: f64 = 0.01;
 const LEFT_OUT: usize = 5;
 /// Relative standard uncertainty from which a parameter counts as not determined.
 const UNCERTAIN: f64 = 0.1;
+
+fn unknowns(plant: &Parameters) -> Unknowns {
+    Unknowns::from([
+        plant.natural_frequency().ln(),
+        0.5 * plant.damping / (plant.stiffness * plant.primary_mass).sqrt(),
+        plant.restitution,
+        plant.half_width.ln(),
+        plant.mass_ratio().ln(),
+        plant.primary_mass.ln(),
+    ])
+}
 
 fn shifted(x: &Unknowns, i: usize, step: f64) -> Unknowns {
     let mut x = *x;
@@ -370,16 +387,9 @@ struct Sums {
 impl Problem<'_> {
     /// The smallest of the minima that are reached from the expected rig and from other restitution coefficients.
     fn fit(&self, expected: &Parameters) -> Result<Fit, FitError> {
-        let zeta = 0.5 * expected.damping / (expected.stiffness * expected.primary_mass).sqrt();
-        let starts = [expected.restitution].into_iter().chain(STARTS).map(|r| {
-            Unknowns::from([
-                expected.natural_frequency().ln(),
-                zeta,
-                r,
-                expected.half_width.ln(),
-                expected.mass_ratio().ln(),
-                expected.primary_mass.ln(),
-            ])
+        let starts = [expected.restitution].into_iter().chain(STARTS).map(|restitution| {
+            let plant = Parameters { restitution, ..*expected };
+            unknowns(&plant)
         });
         let minima = starts.filter_map(|start| self.minimum(start));
         let (x, sums) = minima
