@@ -4,9 +4,16 @@
 
 use std::{fs, path::Path};
 
+use lovines::Parameters;
 use rand_chacha::ChaCha8Rng;
 use rand_chacha::rand_core::{Rng, SeedableRng};
-use vines_testbench::scene::{Override, Scene};
+use vines_model::Dimensionless;
+use vines_testbench::advice;
+use vines_testbench::backbone::{Point, Tracked, track};
+use vines_testbench::comparison::ExactCurve;
+use vines_testbench::identification::Regime;
+use vines_testbench::rig::{BuiltIn, Chain, SensorsOnly, Simulated};
+use vines_testbench::scene::{LinearResponse, Override, Scene};
 
 /// Any error of a study.
 pub type Failure = Box<dyn std::error::Error + Send + Sync>;
@@ -89,4 +96,64 @@ pub fn write(name: &str, header: &str, key: usize, rows: &[String]) -> Result<()
         .collect();
     println!("{header}\n{}", rows.join("\n"));
     Ok(fs::write(path, lines.join("\n") + "\n")?)
+}
+
+/// The backbone of a rig of these epsilon, lambda and r with M = k = b = 1, tracked from sensor readings alone by a client whose scene differs:
+/// `scales` are its relative errors of k, c, m, b and r. Returns that scene as well.
+pub fn tracked(
+    [epsilon, lambda, r]: [f64; 3],
+    noise: u64,
+    snr: &str,
+    [k, c, m, b, dr]: [f64; 5],
+) -> Result<(Tracked, Scene), Failure> {
+    let d = Dimensionless::new(epsilon, lambda, r, 0.0);
+    let [low, high] = advice::stable_range(&d).ok_or("no stable orbit")?;
+    let g = 0.5 * (low + high);
+    let curve = ExactCurve::of(&d);
+    let stable = advice::largest_stable(&d).ok_or("no stable orbit")?;
+    let fold = curve.places().first().ok_or("no backbone")?[0];
+    let (from, to) = (0.95 * stable.min(0.75), 1.05 * fold);
+    // The rig with M = k = b = 1, and the scene of the client in SI units.
+    let truth = Parameters {
+        primary_mass: 1.0,
+        stiffness: 1.0,
+        damping: epsilon * lambda,
+        particle_mass: epsilon,
+        half_width: 1.0,
+        restitution: r,
+    };
+    let width = 1.0 + b;
+    let settings = [
+        format!("plant.M={:?}", 1.0),
+        format!("plant.k={:?}", 1.0 + k),
+        format!("plant.c={:?}", epsilon * lambda * (1.0 + c)),
+        format!("plant.m={:?}", epsilon * (1.0 + m)),
+        format!("plant.b={width:?}"),
+        format!("plant.r={:?}", r * (1.0 + dr)),
+        format!("excitation.E={:?}", g * epsilon),
+        "start.dq2=0.9".into(),
+        "controller.omega_min=0.8".into(),
+        "controller.omega_max=1.2".into(),
+        format!("backbone.C_from={:?}", from / width),
+        format!("backbone.C_to={:?}", to / width),
+        "backbone.G_max=20".into(),
+    ];
+    let chain = [format!("chain.snr={snr}"), format!("chain.seed={noise}")];
+    let mut scene = scene("[plant]\n[start]\n[excitation]\n", &[&settings[..], &chain].concat())?;
+    scene.measured = Some(LinearResponse {
+        omega0: 1.0,
+        damping_rate: 0.5 * epsilon * lambda,
+        uncertainty: 0.0,
+        gain: LinearResponse::of(&scene).gain,
+    });
+    let rig = Simulated::new(truth, scene.start)?;
+    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
+    let mut controller = BuiltIn::new(&scene.backbone_config())?;
+    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {})?;
+    Ok((tracked, scene))
+}
+
+/// Whether a point counts as one of the backbone.
+pub fn is_kept(point: &&Point) -> bool {
+    point.settled && matches!(point.regime, Regime::Symmetric | Regime::Unresolved)
 }

@@ -12,18 +12,10 @@
 
 mod common;
 
-use common::{Failure, Found, STATISTICS, arguments, quantile, scene, statistics, uniform, write};
-use lovines::Parameters;
+use common::{Failure, Found, STATISTICS, arguments, is_kept, quantile, statistics, tracked, uniform, write};
 use rayon::prelude::*;
 use vines_model::Dimensionless;
-use vines_testbench::{
-    advice,
-    backbone::{Point, track},
-    comparison::ExactCurve,
-    identification::Regime,
-    rig::{BuiltIn, Chain, SensorsOnly, Simulated},
-    scene::LinearResponse,
-};
+use vines_testbench::comparison::ExactCurve;
 
 fn main() -> Result<(), Failure> {
     let [count, seed, snr, shift] = &arguments()[..] else {
@@ -53,55 +45,12 @@ fn main() -> Result<(), Failure> {
 }
 
 /// Counts the points, the settled ones, and whether tracking ended early.
-fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, [k, c, m, b, dr]: [f64; 5]) -> Result<Found, Failure> {
-    let d = Dimensionless::new(epsilon, lambda, r, 0.0);
-    let [low, high] = advice::stable_range(&d).ok_or("no stable orbit")?;
-    let g = 0.5 * (low + high);
-    let curve = ExactCurve::of(&d);
-    let stable = advice::largest_stable(&d).ok_or("no stable orbit")?;
-    let fold = curve.places().first().ok_or("no backbone")?[0];
-    let (from, to) = (0.95 * stable.min(0.75), 1.05 * fold);
-    // The rig with M = k = b = 1, and the scene of the client in SI units.
-    let truth = Parameters {
-        primary_mass: 1.0,
-        stiffness: 1.0,
-        damping: epsilon * lambda,
-        particle_mass: epsilon,
-        half_width: 1.0,
-        restitution: r,
-    };
-    let width = 1.0 + b;
-    let settings = [
-        format!("plant.M={:?}", 1.0),
-        format!("plant.k={:?}", 1.0 + k),
-        format!("plant.c={:?}", epsilon * lambda * (1.0 + c)),
-        format!("plant.m={:?}", epsilon * (1.0 + m)),
-        format!("plant.b={width:?}"),
-        format!("plant.r={:?}", r * (1.0 + dr)),
-        format!("excitation.E={:?}", g * epsilon),
-        "start.dq2=0.9".into(),
-        "controller.omega_min=0.8".into(),
-        "controller.omega_max=1.2".into(),
-        format!("backbone.C_from={:?}", from / width),
-        format!("backbone.C_to={:?}", to / width),
-        "backbone.G_max=20".into(),
-    ];
-    let chain = [format!("chain.snr={snr}"), format!("chain.seed={noise}")];
-    let mut scene = scene("[plant]\n[start]\n[excitation]\n", &[&settings[..], &chain].concat())?;
-    scene.measured = Some(LinearResponse {
-        omega0: 1.0,
-        damping_rate: 0.5 * epsilon * lambda,
-        uncertainty: 0.0,
-        gain: LinearResponse::of(&scene).gain,
-    });
-    let rig = Simulated::new(truth, scene.start)?;
-    let mut rig = SensorsOnly::around(Chain::around(Box::new(rig), &scene));
-    let mut controller = BuiltIn::new(&scene.backbone_config())?;
-    let tracked = track(&mut rig, &mut controller, &scene, |_, _| {})?;
+fn run([epsilon, lambda, r]: [f64; 3], noise: u64, snr: &str, scales: [f64; 5]) -> Result<Found, Failure> {
+    let curve = ExactCurve::of(&Dimensionless::new(epsilon, lambda, r, 0.0));
+    let (tracked, scene) = tracked([epsilon, lambda, r], noise, snr, scales)?;
+    let width = scene.plant.half_width;
     let own = scene.dimensionless();
     let (mut ratios, mut errors, mut settled) = (vec![], vec![], 0);
-    let is_backbone = |regime| matches!(regime, Regime::Symmetric | Regime::Unresolved);
-    let is_kept = |point: &&Point| point.settled && is_backbone(point.regime);
     for point in tracked.points.iter().filter(is_kept) {
         settled += 1;
         // In units of the rig.

@@ -5,8 +5,453 @@
 //! the *response*, and the drive follows. The points before predict drive and frequency of the next one,
 //! so that the loops have little to correct.
 
-mod level;
-mod track;
+use std::f64::consts::TAU;
 
-pub use level::{Criterion, Found};
-pub use track::{Point, Tracked, track, track_into};
+use serde::Serialize;
+use vines_model::numerics::{Estimate, RANDOM};
+
+use crate::experiment::{self, ExperimentError, Search, Stage};
+use crate::identification::{
+    Balance, Cycle, Measured, Regime, Slopes, Tone, classify, foreign_tone, regime_by_response,
+};
+use crate::record::Sample;
+use crate::rig::{Controller, Move, Rig};
+use crate::scene::{LinearResponse, Scene};
+
+// One level: the window of the fit, and the judge of whether the motion is steady.
+//
+// The balances ([`Balance`]) give drive and frequency of phase resonance from any window of periods, with their standard uncertainties.
+// What is not noise shows as a difference between the two halves of the window beyond their noise; it counts as a part of the
+// uncertainty. A level is settled when the uncertainties are as small as the scene asks: noise lengthens the window, and so does a
+// transient.
+
+/// What is asked of a level.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Criterion {
+    /// Linear response of the rig.
+    pub linear: LinearResponse,
+    /// Largest standard uncertainty of the drive E, as a share of it, and of the frequency, as a share of `omega0 E/A` at the largest level A.
+    pub precision: f64,
+    /// The largest level, m.
+    pub largest: f64,
+    /// The last two points before, the nearest last: amplitude of the response, m, drive, m, and frequency, rad/s.
+    pub before: [Option<[f64; 3]>; 2],
+}
+
+/// A point of the backbone from a window of periods.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LevelEstimate {
+    /// How many periods.
+    pub periods: usize,
+    /// Mean amplitude of the response, m.
+    pub response: Estimate,
+    /// Mean phase error, rad.
+    pub phase_error: Estimate,
+    /// Drive, m, and frequency, rad/s, of phase resonance at this amplitude.
+    pub at: [Estimate; 2],
+    /// Whether what is left is noise: the fit describes the window, and the rest is within the precision.
+    pub steady: bool,
+}
+
+/// Largest mean phase error, rad: the balances are of the first order in it. At epsilon = 0.02 beside the
+/// fold, 0.03 rad change sigma at equal C by 1.1e-3.
+const BESIDE: f64 = 0.02;
+/// Periods by which the impacts follow a change of the amplitude late: the errors of clean points, over slope and rate, are 0.8 to 1.6 periods
+/// (studies/off_scene.rs).
+const LAG: f64 = 1.6;
+/// Largest scatter of the periods about the fit, over the noise of the sensors: chi-square per degree of freedom is then at most 4.
+const EXCESS: f64 = 2.0;
+/// Relative standard uncertainty of the slope of a straight line through two points: away from the fold it changes by less from level to level.
+const SLOPE: f64 = 0.5;
+/// Shares of the periods that are considered, from the last one backwards.
+const WINDOWS: [f64; 3] = [1.0, 0.7, 0.5];
+
+impl Criterion {
+    /// The window with the smallest uncertainties, from the last of these periods backwards; `None` for too few.
+    #[must_use]
+    pub fn best(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
+        let n = cycles.len();
+        let counts = WINDOWS.map(|share| (share * n as f64).round() as usize);
+        let considered = counts.into_iter().filter(|count| *count >= 2 * Balance::FEWEST);
+        considered
+            .filter_map(|count| self.of(&cycles[n - count..]))
+            .filter(|estimate| estimate.at.iter().all(|one| (one.value + one.uncertainty).is_finite()))
+            .min_by(|one, other| self.size(one).total_cmp(&self.size(other)))
+    }
+
+    /// Whether the uncertainties are small enough, and the phase is near its target.
+    #[must_use]
+    pub fn is_met(&self, estimate: &LevelEstimate) -> bool {
+        let Estimate { value, uncertainty } = estimate.phase_error;
+        self.size(estimate) <= 1.0 && value.abs() <= BESIDE + RANDOM * uncertainty
+    }
+
+    /// Largest uncertainty over the largest allowed.
+    fn size(&self, estimate: &LevelEstimate) -> f64 {
+        let allowed = self.allowed(estimate.at[0].value);
+        let [base, omega] = [0, 1].map(|i| estimate.at[i].uncertainty / allowed[i]);
+        base.max(omega)
+    }
+
+    /// Largest uncertainties allowed of the drive, m, and of the frequency, rad/s, at this drive, m.
+    fn allowed(&self, drive: f64) -> [f64; 2] {
+        let (base, omega0) = (self.precision * drive.abs(), self.linear.omega0);
+        [base, omega0 * base / self.largest]
+    }
+
+    /// Slopes of drive and frequency over the amplitude at a point: of the parabola through it and the two before, with its distance from the
+    /// line through it and the one before as a part of the uncertainty. `None` for the first point.
+    fn slopes(&self, here: [f64; 3]) -> Option<[Estimate; 2]> {
+        let [before, last] = self.before;
+        let last = last?;
+        let between = |one: [f64; 3], other: [f64; 3]| [1, 2].map(|i| (other[i] - one[i]) / (other[0] - one[0]));
+        let line = between(last, here);
+        let bend = before.map_or([0.0; 2], |before| {
+            let earlier = between(before, last);
+            let ahead = (here[0] - last[0]) / (here[0] - before[0]);
+            [0, 1].map(|i| (line[i] - earlier[i]) * ahead)
+        });
+        let slopes = [0, 1].map(|i| Estimate::new(line[i] + bend[i], &[bend[i], SLOPE * line[i]]));
+        slopes.iter().all(|slope| slope.value.is_finite()).then_some(slopes)
+    }
+
+    /// The point of a window.
+    fn of(&self, cycles: &[Cycle]) -> Option<LevelEstimate> {
+        let fit = |cycles: &[Cycle], slopes| Balance::of(cycles, &self.linear, slopes);
+        let whole = fit(cycles, Slopes::Unknown)?;
+        let [base, omega] = whole.at(0.0).map(|one| one.value);
+        let known = self.slopes([whole.response.value, base, omega]);
+        let slopes = known.map_or(Slopes::Unknown, Slopes::Known);
+        let (first, second) = cycles.split_at(cycles.len() / 2);
+        let (whole, first, second) = (fit(cycles, slopes)?, fit(first, slopes)?, fit(second, slopes)?);
+        let amplitude = whole.response.value;
+        let [first, second] = [first, second].map(|half| half.at(amplitude - half.response.value));
+        let (estimates, own) = (whole.at(0.0), whole.slopes());
+        let slope = |i: usize| {
+            let known = known.map_or(0.0, |slopes| slopes[i].value.abs());
+            own[i].value.abs().max(known).hypot(own[i].uncertainty)
+        };
+        // What is not noise belongs to the force of the impacts, a phasor: what is seen of it in one balance may be in the other, too.
+        let (units, change) = ([1.0, amplitude / whole.gain], LAG * whole.change);
+        let systematic = [0, 1].map(|i| {
+            let noise = first[i].uncertainty.hypot(second[i].uncertainty);
+            let drift = ((first[i].value - second[i].value).abs() - RANDOM * noise).max(0.0);
+            let late = slope(i) * change;
+            units[i] * drift.hypot(late)
+        });
+        let systematic = systematic[0].hypot(systematic[1]);
+        let at = [0, 1].map(|i| {
+            // The noise of the amplitude moves drive and frequency along their slopes.
+            let aside = slope(i) * whole.u_level;
+            let one = estimates[i];
+            Estimate::new(
+                one.value,
+                &[one.uncertainty, aside, systematic / units[i], whole.remainders[i]],
+            )
+        });
+        let allowed = self.allowed(at[0].value);
+        Some(LevelEstimate {
+            periods: cycles.len(),
+            response: whole.response,
+            phase_error: whole.phase_error,
+            at,
+            steady: whole.excess <= EXCESS && systematic <= allowed[0].min(units[1] * allowed[1]),
+        })
+    }
+}
+
+impl LevelEstimate {
+    /// Means over the periods, of a motion that no balance describes.
+    #[must_use]
+    pub fn means(cycles: &[Cycle]) -> Self {
+        let mean = |value: &dyn Fn(&Cycle) -> f64| Estimate::mean(&cycles.iter().map(value).collect::<Vec<f64>>());
+        Self {
+            periods: cycles.len(),
+            response: mean(&Cycle::amplitude),
+            phase_error: mean(&|cycle| cycle.phase_error),
+            at: [mean(&|cycle| cycle.base.norm()), mean(&|cycle| cycle.omega)],
+            steady: false,
+        }
+    }
+}
+
+// The tracking of the backbone.
+
+/// One point of the backbone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Point {
+    /// Where it is; frequency and base amplitude are those of phase resonance at this response amplitude.
+    #[serde(flatten)]
+    pub at: Measured,
+    /// Target level, over b.
+    pub level: f64,
+    /// Periods of the move to this level and at this level.
+    pub periods: f64,
+    /// Periods averaged.
+    pub averaged: usize,
+    /// The motion was steady within these uncertainties, on the level, and neither irregular nor asymmetric; otherwise the point was taken at the
+    /// time limit.
+    pub settled: bool,
+    /// The response reached the level; otherwise the drive was at a limit, or the time too short.
+    pub reached: bool,
+    /// The regime determined from the response alone, as on a real rig.
+    pub regime: Regime,
+    /// The regime determined from the impacts, if the rig is a simulation.
+    pub regime_by_impacts: Option<Regime>,
+    /// A tone in the response that is not part of the motion.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub tone: Option<Tone>,
+}
+
+/// The tracked backbone.
+#[derive(Debug)]
+pub struct Tracked {
+    /// The points, in the order in which they were taken.
+    pub points: Vec<Point>,
+    /// Periods from the start to the closed loop.
+    pub periods_to_lock: f64,
+    /// All periods, from the start to the last point.
+    pub periods: f64,
+    /// Why tracking ended before the last level; absent if it did not.
+    pub ended: Option<ExperimentError>,
+}
+
+/// Where the loop holds the rig: response amplitude, m, drive amplitude, m, frequency, rad/s.
+type Held = [f64; 3];
+
+/// Periods between a move and the first that is measured: the loops and the particle follow late.
+const LATE: usize = 8;
+/// Periods of the first level more than those, because the start of the loop disturbs the particle, too.
+const FIRST: usize = 24;
+/// Periods in succession in which the criterion must be met: the halves of a transient can agree by chance.
+const CONFIRMED: usize = 3;
+/// Share of the drive that a move may need in addition to the drive that holds the response.
+const MOVE_SHARE: f64 = 0.8;
+/// Duration of a move, periods.
+const MOVE: f64 = 4.0;
+/// Largest relative difference of the response from its level that counts as reached.
+const REACHED: f64 = 0.01;
+
+/// Rig and controller, read period by period.
+struct Tracker<'a, R: Rig + ?Sized, C: ?Sized> {
+    run: experiment::ControlLoop<'a, R, C>,
+    scene: &'a Scene,
+    stage: Stage,
+    /// Phase target, rad.
+    target: f64,
+    /// Where the loop was closed.
+    closed: Held,
+    /// The points so far.
+    states: Vec<Held>,
+    points: Vec<Point>,
+}
+
+/// Tracks the backbone of `scene`.
+///
+/// # Errors
+/// A failure of the rig or of the controller, or no lock in the time allowed.
+pub fn track(
+    rig: &mut (impl Rig + ?Sized),
+    controller: &mut (impl Controller + ?Sized),
+    scene: &Scene,
+    progress: impl FnMut(usize, usize),
+) -> Result<Tracked, ExperimentError> {
+    track_into(&mut Vec::new(), rig, controller, scene, progress)
+}
+
+/// As [`track`]; if it ends before the first point, what was measured last stays in `samples`.
+///
+/// # Errors
+/// As [`track`].
+pub fn track_into(
+    samples: &mut Vec<Sample>,
+    rig: &mut (impl Rig + ?Sized),
+    controller: &mut (impl Controller + ?Sized),
+    scene: &Scene,
+    progress: impl FnMut(usize, usize),
+) -> Result<Tracked, ExperimentError> {
+    experiment::holds_a_phase(scene)?;
+    let mut tracker = Tracker {
+        run: experiment::ControlLoop::new(rig, controller, scene, samples),
+        scene,
+        stage: Stage::Locking,
+        target: scene.controller.phase_target_radians(),
+        closed: [0.0; 3],
+        states: Vec::new(),
+        points: Vec::new(),
+    };
+    tracker.approach()?;
+    let periods_to_lock = tracker.run.periods;
+    tracker.stage = Stage::Tracking;
+    let mut ended = tracker.follow(progress).err();
+    // What was measured is kept.
+    if let Some(error) = ended.take_if(|_| tracker.points.is_empty()) {
+        return Err(error);
+    }
+    let (points, periods) = (std::mem::take(&mut tracker.points), tracker.run.periods);
+    Ok(Tracked { points, periods_to_lock, periods, ended })
+}
+
+impl<R: Rig + ?Sized, C: Controller + ?Sized> Tracker<'_, R, C> {
+    /// One period of the drive.
+    fn cycle(&mut self) -> Result<Cycle, ExperimentError> {
+        loop {
+            let begin = self.run.samples.len();
+            let first = self.run.periods;
+            while self.run.periods < first.floor() + 1.0 {
+                self.run.sample(self.stage)?;
+            }
+            let samples = &self.run.samples[begin..];
+            if let Some(cycle) = Cycle::of(samples, self.run.sample_time, first * TAU, self.target) {
+                return Ok(cycle);
+            }
+        }
+    }
+
+    /// Goes to a symmetric motion with impacts, if there is one.
+    fn approach(&mut self) -> Result<(), ExperimentError> {
+        let scene = self.scene;
+        let limit = (scene.lock_periods() * scene.controller.samples_per_period) as usize;
+        Search::new(&mut self.run, scene, limit, &mut |_| {}).impacts()?;
+        let cycle = self.cycle()?;
+        self.closed = [cycle.amplitude(), cycle.base.norm(), cycle.omega];
+        Ok(())
+    }
+
+    /// Goes through the levels.
+    fn follow(&mut self, mut progress: impl FnMut(usize, usize)) -> Result<(), ExperimentError> {
+        let levels = self.scene.levels();
+        for (n, &level) in levels.iter().enumerate() {
+            progress(n, levels.len());
+            let before = n
+                .checked_sub(1)
+                .map(|before| (levels[before], self.points[before].regime));
+            let point = self.hold(level)?;
+            self.points.push(point);
+            if let Some((held, Regime::Symmetric | Regime::Unresolved)) = before
+                && matches!(point.regime, Regime::NoImpacts | Regime::Other)
+            {
+                let b = self.scene.plant.half_width;
+                return Err(ExperimentError::MotionLost { held, level, b, regime: point.regime });
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes to a level, m, and holds it until the point has settled, or for the longest time allowed.
+    fn hold(&mut self, level: f64) -> Result<Point, ExperimentError> {
+        let (start, settings) = (self.run.periods, &self.scene.backbone);
+        let (to, periods) = self.step(level);
+        self.run.controller.hold_response(to, self.target)?;
+        self.run.samples.clear();
+        let late = if self.states.is_empty() { FIRST + LATE } else { LATE };
+        while self.run.periods - start < periods + late as f64 {
+            self.cycle()?;
+        }
+        let criterion = self.criterion();
+        let mut cycles: Vec<Cycle> = Vec::new();
+        let mut confirmed = 0;
+        let estimate = loop {
+            cycles.push(self.cycle()?);
+            let estimate = criterion.best(&cycles);
+            let is_met =
+                estimate.is_some_and(|estimate| criterion.is_met(&estimate) && is_reached(estimate.response, level));
+            confirmed = if is_met { confirmed + 1 } else { 0 };
+            if cycles.len() >= settings.dwell_max as usize || confirmed >= CONFIRMED {
+                break estimate;
+            }
+        };
+        let estimate = estimate.unwrap_or_else(|| LevelEstimate::means(&cycles[cycles.len() / 2..]));
+        let [drive, omega] = estimate.at.map(|one| one.value);
+        if drive.is_finite() && omega.is_finite() {
+            self.states.push([estimate.response.value, drive, omega]);
+        }
+        Ok(self.point(level, start, &estimate, &cycles, &criterion))
+    }
+
+    /// The move to a level, m, and its periods: those of the scene, or as many as the drive needs to change the response that much.
+    fn step(&self, level: f64) -> (Move, f64) {
+        let omega0 = self.scene.linear().omega0;
+        let [response, drive, omega] = *self.states.last().unwrap_or(&self.closed);
+        let slowest = (level - response).abs() / (MOVE_SHARE * 0.5 * drive * TAU);
+        // A smooth move is twice as fast in its middle as on average.
+        let periods = MOVE.max(2.0 * slowest);
+        let expected = extrapolated(&self.states, level);
+        let [amplitude, omega] = expected.map_or([0.0; 2], |there| [there[0] - drive, there[1] - omega]);
+        let to = Move {
+            response: level,
+            duration: periods * TAU / omega0,
+            amplitude,
+            omega,
+            growth: 0.0,
+        };
+        (to, periods)
+    }
+
+    /// The point of an estimate from the last of some periods, for a move that began at `start`, in periods.
+    fn point(
+        &self,
+        level: f64,
+        start: f64,
+        estimate: &LevelEstimate,
+        cycles: &[Cycle],
+        criterion: &Criterion,
+    ) -> Point {
+        let d = self.scene.dimensionless();
+        let samples = cycles[cycles.len() - estimate.periods..]
+            .iter()
+            .map(|cycle| cycle.samples);
+        let averaged = &self.run.samples[self.run.samples.len() - samples.sum::<usize>()..];
+        let [base, omega] = estimate.at;
+        let regime = regime_by_response(averaged, self.scene, base.value, self.target, omega.value);
+        let reached = is_reached(estimate.response, level);
+        Point {
+            at: Measured::new([estimate.response, base, omega, estimate.phase_error], &d),
+            // The level as a person would write it.
+            level: (1e9 * level / d.b).round() / 1e9,
+            periods: self.run.periods - start,
+            averaged: estimate.periods,
+            // An irregular motion can seem steady for a while; an asymmetric one is no point of this backbone.
+            settled: reached
+                && !matches!(regime, Regime::Other | Regime::Asymmetric)
+                && (estimate.steady || criterion.is_met(estimate)),
+            reached,
+            regime,
+            regime_by_impacts: self.run.samples[0]
+                .ground_truth
+                .map(|_| classify(averaged, self.run.sample_time, omega.value).1),
+            tone: foreign_tone(averaged, self.scene, omega.value),
+        }
+    }
+
+    /// The criterion for a settled point.
+    fn criterion(&self) -> Criterion {
+        let before = |back: usize| self.states.iter().nth_back(back).copied();
+        Criterion {
+            linear: self.scene.linear(),
+            precision: self.scene.backbone.precision,
+            largest: self.scene.levels().into_iter().fold(0.0, f64::max),
+            before: [before(1), before(0)],
+        }
+    }
+}
+
+/// Whether a response, m, is at the level, m.
+fn is_reached(Estimate { value, uncertainty }: Estimate, level: f64) -> bool {
+    (value - level).abs() <= (REACHED * level).max(4.0 * uncertainty)
+}
+
+/// Drive, m, and frequency, rad/s, at the amplitude `response`, m, on the polynomial through the last points, three at most; `None` without any.
+fn extrapolated(states: &[Held], response: f64) -> Option<[f64; 2]> {
+    let points = &states[states.len().saturating_sub(3)..];
+    let weights = points.iter().enumerate().map(|(i, point)| {
+        let others = points.iter().enumerate().filter(|(j, _)| *j != i);
+        others
+            .map(|(_, other)| (response - other[0]) / (point[0] - other[0]))
+            .product::<f64>()
+    });
+    let expected = points.iter().zip(weights).fold([0.0; 2], |sum, (point, weight)| {
+        [sum[0] + weight * point[1], sum[1] + weight * point[2]]
+    });
+    (!points.is_empty() && expected.iter().all(|one| one.is_finite())).then_some(expected)
+}

@@ -1,20 +1,16 @@
 //! Measurements beside first-order theory and exact orbits at the same parameters.
 
-mod decay;
-mod exact_curve;
-mod tracked;
-
+use lovines::State;
 use serde::Serialize;
-use vines_model::Dimensionless;
-use vines_model::numerics::mean_square;
-use vines_model::orbit::{self, Orbit};
-use vines_model::theory::{BackbonePoint, free_sigma, resonant};
+use vines_model::numerics::{golden_section, mean_square};
+use vines_model::orbit::{self, Limits, Orbit, backbone};
+use vines_model::theory::{BackbonePoint, BranchSide, SlowFlow, free_sigma, resonant};
 
-use crate::identification::{DecayEnd, DecayPoint, Identification, Lock};
-use crate::scene::Scene;
-
-pub use exact_curve::{Distance, ExactCurve};
-pub use tracked::{TrackedComparison, TrackedPoint, Worst};
+use crate::backbone::{Point, Tracked};
+use crate::identification::{DecayEnd, DecayPoint, Identification, Lock, Regime, decay_points};
+use crate::record::{Record, Sample};
+use crate::rig::{Command, Drive, Rig, Simulated};
+use crate::scene::{Dimensionless, Scene};
 
 /// Amplitudes above which the decay is compared with theory, C.
 ///
@@ -82,7 +78,7 @@ impl Comparison {
         let exact = nearest(&orbits, &lock);
         let curve = ExactCurve::of(&parameters);
         let samples = crate::experiment::Plan::of(scene).decay;
-        let predicted = exact.map_or(Vec::new(), |orbit| decay::predicted(&orbit, scene, samples));
+        let predicted = exact.map_or(Vec::new(), |orbit| predicted(&orbit, scene, samples));
         let decay: Vec<ComparedPoint> = found
             .decay
             .points
@@ -91,8 +87,8 @@ impl Comparison {
                 point: *point,
                 sigma_theory: free_sigma(&parameters, point.c),
                 sigma_exact: curve.at(point.c).map(|[sigma, _]| sigma),
-                sigma_slow_flow: decay::by_slow_flow(&parameters, point.c),
-                sigma_predicted: decay::sigma_at(&predicted, point.c),
+                sigma_slow_flow: by_slow_flow(&parameters, point.c),
+                sigma_predicted: sigma_at(&predicted, point.c),
             })
             .collect();
         Self {
@@ -135,4 +131,269 @@ fn rms(points: &[ComparedPoint], error: impl Fn(&ComparedPoint) -> Option<f64>) 
         .filter_map(error);
     let mean_square = mean_square(errors);
     (!mean_square.is_nan()).then(|| mean_square.sqrt())
+}
+
+// Distance of measured points from the exact backbone.
+
+/// Largest step along the curve, which bounds the error of the polygon to 1e-5.
+const STEP: f64 = 4e-3;
+/// Largest particle speed of the curve: beyond symmetry breaking.
+const SPEED_MAX: f64 = 1.35;
+
+/// The exact backbone beyond the fold as a fine polygon, by increasing particle speed.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ExactCurve {
+    /// C, sigma and G.
+    places: Vec<[f64; 3]>,
+}
+
+/// Difference of a point from the exact backbone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Distance {
+    /// Largest of the differences in C, sigma and G, at the place on the curve where it is smallest.
+    pub nearest: f64,
+    /// Difference in sigma at the same C; absent outside the curve.
+    pub sigma: Option<f64>,
+    /// Difference in G at the same C; absent as above.
+    #[serde(rename = "G")]
+    pub g: Option<f64>,
+}
+
+impl ExactCurve {
+    /// The curve of a scene.
+    pub fn of(scene: &Dimensionless) -> Self {
+        let limits = Limits { step: STEP, points: 20_000, ..Limits::default() };
+        let mut points = backbone(scene, &limits).map_or(Vec::new(), |branch| branch.points);
+        if points
+            .first()
+            .zip(points.last())
+            .is_some_and(|(first, last)| first.b > last.b)
+        {
+            points.reverse();
+        }
+        // From the fold on: C rises with B there.
+        let fold = (0..points.len()).min_by(|&a, &b| points[a].c.total_cmp(&points[b].c));
+        let rising = points.into_iter().skip(fold.unwrap_or(0));
+        let places = rising
+            .take_while(|one| one.b < SPEED_MAX)
+            .map(|one| [one.c, one.sigma, one.g]);
+        Self { places: places.collect() }
+    }
+
+    /// C, sigma and G of its orbits, from the fold on.
+    pub fn places(&self) -> &[[f64; 3]] {
+        &self.places
+    }
+
+    /// `[sigma, G]` at the amplitude `c`; `None` outside the curve.
+    pub fn at(&self, c: f64) -> Option<[f64; 2]> {
+        let pair = self
+            .places
+            .windows(2)
+            .rfind(|pair| (pair[0][0] - c) * (pair[1][0] - c) <= 0.0 && pair[0][0] != pair[1][0])?;
+        let x = (c - pair[0][0]) / (pair[1][0] - pair[0][0]);
+        Some([1, 2].map(|i| pair[0][i] + x * (pair[1][i] - pair[0][i])))
+    }
+
+    /// How far `(C, sigma, G)` lies from the curve; `None` where there is no curve.
+    pub fn distance(&self, c: f64, sigma: f64, g: f64) -> Option<Distance> {
+        let segments = self
+            .places
+            .windows(2)
+            .map(|pair| to_segment([c, sigma, g], pair[0], pair[1]));
+        let nearest = segments.reduce(f64::min)?;
+        let same = self.at(c);
+        Some(Distance {
+            nearest,
+            sigma: same.map(|[exact, _]| sigma - exact),
+            g: same.map(|[_, exact]| g - exact),
+        })
+    }
+}
+
+/// Smallest value, over a segment, of the largest difference; it is convex along the segment.
+fn to_segment(point: [f64; 3], from: [f64; 3], to: [f64; 3]) -> f64 {
+    let largest = |x: f64| {
+        (0..3)
+            .map(|i| (point[i] - from[i] - x * (to[i] - from[i])).abs())
+            .fold(0.0, f64::max)
+    };
+    let nearest = golden_section(0.0, 1.0, largest);
+    [nearest, 0.0, 1.0]
+        .map(largest)
+        .into_iter()
+        .fold(f64::INFINITY, f64::min)
+}
+
+// A tracked backbone beside the exact one.
+
+/// A tracked backbone beside the exact one.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct TrackedComparison {
+    /// The numbers all of this belongs to.
+    pub parameters: Dimensionless,
+    /// Periods from the start to the closed loop.
+    pub periods_to_lock: f64,
+    /// All periods, from the start to the last point.
+    pub periods: f64,
+    /// The points, each beside the exact curve.
+    pub points: Vec<TrackedPoint>,
+    /// The exact backbone that the points are compared with.
+    #[serde(skip)]
+    pub exact: ExactCurve,
+}
+
+/// A point and its distance from the exact backbone; absent without an exact backbone.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct TrackedPoint {
+    /// The point.
+    #[serde(flatten)]
+    pub point: Point,
+    /// Its distance.
+    pub exact: Option<Distance>,
+}
+
+impl TrackedComparison {
+    /// Compares the points with the exact backbone of the scene; not where the loop holds another phase than that of resonance.
+    pub fn of(tracked: &Tracked, scene: &Scene) -> Self {
+        let parameters = scene.dimensionless();
+        let curve = ExactCurve::of(&parameters);
+        let exact = |point: &Point| curve.distance(point.at.c, point.at.sigma, point.at.g);
+        let compare = |point: &Point| TrackedPoint {
+            point: *point,
+            exact: Some(point)
+                .filter(|_| scene.controller.is_at_phase_resonance())
+                .and_then(exact),
+        };
+        Self {
+            points: tracked.points.iter().map(compare).collect(),
+            periods_to_lock: tracked.periods_to_lock,
+            periods: tracked.periods,
+            parameters,
+            exact: curve,
+        }
+    }
+
+    /// All periods, the lock included, over the number of points.
+    pub fn periods_per_point(&self) -> f64 {
+        self.periods / self.points.len() as f64
+    }
+
+    /// Why these points are no backbone of a motion with impacts: a settled point, or all points, without evidence of impacts.
+    pub fn doubt(&self) -> Option<String> {
+        let regime = |one: &TrackedPoint| one.point.regime_by_impacts.unwrap_or(one.point.regime);
+        let count = |wanted: Regime| self.points.iter().filter(|one| regime(one) == wanted).count();
+        let [linear, doubtful] = [Regime::NoImpacts, Regime::NotEstablished].map(count);
+        let of = self.points.len();
+        let is_settled = |one: &TrackedPoint| one.point.settled && regime(one) == Regime::NotEstablished;
+        if linear == of {
+            return Some(format!(
+                "all {of} points are without impacts (the linear mode): the particle does not reach the walls. Check that it moves freely; give \
+                 it a velocity in [start]"
+            ));
+        }
+        (linear + doubtful == of || self.points.iter().any(is_settled)).then(|| {
+            format!(
+                "the regime of {doubtful} of {of} points is not established: neither their third harmonic nor a distance from the linear response \
+                 that the loop check measures is evidence of impacts. Check that the particle moves freely; do not skip the loop check; reduce \
+                 noise that hides the harmonic"
+            )
+        })
+    }
+
+    /// Largest error at equal C, in sigma or G, and largest distance from the exact backbone, of the settled points.
+    pub fn worst(&self) -> Option<Worst> {
+        let errors = self.points.iter().filter(|one| one.point.settled).filter_map(|one| {
+            let Distance { nearest, sigma, g } = one.exact?;
+            let at_equal_c = sigma?.abs().max(g?.abs());
+            Some(Worst { at_equal_c, nearest })
+        });
+        errors.reduce(|one, other| Worst {
+            at_equal_c: one.at_equal_c.max(other.at_equal_c),
+            nearest: one.nearest.max(other.nearest),
+        })
+    }
+}
+
+/// Largest errors of the points of a tracked backbone.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Worst {
+    /// Largest difference in sigma or G from the exact backbone at the same C.
+    pub at_equal_c: f64,
+    /// Largest distance from the nearest place of the exact backbone: the largest of the differences in C, sigma and G there.
+    pub nearest: f64,
+}
+
+// The decay as theory and the exact plant predict it, integrated forward.
+
+/// The decay of the scene's plant from `orbit` on, over `samples` samples, as it would be identified without noise; without points if the plant
+/// refuses the scene.
+fn predicted(orbit: &Orbit, scene: &Scene, samples: usize) -> Vec<DecayPoint> {
+    let (d, step) = (scene.dimensionless(), scene.sample_time());
+    let start = orbit.start;
+    let [q1, q2] = [start.q1, start.q2].map(|length| length * d.b);
+    let [dq1, dq2] = [start.dq1, start.dq2].map(|velocity| velocity * d.b * d.omega0);
+    let Ok(plant) = Simulated::new(scene.plant, State { q1, dq1, q2, dq2 }) else {
+        return Vec::new();
+    };
+    let mut rig = plant.with_sensors(scene.resonance);
+    let mut sample = |n: usize| -> Option<Sample> {
+        let sample = Sample {
+            time: n as f64 * step,
+            sensors: rig.sense().ok()?,
+            command: Command {
+                drive: Drive { omega: d.omega0 * orbit.omega, ..Drive::default() },
+                ..Command::default()
+            },
+            ground_truth: rig.ground_truth().ok()?,
+        };
+        rig.advance(Drive::default(), step).ok()?;
+        Some(sample)
+    };
+    // The first sample stands for the hold, which gives the frequency at the release.
+    let samples = (0..samples + 1).map_while(&mut sample).collect();
+    let record = Record {
+        sample_time: step,
+        samples,
+        settled: 0,
+        released: 1,
+        held: false,
+    };
+    decay_points(&record, scene).points
+}
+
+/// sigma at the amplitude `c` along falling amplitudes; `None` outside.
+fn sigma_at(points: &[DecayPoint], c: f64) -> Option<f64> {
+    let pair = points
+        .windows(2)
+        .find(|pair| pair[0].c >= c && c >= pair[1].c && pair[0].c > pair[1].c)?;
+    let share = (pair[0].c - c) / (pair[0].c - pair[1].c);
+    Some(pair[0].sigma + share * (pair[1].sigma - pair[0].sigma))
+}
+
+/// sigma of the slow flow at the amplitude `c` along the free decay: that of the backbone, and of the first order in the rate of the decay;
+/// `None` where there is no 1:1 motion.
+fn by_slow_flow(d: &Dimensionless, c: f64) -> Option<f64> {
+    let flow = SlowFlow::new(d.lambda, d.r);
+    let g = flow.backbone_at(flow.manifold.b(c, BranchSide::Right)?).g;
+    Some(free_sigma(d, c)? - 0.5 * d.epsilon * g * flow.drift(c)?.sigma)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_exact_orbit_lies_on_the_curve() {
+        let scene = Dimensionless::new(0.0084, 1.43, 0.65, 1.1);
+        let curve = ExactCurve::of(&scene);
+        let orbits = vines_model::orbit::phase_resonant(&scene);
+        let orbit = orbits.iter().find(|orbit| orbit.stable).unwrap();
+        let distance = curve.distance(orbit.c, orbit.sigma, orbit.g).unwrap();
+        assert!(distance.nearest < 1e-5, "{distance:?}");
+        assert!(distance.sigma.unwrap().abs() < 1e-5 && distance.g.unwrap().abs() < 1e-5);
+        let off = curve.distance(orbit.c, orbit.sigma + 0.01, orbit.g).unwrap();
+        assert!((off.sigma.unwrap() - 0.01).abs() < 1e-5);
+        assert!(off.nearest > 1e-3 && off.nearest < 0.01);
+    }
 }

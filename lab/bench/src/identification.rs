@@ -1,32 +1,22 @@
 //! What a record says: the locked point, its regime, and the backbone along the free decay.
 
 mod balance;
-mod crossings;
-mod cycle;
 mod decay;
-mod fit;
 mod lock;
-mod measured;
-mod regime;
 mod response;
-mod tone;
-mod validity;
 
 use thiserror::Error;
 
 use crate::record::Record;
 use crate::scene::{Dimensionless, Scene};
 
-pub use balance::{Balance, Slopes};
-pub use cycle::Cycle;
+pub use balance::{Balance, Cycle, Slopes};
 pub use decay::{DecayEnd, DecayPoint, DecayPoints, decay_points};
-pub use lock::Lock;
-pub use measured::Measured;
-use regime::longer_after;
-pub use regime::{classify, impacts};
+pub use lock::{Lock, Measured};
+use lock::{measure, on_target, sensors_after_release};
+use response::longer_after;
 pub(crate) use response::{ASYMMETRIC, without_tones};
-pub use response::{foreign_tone, regime_by_response};
-pub use tone::Tone;
+pub use response::{Tone, classify, foreign_tone, impacts, regime_by_response};
 pub use vines_model::regime::{Impact, Regime};
 
 /// Why a record cannot be identified.
@@ -104,7 +94,7 @@ pub struct Identification {
 /// # Errors
 /// A lock in another regime than the symmetric 1:1 one, or no motion.
 pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, IdentificationError> {
-    let lock = lock::measure(record, scene).ok_or(IdentificationError::NoMotion)?;
+    let lock = measure(record, scene).ok_or(IdentificationError::NoMotion)?;
     // Where noise hides the symmetry, a motion that is steady and off the linear mode is accepted; its regime says so.
     if !matches!(lock.regime, Regime::Symmetric | Regime::Unresolved) {
         return Err(IdentificationError::Regime {
@@ -116,8 +106,8 @@ pub fn identify(record: &Record, scene: &Scene) -> Result<Identification, Identi
                 .flatten(),
         });
     }
-    validity::on_target(&lock, scene)?;
-    validity::sensors_after_release(record, scene)?;
+    on_target(&lock, scene)?;
+    sensors_after_release(record, scene)?;
     let decay = decay_points(record, scene);
     Ok(Identification { parameters: scene.dimensionless(), lock, decay })
 }

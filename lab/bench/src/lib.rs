@@ -8,6 +8,7 @@ pub mod advice;
 pub mod backbone;
 pub mod comparison;
 pub mod experiment;
+pub mod fit;
 pub mod identification;
 pub mod loop_check;
 pub mod record;

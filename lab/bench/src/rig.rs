@@ -2,23 +2,22 @@
 //! drive. An experiment uses only these two traits, so an FMU, a network peer or hardware can replace either side.
 
 mod chain;
-mod error;
 mod faulty;
-mod measured;
-mod phase_lock;
-mod sensors_only;
-mod simulated;
-mod stoppable;
+mod stages;
 
-pub use ::phase_lock::{Fault, LoopState, Move};
+use std::error::Error;
+
+use lovines::{InvalidValue, Parameters, Plant, State};
+use phase_lock::{Config, ConfigError, Input, Output, PhaseLock};
+pub use phase_lock::{Fault, LoopState, Move};
+use thiserror::Error;
+use vines_model::{Definition, Sensor};
+
+use crate::scene::Scene;
+
 pub use chain::Chain;
-pub use error::{ControllerError, RigError};
 pub use faulty::{RigFault, SensorFault, faulty};
-pub use measured::Measured;
-pub use phase_lock::BuiltIn;
-pub use sensors_only::SensorsOnly;
-pub use simulated::Simulated;
-pub use stoppable::{Interrupted, Stoppable};
+pub use stages::{Interrupted, Measured, SensorsOnly, Stoppable};
 
 /// What the controller asks of the rig for the coming sample period.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
@@ -84,6 +83,62 @@ pub trait Rig {
     }
 }
 
+/// A stage of the pipeline around a rig: it changes what is read or how the rig is driven, and passes everything else on.
+pub trait RigStage {
+    /// The rig that this stage surrounds, with the stages nearer to it.
+    fn inner(&mut self) -> &mut dyn Rig;
+
+    /// What the next stage or the controller reads: [`Rig::sense`].
+    ///
+    /// # Errors
+    /// As [`Rig::sense`].
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        self.inner().sense()
+    }
+
+    /// [`Rig::advance`].
+    ///
+    /// # Errors
+    /// As [`Rig::sense`].
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.inner().advance(drive, step)
+    }
+
+    /// [`Rig::hold`].
+    ///
+    /// # Errors
+    /// As [`Rig::hold`].
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.inner().hold(drive, step)
+    }
+
+    /// [`Rig::ground_truth`].
+    ///
+    /// # Errors
+    /// As [`Rig::sense`].
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        self.inner().ground_truth()
+    }
+}
+
+impl<S: RigStage> Rig for S {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        RigStage::sense(self)
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        RigStage::advance(self, drive, step)
+    }
+
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        RigStage::hold(self, drive, step)
+    }
+
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        RigStage::ground_truth(self)
+    }
+}
+
 /// Output of a controller at a sample.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Command {
@@ -126,5 +181,177 @@ pub trait Controller {
     /// As [`Controller::hold_response`].
     fn hold_drive(&mut self) -> Result<(), ControllerError> {
         Err(ControllerError::NoResponseLoop)
+    }
+}
+
+// Why one side of the bench cannot go on.
+
+/// The error of an implementation: of an FMU, or of a link to a peer.
+type Cause = Box<dyn Error + Send + Sync>;
+
+/// Why a rig cannot go on.
+#[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum RigError {
+    #[error("the rig: {0}")]
+    Failed(#[source] Cause),
+    #[error("the rig: {0}")]
+    Refused(#[from] InvalidValue),
+    #[error(
+        "the rig accepts frequency and amplitude only, not samples of the base displacement: chain.hold = true needs a rig that does, and so \
+         does `vines rig --protocol helic`"
+    )]
+    NoHold,
+}
+
+/// Why a controller cannot go on.
+#[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum ControllerError {
+    #[error("the controller: {0}")]
+    Failed(#[source] Cause),
+    #[error(
+        "the controller cannot hold the amplitude of the response; use the built-in controller, PhaseLock.fmu or `vines controller`"
+    )]
+    NoResponseLoop,
+    #[error("the controller: {0}")]
+    Refused(#[from] ConfigError),
+}
+
+impl RigError {
+    /// The error of the implementation, if it is an `E`.
+    pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
+        match self {
+            Self::Failed(cause) => cause.downcast_ref(),
+            Self::Refused(_) | Self::NoHold => None,
+        }
+    }
+}
+
+impl ControllerError {
+    /// The error of the implementation, if it is an `E`.
+    pub fn cause<E: Error + 'static>(&self) -> Option<&E> {
+        match self {
+            Self::Failed(cause) => cause.downcast_ref(),
+            Self::NoResponseLoop | Self::Refused(_) => None,
+        }
+    }
+}
+
+// The simulated plant as a rig, without an FMU.
+
+/// The plant, stepped directly.
+#[derive(Clone)]
+pub struct Simulated {
+    plant: Plant,
+    sensor: Sensor,
+}
+
+impl Simulated {
+    /// A plant at its start; its response is v.
+    pub fn new(parameters: Parameters, start: State) -> Result<Self, InvalidValue> {
+        let plant = Plant::new(parameters, start)?;
+        Ok(Self { plant, sensor: Sensor::V })
+    }
+
+    /// The rig of a scene, with its measurement chain.
+    pub fn of(scene: &Scene) -> Result<Box<dyn Rig>, InvalidValue> {
+        let plant = Self::new(scene.plant, scene.start)?.with_sensors(scene.resonance);
+        Ok(Chain::around(Box::new(plant), scene))
+    }
+
+    /// The same with the sensors of a definition.
+    pub fn with_sensors(mut self, definition: Definition) -> Measured<Self> {
+        self.sensor = definition.sensor;
+        let parameters = *self.plant.parameters();
+        Measured::new(self, definition, &parameters)
+    }
+}
+
+impl Rig for Simulated {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        let response = match self.sensor {
+            Sensor::V => self.plant.centre(),
+            Sensor::Q1 | Sensor::Acceleration => self.plant.state().q1,
+        };
+        Ok(Sensors { response, reference: Some(self.plant.base_displacement()) })
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        let drive = lovines::Drive::harmonic(drive.amplitude, drive.omega);
+        self.plant.advance(drive, step)?;
+        Ok(())
+    }
+
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        self.plant.advance(lovines::Drive::held(drive.displacement), step)?;
+        Ok(())
+    }
+
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        let totals = self.plant.totals();
+        Ok(Some(GroundTruth {
+            impacts: i64::try_from(totals.impacts).unwrap_or(i64::MAX),
+            impact_time: totals.impact_time,
+            impact_velocity: totals.impact_velocity,
+            particle_velocity: self.plant.state().dq2,
+        }))
+    }
+}
+
+// The built-in phase-locked loop as a controller of the bench.
+
+/// The built-in controller: coefficients and state.
+#[derive(Clone)]
+pub struct BuiltIn {
+    lock: PhaseLock,
+    state: phase_lock::State,
+}
+
+impl BuiltIn {
+    /// The controller of a configuration, at its start.
+    pub fn new(config: &Config) -> Result<Self, ConfigError> {
+        let lock = config.build()?;
+        Ok(Self { state: lock.start(), lock })
+    }
+}
+
+impl From<Output> for Command {
+    fn from(output: Output) -> Self {
+        Self {
+            drive: Drive {
+                omega: output.omega,
+                amplitude: output.amplitude,
+                displacement: output.drive,
+            },
+            phase_error: output.phase_error,
+            settled: output.settled,
+            state: Some(output.state),
+            fault: output.fault,
+        }
+    }
+}
+
+impl Controller for BuiltIn {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        let output = self.lock.process(
+            &mut self.state,
+            Input {
+                response: sensors.response,
+                reference: sensors.reference,
+                active,
+            },
+        );
+        Ok(output.into())
+    }
+
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
+        self.lock.retune(self.lock.config().amplitude, phase_target)?;
+        Ok(self.lock.hold_response(&mut self.state, to)?)
+    }
+
+    fn hold_drive(&mut self) -> Result<(), ControllerError> {
+        self.lock.hold_drive(&mut self.state);
+        Ok(())
     }
 }

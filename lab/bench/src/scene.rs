@@ -2,35 +2,23 @@
 
 mod backbone;
 mod chain;
-mod configuration;
 mod controller;
-mod error;
-mod family;
-mod linear_response;
-mod load;
 mod names;
-mod option;
 mod overrides;
-mod phase_lock;
-mod plant;
-mod record;
-mod sections;
-mod validate;
 
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+use lovines::{InvalidValue, State};
+use phase_lock::{ConfigError, Number};
+use serde::{Deserialize, Deserializer, Serialize, Serializer, de::Error, ser::SerializeMap};
+
+pub use backbone::BackboneSettings;
+pub use chain::{ChainSettings, RatioOf};
+pub use controller::{ControllerSettings, KEYS, LinearResponse, PhaseLock, key, refusal};
 pub use lovines::Parameters;
-use lovines::State;
-use serde::Serialize;
-
-pub use backbone::Backbone;
-pub use chain::{Chain, RatioOf};
-pub use controller::Controller;
-pub use error::{SceneError, SyntaxError};
-pub use family::Family;
-pub use linear_response::LinearResponse;
 pub use names::{Name, Names};
-pub use overrides::Override;
-pub use phase_lock::{KEYS, PhaseLock, key, refusal};
-pub use record::{Estimator, Record};
+pub use overrides::{Family, Override};
 pub use vines_model::{Definition, Dimensionless, Reference, Resonance, Sensor};
 
 /// The default scene, embedded so that the program works from any folder.
@@ -40,22 +28,22 @@ pub const PAPER: &str = include_str!("../../../scenes/paper.toml");
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Scene {
     /// The oscillator and its particle, SI units.
-    #[serde(serialize_with = "plant::serialize")]
+    #[serde(serialize_with = "serialize")]
     pub plant: Parameters,
     /// Where the motion starts, SI units.
     pub start: State,
     /// Amplitude E of the base displacement, m.
     pub amplitude: f64,
     /// The phase-locked loop, in units of omega0 and of the natural period.
-    pub controller: Controller,
+    pub controller: ControllerSettings,
     /// Further parameters of the loop.
     pub phase_lock: PhaseLock,
     /// How long to drive and to record, in periods.
-    pub record: Record,
+    pub record: RecordSettings,
     /// How the backbone is tracked, in units of b and in periods.
-    pub backbone: Backbone,
+    pub backbone: BackboneSettings,
     /// The measurement chain between rig and controller.
-    pub chain: Chain,
+    pub chain: ChainSettings,
     /// What counts as resonance, and what is measured.
     pub resonance: Definition,
     /// What a rig other than the simulated one calls its variables.
@@ -91,7 +79,7 @@ impl Scene {
 
     /// Levels of the tracked backbone, amplitudes of the response, m, in the order in which they are visited.
     pub fn levels(&self) -> Vec<f64> {
-        self.backbone.levels(self.plant.half_width)
+        self.backbone.levels()
     }
 
     /// The start (q1, q1', q2, q2'), displacements over b and velocities over `b omega0`.
@@ -103,4 +91,448 @@ impl Scene {
     pub fn sample_time(&self) -> f64 {
         Dimensionless::of(&self.plant, self.amplitude).natural_period() / self.controller.samples_per_period
     }
+}
+
+// The sections of a scene as written, before they are completed and checked.
+
+/// The file; sections left out count as empty.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct Sections {
+    plant: PlantSection,
+    start: StartSection,
+    excitation: Excitation,
+    controller: ControllerSettings,
+    phase_lock: PhaseLock,
+    record: RecordSettings,
+    backbone: BackboneSettings,
+    chain: ChainSettings,
+    resonance: Definition,
+    rig: RigSection,
+    controller_names: Names,
+}
+
+/// A rig other than the simulated one.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct RigSection {
+    names: Names,
+}
+
+/// The base amplitude; exactly one of the two keys is given.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Excitation {
+    #[serde(rename = "G")]
+    g: Option<f64>,
+    #[serde(rename = "E")]
+    e: Option<f64>,
+}
+
+impl Excitation {
+    /// Amplitude E of the base displacement, m.
+    fn in_metres(&self, origin: &str, d: &Dimensionless) -> Result<f64, SceneError> {
+        match (self.g, self.e) {
+            (Some(g), None) => {
+                Checked::new("excitation.G", g, "(dimensionless)").not_negative()?;
+                Ok(d.amplitude(g))
+            }
+            (None, Some(e)) => {
+                Checked::new("excitation.E", e, "m").not_negative()?;
+                Ok(e)
+            }
+            (given, _) => Err(SceneError::Keys {
+                origin: origin.into(),
+                message: format!(
+                    "[excitation] has {} of G (dimensionless) and E (m): give exactly one, with G = E/(b epsilon)",
+                    if given.is_some() { "both" } else { "neither" }
+                ),
+            }),
+        }
+    }
+}
+
+/// A length that a file gives in metres or over a unit of the rig.
+struct Length<'a> {
+    origin: &'a str,
+    section: &'static str,
+    /// Its keys: over the unit, and in metres.
+    keys: [&'static str; 2],
+    over_unit: Option<f64>,
+    in_metres: Option<f64>,
+}
+
+impl Length<'_> {
+    /// The length in metres; `unit` in m.
+    fn resolve(self, unit: f64) -> Result<Option<f64>, SceneError> {
+        let Self { origin, section, keys: [key, in_metres], .. } = self;
+        let check = |key: &str, value, unit| {
+            let key = format!("{section}.{key}").into();
+            Checked { key, value, unit }.positive()
+        };
+        match (self.over_unit, self.in_metres) {
+            (Some(_), Some(_)) => Err(SceneError::Keys {
+                origin: origin.into(),
+                message: format!(
+                    "[{section}] has both {key} and {in_metres} (m), which say the same thing: give one of them"
+                ),
+            }),
+            (Some(value), None) => {
+                check(
+                    key,
+                    value,
+                    if key.starts_with('G') {
+                        "(over b epsilon)"
+                    } else {
+                        "(over b)"
+                    },
+                )?;
+                Ok(Some(value * unit))
+            }
+            (None, Some(value)) => check(in_metres, value, "m").map(|()| Some(value)),
+            (None, None) => Ok(None),
+        }
+    }
+}
+
+impl Sections {
+    /// Replaces a section.
+    fn replace(&mut self, name: &str, table: toml::Table) -> Result<(), toml::de::Error> {
+        match name {
+            "plant" => self.plant = PlantSection::deserialize(table)?,
+            "start" => self.start = StartSection::deserialize(table)?,
+            "excitation" => self.excitation = Excitation::deserialize(table)?,
+            "controller" => self.controller = ControllerSettings::deserialize(table)?,
+            "phase_lock" => self.phase_lock = PhaseLock::deserialize(table)?,
+            "record" => self.record = RecordSettings::deserialize(table)?,
+            "backbone" => self.backbone = BackboneSettings::deserialize(table)?,
+            "chain" => self.chain = ChainSettings::deserialize(table)?,
+            _ => self.resonance = Definition::deserialize(table)?,
+        }
+        Ok(())
+    }
+
+    fn resolve(self, origin: &str) -> Result<Scene, SceneError> {
+        let plant = self.plant.resolve(origin)?;
+        let d = Dimensionless::of(&plant, 0.0);
+        let scene = Scene {
+            start: self.start.resolve(&plant)?,
+            amplitude: self.excitation.in_metres(origin, &d)?,
+            plant,
+            controller: self.controller.in_metres(origin, &d)?,
+            phase_lock: self.phase_lock,
+            record: self.record,
+            backbone: self.backbone.in_metres(origin, &d)?,
+            chain: self.chain,
+            resonance: self.resonance,
+            rig_names: self.rig.names,
+            controller_names: self.controller_names,
+            measured: None,
+        };
+        scene.controller.check()?;
+        scene.record.check(&scene.controller, scene.lock_periods())?;
+        scene.chain.check(&scene.controller)?;
+        if scene.resonance.reference == Reference::Force && !scene.chain.reference {
+            let message = "resonance.reference = \"force\" with chain.reference = false: the force k e + c e' follows from the base \
+                           sensor; switch it on, or take the reference \"base\"";
+            return Err(SceneError::Keys { origin: origin.into(), message: message.into() });
+        }
+        let fastest = scene.controller.omega_max * scene.dimensionless().omega0;
+        lovines::Drive::harmonic(scene.amplitude, fastest)
+            .validate()
+            .map_err(SceneError::Drive)?;
+        Ok(scene)
+    }
+}
+
+// Scenes read from files and texts.
+
+impl Scene {
+    /// Reads the scene file at `path`, or the default scene without one, with the overrides applied in order.
+    pub fn load(path: Option<&Path>, overrides: &[Override]) -> Result<Self, SceneError> {
+        let Some(path) = path else {
+            return Self::parse("paper.toml (the default scene)", PAPER, overrides);
+        };
+        let text = std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.into(), source })?;
+        Self::parse(&path.display().to_string(), &text, overrides)
+    }
+
+    /// Reads a scene from `text`; `origin` names it in messages.
+    pub fn parse(origin: &str, text: &str, overrides: &[Override]) -> Result<Self, SceneError> {
+        let scene = overrides::read(origin, text, overrides)?.0.resolve(origin)?;
+        scene.controller_config().build()?;
+        Ok(scene)
+    }
+}
+
+// The `[plant]` section, in SI units or dimensionless, and the `[start]` section.
+
+/// Keys that only the SI form has.
+const SI_KEYS: [&str; 5] = ["M", "k", "c", "m", "b"];
+/// Keys that only the dimensionless form has.
+const DIMENSIONLESS_KEYS: [&str; 2] = ["epsilon", "lambda"];
+
+/// The section as written.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlantSection {
+    #[serde(rename = "M")]
+    mass: Option<f64>,
+    k: Option<f64>,
+    c: Option<f64>,
+    m: Option<f64>,
+    b: Option<f64>,
+    r: Option<f64>,
+    epsilon: Option<f64>,
+    lambda: Option<f64>,
+}
+
+impl PlantSection {
+    fn resolve(&self, origin: &str) -> Result<Parameters, SceneError> {
+        let keys = |message: &str| SceneError::Keys { origin: origin.into(), message: message.into() };
+        let si = [self.mass, self.k, self.c, self.m, self.b];
+        let dimensionless = [self.epsilon, self.lambda];
+        let is_si = si.iter().any(Option::is_some);
+        if is_si && dimensionless.iter().any(Option::is_some) {
+            return Err(keys(
+                "[plant] mixes SI keys (M, k, c, m, b) with dimensionless ones (epsilon, lambda): \
+                 give one set or the other, and r",
+            ));
+        }
+        let need = |value: Option<f64>, key: &str| {
+            value.ok_or_else(|| {
+                keys(&format!(
+                    "[plant] has no `{key}`: give M, k, c, m, b and r (SI), or epsilon, lambda and r (dimensionless)"
+                ))
+            })
+        };
+        let plant = if is_si {
+            Parameters {
+                primary_mass: need(self.mass, "M")?,
+                stiffness: need(self.k, "k")?,
+                damping: need(self.c, "c")?,
+                particle_mass: need(self.m, "m")?,
+                half_width: need(self.b, "b")?,
+                restitution: need(self.r, "r")?,
+            }
+        } else {
+            let (epsilon, lambda) = (need(self.epsilon, "epsilon")?, need(self.lambda, "lambda")?);
+            Checked::new("plant.epsilon", epsilon, "(dimensionless)").positive()?;
+            Checked::new("plant.lambda", lambda, "(dimensionless)").not_negative()?;
+            Parameters::dimensionless(epsilon, lambda, need(self.r, "r")?)
+        };
+        plant.validate()?;
+        Ok(plant)
+    }
+}
+
+/// The `[start]` section; what is left out is zero.
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+struct StartSection {
+    q1: f64,
+    dq1: f64,
+    q2: f64,
+    dq2: f64,
+}
+
+impl StartSection {
+    /// The state, once a plant takes it.
+    fn resolve(&self, plant: &Parameters) -> Result<State, SceneError> {
+        let Self { q1, dq1, q2, dq2 } = *self;
+        let start = State { q1, dq1, q2, dq2 };
+        lovines::Plant::new(*plant, start)?;
+        Ok(start)
+    }
+}
+
+/// The parameters under their symbols, which are the names of the FMU's variables.
+fn symbols(plant: &Parameters) -> [(&'static str, f64); 6] {
+    [
+        ("M", plant.primary_mass),
+        ("k", plant.stiffness),
+        ("c", plant.damping),
+        ("m", plant.particle_mass),
+        ("b", plant.half_width),
+        ("r", plant.restitution),
+    ]
+}
+
+/// Writes the parameters under their symbols.
+fn serialize<S: Serializer>(plant: &Parameters, serializer: S) -> Result<S::Ok, S::Error> {
+    let mut map = serializer.serialize_map(Some(6))?;
+    for (symbol, value) in symbols(plant) {
+        map.serialize_entry(symbol, &value)?;
+    }
+    map.end()
+}
+
+// The `[record]` section: how long to drive, to record and to average.
+
+/// Durations of an experiment.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct RecordSettings {
+    /// Time limit for the lock, natural periods; by default at least 3000, and 20 relaxation times.
+    pub lock_periods: Option<f64>,
+    /// How long the settled lock is held and measured, natural periods.
+    pub hold_periods: f64,
+    /// Length of the recorded decay, natural periods; by default as long as the linear response takes to fall to 5 %.
+    pub decay_periods: Option<f64>,
+    /// Window of the fit along the decay, periods of the motion.
+    pub window_periods: f64,
+}
+
+impl Default for RecordSettings {
+    fn default() -> Self {
+        Self {
+            lock_periods: None,
+            hold_periods: 20.0,
+            decay_periods: None,
+            window_periods: 2.5,
+        }
+    }
+}
+
+/// Most samples of one record: about 2 GiB in memory.
+const MOST_SAMPLES: f64 = 2e7;
+
+impl RecordSettings {
+    /// `lock_periods` is the time limit for the lock, as set or by default.
+    fn check(&self, controller: &ControllerSettings, lock_periods: f64) -> Result<(), SceneError> {
+        let unit = "(natural periods)";
+        Checked::new("record.lock_periods", lock_periods, unit).positive()?;
+        Checked::new("record.hold_periods", self.hold_periods, unit).check(
+            (3.0..=1e6).contains(&self.hold_periods),
+            "must be from 3 (to count impacts and measure) to 1000000",
+        )?;
+        if let Some(decay_periods) = self.decay_periods {
+            Checked::new("record.decay_periods", decay_periods, unit).positive()?;
+        }
+        let longest = self.decay_periods.unwrap_or(1000.0);
+        Checked::new("record.window_periods", self.window_periods, "(periods)").check(
+            (0.5..=longest).contains(&self.window_periods),
+            format!("must be from 0.5 to {longest} (decay_periods, or 1000)"),
+        )?;
+        let samples =
+            controller.samples_per_period * (lock_periods + self.hold_periods + self.decay_periods.unwrap_or(0.0));
+        Checked::new("samples_per_period times all periods of [record]", samples, "samples")
+            .check(samples <= MOST_SAMPLES, "must be at most 20 million")
+    }
+}
+
+// Options of a scene: a number, or `false` or "none". Zero is a number like every other.
+
+/// What the file says.
+#[derive(Deserialize)]
+#[serde(untagged, expecting = "expected a number, or false or \"none\"")]
+enum WrittenOption<T> {
+    Value(T),
+    Switch(bool),
+    Word(String),
+}
+
+/// Reads an option.
+fn option<'de, D: Deserializer<'de>, T: Deserialize<'de>>(from: D) -> Result<Option<T>, D::Error> {
+    match WrittenOption::deserialize(from)? {
+        WrittenOption::Value(value) => Ok(Some(value)),
+        WrittenOption::Switch(false) => Ok(None),
+        WrittenOption::Word(word) if word == "none" => Ok(None),
+        WrittenOption::Switch(_) | WrittenOption::Word(_) => {
+            Err(D::Error::custom("expected a number, or false or \"none\""))
+        }
+    }
+}
+
+// Range checks that name the value, its unit and what is allowed.
+
+/// One number of a scene, under the name that the file gives it.
+struct Checked {
+    pub key: Cow<'static, str>,
+    pub value: f64,
+    pub unit: &'static str,
+}
+
+impl Checked {
+    fn new(key: &'static str, value: f64, unit: &'static str) -> Self {
+        Self { key: key.into(), value, unit }
+    }
+
+    fn positive(self) -> Result<(), SceneError> {
+        let is_allowed = self.value > 0.0;
+        self.check(is_allowed, "must be positive and finite")
+    }
+
+    fn not_negative(self) -> Result<(), SceneError> {
+        let is_allowed = self.value >= 0.0;
+        self.check(is_allowed, "must be zero or positive, and finite")
+    }
+
+    /// A value that is not finite is refused whatever `ok` says.
+    fn check(self, ok: bool, allowed: impl Into<String>) -> Result<(), SceneError> {
+        if ok && self.value.is_finite() {
+            return Ok(());
+        }
+        Err(SceneError::Value {
+            key: self.key,
+            value: self.value,
+            unit: self.unit,
+            allowed: allowed.into(),
+        })
+    }
+}
+
+// Errors of a scene.
+
+/// Why a scene cannot be used.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum SceneError {
+    #[error("cannot read the scene {}: {source}", path.display())]
+    Read { path: PathBuf, source: std::io::Error },
+    #[error("{origin}: {message}")]
+    Syntax { origin: String, message: String },
+    #[error("--set: {0}")]
+    Argument(#[from] SyntaxError),
+    #[error("--set {argument}: {message}")]
+    Override { argument: String, message: String },
+    #[error("{key} = {} {unit}: {allowed}", Number(*value))]
+    Value {
+        key: Cow<'static, str>,
+        value: f64,
+        unit: &'static str,
+        allowed: String,
+    },
+    #[error("[plant] or [start]: {0}")]
+    Plant(#[from] InvalidValue),
+    #[error("[excitation] or [controller]: {0}")]
+    Drive(InvalidValue),
+    #[error("{}", refusal(.0))]
+    Controller(#[from] ConfigError),
+    #[error("{origin}: {message}")]
+    Keys { origin: String, message: String },
+}
+
+/// An argument that is not `section.key=value`.
+#[derive(Debug, thiserror::Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum SyntaxError {
+    #[error("{}; expected section.key=value, for instance plant.r=0.7 or resonance.sensor=q1", .0.message())]
+    Toml(#[from] toml::de::Error),
+    #[error("expected one section.key=value, for instance plant.r=0.7")]
+    NotOneKey,
+}
+
+/// A message of the TOML reader, without types of Rust.
+fn plain(message: &str) -> String {
+    let words = [
+        ("expected f64", "expected a number"),
+        ("expected u32", "expected a whole number from 0"),
+        ("expected u64", "expected a whole number from 0"),
+        ("expected a boolean", "expected true or false"),
+        ("unit variant, expected string only", "expected a word in quotes"),
+        ("expected a map", "expected a table"),
+    ];
+    let replace = |text: String, (from, to)| text.replace(from, to);
+    words.into_iter().fold(message.trim().to_string(), replace)
 }

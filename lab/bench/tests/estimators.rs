@@ -1,15 +1,17 @@
-//! Guards the accuracy of the fit along the decay, clean and in noise, and that zero crossings are exact on clean samples;
-//! `studies/decay.rs` takes more windows.
+//! Guards the accuracy of the fit along the decay, clean and in noise; `studies/decay.rs` takes more windows.
+
+#[path = "../../../studies/crossings.rs"]
+mod crossings;
 
 use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use vines_model::numerics::mean_square;
 use vines_testbench::comparison::COMPARED_ABOVE;
 use vines_testbench::experiment::{self, Plan};
-use vines_testbench::identification::{DecayPoint, decay_points};
+use vines_testbench::identification::decay_points;
 use vines_testbench::record::Record;
 use vines_testbench::rig::{BuiltIn, Simulated};
-use vines_testbench::scene::{Estimator, Scene};
+use vines_testbench::scene::Scene;
 
 /// A record of the default plant, with this many samples per period.
 fn record(samples: u32) -> (Record, Scene) {
@@ -22,24 +24,13 @@ fn record(samples: u32) -> (Record, Scene) {
     (record, scene)
 }
 
-/// The points of the decay above the fold.
-fn points(record: &Record, scene: &Scene, estimator: Estimator) -> Vec<DecayPoint> {
-    let mut scene = scene.clone();
-    scene.record.estimator = estimator;
-    let mut points = decay_points(record, &scene).points;
-    points.retain(|point| point.c > COMPARED_ABOVE);
-    points
-}
-
-/// RMS of sigma less that of the zero crossings of a clean decay, between whose points it is interpolated.
-fn rms(points: &[DecayPoint], truth: &[DecayPoint]) -> f64 {
-    let error = |point: &DecayPoint| {
-        let after = truth.partition_point(|one| one.tau < point.tau);
-        let (from, to) = (truth.get(after.checked_sub(1)?)?, truth.get(after)?);
-        let share = (point.tau - from.tau) / (to.tau - from.tau);
-        Some(point.sigma - from.sigma - share * (to.sigma - from.sigma))
-    };
-    let errors: Vec<f64> = points.iter().filter_map(error).collect();
+/// RMS of the fit's sigma, above the fold, less the zero crossings of a clean decay.
+fn rms(record: &Record, scene: &Scene, truth: &[[f64; 2]]) -> f64 {
+    let points = decay_points(record, scene).points;
+    let above = points.iter().filter(|point| point.c > COMPARED_ABOVE);
+    let errors: Vec<f64> = above
+        .filter_map(|point| Some(point.sigma - crossings::at(truth, point.tau)?))
+        .collect();
     assert!(errors.len() > 10);
     mean_square(errors).sqrt()
 }
@@ -59,19 +50,22 @@ fn noisy(record: &Record) -> Record {
 #[test]
 fn clean_the_fit_is_within_0_02_in_sigma_and_through_40_db_within_0_04() {
     let (clean, scene) = record(100);
-    let truth = points(&clean, &scene, Estimator::Crossings);
-    let [fit, noisy] = [&clean, &noisy(&clean)].map(|record| rms(&points(record, &scene, Estimator::Fit), &truth));
+    let truth = crossings::detunings(&clean, &scene);
+    let [fit, noisy] = [&clean, &noisy(&clean)].map(|record| rms(record, &scene, &truth));
     println!("clean {fit:.1e}, at 40 dB {noisy:.1e}");
     assert!(fit <= 0.02 && noisy <= 0.04);
 }
 
 #[test]
-fn zero_crossings_are_exact_on_clean_data_and_no_good_in_noise() {
-    let (clean, scene) = record(100);
-    let (fine, of_fine) = record(400);
-    let truth = points(&fine, &of_fine, Estimator::Crossings);
-    let [exact, noisy] =
-        [&clean, &noisy(&clean)].map(|record| rms(&points(record, &scene, Estimator::Crossings), &truth));
-    println!("clean {exact:.1e}, at 40 dB {noisy:.1e}");
-    assert!(exact <= 1e-4 && noisy > 0.1);
+fn the_zero_crossings_that_the_fit_is_compared_with_do_not_depend_on_the_sample_time() {
+    let [(coarse, of_coarse), (fine, of_fine)] = [100, 400].map(record);
+    let truth = crossings::detunings(&fine, &of_fine);
+    let fitted = decay_points(&coarse, &of_coarse).points;
+    let last = fitted.iter().rfind(|point| point.c > COMPARED_ABOVE).unwrap().tau;
+    let points = crossings::detunings(&coarse, &of_coarse);
+    let above = points.iter().filter(|[tau, _]| *tau < last);
+    let errors: Vec<f64> = above
+        .filter_map(|[tau, sigma]| Some(sigma - crossings::at(&truth, *tau)?))
+        .collect();
+    assert!(errors.len() > 10 && mean_square(errors).sqrt() <= 1e-4);
 }

@@ -48,8 +48,8 @@ fn a_dimensionless_scene_is_its_own_model() {
 #[test]
 fn every_key_of_the_paper_file_has_its_default() {
     let scene = paper(&[]).unwrap();
-    assert_eq!(scene.controller, vines_testbench::scene::Controller::default());
-    assert_eq!(scene.record, vines_testbench::scene::Record::default());
+    assert_eq!(scene.controller, vines_testbench::scene::ControllerSettings::default());
+    assert_eq!(scene.record, vines_testbench::scene::RecordSettings::default());
 }
 
 #[test]
@@ -231,7 +231,7 @@ fn a_plant_without_damping_is_accepted() {
 
 #[test]
 fn levels_are_round_numbers() {
-    let levels = paper(&[]).unwrap().backbone.levels(1.0);
+    let levels = paper(&["plant.b=1"]).unwrap().levels();
     assert_eq!(levels[..3], [0.7, 0.68, 0.66]);
 }
 
@@ -271,7 +271,7 @@ fn limits_follow_from_the_numbers_of_the_rig() {
 fn a_number_in_place_of_a_word_lists_the_words_of_a_scene_file() {
     for (section, words) in [
         ("[chain]\nsnr_of = 3", "`signal` or `range`"),
-        ("[record]\nestimator = 1.5", "`fit` or `crossings`"),
+        ("[resonance]\nreference = 1.5", "`base` or `force`"),
         ("[resonance]\nsensor = true", "`v`, `q1`"),
     ] {
         let message = complaint(Scene::parse("mine.toml", section, &[]));

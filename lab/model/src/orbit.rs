@@ -5,6 +5,7 @@
 //! alternating impulses of known size on the oscillator, and their periodic response has a closed form. At a given frequency
 //! one quadratic equation for B remains. There is no first-order approximation.
 
+mod at_speed;
 mod bifurcations;
 mod bounce;
 mod branch;
@@ -29,6 +30,7 @@ mod settle;
 use crate::Dimensionless;
 use serde::Serialize;
 
+pub use at_speed::backbone_at_speed;
 pub use bifurcations::{BifurcationCurve, bifurcation_curves};
 pub use bounce::Bounce;
 pub use branch::{Branch, Ended, Limits, Special};

@@ -1,7 +1,10 @@
 //! Settings of the page, and the scene that they make.
 
 use lovines::{Parameters, State};
-use vines_testbench::scene::{Backbone, Chain, Controller, Definition, Dimensionless, Names, PhaseLock, Record, Scene};
+use vines_testbench::scene::{
+    BackboneSettings, ChainSettings, ControllerSettings, Definition, Dimensionless, Names, PhaseLock, RecordSettings,
+    Scene,
+};
 
 /// Constants from scenes/paper.toml and live/settings.json: the default scene, and an index for each setting.
 mod generated {
@@ -27,22 +30,18 @@ pub fn default_scene() -> Scene {
         restitution,
     };
     let [q1, dq1, q2, dq2] = START;
+    let d = Dimensionless::of(&plant, 0.0);
     Scene {
         plant,
         start: State { q1, dq1, q2, dq2 },
-        amplitude: Dimensionless::of(&plant, 0.0).amplitude(EXCITATION[0]),
-        controller: Controller::default(),
-        record: Record::default(),
-        backbone: Backbone {
-            c_from: Some(0.7),
-            c_to: Some(0.14),
-            g_max: Some(4.0),
-            ..Backbone::default()
-        },
+        amplitude: d.amplitude(EXCITATION[0]),
+        controller: ControllerSettings::default(),
+        record: RecordSettings::default(),
+        backbone: BackboneSettings::of(&d),
         phase_lock: PhaseLock::default(),
         rig_names: Names::default(),
         controller_names: Names::default(),
-        chain: Chain::default(),
+        chain: ChainSettings::default(),
         resonance: Definition::default(),
         measured: None,
     }
@@ -90,6 +89,7 @@ pub fn changed(mut scene: Scene, values: &Settings) -> Scene {
         .any(differs)
     {
         scene.amplitude = d.amplitude(values[index::EXCITATION]);
+        scene.backbone = BackboneSettings::of(&d);
     }
     if differs(index::START_SPEED) || differs(index::GAP) {
         scene.start.dq2 = values[index::START_SPEED] * d.b * d.omega0;

@@ -17,7 +17,7 @@ use std::f64::consts::TAU;
 use nalgebra::DVector;
 use vines_model::numerics::{HarmonicBasis, SIGNIFICANT, mean, noise};
 
-use super::{Bench, ExperimentError, Sample, Stage};
+use super::{ControlLoop, ExperimentError, Sample, Stage};
 use crate::identification::{ASYMMETRIC, Balance, Cycle, Slopes, without_tones};
 use crate::rig::{Command, Controller, ControllerError, LoopState, Move, Rig};
 use crate::scene::{LinearResponse, Scene};
@@ -72,7 +72,7 @@ struct Leg {
 
 /// The search.
 pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
-    bench: &'b mut Bench<'a, R, C>,
+    bench: &'b mut ControlLoop<'a, R, C>,
     scene: &'b Scene,
     linear: LinearResponse,
     /// Time limit, samples.
@@ -80,7 +80,7 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
     progress: &'b mut dyn FnMut(usize),
     /// Half-width of the cavity, and requested drive, m.
     b: f64,
-    asked: f64,
+    requested: f64,
     /// Phase target, rad.
     target: f64,
     /// Natural period, s.
@@ -95,7 +95,7 @@ pub(crate) struct Search<'b, 'a, R: Rig + ?Sized, C: ?Sized> {
 impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// The search on a bench, for at most `limit` samples; `progress` receives their number.
     pub fn new(
-        bench: &'b mut Bench<'a, R, C>,
+        bench: &'b mut ControlLoop<'a, R, C>,
         scene: &'b Scene,
         limit: usize,
         progress: &'b mut dyn FnMut(usize),
@@ -108,7 +108,7 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
             limit,
             progress,
             b: d.b,
-            asked: scene.amplitude,
+            requested: scene.amplitude,
             target: scene.controller.phase_target_radians(),
             period: d.natural_period(),
             setpoint: 0.0,
@@ -120,14 +120,14 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     /// Goes to the lock at the requested drive. Returns whether the response is held by control there, or `None` where the controller cannot
     /// control it.
     pub fn lock(&mut self) -> Result<Option<bool>, ExperimentError> {
-        let mut seen = match self.begin() {
+        let mut leg = match self.begin() {
             Err(ExperimentError::Controller(ControllerError::NoResponseLoop)) => return Ok(None),
-            seen => seen?,
+            leg => leg?,
         };
         for search in 0..SEARCHES {
             let step = STEP / f64::from(1 << search);
-            seen = self.symmetric(seen, step)?;
-            if let Some(held) = self.solve(&mut seen, step, search >= SEARCHES / 2)? {
+            leg = self.symmetric(leg, step)?;
+            if let Some(held) = self.solve(&mut leg, step, search >= SEARCHES / 2)? {
                 return Ok(Some(held));
             }
         }
@@ -136,8 +136,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
 
     /// Goes to a symmetric motion with impacts, if there is one, and holds its response.
     pub fn impacts(&mut self) -> Result<(), ExperimentError> {
-        let seen = self.begin()?;
-        self.symmetric(seen, STEP)?;
+        let leg = self.begin()?;
+        self.symmetric(leg, STEP)?;
         Ok(())
     }
 
@@ -160,114 +160,114 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     }
 
     /// Goes to a symmetric motion with impacts: raises the response until they have begun, and lowers it until the motion is symmetric.
-    fn symmetric(&mut self, mut seen: Leg, step: f64) -> Result<Leg, ExperimentError> {
+    fn symmetric(&mut self, mut leg: Leg, step: f64) -> Result<Leg, ExperimentError> {
         let largest = self.scene.controller_config().amplitude_max.unwrap_or(f64::INFINITY);
         let spare = SHARE * self.gain() * (largest - self.damping() * (1.0 + DRAWING) * self.b);
         let rate = (self.b / (RISE * self.period)).min(spare);
-        while !seen.departed || seen.response < (1.0 - DRAWING) * self.b {
-            if seen.symmetric {
+        while !leg.departed || leg.response < (1.0 - DRAWING) * self.b {
+            if leg.symmetric {
                 // A rise may resemble impacts; at rest the setpoint tells them apart.
-                seen = self.leg(0.0, LEG, 0.0)?;
-                if seen.symmetric {
-                    return Ok(seen);
+                leg = self.leg(0.0, LEG, 0.0)?;
+                if leg.symmetric {
+                    return Ok(leg);
                 }
             }
             let change = rate * LEG as f64 * self.period;
-            if seen.last + change > UNREACHED * self.b || rate <= 0.0 {
-                return Ok(seen);
+            if leg.last + change > UNREACHED * self.b || rate <= 0.0 {
+                return Ok(leg);
             }
-            seen = self.leg(seen.last + change - self.setpoint, LEG, rate)?;
+            leg = self.leg(leg.last + change - self.setpoint, LEG, rate)?;
         }
-        self.fall(seen, step, LOWEST * self.b)
+        self.fall(leg, step, LOWEST * self.b)
     }
 
     /// Lowers the response until the motion is symmetric, but not below `lowest`, m.
-    fn fall(&mut self, mut seen: Leg, step: f64, lowest: f64) -> Result<Leg, ExperimentError> {
-        while !seen.symmetric && seen.departed && self.setpoint > lowest {
-            seen = self.sweep(&seen, -step * seen.last)?;
+    fn fall(&mut self, mut leg: Leg, step: f64, lowest: f64) -> Result<Leg, ExperimentError> {
+        while !leg.symmetric && leg.departed && self.setpoint > lowest {
+            leg = self.sweep(&leg, -step * leg.last)?;
         }
-        Ok(seen)
+        Ok(leg)
     }
 
     /// Follows the symmetric motion to the response that the requested drive holds. Returns whether it stays under control there; `None` if
     /// the motion is lost. `any`: also one that a constant drive does not hold.
-    fn solve(&mut self, seen: &mut Leg, step: f64, any: bool) -> Result<Option<bool>, ExperimentError> {
-        let (mut known, mut passed, mut legs) = (Known::from(*seen), false, 0);
-        let mut upwards = seen.drive < self.asked;
-        while seen.symmetric && self.setpoint > LOWEST * self.b && legs < LEGS {
-            let most = step * seen.last;
+    fn solve(&mut self, leg: &mut Leg, step: f64, any: bool) -> Result<Option<bool>, ExperimentError> {
+        let (mut points, mut passed, mut legs) = (BackbonePoints::from(*leg), false, 0);
+        let mut upwards = leg.drive < self.requested;
+        while leg.symmetric && self.setpoint > LOWEST * self.b && legs < LEGS {
+            let most = step * leg.last;
             let way = if upwards { most } else { -most };
             // From where the response is: it follows its setpoint late.
-            let wanted = known.slope().is_some_and(|slope| any || slope > 0.0);
-            let predicted = known.at(self.asked).map(|to| to - seen.last);
+            let wanted = points.slope().is_some_and(|slope| any || slope > 0.0);
+            let predicted = points.at(self.requested).map(|to| to - leg.last);
             let change = predicted.filter(|change| wanted && (passed || change * way > 0.0));
-            *seen = match change {
+            *leg = match change {
                 Some(change) if change.abs() < most => {
                     legs += 1;
-                    let to = seen.last + change - self.setpoint;
-                    self.leg(to, self.periods(change, seen) / 2, 0.0)?;
+                    let to = leg.last + change - self.setpoint;
+                    self.leg(to, self.periods(change, leg) / 2, 0.0)?;
                     self.leg(0.0, LEG, 0.0)?
                 }
-                change => self.sweep(seen, change.map_or(way, |change| change.clamp(-most, most)))?,
+                change => self.sweep(leg, change.map_or(way, |change| change.clamp(-most, most)))?,
             };
-            if !seen.symmetric {
+            if !leg.symmetric {
                 // A change may disturb the symmetry for a while.
-                *seen = self.leg(0.0, LEG, 0.0)?;
+                *leg = self.leg(0.0, LEG, 0.0)?;
             }
-            if !seen.symmetric {
-                (known, passed, upwards) = (self.below(seen, step)?, false, false);
+            if !leg.symmetric {
+                (points, passed, upwards) = (self.below(leg, step)?, false, false);
                 continue;
             }
-            let between = known.add(*seen, 0.5 * step, self.asked);
-            let Some(slope) = known.slope().filter(|slope| any || *slope > 0.0) else {
+            let between = points.add(*leg, 0.5 * step, self.requested);
+            let Some(slope) = points.slope().filter(|slope| any || *slope > 0.0) else {
                 passed = false;
                 continue;
             };
             passed |= between;
-            let scale = (slope.abs() * seen.response).clamp(FIRM * self.asked, self.asked);
-            let found = (self.asked - seen.drive).abs() < (FOUND * scale).max(seen.noise);
+            let scale = (slope.abs() * leg.response).clamp(FIRM * self.requested, self.requested);
+            let is_found = (self.requested - leg.drive).abs() < (FOUND * scale).max(leg.noise);
             // The condition of stability under a constant drive.
             let firm = slope > FIRM * self.damping();
-            if found || firm && legs == LEGS {
+            if is_found || firm && legs == LEGS {
                 if firm {
                     self.bench.controller.hold_drive()?;
                 }
-                if self.settle(seen)? {
+                if self.settle(leg)? {
                     return Ok(Some(!firm));
                 }
-                (known, passed, upwards) = (self.below(seen, step)?, false, false);
+                (points, passed, upwards) = (self.below(leg, step)?, false, false);
             }
         }
         Ok(None)
     }
 
     /// Goes down to the symmetric motion from where it was lost: above it is a motion without symmetry.
-    fn below(&mut self, seen: &mut Leg, step: f64) -> Result<Known, ExperimentError> {
-        *seen = self.fall(*seen, step, LOST * seen.response)?;
-        Ok(Known::from(*seen))
+    fn below(&mut self, leg: &mut Leg, step: f64) -> Result<BackbonePoints, ExperimentError> {
+        *leg = self.fall(*leg, step, LOST * leg.response)?;
+        Ok(BackbonePoints::from(*leg))
     }
 
     /// Waits until the lock has settled. Returns whether it has; if not, the motion has lost its symmetry.
-    fn settle(&mut self, seen: &mut Leg) -> Result<bool, ExperimentError> {
-        let (mut other, mut grown, first) = (0, 0, seen.response);
+    fn settle(&mut self, leg: &mut Leg) -> Result<bool, ExperimentError> {
+        let (mut other, mut grown, first) = (0, 0, leg.response);
         while other < 2 {
-            let before = seen.asymmetry;
-            *seen = self.measure(LEG)?;
-            grown = if seen.asymmetry > before { grown + 1 } else { 0 };
+            let before = leg.asymmetry;
+            *leg = self.measure(LEG)?;
+            grown = if leg.asymmetry > before { grown + 1 } else { 0 };
             if self.last.settled && grown < GROWN {
                 return Ok(true);
             }
             // Noise may hide an asymmetry, but not where the motion goes.
-            let is_there = (LOST..1.0 / LOST).contains(&(seen.response / first));
-            other = if seen.symmetric && is_there { 0 } else { other + 1 };
-            self.setpoint = seen.last;
+            let is_there = (LOST..1.0 / LOST).contains(&(leg.response / first));
+            other = if leg.symmetric && is_there { 0 } else { other + 1 };
+            self.setpoint = leg.last;
         }
         Ok(false)
     }
 
     /// A leg that changes the response by `change`, m, and lets it go on at this rate.
-    fn sweep(&mut self, seen: &Leg, change: f64) -> Result<Leg, ExperimentError> {
-        let periods = self.periods(STEP * seen.response, seen);
+    fn sweep(&mut self, leg: &Leg, change: f64) -> Result<Leg, ExperimentError> {
+        let periods = self.periods(STEP * leg.response, leg);
         self.leg(change, periods, change / (periods as f64 * self.period))
     }
 
@@ -286,8 +286,8 @@ impl<'b, 'a, R: Rig + ?Sized, C: Controller + ?Sized> Search<'b, 'a, R, C> {
     }
 
     /// Periods for a change of the response, m, so that a share of the holding drive makes it.
-    fn periods(&self, change: f64, seen: &Leg) -> usize {
-        let rate = SHARE * self.gain() * seen.drive.max(FIRM * self.asked);
+    fn periods(&self, change: f64, leg: &Leg) -> usize {
+        let rate = SHARE * self.gain() * leg.drive.max(FIRM * self.requested);
         LEG.max((change.abs() / (rate * self.period)).ceil() as usize)
     }
 
@@ -407,30 +407,30 @@ fn even_and_odd(samples: &[Sample], step: f64) -> Option<[f64; 3]> {
 }
 
 /// The last points of the backbone, at most three.
-struct Known(Vec<Leg>);
+struct BackbonePoints(Vec<Leg>);
 
-impl From<Leg> for Known {
+impl From<Leg> for BackbonePoints {
     fn from(first: Leg) -> Self {
         Self(vec![first])
     }
 }
 
-impl Known {
-    /// Adds a point, or replaces the last one if they are less apart than the share `apart` or noise. Returns whether the drive `asked` lies
+impl BackbonePoints {
+    /// Adds a point, or replaces the last one if they are less apart than the share `apart` or noise. Returns whether the drive `requested` lies
     /// between the two.
-    fn add(&mut self, seen: Leg, apart: f64, asked: f64) -> bool {
+    fn add(&mut self, leg: Leg, apart: f64, requested: f64) -> bool {
         let last = self.0[self.0.len() - 1];
-        let difference = (seen.drive - last.drive).abs();
-        let is_new = (seen.response / last.response - 1.0).abs() > apart
-            && difference > SIGNIFICANT * seen.noise.hypot(last.noise);
+        let difference = (leg.drive - last.drive).abs();
+        let is_new = (leg.response / last.response - 1.0).abs() > apart
+            && difference > SIGNIFICANT * leg.noise.hypot(last.noise);
         if !is_new {
             self.0.pop();
         }
-        self.0.push(seen);
+        self.0.push(leg);
         if self.0.len() > 3 {
             self.0.remove(0);
         }
-        (last.drive - asked) * (seen.drive - asked) <= 0.0
+        (last.drive - requested) * (leg.drive - requested) <= 0.0
     }
 
     /// Slope of the holding drive over the response.

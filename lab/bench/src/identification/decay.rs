@@ -3,15 +3,14 @@
 use std::f64::consts::{PI, TAU};
 use std::ops::Range;
 
+use nalgebra::DVector;
 use serde::Serialize;
-
-use super::crossings;
-use super::fit::harmonic;
-use super::regime::impacts;
-use crate::record::{Record, Sample};
-use crate::scene::{Dimensionless, Estimator, Scene};
-use vines_model::numerics::mean;
+use vines_model::numerics::{HarmonicBasis, mean};
 use vines_model::regime::end_of_synchrony;
+
+use super::response::impacts;
+use crate::record::{Record, Sample};
+use crate::scene::{Dimensionless, Scene};
 
 /// One point along the decay, in SI units, and dimensionless with the parameters of the scene.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -98,10 +97,7 @@ pub fn decay_points(record: &Record, scene: &Scene) -> DecayPoints {
         f64::INFINITY
     };
     let values: Vec<f64> = decay.iter().map(|s| s.sensors.response).collect();
-    let pieces = match scene.record.estimator {
-        Estimator::Fit => fitted(&values, dt, omega, scene.record.window_periods),
-        Estimator::Crossings => crossed(&values, dt),
-    };
+    let pieces = fitted(&values, dt, omega, scene.record.window_periods);
     // What the impacts alone take away, m/s; the mean over the first period is that of the 1:1 motion.
     let damping = scene.linear().damping_rate;
     let taken = |piece: &Piece| -piece.rate - damping * piece.amplitude;
@@ -183,24 +179,106 @@ fn fitted(values: &[f64], dt: f64, mut omega: f64, periods: f64) -> Vec<Piece> {
     pieces
 }
 
-/// One estimate per period between zero crossings; the differences of its neighbours give rate and scatter.
-fn crossed(values: &[f64], dt: f64) -> Vec<Piece> {
-    let periods = crossings::periods(values, dt);
-    let last = periods.len().saturating_sub(1);
-    let piece = |n: usize| {
-        let (from, here, to) = (&periods[n.saturating_sub(1)], &periods[n], &periods[(n + 1).min(last)]);
-        let scatter = |value: fn(&crossings::Period) -> f64| {
-            // White noise of variance 1 gives second differences the variance 6.
-            (value(from) - 2.0 * value(here) + value(to)).abs() / 6f64.sqrt()
-        };
-        Piece {
-            samples: here.samples.clone(),
-            time: here.middle * dt,
-            amplitude: here.amplitude,
-            omega: here.omega,
-            rate: (to.amplitude - from.amplitude) / ((to.middle - from.middle) * dt),
-            uncertainties: [scatter(|period| period.amplitude), scatter(|period| period.omega)],
+// Least squares of a harmonic whose amplitude and phase drift linearly across the window.
+
+/// A harmonic fitted to a window of samples; everything holds at the middle of the window.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Harmonic {
+    /// Amplitude of the fundamental, in the unit of the samples.
+    pub amplitude: f64,
+    /// Phase of the fundamental, rad: the samples are `amplitude sin(phase)` there.
+    pub phase: f64,
+    /// Angular frequency, rad/s.
+    pub omega: f64,
+    /// Rate of change of the amplitude, 1/s times its unit.
+    pub rate: f64,
+    /// Standard uncertainties of amplitude and frequency by the noise of the samples.
+    pub uncertainties: [f64; 2],
+}
+
+/// Rounds of refitting about the frequency found; each reduces the error by orders of magnitude.
+const ROUNDS: usize = 6;
+/// Fewest samples of a window.
+const FEWEST: usize = 16;
+/// Largest relative distance of the frequency from the guess: beyond that, the rounds diverge.
+const FARTHEST: f64 = 0.5;
+
+/// Fits `values`, sampled every `sample_time` seconds, by a fundamental near `omega` (rad/s) and its third harmonic, both
+/// with linear drift, and a constant.
+///
+/// The drift of the fitted phase corrects the frequency, and the fit is repeated about that. `None` for a window that is too
+/// short or contains no motion of about that frequency.
+pub fn harmonic(values: &[f64], sample_time: f64, omega: f64) -> Option<Harmonic> {
+    if values.len() < FEWEST {
+        return None;
+    }
+    let middle = 0.5 * (values.len() - 1) as f64;
+    let right = DVector::from_column_slice(values);
+    // Half a window, s.
+    let half = middle * sample_time;
+    let (guess, mut omega, mut last) = (omega, omega, None);
+    for _ in 0..ROUNDS {
+        let phases: Vec<f64> = (0..values.len())
+            .map(|n| (n as f64 - middle) * sample_time * omega)
+            .collect();
+        let basis = HarmonicBasis::new(&phases, 0, &[Some(2), None, Some(1)]);
+        let fit = basis.fit(&right)?;
+        let a = fit.harmonic(1);
+        let square = a.norm_sqr();
+        if square == 0.0 || !square.is_finite() {
+            return None;
         }
-    };
-    (0..periods.len()).map(piece).collect()
+        // The phase of a turns by Im(drift/a) per half window.
+        let change = fit.drift(1) * a.conj() / half;
+        omega += change.im / square;
+        if (omega / guess - 1.0).abs() > FARTHEST {
+            return None;
+        }
+        last = Some((basis, fit, a, change.re));
+    }
+    let (basis, fit, a, growth) = last?;
+    let amplitude = a.norm_sqr().sqrt();
+    let degrees = (values.len() - basis.terms()) as f64;
+    let noise = (basis.residual(&right, &fit).norm_squared() / degrees).sqrt();
+    let largest = |degree: usize| basis.variances(1, degree).into_iter().fold(0.0, f64::max).sqrt();
+    Some(Harmonic {
+        amplitude,
+        phase: a.arg(),
+        omega,
+        rate: growth / amplitude,
+        uncertainties: [
+            noise * largest(0),
+            noise * largest(1) / (amplitude * middle * sample_time),
+        ],
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn a_drifting_harmonic_is_found_from_a_poor_guess(
+            amplitude in 0.1..2.0f64, phase in -3.0..3.0f64, decay in 0.0..0.02f64, guess in 0.98..1.02f64,
+        ) {
+            let (dt, n) = (0.063, 151);
+            let middle = 75.0;
+            let values: Vec<f64> = (0..n).map(|i| {
+                let t = (f64::from(i) - middle) * dt;
+                let theta = phase + t;
+                amplitude * (1.0 - decay * t) * theta.sin() + 0.02 * (3.0 * theta + 0.3).sin() + 0.01
+            }).collect();
+            let fit = harmonic(&values, dt, guess).unwrap();
+            prop_assert!((fit.omega - 1.0).abs() < 1e-9, "{fit:?}");
+            prop_assert!((fit.amplitude - amplitude).abs() < 1e-9);
+            prop_assert!((fit.phase - phase).abs() < 1e-9);
+        }
+    }
+
+    #[test]
+    fn silence_has_no_harmonic() {
+        assert_eq!(harmonic(&[0.0; 100], 0.1, 1.0), None);
+    }
 }

@@ -3,16 +3,13 @@
 use std::f64::consts::TAU;
 
 use serde::Serialize;
-
-use vines_model::numerics::{Estimate, RANDOM, mean};
+use vines_model::numerics::{Estimate, RANDOM, SIGNIFICANT, mean, standard_deviation};
 use vines_model::regime::Regime;
 
-use super::regime::classify;
-use super::response::{foreign_tone, regime_by_response};
-use super::tone::Tone;
-use super::{Balance, Cycle, Measured, Slopes};
+use super::response::{Tone, classify, foreign_tone, regime_by_response};
+use super::{Balance, Cycle, IdentificationError, Slopes};
 use crate::record::Record;
-use crate::scene::{LinearResponse, Scene};
+use crate::scene::{Dimensionless, LinearResponse, Scene};
 
 /// The locked point as measured over the hold.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -165,4 +162,115 @@ fn means(held: &[Cycle]) -> [Estimate; 3] {
         },
         Estimate { value: response, uncertainty: noise },
     ]
+}
+
+// A measured point of phase resonance.
+
+/// A point of phase resonance as measured, in hertz and metres, and dimensionless with the parameters of the scene.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Measured {
+    /// Frequency, Hz.
+    #[serde(rename = "f_Hz")]
+    pub f_hz: f64,
+    /// Amplitude of the fundamental of the response, m.
+    #[serde(rename = "A_m")]
+    pub a_m: f64,
+    /// Base amplitude, m, measured if a sensor reads the base, otherwise commanded.
+    #[serde(rename = "E_m")]
+    pub e_m: f64,
+    /// Standard uncertainty of the frequency, Hz.
+    #[serde(rename = "u_f_Hz")]
+    pub u_f_hz: f64,
+    /// Standard uncertainty of the response, m.
+    #[serde(rename = "u_A_m")]
+    pub u_a_m: f64,
+    /// Standard uncertainty of the base amplitude, m.
+    #[serde(rename = "u_E_m")]
+    pub u_e_m: f64,
+    /// Detuning.
+    pub sigma: f64,
+    /// Amplitude of the fundamental of the response over b.
+    #[serde(rename = "C")]
+    pub c: f64,
+    /// Base amplitude over `b epsilon`.
+    #[serde(rename = "G")]
+    pub g: f64,
+    /// Phase of the response relative to the base, minus the target, degrees.
+    pub phase_error_deg: f64,
+    /// Standard uncertainty of sigma.
+    pub u_sigma: f64,
+    /// Standard uncertainty of C.
+    #[serde(rename = "u_C")]
+    pub u_c: f64,
+    /// Standard uncertainty of G.
+    #[serde(rename = "u_G")]
+    pub u_g: f64,
+    /// Standard uncertainty of the phase error, degrees.
+    pub u_phase_deg: f64,
+}
+
+impl Measured {
+    /// From the amplitude of the response, m, that of the base, m, the frequency, rad/s, and the phase error, rad.
+    pub(crate) fn new([response, base, omega, phase_error]: [Estimate; 4], d: &Dimensionless) -> Self {
+        Self {
+            f_hz: omega.value / TAU,
+            a_m: response.value,
+            e_m: base.value,
+            u_f_hz: omega.uncertainty / TAU,
+            u_a_m: response.uncertainty,
+            u_e_m: base.uncertainty,
+            sigma: d.sigma(omega.value),
+            c: response.value / d.b,
+            g: d.excitation(base.value),
+            phase_error_deg: phase_error.value.to_degrees(),
+            u_sigma: omega.uncertainty / d.omega_change(1.0),
+            u_c: response.uncertainty / d.b,
+            u_g: d.excitation(base.uncertainty),
+            u_phase_deg: phase_error.uncertainty.to_degrees(),
+        }
+    }
+}
+
+// What makes a record useless: a phase off its target while the lock was held, and a sensor that fails after the release.
+
+/// Share of a free response that impacts leave in two periods at least. They take the share pi epsilon G_imp/C in each, with
+/// G_imp = (4/pi) R B^2/C: 0.14 at epsilon = 0.05, r = 0.65, C = 0.5.
+const LEFT: f64 = 0.1;
+/// Steps of a converter below which the scatter of a response says nothing.
+const STEPS: f64 = 8.0;
+
+/// Refuses a lock whose phase is farther from its target than the tolerance of the lock.
+pub(super) fn on_target(lock: &Lock, scene: &Scene) -> Result<(), IdentificationError> {
+    let (error, tolerance) = (lock.at.phase_error_deg, scene.controller.phase_tolerance);
+    if error.abs() <= tolerance + SIGNIFICANT * lock.at.u_phase_deg {
+        return Ok(());
+    }
+    Err(IdentificationError::OffTarget { error, uncertainty: lock.at.u_phase_deg, tolerance })
+}
+
+/// Refuses a decay in which a sensor reads no number, or in which the response is lost within two periods.
+pub(super) fn sensors_after_release(record: &Record, scene: &Scene) -> Result<(), IdentificationError> {
+    let decay = record.decay();
+    let failed = |n: usize, what| {
+        let seconds = n as f64 * record.sample_time;
+        Err(IdentificationError::SensorAfterRelease { seconds, what })
+    };
+    let is_number = |value: f64| value.is_finite();
+    let all_numbers =
+        |n: &usize| is_number(decay[*n].sensors.response) && decay[*n].sensors.reference.is_none_or(is_number);
+    if let Some(n) = (0..decay.len()).find(|n| !all_numbers(n)) {
+        return failed(n, "reads no number");
+    }
+    let period = scene.controller.samples_per_period.round() as usize;
+    let response: Vec<f64> = decay.iter().map(|sample| sample.sensors.response).collect();
+    let changes = response.windows(2).map(|pair| (pair[1] - pair[0]).abs());
+    let step = changes.filter(|change| *change > 0.0).fold(f64::INFINITY, f64::min);
+    let scatters: Vec<f64> = response.chunks_exact(period).map(standard_deviation).collect();
+    let linear = scene.linear();
+    let left = LEFT * (-2.0 * std::f64::consts::TAU * linear.damping_rate / linear.omega0).exp();
+    let is_lost = |n: &usize| scatters[*n] > STEPS * step && scatters[n + 2] < left * scatters[*n];
+    match (0..scatters.len().saturating_sub(2)).find(is_lost) {
+        Some(n) => failed((n + 1) * period, "stops reading the response"),
+        None => Ok(()),
+    }
 }

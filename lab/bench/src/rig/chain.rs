@@ -4,19 +4,14 @@
 //! An input passes sensor noise, anti-alias filter, converter and delay, in that order. The output is held from sample to sample
 //! and quantised. `[chain]` in the scene switches each stage on.
 
-mod converter;
-mod filter;
-mod noise;
-
 use std::collections::VecDeque;
+use std::f64::consts::{FRAC_1_SQRT_2, SQRT_2};
 
-use converter::Converter;
-use filter::LowPass;
-pub(super) use noise::NormalDistribution;
-use noise::Sensor;
+use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
+use rand_distr::{Distribution, StandardNormal};
 
-use super::{Drive, GroundTruth, Rig, RigError, Sensors};
-use crate::scene::Scene;
+use super::{Drive, Rig, RigError, RigStage, Sensors};
+use crate::scene::{RatioOf, Scene};
 
 /// Largest deviation of a sampling instant, in standard deviations.
 const JITTER_MAX: f64 = 4.0;
@@ -24,8 +19,8 @@ const JITTER_MAX: f64 = 4.0;
 /// A rig behind its measurement chain.
 pub struct Chain {
     rig: Box<dyn Rig>,
-    response: Channel,
-    base: Option<Channel>,
+    response: InputChannel,
+    base: Option<InputChannel>,
     /// For an output that is held: its converter, unless that is ideal.
     output: Option<Option<Converter>>,
     normal: NormalDistribution,
@@ -40,13 +35,13 @@ pub struct Chain {
 }
 
 /// The stages of one input.
-struct Channel {
-    sensor: Option<Sensor>,
+struct InputChannel {
+    sensor: Option<NoisySensor>,
     filter: Option<LowPass>,
     converter: Option<Converter>,
 }
 
-impl Channel {
+impl InputChannel {
     fn read(&mut self, value: f64, elapsed: f64, normal: &mut NormalDistribution) -> f64 {
         let noisy = match &mut self.sensor {
             Some(sensor) => sensor.read(value, normal),
@@ -79,10 +74,10 @@ impl Chain {
     pub fn new(rig: Box<dyn Rig>, scene: &Scene) -> Self {
         let (settings, d) = (&scene.chain, scene.dimensionless());
         // The power of a signal is averaged over about one period.
-        let channel = |range: f64| Channel {
+        let channel = |range: f64| InputChannel {
             sensor: settings
                 .snr
-                .map(|snr| Sensor::new(snr, settings.snr_of, range, scene.controller.samples_per_period)),
+                .map(|snr| NoisySensor::new(snr, settings.snr_of, range, scene.controller.samples_per_period)),
             filter: settings.filter.map(|cut_off| LowPass::new(cut_off * d.omega0)),
             converter: settings.adc_bits.map(|bits| Converter::new(bits, range)),
         };
@@ -116,13 +111,17 @@ impl Chain {
     }
 }
 
-impl Rig for Chain {
+impl RigStage for Chain {
+    fn inner(&mut self) -> &mut dyn Rig {
+        self.rig.as_mut()
+    }
+
     fn sense(&mut self) -> Result<Sensors, RigError> {
-        let seen = self.rig.sense()?;
+        let sensors = self.rig.sense()?;
         let (elapsed, normal) = (self.elapsed, &mut self.normal);
         self.elapsed = 0.0;
-        let response = self.response.read(seen.response, elapsed, normal);
-        let reference = match (&mut self.base, seen.reference) {
+        let response = self.response.read(sensors.response, elapsed, normal);
+        let reference = match (&mut self.base, sensors.reference) {
             (Some(channel), Some(value)) => Some(channel.read(value, elapsed, normal)),
             _ => None,
         };
@@ -137,7 +136,7 @@ impl Rig for Chain {
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
         if self.output.is_some() {
-            return self.hold(drive, step);
+            return RigStage::hold(self, drive, step);
         }
         let taken = self.taken(step);
         self.rig.advance(drive, taken)
@@ -149,8 +148,173 @@ impl Rig for Chain {
         let displacement = converted(output, drive.displacement);
         self.rig.hold(Drive { displacement, ..drive }, taken)
     }
+}
 
-    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
-        self.rig.ground_truth()
+// The anti-alias filter.
+
+/// A Butterworth low pass of second order, `y'' + sqrt(2) wc y' + wc^2 y = wc^2 u`, exact for a signal that is
+/// linear between samples.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LowPass {
+    cut_off: f64,
+    /// Last sample of the signal.
+    input: f64,
+    output: f64,
+    slope: f64,
+}
+
+impl LowPass {
+    /// A filter at rest with the cut-off frequency `cut_off`, rad/s.
+    pub fn new(cut_off: f64) -> Self {
+        Self { cut_off, input: 0.0, output: 0.0, slope: 0.0 }
+    }
+
+    /// The output `elapsed` seconds after the last sample, when the signal is `input`.
+    pub fn pass(&mut self, input: f64, elapsed: f64) -> f64 {
+        if elapsed > 0.0 {
+            let rise = (input - self.input) / elapsed;
+            let rate = FRAC_1_SQRT_2 * self.cut_off;
+            // On a ramp the output lags by sqrt(2)/wc; the initial transient decays.
+            let lag = SQRT_2 / self.cut_off * rise;
+            let cosine = self.output - (self.input - lag);
+            let sine = (self.slope - rise) / rate + cosine;
+            let (sin, cos) = (rate * elapsed).sin_cos();
+            let decay = (-rate * elapsed).exp();
+            let (ringing, quadrature) = (decay * (cosine * cos + sine * sin), decay * (sine * cos - cosine * sin));
+            self.output = input - lag + ringing;
+            self.slope = rise + rate * (quadrature - ringing);
+        }
+        self.input = input;
+        self.output
+    }
+}
+
+// A converter between volts and numbers: a step and a range.
+
+/// Rounds to steps within a range.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Converter {
+    /// Smallest difference, in the unit of the signal.
+    step: f64,
+    low: f64,
+    high: f64,
+}
+
+impl Converter {
+    /// A converter with this number of bits, from `-range` to `range` minus one step, as in two's complement.
+    pub fn new(bits: u32, range: f64) -> Self {
+        let step = 2.0 * range / 2_f64.powi(bits as i32);
+        Self { step, low: -range, high: range - step }
+    }
+
+    pub fn convert(&self, value: f64) -> f64 {
+        ((value / self.step).round() * self.step).clamp(self.low, self.high)
+    }
+}
+
+// Sensor noise; reproducible on every machine for the same seed.
+
+pub struct NormalDistribution(ChaCha8Rng);
+
+impl NormalDistribution {
+    pub fn new(seed: u64) -> Self {
+        Self(ChaCha8Rng::seed_from_u64(seed))
+    }
+
+    /// The next number, with mean 0 and standard deviation 1.
+    pub fn next(&mut self) -> f64 {
+        StandardNormal.sample(&mut self.0)
+    }
+}
+
+/// Adds white noise to a signal.
+pub struct NoisySensor {
+    /// Standard deviation of the noise relative to the RMS of the signal.
+    ratio: f64,
+    /// Mean square of the signal.
+    power: f64,
+    /// Weight of a new sample in the running mean square; 0 for a fixed one.
+    follow: f64,
+}
+
+impl NoisySensor {
+    /// A sensor with the signal-to-noise ratio `snr` (dB), relative to the mean power of about the last `memory` samples, or to
+    /// a sine that fills `range`.
+    pub fn new(snr: f64, of: RatioOf, range: f64, memory: f64) -> Self {
+        let (power, follow) = match of {
+            RatioOf::Signal => (0.0, 1.0 / memory),
+            RatioOf::Range => (0.5 * range * range, 0.0),
+        };
+        Self { ratio: 10_f64.powf(-snr / 20.0), power, follow }
+    }
+
+    pub fn read(&mut self, value: f64, normal: &mut NormalDistribution) -> f64 {
+        self.power += self.follow * (value * value - self.power);
+        value + self.ratio * self.power.sqrt() * normal.next()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Amplitude and lag of the output for a sine of frequency 1.
+    fn response(cut_off: f64) -> (f64, f64) {
+        let mut filter = LowPass::new(cut_off);
+        let dt = std::f64::consts::TAU / 1000.0;
+        let (mut sine, mut cosine) = (0.0, 0.0);
+        for n in 0..20_000 {
+            let t = f64::from(n) * dt;
+            let output = filter.pass(t.sin(), dt);
+            if n >= 19_000 {
+                sine += output * t.sin() / 500.0;
+                cosine += output * t.cos() / 500.0;
+            }
+        }
+        (sine.hypot(cosine), -cosine.atan2(sine))
+    }
+
+    #[test]
+    fn a_sine_passes_as_the_transfer_function_says() {
+        for cut_off in [0.5, 1.0, 3.0, 20.0] {
+            let (amplitude, lag) = response(cut_off);
+            let x: f64 = 1.0 / cut_off;
+            assert!((amplitude - 1.0 / (1.0 + x.powi(4)).sqrt()).abs() < 1e-4, "{cut_off}");
+            assert!((lag - (SQRT_2 * x).atan2(1.0 - x * x)).abs() < 1e-4, "{cut_off}: {lag}");
+        }
+    }
+
+    #[test]
+    fn three_bits_have_eight_values() {
+        let converter = Converter::new(3, 1.0);
+        let mut seen: Vec<f64> = (-300..300).map(|n| converter.convert(f64::from(n) / 100.0)).collect();
+        seen.dedup();
+        assert_eq!(seen, [-1.0, -0.75, -0.5, -0.25, 0.0, 0.25, 0.5, 0.75]);
+    }
+
+    /// Power of the noise on a sine of amplitude 3, relative to that of the sine, dB.
+    fn measured(of: RatioOf) -> f64 {
+        let (mut sensor, mut normal) = (NoisySensor::new(40.0, of, 30.0, 100.0), NormalDistribution::new(7));
+        let mut noise = 0.0;
+        for n in 0..200_000 {
+            let value = 3.0 * (f64::from(n) * 0.0628).sin();
+            let added = sensor.read(value, &mut normal) - value;
+            noise += if n < 1000 { 0.0 } else { added * added };
+        }
+        10.0 * (4.5 / (noise / 199_000.0)).log10()
+    }
+
+    #[test]
+    fn noise_has_the_power_that_was_asked_for() {
+        assert!((measured(RatioOf::Signal) - 40.0).abs() < 0.1);
+        // The range is ten times the signal, so the ratio is 20 dB lower.
+        assert!((measured(RatioOf::Range) - 20.0).abs() < 0.1);
+    }
+
+    #[test]
+    fn the_same_seed_gives_the_same_noise() {
+        let first = |seed| NormalDistribution::new(seed).next();
+        assert_eq!(first(3), first(3));
+        assert_ne!(first(3), first(4));
     }
 }

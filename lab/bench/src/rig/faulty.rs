@@ -219,31 +219,32 @@ impl Faulty {
 impl Rig for Faulty {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let elapsed = self.elapsed();
-        let mut seen = match (&mut self.changed, elapsed) {
+        let mut sensors = match (&mut self.changed, elapsed) {
             (Some(changed), Some(_)) => changed.sense()?,
             _ => self.rig.sense()?,
         };
-        self.past.push_back([seen.response, seen.reference.unwrap_or(0.0)]);
+        self.past
+            .push_back([sensors.response, sensors.reference.unwrap_or(0.0)]);
         if self.past.len() > KEPT + elapsed.unwrap_or(0) {
             self.past.pop_front();
         }
         let Some(elapsed) = elapsed else {
-            return Ok(seen);
+            return Ok(sensors);
         };
         match self.fault {
-            RigFault::Response(sensor) => seen.response = self.read(0, sensor, elapsed),
-            RigFault::Base(sensor) => seen.reference = Some(self.read(1, sensor, elapsed)),
+            RigFault::Response(sensor) => sensors.response = self.read(0, sensor, elapsed),
+            RigFault::Base(sensor) => sensors.reference = Some(self.read(1, sensor, elapsed)),
             RigFault::Both(sensor) => {
-                seen.response = self.read(0, sensor, elapsed);
-                seen.reference = Some(self.read(1, sensor, elapsed));
+                sensors.response = self.read(0, sensor, elapsed);
+                sensors.reference = Some(self.read(1, sensor, elapsed));
             }
             RigFault::Swapped => {
-                let base = seen.reference.unwrap_or(0.0);
-                (seen.response, seen.reference) = (base, Some(seen.response));
+                let base = sensors.reference.unwrap_or(0.0);
+                (sensors.response, sensors.reference) = (base, Some(sensors.response));
             }
             RigFault::Shaker(_) | RigFault::Structure | RigFault::Forward(_) => {}
         }
-        Ok(seen)
+        Ok(sensors)
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {

@@ -2,31 +2,31 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Dimensionless, SceneError, validate::Quantity};
+use super::{Checked, Dimensionless, Length, SceneError};
 
 /// How the response amplitude is stepped with the loop closed.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Backbone {
-    /// First level, response amplitude over b.
-    #[serde(rename = "C_from", skip_serializing_if = "Option::is_none")]
+pub struct BackboneSettings {
+    /// First level over b, in a file only: [`Scene`](super::Scene) has it as `a_from`.
+    #[serde(rename = "C_from", skip_serializing)]
     pub c_from: Option<f64>,
-    /// The same in m.
-    #[serde(rename = "A_from", skip_serializing_if = "Option::is_none")]
+    /// First level, response amplitude, m.
+    #[serde(rename = "A_from")]
     pub a_from: Option<f64>,
-    /// Last level, response amplitude over b.
-    #[serde(rename = "C_to", skip_serializing_if = "Option::is_none")]
+    /// Last level over b, in a file only.
+    #[serde(rename = "C_to", skip_serializing)]
     pub c_to: Option<f64>,
-    /// The same in m.
-    #[serde(rename = "A_to", skip_serializing_if = "Option::is_none")]
+    /// Last level, response amplitude, m.
+    #[serde(rename = "A_to")]
     pub a_to: Option<f64>,
-    /// How many levels, at equal distances.
+    /// Number of levels, at equal distances.
     pub points: u32,
-    /// Largest drive allowed, base amplitude over `b epsilon`.
-    #[serde(rename = "G_max", skip_serializing_if = "Option::is_none")]
+    /// Largest drive allowed over `b epsilon`, in a file only.
+    #[serde(rename = "G_max", skip_serializing)]
     pub g_max: Option<f64>,
-    /// The same in m.
-    #[serde(rename = "E_max", skip_serializing_if = "Option::is_none")]
+    /// Largest drive allowed, base amplitude, m.
+    #[serde(rename = "E_max")]
     pub e_max: Option<f64>,
     /// Periods after which a point is taken, settled or not.
     pub dwell_max: u32,
@@ -35,7 +35,11 @@ pub struct Backbone {
     pub precision: f64,
 }
 
-impl Default for Backbone {
+/// First and last level over b, and the largest drive over `b epsilon`, where a scene states none.
+const LEVELS: [f64; 2] = [0.7, 0.14];
+const G_MAX: f64 = 4.0;
+
+impl Default for BackboneSettings {
     fn default() -> Self {
         Self {
             c_from: None,
@@ -51,72 +55,58 @@ impl Default for Backbone {
     }
 }
 
-impl Backbone {
-    /// First and last level and the largest drive where neither unit is given, and a refusal where both are.
-    pub(super) fn complete(&mut self, origin: &str) -> Result<(), SceneError> {
-        let default =
-            |over_b: &mut Option<f64>, in_m: Option<f64>, [key, other]: [&str; 2], value| match (*over_b, in_m) {
-                (Some(_), Some(_)) => Err(both(origin, "backbone", key, other)),
-                (None, None) => {
-                    *over_b = Some(value);
-                    Ok(())
-                }
-                _ => Ok(()),
-            };
-        default(&mut self.c_from, self.a_from, ["C_from", "A_from"], 0.7)?;
-        default(&mut self.c_to, self.a_to, ["C_to", "A_to"], 0.14)?;
-        default(&mut self.g_max, self.e_max, ["G_max", "E_max"], 4.0)
-    }
-
-    /// The levels, amplitudes of the response, m, in the order in which they are visited; `b` (m) is the half-width of the cavity.
-    pub fn levels(&self, b: f64) -> Vec<f64> {
-        let in_m = |in_m: Option<f64>, over_b: Option<f64>| in_m.or(over_b.map(|c| c * b)).unwrap_or_default();
-        let (from, to, unit) = match (self.c_from, self.c_to) {
-            (Some(from), Some(to)) => (from, to, b),
-            (from, to) => (in_m(self.a_from, from), in_m(self.a_to, to), 1.0),
-        };
-        let steps = f64::from(self.points.max(2) - 1);
-        (0..self.points)
-            .map(|n| unit * rounded(from + (to - from) * f64::from(n) / steps))
-            .collect()
-    }
-
-    /// Largest drive, m.
-    pub(super) fn drive_max(&self, d: &Dimensionless) -> f64 {
-        let by_g = self.g_max.map(|g| d.amplitude(g));
-        self.e_max.or(by_g).unwrap_or(f64::INFINITY)
-    }
-
-    pub(super) fn check(&self) -> Result<(), SceneError> {
-        for (key, value, unit) in [
-            ("backbone.C_from", self.c_from, "(over b)"),
-            ("backbone.C_to", self.c_to, "(over b)"),
-            ("backbone.A_from", self.a_from, "m"),
-            ("backbone.A_to", self.a_to, "m"),
-            ("backbone.G_max", self.g_max, "(dimensionless)"),
-            ("backbone.E_max", self.e_max, "m"),
-        ] {
-            Quantity::new(key, value.unwrap_or(1.0), unit).positive()?;
+impl BackboneSettings {
+    /// The default levels and the default largest drive, in metres.
+    pub fn of(d: &Dimensionless) -> Self {
+        let [a_from, a_to] = LEVELS.map(|level| Some(level * d.b));
+        Self {
+            a_from,
+            a_to,
+            e_max: Some(d.amplitude(G_MAX)),
+            ..Self::default()
         }
-        Quantity::new("backbone.points", self.points.into(), "(levels)")
+    }
+
+    /// The section with its levels and its largest drive in metres, checked.
+    pub(super) fn in_metres(mut self, origin: &str, d: &Dimensionless) -> Result<Self, SceneError> {
+        let default = Self::of(d);
+        let length = |keys, over_unit: &mut Option<f64>, in_metres| Length {
+            origin,
+            section: "backbone",
+            keys,
+            over_unit: over_unit.take(),
+            in_metres,
+        };
+        self.a_from = length(["C_from", "A_from"], &mut self.c_from, self.a_from)
+            .resolve(d.b)?
+            .or(default.a_from);
+        self.a_to = length(["C_to", "A_to"], &mut self.c_to, self.a_to)
+            .resolve(d.b)?
+            .or(default.a_to);
+        self.e_max = length(["G_max", "E_max"], &mut self.g_max, self.e_max)
+            .resolve(d.amplitude(1.0))?
+            .or(default.e_max);
+        Checked::new("backbone.points", self.points.into(), "(levels)")
             .check((1..=10_000).contains(&self.points), "must be from 1 to 10000")?;
-        Quantity::new("backbone.dwell_max", self.dwell_max.into(), "(periods)").check(
+        Checked::new("backbone.dwell_max", self.dwell_max.into(), "(periods)").check(
             (8..=10_000).contains(&self.dwell_max),
             "must be from 8 (two halves of four periods) to 10000",
         )?;
-        Quantity::new("backbone.precision", self.precision, "(relative)").positive()
+        Checked::new("backbone.precision", self.precision, "(relative)").positive()?;
+        Ok(self)
+    }
+
+    /// The levels, amplitudes of the response, m, in the order in which they are visited.
+    pub fn levels(&self) -> Vec<f64> {
+        let [from, to] = [self.a_from, self.a_to].map(Option::unwrap_or_default);
+        let steps = f64::from(self.points.max(2) - 1);
+        (0..self.points)
+            .map(|n| rounded(from + (to - from) * f64::from(n) / steps))
+            .collect()
     }
 }
 
-/// The refusal of a quantity that is given in two units.
-pub(super) fn both(origin: &str, section: &str, key: &str, other: &str) -> SceneError {
-    SceneError::Keys {
-        origin: origin.into(),
-        message: format!("[{section}] has both {key} and {other} (m), which say the same thing: give one of them"),
-    }
-}
-
-/// As a person would write it, to ten digits: 0.68, not 0.6799999999999999.
+/// The value to ten digits, as a person would write it: 0.0068, not 0.0067999999999999996.
 fn rounded(value: f64) -> f64 {
     format!("{value:.9e}").parse().unwrap_or(value)
 }

@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Controller, SceneError, option::option, validate::Quantity};
+use super::{Checked, ControllerSettings, SceneError, option};
 
 /// Reference of a signal-to-noise ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -17,7 +17,7 @@ pub enum RatioOf {
 /// The stages between the rig and the controller; each can be switched off.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Chain {
+pub struct ChainSettings {
     /// Resolution of the inputs, bits; absent: ideal.
     #[serde(deserialize_with = "option")]
     pub adc_bits: Option<u32>,
@@ -50,7 +50,7 @@ pub struct Chain {
     pub compensate: bool,
 }
 
-impl Default for Chain {
+impl Default for ChainSettings {
     fn default() -> Self {
         Self {
             adc_bits: None,
@@ -70,7 +70,7 @@ impl Default for Chain {
     }
 }
 
-impl Chain {
+impl ChainSettings {
     /// Whether anything is switched on.
     pub fn is_on(&self) -> bool {
         let Self {
@@ -105,30 +105,30 @@ impl Chain {
         })
     }
 
-    pub(super) fn check(&self, controller: &Controller) -> Result<(), SceneError> {
+    pub(super) fn check(&self, controller: &ControllerSettings) -> Result<(), SceneError> {
         for (key, bits) in [("chain.adc_bits", self.adc_bits), ("chain.dac_bits", self.dac_bits)] {
             let bits = bits.unwrap_or(1);
-            Quantity::new(key, bits.into(), "bits")
+            Checked::new(key, bits.into(), "bits")
                 .check((1..=32).contains(&bits), "must be from 1 to 32, or \"none\"")?;
         }
-        Quantity::new("chain.dac_bits", self.dac_bits.unwrap_or(0).into(), "bits").check(
+        Checked::new("chain.dac_bits", self.dac_bits.unwrap_or(0).into(), "bits").check(
             self.dac_bits.is_none() || self.hold,
             "needs chain.hold = true: only samples of the drive can be quantised",
         )?;
-        Quantity::new("chain.response_range", self.response_range, "(over b)").positive()?;
-        Quantity::new("chain.base_range", self.base_range, "(over b epsilon)").positive()?;
+        Checked::new("chain.response_range", self.response_range, "(over b)").positive()?;
+        Checked::new("chain.base_range", self.base_range, "(over b epsilon)").positive()?;
         if let Some(snr) = self.snr {
-            Quantity::new("chain.snr", snr, "dB").check((-40.0..=300.0).contains(&snr), "must be from -40 to 300")?;
+            Checked::new("chain.snr", snr, "dB").check((-40.0..=300.0).contains(&snr), "must be from -40 to 300")?;
         }
         let nyquist = 0.5 * controller.samples_per_period;
         if let Some(filter) = self.filter {
-            Quantity::new("chain.filter", filter, "(omega0)").check(
+            Checked::new("chain.filter", filter, "(omega0)").check(
                 (2.0..=nyquist).contains(&filter),
                 format!("must be from 2 to {nyquist} (half the sampling frequency), or \"none\""),
             )?;
         }
-        Quantity::new("chain.jitter", self.jitter, "samples")
+        Checked::new("chain.jitter", self.jitter, "samples")
             .check((0.0..=0.1).contains(&self.jitter), "must be from 0 to 0.1")?;
-        Quantity::new("chain.delay", self.delay.into(), "samples").check(self.delay <= 1000, "must be from 0 to 1000")
+        Checked::new("chain.delay", self.delay.into(), "samples").check(self.delay <= 1000, "must be from 0 to 1000")
     }
 }

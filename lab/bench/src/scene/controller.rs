@@ -1,17 +1,20 @@
 //! The `[controller]` section: the phase-locked loop.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{PI, TAU};
 
-use phase_lock::Config;
-use serde::{Deserialize, Serialize};
+use lovines::State;
+use num_complex::Complex64;
+use phase_lock::{Config, ConfigError, LockCriterion, NONE, PARAMETERS, Parameter, Value as Setting};
+use serde::{Deserialize, Serialize, Serializer};
+use toml::{Table, Value};
+use vines_model::ArgumentError;
 
-use super::option::option;
-use super::{SceneError, validate::Quantity};
+use super::{Checked, Dimensionless, Length, Scene, SceneError, Sensor, option, symbols};
 
 /// Settings of the phase-locked loop, relative to the natural frequency so that they suit any plant.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
-pub struct Controller {
+pub struct ControllerSettings {
     /// Samples per natural period `2 pi/omega0`.
     pub samples_per_period: f64,
     /// Bandwidth of the phase detector, in units of omega0: the only tuning parameter; the gains of the loop follow from it.
@@ -33,12 +36,11 @@ pub struct Controller {
     pub amplitude_tolerance: f64,
     /// How long all of this must hold, periods.
     pub dwell_periods: u32,
-    /// Largest drive allowed, base amplitude over `b epsilon`; by default four times the larger of the requested drive and that at which
-    /// impacts begin.
-    #[serde(rename = "G_max")]
+    /// Largest drive allowed over `b epsilon`, in a file only: [`Scene`] has it as `e_max`.
+    #[serde(rename = "G_max", skip_serializing)]
     pub g_max: Option<f64>,
-    /// The same in m.
-    #[serde(rename = "E_max", skip_serializing_if = "Option::is_none")]
+    /// Largest drive allowed, base amplitude, m; by default four times the larger of the requested drive and the drive at which impacts begin.
+    #[serde(rename = "E_max")]
     pub e_max: Option<f64>,
     /// Response above which the drive is shut down, over b.
     #[serde(rename = "C_max", deserialize_with = "option")]
@@ -52,7 +54,7 @@ pub struct Controller {
     pub delay: f64,
 }
 
-impl Default for Controller {
+impl Default for ControllerSettings {
     fn default() -> Self {
         Self {
             samples_per_period: 100.0,
@@ -75,7 +77,7 @@ impl Default for Controller {
     }
 }
 
-impl Controller {
+impl ControllerSettings {
     /// The phase target in radians.
     pub fn phase_target_radians(&self) -> f64 {
         self.phase_target.to_radians()
@@ -99,32 +101,30 @@ impl Controller {
         self.detector().bandwidth_max()
     }
 
+    /// The section with its largest drive in metres.
+    pub(super) fn in_metres(mut self, origin: &str, d: &Dimensionless) -> Result<Self, SceneError> {
+        let (over_unit, in_metres) = (self.g_max.take(), self.e_max);
+        let keys = ["G_max", "E_max"];
+        let limit = Length { origin, section: "controller", keys, over_unit, in_metres };
+        self.e_max = limit.resolve(d.amplitude(1.0))?;
+        Ok(self)
+    }
+
     pub(super) fn check(&self) -> Result<(), SceneError> {
-        self.check_limits()?;
-        let samples = self.samples_per_period;
-        let highest = self.detector().highest_harmonic();
-        let fewest = (2.0 * highest as f64 * self.omega_max).floor() + 1.0;
-        Quantity::new("controller.samples_per_period", samples, "(samples)").check(
-            (fewest..=1e5).contains(&samples),
-            format!("must be from {fewest} (two per period of harmonic {highest} at omega_max) to 100000"),
-        )?;
-        let widest = self.bandwidth_max();
-        Quantity::new("controller.bandwidth", self.bandwidth, "(omega0)").check(
-            self.bandwidth > 0.0 && self.bandwidth <= widest,
-            format!("must be above 0 and at most {widest:.3} with {samples} samples per period"),
-        )?;
-        let (low, high, start) = (self.omega_min, self.omega_max, self.omega_start);
-        Quantity::new("controller.omega_min", low, "(omega0)").positive()?;
-        Quantity::new("controller.omega_max", high, "(omega0)")
-            .check(high > low, format!("must be above omega_min = {low}"))?;
-        Quantity::new("controller.omega_start", start, "(omega0)").check(
-            (low..=high).contains(&start),
-            format!("must lie between omega_min = {low} and omega_max = {high}"),
-        )?;
-        let target = self.phase_target;
-        Quantity::new("controller.phase_target", target, "degrees")
-            .check(target.abs() <= 180.0, "must lie between -180 and 180 degrees")?;
         for (key, value, unit) in [
+            (
+                "controller.ramp_periods",
+                self.ramp_periods.unwrap_or(0.0),
+                "(natural periods)",
+            ),
+            ("controller.release_periods", self.release_periods, "(natural periods)"),
+            ("controller.delay", self.delay, "samples"),
+        ] {
+            Checked::new(key, value, unit).not_negative()?;
+        }
+        for (key, value, unit) in [
+            ("controller.C_max", self.c_max.unwrap_or(1.0), "(over b)"),
+            ("controller.omega_min", self.omega_min, "(omega0)"),
             ("controller.phase_tolerance", self.phase_tolerance, "degrees"),
             (
                 "controller.frequency_tolerance",
@@ -133,31 +133,347 @@ impl Controller {
             ),
             ("controller.amplitude_tolerance", self.amplitude_tolerance, "(relative)"),
         ] {
-            Quantity::new(key, value, unit).positive()?;
+            Checked::new(key, value, unit).positive()?;
         }
-        let dwell = self.dwell_periods;
-        Quantity::new("controller.dwell_periods", dwell.into(), "(periods)")
-            .check((4..=400).contains(&dwell), "must be from 4 to 400")
-    }
-
-    fn check_limits(&self) -> Result<(), SceneError> {
-        let periods = "(natural periods)";
-        let ramp = self.ramp_periods.unwrap_or(0.0);
-        for (key, value, unit) in [
-            ("controller.ramp_periods", ramp, periods),
-            ("controller.release_periods", self.release_periods, periods),
-            ("controller.delay", self.delay, "samples"),
+        let samples = self.samples_per_period;
+        let highest = self.detector().highest_harmonic();
+        let fewest = (2.0 * highest as f64 * self.omega_max).floor() + 1.0;
+        let widest = self.bandwidth_max();
+        let (low, high, start) = (self.omega_min, self.omega_max, self.omega_start);
+        let (target, dwell) = (self.phase_target, self.dwell_periods);
+        for (key, value, unit, is_allowed, allowed) in [
+            (
+                "controller.samples_per_period",
+                samples,
+                "(samples)",
+                (fewest..=1e5).contains(&samples),
+                format!("must be from {fewest} (two per period of harmonic {highest} at omega_max) to 100000"),
+            ),
+            (
+                "controller.bandwidth",
+                self.bandwidth,
+                "(omega0)",
+                self.bandwidth > 0.0 && self.bandwidth <= widest,
+                format!("must be above 0 and at most {widest:.3} with {samples} samples per period"),
+            ),
+            (
+                "controller.omega_max",
+                high,
+                "(omega0)",
+                high > low,
+                format!("must be above omega_min = {low}"),
+            ),
+            (
+                "controller.omega_start",
+                start,
+                "(omega0)",
+                (low..=high).contains(&start),
+                format!("must lie between omega_min = {low} and omega_max = {high}"),
+            ),
+            (
+                "controller.phase_target",
+                target,
+                "degrees",
+                target.abs() <= 180.0,
+                "must lie between -180 and 180 degrees".into(),
+            ),
+            (
+                "controller.dwell_periods",
+                dwell.into(),
+                "(periods)",
+                (4..=400).contains(&dwell),
+                "must be from 4 to 400".into(),
+            ),
         ] {
-            Quantity::new(key, value, unit).not_negative()?;
-        }
-        let given = |option: Option<f64>| option.unwrap_or(1.0);
-        for (key, value, unit) in [
-            ("controller.G_max", given(self.g_max), "(over b epsilon)"),
-            ("controller.E_max", given(self.e_max), "m"),
-            ("controller.C_max", given(self.c_max), "(over b)"),
-        ] {
-            Quantity::new(key, value, unit).positive()?;
+            Checked::new(key, value, unit).check(is_allowed, allowed)?;
         }
         Ok(())
     }
+}
+
+// The linear response of a rig, without impacts.
+
+/// Frequency response without impacts, near its resonance: response over base `gain/(damping_rate + i (omega - omega0))`.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LinearResponse {
+    /// Natural frequency, rad/s.
+    pub omega0: f64,
+    /// Damping rate, rad/s.
+    pub damping_rate: f64,
+    /// Standard uncertainty of natural frequency and damping rate, rad/s.
+    pub uncertainty: f64,
+    /// Growth rate of the response at resonance per amplitude of the base, 1/s, with its phase relative to the base.
+    pub gain: Complex64,
+}
+
+impl LinearResponse {
+    /// That of the plant of a scene.
+    pub fn of(scene: &Scene) -> Self {
+        let omega0 = scene.dimensionless().omega0;
+        Self {
+            omega0,
+            damping_rate: 0.5 * scene.plant.damping / scene.plant.primary_mass,
+            uncertainty: 0.0,
+            gain: Complex64::new(0.0, -0.5 * omega0),
+        }
+    }
+
+    /// Response over base at the frequency `omega`, rad/s.
+    pub fn at(&self, omega: f64) -> Complex64 {
+        self.gain / Complex64::new(self.damping_rate, omega - self.omega0)
+    }
+}
+
+// A scene's settings in SI units, in the form that plant and controller use.
+
+impl Scene {
+    /// Parameters and start of the plant, under the names of the FMU's variables.
+    pub fn start_values(&self) -> [(&'static str, f64); 10] {
+        let [mass, k, c, m, b, r] = symbols(&self.plant);
+        let State { q1, dq1, q2, dq2 } = self.start;
+        let [q1, dq1] = [("q1", q1), ("der(q1)", dq1)];
+        [mass, k, c, m, b, r, q1, dq1, ("q2", q2), ("der(q2)", dq2)]
+    }
+
+    /// Configuration of the controller for the scene's excitation.
+    pub fn controller_config(&self) -> Config {
+        let d = self.dimensionless();
+        let omega0 = d.omega0;
+        let c = &self.controller;
+        let period = d.natural_period();
+        // Without periods or without a drive, steps.
+        let rate = |amplitude: f64, periods: f64| {
+            Some(amplitude / (periods * period)).filter(|rate| *rate > 0.0 && rate.is_finite())
+        };
+        let amplitude_max = c.e_max.unwrap_or(4.0 * self.drive_needed());
+        let defaults = Config::for_resonance(omega0, self.amplitude);
+        self.phase_lock.apply(Config {
+            sample_time: self.sample_time(),
+            omega_start: c.omega_start * omega0,
+            omega_min: c.omega_min * omega0,
+            omega_max: c.omega_max * omega0,
+            bandwidth: c.bandwidth * omega0,
+            damping_rate: Some(self.linear().damping_rate).filter(|rate| *rate > 0.0),
+            phase_target: c.phase_target_radians(),
+            delay: self.chain.stated_delay(omega0 * self.sample_time()) / omega0
+                + (c.delay + f64::from(u8::from(self.resonance.is_late()))) * self.sample_time(),
+            amplitude_max: Some(amplitude_max),
+            response_max: c.c_max.map(|c| c * d.b),
+            ramp_rate: match c.ramp_periods {
+                Some(periods) => rate(self.amplitude, periods),
+                // The velocity of a base that moves with the largest amplitude.
+                None => Some(amplitude_max * omega0),
+            },
+            release_rate: rate(self.amplitude, c.release_periods),
+            // The range in a period, or in half a time constant of the detector: the loop locks as fast as without a limit.
+            omega_rate: Some((c.omega_max - c.omega_min) * omega0 * (2.0 * c.bandwidth * omega0).max(1.0 / period)),
+            acquire_timeout: Some(self.lock_periods() * period),
+            residual_max: Some(self.residual()),
+            reference_connected: self.chain.reference,
+            lock: self.lock_criterion(),
+            ..defaults
+        })
+    }
+
+    /// The lock criterion: the drifts that are left near the steady state, at the rate at which the response approaches it.
+    fn lock_criterion(&self) -> LockCriterion {
+        let c = &self.controller;
+        let bandwidth = self.bandwidth().max(BANDWIDTH_MIN);
+        let approached = PI * bandwidth;
+        let defaults = LockCriterion::default();
+        LockCriterion {
+            phase_tolerance: c.phase_tolerance.to_radians(),
+            frequency_drift: c.frequency_tolerance * bandwidth * approached,
+            amplitude_drift: c.amplitude_tolerance * approached,
+            dwell: c.dwell_periods,
+            ..defaults
+        }
+    }
+
+    /// Largest plausible difference between a reading and its prediction, as a share of the amplitude.
+    fn residual(&self) -> f64 {
+        let impulse = match self.resonance.sensor {
+            // Impacts change the velocity within a sample. Two in a period that balance the base amplitude E have the acceleration
+            // omega0^2 E samples/4; frequency and transients take a few times as much. The amplitude of the response is about b.
+            Sensor::Acceleration => self.drive_needed() / self.dimensionless().b * self.controller.samples_per_period,
+            Sensor::V | Sensor::Q1 => 0.0,
+        };
+        RESIDUAL + impulse
+    }
+
+    /// The larger of the requested drive, m, and the one that holds the linear mode at the amplitude at which impacts certainly occur.
+    fn drive_needed(&self) -> f64 {
+        let linear = self.bandwidth().max(BANDWIDTH_MIN);
+        self.amplitude.max(IMPACTS * linear * self.dimensionless().b)
+    }
+
+    /// Half-power bandwidth of the linear response over omega0: twice the damping ratio, and base over response at resonance.
+    fn bandwidth(&self) -> f64 {
+        let linear = self.linear();
+        2.0 * linear.damping_rate.max(0.0) / linear.omega0
+    }
+
+    /// Natural periods in which the amplitude of the linear mode falls by a factor of e.
+    pub fn relaxation_periods(&self) -> f64 {
+        1.0 / (PI * self.bandwidth())
+    }
+
+    /// Time limit for the lock, natural periods: as set, or at least 3000 and 20 times the relaxation time.
+    pub fn lock_periods(&self) -> f64 {
+        let relaxation = PI * self.relaxation_periods();
+        let samples_per_period = self.controller.samples_per_period;
+        self.record
+            .lock_periods
+            .unwrap_or((20.0 * relaxation).max(3000.0).min(1e7 / samples_per_period))
+    }
+
+    /// Configuration of the controller for tracking: with the largest drive of `[backbone]`, and a bandwidth at which the loops are not coupled.
+    pub fn backbone_config(&self) -> Config {
+        let limits = self.backbone.e_max.into_iter().chain(self.controller.e_max);
+        Config {
+            amplitude_max: limits.reduce(f64::min),
+            bandwidth: self.controller.bandwidth.min(self.coupled_bandwidth()) * self.linear().omega0,
+            ..self.controller_config()
+        }
+    }
+
+    /// Largest bandwidth of the loops of phase and amplitude, in units of omega0, at which their coupling is weak. A drive that changes shifts
+    /// the phase that the detectors read, and a frequency that changes shifts the amplitude. From loop to loop the gain is the cube of the
+    /// bandwidth times A/E, which is largest without impacts: the inverse of twice the damping ratio.
+    fn coupled_bandwidth(&self) -> f64 {
+        COUPLED * self.bandwidth().max(f64::MIN_POSITIVE).cbrt()
+    }
+}
+
+/// That bandwidth over the cube root of E/A.
+const COUPLED: f64 = 0.9;
+/// Smallest half-power bandwidth over omega0 that counts for the lock criterion and the largest drive: with less, most of the energy is lost in
+/// impacts.
+const BANDWIDTH_MIN: f64 = 1e-4;
+/// Share of the amplitude by which a reading may differ from its prediction: a resonant response changes slowly.
+const RESIDUAL: f64 = 0.3;
+/// Response amplitude over b at which impacts certainly occur: a particle at rest in the middle is hit at 1.
+const IMPACTS: f64 = 1.1;
+
+// The `[phase_lock]` section: parameters of the controller that no other key sets, in SI units and by their names in `PhaseLock.fmu`.
+
+/// The parameters that other keys of a scene set, in units that suit any plant.
+pub const KEYS: [(&str, &str); 18] = [
+    ("sample_time", "controller.samples_per_period"),
+    ("omega_start", "controller.omega_start"),
+    ("omega_min", "controller.omega_min"),
+    ("omega_max", "controller.omega_max"),
+    ("amplitude", "excitation.G"),
+    ("amplitude_max", "controller.G_max"),
+    ("ramp_rate", "controller.ramp_periods"),
+    ("release_rate", "controller.release_periods"),
+    ("phase_target", "controller.phase_target"),
+    ("bandwidth", "controller.bandwidth"),
+    ("delay", "controller.delay"),
+    ("lock.phase_tolerance", "controller.phase_tolerance"),
+    ("lock.frequency_drift", "controller.frequency_tolerance"),
+    ("lock.amplitude_drift", "controller.amplitude_tolerance"),
+    ("lock.dwell", "controller.dwell_periods"),
+    ("response_max", "controller.C_max"),
+    ("acquire_timeout", "record.lock_periods"),
+    ("reference_connected", "chain.reference"),
+];
+
+/// The key of the scene that sets a parameter of the controller.
+pub fn key(name: &str) -> String {
+    let key = KEYS.iter().find(|(parameter, _)| *parameter == name);
+    key.map_or_else(|| format!("phase_lock.{name}"), |(_, key)| (*key).to_string())
+}
+
+/// The message for a refused configuration, with the keys of the scene.
+pub fn refusal(error: &ConfigError) -> String {
+    let mut text = format!("{}: {error}", key(error.name));
+    let words = error.allowed.split([' ', ',', '(', ')']);
+    for name in words.filter(|word| Parameter::find(word).is_some()) {
+        text += &format!("; {name} is {}", key(name));
+    }
+    text
+}
+
+/// Checked values by the names of the controller's parameters.
+#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
+#[serde(try_from = "Table")]
+pub struct PhaseLock(Vec<(&'static str, Setting)>);
+
+impl TryFrom<Table> for PhaseLock {
+    type Error = ArgumentError;
+
+    fn try_from(table: Table) -> Result<Self, ArgumentError> {
+        if !table.is_empty() && !cfg!(feature = "parameters") {
+            return Err("the section [phase_lock] needs the feature `parameters`"
+                .to_string()
+                .into());
+        }
+        let mut flat = Table::new();
+        for (name, value) in table {
+            match value {
+                Value::Table(group) => flat.extend(group.into_iter().map(|(key, one)| (format!("{name}.{key}"), one))),
+                value => _ = flat.insert(name, value),
+            }
+        }
+        let settings = flat.iter().map(|(name, value)| setting(name, value));
+        Ok(Self(settings.collect::<Result<_, _>>()?))
+    }
+}
+
+impl Serialize for PhaseLock {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        serializer.collect_map(self.0.iter().map(|(name, setting)| {
+            let value = match *setting {
+                Setting::Real(NONE) => Value::from("none"),
+                Setting::Real(number) => Value::from(number),
+                Setting::Integer(number) => Value::from(number),
+                Setting::Boolean(one) => Value::from(one),
+            };
+            (name, value)
+        }))
+    }
+}
+
+impl PhaseLock {
+    /// The configuration with these values. Without the feature `parameters` there are none, and nothing that sets them is compiled.
+    fn apply(&self, mut config: Config) -> Config {
+        let settings = if cfg!(feature = "parameters") { &self.0[..] } else { &[] };
+        for (name, setting) in settings {
+            // Names, types and whole numbers were checked when the scene was read; `Config::build` checks the rest.
+            let _ = Parameter::find(name).map(|parameter| parameter.set(&mut config, *setting));
+        }
+        config
+    }
+}
+
+/// Name and value of a parameter, from the name and the value in the file.
+fn setting(name: &str, value: &Value) -> Result<(&'static str, Setting), ArgumentError> {
+    if let Some((_, key)) = KEYS.iter().find(|(parameter, _)| *parameter == name) {
+        return Err(format!("phase_lock.{name} is set by {key}").into());
+    }
+    let parameter = Parameter::find(name).ok_or_else(|| {
+        let free = PARAMETERS.iter().map(|one| one.name);
+        let free: Vec<&str> = free.filter(|one| KEYS.iter().all(|(name, _)| name != one)).collect();
+        format!(
+            "the controller has no parameter `{name}`; expected one of {}",
+            free.join(", ")
+        )
+    })?;
+    let mut config = Config::for_resonance(1.0, 1.0);
+    let setting = match (parameter.get(&config), value) {
+        (Setting::Real(_), Value::Float(number)) => Setting::Real(*number),
+        (Setting::Real(_), Value::Integer(number)) => Setting::Real(*number as f64),
+        (Setting::Real(_), Value::String(word)) if word == "none" => Setting::Real(NONE),
+        (Setting::Real(_), Value::Boolean(false)) => Setting::Real(NONE),
+        (Setting::Integer(_), Value::Integer(number)) => Setting::Integer(i32::try_from(*number).unwrap_or(i32::MAX)),
+        (Setting::Boolean(_), Value::Boolean(one)) => Setting::Boolean(*one),
+        _ => {
+            let (allowed, given) = (parameter.range.allowed(), value.type_str());
+            return Err(format!("phase_lock.{name} is a {given}, which is refused; allowed is {allowed}").into());
+        }
+    };
+    let accepted = parameter.set(&mut config, setting);
+    accepted.map_err(|error| format!("phase_lock.{error}"))?;
+    Ok((parameter.name, setting))
 }

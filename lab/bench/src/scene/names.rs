@@ -24,7 +24,7 @@ const UNITS: [(&str, f64); 12] = [
 
 /// A variable of a rig or a controller.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(try_from = "Written")]
+#[serde(try_from = "NameSection")]
 pub struct Name {
     /// Its name there.
     pub name: String,
@@ -35,7 +35,7 @@ pub struct Name {
 /// As written: `"name"`, or a table with `name` and one of `unit` and `factor`.
 #[derive(Deserialize)]
 #[serde(untagged, deny_unknown_fields)]
-enum Written {
+enum NameSection {
     Plain(String),
     Full {
         name: String,
@@ -44,29 +44,38 @@ enum Written {
     },
 }
 
-impl TryFrom<Written> for Name {
+impl Name {
+    /// A variable in a unit.
+    ///
+    /// # Errors
+    /// An unknown unit.
+    pub fn with_unit(name: &str, unit: &str) -> Result<Self, ArgumentError> {
+        let factor = UNITS
+            .iter()
+            .find(|(symbol, _)| *symbol == unit)
+            .map(|(_, factor)| *factor);
+        let symbols = || UNITS.map(|(symbol, _)| symbol).join(", ");
+        let factor = factor.ok_or_else(|| {
+            format!(
+                "{name}: the unit {unit} is unknown; known are {}, or give a factor",
+                symbols()
+            )
+        })?;
+        Ok(Self { name: name.into(), factor })
+    }
+}
+
+impl TryFrom<NameSection> for Name {
     type Error = ArgumentError;
 
-    fn try_from(written: Written) -> Result<Self, ArgumentError> {
+    fn try_from(written: NameSection) -> Result<Self, ArgumentError> {
         let (name, unit, factor) = match written {
-            Written::Plain(name) => (name, None, None),
-            Written::Full { name, unit, factor } => (name, unit, factor),
+            NameSection::Plain(name) => (name, None, None),
+            NameSection::Full { name, unit, factor } => (name, unit, factor),
         };
-        let of = |unit: &str| {
-            UNITS
-                .iter()
-                .find(|(known, _)| *known == unit)
-                .map(|(_, factor)| *factor)
-        };
-        let known = || UNITS.map(|(unit, _)| unit).join(", ");
         let factor = match (unit, factor) {
             (Some(_), Some(_)) => return Err(format!("{name}: give a unit or a factor, not both").into()),
-            (Some(unit), None) => of(&unit).ok_or_else(|| {
-                format!(
-                    "{name}: the unit {unit} is unknown; known are {}, or give a factor",
-                    known()
-                )
-            })?,
+            (Some(unit), None) => return Self::with_unit(&name, &unit),
             (None, factor) => factor.unwrap_or(1.0),
         };
         if !factor.is_finite() || factor == 0.0 {
@@ -105,5 +114,24 @@ impl Names {
 }
 
 #[cfg(test)]
-#[path = "../../tests/unit/names.rs"]
-mod tests;
+mod tests {
+    use super::*;
+
+    #[test]
+    fn names_have_units_or_factors_and_mistakes_are_named() {
+        let text = "response = \"y\"\nbase = { name = \"x\", unit = \"mm\" }\nE = { name = \"A\", factor = -0.5 }";
+        let names: Names = toml::from_str(text).unwrap();
+        let seen = ["response", "base", "E", "omega"].map(|ours| names.of(ours));
+        assert_eq!(seen.each_ref().map(|one| one.factor), [1.0, 1e-3, -0.5, 1.0]);
+        assert_eq!(seen.each_ref().map(|one| &*one.name), ["y", "x", "A", "omega"]);
+        assert_eq!(names.unknown(&["response", "base"]), Some("E"));
+        for (text, reason) in [
+            ("a = { name = \"x\", unit = \"furlong\" }", "unknown"),
+            ("a = { name = \"x\", unit = \"m\", factor = 2 }", "not both"),
+            ("a = { name = \"x\", factor = 0.0 }", "other than 0"),
+        ] {
+            let refused = toml::from_str::<Names>(text).unwrap_err().to_string();
+            assert!(refused.contains(reason), "{refused}");
+        }
+    }
+}

@@ -86,17 +86,29 @@ impl Family {
         })
     }
 
-    /// The two motions at phase resonance, each a continuous branch where it exists.
-    pub(super) fn phase_resonant(&self) -> Option<[Candidate; 2]> {
+    /// Coefficients of B², B and 1 in `Re(V conj(F))`, up to a factor: zero at phase resonance.
+    fn resonance(&self) -> [f64; 3] {
         let Self { alpha, beta, .. } = *self;
         // Only the direction of the base's harmonic matters for the phase.
         let d = (self.base_over_y * self.reference).conj();
         let u = d * self.kappa;
-        let speeds = quadratic(
+        [
             d.re * (alpha * alpha + beta * beta) + u.re * beta + u.im * alpha,
             2.0 * alpha * d.re + u.im,
             d.re,
-        )?;
+        ]
+    }
+
+    /// How far the motion with the speed `b` is from phase resonance, in the units of the coefficients.
+    pub(super) fn off_resonance(&self, b: f64) -> f64 {
+        let [square, linear, constant] = self.resonance();
+        (square * b + linear) * b + constant
+    }
+
+    /// The two motions at phase resonance, each a continuous branch where it exists.
+    pub(super) fn phase_resonant(&self) -> Option<[Candidate; 2]> {
+        let [square, linear, constant] = self.resonance();
+        let speeds = quadratic(square, linear, constant)?;
         Some(speeds.map(|b| self.at(b)))
     }
 
@@ -113,7 +125,8 @@ impl Family {
         self.base_over_y.norm() / self.epsilon * self.beta.abs() / self.alpha.hypot(self.beta)
     }
 
-    fn at(&self, b: f64) -> Candidate {
+    /// The motion with the particle speed `b`, whatever drives it.
+    pub(super) fn at(&self, b: f64) -> Candidate {
         let y = Complex::new(self.beta * b, 1.0 + self.alpha * b);
         let v = y + self.kappa * b;
         let base = y * self.base_over_y;

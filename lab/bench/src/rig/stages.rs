@@ -1,9 +1,13 @@
-//! A rig read by the sensors of a definition of resonance.
+//! Stages of a rig: the sensors of a definition of resonance, no ground truth, a stop on a flag.
+
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 use lovines::Parameters;
+use thiserror::Error;
 use vines_model::{Definition, Reference, Sensor};
 
-use super::{Drive, GroundTruth, Rig, RigError, Sensors};
+use super::{Drive, GroundTruth, Rig, RigError, RigStage, Sensors};
 
 /// A rig whose response is a displacement and whose reference is the base, with the sensors of a definition of resonance.
 ///
@@ -44,7 +48,11 @@ impl<R: Rig> Measured<R> {
     }
 }
 
-impl<R: Rig> Rig for Measured<R> {
+impl<R: Rig> RigStage for Measured<R> {
+    fn inner(&mut self) -> &mut dyn Rig {
+        &mut self.rig
+    }
+
     fn sense(&mut self) -> Result<Sensors, RigError> {
         self.now = self.rig.sense()?;
         let [(middle, late), (first, early)] = self.before;
@@ -77,8 +85,95 @@ impl<R: Rig> Rig for Measured<R> {
         self.step_begins(step);
         self.rig.hold(drive, step)
     }
+}
+
+// A rig that shows its sensors only, as a real one does.
+
+/// A rig without its ground truth.
+pub struct SensorsOnly(Box<dyn Rig>);
+
+impl SensorsOnly {
+    /// Hides the ground truth of a rig.
+    #[must_use]
+    pub fn around(rig: Box<dyn Rig>) -> Self {
+        Self(rig)
+    }
+}
+
+impl RigStage for SensorsOnly {
+    fn inner(&mut self) -> &mut dyn Rig {
+        self.0.as_mut()
+    }
 
     fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
-        self.rig.ground_truth()
+        Ok(None)
+    }
+}
+
+// A rig that stops on a flag, which a signal or another thread sets.
+
+/// The flag was set.
+#[derive(Debug, Error)]
+#[error("interrupted by a signal; the drive is zero")]
+pub struct Interrupted;
+
+/// A rig that stops on a flag: it gets a zero drive, and its next reading is the error [`Interrupted`].
+pub struct Stoppable {
+    rig: Box<dyn Rig>,
+    sample_time: f64,
+    stop: Arc<AtomicBool>,
+}
+
+impl Stoppable {
+    /// `sample_time` in s.
+    pub fn around(rig: Box<dyn Rig>, sample_time: f64, stop: &Arc<AtomicBool>) -> Self {
+        Self { rig, sample_time, stop: Arc::clone(stop) }
+    }
+}
+
+impl RigStage for Stoppable {
+    fn inner(&mut self) -> &mut dyn Rig {
+        self.rig.as_mut()
+    }
+
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        let sensors = self.rig.sense()?;
+        if self.stop.load(Ordering::Relaxed) {
+            self.rig.advance(Drive::default(), self.sample_time)?;
+            return Err(RigError::Failed(Interrupted.into()));
+        }
+        Ok(sensors)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Mutex;
+
+    struct Log(Arc<Mutex<Vec<Drive>>>);
+
+    impl Rig for Log {
+        fn sense(&mut self) -> Result<Sensors, RigError> {
+            Ok(Sensors { response: 1.0, reference: None })
+        }
+
+        fn advance(&mut self, drive: Drive, _: f64) -> Result<(), RigError> {
+            self.0.lock().unwrap().push(drive);
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn a_rig_that_is_stopped_gets_a_zero_drive_and_fails() {
+        let (drives, stop) = (Arc::default(), Arc::default());
+        let stage = Stoppable::around(Box::new(Log(Arc::clone(&drives))), 0.1, &stop);
+        let mut rig: Box<dyn Rig> = Box::new(stage);
+        let drive = Drive { omega: 1.0, amplitude: 2.0, displacement: 0.0 };
+        assert_eq!(rig.sense().unwrap().response, 1.0);
+        rig.advance(drive, 0.1).unwrap();
+        stop.store(true, Ordering::Relaxed);
+        assert!(rig.sense().unwrap_err().cause::<Interrupted>().is_some());
+        assert_eq!(*drives.lock().unwrap(), [drive, Drive::default()]);
     }
 }

@@ -1,0 +1,544 @@
+//! Parameters of a rig from measured points of its backbone: natural frequency, damping ratio, restitution, half-width of the cavity and mass
+//! ratio, with their covariance.
+//!
+//! The model is the exact symmetric 1:1 motion at phase resonance ([`backbone_at_speed`]): a curve over the particle speed B, with the amplitude
+//! `A = b C`, the frequency `omega = omega0 Omega` and the drive `E = b epsilon G`. A measured point has all three, each with a standard
+//! uncertainty. For given parameters, the B of a point is where its weighted distance from the curve is smallest. The sum of the squared distances
+//! is chi-square; the parameters minimise it (Levenberg and Marquardt). Half of its second derivative, with every B eliminated, is the inverse
+//! of the covariance.
+
+use std::f64::consts::TAU;
+use std::fmt::{self, Display, Formatter};
+use std::str::FromStr;
+
+use nalgebra::{Matrix6, Vector3, Vector6};
+use statrs::distribution::{ChiSquared, ContinuousCDF};
+use thiserror::Error;
+use vines_model::numerics::Estimate;
+use vines_model::orbit::backbone_at_speed;
+use vines_model::theory::{BranchSide, SlowFlow};
+use vines_model::{ArgumentError, Definition};
+
+use crate::identification::Measured;
+use crate::scene::{Dimensionless, Parameters};
+
+/// A measured point of phase resonance.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct MeasuredPoint {
+    /// Amplitude of the fundamental of the response, m.
+    pub response: Estimate,
+    /// Angular frequency, rad/s.
+    pub omega: Estimate,
+    /// Amplitude of the base, m.
+    pub drive: Estimate,
+}
+
+impl From<&Measured> for MeasuredPoint {
+    fn from(at: &Measured) -> Self {
+        let estimate = |value, uncertainty| Estimate { value, uncertainty };
+        Self {
+            response: estimate(at.a_m, at.u_a_m),
+            omega: estimate(TAU * at.f_hz, TAU * at.u_f_hz),
+            drive: estimate(at.e_m, at.u_e_m),
+        }
+    }
+}
+
+/// A quantity of a rig.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Quantity {
+    /// Natural frequency without the particle, Hz.
+    F0,
+    /// Damping ratio of the structure.
+    Zeta,
+    /// Restitution coefficient.
+    R,
+    /// Half-width of the cavity, m.
+    B,
+    /// Mass ratio m/M.
+    Epsilon,
+    /// Primary mass, kg.
+    PrimaryMass,
+    /// Mass of the particle, kg.
+    ParticleMass,
+    /// Stiffness, N/m.
+    Stiffness,
+    /// Damping, N s/m.
+    Damping,
+}
+
+impl Quantity {
+    /// All of them: those that a fit determines first, then those that need a mass, a stiffness or a damping from elsewhere.
+    pub const ALL: [Self; 9] = [
+        Self::F0,
+        Self::Zeta,
+        Self::R,
+        Self::B,
+        Self::Epsilon,
+        Self::PrimaryMass,
+        Self::ParticleMass,
+        Self::Stiffness,
+        Self::Damping,
+    ];
+
+    /// Symbol and unit.
+    #[must_use]
+    pub fn symbol(self) -> [&'static str; 2] {
+        match self {
+            Self::F0 => ["f0", "Hz"],
+            Self::Zeta => ["zeta", ""],
+            Self::R => ["r", ""],
+            Self::B => ["b", "m"],
+            Self::Epsilon => ["epsilon", ""],
+            Self::PrimaryMass => ["M", "kg"],
+            Self::ParticleMass => ["m", "kg"],
+            Self::Stiffness => ["k", "N/m"],
+            Self::Damping => ["c", "N s/m"],
+        }
+    }
+
+    /// Whether the motion shows it only together with another mass, stiffness or damping.
+    fn needs_a_scale(self) -> bool {
+        matches!(
+            self,
+            Self::PrimaryMass | Self::ParticleMass | Self::Stiffness | Self::Damping
+        )
+    }
+
+    /// The value at the unknowns.
+    fn of(self, x: &Unknowns) -> f64 {
+        let (omega0, mass) = (x[0].exp(), x[5].exp());
+        match self {
+            Self::F0 => omega0 / TAU,
+            Self::Zeta => x[1],
+            Self::R => x[2],
+            Self::B => x[3].exp(),
+            Self::Epsilon => x[4].exp(),
+            Self::PrimaryMass => mass,
+            Self::ParticleMass => x[4].exp() * mass,
+            Self::Stiffness => mass * omega0 * omega0,
+            Self::Damping => 2.0 * x[1] * omega0 * mass,
+        }
+    }
+
+    /// The value of a plant.
+    #[must_use]
+    pub fn of_plant(self, plant: &Parameters) -> f64 {
+        self.of(&unknowns(plant))
+    }
+
+    /// The gradient over the unknowns.
+    fn gradient(self, x: &Unknowns) -> Unknowns {
+        Unknowns::from_fn(|i, _| {
+            let [below, above] = [-STEP, STEP].map(|step| self.of(&shifted(x, i, step)));
+            (above - below) / (2.0 * STEP)
+        })
+    }
+}
+
+impl Display for Quantity {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str(self.symbol()[0])
+    }
+}
+
+/// A quantity that is known from elsewhere; parse it from `m=0.032±0.0005`, or `r=0.65` for an exact value.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Known {
+    /// Which.
+    pub quantity: Quantity,
+    /// Its value in the unit of the quantity; an uncertainty of 0 fixes it.
+    pub estimate: Estimate,
+}
+
+impl FromStr for Known {
+    type Err = ArgumentError;
+
+    fn from_str(text: &str) -> Result<Self, ArgumentError> {
+        let symbols = Quantity::ALL.map(|quantity| quantity.symbol()[0]).join(", ");
+        let form = || {
+            format!("`{text}`: expected SYMBOL=VALUE±UNCERTAINTY, for instance m=0.032±0.0005, with one of {symbols}")
+        };
+        let (symbol, numbers) = text.split_once('=').ok_or_else(form)?;
+        let quantity = Quantity::ALL
+            .into_iter()
+            .find(|quantity| quantity.symbol()[0] == symbol.trim())
+            .ok_or_else(form)?;
+        let (value, uncertainty) = numbers
+            .split_once('±')
+            .or(numbers.split_once("+-"))
+            .unwrap_or((numbers, "0"));
+        let number = |text: &str| text.trim().parse::<f64>().ok().filter(|number| number.is_finite());
+        let (value, uncertainty) = number(value).zip(number(uncertainty)).ok_or_else(form)?;
+        if uncertainty < 0.0
+            || value < 0.0
+            || (value == 0.0 && quantity != Quantity::Zeta && quantity != Quantity::Damping)
+        {
+            return Err(format!("`{text}`: the value must be positive, and its uncertainty positive or 0").into());
+        }
+        Ok(Self { quantity, estimate: Estimate { value, uncertainty } })
+    }
+}
+
+/// The unknowns: the logarithm of omega0 (rad/s), zeta, r, and the logarithms of b (m), epsilon and M (kg).
+type Unknowns = Vector6<f64>;
+
+/// Step of a difference, relative or, of zeta and r, absolute: the curve is exact to 1e-13, and smooth.
+const STEP: f64 = 1e-6;
+/// Rounds of the minimisation; a fit that converges takes about twenty.
+const ROUNDS: usize = 200;
+/// Restitution coefficients from which the minimisation begins, besides the expected one: chi-square may have several minima.
+const STARTS: [f64; 4] = [0.4, 0.55, 0.7, 0.85];
+/// Relative uncertainty of a value that is known exactly: above rounding.
+const EXACT: f64 = 1e-9;
+/// Fewest points: two equations each for five parameters, and one to spare.
+const FEWEST: usize = 3;
+/// Probability of a larger chi-square below which the model is rejected.
+const REJECTED: f64 = 0.01;
+/// The share of the points that may be left out is the inverse of this.
+const LEFT_OUT: usize = 5;
+/// Relative standard uncertainty from which a parameter counts as not determined.
+const UNCERTAIN: f64 = 0.1;
+
+fn unknowns(plant: &Parameters) -> Unknowns {
+    Unknowns::from([
+        plant.natural_frequency().ln(),
+        0.5 * plant.damping / (plant.stiffness * plant.primary_mass).sqrt(),
+        plant.restitution,
+        plant.half_width.ln(),
+        plant.mass_ratio().ln(),
+        plant.primary_mass.ln(),
+    ])
+}
+
+fn shifted(x: &Unknowns, i: usize, step: f64) -> Unknowns {
+    let mut x = *x;
+    x[i] += step;
+    x
+}
+
+/// Why there is no fit.
+#[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum FitError {
+    #[error("{0} points are too few for the five parameters: at least {FEWEST} at different amplitudes are needed")]
+    TooFew(usize),
+    #[error("point {number}: {what} = {value} ± {uncertainty}: both must be finite, and above 0")]
+    NotPositive {
+        number: usize,
+        what: &'static str,
+        value: f64,
+        uncertainty: f64,
+    },
+    #[error(
+        "no symmetric 1:1 motion has these points, whatever the parameters: are amplitudes in m, frequencies in Hz or rad/s as stated?"
+    )]
+    NoMotion,
+}
+
+/// The fitted rig.
+#[derive(Debug, Clone)]
+pub struct Fit {
+    x: Unknowns,
+    covariance: Matrix6<f64>,
+    has_scale: bool,
+    /// Chi-square.
+    pub chi_square: f64,
+    /// Its degrees of freedom.
+    pub degrees: usize,
+    /// Residuals of the points over their standard uncertainties: response, frequency, drive.
+    pub residuals: Vec<[f64; 3]>,
+    /// Numbers, from 0, of the points that contradict the others and are left out.
+    pub left_out: Vec<usize>,
+}
+
+impl Fit {
+    /// A quantity; `None` for a mass, a stiffness or a damping if none of them is known.
+    #[must_use]
+    pub fn estimate(&self, quantity: Quantity) -> Option<Estimate> {
+        let gradient = quantity.gradient(&self.x);
+        let variance = (gradient.transpose() * self.covariance * gradient)[0];
+        (self.has_scale || !quantity.needs_a_scale()).then(|| Estimate {
+            value: quantity.of(&self.x),
+            uncertainty: variance.max(0.0).sqrt(),
+        })
+    }
+
+    /// Correlation of two quantities.
+    #[must_use]
+    pub fn correlation(&self, one: Quantity, other: Quantity) -> f64 {
+        let [a, b] = [one, other].map(|quantity| quantity.gradient(&self.x));
+        let covariance = |a: &Unknowns, b: &Unknowns| (a.transpose() * self.covariance * b)[0];
+        covariance(&a, &b) / (covariance(&a, &a) * covariance(&b, &b)).sqrt()
+    }
+
+    /// The probability of a larger chi-square if the model is right; `None` without a degree of freedom.
+    #[must_use]
+    pub fn p_value(&self) -> Option<f64> {
+        let distribution = ChiSquared::new(self.degrees as f64).ok()?;
+        Some(distribution.sf(self.chi_square))
+    }
+
+    /// Whether the points contradict the model.
+    #[must_use]
+    pub fn is_rejected(&self) -> bool {
+        self.p_value().is_some_and(|p| p < REJECTED)
+    }
+
+    /// The fitted quantities whose relative standard uncertainty is above 10 %, each with the one that it is correlated with most, and that
+    /// correlation: the points do not separate the two.
+    #[must_use]
+    pub fn not_separated(&self) -> Vec<(Quantity, Quantity, f64)> {
+        let fitted = &Quantity::ALL[..5];
+        let is_uncertain = |quantity: &&Quantity| {
+            let estimate = self.estimate(**quantity);
+            estimate.is_none_or(|one| !(one.uncertainty <= UNCERTAIN * one.value.abs()))
+        };
+        let partner = |one: &Quantity| {
+            let others = fitted.iter().filter(|other| *other != one);
+            let correlations = others.map(|other| (*one, *other, self.correlation(*one, *other)));
+            correlations.max_by(|a, b| a.2.abs().total_cmp(&b.2.abs()))
+        };
+        fitted.iter().filter(is_uncertain).filter_map(partner).collect()
+    }
+
+    /// The plant of the fit; without a known mass, stiffness or damping, its primary mass is that of `scene`.
+    #[must_use]
+    pub fn plant(&self, scene: &Parameters) -> Parameters {
+        let mut x = self.x;
+        if !self.has_scale {
+            x[5] = scene.primary_mass.ln();
+        }
+        Parameters {
+            primary_mass: Quantity::PrimaryMass.of(&x),
+            stiffness: Quantity::Stiffness.of(&x),
+            damping: Quantity::Damping.of(&x).max(0.0),
+            particle_mass: Quantity::ParticleMass.of(&x),
+            half_width: Quantity::B.of(&x),
+            restitution: Quantity::R.of(&x),
+        }
+    }
+}
+
+/// Fits the parameters to `points`. The minimisation begins at the rig `expected`, whose resonance the points show as `definition` says.
+///
+/// If the model is rejected, the points that contradict it most are left out one by one, at most a fifth of them. If the rest still
+/// contradicts the model, the fit is that of all points, and rejected.
+///
+/// # Errors
+/// Too few points, values that are not positive, or points that no motion has.
+pub fn fit(
+    points: &[MeasuredPoint],
+    definition: Definition,
+    expected: &Parameters,
+    known: &[Known],
+) -> Result<Fit, FitError> {
+    if points.len() < FEWEST {
+        return Err(FitError::TooFew(points.len()));
+    }
+    for (n, point) in points.iter().enumerate() {
+        for (what, Estimate { value, uncertainty }) in [
+            ("response", point.response),
+            ("frequency", point.omega),
+            ("drive", point.drive),
+        ] {
+            let is_positive = |number: f64| number > 0.0 && number.is_finite();
+            if !(is_positive(value) && is_positive(uncertainty)) {
+                return Err(FitError::NotPositive { number: n + 1, what, value, uncertainty });
+            }
+        }
+    }
+    let has_scale = known.iter().any(|one| one.quantity.needs_a_scale());
+    let all = Problem { points: points.to_vec(), definition, known, has_scale }.fit(expected)?;
+    let (mut rest, mut fit) = ((0..points.len()).collect::<Vec<usize>>(), all.clone());
+    while fit.is_rejected() {
+        if (points.len() - rest.len() + 1) * LEFT_OUT > points.len() {
+            return Ok(all);
+        }
+        let size = |residual: &[f64; 3]| residual.iter().map(|part| part * part).sum::<f64>();
+        let sizes = fit.residuals.iter().map(size).enumerate();
+        let (worst, _) = sizes
+            .max_by(|one, other| one.1.total_cmp(&other.1))
+            .ok_or(FitError::NoMotion)?;
+        rest.remove(worst);
+        let points = rest.iter().map(|n| points[*n]).collect();
+        fit = Problem { points, definition, known, has_scale }.fit(expected)?;
+    }
+    fit.left_out = (0..points.len()).filter(|n| !rest.contains(n)).collect();
+    Ok(fit)
+}
+
+/// What is minimised.
+struct Problem<'a> {
+    points: Vec<MeasuredPoint>,
+    definition: Definition,
+    known: &'a [Known],
+    has_scale: bool,
+}
+
+/// Chi-square at some unknowns, with the gradient and the matrix of its quadratic approximation.
+struct Sums {
+    chi_square: f64,
+    gradient: Unknowns,
+    normal: Matrix6<f64>,
+    residuals: Vec<[f64; 3]>,
+}
+
+impl Problem<'_> {
+    /// The smallest of the minima that are reached from the expected rig and from other restitution coefficients.
+    fn fit(&self, expected: &Parameters) -> Result<Fit, FitError> {
+        let starts = [expected.restitution].into_iter().chain(STARTS).map(|restitution| {
+            let plant = Parameters { restitution, ..*expected };
+            unknowns(&plant)
+        });
+        let minima = starts.filter_map(|start| self.minimum(start));
+        let (x, sums) = minima
+            .min_by(|one, other| one.1.chi_square.total_cmp(&other.1.chi_square))
+            .ok_or(FitError::NoMotion)?;
+        let equations = 2 * self.points.len() + self.known.len();
+        Ok(Fit {
+            x,
+            covariance: sums.normal.try_inverse().unwrap_or(Matrix6::from_element(f64::NAN)),
+            has_scale: self.has_scale,
+            chi_square: sums.chi_square,
+            degrees: equations.saturating_sub(5 + usize::from(self.has_scale)),
+            residuals: sums.residuals,
+            left_out: Vec::new(),
+        })
+    }
+
+    /// The minimum that is reached from `x`.
+    fn minimum(&self, mut x: Unknowns) -> Option<(Unknowns, Sums)> {
+        let mut speeds = vec![None; self.points.len()];
+        let mut here = self.sums(&x, &mut speeds)?;
+        let mut damping = 1e-3;
+        for _ in 0..ROUNDS {
+            let mut matrix = here.normal;
+            for i in 0..6 {
+                matrix[(i, i)] *= 1.0 + damping;
+            }
+            let step = matrix.cholesky()?.solve(&here.gradient);
+            let (next, mut next_speeds) = (x - step, speeds.clone());
+            match self
+                .sums(&next, &mut next_speeds)
+                .filter(|sums| sums.chi_square <= here.chi_square)
+            {
+                Some(sums) => {
+                    let gained = here.chi_square - sums.chi_square;
+                    (x, here, speeds) = (next, sums, next_speeds);
+                    if gained < 1e-9 * (1.0 + here.chi_square) && damping < 1e-6 {
+                        return Some((x, here));
+                    }
+                    damping *= 0.1;
+                }
+                // The smallest step that counts is far below a standard uncertainty.
+                None if damping > 1e12 => return Some((x, here)),
+                None => damping *= 10.0,
+            }
+        }
+        Some((x, here))
+    }
+
+    /// `None` where the curve does not exist.
+    fn sums(&self, x: &Unknowns, speeds: &mut [Option<f64>]) -> Option<Sums> {
+        if !(0.0 < x[2] && x[2] <= 1.0) {
+            return None;
+        }
+        let mut sums = Sums {
+            chi_square: 0.0,
+            gradient: Unknowns::zeros(),
+            normal: Matrix6::zeros(),
+            residuals: Vec::with_capacity(self.points.len()),
+        };
+        for (point, speed) in self.points.iter().zip(speeds) {
+            let (b, residual, by_speed) = self.nearest(x, point, *speed)?;
+            *speed = Some(b);
+            // The speed follows the parameters: only what is perpendicular to the curve counts.
+            let along = by_speed.normalize();
+            let mut rows = [Vector3::zeros(); 6];
+            for (i, row) in rows.iter_mut().enumerate().take(5) {
+                let [below, above] = [-STEP, STEP].map(|step| self.residual(&shifted(x, i, step), point, b));
+                let slope = (above? - below?) / (2.0 * STEP);
+                *row = slope - along * along.dot(&slope);
+            }
+            let residual = residual - along * along.dot(&residual);
+            for i in 0..6 {
+                sums.gradient[i] += rows[i].dot(&residual);
+                for j in 0..6 {
+                    sums.normal[(i, j)] += rows[i].dot(&rows[j]);
+                }
+            }
+            sums.chi_square += residual.norm_squared();
+            sums.residuals.push(residual.into());
+        }
+        for one in self.known {
+            let Estimate { value, uncertainty } = one.estimate;
+            let u = uncertainty.max(EXACT * value.abs()).max(f64::MIN_POSITIVE);
+            let (residual, row) = ((one.quantity.of(x) - value) / u, one.quantity.gradient(x) / u);
+            sums.chi_square += residual * residual;
+            sums.gradient += row * residual;
+            sums.normal += row * row.transpose();
+        }
+        if !self.has_scale {
+            // Without a scale the primary mass has no influence.
+            sums.normal[(5, 5)] += 1.0;
+        }
+        sums.chi_square.is_finite().then_some(sums)
+    }
+
+    /// The speed at which the curve is nearest to a point, the residual there, and its derivative by the speed.
+    fn nearest(
+        &self,
+        x: &Unknowns,
+        point: &MeasuredPoint,
+        start: Option<f64>,
+    ) -> Option<(f64, Vector3<f64>, Vector3<f64>)> {
+        let (b, epsilon) = (x[3].exp(), x[4].exp());
+        let manifold = SlowFlow::new(2.0 * x[1] / epsilon, x[2]).manifold;
+        let by_theory = || {
+            let c = point.response.value / b;
+            manifold.b(c, BranchSide::Right).unwrap_or(1.02 * manifold.b_min())
+        };
+        let mut speed = start.unwrap_or_else(by_theory);
+        let slope = |speed: f64| {
+            let [below, above] = [-STEP, STEP].map(|step| self.residual(x, point, speed + step));
+            Some((above? - below?) / (2.0 * STEP))
+        };
+        let mut residual = self.residual(x, point, speed)?;
+        let mut by_speed = slope(speed)?;
+        for _ in 0..ROUNDS {
+            let mut step = -by_speed.dot(&residual) / by_speed.norm_squared();
+            let next = loop {
+                let there = self.residual(x, point, speed + step);
+                match there.filter(|there| there.norm_squared() <= residual.norm_squared()) {
+                    Some(there) => break Some(there),
+                    None if step.abs() < 1e-13 => break None,
+                    None => step *= 0.25,
+                }
+            };
+            let Some(next) = next else { break };
+            (speed, residual) = (speed + step, next);
+            by_speed = slope(speed)?;
+            if step.abs() < 1e-12 {
+                break;
+            }
+        }
+        Some((speed, residual, by_speed))
+    }
+
+    /// The curve at a speed less the point, over its standard uncertainties.
+    fn residual(&self, x: &Unknowns, point: &MeasuredPoint, speed: f64) -> Option<Vector3<f64>> {
+        let (omega0, b, epsilon) = (x[0].exp(), x[3].exp(), x[4].exp());
+        let model = Dimensionless {
+            definition: self.definition,
+            ..Dimensionless::new(epsilon, 2.0 * x[1] / epsilon, x[2], 0.0)
+        };
+        let [omega, c, g] = backbone_at_speed(&model, speed)?;
+        let over = |value: f64, measured: Estimate| (value - measured.value) / measured.uncertainty;
+        Some(Vector3::new(
+            over(b * c, point.response),
+            over(omega0 * omega, point.omega),
+            over(b * epsilon * g, point.drive),
+        ))
+    }
+}
