@@ -150,7 +150,7 @@ fn identified_without_ground_truth(scene: &Scene) -> Result<Comparison, Identifi
     let record = if scene.start.dq2 == 0.0 {
         run(&mut rig, &mut ConstantDrive::new(scene), scene).unwrap()
     } else {
-        let mut controller = built_in(&scene);
+        let mut controller = built_in(scene);
         run(&mut rig, &mut controller, scene).unwrap()
     };
     Ok(Comparison::of(&identify(&record, scene)?, scene))
