@@ -83,19 +83,19 @@ fn a_person_gets_tables() {
         let text = String::from_utf8(output.stdout).unwrap();
         assert!(text.contains("sigma") && text.contains("stable"), "{text}");
     }
-    let none = vines(&["orbit", "--set", "excitation.G=0"]).stdout;
+    let none = vines(&["orbit", "--set=excitation.G=0"]).stdout;
     assert!(String::from_utf8(none).unwrap().contains("without excitation"));
 }
 
 #[test]
 fn bad_input_ends_with_code_two_and_one_message() {
     fails(
-        &["orbit", "--set", "plant.r=1.5"],
+        &["orbit", "--set=plant.r=1.5"],
         2,
         "r (coefficient of restitution) = 1.5",
     );
-    fails(&["orbit", "--set", "plant.rr=0.5"], 2, "`rr`");
-    fails(&["orbit", "--set", "nonsense"], 2, "section.key=value");
+    fails(&["orbit", "--set=plant.rr=0.5"], 2, "`rr`");
+    fails(&["orbit", "--set=nonsense"], 2, "section.key=value");
     fails(&["theory", "--scene", "no-such.toml"], 2, "no-such.toml");
     fails(&["theory", "--points", "1"], 2, "--points");
     fails(&["dance"], 2, "dance");
@@ -157,17 +157,14 @@ fn curves_and_settled_orbits_come_as_json_too() {
         "orbit",
         "--backbone",
         "--json",
-        "--set",
-        "plant.c=0.0",
-        "--set",
-        "plant.r=1.0",
-        "--set",
-        "excitation.G=0",
+        "--set=plant.c=0.0",
+        "--set=plant.r=1.0",
+        "--set=excitation.G=0",
     ];
     let mode = json(&mode);
     let points = mode["points"].as_array().unwrap();
     assert!(points.len() > 100 && points.iter().all(|one| one["G"].as_f64().unwrap().abs() < 1e-9));
-    let response = json(&["orbit", "--response", "--json", "--set", "excitation.G=1.6"]);
+    let response = json(&["orbit", "--response", "--json", "--set=excitation.G=1.6"]);
     let components = response["components"].as_array().unwrap();
     let named = |name: &str| {
         components
@@ -179,7 +176,7 @@ fn curves_and_settled_orbits_come_as_json_too() {
     assert_eq!((named("symmetric 1:1"), named("asymmetric 1:1")), (1, 1));
     let study = json(&["orbit", "--definitions", "--json"]);
     assert_eq!(study.as_array().map(Vec::len), Some(9));
-    let settled = json(&["orbit", "--sigma=-0.6", "--json", "--set", "excitation.G=2.2"]);
+    let settled = json(&["orbit", "--sigma=-0.6", "--json", "--set=excitation.G=2.2"]);
     assert_eq!(settled["bounces"].as_array().map(Vec::len), Some(6));
     let study = json(&["orbit", "--convergence", "--json"]);
     assert!((study["slopes"][0].as_f64().unwrap() - 1.0).abs() < 0.05);
@@ -220,11 +217,11 @@ fn a_map_is_written_as_table_and_figures() {
 #[test]
 fn absurd_curves_and_maps_are_refused() {
     fails(&["orbit", "--sigma=-1000"], 2, "above 0");
-    fails(&["orbit", "--sigma=-1", "--set", "excitation.G=0.6"], 1, "vines map");
-    fails(&["orbit", "--response", "--set", "excitation.G=0"], 1, "G = 0");
+    fails(&["orbit", "--sigma=-1", "--set=excitation.G=0.6"], 1, "vines map");
+    fails(&["orbit", "--response", "--set=excitation.G=0"], 1, "G = 0");
     fails(&["orbit", "--response", "--range=2:-2"], 2, "first below the last");
     fails(&["theory", "--sigma=nan"], 2, "finite");
-    let refused = ["identify", "--set", "controller.G_max=1.0"];
+    let refused = ["identify", "--set=controller.G_max=1.0"];
     fails(&refused, 2, "amplitude_max is controller.G_max");
     fails(&["map", "--x", "G=1:2:3", "--y", "G=1:2:3"], 2, "both axes are G");
     fails(&["map", "--sigma=-1.1"], 2, "sigma is on an axis already");
@@ -252,12 +249,9 @@ fn a_folder_that_is_a_file_is_refused_as_wrong_usage_before_anything_runs() {
 fn results_that_cannot_be_written_are_printed() {
     // The names of the files are taken by folders, as if the disk were full at the end.
     let quick = [
-        "--set",
-        "record.decay_periods=40",
-        "--set",
-        "controller.amplitude_tolerance=4e-3",
-        "--set",
-        "backbone.points=2",
+        "--set=record.decay_periods=40",
+        "--set=controller.amplitude_tolerance=4e-3",
+        "--set=backbone.points=2",
     ];
     let quick: Vec<&str> = quick.into_iter().chain(["--rig", "built-in"]).collect();
     for (command, taken, part) in [
@@ -293,6 +287,6 @@ fn packing_refuses_what_it_cannot_pack_before_it_writes() {
     let pack = |option: &[&'static str]| [&["pack", "--out", out], option].concat();
     fails(&pack(&["--binary", "win64"]), 2, "PLATFORM=PATH");
     fails(&pack(&["--binary", "amiga=x.so"]), 2, "linux64, linux32");
-    fails(&pack(&["--set", "plant.r=2"]), 2, "r (coefficient of restitution) = 2");
+    fails(&pack(&["--set=plant.r=2"]), 2, "r (coefficient of restitution) = 2");
     assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
 }

@@ -124,10 +124,8 @@ fn built_in_fmu_and_lock_step_network_give_the_same_bits() {
 fn the_sensors_of_the_scene_are_those_of_every_rig() {
     let plant = fmu("LoViNes.fmu");
     let sensors = [
-        "--set",
-        "resonance.sensor='acceleration'",
-        "--set",
-        "resonance.reference='force'",
+        "--set=resonance.sensor='acceleration'",
+        "--set=resonance.reference='force'",
     ];
     let with = |rig: &str| identified(&[&["--rig", rig], &sensors[..]].concat());
     let direct = with("built-in");
@@ -189,7 +187,7 @@ fn from_a_rig_that_shows_its_sensors_only_and_is_at_rest_lock_and_backbone_are_t
     let far = identified(&["--rig", &again.1, "--controller", &peer.1]);
     assert!((sigma(&far) - sigma(&direct)).abs() < 2e-3);
     let (second, folder) = (rig(), tempfile::tempdir().unwrap());
-    let few = ["--set", "backbone.points=3", "--set", "backbone.C_to=0.6"];
+    let few = ["--set=backbone.points=3", "--set=backbone.C_to=0.6"];
     let arguments = ["backbone", "--json", "--out", folder.path().to_str().unwrap()];
     let done = vines(&with_settings(&[&arguments[..], &few, &["--rig", &second.1]].concat()));
     let found: Value = serde_json::from_slice(&done.stdout).unwrap();
@@ -205,11 +203,11 @@ fn from_a_rig_that_shows_its_sensors_only_and_is_at_rest_lock_and_backbone_are_t
 #[test]
 fn a_backbone_without_a_single_impact_is_a_failure() {
     // The cavity is too wide for the particle to reach its walls.
-    let wide = ["--set", "plant.b=1"];
+    let wide = ["--set=plant.b=1"];
     for (check, part) in [(&[][..], "without impacts"), (&["--no-check"], "is not established")] {
         let rig = Server::start(&[&["rig", "--lock-step", "--sensors-only"], &wide[..]].concat());
         let out = tempfile::tempdir().unwrap();
-        let few = ["--set", "backbone.points=3", "--set", "backbone.C_to=0.6"];
+        let few = ["--set=backbone.points=3", "--set=backbone.C_to=0.6"];
         let arguments = ["backbone", "--out", out.path().to_str().unwrap(), "--rig", &rig.1];
         let done = vines(&with_settings(&[&arguments[..], &few, check].concat()));
         let [table, message] = [&done.stdout, &done.stderr].map(|text| String::from_utf8_lossy(text).into_owned());
@@ -423,13 +421,13 @@ fn a_port_in_use_is_named() {
 #[test]
 fn a_rig_of_another_scene_is_refused() {
     let rig = Server::start(&["rig"]);
-    let coarser = ["--set", "controller.samples_per_period=40"];
+    let coarser = ["--set=controller.samples_per_period=40"];
     fails(
         &[&["identify", "--rig", &rig.1], &coarser[..]].concat(),
         1,
         "same scene",
     );
-    let other = Server::start(&["rig", "--lock-step", "--set", "resonance.sensor='q1'"]);
+    let other = Server::start(&["rig", "--lock-step", "--set=resonance.sensor='q1'"]);
     fails(&["identify", "--rig", &other.1], 1, "measures q1 and e");
 }
 
@@ -461,7 +459,7 @@ fn a_signal_during_an_experiment_zeroes_the_drive_and_keeps_what_was_measured() 
         let out = folder.path().to_str().unwrap();
         let arguments = ["identify", "--out", out, "--rig", &rig.1];
         // A signal that comes later finds the rig still driven.
-        let long = ["--set", "record.hold_periods=20000"];
+        let long = ["--set=record.hold_periods=20000"];
         let client = Command::new(PROGRAM)
             .args([&with_settings(&arguments)[..], &long].concat())
             .stderr(Stdio::piped())
@@ -489,12 +487,9 @@ fn a_signal_between_two_points_of_a_backbone_keeps_the_points_and_ends_with_the_
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().to_str().unwrap();
     let long = [
-        "--set",
-        "backbone.C_from=0.6",
-        "--set",
-        "backbone.C_to=0.58",
-        "--set",
-        "backbone.points=2000",
+        "--set=backbone.C_from=0.6",
+        "--set=backbone.C_to=0.58",
+        "--set=backbone.points=2000",
     ];
     let client = Command::new(PROGRAM)
         .args(with_settings(

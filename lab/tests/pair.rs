@@ -1,4 +1,5 @@
-//! Guards both FMUs as the `fmi` crate couples them in co-simulation, with its delay of one sample, and FMUs with other names and signs.
+//! Guards both FMUs coupled in co-simulation, with its delay of one sample, the values in their system file, and FMUs with other names and
+//! signs.
 
 use std::{
     fs,
@@ -6,13 +7,12 @@ use std::{
     path::{Path, PathBuf},
 };
 
-use fmi::fmi2::import::Fmi2Import;
-use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
-use fmi::traits::FmiImport;
+use fmi2_description::Description;
+use tempfile::TempDir;
 use vines::experiment::{self, Plan};
 use vines::fmu::{FmuController, FmuRig};
 use vines::identification::identify;
-use vines::pack::pack_bench;
+use vines::pack::{components, pack_bench};
 use vines::rig::{BuiltIn, Controller, Drive, GroundTruth, Move, Rig, RigError, Sensors, Simulated};
 use vines::scene::{Names, PAPER, Scene};
 
@@ -25,119 +25,73 @@ fn libraries() -> PathBuf {
     Path::new(env!("CARGO_BIN_EXE_vines")).with_file_name("deps")
 }
 
-/// One FMU of the pair.
-struct Part {
-    instance: InstanceCS,
-    import: Fmi2Import,
+/// Plant and controller with the parameters of a scene, packed into a folder.
+fn packed(scene: &Scene) -> TempDir {
+    let folder = tempfile::tempdir().unwrap();
+    pack_bench(scene, &libraries().as_path().into(), folder.path()).unwrap();
+    folder
 }
 
-impl Part {
-    /// Loads the FMU and starts it with the values that the system file binds to it.
-    fn start(out: &Path, file: &str, bound: &str) -> Self {
-        let import: Fmi2Import = fmi::import::from_path(out.join(file)).unwrap();
-        let mut part = Self {
-            instance: import.instantiate_cs(file, false, true).unwrap(),
-            import,
-        };
-        for (name, kind, value) in values(&out.join("bench.ssp"), bound) {
-            let reference = [part.find(&name)];
-            let instance = &mut part.instance;
-            match kind.as_str() {
-                "Real" => instance.set_real(&reference, &[value.parse().unwrap()]),
-                "Integer" => instance.set_integer(&reference, &[value.parse().unwrap()]),
-                _ => instance.set_boolean(&reference, &[i32::from(value == "true")]),
-            }
-            .unwrap();
-        }
-        let instance = &mut part.instance;
-        instance.setup_experiment(None, 0.0, None).unwrap();
-        instance.enter_initialization_mode().unwrap();
-        instance.exit_initialization_mode().unwrap();
-        part
-    }
-
-    fn find(&self, name: &str) -> u32 {
-        let variables = &self.import.model_description().model_variables.variables;
-        let variable = variables.iter().find(|variable| variable.name == name);
-        variable.expect("the FMU has the variable").value_reference
-    }
-
-    fn find_two(&self, names: [&str; 2]) -> [u32; 2] {
-        names.map(|name| self.find(name))
-    }
-
-    fn read(&mut self, references: [u32; 2]) -> [f64; 2] {
-        let mut values = [0.0; 2];
-        self.instance.get_real(&references, &mut values).unwrap();
-        values
-    }
-
-    fn advance(&mut self, inputs: [u32; 2], values: [f64; 2], time: f64, step: f64) {
-        self.instance.set_real(&inputs, &values).unwrap();
-        self.instance.do_step(time, step, true).unwrap();
-    }
-}
-
-/// Name, type and value of what a parameter set of the system file binds.
-fn values(system: &Path, name: &str) -> Vec<(String, String, String)> {
+/// Names and types of the values in a parameter set of the system file.
+fn bindings(system: &Path, name: &str) -> Vec<[String; 2]> {
     let mut archive = zip::ZipArchive::new(fs::File::open(system).unwrap()).unwrap();
     let mut text = String::new();
-    let mut entry = archive.by_name(name).unwrap();
-    entry.read_to_string(&mut text).unwrap();
+    archive.by_name(name).unwrap().read_to_string(&mut text).unwrap();
     let parameters = text.lines().filter(|line| line.contains("<ssv:Parameter "));
-    let values = parameters.map(|line| {
+    let bindings = parameters.map(|line| {
         let words: Vec<&str> = line.split('"').collect();
-        let kind = words[2].trim_start_matches("><ssv:");
-        let kind = kind.trim_end_matches(" value=");
-        (words[1].into(), kind.into(), words[3].into())
+        let kind = words[2].trim_start_matches("><ssv:").trim_end_matches(" value=");
+        [words[1], kind].map(String::from)
     });
-    values.collect()
+    bindings.collect()
+}
+
+#[test]
+fn every_value_in_the_system_file_belongs_to_a_variable_of_its_fmu() {
+    let folder = packed(&Scene::load(None, &[]).unwrap());
+    for (component, name) in components().into_iter().zip(["plant", "controller"]) {
+        let description = Description::parse(&component.xml).unwrap();
+        let bindings = bindings(&folder.path().join("bench.ssp"), &format!("resources/{name}.ssv"));
+        assert!(bindings.len() > 8, "{bindings:?}");
+        for [name, kind] in bindings {
+            let variable = description.variables.iter().find(|variable| variable.name == name);
+            let (variable_kind, _) = variable.expect(&name).content().unwrap();
+            assert_eq!(format!("{variable_kind:?}"), kind, "{name}");
+        }
+    }
 }
 
 #[test]
 fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
     let scene = Scene::load(None, &[]).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    let out = folder.path();
-    pack_bench(&scene, &libraries().as_path().into(), out).unwrap();
-    let mut plant = Part::start(out, "LoViNes.fmu", "resources/plant.ssv");
-    let mut controller = Part::start(out, "PhaseLock.fmu", "resources/controller.ssv");
-
-    let sensed = plant.find_two(["v", "base"]);
-    let driven = plant.find_two(["omega", "E"]);
-    let sensors = controller.find_two(["response", "reference"]);
-    let drive = controller.find_two(["omega", "E"]);
-    let impacts = [plant.find("impacts")];
-
-    let step = scene.sample_time();
+    let folder = packed(&scene);
+    let path = |name| folder.path().join(name);
+    let (values, names, config) = (scene.start_values(), Names::default(), scene.controller_config());
+    let mut rig = FmuRig::load(&path("LoViNes.fmu"), &values, scene.resonance, &scene.plant, &names).unwrap();
+    let mut controller = FmuController::load(&path("PhaseLock.fmu"), &config, &names).unwrap();
     let samples = |periods: f64| (periods * scene.controller.samples_per_period) as usize;
-    let (mut omega, mut before, mut after) = (0.0, [0], [0]);
     let hold = samples(HOLD_PERIODS);
+    let (mut omega, mut before) = (0.0, 0);
+    let mut command = controller.sample(rig.sense().unwrap(), true).unwrap();
     for n in 0..samples(PERIODS) {
-        let (readings, command) = (plant.read(sensed), controller.read(drive));
+        // Both advance at the same time: the plant has the drive that follows from the reading before.
+        let next = controller.sample(rig.sense().unwrap(), true).unwrap();
         if n + hold == samples(PERIODS) {
-            plant.instance.get_integer(&impacts, &mut before).unwrap();
+            before = rig.ground_truth().unwrap().unwrap().impacts;
         }
         if n + hold >= samples(PERIODS) {
-            omega += command[0] / hold as f64;
+            omega += command.drive.omega / hold as f64;
         }
-        let time = n as f64 * step;
-        controller.advance(sensors, readings, time, step);
-        plant.advance(driven, command, time, step);
+        rig.advance(command.drive, scene.sample_time()).unwrap();
+        command = next;
     }
-    plant.instance.get_integer(&impacts, &mut after).unwrap();
-
-    let mut flag = [0];
-    let reference = [controller.find("locked")];
-    controller.instance.get_boolean(&reference, &mut flag).unwrap();
-    assert_eq!(flag, [1]);
-
+    assert!(command.settled);
     let sigma = scene.dimensionless().sigma(omega);
     let mut own = (Simulated::new(scene.plant, scene.start).unwrap(), built_in(&scene));
     let off = sigma - locked(&mut own.0, &mut own.1, &scene);
     println!("sigma = {sigma:.6}, off the own loop by {off:.1e}");
     assert!(off.abs() < 1e-4);
-    let hits = after[0] - before[0];
+    let hits = rig.ground_truth().unwrap().unwrap().impacts - before;
     assert!((39..=41).contains(&hits), "{hits} impacts in 20 periods");
 }
 
@@ -145,8 +99,7 @@ fn the_pair_in_co_simulation_locks_where_the_built_in_loop_does() {
 fn the_fmu_moves_the_response_with_the_bits_of_the_built_in_controller() {
     let overrides = ["phase_lock.harmonics=4", "phase_lock.base_bandwidth=0.5"].map(|one| one.parse().unwrap());
     let scene = Scene::load(None, &overrides).unwrap();
-    let folder = tempfile::tempdir().unwrap();
-    pack_bench(&scene, &libraries().as_path().into(), folder.path()).unwrap();
+    let folder = packed(&scene);
     let config = scene.backbone_config();
     let mut fmu = FmuController::load(&folder.path().join("PhaseLock.fmu"), &config, &Default::default()).unwrap();
     let mut own = BuiltIn::new(&config).unwrap();
