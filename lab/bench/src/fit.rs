@@ -12,6 +12,7 @@ use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
 use nalgebra::{Matrix6, Vector3, Vector6};
+use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
 use vines_model::numerics::Estimate;
@@ -540,5 +541,65 @@ impl Problem<'_> {
             over(omega0 * omega, point.omega),
             over(b * epsilon * g, point.drive),
         ))
+    }
+}
+
+/// A fit in numbers, for programs.
+#[derive(Debug, Clone, Serialize)]
+pub struct FitReport {
+    /// Whether the model describes the points.
+    pub describes: bool,
+    /// Chi-square.
+    pub chi_square: f64,
+    /// Its degrees of freedom.
+    pub degrees: usize,
+    /// Probability of a larger chi-square; absent without a degree of freedom.
+    pub p_value: Option<f64>,
+    /// The parameters: first f0, zeta, r, b and epsilon, then, with a known scale, M, m, k and c.
+    pub parameters: Vec<FittedParameter>,
+    /// Correlations of the first five.
+    pub correlations: Vec<[f64; 5]>,
+    /// Residuals over their standard uncertainties: response, frequency, drive.
+    pub residuals: Vec<[f64; 3]>,
+    /// Numbers, from 1, of the points that contradict the others.
+    pub left_out: Vec<usize>,
+}
+
+/// A parameter of a fit.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct FittedParameter {
+    /// Its symbol.
+    pub symbol: &'static str,
+    /// Its unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Its standard uncertainty.
+    pub uncertainty: f64,
+    /// The value that was expected.
+    pub expected: f64,
+}
+
+impl Fit {
+    /// The numbers of the fit, beside those of the rig that was expected.
+    #[must_use]
+    pub fn report(&self, expected: &Parameters) -> FitReport {
+        let fitted = &Quantity::ALL[..5];
+        let parameter = |quantity: Quantity| {
+            let (Estimate { value, uncertainty }, [symbol, unit]) = (self.estimate(quantity)?, quantity.symbol());
+            let expected = quantity.of_plant(expected);
+            Some(FittedParameter { symbol, unit, value, uncertainty, expected })
+        };
+        let correlations = |one: &Quantity| std::array::from_fn(|n| self.correlation(*one, fitted[n]));
+        FitReport {
+            describes: !self.is_rejected(),
+            chi_square: self.chi_square,
+            degrees: self.degrees,
+            p_value: self.p_value(),
+            parameters: Quantity::ALL.into_iter().filter_map(parameter).collect(),
+            correlations: fitted.iter().map(correlations).collect(),
+            residuals: self.residuals.clone(),
+            left_out: self.left_out.iter().map(|n| n + 1).collect(),
+        }
     }
 }
