@@ -19,7 +19,7 @@ use vines_testbench::{
     backbone::track,
     comparison::{Comparison, TrackedComparison},
     experiment::{self, Plan},
-    fit::{self, Known, MeasuredPoint},
+    fit::{Known, MeasuredPoint, fit as fitted_rig},
     identification,
     rig::{BuiltIn, Simulated, Stoppable},
 };
@@ -88,7 +88,9 @@ pub fn fit(py: Python<'_>, scene: &Scene, points: Vec<[f64; 6]>, known: Vec<Stri
     };
     let points: Vec<MeasuredPoint> = points.into_iter().map(point).collect();
     let plant = scene.scene.plant;
-    let fit = py.detach(|| fit::fit(&points, scene.scene.resonance, &plant, &known)).map_err(invalid)?;
+    let fit = py
+        .detach(|| fitted_rig(&points, scene.scene.resonance, &plant, &known))
+        .map_err(invalid)?;
     let fitted = fit.plant(&plant);
     json(&json!({"report": fit.report(&plant), "plant": {
         "M": fitted.primary_mass, "k": fitted.stiffness, "c": fitted.damping,
