@@ -15,7 +15,7 @@ use nalgebra::{Matrix6, Vector3, Vector6};
 use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
-use vines_model::numerics::Estimate;
+use vines_model::numerics::{Estimate, SIGNIFICANT};
 use vines_model::orbit::backbone_at_speed;
 use vines_model::theory::{BranchSide, SlowFlow};
 use vines_model::{ArgumentError, Definition};
@@ -367,6 +367,50 @@ pub fn fit(
     }
     fit.left_out = (0..points.len()).filter(|n| !rest.contains(n)).collect();
     Ok(fit)
+}
+
+/// What is to be said where the points contradict the rig `expected`: which parameters fit instead. `None` where they do not, or cannot tell.
+#[must_use]
+pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected: &Parameters) -> Option<String> {
+    let problem = Problem {
+        points: points.to_vec(),
+        definition,
+        known: &[],
+        has_scale: false,
+    };
+    let sums = problem.sums(&unknowns(expected), &mut vec![None; points.len()])?;
+    let distribution = ChiSquared::new(2.0 * points.len() as f64).ok()?;
+    if distribution.sf(sums.chi_square) >= REJECTED {
+        return None;
+    }
+    let fit = fit(points, definition, expected, &[]).ok()?;
+    if fit.is_rejected() {
+        return Some("the points contradict the model, whatever its parameters; see `vines fit`".into());
+    }
+    let report = fit.report(expected);
+    let differs = |one: &&FittedParameter| (one.value - one.expected).abs() > SIGNIFICANT * one.uncertainty;
+    let texts: Vec<String> = report
+        .parameters
+        .iter()
+        .filter(differs)
+        .map(|one| {
+            let FittedParameter { symbol, unit, value, uncertainty, expected } = one;
+            let unit = if unit.is_empty() {
+                String::new()
+            } else {
+                format!(" {unit}")
+            };
+            format!("{symbol} = {value:.4e} ± {uncertainty:.1e}{unit} fits, the scene says {expected:.4e}")
+        })
+        .collect();
+    let texts = if texts.is_empty() {
+        "several parameters differ a little".into()
+    } else {
+        texts.join("; ")
+    };
+    Some(format!(
+        "the points do not belong to this scene: {texts}; see `vines fit`"
+    ))
 }
 
 /// What is minimised.

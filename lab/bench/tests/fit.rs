@@ -4,7 +4,7 @@ use rand_chacha::{ChaCha8Rng, rand_core::SeedableRng};
 use rand_distr::{Distribution, StandardNormal};
 use vines_model::numerics::Estimate;
 use vines_model::orbit::backbone_at_speed;
-use vines_testbench::fit::{Fit, FitError, Known, MeasuredPoint, Quantity, fit};
+use vines_testbench::fit::{Fit, FitError, Known, MeasuredPoint, Quantity, contradiction, fit};
 use vines_testbench::scene::{Definition, Dimensionless, Parameters, Scene};
 
 /// The rig that the points belong to.
@@ -161,4 +161,16 @@ fn too_few_points_and_numbers_that_are_not_positive_are_refused() {
     for text in ["q=1", "r", "r=x", "m=-1", "m=0.03±-1"] {
         assert!(text.parse::<Known>().is_err(), "{text}");
     }
+}
+
+#[test]
+fn points_of_another_rig_contradict_the_scene_and_those_of_its_own_do_not() {
+    let points = points(2e-3, 8);
+    assert_eq!(contradiction(&points, Definition::default(), &RIG), None);
+    let wrong = Parameters { restitution: 0.65, ..RIG };
+    let text = contradiction(&points, Definition::default(), &wrong).unwrap();
+    assert!(
+        text.contains("r = 5.5") && text.contains("the scene says 6.5000e-1"),
+        "{text}"
+    );
 }
