@@ -4,8 +4,7 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use serde::Serialize;
-use vines::fit::{Fit, Known, Quantity, fit};
+use vines::fit::{Fit, FitReport, Known, fit};
 use vines::points::{Column, read};
 use vines::report::Table;
 
@@ -62,32 +61,6 @@ pub(super) struct Arguments {
     json: bool,
 }
 
-/// The JSON that is printed.
-#[derive(Debug, Serialize)]
-struct Report {
-    /// Whether the model describes the points.
-    describes: bool,
-    chi_square: f64,
-    degrees: usize,
-    p_value: Option<f64>,
-    parameters: Vec<Parameter>,
-    /// Correlations of f0, zeta, r, b and epsilon.
-    correlations: Vec<[f64; 5]>,
-    /// Residuals over standard uncertainties: response, frequency, drive.
-    residuals: Vec<[f64; 3]>,
-    /// Numbers, from 1, of the points that contradict the others.
-    left_out: Vec<usize>,
-}
-
-#[derive(Debug, Serialize)]
-struct Parameter {
-    symbol: &'static str,
-    unit: &'static str,
-    value: f64,
-    uncertainty: f64,
-    scene: f64,
-}
-
 pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     let scene = arguments.scene.load()?;
     let (mut points, mut skipped) = (Vec::new(), 0);
@@ -97,26 +70,7 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
         skipped += left_out;
     }
     let fit = fit(&points, scene.resonance, &scene.plant, &arguments.known).map_err(Failure::run)?;
-    let parameters: Vec<Parameter> = Quantity::ALL
-        .into_iter()
-        .filter_map(|quantity| {
-            let (estimate, [symbol, unit]) = (fit.estimate(quantity)?, quantity.symbol());
-            let scene = quantity.of_plant(&scene.plant);
-            Some(Parameter { symbol, unit, value: estimate.value, uncertainty: estimate.uncertainty, scene })
-        })
-        .collect();
-    let fitted = &Quantity::ALL[..5];
-    let correlations = |one: &Quantity| std::array::from_fn(|n| fit.correlation(*one, fitted[n]));
-    let report = Report {
-        describes: !fit.is_rejected(),
-        chi_square: fit.chi_square,
-        degrees: fit.degrees,
-        p_value: fit.p_value(),
-        parameters,
-        correlations: fitted.iter().map(correlations).collect(),
-        residuals: fit.residuals.clone(),
-        left_out: fit.left_out.iter().map(|n| n + 1).collect(),
-    };
+    let report = fit.report(&scene.plant);
     let mut text = output(arguments.json, &report, || summary(&report, &fit, points.len(), skipped))?;
     if let Some(path) = &arguments.out {
         let plant = plant_section(&report, &fit.plant(&scene.plant));
@@ -137,17 +91,17 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     )))
 }
 
-fn summary(report: &Report, fit: &Fit, points: usize, skipped: usize) -> String {
+fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> String {
     let doubt = if report.describes { "" } else { " (rejected)" };
     let rows = report.parameters.iter().map(|one| {
         let digits = digits(one.uncertainty);
         let number = |value: f64| format!("{value:.digits$}");
-        let difference = (one.value - one.scene) / one.uncertainty;
+        let difference = (one.value - one.expected) / one.uncertainty;
         [
             one.symbol.to_string(),
             format!("{} ± {}{doubt}", number(one.value), number(one.uncertainty)),
             one.unit.to_string(),
-            number(one.scene),
+            number(one.expected),
             format!("{difference:+.1} u"),
         ]
     });
@@ -187,7 +141,7 @@ fn digits(uncertainty: f64) -> usize {
 }
 
 /// The section `[plant]` of a scene, with the standard uncertainties in comments.
-fn plant_section(report: &Report, plant: &vines::scene::Parameters) -> String {
+fn plant_section(report: &FitReport, plant: &vines::scene::Parameters) -> String {
     let values = [
         ("M", plant.primary_mass),
         ("k", plant.stiffness),
