@@ -4,6 +4,7 @@ mod backbone;
 mod check;
 mod experiment;
 mod failure;
+mod fit;
 mod identify;
 mod map;
 mod options;
@@ -29,6 +30,7 @@ const EXAMPLES: &str = "\
 Examples:
   vines identify                               the whole experiment on the default scene, results in out/
   vines backbone                               the backbone level by level, with the loop closed
+  vines fit out/tracked.csv                    the parameters of the rig from its backbone
   vines orbit                                  exact orbits of the default scene
   vines orbit --set excitation.G=1.0 --json    the same at another excitation, for programs
   vines orbit --response                       the exact frequency response, stable and unstable
@@ -53,6 +55,7 @@ struct Cli {
 enum Command {
     Identify(identify::Arguments),
     Backbone(backbone::Arguments),
+    Fit(fit::Arguments),
     Check(check::Arguments),
     Orbit(orbit::Arguments),
     Theory(theory::Arguments),
@@ -70,6 +73,7 @@ pub fn run() -> ExitCode {
     let output = match Cli::parse().command {
         Command::Identify(arguments) => identify::run(&arguments),
         Command::Backbone(arguments) => backbone::run(&arguments),
+        Command::Fit(arguments) => fit::run(&arguments),
         Command::Check(arguments) => check::run(&arguments),
         Command::Orbit(arguments) => orbit::run(&arguments),
         Command::Theory(arguments) => theory::run(&arguments),

@@ -37,6 +37,19 @@ pub(crate) fn write<N: AsRef<Path>, C: AsRef<[u8]>>(
     finished.into_iter().map(keep).collect()
 }
 
+/// Writes one file, complete or not at all.
+///
+/// # Errors
+/// A file that cannot be written.
+pub fn write_file(path: &Path, content: &str) -> Result<PathBuf, FileError> {
+    let folder = path
+        .parent()
+        .filter(|folder| !folder.as_os_str().is_empty())
+        .unwrap_or(Path::new("."));
+    let name = path.file_name().unwrap_or_default();
+    Ok(write(folder, [(name, content)])?.remove(0))
+}
+
 /// A temporary file that others may read once it is kept, as with any file made here.
 fn temporary(folder: &Path) -> io::Result<NamedTempFile> {
     let mut builder = tempfile::Builder::new();

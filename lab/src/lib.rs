@@ -7,7 +7,7 @@ pub mod pack;
 pub mod points;
 pub mod report;
 
-pub use files::FileError;
+pub use files::{FileError, write_file};
 pub use vines_fmu as fmu;
 pub use vines_helic as helic;
 pub use vines_model::{ArgumentError, map, numerics, orbit, regime, theory};

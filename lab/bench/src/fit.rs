@@ -293,7 +293,7 @@ impl Fit {
         let fitted = &Quantity::ALL[..5];
         let is_uncertain = |quantity: &&Quantity| {
             let estimate = self.estimate(**quantity);
-            estimate.is_none_or(|one| !(one.uncertainty <= UNCERTAIN * one.value.abs()))
+            estimate.is_none_or(|one| one.uncertainty.is_nan() || one.uncertainty > UNCERTAIN * one.value.abs())
         };
         let partner = |one: &Quantity| {
             let others = fitted.iter().filter(|other| *other != one);

@@ -71,7 +71,9 @@ pub(super) fn run(arguments: &Arguments) -> Result<String, Failure> {
     }
     let fit = fit(&points, scene.resonance, &scene.plant, &arguments.known).map_err(Failure::run)?;
     let report = fit.report(&scene.plant);
-    let mut text = output(arguments.json, &report, || summary(&report, &fit, points.len(), skipped))?;
+    let mut text = output(arguments.json, &report, || {
+        summary(&report, &fit, points.len(), skipped)
+    })?;
     if let Some(path) = &arguments.out {
         let plant = plant_section(&report, &fit.plant(&scene.plant));
         let scene = arguments.scene.with_plant(&plant)?;
@@ -105,9 +107,17 @@ fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> Stri
             format!("{difference:+.1} u"),
         ]
     });
-    let mut text = Table::new("parameter | value | unit | scene | difference").rows(rows).text();
-    let p = report.p_value.map_or_else(|| "without a degree of freedom".into(), |p| format!("p = {p:.2}"));
-    let verdict = if report.describes { "the model describes them" } else { "the model does not describe them" };
+    let mut text = Table::new("parameter | value | unit | scene | difference")
+        .rows(rows)
+        .text();
+    let p = report
+        .p_value
+        .map_or_else(|| "without a degree of freedom".into(), |p| format!("p = {p:.2}"));
+    let verdict = if report.describes {
+        "the model describes them"
+    } else {
+        "the model does not describe them"
+    };
     let _ = writeln!(
         text,
         "\n{} points; chi-square {:.1} for {} degrees of freedom ({p}): {verdict}",
@@ -116,11 +126,19 @@ fn summary(report: &FitReport, fit: &Fit, points: usize, skipped: usize) -> Stri
         report.degrees
     );
     if skipped > 0 {
-        let _ = writeln!(text, "{skipped} points are not settled or not symmetric 1:1, and left out");
+        let _ = writeln!(
+            text,
+            "{skipped} points are not settled or not symmetric 1:1, and left out"
+        );
     }
     if !report.left_out.is_empty() {
         let numbers: Vec<String> = report.left_out.iter().map(usize::to_string).collect();
-        let _ = writeln!(text, "{} of {points} points contradict the others, and are left out: {}", numbers.len(), numbers.join(", "));
+        let _ = writeln!(
+            text,
+            "{} of {points} points contradict the others, and are left out: {}",
+            numbers.len(),
+            numbers.join(", ")
+        );
     }
     for (one, other, correlation) in fit.not_separated() {
         let _ = writeln!(

@@ -14,7 +14,7 @@ use vines::net::{Address, BindScope, Key, NetController, NetRig, ReportLost, Tim
 use vines::rig::{BuiltIn, Chain, Controller, Measured, Rig, Simulated, Stoppable};
 #[cfg(feature = "sweep")]
 use vines::scene::Family;
-use vines::scene::{Name, Names, Override, Scene, SceneError};
+use vines::scene::{Name, Names, Override, PAPER, Scene, SceneError};
 
 use super::failure::{Failure, stop_flag};
 
@@ -32,6 +32,29 @@ pub(super) struct SceneArguments {
 impl SceneArguments {
     pub(super) fn load(&self) -> Result<Scene, SceneError> {
         Scene::load(self.scene.as_deref(), &self.set)
+    }
+
+    /// The text of the scene's file with another section `[plant]`.
+    pub(super) fn with_plant(&self, plant: &str) -> Result<String, SceneError> {
+        let text = match &self.scene {
+            None => PAPER.to_string(),
+            Some(path) => {
+                std::fs::read_to_string(path).map_err(|source| SceneError::Read { path: path.clone(), source })?
+            }
+        };
+        let (mut lines, mut inside) = (String::new(), false);
+        for line in text.lines() {
+            if line.trim_start().starts_with('[') {
+                inside = line.trim_start().starts_with("[plant]");
+                if inside {
+                    lines += &format!("{plant}\n");
+                }
+            }
+            if !inside {
+                lines += &format!("{line}\n");
+            }
+        }
+        Ok(lines)
     }
 
     /// The scene, of which numbers may vary.
