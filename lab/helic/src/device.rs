@@ -30,6 +30,16 @@ const PARAMETERS: &[(&str, u8, usize)] = &[
     (WATCHDOG, b'f', 1),
     ("impacts", b'I', 1),
 ];
+/// Parameters that a host may set.
+const WRITABLE: [&str; 7] = [
+    "freq",
+    "target_coeffs",
+    "forcing_coeffs",
+    "table_mode",
+    "diag_reset",
+    "arm",
+    WATCHDOG,
+];
 /// Sources of a stream, with their units. A rig without a base sensor has no `reference`.
 const SOURCES: [(&str, &str); 8] = [
     ("response", "mm"),
@@ -52,94 +62,31 @@ const EPOCH: u32 = 1 << 24;
 /// Longest time before a packet is sent, s (protocol, "Stream channel").
 const FLUSH: f64 = 0.005;
 
-#[derive(Debug)]
-struct Parameter {
-    name: &'static str,
-    code: u8,
-    values: Vec<f64>,
+/// The definitions of all parameters: name, type, number of values.
+fn parameters() -> impl Iterator<Item = (&'static str, u8, usize)> {
+    let rows = PARAMETERS.iter();
+    rows.flat_map(|&(names, code, count)| names.split(' ').map(move |name| (name, code, count)))
 }
 
-/// All parameters; at the start, all values are 0.
-#[derive(Debug)]
-struct Registry(Vec<Parameter>);
-
-impl Registry {
-    fn new() -> Self {
-        let rows = PARAMETERS.iter().flat_map(|&(names, code, count)| {
-            let parameter = move |name| Parameter { name, code, values: vec![0.0; count] };
-            names.split(' ').map(parameter)
-        });
-        Self(rows.collect())
-    }
-
-    fn at(&self, index: u16) -> Result<&Parameter, ErrorCode> {
-        self.0.get(usize::from(index)).ok_or(ErrorCode::BadIndex)
-    }
-
-    fn values_mut(&mut self, name: &str) -> &mut [f64] {
-        let parameter = self.0.iter_mut().find(|parameter| parameter.name == name);
-        &mut parameter.expect("a name of the table").values
-    }
-
-    fn values(&self, name: &str) -> &[f64] {
-        let parameter = self.0.iter().find(|parameter| parameter.name == name);
-        &parameter.expect("a name of the table").values
-    }
-
-    /// The value of a parameter that has one.
-    fn real(&self, name: &str) -> f64 {
-        self.values(name)[0]
-    }
-
-    fn put(&mut self, name: &str, value: f64) {
-        self.values_mut(name)[0] = value;
-    }
-
-    /// A page of definitions: those from `start` on that fit into a payload.
-    fn page(&self, start: u16) -> Result<Vec<u8>, ErrorCode> {
-        let rest = self.0.get(usize::from(start)..).ok_or(ErrorCode::BadIndex)?;
-        let (mut next, mut page) = (start, Vec::new());
-        for Parameter { name, code, values } in rest {
-            let mut definition = format!("{name}\0").into_bytes();
-            definition.push(*code);
-            definition.extend((values.len() as u16).to_le_bytes());
-            definition.push(is_writable(name).into());
-            if 4 + page.len() + definition.len() > MAX_PAYLOAD {
-                break;
-            }
-            page.extend(definition);
-            next += 1;
-        }
-        Ok([&start.to_le_bytes()[..], &next.to_le_bytes(), &page].concat())
-    }
-
-    /// The values of the parameters with these indices, as bytes.
-    fn read(&self, indices: &[u8]) -> Result<Vec<u8>, ErrorCode> {
-        if indices.is_empty() || !indices.len().is_multiple_of(2) {
-            return Err(ErrorCode::BadLength);
-        }
-        let mut bytes = Vec::new();
-        for index in of_bytes(b'H', indices) {
-            let Parameter { code, values, .. } = self.at(index as u16)?;
-            bytes.extend(to_bytes(*code, values));
-        }
-        (bytes.len() <= MAX_PAYLOAD)
-            .then_some(bytes)
-            .ok_or(ErrorCode::BadLength)
-    }
+fn parameter(index: u16) -> Result<(&'static str, u8, usize), ErrorCode> {
+    parameters().nth(index.into()).ok_or(ErrorCode::BadIndex)
 }
 
-fn is_writable(name: &str) -> bool {
-    let names = [
-        "freq",
-        "target_coeffs",
-        "forcing_coeffs",
-        "table_mode",
-        "diag_reset",
-        "arm",
-        WATCHDOG,
-    ];
-    names.contains(&name)
+/// A page of definitions: those from `start` on that fit into a payload.
+fn page(start: u16) -> Result<Vec<u8>, ErrorCode> {
+    parameter(start)?;
+    let (mut next, mut page) = (start, Vec::new());
+    for (name, code, count) in parameters().skip(start.into()) {
+        let [low, high] = (count as u16).to_le_bytes();
+        let writable = WRITABLE.contains(&name).into();
+        let definition = [name.as_bytes(), &[0, code, low, high, writable]].concat();
+        if 4 + page.len() + definition.len() > MAX_PAYLOAD {
+            break;
+        }
+        page.extend(definition);
+        next += 1;
+    }
+    Ok([&start.to_le_bytes()[..], &next.to_le_bytes(), &page].concat())
 }
 
 /// The stream: what the host has set up, and the packet that is being filled.
@@ -222,7 +169,16 @@ pub struct Device {
     rig: Box<dyn Rig>,
     has_reference: bool,
     sample_rate: f64,
-    registry: Registry,
+    /// Largest output, V.
+    largest: f64,
+    /// Frequency of the oscillator, Hz, and its series target and forcing, V.
+    frequency: f64,
+    series: [Vec<f64>; 2],
+    armed: bool,
+    safety: u8,
+    /// s
+    watchdog: f64,
+    impacts: u32,
     stream: Stream,
     /// Phase of the oscillator, 2^-32 turns.
     phase: u32,
@@ -237,27 +193,17 @@ pub struct Device {
 impl Device {
     /// The rig `rig` as a device, sampled every `sample_time`, s; its output is limited to `max_amplitude`, m.
     pub fn new(mut rig: Box<dyn Rig>, sample_time: f64, max_amplitude: f64) -> Result<Self, RigError> {
-        let mut registry = Registry::new();
-        for (name, text) in [
-            ("firmware", concat!("vines ", env!("CARGO_PKG_VERSION"))),
-            ("experiment", "vines"),
-        ] {
-            let bytes = text.bytes().map(f64::from);
-            registry
-                .values_mut(name)
-                .iter_mut()
-                .zip(bytes)
-                .for_each(|(slot, byte)| *slot = byte);
-        }
-        let sample_rate = 1.0 / sample_time;
-        registry.put("sample_freq", sample_rate);
-        registry.put("rig_gain", GAIN);
-        registry.put("rig_out_max", max_amplitude / (GAIN * MILLI));
         Ok(Self {
             has_reference: rig.sense()?.reference.is_some(),
             rig,
-            sample_rate,
-            registry,
+            sample_rate: 1.0 / sample_time,
+            largest: max_amplitude / (GAIN * MILLI),
+            frequency: 0.0,
+            series: [vec![0.0; COEFFICIENTS], vec![0.0; COEFFICIENTS]],
+            armed: false,
+            safety: 0,
+            watchdog: 0.0,
+            impacts: 0,
             stream: Stream::default(),
             phase: 0,
             ticks: 0,
@@ -270,12 +216,12 @@ impl Device {
     /// The host has left: output and stream stop.
     pub fn disconnect(&mut self) {
         self.stream.port = None;
-        self.registry.put("arm", 0.0);
+        self.armed = false;
     }
 
     /// Whether the output may be other than zero.
     pub fn is_driven(&self) -> bool {
-        self.registry.real("arm") == 1.0
+        self.armed
     }
 
     fn sources(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
@@ -304,13 +250,13 @@ impl Device {
         match kind {
             message::GET_PARAMS => {
                 let start = payload.try_into().map_err(|_| ErrorCode::BadLength)?;
-                self.registry.page(u16::from_le_bytes(start))
+                page(u16::from_le_bytes(start))
             }
             message::GET_SOURCES => {
                 let entry = |(name, unit): (&str, &str)| format!("{name}\0{unit}\0").into_bytes();
                 Ok(self.sources().flat_map(entry).collect())
             }
-            message::GET_PAR => self.registry.read(payload),
+            message::GET_PAR => self.read(payload),
             message::SET_PAR => self.set(payload).map(empty),
             message::STREAM_SETUP => self.stream.set_up(payload, self.sources().count()).map(empty),
             message::STREAM_START => self.stream.start(payload).map(empty),
@@ -319,7 +265,7 @@ impl Device {
                 Ok(Vec::new())
             }
             message::STATUS => {
-                let (parameters, sources) = (self.registry.0.len() as u16, self.sources().count() as u8);
+                let (parameters, sources) = (parameters().count() as u16, self.sources().count() as u8);
                 let sample_rate = self.sample_rate as f32;
                 Ok(Status { version: VERSION, parameters, sources, sample_rate, uptime }.encode())
             }
@@ -327,37 +273,65 @@ impl Device {
         }
     }
 
+    /// The values of the parameters with these indices, as bytes.
+    fn read(&self, indices: &[u8]) -> Result<Vec<u8>, ErrorCode> {
+        if indices.is_empty() || !indices.len().is_multiple_of(2) {
+            return Err(ErrorCode::BadLength);
+        }
+        let mut bytes = Vec::new();
+        for index in of_bytes(b'H', indices) {
+            let (name, code, count) = parameter(index as u16)?;
+            let text = |text: &str| text.bytes().map(f64::from).collect();
+            let mut values: Vec<f64> = match name {
+                "firmware" => text(concat!("vines ", env!("CARGO_PKG_VERSION"))),
+                "experiment" => text("vines"),
+                "sample_freq" => vec![self.sample_rate],
+                "ticks" => vec![self.ticks.into()],
+                "freq" => vec![self.frequency],
+                "target_coeffs" => self.series[0].clone(),
+                "forcing_coeffs" => self.series[1].clone(),
+                "arm" => vec![self.armed.into()],
+                "safety" => vec![self.safety.into()],
+                "rig_gain" => vec![GAIN],
+                "rig_out_max" => vec![self.largest],
+                WATCHDOG => vec![self.watchdog],
+                "impacts" => vec![self.impacts.into()],
+                // The waveform table, and statistics of the processor.
+                _ => Vec::new(),
+            };
+            values.resize(count, 0.0);
+            bytes.extend(to_bytes(code, &values));
+        }
+        (bytes.len() <= MAX_PAYLOAD)
+            .then_some(bytes)
+            .ok_or(ErrorCode::BadLength)
+    }
+
     /// Sets a parameter: `index u16, values`.
     fn set(&mut self, payload: &[u8]) -> Result<(), ErrorCode> {
         let (index, bytes) = payload.split_first_chunk().ok_or(ErrorCode::BadLength)?;
-        let &Parameter { name, code, ref values } = self.registry.at(u16::from_le_bytes(*index))?;
-        if !is_writable(name) {
+        let (name, code, count) = parameter(u16::from_le_bytes(*index))?;
+        if !WRITABLE.contains(&name) {
             return Err(ErrorCode::ReadOnly);
         }
-        if bytes.len() != values.len() * size(code) {
+        if bytes.len() != count * size(code) {
             return Err(ErrorCode::BadLength);
         }
         let values = of_bytes(code, bytes);
         let value = values[0];
-        let allowed = match name {
-            "freq" => (0.0..0.5 * self.sample_rate).contains(&value),
-            "table_mode" => value == 0.0,
-            "arm" => value <= 1.0,
-            WATCHDOG => value >= 0.0 && value.is_finite(),
-            // There are no statistics to reset.
-            "diag_reset" => return Ok(()),
-            // A series that cannot exceed the limit of the output.
-            _ => {
-                let (cosines, sines) = values[1..].split_at(HARMONICS);
-                let harmonics = cosines.iter().zip(sines).map(|(a, b)| a.hypot(*b));
-                value.abs() + harmonics.sum::<f64>() <= self.registry.real("rig_out_max")
-            }
-        };
-        if !allowed {
-            return Err(ErrorCode::BadValue);
+        let is_command = !["arm", WATCHDOG, "diag_reset"].contains(&name);
+        match name {
+            "freq" if (0.0..0.5 * self.sample_rate).contains(&value) => self.frequency = value,
+            "target_coeffs" if amplitude(&values) <= self.largest => self.series[0] = values,
+            "forcing_coeffs" if amplitude(&values) <= self.largest => self.series[1] = values,
+            "arm" if value <= 1.0 => self.armed = value == 1.0,
+            WATCHDOG if value >= 0.0 && value.is_finite() => self.watchdog = value,
+            // There is no waveform table, and there are no statistics.
+            "table_mode" if value == 0.0 => {}
+            "diag_reset" => {}
+            _ => return Err(ErrorCode::BadValue),
         }
-        self.registry.values_mut(name).copy_from_slice(&values);
-        self.commands += u32::from(!["arm", WATCHDOG].contains(&name));
+        self.commands += u32::from(is_command);
         Ok(())
     }
 
@@ -367,12 +341,10 @@ impl Device {
         let step = 1.0 / self.sample_rate;
         self.epoch = (self.epoch + std::mem::take(&mut self.commands)) % EPOCH;
         self.silence = self.silence.saturating_add(1);
-        let watchdog = self.registry.real(WATCHDOG);
-        if watchdog > 0.0 && f64::from(self.silence) * step > watchdog {
-            self.registry.put("arm", 0.0);
+        if self.watchdog > 0.0 && f64::from(self.silence) * step > self.watchdog {
+            self.armed = false;
         }
-        let [target, forcing] =
-            ["target_coeffs", "forcing_coeffs"].map(|name| series(self.registry.values(name), self.phase));
+        let [target, forcing] = [0, 1].map(|n| value(&self.series[n], self.phase));
         let out = self.gate(target + forcing);
         let (turns, epoch) = (f64::from(self.phase) / TURN, f64::from(self.epoch));
         let sensors = [Some(response), reference]
@@ -383,40 +355,44 @@ impl Device {
         let packet = self.stream.record(self.ticks, &values, FLUSH * self.sample_rate);
         let displacement = out * GAIN * MILLI;
         self.rig.hold(Drive { displacement, ..Drive::default() }, step)?;
-        let turn = self.registry.real("freq") * step * TURN;
+        let turn = self.frequency * step * TURN;
         self.phase = self.phase.wrapping_add(turn.round() as u32);
         self.ticks = self.ticks.wrapping_add(1);
-        self.registry.put("ticks", self.ticks.into());
-        if let Some(inside) = self.rig.ground_truth()? {
-            self.registry.put("impacts", f64::from(inside.impacts as u32));
-        }
+        self.impacts = self.rig.ground_truth()?.map_or(0, |inside| inside.impacts as u32);
         Ok(packet)
     }
 
     /// The output, V: zero unless armed, and never more than the limit.
     fn gate(&mut self, wanted: f64) -> f64 {
-        let largest = self.registry.real("rig_out_max");
-        let (armed, quiet) = (self.is_driven(), !self.is_driven() || !wanted.is_finite());
-        let out = if quiet { 0.0 } else { wanted.clamp(-largest, largest) };
-        // Bits: 0 armed, 1 tripped (nothing trips here), 2 limited, 3 quiet.
+        let quiet = !self.armed || !wanted.is_finite();
+        let out = if quiet {
+            0.0
+        } else {
+            wanted.clamp(-self.largest, self.largest)
+        };
         let limited = !quiet && out != wanted;
-        self.registry.put(
-            "safety",
-            f64::from(u8::from(armed) | u8::from(limited) << 2 | u8::from(quiet) << 3),
-        );
+        // Bits: 0 armed, 1 tripped (nothing trips here), 2 limited, 3 quiet.
+        self.safety = u8::from(self.armed) | u8::from(limited) << 2 | u8::from(quiet) << 3;
         out
     }
 }
 
-/// Value of a Fourier series, mean, cosines and sines, at a phase of its fundamental.
-fn series(coefficients: &[f64], phase: u32) -> f64 {
+/// Upper bound of a Fourier series: mean, cosines, sines.
+fn amplitude(coefficients: &[f64]) -> f64 {
     let (cosines, sines) = coefficients[1..].split_at(HARMONICS);
-    let harmonic = |(k, (a, b)): (usize, (&f64, &f64))| {
-        if *a == 0.0 && *b == 0.0 {
-            return 0.0;
-        }
-        let (sine, cosine) = (TAU * f64::from(phase.wrapping_mul(k as u32 + 1)) / TURN).sin_cos();
+    let harmonics = cosines.iter().zip(sines).map(|(a, b)| a.hypot(*b));
+    coefficients[0].abs() + harmonics.sum::<f64>()
+}
+
+/// Value of a Fourier series at a phase of its fundamental.
+fn value(coefficients: &[f64], phase: u32) -> f64 {
+    let (cosines, sines) = coefficients[1..].split_at(HARMONICS);
+    let harmonics = (1..)
+        .zip(cosines.iter().zip(sines))
+        .filter(|(_, (a, b))| **a != 0.0 || **b != 0.0);
+    let values = harmonics.map(|(k, (a, b))| {
+        let (sine, cosine) = (TAU * f64::from(phase.wrapping_mul(k)) / TURN).sin_cos();
         a * cosine + b * sine
-    };
-    coefficients[0] + cosines.iter().zip(sines).enumerate().map(harmonic).sum::<f64>()
+    });
+    coefficients[0] + values.sum::<f64>()
 }
