@@ -55,6 +55,13 @@ pub fn is_loopback(ip: IpAddr) -> bool {
 }
 
 impl Address {
+    /// The address of the socket, without the transport.
+    pub fn socket(self) -> SocketAddr {
+        match self {
+            Self::Tcp(socket) | Self::Udp(socket) => socket,
+        }
+    }
+
     /// The address of `tcp://HOST:PORT` or `udp://HOST:PORT`.
     pub fn parse(text: &str, scope: BindScope) -> Result<Self, LinkError> {
         match text.split_once("://") {

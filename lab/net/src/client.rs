@@ -96,7 +96,7 @@ impl Client {
     /// Sends a frame, and keeps it for a repetition.
     pub fn send(&mut self, frame: Frame) -> Result<(), LinkError> {
         self.last = frame;
-        Ok(self.link.send(&frame)?)
+        Ok(self.link.send(&frame, self.peer.socket())?)
     }
 
     /// The next valid frame of this session, or None at `end`.
@@ -108,7 +108,7 @@ impl Client {
             } else {
                 end
             };
-            match self.link.receive(until)? {
+            match self.link.receive(until)?.map(|(received, _)| received) {
                 Some(Err(FrameError::Version(theirs))) => return Err(LinkError::Version { peer, theirs }),
                 Some(Err(FrameError::Closed)) => return Err(LinkError::Closed { peer, time }),
                 Some(Err(_)) => self.counters.malformed += 1,
@@ -125,14 +125,14 @@ impl Client {
                     return Ok(Some(frame));
                 }
                 None if Instant::now() >= end => return Ok(None),
-                None => self.link.send(&self.last)?,
+                None => self.link.send(&self.last, self.peer.socket())?,
             }
         }
     }
 
     /// Whether the rig runs in real time.
     pub fn is_real_time(&self) -> bool {
-        matches!(self.peer, Address::Udp(_))
+        self.link.is_real_time()
     }
 
     /// Time of the present sample, s.

@@ -310,10 +310,9 @@ impl Refusal {
             Self::Move { index, value } => [7.0, index as f64, value, 0.0],
             Self::Other(code) => [code, 0.0, 0.0, 0.0],
         };
-        let mut frame = Frame { flags: 0, kind: Kind::Refusal, ..*cause };
-        frame.values = [0.0; 6];
-        frame.values[..4].copy_from_slice(&values);
-        frame
+        let [code, first, value, limit] = values;
+        let values = [code, first, value, limit, 0.0, 0.0];
+        Frame { flags: 0, kind: Kind::Refusal, values, ..*cause }
     }
 
     pub(crate) fn read(frame: &Frame) -> Self {
@@ -331,24 +330,25 @@ impl Refusal {
     }
 }
 
-/// Values of a refused move, by their numbers from 1: those of the frame, then what the controller itself lacks.
-const MOVE: [(&str, &str); 8] = [
-    ("response", "m"),
-    ("duration", "s"),
-    ("amplitude", "m"),
-    ("omega", "rad/s"),
-    ("phase_target", "rad"),
-    ("growth", "m/s"),
-    ("amplitude_max", "m"),
-    ("state", ""),
+/// Values of a refused move, by their numbers from 1, with unit and allowed range: those of the frame, then what the controller lacks.
+const MOVE: [(&str, &str, &str); 8] = [
+    ("response", "m", "above 0"),
+    ("duration", "s", "0 or above"),
+    ("amplitude", "m", CONFIGURED),
+    ("omega", "rad/s", CONFIGURED),
+    ("phase_target", "rad", CONFIGURED),
+    ("growth", "m/s", CONFIGURED),
+    ("amplitude_max", "m", ""),
+    ("state", "", ""),
 ];
+const CONFIGURED: &str = "a finite number that the configuration of the controller allows";
 
 impl From<ControllerError> for Refusal {
     /// The refusal of a move.
     fn from(error: ControllerError) -> Self {
         let (index, value) = match error {
             ControllerError::Refused(error) => {
-                let index = MOVE.iter().position(|(name, _)| *name == error.name);
+                let index = MOVE.iter().position(|(name, ..)| *name == error.name);
                 (index.map_or(0, |index| index + 1), error.value.unwrap_or(f64::NAN))
             }
             ControllerError::NoResponseLoop => (MOVE.len() + 1, 0.0),
@@ -362,12 +362,7 @@ impl From<ControllerError> for Refusal {
 fn immovable(index: usize, value: f64) -> String {
     match index {
         1..=6 => {
-            let (name, unit) = MOVE[index - 1];
-            let allowed = match index {
-                1 => "above 0",
-                2 => "0 or above",
-                _ => "a finite number that the configuration of the controller allows",
-            };
+            let (name, unit, allowed) = MOVE[index - 1];
             format!("refuses a move with {name} = {value} {unit}: allowed is {allowed}")
         }
         7 => "has no limit of the drive, which the control of the response amplitude needs: set phase_lock.amplitude_max in its scene".into(),

@@ -10,7 +10,7 @@ use super::frame::{
     Frame, FrameError, Kind, Reading, Refusal, VERSION, flag, read_command, read_move, read_reading, write_command,
     write_reading,
 };
-use super::link::{Key, Listener, Received};
+use super::link::{Key, Link, Received};
 use super::timing::{Counters, Ended, Punctuality, RealTimeClock, Session, Timing};
 use vines_testbench::rig::{Controller, Drive, Rig, RigError};
 use vines_testbench::scene::Definition;
@@ -89,7 +89,7 @@ const BURST: u32 = 256;
 
 /// A server, one session at a time. Over UDP a rig runs in real time; over TCP it is in lock-step with the drives.
 pub struct Server {
-    listener: Listener,
+    link: Link,
     service: Service,
     /// The client of the last session, and the report on it.
     last: Option<(SocketAddr, Frame)>,
@@ -98,13 +98,13 @@ pub struct Server {
 impl Server {
     /// Listens on `address`; with port 0 the system chooses a free port. With a key, only for clients that have it.
     pub fn listen(address: Address, service: Service, key: Option<Key>) -> Result<Self, LinkError> {
-        let listener = Listener::bind(address, key).map_err(|source| LinkError::Listen { address, source })?;
-        Ok(Self { listener, service, last: None })
+        let link = Link::bind(address, key).map_err(|source| LinkError::Listen { address, source })?;
+        Ok(Self { link, service, last: None })
     }
 
     /// Address of the server.
     pub fn address(&self) -> io::Result<Address> {
-        self.listener.address()
+        self.link.address()
     }
 
     /// Serves sessions until `stop` returns true. `make` creates the rig, or the controller, of a session;
@@ -121,7 +121,7 @@ impl Server {
             let (due, idle) = (run.as_ref().and_then(Run::due), Instant::now() + IDLE);
             let deadline = due.map_or(idle, |due| due.min(idle));
             let received = if burst < BURST {
-                self.listener.receive(deadline)?
+                self.link.receive(deadline)?
             } else {
                 None
             };
@@ -135,7 +135,7 @@ impl Server {
                     run = self.open(&frame, from, &mut make)?
                 }
                 (Some((received, from)), run) => self.sort(run.as_mut(), received, from)?,
-                (None, Some(run)) if due.is_some_and(|due| Instant::now() >= due) => run.pass(&mut self.listener)?,
+                (None, Some(run)) if due.is_some_and(|due| Instant::now() >= due) => run.pass(&mut self.link)?,
                 (None, _) => {}
             }
             let stopped = stop();
@@ -143,7 +143,7 @@ impl Server {
                 run.end(Ended::Stopped);
             }
             if let Some(over) = run.take_if(|run| run.is_over()) {
-                self.listener.close(over.peer);
+                self.link.close(over.peer);
                 self.last = Some((over.peer, over.report()));
                 tell(&over.finish());
             }
@@ -167,13 +167,13 @@ impl Server {
                 return Ok(None);
             }
         };
-        self.listener.prefer(from);
-        let drawn = self.listener.seal.draw().map_err(io::Error::other)?;
+        self.link.prefer(from);
+        let drawn = self.link.seal.draw().map_err(io::Error::other)?;
         welcome.values[3..5].copy_from_slice(&drawn);
-        self.listener.seal.begin(hello.session, drawn);
-        let real_time = self.listener.is_real_time();
+        self.link.seal.begin(hello.session, drawn);
+        let real_time = self.link.is_real_time();
         let mut run = Run::new(make()?, self.service, real_time, from, welcome);
-        run.welcome(&mut self.listener)?;
+        run.welcome(&mut self.link)?;
         Ok(Some(run))
     }
 
@@ -187,7 +187,7 @@ impl Server {
                 if let Some(run) = run {
                     run.counters.malformed += 1;
                     // Over TCP, the refusal closes the connection.
-                    if version && run.peer == from && !self.listener.is_real_time() {
+                    if version && run.peer == from && !self.link.is_real_time() {
                         run.end(Ended::Refused);
                     }
                 }
@@ -195,14 +195,14 @@ impl Server {
                     self.refuse(Refusal::Version(VERSION), &Frame::new(Kind::Hello, 0), from)?;
                 }
             }
-            (Ok(frame), Some(run)) if run.is_client(from, frame.session) => run.handle(&frame, &mut self.listener)?,
+            (Ok(frame), Some(run)) if run.is_client(from, frame.session) => run.handle(&frame, &mut self.link)?,
             (Ok(frame), Some(run)) => {
                 run.counters.foreign += 1;
                 if frame.kind == Kind::Hello {
                     self.refuse(Refusal::Busy, &frame, from)?;
                 }
                 // Over TCP, nobody else may keep the server from its client.
-                self.listener.close(from);
+                self.link.close(from);
             }
             // The report was lost, and the session has ended in the meantime.
             (Ok(frame), None) if frame.kind == Kind::Farewell => {
@@ -210,14 +210,14 @@ impl Server {
                     .last
                     .filter(|(to, last)| (*to, last.session) == (from, frame.session));
                 if let Some((to, report)) = report {
-                    self.listener.send(&report, to)?;
+                    self.link.send(&report, to)?;
                 }
             }
             // The session of this client has ended.
             (Ok(frame), None) if frame.kind == Kind::Drive => {
                 let mut answer = Frame { kind: Kind::Sensors, values: [0.0; 6], ..frame };
                 answer.flags = flag::SHUT_DOWN;
-                self.listener.send(&answer, from)?;
+                self.link.send(&answer, from)?;
             }
             (Ok(_), None) => {}
         }
@@ -225,8 +225,8 @@ impl Server {
     }
 
     fn refuse(&mut self, refusal: Refusal, cause: &Frame, to: SocketAddr) -> io::Result<()> {
-        self.listener.send(&refusal.answer(cause), to)?;
-        self.listener.close(to);
+        self.link.send(&refusal.answer(cause), to)?;
+        self.link.close(to);
         Ok(())
     }
 }
@@ -310,27 +310,27 @@ impl Run {
     }
 
     /// Sends Welcome, and the first reading of a rig.
-    pub fn welcome(&mut self, listener: &mut Listener) -> Result<(), ServerError> {
-        listener.send(&self.welcome, self.peer)?;
-        self.tell_reading(listener)
+    pub fn welcome(&mut self, link: &mut Link) -> Result<(), ServerError> {
+        link.send(&self.welcome, self.peer)?;
+        self.tell_reading(link)
     }
 
-    pub fn handle(&mut self, frame: &Frame, listener: &mut Listener) -> Result<(), ServerError> {
+    pub fn handle(&mut self, frame: &Frame, link: &mut Link) -> Result<(), ServerError> {
         self.heard = Instant::now();
         self.counters.received += 1;
         match (frame.kind, &self.served) {
             (Kind::Drive, Served::Rig(_)) if self.real_time => self.take_drive(frame),
-            (Kind::Hello, _) if self.real_time && self.clock.is_none() => self.welcome(listener)?,
+            (Kind::Hello, _) if self.real_time && self.clock.is_none() => self.welcome(link)?,
             (Kind::Hello, _) if self.real_time => {}
             (Kind::Farewell, _) if self.real_time => {
                 self.end(Ended::Farewell);
-                listener.send(&self.report(), self.peer)?;
+                link.send(&self.report(), self.peer)?;
             }
             _ if self.real_time => self.counters.malformed += 1,
             _ => {
-                if let Err(refusal) = self.step(frame, listener)? {
+                if let Err(refusal) = self.step(frame, link)? {
                     let cause = Frame { sequence: self.at, ..*frame };
-                    listener.send(&refusal.answer(&cause), self.peer)?;
+                    link.send(&refusal.answer(&cause), self.peer)?;
                     self.end(Ended::Refused);
                 }
             }
@@ -339,14 +339,14 @@ impl Run {
     }
 
     /// Answers a frame in lock-step.
-    fn step(&mut self, frame: &Frame, listener: &mut Listener) -> Result<Result<(), Refusal>, ServerError> {
+    fn step(&mut self, frame: &Frame, link: &mut Link) -> Result<Result<(), Refusal>, ServerError> {
         match (&mut self.served, frame.kind) {
             _ if frame.sequence != self.at => Ok(Err(Refusal::Unexpected)),
             (Served::Controller(controller), Kind::Sensors) => {
                 let command = controller.sample(read_reading(frame).sensors, frame.has(flag::ACTIVE))?;
                 let answer = write_command(Frame { flags: 0, ..*frame }, &command);
                 self.at += 1;
-                listener.send(&answer, self.peer)?;
+                link.send(&answer, self.peer)?;
                 Ok(Ok(()))
             }
             (Served::Controller(controller), Kind::Move) => {
@@ -364,7 +364,7 @@ impl Run {
                 Ok(drive) => {
                     self.drive.set(drive, frame.has(flag::HOLD));
                     self.advance()?;
-                    self.tell_reading(listener)?;
+                    self.tell_reading(link)?;
                     Ok(Ok(()))
                 }
             },
@@ -387,7 +387,7 @@ impl Run {
     }
 
     /// The deadline has passed: a sample is due, or the client is silent.
-    pub fn pass(&mut self, listener: &mut Listener) -> Result<(), ServerError> {
+    pub fn pass(&mut self, link: &mut Link) -> Result<(), ServerError> {
         let Some(clock) = &mut self.clock else {
             self.end(Ended::Silence);
             return Ok(());
@@ -402,7 +402,7 @@ impl Run {
             }
         }
         self.advance()?;
-        self.tell_reading(listener)
+        self.tell_reading(link)
     }
 
     fn advance(&mut self) -> Result<(), ServerError> {
@@ -414,7 +414,7 @@ impl Run {
     }
 
     /// Sends the present reading of a rig.
-    fn tell_reading(&mut self, listener: &mut Listener) -> Result<(), ServerError> {
+    fn tell_reading(&mut self, link: &mut Link) -> Result<(), ServerError> {
         let Served::Rig(rig) = &mut self.served else {
             return Ok(());
         };
@@ -425,7 +425,7 @@ impl Run {
         if self.drive.is_shut_down() {
             frame.flags |= flag::SHUT_DOWN;
         }
-        Ok(listener.send(&frame, self.peer)?)
+        Ok(link.send(&frame, self.peer)?)
     }
 
     /// The report to the client of a rig in real time.
