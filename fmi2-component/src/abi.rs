@@ -213,11 +213,7 @@ unsafe fn input<'a, T>(pointer: *const T, count: usize, what: &str) -> Result<&'
 
 /// The places of an array that is written.
 #[inline]
-unsafe fn output<'a, T>(
-    pointer: *mut T,
-    count: usize,
-    what: &str,
-) -> Result<&'a mut [MaybeUninit<T>], Refusal> {
+unsafe fn output<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a mut [MaybeUninit<T>], Refusal> {
     if count == 0 {
         return Ok(&mut []);
     }
@@ -244,7 +240,7 @@ unsafe fn text<'a>(pointer: *const c_char) -> Option<Cow<'a, str>> {
 
 #[inline]
 fn check<T>(pointer: *const T, count: usize, what: &str) -> Result<(), Refusal> {
-    if pointer.is_null() || !pointer.is_aligned() || count > MOST {
+    if pointer.is_null() | !pointer.is_aligned() | (count > MOST) {
         return Err(refuse_array(pointer.is_null(), count, what));
     }
     Ok(())
