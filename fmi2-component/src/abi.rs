@@ -222,6 +222,30 @@ unsafe fn output<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), count) })
 }
 
+/// Value references and as many values, or places of values, checked at once.
+#[inline]
+unsafe fn pairs<'a, T>(
+    references: *const CValueReference,
+    values: *const T,
+    count: usize,
+) -> Result<(&'a [CValueReference], &'a [T]), Refusal> {
+    if count == 0 {
+        return Ok((&[], &[]));
+    }
+    let aligned = references.is_aligned() & values.is_aligned();
+    if !aligned | references.is_null() | values.is_null() | (count > MOST) {
+        check(references, count, "vr")?;
+        check(values, count, "value")?;
+    }
+    // SAFETY: neither is NULL, both are aligned, of a sane size, and by the contract of this module as long as the count says.
+    Ok(unsafe {
+        (
+            std::slice::from_raw_parts(references, count),
+            std::slice::from_raw_parts(values, count),
+        )
+    })
+}
+
 /// The place of a single answer.
 #[inline]
 unsafe fn place<'a, T>(pointer: *mut T, what: &str) -> Result<&'a mut MaybeUninit<T>, Refusal> {
@@ -240,7 +264,7 @@ unsafe fn text<'a>(pointer: *const c_char) -> Option<Cow<'a, str>> {
 
 #[inline]
 fn check<T>(pointer: *const T, count: usize, what: &str) -> Result<(), Refusal> {
-    if pointer.is_null() | !pointer.is_aligned() | (count > MOST) {
+    if pointer.is_null() || !pointer.is_aligned() || count > MOST {
         return Err(refuse_array(pointer.is_null(), count, what));
     }
     Ok(())

@@ -2,7 +2,7 @@
 
 use std::fmt::Write;
 
-use crate::guid::guid;
+use crate::guid;
 use crate::table::{Kind, Literal, Table, Variable};
 
 /// The contents of `variables.rs`.

@@ -132,25 +132,3 @@ fn an_unknown_category_is_a_warning() {
     let (status, _) = overflow(|m| unsafe { (m.f.fmi2SetDebugLogging)(m.c, 1, 1, null()) });
     assert_eq!(status, Status::Error);
 }
-
-#[test]
-fn instances_know_nothing_of_each_other() {
-    let (one, two) = (ready(), ready());
-    one.set_real(2, 0.2);
-    one.step(0.0, 1.0);
-    assert_eq!(two.step(0.0, 1.0), Status::Ok);
-    assert_eq!((one.real(3), two.real(3)), (0.6, 0.5));
-}
-
-#[test]
-fn an_instance_may_be_called_from_changing_threads() {
-    let mut carried = ready();
-    for i in 0..4 {
-        carried = std::thread::spawn(move || {
-            assert_eq!(carried.step(f64::from(i), 1.0), Status::Ok);
-            carried
-        })
-        .join()
-        .unwrap();
-    }
-}
