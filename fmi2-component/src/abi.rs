@@ -22,7 +22,7 @@ pub use functions::*;
 use crate::instance::Instance;
 use crate::life_cycle::{Function, State};
 use crate::log::Logger;
-use crate::refusal::{Refusal, Severity};
+use crate::refusal::Refusal;
 
 /// `fmi2Component`.
 pub type CComponent = *mut c_void;
@@ -143,7 +143,7 @@ unsafe fn enter<C, R: Into<Status>>(
 
 #[cold]
 fn refuse<C>(instance: &mut Instance<C>, name: &str, refusal: &Refusal) -> Status {
-    if refusal.severity() == Severity::Fatal {
+    if refusal.status() == Status::Fatal {
         instance.session.state = State::Fatal;
     }
     let status = refusal.status();
@@ -222,26 +222,40 @@ unsafe fn output<'a, T>(pointer: *mut T, count: usize, what: &str) -> Result<&'a
     Ok(unsafe { std::slice::from_raw_parts_mut(pointer.cast(), count) })
 }
 
-/// Value references and as many values, or places of values, checked at once.
+/// Value references, and as many values.
 #[inline]
-unsafe fn pairs<'a, T>(
-    references: *const CValueReference,
-    values: *const T,
+unsafe fn settings<'a, T>(
+    (references, values): (*const CValueReference, *const T),
     count: usize,
 ) -> Result<(&'a [CValueReference], &'a [T]), Refusal> {
     if count == 0 {
         return Ok((&[], &[]));
     }
-    let aligned = references.is_aligned() & values.is_aligned();
-    if !aligned | references.is_null() | values.is_null() | (count > MOST) {
-        check(references, count, "vr")?;
-        check(values, count, "value")?;
-    }
+    check_both(references, values, count)?;
     // SAFETY: neither is NULL, both are aligned, of a sane size, and by the contract of this module as long as the count says.
     Ok(unsafe {
         (
             std::slice::from_raw_parts(references, count),
             std::slice::from_raw_parts(values, count),
+        )
+    })
+}
+
+/// Value references, and as many places of values.
+#[inline]
+unsafe fn readings<'a, T>(
+    (references, values): (*const CValueReference, *mut T),
+    count: usize,
+) -> Result<(&'a [CValueReference], &'a mut [MaybeUninit<T>]), Refusal> {
+    if count == 0 {
+        return Ok((&[], &mut []));
+    }
+    check_both(references, values, count)?;
+    // SAFETY: as in `settings`; what the master's memory holds now is not read.
+    Ok(unsafe {
+        (
+            std::slice::from_raw_parts(references, count),
+            std::slice::from_raw_parts_mut(values.cast(), count),
         )
     })
 }
@@ -268,6 +282,23 @@ fn check<T>(pointer: *const T, count: usize, what: &str) -> Result<(), Refusal> 
         return Err(refuse_array(pointer.is_null(), count, what));
     }
     Ok(())
+}
+
+/// Checks both arrays at once: these calls are in every step.
+#[inline]
+fn check_both<T>(references: *const CValueReference, values: *const T, count: usize) -> Result<(), Refusal> {
+    let aligned = references.is_aligned() & values.is_aligned();
+    if !aligned | references.is_null() | values.is_null() | (count > MOST) {
+        return refuse_either(references, values, count);
+    }
+    Ok(())
+}
+
+#[cold]
+#[inline(never)]
+fn refuse_either<T>(references: *const CValueReference, values: *const T, count: usize) -> Result<(), Refusal> {
+    check(references, count, "vr")?;
+    check(values, count, "value")
 }
 
 #[cold]

@@ -99,16 +99,11 @@ mod export;
 mod instance;
 mod life_cycle;
 mod log;
-mod model;
-mod model_exchange;
 mod refusal;
-mod session;
 mod variable;
 
 pub use archive::Archive;
-pub use component::{BooleanOf, Component, IntegerOf, RealOf, StringOf};
+pub use component::{BooleanOf, Component, Discrete, IntegerOf, Key, Model, ModelExchange, RealOf, StringOf};
 pub use log::{Category, Log, Logger};
-pub use model::{Key, Model};
-pub use model_exchange::{Discrete, ModelExchange};
-pub use refusal::{Refusal, Severity, Status};
+pub use refusal::{Refusal, Status};
 pub use variable::{Causality, Initial, Occasions, Variability, Variable};

@@ -1,6 +1,6 @@
 //! What `modelDescription.xml` says of a variable, as the build step found it (FMI 2.0, clause 2.2.7).
 
-use std::fmt::{self, Display};
+use std::fmt::{Debug, Display};
 
 use crate::life_cycle::State;
 use crate::refusal::Refusal;
@@ -48,23 +48,12 @@ pub enum Initial {
     Calculated,
 }
 
-/// The words of the standard, for messages.
-macro_rules! words {
-    ($type:ident: $($variant:ident $word:literal)*) => {
-        impl Display for $type {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(match self {
-                    $(Self::$variant => $word,)*
-                })
-            }
-        }
-    };
+/// The word of the standard for a variant, for messages: its name with a small letter.
+pub(crate) fn word(variant: impl Debug) -> String {
+    let mut word = format!("{variant:?}");
+    word[..1].make_ascii_lowercase();
+    word
 }
-
-words!(Causality: Parameter "parameter" CalculatedParameter "calculatedParameter" Input "input" Output "output" Local "local"
-    Independent "independent");
-words!(Variability: Constant "constant" Fixed "fixed" Tunable "tunable" Discrete "discrete" Continuous "continuous");
-words!(Initial: Exact "exact" Approx "approx" Calculated "calculated");
 
 /// A variable whose values are of type `T`.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -27,11 +27,12 @@
 mod source;
 mod table;
 
-use std::fmt::{self, Write};
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use fmi2_description::Description;
 use table::Table;
+use thiserror::Error;
 use uuid::Uuid;
 
 /// Reads the description at `path`, relative to the package, and writes `$OUT_DIR/variables.rs`. For `build.rs`.
@@ -123,9 +124,10 @@ fn guid(table: &Table) -> String {
 }
 
 /// Reason why a description is refused.
-#[derive(Debug)]
+#[derive(Debug, Error)]
 pub enum Error {
     /// The file cannot be read or written.
+    #[error("{} cannot be read or written", path.display())]
     File {
         /// Which file.
         path: PathBuf,
@@ -133,33 +135,9 @@ pub enum Error {
         source: std::io::Error,
     },
     /// The text is not a model description.
-    Description(fmi2_description::Error),
+    #[error("the text is not a model description of FMI 2.0")]
+    Description(#[from] fmi2_description::Error),
     /// No table can be made of the description.
+    #[error("{0}")]
     Fault(String),
-}
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::File { path, .. } => write!(f, "{} cannot be read or written", path.display()),
-            Self::Description(_) => f.write_str("the text is not a model description of FMI 2.0"),
-            Self::Fault(fault) => f.write_str(fault),
-        }
-    }
-}
-
-impl std::error::Error for Error {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match self {
-            Self::File { source, .. } => Some(source),
-            Self::Description(source) => Some(source),
-            Self::Fault(_) => None,
-        }
-    }
-}
-
-impl From<fmi2_description::Error> for Error {
-    fn from(error: fmi2_description::Error) -> Self {
-        Self::Description(error)
-    }
 }

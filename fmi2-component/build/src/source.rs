@@ -112,7 +112,7 @@ impl ::fmi2_component::Key for {kind:?} {{
         all.join(", "),
         all.len()
     )?;
-    find(out, kind, variables, &variants)?;
+    find(out, variables, &variants)?;
     // An enum without variants has no number.
     let index = if variables.is_empty() {
         "match self {}"
@@ -131,43 +131,27 @@ impl ::fmi2_component::Key for {kind:?} {{
     )
 }
 
-/// How a variable is found by its value reference: by its index in a table, unless most entries would be empty.
-fn find(out: &mut String, kind: Kind, variables: &[&Variable], variants: &[String]) -> std::fmt::Result {
-    let named = || variables.iter().map(|v| v.value_reference).zip(variants);
-    let places = variables.iter().map(|v| v.value_reference as usize + 1);
-    let places = places.max().unwrap_or(0);
+/// How a variable is found by its value reference.
+fn find(out: &mut String, variables: &[&Variable], variants: &[String]) -> std::fmt::Result {
     writeln!(
         out,
         "    #[inline]
-    fn find(value_reference: u32) -> ::core::option::Option<Self> {{"
+    fn find(value_reference: u32) -> ::core::option::Option<Self> {{
+        match value_reference {{"
     )?;
-    if places <= 4 * variables.len() + 64 {
-        let mut table = vec!["::core::option::Option::None".to_owned(); places];
-        for (reference, variant) in named() {
-            table[reference as usize] = format!("::core::option::Option::Some({kind:?}::{variant})");
-        }
-        let entries = table.join(", ");
+    for (variable, variant) in variables.iter().zip(variants) {
+        let reference = variable.value_reference;
         writeln!(
             out,
-            "        const TABLE: [::core::option::Option<{kind:?}>; {places}] = [{entries}];
-        TABLE.get(value_reference as usize).copied().flatten()
-    }}"
-        )
-    } else {
-        writeln!(out, "        match value_reference {{")?;
-        for (reference, variant) in named() {
-            writeln!(
-                out,
-                "            {reference} => ::core::option::Option::Some(Self::{variant}),"
-            )?;
-        }
-        writeln!(
-            out,
-            "            _ => ::core::option::Option::None,
+            "            {reference} => ::core::option::Option::Some(Self::{variant}),"
+        )?;
+    }
+    writeln!(
+        out,
+        "            _ => ::core::option::Option::None,
         }}
     }}"
-        )
-    }
+    )
 }
 
 fn doc(v: &Variable) -> String {

@@ -1,24 +1,19 @@
 //! The C functions, each as a generic one that [`export!`](crate::export) gives its name.
 
 use std::any::TypeId;
-use std::cell::Cell;
 use std::ffi::{CStr, CString as OwnedCString, c_char, c_int};
-use std::mem::MaybeUninit;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::ptr;
 
 use super::{
     CBoolean, CComponent, CFmuState, CString, CValueReference, CallbackFunctions, EventInfo, Handle, Status, enter,
-    input, output, pairs, panic_message, place, text,
+    input, output, panic_message, place, readings, settings, text,
 };
-use crate::component::{BooleanOf, Component, IntegerOf, RealOf, StringOf};
-use crate::instance::Instance;
+use crate::component::{BooleanOf, Component, IntegerOf, Key, Model, ModelExchange, RealOf, StringOf};
+use crate::instance::{Instance, Select, Session, deserialise, serialise};
 use crate::life_cycle::{Function, State};
 use crate::log::Log;
-use crate::model::{Key, Model};
-use crate::model_exchange::ModelExchange;
 use crate::refusal::Refusal;
-use crate::session::{Select, Session, deserialise, serialise};
 use crate::variable::{Causality, Occasions};
 
 /// Declares functions of a [`Component`] or of [`ModelExchange`]: the name in Rust, the group of the life cycle, the name in C, the
@@ -187,19 +182,19 @@ macro_rules! values {
             Component:
             $get = GetValues $c_get (references: *const CValueReference, count: usize, values: *mut $c_type) |instance| {
                 // SAFETY: the arrays are as long as their count, by contract.
-                let (references, values) = unsafe { pairs(references, values.cast::<Cell<MaybeUninit<$c_type>>>(), count) }?;
+                let (references, values) = unsafe { readings((references, values), count) }?;
                 if instance.session.stale {
                     refresh_for::<C, $key<C>>(instance, references)?;
                 }
                 for (&reference, value) in references.iter().zip(values) {
                     let key = find::<$key<C>>(reference)?;
-                    value.set(MaybeUninit::new($read(&instance.session.component, key)));
+                    value.write($read(&instance.session.component, key));
                 }
                 Ok(())
             };
             $set = $setting $c_set (references: *const CValueReference, count: usize, values: *const $c_type) |instance| {
                 // SAFETY: the arrays are as long as their count, by contract.
-                let (references, values) = unsafe { pairs(references, values, count) }?;
+                let (references, values) = unsafe { settings((references, values), count) }?;
                 // All are checked before the first is set.
                 let mut common = Occasions::ALL;
                 for (&reference, &value) in references.iter().zip(values) {
