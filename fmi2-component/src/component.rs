@@ -4,7 +4,7 @@
 use crate::archive::Archive;
 use crate::log::Log;
 use crate::refusal::Refusal;
-use crate::variable::{Occasions, Variable};
+use crate::variable::Variable;
 
 /// A model's identity and its variables; implemented by the generated type `Model`.
 pub trait Model: 'static {
@@ -42,8 +42,6 @@ pub trait Key: Copy + 'static {
     const VARIABLES: &'static [Variable<Self::Value>];
     /// All of them, in the same order.
     const ALL: &'static [Self];
-    /// When each of them may be set: [`Occasions::table`] of `VARIABLES`.
-    const OCCASIONS: &'static [Occasions];
 
     /// The variable with that value reference.
     fn find(value_reference: u32) -> Option<Self>;

@@ -13,7 +13,7 @@ use crate::component::{Component, Key, Model, RealOf};
 use crate::life_cycle::{Interface, State};
 use crate::log::Log;
 use crate::refusal::{Refusal, Status};
-use crate::variable::{Occasions, Variable, word};
+use crate::variable::{Variable, word};
 
 /// How far, relatively, a master's clock may be from ours, and a step may lead past the stop time: both round.
 const CLOCK_TOLERANCE: f64 = 1e-9;
@@ -95,14 +95,14 @@ impl<C: Component> Instance<C> {
         Ok(())
     }
 
-    /// Whether a variable may be set now, in a state where setting is legal at all; answers when else.
+    /// The variable, if it may be set now, in a state where setting is legal at all.
     #[inline]
-    pub fn check_settable<K: Key>(&self, key: K) -> Result<Occasions, Refusal> {
-        let occasions = K::OCCASIONS[key.index()];
-        if occasions.meets(Occasions::now(self.session.state)) {
-            return Ok(occasions);
+    pub fn check_settable<K: Key>(&self, key: K) -> Result<&'static Variable<K::Value>, Refusal> {
+        let variable = key.variable();
+        if variable.settable_in(self.session.state) {
+            return Ok(variable);
         }
-        Err(not_settable(key.variable(), self.session.state))
+        Err(not_settable(variable, self.session.state))
     }
 
     /// Announces that values will be set: what was initialised from the old ones is then invalid.

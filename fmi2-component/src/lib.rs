@@ -106,4 +106,4 @@ pub use archive::Archive;
 pub use component::{BooleanOf, Component, Discrete, IntegerOf, Key, Model, ModelExchange, RealOf, StringOf};
 pub use log::{Category, Log, Logger};
 pub use refusal::{Refusal, Status};
-pub use variable::{Causality, Initial, Occasions, Variability, Variable};
+pub use variable::{Causality, Initial, Variability, Variable};

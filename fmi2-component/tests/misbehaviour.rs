@@ -5,9 +5,7 @@ use std::ptr::null_mut;
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 
 use fmi2_boundary::{Fmu, Master, callbacks, functions_of};
-use fmi2_component::{
-    Causality, Component, Initial, Key, Log, Model, Occasions, Refusal, Status, Variability, Variable,
-};
+use fmi2_component::{Causality, Component, Initial, Key, Log, Model, Refusal, Status, Variability, Variable};
 
 struct Moody;
 
@@ -41,7 +39,6 @@ impl<T: 'static> Key for Nothing<T> {
     type Value = T;
     const VARIABLES: &'static [Variable<T>] = &[];
     const ALL: &'static [Self] = &[];
-    const OCCASIONS: &'static [Occasions] = &[];
 
     fn find(_: u32) -> Option<Self> {
         None
@@ -72,7 +69,6 @@ impl Key for Mood {
         description: "",
     }];
     const ALL: &'static [Self] = &[Self];
-    const OCCASIONS: &'static [Occasions] = &Occasions::table::<_, 1>(Self::VARIABLES);
 
     fn find(value_reference: u32) -> Option<Self> {
         (value_reference == 0).then_some(Self)

@@ -107,10 +107,8 @@ impl ::fmi2_component::Key for {kind:?} {{
         out,
         "    ];
     const ALL: &'static [Self] = &[{}];
-    const OCCASIONS: &'static [::fmi2_component::Occasions] = &::fmi2_component::Occasions::table::<_, {}>(Self::VARIABLES);
 ",
-        all.join(", "),
-        all.len()
+        all.join(", ")
     )?;
     find(out, variables, &variants)?;
     // An enum without variants has no number.

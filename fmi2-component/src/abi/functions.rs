@@ -14,7 +14,7 @@ use crate::instance::{Instance, Select, Session, deserialise, serialise};
 use crate::life_cycle::{Function, State};
 use crate::log::Log;
 use crate::refusal::Refusal;
-use crate::variable::{Causality, Occasions};
+use crate::variable::Causality;
 
 /// Declares functions of a [`Component`] or of [`ModelExchange`]: the name in Rust, the group of the life cycle, the name in C, the
 /// arguments, and what is done with the instance.
@@ -196,10 +196,10 @@ macro_rules! values {
                 // SAFETY: the arrays are as long as their count, by contract.
                 let (references, values) = unsafe { settings((references, values), count) }?;
                 // All are checked before the first is set.
-                let mut common = Occasions::ALL;
+                let mut inputs = true;
                 for (&reference, &value) in references.iter().zip(values) {
                     let key = find::<$key<C>>(reference)?;
-                    common = common.and(instance.check_settable(key)?);
+                    inputs &= instance.check_settable(key)?.causality == Causality::Input;
                     $check(key, value)?;
                 }
                 let set = |component: &mut C| {
@@ -208,7 +208,7 @@ macro_rules! values {
                     }
                     Ok(())
                 };
-                if count <= 1 || C::TAKES_EVERY_INPUT && common.is_input() {
+                if count <= 1 || C::TAKES_EVERY_INPUT && inputs {
                     set(&mut instance.session.component)?;
                 } else {
                     instance.change(set)?;

@@ -107,17 +107,26 @@ impl Master {
         master
     }
 
+    /// Takes the instance into Initialization Mode.
+    ///
+    /// # Panics
+    /// If a call is refused.
+    pub fn enter_initialization(&self) {
+        // SAFETY: the instance is alive.
+        unsafe {
+            self.well((self.f.fmi2SetupExperiment)(self.c, 0, 0.0, 0.0, 0, 0.0));
+            self.well((self.f.fmi2EnterInitializationMode)(self.c));
+        }
+    }
+
     /// Takes the instance from its instantiation through initialization.
     ///
     /// # Panics
     /// If a call is refused.
     pub fn start(&self) {
-        // SAFETY: the instance is alive; so below.
-        unsafe {
-            self.well((self.f.fmi2SetupExperiment)(self.c, 0, 0.0, 0.0, 0, 0.0));
-            self.well((self.f.fmi2EnterInitializationMode)(self.c));
-            self.well((self.f.fmi2ExitInitializationMode)(self.c));
-        }
+        self.enter_initialization();
+        // SAFETY: the instance is alive.
+        self.well(unsafe { (self.f.fmi2ExitInitializationMode)(self.c) });
     }
 
     /// Switches on these categories of the log and no other.
