@@ -110,7 +110,7 @@ impl ::fmi2_component::Key for {kind:?} {{
 ",
         all.join(", ")
     )?;
-    find(out, variables, &variants)?;
+    find(out, kind, variables, &variants)?;
     // An enum without variants has no number.
     let index = if variables.is_empty() {
         "match self {}"
@@ -129,25 +129,30 @@ impl ::fmi2_component::Key for {kind:?} {{
     )
 }
 
-/// How a variable is found by its value reference.
-fn find(out: &mut String, variables: &[&Variable], variants: &[String]) -> std::fmt::Result {
+/// How a variable is found by its value reference: by its index in a table, unless most entries would be empty.
+fn find(out: &mut String, kind: Kind, variables: &[&Variable], variants: &[String]) -> std::fmt::Result {
+    let named = || variables.iter().map(|v| v.value_reference as usize).zip(variants);
+    let places = named().map(|(reference, _)| reference + 1).max().unwrap_or(0);
+    let body = if places <= 4 * variables.len() + 64 {
+        let mut table = vec!["::core::option::Option::None".to_owned(); places];
+        for (reference, variant) in named() {
+            table[reference] = format!("::core::option::Option::Some({kind:?}::{variant})");
+        }
+        let entries = table.join(", ");
+        format!(
+            "const TABLE: [::core::option::Option<{kind:?}>; {places}] = [{entries}];
+        TABLE.get(value_reference as usize).copied().flatten()"
+        )
+    } else {
+        let arm = |(reference, variant)| format!("{reference} => ::core::option::Option::Some(Self::{variant}), ");
+        let arms: String = named().map(arm).collect();
+        format!("match value_reference {{ {arms}_ => ::core::option::Option::None }}")
+    };
     writeln!(
         out,
         "    #[inline]
     fn find(value_reference: u32) -> ::core::option::Option<Self> {{
-        match value_reference {{"
-    )?;
-    for (variable, variant) in variables.iter().zip(variants) {
-        let reference = variable.value_reference;
-        writeln!(
-            out,
-            "            {reference} => ::core::option::Option::Some(Self::{variant}),"
-        )?;
-    }
-    writeln!(
-        out,
-        "            _ => ::core::option::Option::None,
-        }}
+        {body}
     }}"
     )
 }

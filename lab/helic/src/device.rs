@@ -74,7 +74,9 @@ fn parameter(index: u16) -> Result<(&'static str, u8, usize), ErrorCode> {
 
 /// A page of definitions: those from `start` on that fit into a payload.
 fn page(start: u16) -> Result<Vec<u8>, ErrorCode> {
-    parameter(start)?;
+    if usize::from(start) > parameters().count() {
+        return Err(ErrorCode::BadIndex);
+    }
     let (mut next, mut page) = (start, Vec::new());
     for (name, code, count) in parameters().skip(start.into()) {
         let [low, high] = (count as u16).to_le_bytes();

@@ -11,7 +11,7 @@ use std::time::Duration;
 use vines_net::frame::{Frame, Kind};
 use vines_net::{Counters, Ended, LinkError, NetController, NetRig, RAMP_SAMPLES, ReportLost, Session, Timing};
 use vines_testbench::experiment::{self, ExperimentError, Plan};
-use vines_testbench::rig::{BuiltIn, Command, Controller, ControllerError, Drive, Rig, Sensors, Simulated};
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, Rig, Sensors, Simulated};
 
 use crate::bench::{drive, real_time_rig, scene, serve_controller, shake, socket};
 use crate::proxy::{Fate, Proxy};
