@@ -65,7 +65,7 @@ functions! {
     reset = Reset "fmi2Reset" () |instance| instance.reset();
 
     /// Whether the master may come back to an earlier point makes no difference here.
-    do_step = DoStep "fmi2DoStep" (time: f64, step: f64) |instance| instance.do_step(time, step);
+    do_step = DoStep "fmi2DoStep" (time: f64, step: f64, _no_set_prior: CBoolean) |instance| instance.do_step(time, step);
 
     /// Never legal, since no step continues in the background.
     cancel_step = CancelStep "fmi2CancelStep" () |_| Ok(());
@@ -578,7 +578,7 @@ functions! {
 
     /// The component never asks to end here.
     completed_integrator_step = CompletedIntegratorStep "fmi2CompletedIntegratorStep" (
-        event: *mut CBoolean, terminate: *mut CBoolean
+        _no_set_prior: CBoolean, event: *mut CBoolean, terminate: *mut CBoolean
     ) |instance| {
         // SAFETY: NULL or one writable place each, by contract.
         let (event, terminate) = unsafe { (place(event, "enterEventMode")?, place(terminate, "terminateSimulation")?) };
