@@ -78,11 +78,8 @@ struct Handle<C> {
 
 impl<C> Handle<C> {
     fn into_pointer(instance: Instance<C>) -> CComponent {
-        Box::into_raw(Box::new(Self {
-            busy: AtomicBool::new(false),
-            instance: UnsafeCell::new(instance),
-        }))
-        .cast()
+        let (busy, instance) = (AtomicBool::new(false), UnsafeCell::new(instance));
+        Box::into_raw(Box::new(Self { busy, instance })).cast()
     }
 
     /// Ends the instance, if it is there and idle.

@@ -655,10 +655,6 @@ unsafe fn answer<C: Component, I>(
 }
 
 fn counted(name: &str, count: usize, expected: usize) -> Result<(), Refusal> {
-    if count == expected {
-        return Ok(());
-    }
-    Err(Refusal::error(format!(
-        "{name} = {count} is refused; expected {expected}"
-    )))
+    let refusal = || Refusal::error(format!("{name} = {count} is refused; expected {expected}"));
+    (count == expected).then_some(()).ok_or_else(refusal)
 }
