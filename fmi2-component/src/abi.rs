@@ -26,7 +26,7 @@ use crate::refusal::Refusal;
 
 /// `fmi2Component`.
 pub type CComponent = *mut c_void;
-/// `fmi2FMUstate`: a number, see `session.rs`.
+/// `fmi2FMUstate`: a number, see `instance.rs`.
 pub type CFmuState = *mut c_void;
 /// `fmi2ValueReference`.
 pub type CValueReference = c_uint;
