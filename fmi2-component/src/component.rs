@@ -1,9 +1,71 @@
-//! The trait that a component implements.
+//! The traits: what the build step generates ([`Model`], [`Key`]), what a component implements ([`Component`]), and its second
+//! interface, for the master's own integrator ([`ModelExchange`]; FMI 2.0, clause 3).
 
 use crate::archive::Archive;
 use crate::log::Log;
-use crate::model::{Key, Model, any_settable};
 use crate::refusal::Refusal;
+use crate::variable::Variable;
+
+/// A model's identity and its variables; implemented by the generated type `Model`.
+pub trait Model: 'static {
+    /// `modelName`.
+    const NAME: &'static str;
+    /// `modelIdentifier`: the name of the FMU and of the library in it.
+    const IDENTIFIER: &'static str;
+    /// Derived from the variable table: a library meets only the description that it was built with.
+    const GUID: &'static str;
+    /// The version of the model; a serialised state of another one is refused.
+    const VERSION: &'static str;
+    /// The continuous states, in the order of the description's list of derivatives.
+    const STATES: &'static [Self::Real];
+    /// Their derivatives, in the same order.
+    const DERIVATIVES: &'static [Self::Real];
+    /// `numberOfEventIndicators`.
+    const EVENT_INDICATORS: usize;
+    /// The names of the log categories.
+    const CATEGORIES: &'static [&'static str];
+    /// The variables that hold a real number.
+    type Real: Key<Value = f64>;
+    /// The variables that hold an integer or an enumeration.
+    type Integer: Key<Value = i32>;
+    /// The Boolean variables.
+    type Boolean: Key<Value = bool>;
+    /// The variables that hold text.
+    type String: Key<Value = &'static str>;
+}
+
+/// A variable of one type as a Rust enum, one variant each; generated.
+pub trait Key: Copy + 'static {
+    /// What start values are made of.
+    type Value: 'static;
+    /// The table, in the order of the variants.
+    const VARIABLES: &'static [Variable<Self::Value>];
+    /// All of them, in the same order.
+    const ALL: &'static [Self];
+
+    /// The variable with that value reference.
+    fn find(value_reference: u32) -> Option<Self>;
+
+    /// Its place in the table.
+    fn index(self) -> usize;
+
+    /// What the description says of it.
+    fn variable(self) -> &'static Variable<Self::Value> {
+        &Self::VARIABLES[self.index()]
+    }
+}
+
+/// Whether a master may ever set one of `variables`.
+pub(crate) const fn any_settable<T>(variables: &[Variable<T>]) -> bool {
+    let mut i = 0;
+    while i < variables.len() {
+        if variables[i].settable_at_start(false) || variables[i].settable_between_steps() {
+            return true;
+        }
+        i += 1;
+    }
+    false
+}
 
 /// The real variables of component `C`.
 pub type RealOf<C> = <<C as Component>::Model as Model>::Real;
@@ -189,4 +251,59 @@ const fn must_not_be_settable<K: Key>() {
         !any_settable(K::VARIABLES),
         "the model has settable variables of a type that the component writes no setter for"
     );
+}
+
+/// A component whose equations a master can integrate by itself.
+///
+/// Which variables are states and derivatives, the description says in `ModelStructure`; the shell reads them by
+/// [`Component::get_real`]. What is left is to set a state, to tell the event indicators, and what happens at an event.
+pub trait ModelExchange: Component {
+    /// Says that this instance is for model exchange; called right after [`Component::new`].
+    fn select(&mut self);
+
+    /// Sets a continuous state to a finite value.
+    fn set_state(&mut self, state: RealOf<Self>, value: f64);
+
+    /// The event indicator at `index`: an event happens where it goes from above 0 to 0 or below, or back.
+    fn event_indicator(&self, index: usize) -> f64;
+
+    /// Applies what happens at an event, the one at the start included; called until nothing more is to be done.
+    ///
+    /// # Errors
+    /// An event after which the equations make no sense.
+    fn new_discrete_states(&mut self, time: f64, log: &Log) -> Result<Discrete, Refusal>;
+
+    /// Sets the time; for equations that contain it.
+    fn set_time(&mut self, time: f64) {
+        let _ = time;
+    }
+
+    /// Begins an event: inputs may jump from now on.
+    fn enter_event_mode(&mut self) {}
+
+    /// Called when the integrator has completed a step. Returns whether an event must be handled now, even if no indicator has
+    /// shown it.
+    fn completed_step(&mut self) -> bool {
+        false
+    }
+
+    /// A typical magnitude of a state, above 0; by default the description's `nominal`, or 1.
+    fn nominal(&self, state: RealOf<Self>) -> f64 {
+        state.variable().nominal.unwrap_or(1.0)
+    }
+}
+
+/// What an event has led to.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Discrete {
+    /// The event is not over: another call is needed.
+    pub again: bool,
+    /// The simulation is to be ended.
+    pub terminate: bool,
+    /// States have jumped.
+    pub states_changed: bool,
+    /// Nominal values have changed.
+    pub nominals_changed: bool,
+    /// When the next event is due by the clock, if one is.
+    pub next_event_time: Option<f64>,
 }

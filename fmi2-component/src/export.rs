@@ -33,22 +33,11 @@ macro_rules! export {
     };
     ($component:ty, model_exchange) => {
         $crate::export!(@library $component, ::core::option::Option::Some(<$component as $crate::ModelExchange>::select), {
-            #[unsafe(no_mangle)]
-            pub unsafe extern "C" fn fmi2CompletedIntegratorStep(
-                component: CComponent,
-                _no_set_fmu_state_prior_to_current_point: CBoolean,
-                event: *mut CBoolean,
-                terminate: *mut CBoolean,
-            ) -> Status {
-                unsafe {
-                    $crate::abi::completed_integrator_step::<$component>(component, event, terminate)
-                }
-            }
-
             $crate::export_functions! { $component,
                 fmi2EnterEventMode = enter_event_mode();
                 fmi2NewDiscreteStates = new_discrete_states(info: *mut EventInfo);
                 fmi2EnterContinuousTimeMode = enter_continuous_time_mode();
+                fmi2CompletedIntegratorStep = completed_integrator_step(no_set_prior: CBoolean, event: *mut CBoolean, terminate: *mut CBoolean);
                 fmi2SetTime = set_time(time: f64);
                 fmi2SetContinuousStates = set_continuous_states(states: *const f64, count: usize);
                 fmi2GetDerivatives = get_derivatives(derivatives: *mut f64, count: usize);
@@ -100,24 +89,9 @@ macro_rules! export {
                 unsafe { $crate::abi::free_instance::<$component>(component) }
             }
 
-            #[unsafe(no_mangle)]
-            pub unsafe extern "C" fn fmi2SetupExperiment(
-                component: CComponent,
-                tolerance_defined: CBoolean,
-                tolerance: f64,
-                start_time: f64,
-                stop_time_defined: CBoolean,
-                stop_time: f64,
-            ) -> Status {
-                unsafe {
-                    $crate::abi::setup_experiment::<$component>(
-                        component, tolerance_defined, tolerance, start_time, stop_time_defined, stop_time,
-                    )
-                }
-            }
-
             $crate::export_functions! { $component,
                 fmi2SetDebugLogging = set_debug_logging(on: CBoolean, count: usize, categories: *const CString);
+                fmi2SetupExperiment = setup_experiment(tolerance_defined: CBoolean, tolerance: f64, start_time: f64, stop_time_defined: CBoolean, stop_time: f64);
                 fmi2EnterInitializationMode = enter_initialization_mode();
                 fmi2ExitInitializationMode = exit_initialization_mode();
                 fmi2Terminate = terminate();
@@ -139,22 +113,13 @@ macro_rules! export {
                 fmi2GetDirectionalDerivative = get_directional_derivative(unknown: *const CValueReference, unknowns: usize, known: *const CValueReference, knowns: usize, direction: *const f64, answer: *mut f64);
                 fmi2SetRealInputDerivatives = set_real_input_derivatives(vr: *const CValueReference, count: usize, order: *const c_int, value: *const f64);
                 fmi2GetRealOutputDerivatives = get_real_output_derivatives(vr: *const CValueReference, count: usize, order: *const c_int, value: *mut f64);
+                fmi2DoStep = do_step(time: f64, step: f64, no_set_prior: CBoolean);
                 fmi2CancelStep = cancel_step();
                 fmi2GetStatus = get_status(kind: c_int, value: *mut Status);
                 fmi2GetRealStatus = get_real_status(kind: c_int, value: *mut f64);
                 fmi2GetIntegerStatus = get_integer_status(kind: c_int, value: *mut c_int);
                 fmi2GetBooleanStatus = get_boolean_status(kind: c_int, value: *mut CBoolean);
                 fmi2GetStringStatus = get_string_status(kind: c_int, value: *mut CString);
-            }
-
-            #[unsafe(no_mangle)]
-            pub unsafe extern "C" fn fmi2DoStep(
-                component: CComponent,
-                time: f64,
-                step: f64,
-                _no_set_fmu_state_prior_to_current_point: CBoolean,
-            ) -> Status {
-                unsafe { $crate::abi::do_step::<$component>(component, time, step) }
             }
 
             $($model_exchange)*

@@ -18,58 +18,44 @@ impl Interface {
     }
 }
 
-/// A state of a component. The first two and the last three are in both interfaces.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub(crate) enum State {
-    Instantiated,
-    InitializationMode,
-    EventMode,
-    ContinuousTimeMode,
-    StepComplete,
-    StepInProgress,
-    StepFailed,
-    StepCanceled,
-    Terminated,
-    Error,
-    Fatal,
+/// Declares the states, with the names that the standard gives them.
+macro_rules! states {
+    ($($state:ident $name:literal)*) => {
+        /// A state of a component. The first two and the last three are in both interfaces.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub(crate) enum State {
+            $($state,)*
+        }
+
+        impl State {
+            pub(crate) const ALL: &'static [Self] = &[$(Self::$state),*];
+
+            pub(crate) const fn name(self) -> &'static str {
+                match self {
+                    $(Self::$state => $name,)*
+                }
+            }
+
+            const fn bit(self) -> u16 {
+                1 << self as u8
+            }
+        }
+    };
 }
 
-impl State {
-    pub(crate) const ALL: [Self; 11] = [
-        Self::Instantiated,
-        Self::InitializationMode,
-        Self::EventMode,
-        Self::ContinuousTimeMode,
-        Self::StepComplete,
-        Self::StepInProgress,
-        Self::StepFailed,
-        Self::StepCanceled,
-        Self::Terminated,
-        Self::Error,
-        Self::Fatal,
-    ];
-
-    /// The name that the standard gives it.
-    pub(crate) const fn name(self) -> &'static str {
-        match self {
-            Self::Instantiated => "instantiated",
-            Self::InitializationMode => "Initialization Mode",
-            Self::EventMode => "Event Mode",
-            Self::ContinuousTimeMode => "Continuous-Time Mode",
-            Self::StepComplete => "stepComplete",
-            Self::StepInProgress => "stepInProgress",
-            Self::StepFailed => "stepFailed",
-            Self::StepCanceled => "stepCanceled",
-            Self::Terminated => "terminated",
-            Self::Error => "error",
-            Self::Fatal => "fatal",
-        }
-    }
-
-    const fn bit(self) -> u16 {
-        1 << self as u8
-    }
+states! {
+    Instantiated "instantiated"
+    InitializationMode "Initialization Mode"
+    EventMode "Event Mode"
+    ContinuousTimeMode "Continuous-Time Mode"
+    StepComplete "stepComplete"
+    StepInProgress "stepInProgress"
+    StepFailed "stepFailed"
+    StepCanceled "stepCanceled"
+    Terminated "terminated"
+    Error "error"
+    Fatal "fatal"
 }
 
 /// A set of states.
@@ -94,8 +80,8 @@ impl States {
 
 impl fmt::Display for States {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        let names = State::ALL.into_iter().filter(|&s| self.contains(s));
-        let names: Vec<_> = names.map(State::name).collect();
+        let names = State::ALL.iter().filter(|state| self.contains(**state));
+        let names: Vec<_> = names.map(|state| state.name()).collect();
         f.write_str(&names.join(", "))
     }
 }
@@ -202,11 +188,12 @@ mod tests {
 
     /// The table as the crate's documentation shows it.
     fn rendered() -> String {
-        let states = State::ALL.map(State::name);
+        let states: Vec<_> = State::ALL.iter().map(|state| state.name()).collect();
         let mut text = format!("| `fmi2…` | {} |\n", states.join(" | "));
         text += &format!("|---|{}\n", ":-:|".repeat(states.len()));
         for function in Function::ALL {
-            let marks = State::ALL.map(|s| if function.legal_in().contains(s) { "x" } else { "" });
+            let mark = |state: &State| if function.legal_in().contains(*state) { "x" } else { "" };
+            let marks: Vec<_> = State::ALL.iter().map(mark).collect();
             text += &format!("| {} | {} |\n", function.name(), marks.join(" | "));
         }
         text

@@ -18,63 +18,44 @@ pub enum Status {
     Pending = 5,
 }
 
-/// How bad a refusal is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Severity {
-    /// The call could not be done; the component is as it was before.
-    Discard,
-    /// The call was wrong; a step that ends so cannot be continued.
-    Error,
-    /// The component can only be freed.
-    Fatal,
-}
-
 /// A call that was not done, and one line which says what, where and what was expected.
 ///
-/// Any error type converts into a refusal of severity [`Severity::Error`], so that `?` works on a component's own
+/// Any error type converts into a refusal with [`Status::Error`], so that `?` works on a component's own
 /// errors. (For that blanket conversion a refusal is not itself a `std::error::Error`.)
 ///
 /// It is as small as a pointer: every call that succeeds hands on that there is none.
 #[derive(Clone, Debug, PartialEq, Eq)]
-pub struct Refusal(Box<(Severity, String)>);
+pub struct Refusal(Box<(Status, String)>);
 
 impl Refusal {
     /// The call could not be done, and changed nothing.
     pub fn discard(message: impl Into<String>) -> Self {
-        Self::new(Severity::Discard, message)
+        Self::new(Status::Discard, message)
     }
 
     /// The call was wrong.
     pub fn error(message: impl Into<String>) -> Self {
-        Self::new(Severity::Error, message)
+        Self::new(Status::Error, message)
     }
 
     /// The component can only be freed.
     pub fn fatal(message: impl Into<String>) -> Self {
-        Self::new(Severity::Fatal, message)
+        Self::new(Status::Fatal, message)
     }
 
     #[cold]
-    fn new(severity: Severity, message: impl Into<String>) -> Self {
-        Self(Box::new((severity, message.into())))
+    fn new(status: Status, message: impl Into<String>) -> Self {
+        Self(Box::new((status, message.into())))
     }
 
-    /// How bad it is.
-    pub fn severity(&self) -> Severity {
+    /// The status of the call: discard, error or fatal.
+    pub fn status(&self) -> Status {
         self.0.0
     }
 
     /// What, where, and what was expected.
     pub fn message(&self) -> &str {
         &self.0.1
-    }
-
-    pub(crate) fn status(&self) -> Status {
-        match self.severity() {
-            Severity::Discard => Status::Discard,
-            Severity::Error => Status::Error,
-            Severity::Fatal => Status::Fatal,
-        }
     }
 }
 
@@ -102,7 +83,7 @@ mod tests {
             Ok("seven".parse::<f64>()?)
         }
         let refusal = parse().unwrap_err();
-        assert_eq!(refusal.severity(), Severity::Error);
+        assert_eq!(refusal.status(), Status::Error);
         assert_eq!(refusal.message(), "invalid float literal");
     }
 }

@@ -1,6 +1,6 @@
 //! What `modelDescription.xml` says of a variable, as the build step found it (FMI 2.0, clause 2.2.7).
 
-use std::fmt::{self, Display};
+use std::fmt::{Debug, Display};
 
 use crate::life_cycle::State;
 use crate::refusal::Refusal;
@@ -48,23 +48,12 @@ pub enum Initial {
     Calculated,
 }
 
-/// The words of the standard, for messages.
-macro_rules! words {
-    ($type:ident: $($variant:ident $word:literal)*) => {
-        impl Display for $type {
-            fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-                f.write_str(match self {
-                    $(Self::$variant => $word,)*
-                })
-            }
-        }
-    };
+/// The word of the standard for a variant, for messages: its name with a small letter.
+pub(crate) fn word(variant: impl Debug) -> String {
+    let mut word = format!("{variant:?}");
+    word[..1].make_ascii_lowercase();
+    word
 }
-
-words!(Causality: Parameter "parameter" CalculatedParameter "calculatedParameter" Input "input" Output "output" Local "local"
-    Independent "independent");
-words!(Variability: Constant "constant" Fixed "fixed" Tunable "tunable" Discrete "discrete" Continuous "continuous");
-words!(Initial: Exact "exact" Approx "approx" Calculated "calculated");
 
 /// A variable whose values are of type `T`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -131,80 +120,19 @@ impl<T> Variable<T> {
         matches!(self.causality, Causality::Input) && matches!(self.variability, Variability::Continuous)
     }
 
+    /// Whether a master may set it in `state`, among states in which setting is legal at all.
+    #[inline]
+    pub(crate) const fn settable_in(&self, state: State) -> bool {
+        match state {
+            State::Instantiated => self.settable_at_start(false),
+            State::InitializationMode => self.settable_at_start(true),
+            State::ContinuousTimeMode => self.settable_in_continuous_time(),
+            _ => self.settable_between_steps(),
+        }
+    }
+
     /// Whether its value is the component's to compute, not the master's to set.
     pub(crate) const fn computed(&self) -> bool {
         !matches!(self.causality, Causality::Parameter | Causality::Input)
-    }
-}
-
-/// When a variable may be set, a set of occasions: worked out at compile time, so that a call need not look at attributes.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub struct Occasions(u8);
-
-const SET_UP: u8 = 1;
-const INITIALIZATION: u8 = 2;
-const BETWEEN_STEPS: u8 = 4;
-const CONTINUOUS_TIME: u8 = 8;
-/// Not an occasion: the variable is an input.
-const INPUT: u8 = 16;
-
-impl Occasions {
-    /// Those of each of `N` variables.
-    pub const fn table<T, const N: usize>(variables: &[Variable<T>]) -> [Self; N] {
-        let mut table = [Self(0); N];
-        let mut i = 0;
-        while i < N {
-            table[i] = Self::of(&variables[i]);
-            i += 1;
-        }
-        table
-    }
-
-    const fn of<T>(variable: &Variable<T>) -> Self {
-        let mut bits = 0;
-        if variable.settable_at_start(false) {
-            bits |= SET_UP;
-        }
-        if variable.settable_at_start(true) {
-            bits |= INITIALIZATION;
-        }
-        if variable.settable_between_steps() {
-            bits |= BETWEEN_STEPS;
-        }
-        if variable.settable_in_continuous_time() {
-            bits |= CONTINUOUS_TIME;
-        }
-        if matches!(variable.causality, Causality::Input) {
-            bits |= INPUT;
-        }
-        Self(bits)
-    }
-
-    /// The one that `state` is, among states in which setting is legal at all.
-    pub(crate) const fn now(state: State) -> Self {
-        Self(match state {
-            State::Instantiated => SET_UP,
-            State::InitializationMode => INITIALIZATION,
-            State::ContinuousTimeMode => CONTINUOUS_TIME,
-            _ => BETWEEN_STEPS,
-        })
-    }
-
-    /// All that there are.
-    pub(crate) const ALL: Self = Self(u8::MAX);
-
-    /// What both have in common.
-    #[inline]
-    pub(crate) const fn and(self, other: Self) -> Self {
-        Self(self.0 & other.0)
-    }
-
-    /// Whether both have one in common.
-    pub(crate) const fn meets(self, other: Self) -> bool {
-        self.0 & other.0 != 0
-    }
-
-    pub(crate) const fn is_input(self) -> bool {
-        self.0 & INPUT != 0
     }
 }

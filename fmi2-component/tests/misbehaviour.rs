@@ -1,15 +1,11 @@
 //! A component that panics and refuses at every opportunity, and a logger that calls back. Its table is written by hand.
 
-mod master;
-
 use std::ffi::c_void;
 use std::ptr::null_mut;
 use std::sync::atomic::{AtomicPtr, AtomicU32, Ordering};
 
-use fmi2_component::{
-    Causality, Component, Initial, Key, Log, Model, Occasions, Refusal, Status, Variability, Variable,
-};
-use master::*;
+use fmi2_boundary::{Fmu, Master, callbacks, functions_of};
+use fmi2_component::{Causality, Component, Initial, Key, Log, Model, Refusal, Status, Variability, Variable};
 
 struct Moody;
 
@@ -43,7 +39,6 @@ impl<T: 'static> Key for Nothing<T> {
     type Value = T;
     const VARIABLES: &'static [Variable<T>] = &[];
     const ALL: &'static [Self] = &[];
-    const OCCASIONS: &'static [Occasions] = &[];
 
     fn find(_: u32) -> Option<Self> {
         None
@@ -74,7 +69,6 @@ impl Key for Mood {
         description: "",
     }];
     const ALL: &'static [Self] = &[Self];
-    const OCCASIONS: &'static [Occasions] = &Occasions::table::<_, 1>(Self::VARIABLES);
 
     fn find(value_reference: u32) -> Option<Self> {
         (value_reference == 0).then_some(Self)
@@ -133,20 +127,27 @@ impl Component for Person {
 
 fmi2_component::export!(Person);
 
+const PERSON: Fmu = Fmu {
+    name: "Moody",
+    functions: functions_of!(fmi2_functions),
+    description: "",
+};
+
 fn in_mood(mood: i32) -> Master {
-    let master = Master::ready("moody");
-    let status = unsafe { fmi2SetInteger(master.c, &0, 1, &mood) };
+    let master = Master::at(&PERSON, 1, "moody", None);
+    master.start();
+    let status = unsafe { (master.f.fmi2SetInteger)(master.c, &0, 1, &mood) };
     assert_eq!(status, Status::Ok);
     master
 }
 
 fn assert_fatal(master: &Master) {
-    let c = master.c;
-    for call in [fmi2Reset, fmi2Terminate, fmi2EnterInitializationMode] {
+    let (c, f) = (master.c, master.f);
+    for call in [f.fmi2Reset, f.fmi2Terminate, f.fmi2EnterInitializationMode] {
         assert_eq!(unsafe { call(c) }, Status::Fatal);
         master.heard_one(&["only fmi2FreeInstance"]);
     }
-    assert_eq!(unsafe { fmi2GetInteger(c, &0, 1, &mut 0) }, Status::Fatal);
+    assert_eq!(unsafe { (f.fmi2GetInteger)(c, &0, 1, &mut 0) }, Status::Fatal);
 }
 
 #[test]
@@ -158,7 +159,10 @@ fn a_panic_is_logged_and_ends_the_instance_only() {
     assert_fatal(&master);
 
     let master = in_mood(PANIC_ON_GET);
-    assert_eq!(unsafe { fmi2GetInteger(master.c, &0, 1, &mut 0) }, Status::Fatal);
+    assert_eq!(
+        unsafe { (master.f.fmi2GetInteger)(master.c, &0, 1, &mut 0) },
+        Status::Fatal
+    );
     master.heard_one(&["fmi2GetInteger", "got 100%%"]);
     assert_fatal(&master);
     assert_eq!(other.step(0.0, 1.0), Status::Ok);
@@ -182,11 +186,14 @@ fn after_an_error_in_a_step_values_can_be_read_and_the_instance_reset() {
     let master = in_mood(ERROR_ON_STEP);
     assert_eq!(master.step(0.0, 1.0), Status::Error);
     master.heard_one(&["cannot go on"]);
-    assert_eq!(unsafe { fmi2GetInteger(master.c, &0, 1, &mut 0) }, Status::Ok);
+    assert_eq!(
+        unsafe { (master.f.fmi2GetInteger)(master.c, &0, 1, &mut 0) },
+        Status::Ok
+    );
     assert_eq!(master.step(0.0, 1.0), Status::Error);
     master.heard_one(&["illegal in state error"]);
-    assert_eq!(unsafe { fmi2Reset(master.c) }, Status::Ok);
-    assert_eq!(unsafe { fmi2EnterInitializationMode(master.c) }, Status::Ok);
+    assert_eq!(unsafe { (master.f.fmi2Reset)(master.c) }, Status::Ok);
+    assert_eq!(unsafe { (master.f.fmi2EnterInitializationMode)(master.c) }, Status::Ok);
 }
 
 #[test]
@@ -194,10 +201,13 @@ fn what_a_component_does_not_provide_is_refused() {
     let master = in_mood(0);
     let (mut state, mut size) = (null_mut(), 0);
     unsafe {
-        assert_eq!(fmi2GetFMUstate(master.c, &mut state), Status::Ok);
-        assert_eq!(fmi2SerializedFMUstateSize(master.c, state, &mut size), Status::Error);
+        assert_eq!((master.f.fmi2GetFMUstate)(master.c, &mut state), Status::Ok);
+        assert_eq!(
+            (master.f.fmi2SerializedFMUstateSize)(master.c, state, &mut size),
+            Status::Error
+        );
         master.heard_one(&["cannot be serialised"]);
-        assert_eq!(fmi2GetReal(master.c, &0, 1, &mut 0.0), Status::Error);
+        assert_eq!((master.f.fmi2GetReal)(master.c, &0, 1, &mut 0.0), Status::Error);
         master.heard_one(&[
             "value reference 0 is unknown",
             "the model has no variables of type Real",
@@ -216,9 +226,9 @@ fn a_logger_cannot_call_back_into_its_instance() {
         _: *const std::ffi::c_char,
         _: *const std::ffi::c_char,
     ) {
-        let c = INSTANCE.load(Ordering::Relaxed);
-        unsafe { fmi2FreeInstance(c) };
-        if unsafe { fmi2Reset(c) } == Status::Error {
+        let (c, f) = (INSTANCE.load(Ordering::Relaxed), PERSON.functions);
+        unsafe { (f.fmi2FreeInstance)(c) };
+        if unsafe { (f.fmi2Reset)(c) } == Status::Error {
             REFUSED.fetch_add(1, Ordering::Relaxed);
         }
     }
@@ -229,10 +239,11 @@ fn a_logger_cannot_call_back_into_its_instance() {
         Some(unsafe { std::mem::transmute::<*const (), fmi2_component::Logger>(call_back as *const ()) });
     unsafe {
         let (name, guid) = (c"one".as_ptr(), c"moody".as_ptr());
-        let c = fmi2Instantiate(name, 1, guid, std::ptr::null(), &functions, 0, 0);
+        let f = PERSON.functions;
+        let c = (f.fmi2Instantiate)(name, 1, guid, std::ptr::null(), &functions, 0, 0);
         INSTANCE.store(c, Ordering::Relaxed);
-        assert_eq!(fmi2DoStep(c, 0.0, 1.0, 1), Status::Error);
+        assert_eq!((f.fmi2DoStep)(c, 0.0, 1.0, 1), Status::Error);
         assert_eq!(REFUSED.load(Ordering::Relaxed), 1);
-        fmi2FreeInstance(c);
+        (f.fmi2FreeInstance)(c);
     }
 }

@@ -8,7 +8,7 @@
 //! }
 //! ```
 //!
-//! They check what the variable table needs and write `$OUT_DIR/variables.rs`, which the component includes:
+//! They write `$OUT_DIR/variables.rs`, which the component includes:
 //!
 //! ```ignore
 //! mod variables {
@@ -24,16 +24,16 @@
 //! gives it the GUID that follows from the variables; whoever packs the FMU puts that text into it.
 #![forbid(unsafe_code)]
 
-mod check;
-mod guid;
 mod source;
 mod table;
 
-use std::fmt;
+use std::fmt::Write;
 use std::path::{Path, PathBuf};
 
 use fmi2_description::Description;
 use table::Table;
+use thiserror::Error;
+use uuid::Uuid;
 
 /// Reads the description at `path`, relative to the package, and writes `$OUT_DIR/variables.rs`. For `build.rs`.
 ///
@@ -73,7 +73,7 @@ pub fn source_of(xml: &str) -> Result<String, Error> {
 /// # Errors
 /// A description that FMI 2.0 does not allow.
 pub fn guid_of(xml: &str) -> Result<String, Error> {
-    read(xml).map(|table| guid::guid(&table))
+    read(xml).map(|table| guid(&table))
 }
 
 /// The description with its attribute `guid` set to [`guid_of`], and otherwise untouched.
@@ -81,25 +81,53 @@ pub fn guid_of(xml: &str) -> Result<String, Error> {
 /// # Errors
 /// A description that FMI 2.0 does not allow.
 pub fn describe(xml: &str) -> Result<String, Error> {
-    guid::replace(xml, &Description::parse(xml)?.guid, &guid_of(xml)?)
+    let before = format!(" guid=\"{}\"", Description::parse(xml)?.guid);
+    if xml.matches(&before).count() != 1 {
+        let fault =
+            "fmiModelDescription needs an attribute guid=\"…\", in this spelling, and no other element the same";
+        return Err(Error::Fault(fault.into()));
+    }
+    Ok(xml.replacen(&before, &format!(" guid=\"{}\"", guid_of(xml)?), 1))
 }
 
 fn read(xml: &str) -> Result<Table, Error> {
-    let description = Description::parse(xml)?;
-    let mut faults = Vec::new();
-    let table = Table::new(&description, &mut faults);
-    check::check(&description, &table, &mut faults);
-    if faults.is_empty() {
-        Ok(table)
-    } else {
-        Err(Error::Faults(faults))
+    Table::new(&Description::parse(xml)?).map_err(Error::Fault)
+}
+
+/// The namespace of these GUIDs: any fixed one will do.
+const NAMESPACE: Uuid = Uuid::from_u128(0x5c1d_1f8e_2f0a_4d5b_9a67_3e1b_7c90_42d1);
+
+/// The GUID of a table. Descriptions have no effect on it: other words do not make another model.
+fn guid(table: &Table) -> String {
+    let mut text = format!(
+        "{}\n{}\n{:?}\n{:?} {}\n",
+        table.name, table.identifier, table.categories, table.states, table.event_indicators
+    );
+    for v in &table.variables {
+        let _ = writeln!(
+            text,
+            "{:?} {} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?} {:?}",
+            v.name,
+            v.value_reference,
+            v.kind,
+            v.causality,
+            v.variability,
+            v.initial,
+            v.unit,
+            v.start,
+            v.min,
+            v.max,
+            v.nominal,
+        );
     }
+    Uuid::new_v5(&NAMESPACE, text.as_bytes()).to_string()
 }
 
 /// Reason why a description is refused.
-#[derive(Debug)]
+#[derive(Debug, Error)]
 pub enum Error {
     /// The file cannot be read or written.
+    #[error("{} cannot be read or written", path.display())]
     File {
         /// Which file.
         path: PathBuf,
@@ -107,33 +135,9 @@ pub enum Error {
         source: std::io::Error,
     },
     /// The text is not a model description.
-    Description(fmi2_description::Error),
-    /// The description violates FMI 2.0; one line per fault.
-    Faults(Vec<String>),
-}
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::File { path, .. } => write!(f, "{} cannot be read or written", path.display()),
-            Self::Description(_) => f.write_str("the text is not a model description of FMI 2.0"),
-            Self::Faults(faults) => f.write_str(&faults.join("\n")),
-        }
-    }
-}
-
-impl std::error::Error for Error {
-    fn source(&self) -> Option<&(dyn std::error::Error + 'static)> {
-        match self {
-            Self::File { source, .. } => Some(source),
-            Self::Description(source) => Some(source),
-            Self::Faults(_) => None,
-        }
-    }
-}
-
-impl From<fmi2_description::Error> for Error {
-    fn from(error: fmi2_description::Error) -> Self {
-        Self::Description(error)
-    }
+    #[error("the text is not a model description of FMI 2.0")]
+    Description(#[from] fmi2_description::Error),
+    /// No table can be made of the description.
+    #[error("{0}")]
+    Fault(String),
 }

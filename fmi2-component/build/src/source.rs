@@ -1,24 +1,15 @@
 //! The Rust source of a table.
 
-use std::fmt::Write;
-
-use crate::guid::guid;
+use crate::guid;
 use crate::table::{Kind, Literal, Table, Variable};
 
 /// The contents of `variables.rs`.
 pub(crate) fn source(table: &Table) -> String {
-    let mut out = String::new();
-    // Writing to a string cannot fail.
-    let _ = identity(&mut out, table);
-    for kind in Kind::ALL {
-        let variables: Vec<_> = table.of(kind).collect();
-        let _ = key(&mut out, kind, &variables);
-    }
-    let _ = categories(&mut out, &table.categories);
-    out
+    let keys = Kind::ALL.map(|kind| key(kind, &table.of(kind).collect::<Vec<_>>()));
+    identity(table) + &keys.concat() + &categories(&table.categories)
 }
 
-fn identity(out: &mut String, table: &Table) -> std::fmt::Result {
+fn identity(table: &Table) -> String {
     let guid = guid(table);
     let Table {
         name,
@@ -36,8 +27,7 @@ fn identity(out: &mut String, table: &Table) -> std::fmt::Result {
         names.collect::<Vec<_>>().join(", ")
     };
     let (states, derivatives) = (keys(|pair| pair.0), keys(|pair| pair.1));
-    writeln!(
-        out,
+    format!(
         "/// `modelName`.
 #[allow(dead_code)]
 pub const MODEL_NAME: &str = {name:?};
@@ -66,128 +56,96 @@ impl ::fmi2_component::Model for Model {{
     type Boolean = Boolean;
     type String = String;
 }}
+
 "
     )
 }
 
-fn key(out: &mut String, kind: Kind, variables: &[&Variable]) -> std::fmt::Result {
+fn key(kind: Kind, variables: &[&Variable]) -> String {
     let value = match kind {
         Kind::Real => "f64",
         Kind::Integer => "i32",
         Kind::Boolean => "bool",
         Kind::String => "&'static str",
     };
-    let variants: Vec<_> = variables.iter().map(|v| identifier(&v.name)).collect();
-
-    writeln!(
-        out,
-        "/// The variables of type {kind:?}.
-#[allow(non_camel_case_types, clippy::upper_case_acronyms, dead_code)]
-#[allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)]
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
-pub enum {kind:?} {{"
-    )?;
-    for (variable, variant) in variables.iter().zip(&variants) {
-        writeln!(out, "    #[doc = {:?}]\n    {variant},", doc(variable))?;
-    }
-    writeln!(
-        out,
-        "}}
-
-#[allow(clippy::approx_constant, clippy::match_single_binding)]
-impl ::fmi2_component::Key for {kind:?} {{
-    type Value = {value};
-    const VARIABLES: &'static [::fmi2_component::Variable<{value}>] = &["
-    )?;
-    for variable in variables {
-        entry(out, variable)?;
-    }
-    let all: Vec<_> = variants.iter().map(|v| format!("Self::{v}")).collect();
-    writeln!(
-        out,
-        "    ];
-    const ALL: &'static [Self] = &[{}];
-    const OCCASIONS: &'static [::fmi2_component::Occasions] = &::fmi2_component::Occasions::table::<_, {}>(Self::VARIABLES);
-",
-        all.join(", "),
-        all.len()
-    )?;
-    find(out, kind, variables, &variants)?;
+    let names: Vec<_> = variables.iter().map(|v| identifier(&v.name)).collect();
+    let documented = variables.iter().zip(&names);
+    let variants: String = documented
+        .map(|(v, name)| format!("    #[doc = {:?}]\n    {name},\n", doc(v)))
+        .collect();
+    let entries: String = variables.iter().map(|v| entry(v)).collect();
+    let all: String = names.iter().map(|name| format!("Self::{name}, ")).collect();
+    let find = find(kind, variables, &names);
     // An enum without variants has no number.
     let index = if variables.is_empty() {
         "match self {}"
     } else {
         "self as usize"
     };
-    writeln!(
-        out,
-        "
+    format!(
+        "/// The variables of type {kind:?}.
+#[allow(non_camel_case_types, clippy::upper_case_acronyms, dead_code)]
+#[allow(rustdoc::broken_intra_doc_links, rustdoc::invalid_html_tags, rustdoc::bare_urls)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
+pub enum {kind:?} {{
+{variants}}}
+
+#[allow(clippy::approx_constant, clippy::match_single_binding)]
+impl ::fmi2_component::Key for {kind:?} {{
+    type Value = {value};
+    const VARIABLES: &'static [::fmi2_component::Variable<{value}>] = &[
+{entries}    ];
+    const ALL: &'static [Self] = &[{all}];
+
+    #[inline]
+    fn find(value_reference: u32) -> ::core::option::Option<Self> {{
+        {find}
+    }}
+
     #[inline]
     fn index(self) -> usize {{
         {index}
     }}
 }}
+
 "
     )
 }
 
 /// How a variable is found by its value reference: by its index in a table, unless most entries would be empty.
-fn find(out: &mut String, kind: Kind, variables: &[&Variable], variants: &[String]) -> std::fmt::Result {
-    let named = || variables.iter().map(|v| v.value_reference).zip(variants);
-    let places = variables.iter().map(|v| v.value_reference as usize + 1);
-    let places = places.max().unwrap_or(0);
-    writeln!(
-        out,
-        "    #[inline]
-    fn find(value_reference: u32) -> ::core::option::Option<Self> {{"
-    )?;
-    if places <= 4 * variables.len() + 64 {
-        let mut table = vec!["::core::option::Option::None".to_owned(); places];
-        for (reference, variant) in named() {
-            table[reference as usize] = format!("::core::option::Option::Some({kind:?}::{variant})");
-        }
-        let entries = table.join(", ");
-        writeln!(
-            out,
-            "        const TABLE: [::core::option::Option<{kind:?}>; {places}] = [{entries}];
-        TABLE.get(value_reference as usize).copied().flatten()
-    }}"
-        )
-    } else {
-        writeln!(out, "        match value_reference {{")?;
-        for (reference, variant) in named() {
-            writeln!(
-                out,
-                "            {reference} => ::core::option::Option::Some(Self::{variant}),"
-            )?;
-        }
-        writeln!(
-            out,
-            "            _ => ::core::option::Option::None,
-        }}
-    }}"
-        )
+fn find(kind: Kind, variables: &[&Variable], names: &[String]) -> String {
+    let named = || variables.iter().map(|v| v.value_reference as usize).zip(names);
+    let places = named().map(|(reference, _)| reference + 1).max().unwrap_or(0);
+    if places > 4 * variables.len() + 64 {
+        let arm = |(reference, name)| format!("{reference} => ::core::option::Option::Some(Self::{name}), ");
+        let arms: String = named().map(arm).collect();
+        return format!("match value_reference {{ {arms}_ => ::core::option::Option::None }}");
     }
+    let mut table = vec!["::core::option::Option::None".to_owned(); places];
+    for (reference, name) in named() {
+        table[reference] = format!("::core::option::Option::Some({kind:?}::{name})");
+    }
+    let entries = table.join(", ");
+    format!(
+        "const TABLE: [::core::option::Option<{kind:?}>; {places}] = [{entries}];
+        TABLE.get(value_reference as usize).copied().flatten()"
+    )
 }
 
 fn doc(v: &Variable) -> String {
-    let unit = v.unit.as_ref().map(|unit| format!(", {unit}"));
-    let description = match v.description.as_str() {
-        "" => String::new(),
-        text => format!(": {text}"),
-    };
-    format!("`{}`{}{description}", v.name, unit.unwrap_or_default())
+    let unit: String = v.unit.iter().map(|unit| format!(", {unit}")).collect();
+    let separator = if v.description.is_empty() { "" } else { ": " };
+    format!("`{}`{unit}{separator}{}", v.name, v.description)
 }
 
-fn entry(out: &mut String, v: &Variable) -> std::fmt::Result {
+fn entry(v: &Variable) -> String {
     let option = |literal: &Option<Literal>| match literal {
         Some(literal) => format!("::core::option::Option::Some({literal})"),
         None => "::core::option::Option::None".into(),
     };
     let initial = (v.initial).map(|initial| format!("::fmi2_component::Initial::{initial:?}"));
     let unit = v.unit.as_ref().map(|unit| format!("{unit:?}"));
-    writeln!(
-        out,
+    format!(
         "        ::fmi2_component::Variable {{
             name: {:?},
             value_reference: {},
@@ -200,7 +158,8 @@ fn entry(out: &mut String, v: &Variable) -> std::fmt::Result {
             nominal: {},
             unit: {},
             description: {:?},
-        }},",
+        }},
+",
         v.name,
         v.value_reference,
         v.causality,
@@ -215,21 +174,22 @@ fn entry(out: &mut String, v: &Variable) -> std::fmt::Result {
     )
 }
 
-fn categories(out: &mut String, categories: &[String]) -> std::fmt::Result {
-    writeln!(
-        out,
+fn categories(categories: &[String]) -> String {
+    let constant = |(index, name): (usize, &String)| {
+        format!(
+            "    #[doc = \"`{name}`.\"]
+    pub const {name}: ::fmi2_component::Category = ::fmi2_component::Category::new({index}, {name:?});
+"
+        )
+    };
+    let constants: String = categories.iter().enumerate().map(constant).collect();
+    format!(
         "/// The log categories.
 #[allow(non_upper_case_globals, dead_code)]
-pub mod category {{"
-    )?;
-    for (index, name) in categories.iter().enumerate() {
-        writeln!(
-            out,
-            "    #[doc = \"`{name}`.\"]
-    pub const {name}: ::fmi2_component::Category = ::fmi2_component::Category::new({index}, {name:?});"
-        )?;
-    }
-    writeln!(out, "}}")
+pub mod category {{
+{constants}}}
+"
+    )
 }
 
 /// The Rust identifier of a structured name (FMI 2.0, clause 2.2.9): the name itself, with every run of other characters

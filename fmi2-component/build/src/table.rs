@@ -1,11 +1,13 @@
-//! The variable table: the description with defaults filled in and declared types looked up.
+//! The variable table: the description with defaults filled in and declared types looked up. Only faults that would break the generated
+//! code are found here; whether a description follows FMI 2.0 is for a validator to check, such as FMPy's.
 
+use std::collections::HashMap;
 use std::fmt::Debug;
 
 use fmi2_description as xml;
 use fmi2_description::{Causality, Content, Description, Initial, ScalarVariable, SimpleType, Variability};
 
-use crate::check::allowed;
+use crate::source::identifier;
 
 /// A model's identity and its variables.
 #[derive(Debug)]
@@ -59,47 +61,72 @@ impl Table {
         self.variables.iter().filter(move |v| v.kind == kind)
     }
 
-    /// Fills in defaults; reports what it cannot interpret.
-    pub fn new(description: &Description, faults: &mut Vec<String>) -> Self {
-        let identifier = description.co_simulation.as_ref().map(|i| i.model_identifier.clone());
-        let mut table = Self {
+    /// Fills in defaults.
+    ///
+    /// # Errors
+    /// What it cannot interpret.
+    pub fn new(description: &Description) -> Result<Self, String> {
+        if description.fmi_version != "2.0" {
+            return Err(format!("fmiVersion is {:?}; expected \"2.0\"", description.fmi_version));
+        }
+        let co_simulation = description.co_simulation.as_ref().ok_or("CoSimulation is missing")?;
+        let categories = description.categories.iter().map(|category| category.name.clone());
+        let read_one = |v: &ScalarVariable| read(v, &description.types).map_err(|fault| format!("{}: {fault}", v.name));
+        let derivatives = description.structure.derivatives.iter();
+        let table = Self {
             name: description.model_name.clone(),
-            identifier: identifier.unwrap_or_default(),
+            identifier: co_simulation.model_identifier.clone(),
             version: description.version.clone(),
             event_indicators: description.number_of_event_indicators,
-            states: Vec::new(),
-            categories: description
-                .categories
-                .iter()
-                .map(|category| category.name.clone())
-                .collect(),
-            variables: Vec::new(),
+            states: derivatives
+                .map(|unknown| state(unknown.index, description))
+                .collect::<Result<_, _>>()?,
+            categories: categories.collect(),
+            variables: description.variables.iter().map(read_one).collect::<Result<_, _>>()?,
         };
-        for variable in &description.variables {
-            match read(variable, &description.types) {
-                Ok(variable) => table.variables.push(variable),
-                Err(fault) => faults.push(format!("{}: {fault}", variable.name)),
+        table.check_names()?;
+        Ok(table)
+    }
+
+    /// Checks that names and value references are unique where the generated code needs it.
+    fn check_names(&self) -> Result<(), String> {
+        // The shell keeps the categories that are on as bits of a word.
+        if self.categories.len() > 64 {
+            return Err("LogCategories has more than 64 categories".into());
+        }
+        let mut names = self.categories.iter().chain([&self.identifier]);
+        if let Some(name) = names.find(|name| identifier(name) != **name) {
+            return Err(format!("{name:?} is not a C identifier"));
+        }
+        for kind in Kind::ALL {
+            let (mut references, mut variants) = (HashMap::new(), HashMap::new());
+            for Variable { name, value_reference, .. } in self.of(kind) {
+                if let Some(other) = references.insert(value_reference, name) {
+                    return Err(format!(
+                        "{other} and {name} have the same valueReference {value_reference}"
+                    ));
+                }
+                let variant = identifier(name);
+                if let Some(other) = variants.insert(variant.clone(), name) {
+                    return Err(format!("{other} and {name} would both be the Rust variant {variant}"));
+                }
             }
         }
-        for unknown in &description.structure.derivatives {
-            match state(unknown.index, description) {
-                Some(pair) => table.states.push(pair),
-                None => faults.push(format!(
-                    "Derivatives lists index {}, which is not a variable with the index of a state as `derivative`",
-                    unknown.index
-                )),
-            }
-        }
-        table
+        Ok(())
     }
 }
 
 /// The place of the state whose derivative has that index, and the place of the derivative.
-fn state(index: usize, description: &Description) -> Option<(usize, usize)> {
-    let derivative = index.checked_sub(1)?;
-    let (_, content) = description.variables.get(derivative)?.content()?;
-    let state = content.derivative?.checked_sub(1)?;
-    (state < description.variables.len()).then_some((state, derivative))
+fn state(index: usize, description: &Description) -> Result<(usize, usize), String> {
+    let places = || {
+        let derivative = index.checked_sub(1)?;
+        let (_, content) = description.variables.get(derivative)?.content()?;
+        let state = content.derivative?.checked_sub(1)?;
+        (state < description.variables.len()).then_some((state, derivative))
+    };
+    places().ok_or_else(|| {
+        format!("Derivatives lists index {index}, which is not a variable with the index of a state as `derivative`")
+    })
 }
 
 fn read(v: &ScalarVariable, types: &[SimpleType]) -> Result<Variable, String> {
@@ -109,10 +136,10 @@ fn read(v: &ScalarVariable, types: &[SimpleType]) -> Result<Variable, String> {
     let declared = match &own.declared_type {
         None => None,
         Some(name) => {
-            let mut declared = types.iter().filter(|t| t.name == *name).filter_map(SimpleType::content);
-            let found = declared.find(|(other, _)| *other == kind);
+            let mut types = types.iter().filter(|t| t.name == *name).filter_map(SimpleType::content);
+            let declared = types.find(|(other, _)| *other == kind);
             Some(
-                found
+                declared
                     .ok_or_else(|| format!("TypeDefinitions has no {name:?} of the variable's type"))?
                     .1,
             )
@@ -139,7 +166,7 @@ fn read(v: &ScalarVariable, types: &[SimpleType]) -> Result<Variable, String> {
         description: v.description.clone(),
         causality: v.causality,
         variability: v.variability,
-        initial: (v.initial).or_else(|| allowed(v.causality, v.variability).first().copied().flatten()),
+        initial: v.initial.or_else(|| default_initial(v.causality, v.variability)),
         kind,
         unit: inherited(|c| c.unit.as_ref()).cloned(),
         // A declared type has no start value.
@@ -153,6 +180,15 @@ fn read(v: &ScalarVariable, types: &[SimpleType]) -> Result<Variable, String> {
 /// The value as a Rust literal.
 fn literal(value: Option<impl Debug>) -> Option<Literal> {
     value.map(|value| format!("{value:?}"))
+}
+
+/// The default of `initial` (FMI 2.0, clause 2.2.7).
+fn default_initial(causality: Causality, variability: Variability) -> Option<Initial> {
+    match (causality, variability) {
+        (Causality::Input | Causality::Independent, _) => None,
+        (Causality::Parameter, _) | (_, Variability::Constant) => Some(Initial::Exact),
+        _ => Some(Initial::Calculated),
+    }
 }
 
 /// `xs:boolean`: true, false, 1 or 0.

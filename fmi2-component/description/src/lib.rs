@@ -5,8 +5,6 @@
 #![forbid(unsafe_code)]
 #![allow(missing_docs)] // the names are those of the standard
 
-use std::fmt;
-
 use serde::{Deserialize, Deserializer};
 
 /// A model description.
@@ -195,16 +193,9 @@ pub struct Unknown {
 }
 
 /// Reason why a text is not a model description: the element, counted from 0, and the problem.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[error("{0}")]
 pub struct Error(String);
-
-impl fmt::Display for Error {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(&self.0)
-    }
-}
-
-impl std::error::Error for Error {}
 
 impl Description {
     /// Reads a description.

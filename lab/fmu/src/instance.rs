@@ -7,12 +7,74 @@ use fmi::fmi2::import::Fmi2Import;
 use fmi::fmi2::instance::{CoSimulation, Common, InstanceCS};
 use fmi::schema::fmi2::ScalarVariableElement;
 use fmi::traits::FmiImport;
+use libloading::Library;
 use phase_lock::Value;
 use thiserror::Error;
 use vines_testbench::rig::{ControllerError, RigError};
 use vines_testbench::scene::{Name, Names};
 
-use crate::error::{CallError, LoadError};
+/// Reason why a file cannot be loaded as an FMU.
+#[derive(Debug, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum LoadError {
+    #[error("the file is not an FMU, which is a zip archive: {0}")]
+    Archive(String),
+    #[error("modelDescription.xml: {0}")]
+    Description(fmi::schema::Error),
+    #[error("the FMU has FMI version {0}; version 2.0 is needed")]
+    Version(String),
+    #[error("the FMU does not support co-simulation")]
+    NoCoSimulation,
+    #[error("FMUs of FMI 2.0 cannot be loaded on {os} with the processor {architecture}")]
+    Platform { os: String, architecture: String },
+    #[error("the FMU has no library for this platform ({})", .0.display())]
+    NoLibrary(PathBuf),
+    #[error("the FMU cannot be instantiated; its own message has been logged")]
+    Instantiate,
+    #[error("the library of the FMU cannot be loaded: {0}")]
+    Library(fmi::Error),
+    #[error(transparent)]
+    Fmi(fmi::Error),
+}
+
+impl From<fmi::Error> for LoadError {
+    fn from(error: fmi::Error) -> Self {
+        use fmi::Error;
+        match error {
+            Error::Zip(source) => Self::Archive(source.to_string()),
+            Error::ArchiveStructure(text) => Self::Archive(text),
+            Error::Schema(source) => Self::Description(source),
+            Error::UnsupportedFmuType(_) => Self::NoCoSimulation,
+            Error::UnsupportedPlatform { os, arch } => Self::Platform { os, architecture: arch },
+            Error::Instantiation => Self::Instantiate,
+            Error::LibLoading { .. } => Self::Library(error),
+            _ => Self::Fmi(error),
+        }
+    }
+}
+
+/// Status of a call that failed (FMI 2.0, clause 2.1.3).
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum CallError {
+    #[error("the FMU discarded the call (fmi2Discard)")]
+    Discard,
+    #[error("the FMU reported an error (fmi2Error)")]
+    Error,
+    #[error("the FMU reported a fatal error (fmi2Fatal)")]
+    Fatal,
+}
+
+impl From<Fmi2Error> for CallError {
+    fn from(error: Fmi2Error) -> Self {
+        match error {
+            Fmi2Error::Discard => Self::Discard,
+            Fmi2Error::Error => Self::Error,
+            // The other one, a wrong `fmi2GetTypesPlatform`, is not a status: the bench does not call that function.
+            Fmi2Error::Fatal | Fmi2Error::TypesPlatformMismatch(_) => Self::Fatal,
+        }
+    }
+}
 
 /// Reason why an FMU cannot be used, or cannot continue.
 #[derive(Debug, Error)]
@@ -234,6 +296,22 @@ fn open(path: &Path, name: &str) -> Result<(Fmi2Import, InstanceCS), LoadError> 
     }
     let instance = import.instantiate_cs(name, false, true)?;
     Ok((import, instance))
+}
+
+/// Loads the library, and looks for the function that makes instances.
+///
+/// # Errors
+/// What the system's loader says.
+pub fn check(path: &Path) -> Result<(), String> {
+    // The loader looks for a bare name elsewhere.
+    let path = std::path::absolute(path).unwrap_or_else(|_| path.into());
+    let reason =
+        |error: libloading::Error| std::error::Error::source(&error).map_or(error.to_string(), ToString::to_string);
+    // SAFETY: a library of FMI 2.0 runs nothing of its own when it is loaded.
+    let library = unsafe { Library::new(path) }.map_err(reason)?;
+    // SAFETY: the function is not called.
+    let function = unsafe { library.get::<unsafe extern "C" fn()>(b"fmi2Instantiate") };
+    function.map(drop).map_err(reason)
 }
 
 #[cfg(test)]

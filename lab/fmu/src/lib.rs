@@ -4,14 +4,9 @@
 //! ARM is not supported.
 
 mod controller;
-mod error;
 mod instance;
-mod judge;
-mod library;
 mod rig;
 
 pub use controller::FmuController;
-pub use error::{CallError, LoadError};
-pub use instance::{FmuError, Kind};
-pub use library::check;
+pub use instance::{CallError, FmuError, Kind, LoadError, check};
 pub use rig::FmuRig;

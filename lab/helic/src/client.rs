@@ -1,5 +1,5 @@
-//! The host: what a device has, its values by name, and the device as a rig of the bench. The oscillator runs on the device; the host sets
-//! frequency and amplitude, step by step.
+//! The host: the parameters and sources of a device by name, and the device as a rig of the bench. The oscillator runs on the device; the
+//! host sets frequency and amplitude, step by step.
 
 use std::collections::VecDeque;
 use std::f64::consts::TAU;
@@ -7,8 +7,10 @@ use std::io;
 
 use thiserror::Error;
 
-use super::codec::{ErrorCode, Frame, Malformed, Packet, Status, VERSION, message, take, take_text, to_bytes};
-use super::registry::{COEFFICIENTS, HARMONICS, WATCHDOG};
+use super::codec::{
+    COEFFICIENTS, ErrorCode, Frame, HARMONICS, Malformed, Packet, Status, VERSION, message, take, take_text, to_bytes,
+};
+use super::device::WATCHDOG;
 use super::transport::Transport;
 use vines_net::{Bridge, Counters};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
@@ -18,7 +20,7 @@ const SAME_RATE: f64 = 1e-6;
 /// Largest relative difference between the commanded frequency and the present one of the device at which the drive begins: an error of the
 /// phase that the next packet corrects.
 const RUNNING: f64 = 0.01;
-/// Share of the longest silence after which the device is asked whether its output is on.
+/// Interval at which the device is asked whether its output is on, as a share of the longest silence.
 const SUPERVISION: f64 = 0.25;
 
 /// Why a device cannot be used, in words.
@@ -38,33 +40,17 @@ impl From<HostError> for RigError {
     }
 }
 
-/// A device, seen from its host: names and types of its parameters, names and units of its sources.
+/// A device, seen from its host.
 #[derive(Debug)]
 struct Host<T> {
     transport: T,
     sequence: u8,
+    /// Names and types.
     parameters: Vec<(String, u8)>,
+    /// Names and units.
     sources: Vec<(String, String)>,
     /// Samples per second.
     sample_rate: f64,
-}
-
-/// The place of `name` in a list of names with their units.
-fn place<V>(
-    what: &'static str,
-    name: &str,
-    all: &[(String, V)],
-    text: fn(&(String, V)) -> String,
-) -> Result<usize, HostError> {
-    let found = all.iter().position(|(own, _)| own == name);
-    let list = || all.iter().map(text).collect::<Vec<_>>().join(", ");
-    found.ok_or_else(|| {
-        let text = "[rig.names] of the scene maps response and base";
-        HostError(format!(
-            "the helic device has no {what} \"{name}\"; it has: {}; {text}",
-            list()
-        ))
-    })
 }
 
 impl<T: Transport> Host<T> {
@@ -89,7 +75,8 @@ impl<T: Transport> Host<T> {
         let status = Status::decode(&answer)?;
         host.sample_rate = status.sample_rate.into();
         while host.parameters.len() < usize::from(status.parameters) {
-            let start = (host.parameters.len() as u16).to_le_bytes();
+            let before = host.parameters.len();
+            let start = (before as u16).to_le_bytes();
             let page = host.request(message::GET_PARAMS, start.into(), "GetParams")?;
             let mut rest = &page[..];
             let (echo, next) = (take(&mut rest)?, u16::from_le_bytes(take(&mut rest)?));
@@ -99,7 +86,7 @@ impl<T: Transport> Host<T> {
                 host.parameters.push((name, code));
             }
             let count = host.parameters.len();
-            if echo != start || count == usize::from(u16::from_le_bytes(start)) || usize::from(next) != count {
+            if echo != start || count == before || count != usize::from(next) {
                 return Err(Malformed.into());
             }
         }
@@ -116,63 +103,59 @@ impl<T: Transport> Host<T> {
     fn request(&mut self, kind: u8, payload: Vec<u8>, what: &str) -> Result<Vec<u8>, HostError> {
         self.sequence = self.sequence.wrapping_add(1);
         let request = Frame { kind, sequence: self.sequence, payload };
-        let answer = self.transport.request(&request);
-        let Frame { kind: answered, sequence, payload } = answer.map_err(lost(what))?;
-        if sequence != self.sequence {
-            return Err(Malformed.into());
-        }
-        match (answered, &payload[..]) {
+        let answer = self.transport.request(&request).map_err(lost(what))?;
+        match (answer.kind, &answer.payload[..]) {
+            _ if answer.sequence != self.sequence => Err(Malformed.into()),
             (message::ERROR, &[code, cause]) if cause == kind => {
                 let code = ErrorCode::of_number(code).ok_or(Malformed)?;
                 Err(HostError(format!("the helic device refuses {what}: {code}")))
             }
-            _ if answered == kind => Ok(payload),
+            (answered, _) if answered == kind => Ok(answer.payload),
             _ => Err(Malformed.into()),
         }
     }
 
-    fn parameter(&self, name: &str) -> Result<usize, HostError> {
-        place("parameter", name, &self.parameters, |(name, _)| name.clone())
+    /// Index and type of a parameter.
+    fn parameter(&self, name: &str) -> Result<(u16, u8), HostError> {
+        let index = self.parameters.iter().position(|(own, _)| own == name);
+        let index = index.ok_or_else(|| HostError(format!("the helic device has no parameter \"{name}\"")))?;
+        Ok((index as u16, self.parameters[index].1))
     }
 
     /// Id of a source.
     fn source(&self, name: &str) -> Result<u8, HostError> {
-        let text = |(name, unit): &(String, String)| format!("{name} [{unit}]");
-        Ok(place("source", name, &self.sources, text)? as u8)
+        let index = self.sources.iter().position(|(own, _)| own == name);
+        index.map(|index| index as u8).ok_or_else(|| {
+            let all: Vec<_> = self.sources.iter().map(|(name, unit)| format!("{name} [{unit}]")).collect();
+            HostError(format!(
+                "the helic device has no source \"{name}\"; it has: {}; [rig.names] of the scene maps response and base",
+                all.join(", ")
+            ))
+        })
     }
 
     /// The request that sets a parameter.
     fn setting(&self, name: &str, values: &[f64]) -> Result<Frame, HostError> {
-        let index = self.parameter(name)?;
-        let payload = [
-            &(index as u16).to_le_bytes()[..],
-            &to_bytes(self.parameters[index].1, values),
-        ]
-        .concat();
+        let (index, code) = self.parameter(name)?;
+        let payload = [&index.to_le_bytes()[..], &to_bytes(code, values)].concat();
         Ok(Frame { kind: message::SET_PAR, sequence: 0, payload })
     }
 
     /// Sets a parameter.
     fn set(&mut self, name: &str, values: &[f64]) -> Result<(), HostError> {
         let Frame { kind, payload, .. } = self.setting(name, values)?;
-        self.request(kind, payload, name)?;
-        Ok(())
+        self.request(kind, payload, name).map(drop)
     }
 
     /// Sets the stream up without an end, and starts it.
     fn stream(&mut self, sources: &[u8], decimation: u16) -> Result<(), HostError> {
         self.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
-        let setup = [
-            &decimation.to_le_bytes()[..],
-            &0u32.to_le_bytes(),
-            &[sources.len() as u8],
-            sources,
-        ]
-        .concat();
+        let [d, e] = decimation.to_le_bytes();
+        let setup = [&[d, e, 0, 0, 0, 0, sources.len() as u8], sources].concat();
         self.request(message::STREAM_SETUP, setup, "StreamSetup")?;
         let port = self.transport.port().map_err(lost("its stream"))?;
-        self.request(message::STREAM_START, port.to_le_bytes().into(), "StreamStart")?;
-        Ok(())
+        let start = port.to_le_bytes().into();
+        self.request(message::STREAM_START, start, "StreamStart").map(drop)
     }
 }
 
@@ -184,7 +167,7 @@ fn lost(what: &str) -> impl Fn(io::Error) -> HostError {
     }
 }
 
-/// What a host takes from a device, and gives to it.
+/// The quantities that a host reads from a device, and the gain of its output.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Channels {
     /// Source of the response, and m per unit of it.
@@ -196,7 +179,7 @@ pub struct Channels {
 }
 
 impl Default for Channels {
-    /// Those of `vines rig --protocol helic`.
+    /// The channels of `vines rig --protocol helic`.
     fn default() -> Self {
         let source = |name: &str| (name.to_string(), 1e-3);
         Self {
@@ -205,14 +188,6 @@ impl Default for Channels {
             gain: 1e-3,
         }
     }
-}
-
-/// A record of the stream.
-#[derive(Debug, Clone, Copy)]
-struct Record {
-    sensors: Sensors,
-    /// Phase of the device's oscillator, turns.
-    phase: f64,
 }
 
 /// A device as a rig.
@@ -230,15 +205,15 @@ pub struct HelicRig<T: Transport> {
     /// Samples of the device per sample of the scene.
     decimation: u16,
     is_streaming: bool,
-    /// Records that have arrived, or were lost.
-    records: VecDeque<Option<Record>>,
+    /// Readings and phase of the device's oscillator, turns, of the samples that have arrived; None if lost.
+    records: VecDeque<Option<(Sensors, f64)>>,
     now: Option<Sensors>,
     bridge: Bridge,
     /// Number of the sample that the next packet begins with.
     next: Option<u32>,
     /// Phase of the host's drive at the present sample, turns.
     phase: f64,
-    /// The same less the phase of the device's oscillator, at the last record.
+    /// Lead of the host's drive over the device's oscillator at the last record, turns.
     lead: Option<f64>,
     /// Phase of the device's oscillator at the last record, unless the record before the present one was lost, and its step, turns.
     device_phase: Option<f64>,
@@ -249,7 +224,7 @@ pub struct HelicRig<T: Transport> {
     /// Frequency of the device, rad/s, and the cosine and sine of its forcing, V.
     omega: f64,
     parts: [f64; 2],
-    /// What has arrived, and what was bridged.
+    /// Packets that have arrived, and samples that were bridged.
     pub counters: Counters,
 }
 
@@ -267,16 +242,18 @@ impl<T: Transport> HelicRig<T> {
                 1.0 / sample_time
             )));
         }
-        let mut sources = vec![host.source(&channels.response.0)?];
-        if let Some((name, _)) = &channels.reference {
-            sources.push(host.source(name)?);
-        }
-        sources.push(host.source("phase")?);
+        let reference = channels.reference.iter().map(|(name, _)| name.as_str());
+        let names = [channels.response.0.as_str()]
+            .into_iter()
+            .chain(reference)
+            .chain(["phase"]);
+        let sources = names.map(|name| host.source(name)).collect::<Result<_, _>>()?;
         host.set("arm", &[0.0])?;
         for series in ["target_coeffs", "forcing_coeffs"] {
             host.set(series, &[0.0; COEFFICIENTS])?;
         }
         let silence = host.transport.silence().as_secs_f64();
+        // Not every device has these.
         for (name, value) in [
             ("table_mode", 0.0),
             ("control_mode", 0.0),
@@ -310,7 +287,7 @@ impl<T: Transport> HelicRig<T> {
         })
     }
 
-    /// The way to the device.
+    /// The connection to the device.
     pub fn transport(&mut self) -> &mut T {
         &mut self.host.transport
     }
@@ -320,54 +297,48 @@ impl<T: Transport> HelicRig<T> {
     }
 
     fn reading(&mut self) -> Result<Sensors, HostError> {
+        if let Some(now) = self.now {
+            return Ok(now);
+        }
         if !self.is_streaming {
             // Not earlier: readings that nobody takes only wait.
             self.host.stream(&self.sources, self.decimation)?;
             self.is_streaming = true;
         }
-        loop {
-            if let Some(now) = self.now {
-                return Ok(now);
-            }
-            // The first record after those that were lost.
+        let reading = loop {
+            // The first record after the lost ones.
             let next = self.records.iter().flatten().next().copied();
-            let reading = match (self.records.pop_front(), next) {
-                (Some(Some(record)), _) => {
-                    self.follow(record.phase);
-                    record.sensors
+            match (self.records.pop_front(), next) {
+                (Some(Some((sensors, phase))), _) => {
+                    self.device_turn = self.device_phase.map(|before| (phase - before).rem_euclid(1.0));
+                    self.device_phase = Some(phase);
+                    self.lead = Some(self.phase - phase);
+                    break sensors;
                 }
-                (Some(None), Some(Record { sensors, .. })) => {
+                (Some(None), Some((sensors, _))) => {
                     let ahead = 1 + self.records.iter().take_while(|record| record.is_none()).count() as u64;
                     let turn = self.wanted.omega * self.sample_time / TAU;
                     self.device_phase = None;
-                    self.bridge.fill(self.phase, &sensors, ahead, turn)
+                    break self.bridge.fill(self.phase, &sensors, ahead, turn);
                 }
                 _ => {
                     self.command()?;
                     self.receive()?;
-                    continue;
                 }
-            };
-            self.bridge.keep(self.phase, reading);
-            self.now = Some(reading);
-            self.unsupervised += self.sample_time;
-            if self.unsupervised > SUPERVISION * self.host.transport.silence().as_secs_f64() && self.is_driven() {
-                self.supervise()?;
             }
+        };
+        self.bridge.keep(self.phase, reading);
+        self.now = Some(reading);
+        self.unsupervised += self.sample_time;
+        if self.unsupervised > SUPERVISION * self.host.transport.silence().as_secs_f64() && self.is_driven() {
+            self.supervise()?;
         }
-    }
-
-    /// Takes the phase of the device's oscillator at the present sample, turns.
-    fn follow(&mut self, phase: f64) {
-        self.device_turn = self.device_phase.map(|before| (phase - before).rem_euclid(1.0));
-        self.device_phase = Some(phase);
-        self.lead = Some(self.phase - phase);
+        Ok(reading)
     }
 
     /// Waits for the next packet.
     fn receive(&mut self) -> Result<(), HostError> {
-        let datagram = self.host.transport.datagram();
-        let bytes = datagram.map_err(lost("its stream"))?;
+        let bytes = self.host.transport.datagram().map_err(lost("its stream"))?;
         let Ok(packet) = Packet::decode(&bytes) else {
             self.counters.malformed += 1;
             return Ok(());
@@ -397,33 +368,27 @@ impl<T: Transport> HelicRig<T> {
         self.counters.received += 1;
         for record in packet.values.chunks_exact(width) {
             let read = |n: usize, factor: f64| factor * f64::from(record[n]);
-            let sensors = Sensors {
-                response: read(0, self.channels.response.1),
-                reference: self.channels.reference.as_ref().map(|(_, factor)| read(1, *factor)),
-            };
-            self.records
-                .push_back(Some(Record { sensors, phase: read(width - 1, 1.0) }));
+            let response = read(0, self.channels.response.1);
+            let reference = self.channels.reference.as_ref().map(|(_, factor)| read(1, *factor));
+            let phase = read(width - 1, 1.0);
+            self.records.push_back(Some((Sensors { response, reference }, phase)));
         }
         let records = (packet.values.len() / width) as u32;
         self.next = Some(packet.first.wrapping_add(records * step));
         Ok(())
     }
 
-    /// The output of the device must be on, if it says whether it is.
+    /// Checks that the output of the device is on, if it reports it.
     fn supervise(&mut self) -> Result<(), HostError> {
         self.unsupervised = 0.0;
-        let index = self.host.parameter("safety")? as u16;
-        let bytes = self
-            .host
-            .request(message::GET_PAR, index.to_le_bytes().into(), "safety")?;
-        let safety = bytes.first().copied().unwrap_or_default();
-        // Devices without a gate read 0.
-        if safety == 0 || safety & 0b11 == 1 {
-            Ok(())
-        } else {
-            Err(HostError(format!(
+        let index = self.host.parameter("safety")?.0.to_le_bytes();
+        let bytes = self.host.request(message::GET_PAR, index.into(), "safety")?;
+        match bytes.first().copied().unwrap_or_default() {
+            // Armed and not tripped; a device without a gate reads 0.
+            safety if safety == 0 || safety & 0b11 == 1 => Ok(()),
+            safety => Err(HostError(format!(
                 "the output of the helic device is off (safety = {safety}): it has tripped, or was disarmed; the drive is zero"
-            )))
+            ))),
         }
     }
 
@@ -449,14 +414,14 @@ impl<T: Transport> HelicRig<T> {
         }
         let was_driven = self.is_driven();
         let mut forcing = [0.0; COEFFICIENTS];
-        (forcing[1], forcing[1 + HARMONICS]) = (parts[0], parts[1]);
         if !was_driven {
             let stop = [
-                self.host.setting("forcing_coeffs", &[0.0; COEFFICIENTS])?,
+                self.host.setting("forcing_coeffs", &forcing)?,
                 self.host.setting("arm", &[0.0])?,
             ];
-            self.host.transport.guard(Some(stop.into())).map_err(lost("arm"))?;
+            self.host.transport.guard(&stop).map_err(lost("arm"))?;
         }
+        (forcing[1], forcing[1 + HARMONICS]) = (parts[0], parts[1]);
         self.host.set("forcing_coeffs", &forcing)?;
         self.parts = parts;
         if !was_driven {
@@ -465,13 +430,13 @@ impl<T: Transport> HelicRig<T> {
         } else if !self.is_driven() {
             self.supervise()?;
             self.host.set("arm", &[0.0])?;
-            self.host.transport.guard(None).map_err(lost("arm"))?;
+            self.host.transport.guard(&[]).map_err(lost("arm"))?;
         }
         Ok(())
     }
 
     /// After an error the device is not driven any more.
-    fn ended<V>(&mut self, outcome: Result<V, HostError>) -> Result<V, RigError> {
+    fn checked<V>(&mut self, outcome: Result<V, HostError>) -> Result<V, RigError> {
         if outcome.is_err() {
             self.host.transport.close();
         }
@@ -483,15 +448,16 @@ impl<T: Transport> HelicRig<T> {
             self.host.set("forcing_coeffs", &[0.0; COEFFICIENTS])?;
         }
         self.host.set("arm", &[0.0])?;
-        self.host.request(message::STREAM_STOP, Vec::new(), "StreamStop")?;
-        Ok(())
+        self.host
+            .request(message::STREAM_STOP, Vec::new(), "StreamStop")
+            .map(drop)
     }
 }
 
 impl<T: Transport> Rig for HelicRig<T> {
     fn sense(&mut self) -> Result<Sensors, RigError> {
         let reading = self.reading();
-        self.ended(reading)
+        self.checked(reading)
     }
 
     fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
@@ -501,7 +467,7 @@ impl<T: Transport> Rig for HelicRig<T> {
         if drive.amplitude == 0.0 && self.is_driven() {
             // A drive of zero is not delayed.
             let sent = self.command();
-            return self.ended(sent);
+            return self.checked(sent);
         }
         Ok(())
     }

@@ -10,16 +10,18 @@ pub const VERSION: u8 = 3;
 pub const MAX_PAYLOAD: usize = 1024;
 /// Longest packet of a stream, bytes.
 const MAX_PACKET: usize = 1472;
-/// Request of the discovery beacon.
-pub const BEACON_REQUEST: [u8; 3] = [b'H', b'L', 1];
+/// Number of harmonics of a Fourier series.
+pub(crate) const HARMONICS: usize = 16;
+/// Number of coefficients of a Fourier series: mean, cosines, sines.
+pub(crate) const COEFFICIENTS: usize = 2 * HARMONICS + 1;
 
-/// Magic, type, sequence and length.
+/// Length of magic, type, sequence and length.
 const HEADER: usize = 6;
 const PACKET_HEADER: usize = 20;
 /// "CCITT-FALSE": polynomial 0x1021, initial value 0xffff.
 const CHECKSUM: Crc<u16> = Crc::<u16>::new(&CRC_16_IBM_3740);
 
-/// Types of a request; the answer has the same one, or [`message::ERROR`].
+/// Types of a request. The answer has the type of the request, or [`message::ERROR`].
 #[expect(missing_docs, reason = "the names of the protocol")]
 pub mod message {
     pub const GET_PARAMS: u8 = 1;
@@ -37,7 +39,6 @@ pub mod message {
 
 /// Why a device refuses a request.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Error)]
-#[repr(u8)]
 #[expect(missing_docs, reason = "the messages explain the variants")]
 pub enum ErrorCode {
     #[error("bad frame")]
@@ -84,47 +85,43 @@ pub(crate) fn take<const N: usize>(bytes: &mut &[u8]) -> Result<[u8; N], Malform
 /// Text without an end, or not ASCII.
 pub fn take_text(bytes: &mut &[u8]) -> Result<String, Malformed> {
     let end = bytes.iter().position(|byte| *byte == 0).ok_or(Malformed)?;
-    let text = bytes[..end]
-        .is_ascii()
-        .then(|| String::from_utf8_lossy(&bytes[..end]).into());
-    *bytes = &bytes[end + 1..];
-    text.ok_or(Malformed)
+    let (text, rest) = bytes.split_at(end);
+    *bytes = &rest[1..];
+    let ascii = text.is_ascii().then(|| String::from_utf8_lossy(text).into());
+    ascii.ok_or(Malformed)
 }
 
-/// Values of a type, as in Python's `struct`: `f`, `I`, `i`, `H`, `h`, `B`, `b` or `c`.
-pub(crate) fn to_bytes(code: u8, values: &[f64]) -> Vec<u8> {
-    let bytes = |value: f64| match code {
-        b'f' => (value as f32).to_le_bytes(),
-        // A conversion from i64 keeps the bits of negative values.
-        _ => (value as i64 as u32).to_le_bytes(),
-    };
-    values
-        .iter()
-        .flat_map(|value| bytes(*value).into_iter().take(size(code)))
-        .collect()
-}
-
-/// The values in `bytes`.
-pub(crate) fn of_bytes(code: u8, bytes: &[u8]) -> Vec<f64> {
-    let value = |bytes: &[u8]| {
-        let mut word = [0; 4];
-        word[..bytes.len()].copy_from_slice(bytes);
-        if code == b'f' {
-            f32::from_le_bytes(word).into()
-        } else {
-            u32::from_le_bytes(word).into()
-        }
-    };
-    bytes.chunks_exact(size(code)).map(value).collect()
-}
-
-/// Size of a value, bytes.
+/// Size of a value, bytes. Its type is a letter as in Python's `struct`: `f`, `I`, `i`, `H`, `h`, `B`, `b` or `c`.
 pub(crate) fn size(code: u8) -> usize {
     match code {
         b'H' | b'h' => 2,
         b'B' | b'b' | b'c' => 1,
         _ => 4,
     }
+}
+
+/// The bytes of values of a type.
+pub(crate) fn to_bytes(code: u8, values: &[f64]) -> Vec<u8> {
+    let bytes = |value: f64| match code {
+        b'f' => (value as f32).to_le_bytes(),
+        // A conversion from i64 keeps the bits of negative values.
+        _ => (value as i64 as u32).to_le_bytes(),
+    };
+    let words = values.iter().map(|value| bytes(*value));
+    words.flat_map(|word| word.into_iter().take(size(code))).collect()
+}
+
+/// The values of a type in `bytes`.
+pub(crate) fn of_bytes(code: u8, bytes: &[u8]) -> Vec<f64> {
+    let value = |bytes: &[u8]| {
+        let mut word = [0; 4];
+        word[..bytes.len()].copy_from_slice(bytes);
+        match code {
+            b'f' => f32::from_le_bytes(word).into(),
+            _ => u32::from_le_bytes(word).into(),
+        }
+    };
+    bytes.chunks_exact(size(code)).map(value).collect()
 }
 
 /// A frame of the control channel.
@@ -166,13 +163,11 @@ impl Frame {
             return Err(Malformed);
         }
         let payload = rest[..length].to_vec();
-        Ok(Some((
-            Self { kind: header[2], sequence: header[3], payload },
-            HEADER + length + 2,
-        )))
+        let frame = Self { kind: header[2], sequence: header[3], payload };
+        Ok(Some((frame, HEADER + length + 2)))
     }
 
-    /// Takes the first frame from what has arrived of a connection; None if more bytes are needed.
+    /// Takes the first frame from the bytes that a connection has received; None if more bytes are needed.
     pub(crate) fn take(bytes: &mut Vec<u8>) -> Result<Option<Self>, Malformed> {
         Ok(Self::decode(bytes)?.map(|(frame, length)| {
             bytes.drain(..length);
@@ -205,21 +200,22 @@ pub struct Packet {
 
 impl Packet {
     /// Largest number of records of `width` values.
-    pub(crate) fn most(width: usize) -> usize {
+    pub(crate) fn capacity(width: usize) -> usize {
         (MAX_PACKET - PACKET_HEADER) / (4 * width.max(1))
     }
 
     /// The bytes of the packet.
     pub fn encode(&self) -> Vec<u8> {
-        let records = (self.values.len() / usize::from(self.width).max(1)) as u16;
-        let mut bytes = [&MAGIC[..], &[VERSION, self.width]].concat();
+        let Self { sequence, first, dropped, decimation, width, values } = self;
+        let records = (values.len() / usize::from(*width).max(1)) as u16;
+        let mut bytes = [&MAGIC[..], &[VERSION, *width]].concat();
         bytes.extend(
-            [self.sequence, self.first, self.dropped]
-                .iter()
+            [sequence, first, dropped]
+                .into_iter()
                 .flat_map(|word| word.to_le_bytes()),
         );
-        bytes.extend([self.decimation, records].iter().flat_map(|half| half.to_le_bytes()));
-        bytes.extend(self.values.iter().flat_map(|value| value.to_le_bytes()));
+        bytes.extend([*decimation, records].into_iter().flat_map(u16::to_le_bytes));
+        bytes.extend(values.iter().flat_map(|value| value.to_le_bytes()));
         bytes
     }
 
@@ -238,7 +234,7 @@ impl Packet {
     }
 }
 
-/// What a device answers to Status.
+/// The answer of a device to [`message::STATUS`].
 #[derive(Debug, Clone, Copy, PartialEq)]
 #[expect(missing_docs, reason = "the names of the protocol")]
 pub struct Status {
@@ -254,34 +250,24 @@ pub struct Status {
 impl Status {
     /// The payload.
     pub fn encode(&self) -> Vec<u8> {
-        let Self { version, parameters, sources, sample_rate, uptime } = *self;
-        let (parameters, sample_rate, uptime) = (
-            parameters.to_le_bytes(),
-            sample_rate.to_le_bytes(),
-            uptime.to_le_bytes(),
-        );
-        [&[version][..], &parameters, &[sources], &sample_rate, &uptime].concat()
+        let Self { version, parameters, sources, sample_rate, uptime } = self;
+        let mut bytes = vec![*version];
+        bytes.extend(parameters.to_le_bytes());
+        bytes.push(*sources);
+        bytes.extend([sample_rate.to_le_bytes(), uptime.to_le_bytes()].concat());
+        bytes
     }
 
     /// Reads a payload.
     pub fn decode(mut payload: &[u8]) -> Result<Self, Malformed> {
         let bytes = &mut payload;
-        let [version] = take(bytes)?;
-        let parameters = u16::from_le_bytes(take(bytes)?);
-        let [sources] = take(bytes)?;
-        let (sample_rate, uptime) = (f32::from_le_bytes(take(bytes)?), u32::from_le_bytes(take(bytes)?));
-        let status = Self { version, parameters, sources, sample_rate, uptime };
+        let status = Self {
+            version: take::<1>(bytes)?[0],
+            parameters: u16::from_le_bytes(take(bytes)?),
+            sources: take::<1>(bytes)?[0],
+            sample_rate: f32::from_le_bytes(take(bytes)?),
+            uptime: u32::from_le_bytes(take(bytes)?),
+        };
         bytes.is_empty().then_some(status).ok_or(Malformed)
     }
-}
-
-/// The answer to the discovery beacon.
-pub fn beacon(control_port: u16, experiment: &str, firmware: &str) -> Vec<u8> {
-    /// A locally administered address: the device is a program.
-    const MAC: [u8; 6] = [2, b'H', b'L', 0, 0, 1];
-    let mut bytes = [&MAGIC[..], &[2, VERSION], &control_port.to_le_bytes(), &MAC].concat();
-    for text in [experiment, firmware] {
-        bytes.extend(text.bytes().chain([0; 16]).take(16));
-    }
-    bytes
 }

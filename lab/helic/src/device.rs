@@ -1,13 +1,56 @@
-//! A rig as a device: requests of the host, and one sample after another.
+//! A rig as a device: its parameters, its stream, the requests of the host, and one sample after another.
 
 use std::f64::consts::TAU;
 
-use super::codec::{ErrorCode, Frame, Status, VERSION, message};
-use super::pll::Pll;
-use super::registry::{HARMONICS, Registry, WATCHDOG};
-use super::stream::Stream;
+use super::codec::{
+    COEFFICIENTS, ErrorCode, Frame, HARMONICS, MAX_PAYLOAD, Packet, Status, VERSION, message, of_bytes, size, take,
+    to_bytes,
+};
 use vines_testbench::rig::{Drive, Rig, RigError, Sensors};
 
+/// Longest silence of the host, s, before the output is disarmed; 0: no limit.
+pub(crate) const WATCHDOG: &str = "rig_watchdog";
+/// Names, type and number of values of the parameters, in the order of version 3; then come those of the rig.
+const PARAMETERS: &[(&str, u8, usize)] = &[
+    ("firmware experiment", b'c', 16),
+    ("sample_freq", b'f', 1),
+    ("ticks loop_time_last loop_time_max clock_jitter overruns", b'I', 1),
+    ("tick_timeouts records_dropped", b'I', 1),
+    ("freq", b'f', 1),
+    ("target_coeffs forcing_coeffs", b'f', COEFFICIENTS),
+    ("table", b'f', 4096),
+    ("table_len", b'H', 1),
+    ("table_freq table_gain", b'f', 1),
+    ("table_interp table_mode table_mult", b'I', 1),
+    ("table_phase", b'f', 1),
+    ("table_trigger wake_phase_min wake_phase_max t_measure_max", b'I', 1),
+    ("t_actuate_max t_rest_max diag_reset cmd_backlog_max", b'I', 1),
+    ("arm safety mcu_reboot", b'I', 1),
+    ("rig_gain rig_out_max", b'f', 1),
+    (WATCHDOG, b'f', 1),
+    ("impacts", b'I', 1),
+];
+/// Parameters that a host may set.
+const WRITABLE: [&str; 7] = [
+    "freq",
+    "target_coeffs",
+    "forcing_coeffs",
+    "table_mode",
+    "diag_reset",
+    "arm",
+    WATCHDOG,
+];
+/// Sources of a stream, with their units. A rig without a base sensor has no `reference`.
+const SOURCES: [(&str, &str); 8] = [
+    ("response", "mm"),
+    ("reference", "mm"),
+    ("target", "V"),
+    ("forcing", "V"),
+    ("table", "V"),
+    ("phase", "turns"),
+    ("out", "V"),
+    ("cmd_epoch", "count"),
+];
 /// Base displacement per volt of the output, mm.
 const GAIN: f64 = 1.0;
 /// m per mm.
@@ -16,39 +59,130 @@ const MILLI: f64 = 1e-3;
 const TURN: f64 = 4_294_967_296.0;
 /// The command counter is exact as a float.
 const EPOCH: u32 = 1 << 24;
-/// The value of `mcu_reboot` that restarts a device.
-const REBOOT: u32 = 0x5245_4254;
+/// Longest time before a packet is sent, s (protocol, "Stream channel").
+const FLUSH: f64 = 0.005;
 
-/// Sources of a stream, with their units. A rig without a reference sensor has no `reference`, which is the last.
-const SOURCES: [(&str, &str); 14] = [
-    ("response", "mm"),
-    ("control_mode", "enum"),
-    ("pll_phase", "degree"),
-    ("pll_phase_error", "degree"),
-    ("pll_exc_amp", "mm"),
-    ("pll_resp_amp", "mm"),
-    ("pll_freq_actual", "Hz"),
-    ("pll_state", "enum"),
-    ("target", "V"),
-    ("forcing", "V"),
-    ("table", "V"),
-    ("phase", "turns"),
-    ("out", "V"),
-    ("cmd_epoch", "count"),
-];
-const REFERENCE: (&str, &str) = ("reference", "mm");
+/// The definitions of all parameters: name, type, number of values.
+fn parameters() -> impl Iterator<Item = (&'static str, u8, usize)> {
+    let rows = PARAMETERS.iter();
+    rows.flat_map(|&(names, code, count)| names.split(' ').map(move |name| (name, code, count)))
+}
+
+fn parameter(index: u16) -> Result<(&'static str, u8, usize), ErrorCode> {
+    parameters().nth(index.into()).ok_or(ErrorCode::BadIndex)
+}
+
+/// A page of definitions: those from `start` on that fit into a payload.
+fn page(start: u16) -> Result<Vec<u8>, ErrorCode> {
+    if usize::from(start) > parameters().count() {
+        return Err(ErrorCode::BadIndex);
+    }
+    let (mut next, mut page) = (start, Vec::new());
+    for (name, code, count) in parameters().skip(start.into()) {
+        let [low, high] = (count as u16).to_le_bytes();
+        let writable = WRITABLE.contains(&name).into();
+        let definition = [name.as_bytes(), &[0, code, low, high, writable]].concat();
+        if 4 + page.len() + definition.len() > MAX_PAYLOAD {
+            break;
+        }
+        page.extend(definition);
+        next += 1;
+    }
+    Ok([&start.to_le_bytes()[..], &next.to_le_bytes(), &page].concat())
+}
+
+/// The stream: what the host has set up, and the packet that is being filled.
+#[derive(Debug, Default)]
+struct Stream {
+    sources: Vec<u8>,
+    decimation: u16,
+    /// Records, or 0 for a stream without an end.
+    count: u32,
+    /// Port of the host while the stream runs.
+    port: Option<u16>,
+    /// Samples and records since the start, and samples since the last packet.
+    samples: u64,
+    records: u32,
+    age: u32,
+    packet: Packet,
+}
+
+impl Stream {
+    /// Sets the stream up: `decimation u16, count u32, n u8, source u8 × n`; `all` is the number of sources.
+    fn set_up(&mut self, mut payload: &[u8], all: usize) -> Result<(), ErrorCode> {
+        let [d, e, a, b, c, f, n] = take(&mut payload).map_err(|_| ErrorCode::BadLength)?;
+        let decimation = u16::from_le_bytes([d, e]);
+        let sources_exist = payload.iter().all(|source| usize::from(*source) < all);
+        match () {
+            () if payload.len() != usize::from(n) => return Err(ErrorCode::BadLength),
+            () if self.port.is_some() => return Err(ErrorCode::Busy),
+            () if decimation == 0 || n == 0 || !sources_exist => return Err(ErrorCode::BadValue),
+            () => {}
+        }
+        (self.decimation, self.count, self.sources) = (decimation, u32::from_le_bytes([a, b, c, f]), payload.into());
+        Ok(())
+    }
+
+    /// Starts the stream to a port of the host.
+    fn start(&mut self, payload: &[u8]) -> Result<(), ErrorCode> {
+        let port = u16::from_le_bytes(payload.try_into().map_err(|_| ErrorCode::BadLength)?);
+        if self.port.is_some() {
+            return Err(ErrorCode::Busy);
+        }
+        if port == 0 || self.sources.is_empty() {
+            return Err(ErrorCode::BadValue);
+        }
+        (self.port, self.samples, self.records, self.age) = (Some(port), 0, 0, 0);
+        let width = self.sources.len() as u8;
+        self.packet = Packet { decimation: self.decimation, width, ..Packet::default() };
+        Ok(())
+    }
+
+    /// Takes the values of all sources at sample `index`; returns a packet that is full, complete or `flush` samples old, and its port.
+    fn record(&mut self, index: u32, values: &[f64], flush: f64) -> Option<(u16, Vec<u8>)> {
+        let (port, packet) = (self.port?, &mut self.packet);
+        if self.samples.is_multiple_of(self.decimation.into()) {
+            if packet.values.is_empty() {
+                packet.first = index;
+            }
+            let record = self.sources.iter().map(|source| values[usize::from(*source)] as f32);
+            packet.values.extend(record);
+            self.records += 1;
+        }
+        self.samples += 1;
+        self.age += 1;
+        let width = self.sources.len();
+        let complete = self.count != 0 && self.records == self.count;
+        let due = packet.values.len() / width >= Packet::capacity(width) || f64::from(self.age + 1) > flush;
+        if packet.values.is_empty() || !(due || complete) {
+            return None;
+        }
+        let bytes = packet.encode();
+        packet.sequence = packet.sequence.wrapping_add(1);
+        packet.values.clear();
+        self.age = 0;
+        self.port.take_if(|_| complete);
+        Some((port, bytes))
+    }
+}
 
 /// A device. Everything in it happens at a sample or between two of them, in the order of the calls.
 pub struct Device {
     rig: Box<dyn Rig>,
     has_reference: bool,
     sample_rate: f64,
-    registry: Registry,
+    /// Largest output, V.
+    largest: f64,
+    /// Frequency of the oscillator, Hz, and its series target and forcing, V.
+    frequency: f64,
+    series: [Vec<f64>; 2],
+    armed: bool,
+    safety: u8,
+    /// s
+    watchdog: f64,
+    impacts: u32,
     stream: Stream,
-    /// The loop: present while the output is armed in `control_mode` 2, and after a lost lock.
-    pll: Option<Pll>,
-    tripped: bool,
-    /// Master phase.
+    /// Phase of the oscillator, 2^-32 turns.
     phase: u32,
     ticks: u32,
     /// Commands since the last sample, and up to it.
@@ -56,90 +190,47 @@ pub struct Device {
     epoch: u32,
     /// Samples since the last request.
     silence: u32,
-    /// Time of the last reboot, ms, and whether it has just happened.
-    booted: u32,
-    rebooted: bool,
 }
 
 impl Device {
     /// The rig `rig` as a device, sampled every `sample_time`, s; its output is limited to `max_amplitude`, m.
     pub fn new(mut rig: Box<dyn Rig>, sample_time: f64, max_amplitude: f64) -> Result<Self, RigError> {
-        let sample_rate = 1.0 / sample_time;
         Ok(Self {
             has_reference: rig.sense()?.reference.is_some(),
             rig,
-            sample_rate,
-            registry: Registry::new(sample_rate, GAIN, max_amplitude / (GAIN * MILLI)),
-            stream: Stream::new(sample_rate),
-            pll: None,
-            tripped: false,
+            sample_rate: 1.0 / sample_time,
+            largest: max_amplitude / (GAIN * MILLI),
+            frequency: 0.0,
+            series: [vec![0.0; COEFFICIENTS], vec![0.0; COEFFICIENTS]],
+            armed: false,
+            safety: 0,
+            watchdog: 0.0,
+            impacts: 0,
+            stream: Stream::default(),
             phase: 0,
             ticks: 0,
             commands: 0,
             epoch: 0,
             silence: 0,
-            booted: 0,
-            rebooted: false,
         })
-    }
-
-    /// Starts again with the values of the start, at `uptime`, ms. The rig and its motion stay as they are.
-    fn reboot(&mut self, uptime: u32) {
-        self.registry = Registry::new(self.sample_rate, GAIN, self.registry.real("rig_out_max"));
-        (self.stream, self.pll, self.tripped) = (Stream::new(self.sample_rate), None, false);
-        (self.phase, self.ticks, self.commands, self.epoch) = (0, 0, 0, 0);
-        (self.booted, self.rebooted) = (uptime, true);
-    }
-
-    /// Whether the device has restarted since the last call: the connection to its host is not valid any more.
-    pub fn has_rebooted(&mut self) -> bool {
-        std::mem::take(&mut self.rebooted)
     }
 
     /// The host has left: output and stream stop.
     pub fn disconnect(&mut self) {
-        self.stream.stop();
-        self.disarm();
-    }
-
-    fn disarm(&mut self) {
-        self.registry.put("arm", &[0.0]);
-        self.pll.take_if(|pll| !pll.is_lost());
-    }
-
-    /// Arms the output, which clears a trip unless the lock was lost; the loop starts anew. False if its parameters do not fit together.
-    fn arm(&mut self) -> bool {
-        self.tripped = false;
-        if self.is_locked_mode() {
-            if self.pll.as_ref().is_some_and(Pll::is_lost) {
-                self.tripped = true;
-                return true;
-            }
-            self.pll = Pll::new(&self.registry).ok();
-            return self.pll.is_some();
-        }
-        true
-    }
-
-    fn is_armed(&self) -> bool {
-        self.registry.real("arm") == 1.0
-    }
-
-    fn is_locked_mode(&self) -> bool {
-        self.registry.real("control_mode") == 2.0
+        self.stream.port = None;
+        self.armed = false;
     }
 
     /// Whether the output may be other than zero.
     pub fn is_driven(&self) -> bool {
-        self.is_armed() && !self.tripped
+        self.armed
     }
 
     fn sources(&self) -> impl Iterator<Item = (&'static str, &'static str)> {
-        let [first, rest @ ..] = SOURCES;
-        [first]
+        let has_reference = self.has_reference;
+        SOURCES
             .into_iter()
-            .chain(self.has_reference.then_some(REFERENCE))
-            .chain(rest)
+            .filter(move |(name, _)| has_reference || *name != "reference")
     }
 
     /// Answers a request. `uptime` in ms.
@@ -157,71 +248,92 @@ impl Device {
         if matches!(kind, message::GET_SOURCES | message::STREAM_STOP | message::STATUS) && !payload.is_empty() {
             return Err(ErrorCode::BadLength);
         }
+        let empty = |()| Vec::new();
         match kind {
             message::GET_PARAMS => {
                 let start = payload.try_into().map_err(|_| ErrorCode::BadLength)?;
-                return self.registry.page(u16::from_le_bytes(start));
+                page(u16::from_le_bytes(start))
             }
             message::GET_SOURCES => {
                 let entry = |(name, unit): (&str, &str)| format!("{name}\0{unit}\0").into_bytes();
-                return Ok(self.sources().flat_map(entry).collect());
+                Ok(self.sources().flat_map(entry).collect())
             }
-            message::GET_PAR => return self.registry.read(payload),
-            message::SET_PAR => self.set(payload, uptime)?,
-            message::STREAM_SETUP => self.stream.set_up(payload, self.sources().count())?,
-            message::STREAM_START => self.stream.start(payload)?,
-            message::STREAM_STOP => self.stream.stop(),
+            message::GET_PAR => self.read(payload),
+            message::SET_PAR => self.set(payload).map(empty),
+            message::STREAM_SETUP => self.stream.set_up(payload, self.sources().count()).map(empty),
+            message::STREAM_START => self.stream.start(payload).map(empty),
+            message::STREAM_STOP => {
+                self.stream.port = None;
+                Ok(Vec::new())
+            }
             message::STATUS => {
-                let status = Status {
-                    version: VERSION,
-                    parameters: self.registry.len() as u16,
-                    sources: self.sources().count() as u8,
-                    sample_rate: self.sample_rate as f32,
-                    uptime: uptime.wrapping_sub(self.booted),
-                };
-                return Ok(status.encode());
+                let (parameters, sources) = (parameters().count() as u16, self.sources().count() as u8);
+                let sample_rate = self.sample_rate as f32;
+                Ok(Status { version: VERSION, parameters, sources, sample_rate, uptime }.encode())
             }
-            _ => return Err(ErrorCode::UnknownType),
+            _ => Err(ErrorCode::UnknownType),
         }
-        Ok(Vec::new())
     }
 
-    /// `index u16, value`.
-    fn set(&mut self, payload: &[u8], uptime: u32) -> Result<(), ErrorCode> {
-        let (index, bytes) = payload.split_first_chunk().ok_or(ErrorCode::BadLength)?;
-        let (name, values) = self.registry.writing(u16::from_le_bytes(*index), bytes)?;
-        let (value, refused) = (values[0], Err(ErrorCode::BadValue));
-        match name {
-            "mcu_reboot" if value != f64::from(REBOOT) => return refused,
-            "mcu_reboot" => self.reboot(uptime),
-            "ctrl_reset" if value != 0.0 => {
-                self.pll = self.pll.take().and_then(|_| Pll::new(&self.registry).ok());
-                self.commands += 1;
-            }
-            // Commands that have nothing to do here.
-            "ctrl_reset" | "table_trigger" | "diag_reset" => {}
-            "control_mode" if self.is_armed() && value != self.registry.real(name) => return refused,
-            _ => {
-                let before = self.registry.values(name).to_vec();
-                self.registry.put(name, &values);
-                let fits = match (name, &mut self.pll) {
-                    ("arm", _) if value == 1.0 => self.arm(),
-                    ("arm", _) => {
-                        self.disarm();
-                        true
-                    }
-                    (name, Some(pll)) if !pll.is_lost() && (name.starts_with("pll_") || name == "forcing_coeffs") => {
-                        pll.configure(&self.registry).is_ok()
-                    }
-                    _ => true,
-                };
-                if !fits {
-                    self.registry.put(name, &before);
-                    return refused;
-                }
-                self.commands += u32::from(!["arm", WATCHDOG].contains(&name));
-            }
+    /// The values of the parameters with these indices, as bytes.
+    fn read(&self, indices: &[u8]) -> Result<Vec<u8>, ErrorCode> {
+        if indices.is_empty() || !indices.len().is_multiple_of(2) {
+            return Err(ErrorCode::BadLength);
         }
+        let mut bytes = Vec::new();
+        for index in of_bytes(b'H', indices) {
+            let (name, code, count) = parameter(index as u16)?;
+            let text = |text: &str| text.bytes().map(f64::from).collect();
+            let mut values: Vec<f64> = match name {
+                "firmware" => text(concat!("vines ", env!("CARGO_PKG_VERSION"))),
+                "experiment" => text("vines"),
+                "sample_freq" => vec![self.sample_rate],
+                "ticks" => vec![self.ticks.into()],
+                "freq" => vec![self.frequency],
+                "target_coeffs" => self.series[0].clone(),
+                "forcing_coeffs" => self.series[1].clone(),
+                "arm" => vec![self.armed.into()],
+                "safety" => vec![self.safety.into()],
+                "rig_gain" => vec![GAIN],
+                "rig_out_max" => vec![self.largest],
+                WATCHDOG => vec![self.watchdog],
+                "impacts" => vec![self.impacts.into()],
+                // The waveform table, and statistics of the processor.
+                _ => Vec::new(),
+            };
+            values.resize(count, 0.0);
+            bytes.extend(to_bytes(code, &values));
+        }
+        (bytes.len() <= MAX_PAYLOAD)
+            .then_some(bytes)
+            .ok_or(ErrorCode::BadLength)
+    }
+
+    /// Sets a parameter: `index u16, values`.
+    fn set(&mut self, payload: &[u8]) -> Result<(), ErrorCode> {
+        let (index, bytes) = payload.split_first_chunk().ok_or(ErrorCode::BadLength)?;
+        let (name, code, count) = parameter(u16::from_le_bytes(*index))?;
+        if !WRITABLE.contains(&name) {
+            return Err(ErrorCode::ReadOnly);
+        }
+        if bytes.len() != count * size(code) {
+            return Err(ErrorCode::BadLength);
+        }
+        let values = of_bytes(code, bytes);
+        let value = values[0];
+        let is_command = !["arm", WATCHDOG, "diag_reset"].contains(&name);
+        match name {
+            "freq" if (0.0..0.5 * self.sample_rate).contains(&value) => self.frequency = value,
+            "target_coeffs" if amplitude(&values) <= self.largest => self.series[0] = values,
+            "forcing_coeffs" if amplitude(&values) <= self.largest => self.series[1] = values,
+            "arm" if value <= 1.0 => self.armed = value == 1.0,
+            WATCHDOG if value >= 0.0 && value.is_finite() => self.watchdog = value,
+            // There is no waveform table, and there are no statistics.
+            "table_mode" if value == 0.0 => {}
+            "diag_reset" => {}
+            _ => return Err(ErrorCode::BadValue),
+        }
+        self.commands += u32::from(is_command);
         Ok(())
     }
 
@@ -231,81 +343,58 @@ impl Device {
         let step = 1.0 / self.sample_rate;
         self.epoch = (self.epoch + std::mem::take(&mut self.commands)) % EPOCH;
         self.silence = self.silence.saturating_add(1);
-        let watchdog = self.registry.real(WATCHDOG);
-        if watchdog > 0.0 && f64::from(self.silence) * step > watchdog {
-            self.disarm();
+        if self.watchdog > 0.0 && f64::from(self.silence) * step > self.watchdog {
+            self.armed = false;
         }
-        let series = ["target_coeffs", "forcing_coeffs"].map(|name| series(self.registry.values(name), self.phase));
-        let ([target, forcing], response) = (series, response / MILLI);
-        let excitation = reference.map_or(GAIN * forcing, |base| base / MILLI);
-        let [nominal, mode] = ["freq", "control_mode"].map(|name| self.registry.real(name));
-        // Up to this sample, and from it on.
-        let mut frequencies = [nominal; 2];
-        if self.is_driven()
-            && let Some(pll) = &mut self.pll
-        {
-            frequencies[0] = pll.frequency();
-            pll.update(response, excitation);
-            frequencies[1] = pll.frequency();
-            // Quiet at once, and from now on.
-            self.tripped |= pll.is_lost();
-        }
-        let out = self.gate(if self.is_locked_mode() {
-            forcing
-        } else {
-            target + forcing
-        });
-        let unlocked = ([f64::NAN, f64::NAN, 0.0, 0.0], 0.0);
-        let (of_pll, state) = self.pll.as_ref().map_or(unlocked, Pll::sources);
-        let turns = f64::from(self.phase) / TURN;
-        let mut values = vec![response];
-        values.extend(self.has_reference.then_some(excitation));
-        values.push(mode);
-        values.extend(of_pll);
-        values.extend([
-            frequencies[0],
-            state,
-            target,
-            forcing,
-            0.0,
-            turns,
-            out,
-            f64::from(self.epoch),
-        ]);
-        let packet = self.stream.record(self.ticks, &values);
+        let [target, forcing] = [0, 1].map(|n| value(&self.series[n], self.phase));
+        let out = self.gate(target + forcing);
+        let (turns, epoch) = (f64::from(self.phase) / TURN, f64::from(self.epoch));
+        let sensors = [Some(response), reference]
+            .into_iter()
+            .flatten()
+            .map(|length| length / MILLI);
+        let values: Vec<f64> = sensors.chain([target, forcing, 0.0, turns, out, epoch]).collect();
+        let packet = self.stream.record(self.ticks, &values, FLUSH * self.sample_rate);
         let displacement = out * GAIN * MILLI;
         self.rig.hold(Drive { displacement, ..Drive::default() }, step)?;
-        self.phase = self.phase.wrapping_add((frequencies[1] * step * TURN).round() as u32);
+        let turn = self.frequency * step * TURN;
+        self.phase = self.phase.wrapping_add(turn.round() as u32);
         self.ticks = self.ticks.wrapping_add(1);
-        self.registry.put("ticks", &[self.ticks.into()]);
-        if let Some(inside) = self.rig.ground_truth()? {
-            self.registry.put("impacts", &[f64::from(inside.impacts as u32)]);
-        }
+        self.impacts = self.rig.ground_truth()?.map_or(0, |inside| inside.impacts as u32);
         Ok(packet)
     }
 
-    /// The output, V: nothing unless armed, and never more than the limit.
+    /// The output, V: zero unless armed, and never more than the limit.
     fn gate(&mut self, wanted: f64) -> f64 {
-        let largest = self.registry.real("rig_out_max");
-        let quiet = !self.is_driven() || !wanted.is_finite();
-        let out = if quiet { 0.0 } else { wanted.clamp(-largest, largest) };
-        // Bits 0 to 3: armed, tripped, limited, quiet.
-        let bits = [self.is_armed(), self.tripped, !quiet && out != wanted, quiet];
-        let safety: u8 = bits.iter().rev().fold(0, |bits, bit| 2 * bits + u8::from(*bit));
-        self.registry.put("safety", &[safety.into()]);
+        let quiet = !self.armed || !wanted.is_finite();
+        let out = if quiet {
+            0.0
+        } else {
+            wanted.clamp(-self.largest, self.largest)
+        };
+        let limited = !quiet && out != wanted;
+        // Bits: 0 armed, 1 tripped (nothing trips here), 2 limited, 3 quiet.
+        self.safety = u8::from(self.armed) | u8::from(limited) << 2 | u8::from(quiet) << 3;
         out
     }
 }
 
-/// Value of a Fourier series, mean, cosines and sines, at a phase of its fundamental.
-fn series(coefficients: &[f64], phase: u32) -> f64 {
+/// Upper bound of a Fourier series: mean, cosines, sines.
+fn amplitude(coefficients: &[f64]) -> f64 {
     let (cosines, sines) = coefficients[1..].split_at(HARMONICS);
-    let harmonic = |(k, (a, b)): (usize, (&f64, &f64))| {
-        if *a == 0.0 && *b == 0.0 {
-            return 0.0;
-        }
-        let (sine, cosine) = (TAU * f64::from(phase.wrapping_mul(k as u32 + 1)) / TURN).sin_cos();
+    let harmonics = cosines.iter().zip(sines).map(|(a, b)| a.hypot(*b));
+    coefficients[0].abs() + harmonics.sum::<f64>()
+}
+
+/// Value of a Fourier series at a phase of its fundamental.
+fn value(coefficients: &[f64], phase: u32) -> f64 {
+    let (cosines, sines) = coefficients[1..].split_at(HARMONICS);
+    let harmonics = (1..)
+        .zip(cosines.iter().zip(sines))
+        .filter(|(_, (a, b))| **a != 0.0 || **b != 0.0);
+    let values = harmonics.map(|(k, (a, b))| {
+        let (sine, cosine) = (TAU * f64::from(phase.wrapping_mul(k)) / TURN).sin_cos();
         a * cosine + b * sine
-    };
-    coefficients[0] + cosines.iter().zip(sines).enumerate().map(harmonic).sum::<f64>()
+    });
+    coefficients[0] + values.sum::<f64>()
 }

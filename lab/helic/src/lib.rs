@@ -8,10 +8,7 @@
 mod client;
 pub mod codec;
 mod device;
-mod pll;
-mod registry;
 mod server;
-mod stream;
 mod transport;
 
 pub use client::{Channels, HelicRig, HostError};

@@ -1,8 +1,8 @@
-//! The way to a device: requests and answers over TCP, packets over UDP, and a thread that stops the drive when the host hangs.
+//! The connection to a device: requests and answers over TCP, packets over UDP, and a thread that stops the drive when the host hangs.
 
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{Shutdown, SocketAddr, TcpStream, UdpSocket};
-use std::sync::{Arc, Mutex, PoisonError, mpsc};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use std::thread;
 use std::time::{Duration, Instant};
 
@@ -11,10 +11,10 @@ use vines_net::is_loopback;
 
 /// Longest time for an answer while the device is set up.
 const PATIENCE: Duration = Duration::from_secs(2);
-/// Longest silence of a driven device, and of a host that drives it. The drive stops within 0.2 s, with some time for the way.
+/// Longest silence of a driven device, and of a host that drives it. The drive stops within 0.2 s, with 50 ms for the network.
 pub const LONGEST_SILENCE: Duration = Duration::from_millis(150);
 
-/// The way to a device.
+/// The connection to a device.
 pub trait Transport {
     /// Sends a request and returns the answer.
     fn request(&mut self, request: &Frame) -> io::Result<Frame>;
@@ -30,9 +30,9 @@ pub trait Transport {
         LONGEST_SILENCE
     }
 
-    /// From now on the device is driven: when the host takes no datagram for too long, the transport sends these requests, which stop the drive, and closes
-    /// the control channel. With None, it is not driven any more. A transport without a clock does nothing.
-    fn guard(&mut self, _stop: Option<Vec<Frame>>) -> io::Result<()> {
+    /// From now on the device is driven: when the host takes no datagram for too long, the transport sends the requests `stop`, which stop
+    /// the drive, and closes the control channel. Without requests, it is not driven any more. A transport without a clock does nothing.
+    fn guard(&mut self, _stop: &[Frame]) -> io::Result<()> {
         Ok(())
     }
 
@@ -47,9 +47,16 @@ pub struct Network {
     stream: UdpSocket,
     bytes: Vec<u8>,
     silence: Duration,
-    watchdog: Option<Watchdog>,
-    /// The requests that stop the drive, while there is one.
+    watchdog: Arc<Mutex<Watchdog>>,
+}
+
+/// What the thread that watches over the host knows.
+#[derive(Debug)]
+struct Watchdog {
+    /// The requests that stop the drive; empty while there is none.
     stop: Vec<u8>,
+    last_reading: Instant,
+    fired: Option<Instant>,
 }
 
 impl Network {
@@ -58,15 +65,16 @@ impl Network {
     pub fn connect(peer: SocketAddr, silence: Duration) -> io::Result<Self> {
         let control = TcpStream::connect_timeout(&peer, PATIENCE)?;
         control.set_nodelay(true)?;
-        let mut own = control.local_addr()?;
-        own.set_port(0);
-        let stream = UdpSocket::bind(own)?;
+        let stream = UdpSocket::bind((control.local_addr()?.ip(), 0))?;
         stream.set_read_timeout(Some(silence))?;
         if !is_loopback(peer.ip()) {
             stream.send_to(b"vines", (peer.ip(), peer.port().saturating_add(1)))?;
         }
-        let (bytes, watchdog, stop) = (Vec::new(), None, Vec::new());
-        let network = Self { control, stream, bytes, silence, watchdog, stop };
+        let (stop, last_reading) = (Vec::new(), Instant::now());
+        let watchdog = Arc::new(Mutex::new(Watchdog { stop, last_reading, fired: None }));
+        let (shared, channel) = (Arc::downgrade(&watchdog), control.try_clone()?);
+        thread::Builder::new().spawn(move || watch(&shared, channel, silence))?;
+        let network = Self { control, stream, bytes: Vec::new(), silence, watchdog };
         network.patience(PATIENCE)?;
         Ok(network)
     }
@@ -77,25 +85,24 @@ impl Network {
         self.control.set_write_timeout(Some(patience))
     }
 
-    /// `error` in words, after waiting since `began`: a host that the watchdog stopped before is to blame itself.
+    /// `error` in words, after waiting since `began`.
     fn explained(&self, error: io::Error, waited: &str, began: Instant) -> io::Error {
-        let said = |message| io::Error::new(ErrorKind::TimedOut, message);
-        let fired = self.watchdog.as_ref().and_then(Watchdog::fired);
-        if fired.is_some_and(|fired| fired < began) {
-            let seconds = self.silence.as_secs_f64();
-            return said(format!(
-                "this program took no reading for {seconds} s, so the drive was stopped and the connection closed; is the machine too busy?"
-            ));
-        }
-        match error.kind() {
-            ErrorKind::WouldBlock | ErrorKind::TimedOut => {}
-            _ if fired.is_some() => {}
-            ErrorKind::ConnectionAborted | ErrorKind::BrokenPipe | ErrorKind::ConnectionReset => {
-                return io::Error::new(ErrorKind::ConnectionAborted, "the connection is closed");
-            }
-            _ => return error,
-        }
-        said(format!("{waited} for {:.2} s", began.elapsed().as_secs_f64()))
+        let (fired, kind) = (lock(&self.watchdog).fired, error.kind());
+        let silence = self.silence.as_secs_f64();
+        io::Error::other(if fired.is_some_and(|fired| fired < began) {
+            format!(
+                "this program took no reading for {silence} s, so the drive was stopped and the connection closed; is the machine too busy?"
+            )
+        } else if fired.is_some() || matches!(kind, ErrorKind::WouldBlock | ErrorKind::TimedOut) {
+            format!("{waited} for {:.2} s", began.elapsed().as_secs_f64())
+        } else if matches!(
+            kind,
+            ErrorKind::ConnectionAborted | ErrorKind::BrokenPipe | ErrorKind::ConnectionReset
+        ) {
+            "the connection is closed".into()
+        } else {
+            return error;
+        })
     }
 
     fn answer(&mut self, request: &Frame) -> io::Result<Frame> {
@@ -117,8 +124,8 @@ impl Network {
 impl Transport for Network {
     fn request(&mut self, request: &Frame) -> io::Result<Frame> {
         let began = Instant::now();
-        self.answer(request)
-            .map_err(|error| self.explained(error, "no answer", began))
+        let answer = self.answer(request);
+        answer.map_err(|error| self.explained(error, "no answer", began))
     }
 
     fn datagram(&mut self) -> io::Result<Vec<u8>> {
@@ -126,9 +133,7 @@ impl Transport for Network {
         let size = uninterrupted(|| self.stream.recv(&mut bytes))
             .map_err(|error| self.explained(error, "no packet of its stream has arrived", began))?;
         bytes.truncate(size);
-        if let Some(watchdog) = &self.watchdog {
-            watchdog.state().last = Instant::now();
-        }
+        lock(&self.watchdog).last_reading = Instant::now();
         Ok(bytes)
     }
 
@@ -140,19 +145,16 @@ impl Transport for Network {
         self.silence
     }
 
-    fn guard(&mut self, stop: Option<Vec<Frame>>) -> io::Result<()> {
-        self.patience(if stop.is_some() { self.silence } else { PATIENCE })?;
-        self.stop = stop.iter().flatten().flat_map(Frame::encode).collect();
-        self.watchdog = None;
-        if stop.is_some() {
-            let control = self.control.try_clone()?;
-            self.watchdog = Some(Watchdog::start(control, self.stop.clone(), self.silence)?);
-        }
+    fn guard(&mut self, stop: &[Frame]) -> io::Result<()> {
+        self.patience(if stop.is_empty() { PATIENCE } else { self.silence })?;
+        let mut watchdog = lock(&self.watchdog);
+        watchdog.stop = stop.iter().flat_map(Frame::encode).collect();
+        watchdog.last_reading = Instant::now();
         Ok(())
     }
 
     fn close(&mut self) {
-        stop_and_close(&mut self.control, &self.stop);
+        stop_and_close(&mut self.control, &lock(&self.watchdog).stop);
     }
 }
 
@@ -173,49 +175,26 @@ fn stop_and_close(control: &mut TcpStream, stop: &[u8]) {
     let _ = control.shutdown(Shutdown::Both);
 }
 
-/// The watchdog of a host that drives a device: a thread that stops the drive when the host takes no readings any more, whether it waits
-/// for an answer, for a disk or for a terminal. It ends when it is dropped.
-#[derive(Debug)]
-struct Watchdog {
-    state: Arc<Mutex<Beats>>,
-    /// The thread ends when this is dropped.
-    _alive: mpsc::Sender<()>,
+fn lock(watchdog: &Mutex<Watchdog>) -> MutexGuard<'_, Watchdog> {
+    watchdog.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// Times of the last reading, and of the end of the drive.
-#[derive(Debug)]
-struct Beats {
-    last: Instant,
-    fired: Option<Instant>,
-}
-
-impl Watchdog {
-    /// After a silence longer than `silence`, sends `stop` on `control` and closes it.
-    fn start(mut control: TcpStream, stop: Vec<u8>, silence: Duration) -> io::Result<Self> {
-        let state = Arc::new(Mutex::new(Beats { last: Instant::now(), fired: None }));
-        let (alive, dropped) = mpsc::channel();
-        let watchdog = Self { state: Arc::clone(&state), _alive: alive };
-        thread::Builder::new().spawn(move || {
-            let mut left = silence;
-            while dropped.recv_timeout(left) == Err(mpsc::RecvTimeoutError::Timeout) {
-                let mut beats = state.lock().unwrap_or_else(PoisonError::into_inner);
-                left = (beats.last + silence).saturating_duration_since(Instant::now());
-                if left.is_zero() {
-                    beats.fired = Some(Instant::now());
-                    drop(beats);
-                    return stop_and_close(&mut control, &stop);
-                }
-            }
-        })?;
-        Ok(watchdog)
-    }
-
-    fn state(&self) -> std::sync::MutexGuard<'_, Beats> {
-        self.state.lock().unwrap_or_else(PoisonError::into_inner)
-    }
-
-    /// When the drive was stopped.
-    fn fired(&self) -> Option<Instant> {
-        self.state().fired
+/// Stops the drive when the host takes no reading for longer than `silence`, whether it waits for an answer, for a disk or for a terminal.
+/// Ends with the connection.
+fn watch(shared: &Weak<Mutex<Watchdog>>, mut control: TcpStream, silence: Duration) {
+    let mut left = silence;
+    loop {
+        thread::sleep(left);
+        let Some(watchdog) = shared.upgrade() else {
+            return;
+        };
+        let mut watchdog = lock(&watchdog);
+        left = (watchdog.last_reading + silence).saturating_duration_since(Instant::now());
+        if watchdog.stop.is_empty() {
+            left = silence;
+        } else if left.is_zero() {
+            watchdog.fired = Some(Instant::now());
+            return stop_and_close(&mut control, &watchdog.stop);
+        }
     }
 }

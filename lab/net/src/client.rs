@@ -1,16 +1,23 @@
-//! The client's side of a session.
+//! The client's side of a session: a rig or a controller at a network address.
 
+use std::f64::consts::TAU;
 use std::hash::{BuildHasher, Hasher, RandomState};
+use std::net::SocketAddr;
+use std::sync::{Arc, OnceLock};
 use std::thread;
 use std::time::{Duration, Instant};
 
-use super::address::Address;
-use super::error::LinkError;
-use super::frame::{Frame, FrameError, Kind, flag};
-use super::handshake::{Refusal, SAME_TIME};
-use super::link::Link;
-use super::report::Counters;
-use super::seal::Key;
+use super::address::{Address, LinkError};
+use super::bridge::Bridge;
+use super::frame::{
+    Frame, FrameError, Kind, Reading, Refusal, flag, read_command, read_reading, write_command, write_move,
+    write_reading,
+};
+use super::link::{Key, Link};
+use super::server::SAME_TIME;
+use super::timing::{Counters, ReportLost, Timing};
+use vines_testbench::rig::{Command, Controller, ControllerError, Drive, GroundTruth, Move, Rig, RigError, Sensors};
+use vines_testbench::scene::Definition;
 
 /// Longest time until the server opens the session.
 const CONNECT: Duration = Duration::from_secs(2);
@@ -20,7 +27,7 @@ const RESEND: Duration = Duration::from_millis(50);
 
 /// A session.
 #[derive(Debug)]
-pub(super) struct Client {
+pub(crate) struct Client {
     link: Link,
     pub peer: Address,
     session: u64,
@@ -89,7 +96,7 @@ impl Client {
     /// Sends a frame, and keeps it for a repetition.
     pub fn send(&mut self, frame: Frame) -> Result<(), LinkError> {
         self.last = frame;
-        Ok(self.link.send(&frame)?)
+        Ok(self.link.send(&frame, self.peer.socket())?)
     }
 
     /// The next valid frame of this session, or None at `end`.
@@ -101,7 +108,7 @@ impl Client {
             } else {
                 end
             };
-            match self.link.receive(until)? {
+            match self.link.receive(until)?.map(|(received, _)| received) {
                 Some(Err(FrameError::Version(theirs))) => return Err(LinkError::Version { peer, theirs }),
                 Some(Err(FrameError::Closed)) => return Err(LinkError::Closed { peer, time }),
                 Some(Err(_)) => self.counters.malformed += 1,
@@ -118,14 +125,14 @@ impl Client {
                     return Ok(Some(frame));
                 }
                 None if Instant::now() >= end => return Ok(None),
-                None => self.link.send(&self.last)?,
+                None => self.link.send(&self.last, self.peer.socket())?,
             }
         }
     }
 
     /// Whether the rig runs in real time.
     pub fn is_real_time(&self) -> bool {
-        matches!(self.peer, Address::Udp(_))
+        self.link.is_real_time()
     }
 
     /// Time of the present sample, s.
@@ -183,4 +190,279 @@ fn unreachable(peer: Address, controller: bool) -> LinkError {
         Address::Udp(place) => format!("vines rig --listen {place}"),
     };
     LinkError::Unreachable { peer, command, seconds: CONNECT.as_secs_f64() }
+}
+
+/// Longest time for the report of a rig in real time: twenty repetitions of the farewell.
+const REPORT: Duration = Duration::from_secs(1);
+
+/// A rig at a network address: in lock-step over TCP, in real time over UDP.
+///
+/// Lost readings are bridged, so that the controller gets every sample of the rig's clock.
+#[derive(Debug)]
+pub struct NetRig {
+    client: Client,
+    /// Reading of the present sample, if it has arrived.
+    now: Option<Reading>,
+    /// The last valid reading.
+    good: Reading,
+    /// The frame with the newest reading, which may be that of a later sample.
+    newest: Option<Frame>,
+    bridge: Bridge,
+    /// Phase of the drive at the present sample, and its last step, turns.
+    phase: f64,
+    turn: f64,
+    timing: Arc<OnceLock<Result<Timing, ReportLost>>>,
+}
+
+impl NetRig {
+    /// Opens a session with the rig server at `peer`; `sample_time` in s. A server with another key does not answer.
+    pub fn connect(peer: Address, sample_time: f64, key: Option<Key>) -> Result<Self, LinkError> {
+        Ok(Self {
+            client: Client::connect(peer, 0, sample_time, key)?,
+            now: None,
+            good: Reading::default(),
+            newest: None,
+            bridge: Bridge::default(),
+            phase: 0.0,
+            turn: 0.0,
+            timing: Arc::default(),
+        })
+    }
+
+    /// Refuses a rig whose sensors are not those of `expected`.
+    pub fn with_sensors(self, expected: Definition) -> Result<Self, LinkError> {
+        let is_theirs = |one: &Definition| one.channels() == self.client.channels;
+        if is_theirs(&expected) {
+            return Ok(self);
+        }
+        let theirs = Definition::all().into_iter().find(is_theirs);
+        let theirs = theirs.map_or("unknown".into(), |one| one.channel_names());
+        let (peer, ours) = (self.client.peer, expected.channel_names());
+        Err(LinkError::Sensors { peer, theirs, ours })
+    }
+
+    /// The longest silence, s, of a rig in real time; None for a rig in lock-step.
+    pub fn pace(&self) -> Option<f64> {
+        self.client.is_real_time().then_some(self.client.silence.as_secs_f64())
+    }
+
+    /// The counters of the session.
+    pub fn counters(&self) -> Counters {
+        self.client.counters
+    }
+
+    /// What a rig in real time reports about its timing. Set at the end of the session.
+    pub fn timing(&self) -> Arc<OnceLock<Result<Timing, ReportLost>>> {
+        Arc::clone(&self.timing)
+    }
+
+    /// The reading of the present sample.
+    fn reading(&mut self) -> Result<Reading, LinkError> {
+        let end = Instant::now() + self.client.silence;
+        loop {
+            let reading = match (self.now, self.newest) {
+                (Some(reading), _) => return Ok(reading),
+                (None, Some(frame)) if frame.sequence == self.client.at => read_reading(&frame),
+                (None, Some(frame)) if frame.sequence > self.client.at => {
+                    let (next, ahead) = (read_reading(&frame), frame.sequence - self.client.at);
+                    self.client.counters.hold(ahead);
+                    let sensors = self.bridge.fill(self.phase, &next.sensors, ahead, self.turn);
+                    Reading { sensors, ..self.good }
+                }
+                _ => {
+                    self.wait(end)?;
+                    continue;
+                }
+            };
+            self.bridge.keep(self.phase, reading.sensors);
+            self.good = reading;
+            self.now = Some(reading);
+        }
+    }
+
+    /// Waits for a later reading.
+    fn wait(&mut self, end: Instant) -> Result<(), LinkError> {
+        let frame = self.client.receive(end)?.ok_or_else(|| self.client.silent())?;
+        if frame.kind != Kind::Sensors {
+            return Ok(());
+        }
+        if self.newest.is_some_and(|newest| newest.sequence >= frame.sequence) {
+            self.client.counters.late += 1;
+            return Ok(());
+        }
+        let lost = frame.sequence.saturating_sub(self.client.at);
+        if lost > self.client.patience() {
+            return Err(self.client.blackout(lost));
+        }
+        self.newest = Some(frame);
+        Ok(())
+    }
+
+    fn drive(&mut self, drive: Drive, flags: u8, step: f64) -> Result<(), LinkError> {
+        self.client.check_step(step)?;
+        let command = Command { drive, ..Command::default() };
+        let frame = write_command(self.client.frame(Kind::Drive), &command);
+        self.client.send(Frame { flags: frame.flags | flags, ..frame })?;
+        self.client.at += 1;
+        self.now = None;
+        // A rig that plays samples has no frequency: then a line is all that bridges a gap.
+        self.turn = drive.omega * step / TAU;
+        self.phase += self.turn;
+        Ok(())
+    }
+
+    /// Ends the session with a rig in real time. If this fails, the server's watchdog does.
+    fn farewell(&mut self) -> Result<(), LinkError> {
+        self.client.send(self.client.frame(Kind::Farewell))?;
+        let end = Instant::now() + REPORT;
+        loop {
+            match self.client.receive(end) {
+                Ok(Some(frame)) if frame.kind == Kind::Report => {
+                    let _ = self.timing.set(Ok(Timing::read(&frame)));
+                    return Ok(());
+                }
+                // Readings of the ramp to zero overtake a report that was lost.
+                Ok(Some(_)) | Err(LinkError::ShutDown { .. }) => {}
+                Ok(None) => return Ok(()),
+                Err(error) => return Err(error),
+            }
+        }
+    }
+}
+
+impl Rig for NetRig {
+    fn sense(&mut self) -> Result<Sensors, RigError> {
+        Ok(self.reading()?.sensors)
+    }
+
+    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        Ok(self.drive(drive, 0, step)?)
+    }
+
+    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
+        Ok(self.drive(drive, flag::HOLD, step)?)
+    }
+
+    fn ground_truth(&mut self) -> Result<Option<GroundTruth>, RigError> {
+        Ok(self.reading()?.ground_truth)
+    }
+}
+
+impl Drop for NetRig {
+    fn drop(&mut self) {
+        if self.client.is_real_time() {
+            let _ = self.farewell();
+            // Without effect if the report has arrived.
+            let _ = self.timing.set(Err(ReportLost));
+        }
+    }
+}
+
+/// A controller at a network address.
+#[derive(Debug)]
+pub struct NetController {
+    client: Client,
+    /// Waiting time for an answer before the last one is held; None beside a rig that waits, too.
+    patience: Option<Duration>,
+    /// Since when an answer is due.
+    waiting: Option<Instant>,
+    /// The last answer, and the number of samples until then.
+    good: Command,
+    answered: u64,
+    failed: bool,
+}
+
+impl NetController {
+    /// Opens a session with the controller server at `peer`; `sample_time` in s.
+    ///
+    /// Beside a rig in real time the client waits for an answer for half a sample period, and then holds the last one.
+    /// `pace` is the longest silence of such a rig, s; it also limits the silence of the controller. For a rig that waits,
+    /// `pace` is None. A server with another key does not answer.
+    pub fn connect(peer: SocketAddr, sample_time: f64, pace: Option<f64>, key: Option<Key>) -> Result<Self, LinkError> {
+        let mut client = Client::connect(Address::Tcp(peer), flag::CONTROLLER, sample_time, key)?;
+        let limit = pace.and_then(|seconds| Duration::try_from_secs_f64(seconds).ok());
+        client.silence = limit.map_or(client.silence, |limit| limit.min(client.silence));
+        Ok(Self {
+            client,
+            patience: pace.map(|_| Duration::from_secs_f64(0.5 * sample_time)),
+            waiting: None,
+            good: Command::default(),
+            answered: 0,
+            failed: false,
+        })
+    }
+
+    /// The counters of the session.
+    pub fn counters(&self) -> Counters {
+        self.client.counters
+    }
+
+    fn ask(&mut self, sensors: Sensors, active: bool) -> Result<Command, LinkError> {
+        let reading = Reading { sensors, ground_truth: None };
+        let mut frame = write_reading(self.client.frame(Kind::Sensors), &reading);
+        frame.flags |= if active { flag::ACTIVE } else { 0 };
+        self.client.send(frame)?;
+        let now = Instant::now();
+        let end = *self.waiting.get_or_insert(now) + self.client.silence;
+        let until = self.patience.map_or(end, |patience| (now + patience).min(end));
+        let command = loop {
+            let Some(frame) = self.client.receive(until)? else {
+                if Instant::now() >= end {
+                    return Err(self.client.silent());
+                }
+                self.client.counters.hold(self.client.at + 1 - self.answered);
+                break self.held(active);
+            };
+            self.good = self.read(&frame)?;
+            self.waiting = None;
+            self.answered = frame.sequence + 1;
+            if frame.sequence == self.client.at {
+                break self.good;
+            }
+            self.client.counters.late += 1;
+        };
+        self.client.at += 1;
+        Ok(command)
+    }
+
+    /// The last answer, for a sample without one.
+    fn held(&self, active: bool) -> Command {
+        let drive = if active {
+            self.good.drive
+        } else {
+            Drive { omega: self.good.drive.omega, ..Drive::default() }
+        };
+        Command { drive, settled: false, ..self.good }
+    }
+
+    /// The answer to this sample or an earlier one.
+    fn read(&self, frame: &Frame) -> Result<Command, LinkError> {
+        let command = read_command(frame);
+        let Drive { omega, amplitude, .. } = command.drive;
+        let valid = frame.values.iter().all(|x| x.is_finite()) && omega >= 0.0 && amplitude >= 0.0;
+        let due = frame.kind == Kind::Drive && frame.sequence <= self.client.at;
+        (valid && due).then_some(command).ok_or_else(|| self.client.invalid())
+    }
+}
+
+impl Controller for NetController {
+    fn sample(&mut self, sensors: Sensors, active: bool) -> Result<Command, ControllerError> {
+        if self.failed {
+            return Err(self.client.silent().into());
+        }
+        let answer = self.ask(sensors, active);
+        // Latched: after one failure the peer is not asked again.
+        self.failed = answer.is_err();
+        Ok(answer?)
+    }
+
+    fn hold_response(&mut self, to: Move, phase_target: f64) -> Result<(), ControllerError> {
+        let frame = write_move(self.client.frame(Kind::Move), to, phase_target);
+        Ok(self.client.send(frame)?)
+    }
+
+    fn hold_drive(&mut self) -> Result<(), ControllerError> {
+        let frame = self.client.frame(Kind::Move);
+        Ok(self.client.send(Frame { flags: flag::HOLD, ..frame })?)
+    }
 }

@@ -1,6 +1,8 @@
-//! The frame: 84 bytes, little-endian, one layout for all kinds. The specification is `docs/network-protocol.md`.
+//! The frame: 84 bytes, little-endian, one layout for all kinds, and the readings, drives, moves and refusals that it carries.
+//! The specification is `docs/network-protocol.md`.
 
 use thiserror::Error;
+use vines_testbench::rig::{Command, ControllerError, Drive, Fault, GroundTruth, LoopState, Move, Sensors};
 
 /// Version of the protocol.
 pub const VERSION: u16 = 2;
@@ -165,6 +167,221 @@ impl Frame {
             values: std::array::from_fn(|n| f64::from_bits(word(32 + 8 * n))),
         })
     }
+}
+
+/// Readings of a sample.
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
+pub(crate) struct Reading {
+    pub sensors: Sensors,
+    pub ground_truth: Option<GroundTruth>,
+}
+
+pub(crate) fn write_reading(mut frame: Frame, reading: &Reading) -> Frame {
+    let Reading { sensors, ground_truth } = reading;
+    frame.kind = Kind::Sensors;
+    if sensors.reference.is_some() {
+        frame.flags |= flag::REFERENCE;
+    }
+    if ground_truth.is_some() {
+        frame.flags |= flag::GROUND_TRUTH;
+    }
+    let inside = ground_truth.unwrap_or_default();
+    frame.values = [
+        sensors.response,
+        sensors.reference.unwrap_or(0.0),
+        inside.impacts as f64,
+        inside.impact_time,
+        inside.impact_velocity,
+        inside.particle_velocity,
+    ];
+    frame
+}
+
+pub(crate) fn read_reading(frame: &Frame) -> Reading {
+    let [
+        response,
+        reference,
+        impacts,
+        impact_time,
+        impact_velocity,
+        particle_velocity,
+    ] = frame.values;
+    Reading {
+        sensors: Sensors {
+            response,
+            reference: frame.has(flag::REFERENCE).then_some(reference),
+        },
+        ground_truth: frame.has(flag::GROUND_TRUTH).then_some(GroundTruth {
+            impacts: impacts as i64,
+            impact_time,
+            impact_velocity,
+            particle_velocity,
+        }),
+    }
+}
+
+pub(crate) fn write_command(mut frame: Frame, command: &Command) -> Frame {
+    frame.kind = Kind::Drive;
+    if command.settled {
+        frame.flags |= flag::SETTLED;
+    }
+    if command.phase_error.is_none() {
+        frame.flags |= flag::NO_PHASE;
+    }
+    let Drive { omega, amplitude, displacement } = command.drive;
+    // The state is counted from 1, so that 0 means that it is not reported.
+    let state = command.state.map_or(0.0, |state| f64::from(state as u8) + 1.0);
+    let fault = command.fault.map_or(0.0, |fault| f64::from(fault as u8));
+    let phase_error = command.phase_error.unwrap_or(0.0);
+    frame.values = [omega, amplitude, displacement, phase_error, state, fault];
+    frame
+}
+
+pub(crate) fn read_command(frame: &Frame) -> Command {
+    let [omega, amplitude, displacement, phase_error, state, fault] = frame.values;
+    Command {
+        drive: Drive { omega, amplitude, displacement },
+        phase_error: (!frame.has(flag::NO_PHASE)).then_some(phase_error),
+        settled: frame.has(flag::SETTLED),
+        state: LoopState::of_number(state as i32 - 1),
+        fault: Fault::of_number(fault as i32),
+    }
+}
+
+/// Writes a move of the response and its phase target, rad, into a frame. A response of 0 ends the control of the response.
+pub(crate) fn write_move(mut frame: Frame, to: Move, phase_target: f64) -> Frame {
+    frame.kind = Kind::Move;
+    frame.values = [
+        to.response,
+        to.duration,
+        to.amplitude,
+        to.omega,
+        phase_target,
+        to.growth,
+    ];
+    frame
+}
+
+/// The move and the phase target in a frame.
+pub(crate) fn read_move(frame: &Frame) -> (Move, f64) {
+    let [response, duration, amplitude, omega, phase_target, growth] = frame.values;
+    let to = Move { response, duration, amplitude, omega, growth };
+    (to, phase_target)
+}
+
+/// Reason of a server to refuse a session, or to end it, with its code.
+#[derive(Debug, Clone, Copy, PartialEq, Error)]
+#[expect(missing_docs, reason = "the messages explain the variants")]
+pub enum Refusal {
+    /// 1
+    #[error("it has another client; sessions are served one at a time")]
+    Busy,
+    /// 2: the sample time of the server, s.
+    #[error("its sample time is {0} s, which differs from that of this program: use the same scene for both")]
+    SampleTime(f64),
+    /// 3
+    #[error("it is a rig where a controller is needed, or the reverse")]
+    Role,
+    /// 4: the version of the server.
+    #[error("it has version {0} of the protocol, this program has {VERSION}")]
+    Version(u16),
+    /// 5: a value, rad/s or m, that is not finite or above its limit: frequency, amplitude, displacement.
+    #[error("{}", excess(*index, *value, *limit))]
+    Drive { index: usize, value: f64, limit: f64 },
+    /// 6
+    #[error("a frame was damaged, or was not that of the present sample")]
+    Unexpected,
+    /// 7: what the controller cannot move, and the value that it refuses.
+    #[error("its controller {}", immovable(*index, *value))]
+    Move { index: usize, value: f64 },
+    #[error("reason {0}")]
+    Other(f64),
+}
+
+impl Refusal {
+    pub(crate) fn answer(self, cause: &Frame) -> Frame {
+        let values = match self {
+            Self::Busy => [1.0, 0.0, 0.0, 0.0],
+            Self::SampleTime(seconds) => [2.0, seconds, 0.0, 0.0],
+            Self::Role => [3.0, 0.0, 0.0, 0.0],
+            Self::Version(version) => [4.0, version.into(), 0.0, 0.0],
+            Self::Drive { index, value, limit } => [5.0, index as f64, value, limit],
+            Self::Unexpected => [6.0, 0.0, 0.0, 0.0],
+            Self::Move { index, value } => [7.0, index as f64, value, 0.0],
+            Self::Other(code) => [code, 0.0, 0.0, 0.0],
+        };
+        let [code, first, value, limit] = values;
+        let values = [code, first, value, limit, 0.0, 0.0];
+        Frame { flags: 0, kind: Kind::Refusal, values, ..*cause }
+    }
+
+    pub(crate) fn read(frame: &Frame) -> Self {
+        let [code, first, value, limit, ..] = frame.values;
+        match code as u8 {
+            1 => Self::Busy,
+            2 => Self::SampleTime(first),
+            3 => Self::Role,
+            4 => Self::Version(first as u16),
+            5 => Self::Drive { index: first as usize, value, limit },
+            6 => Self::Unexpected,
+            7 => Self::Move { index: first as usize, value },
+            _ => Self::Other(code),
+        }
+    }
+}
+
+/// Values of a refused move, by their numbers from 1, with unit and allowed range: those of the frame, then what the controller lacks.
+const MOVE: [(&str, &str, &str); 8] = [
+    ("response", "m", "above 0"),
+    ("duration", "s", "0 or above"),
+    ("amplitude", "m", CONFIGURED),
+    ("omega", "rad/s", CONFIGURED),
+    ("phase_target", "rad", CONFIGURED),
+    ("growth", "m/s", CONFIGURED),
+    ("amplitude_max", "m", ""),
+    ("state", "", ""),
+];
+const CONFIGURED: &str = "a finite number that the configuration of the controller allows";
+
+impl From<ControllerError> for Refusal {
+    /// The refusal of a move.
+    fn from(error: ControllerError) -> Self {
+        let (index, value) = match error {
+            ControllerError::Refused(error) => {
+                let index = MOVE.iter().position(|(name, ..)| *name == error.name);
+                (index.map_or(0, |index| index + 1), error.value.unwrap_or(f64::NAN))
+            }
+            ControllerError::NoResponseLoop => (MOVE.len() + 1, 0.0),
+            ControllerError::Failed(_) => (0, 0.0),
+        };
+        Self::Move { index, value }
+    }
+}
+
+/// The message for a move that is refused.
+fn immovable(index: usize, value: f64) -> String {
+    match index {
+        1..=6 => {
+            let (name, unit, allowed) = MOVE[index - 1];
+            format!("refuses a move with {name} = {value} {unit}: allowed is {allowed}")
+        }
+        7 => "has no limit of the drive, which the control of the response amplitude needs: set phase_lock.amplitude_max in its scene".into(),
+        8 => format!(
+            "is in state {value}: the response amplitude can be controlled in a closed loop only, in state 2 (acquiring) or 3 (locked)"
+        ),
+        9 => "cannot control the response amplitude".into(),
+        _ => "cannot control the response amplitude now".into(),
+    }
+}
+
+/// The message for a drive that is not allowed.
+fn excess(index: usize, value: f64, limit: f64) -> String {
+    let (name, unit, advice) = match index {
+        0 => ("frequency", "rad/s", "the limit is half its sample rate"),
+        1 => ("amplitude", "m", "`vines rig --max-amplitude` sets the limit"),
+        _ => ("displacement", "m", "`vines rig --max-amplitude` sets the limit"),
+    };
+    format!("the {name} of the drive is {value:e} {unit}, allowed is up to {limit:e} {unit}; {advice}")
 }
 
 #[cfg(test)]

@@ -1,14 +1,124 @@
-//! Frames over TCP and UDP, with a deadline for receiving.
+//! Frames over TCP and UDP, with a deadline for receiving, and their authentication.
 
+use std::fmt::{self, Debug, Formatter};
 use std::hint;
 use std::io::{self, ErrorKind, Read, Write};
 use std::net::{IpAddr, Ipv4Addr, Ipv6Addr, SocketAddr, TcpListener, TcpStream, UdpSocket};
 use std::thread;
 use std::time::{Duration, Instant};
 
+use hmac::{Hmac, KeyInit, Mac};
+use sha2::{Digest, Sha256};
+
 use super::address::{Address, is_loopback};
-use super::frame::{Frame, FrameError};
-use super::seal::{Key, Seal, Side};
+use super::frame::{Frame, FrameError, Kind, SIZE};
+
+/// Length of the authentication code, bytes.
+const TAG: usize = 32;
+/// Shortest secret, bytes.
+const SECRET: usize = 16;
+
+/// A shared key.
+#[derive(Clone, Copy, PartialEq, Eq)]
+pub struct Key([u8; 32]);
+
+impl Key {
+    /// The key of a secret; None if it is shorter than 16 bytes. Space at its end does not count.
+    pub fn of(secret: &[u8]) -> Option<Self> {
+        let secret = secret.trim_ascii_end();
+        (secret.len() >= SECRET).then(|| Self(Sha256::digest(secret).into()))
+    }
+}
+
+impl Debug for Key {
+    fn fmt(&self, f: &mut Formatter<'_>) -> fmt::Result {
+        f.write_str("Key")
+    }
+}
+
+/// One side of a connection: which frames it sends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Side {
+    Client = 1,
+    Server = 2,
+}
+
+/// Encodes and decodes frames, with a code if there is a key.
+///
+/// The code covers the sender's side, a number that the server draws for the session, and the frame, in which the client's number of
+/// the session and the number of the sample are counters against a replay. Hello, Welcome and the refusal of a session come before the
+/// number of the server, and are covered without it.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Seal {
+    key: Option<Key>,
+    side: Side,
+    /// The client's number of the session, and the server's.
+    session: Option<(u64, [f64; 2])>,
+}
+
+impl Seal {
+    pub fn new(key: Option<Key>, side: Side) -> Self {
+        Self { key, side, session: None }
+    }
+
+    /// Length of a frame, bytes.
+    pub fn size(&self) -> usize {
+        SIZE + if self.key.is_some() { TAG } else { 0 }
+    }
+
+    /// Draws the server's number of a session: integers that are exact as values of a frame, or zeros without a key.
+    pub fn draw(&self) -> Result<[f64; 2], getrandom::Error> {
+        let number = || Ok((getrandom::u64()? >> 12) as f64);
+        self.key.map_or(Ok([0.0; 2]), |_| Ok([number()?, number()?]))
+    }
+
+    /// From now on, frames of this session need its numbers.
+    pub fn begin(&mut self, session: u64, drawn: [f64; 2]) {
+        self.session = Some((session, drawn));
+    }
+
+    /// The bytes of a frame.
+    pub fn encode(&self, frame: &Frame) -> Vec<u8> {
+        let mut bytes = frame.encode().to_vec();
+        if let Some(mac) = self.mac(frame, &bytes, self.side) {
+            bytes.extend(mac.finalize().into_bytes());
+        }
+        bytes
+    }
+
+    /// Reads a datagram of the other side.
+    pub fn decode(&self, bytes: &[u8]) -> Result<Frame, FrameError> {
+        if self.key.is_none() {
+            return Frame::decode(bytes);
+        }
+        let (bytes, tag) = bytes.split_at(bytes.len().min(SIZE));
+        let frame = Frame::decode(bytes)?;
+        let other = match self.side {
+            Side::Client => Side::Server,
+            Side::Server => Side::Client,
+        };
+        let mac = self.mac(&frame, bytes, other).ok_or(FrameError::Tag)?;
+        // In constant time.
+        mac.verify_slice(tag).map_err(|_| FrameError::Tag)?;
+        Ok(frame)
+    }
+
+    fn mac(&self, frame: &Frame, bytes: &[u8], from: Side) -> Option<Hmac<Sha256>> {
+        let opens = matches!(frame.kind, Kind::Hello | Kind::Welcome);
+        let session = self.session.filter(|(number, _)| *number == frame.session && !opens);
+        // Only the start of a session is valid without the server's number.
+        if session.is_none() && !opens && frame.kind != Kind::Refusal {
+            return None;
+        }
+        let mut mac = Hmac::<Sha256>::new_from_slice(&self.key?.0).ok()?;
+        mac.update(&[from as u8, session.is_some().into()]);
+        for number in session.map_or([0.0; 2], |(_, drawn)| drawn) {
+            mac.update(&number.to_le_bytes());
+        }
+        mac.update(bytes);
+        Some(mac)
+    }
+}
 
 /// Shorter waits use polling: the time-outs of the system may be as coarse as 16 ms, which is several samples.
 const FINE: Duration = Duration::from_millis(20);
@@ -16,37 +126,49 @@ const FINE: Duration = Duration::from_millis(20);
 const POLL: Duration = Duration::from_micros(50);
 /// Shorter waits do not sleep: the system wakes a program up later than it asks for, by about this.
 const SPIN: Duration = Duration::from_micros(100);
-/// Interval at which a server without a session looks for connections and what they say.
+/// Interval at which a server without a session looks for connections and their frames.
 const ACCEPT: Duration = Duration::from_millis(5);
 /// Longest time for sending a frame over TCP to a peer that does not read.
 const SEND: Duration = Duration::from_secs(5);
 /// Longest time for a TCP client to say Hello.
 const HELLO: Duration = Duration::from_secs(1);
 
-/// A frame, or what arrived instead.
-pub(super) type Received = Result<Frame, FrameError>;
+/// A frame, or why the bytes are none.
+pub(crate) type Received = Result<Frame, FrameError>;
 
-/// The client's end of a connection.
+/// One end of a connection: of a client, or of a server and all of its connections.
 #[derive(Debug)]
-pub(super) struct Link {
-    socket: LinkSocket,
+pub(crate) struct Link {
+    socket: Socket,
     pub seal: Seal,
 }
 
 #[derive(Debug)]
-enum LinkSocket {
-    Tcp(FrameStream),
+enum Socket {
+    Tcp(Connections),
     Udp(UdpSocket),
 }
 
+/// TCP connections.
+#[derive(Debug)]
+struct Connections {
+    /// None at the end of a client.
+    listener: Option<TcpListener>,
+    /// The peer of the session.
+    peer: Option<Connection>,
+    /// Clients of a server that have not opened a session.
+    visitors: Vec<Connection>,
+}
+
 impl Link {
+    /// The client's end of a connection to the server at `peer`.
     pub fn connect(peer: Address, patience: Duration, key: Option<Key>) -> io::Result<Self> {
         let seal = Seal::new(key, Side::Client);
         let socket = match peer {
-            Address::Tcp(to) => LinkSocket::Tcp(FrameStream::new(
-                TcpStream::connect_timeout(&to, patience)?,
-                seal.size(),
-            )?),
+            Address::Tcp(to) => {
+                let connection = Connection::new(TcpStream::connect_timeout(&to, patience)?, to, seal.size())?;
+                Socket::Tcp(Connections { listener: None, peer: Some(connection), visitors: Vec::new() })
+            }
             Address::Udp(to) => {
                 // Bound to loopback if the peer is on loopback.
                 let own = match to.ip() {
@@ -57,113 +179,79 @@ impl Link {
                 let socket = UdpSocket::bind((own, 0))?;
                 // Datagrams of other senders do not arrive from now on.
                 socket.connect(to)?;
-                LinkSocket::Udp(socket)
+                Socket::Udp(socket)
             }
         };
         Ok(Self { socket, seal })
     }
 
-    /// Sends a frame. One that cannot be sent shows when no answer arrives.
-    pub fn send(&mut self, frame: &Frame) -> io::Result<()> {
-        let bytes = self.seal.encode(frame);
-        match &mut self.socket {
-            LinkSocket::Tcp(stream) => stream.send(&bytes),
-            LinkSocket::Udp(socket) => delivered(socket.send(&bytes)),
-        }
-    }
-
-    /// Waits for a frame until `deadline`. A frame that has arrived is returned even after the deadline.
-    pub fn receive(&mut self, deadline: Instant) -> io::Result<Option<Received>> {
-        match &mut self.socket {
-            LinkSocket::Tcp(stream) => stream.receive(deadline, &self.seal),
-            LinkSocket::Udp(socket) => Ok(receive_from(socket, deadline, &self.seal)?.map(|(frame, _)| frame)),
-        }
-    }
-}
-
-/// The server's end of all connections.
-#[derive(Debug)]
-pub(super) struct Listener {
-    socket: ListenerSocket,
-    pub seal: Seal,
-}
-
-#[derive(Debug)]
-enum ListenerSocket {
-    Tcp(Connections),
-    Udp(UdpSocket),
-}
-
-/// The connections of a TCP server.
-#[derive(Debug)]
-struct Connections {
-    listener: TcpListener,
-    /// The client of the session.
-    client: Option<(SocketAddr, FrameStream)>,
-    /// Those that have said nothing yet, and when they came.
-    visitors: Vec<(SocketAddr, FrameStream, Instant)>,
-}
-
-impl Listener {
+    /// The server's end of all connections to `address`.
     pub fn bind(address: Address, key: Option<Key>) -> io::Result<Self> {
         let socket = match address {
-            Address::Udp(address) => ListenerSocket::Udp(UdpSocket::bind(address)?),
+            Address::Udp(address) => Socket::Udp(UdpSocket::bind(address)?),
             Address::Tcp(address) => {
                 let listener = TcpListener::bind(address)?;
                 listener.set_nonblocking(true)?;
-                ListenerSocket::Tcp(Connections { listener, client: None, visitors: Vec::new() })
+                Socket::Tcp(Connections { listener: Some(listener), peer: None, visitors: Vec::new() })
             }
         };
         Ok(Self { socket, seal: Seal::new(key, Side::Server) })
     }
 
     pub fn is_real_time(&self) -> bool {
-        matches!(self.socket, ListenerSocket::Udp(_))
+        matches!(self.socket, Socket::Udp(_))
     }
 
+    /// Own address of a server.
     pub fn address(&self) -> io::Result<Address> {
-        Ok(match &self.socket {
-            ListenerSocket::Tcp(all) => Address::Tcp(all.listener.local_addr()?),
-            ListenerSocket::Udp(socket) => Address::Udp(socket.local_addr()?),
-        })
-    }
-
-    /// Waits for a frame until `deadline`, or less.
-    pub fn receive(&mut self, deadline: Instant) -> io::Result<Option<(Received, SocketAddr)>> {
-        match &mut self.socket {
-            ListenerSocket::Udp(socket) => receive_from(socket, deadline, &self.seal),
-            ListenerSocket::Tcp(all) => all.receive(deadline, &self.seal),
+        match &self.socket {
+            Socket::Udp(socket) => Ok(Address::Udp(socket.local_addr()?)),
+            Socket::Tcp(all) => match &all.listener {
+                Some(listener) => Ok(Address::Tcp(listener.local_addr()?)),
+                None => Err(ErrorKind::NotConnected.into()),
+            },
         }
     }
 
-    /// Sends a frame. If a TCP client has left, the next call of `receive` says so.
+    /// Waits for a frame until `deadline`, or less. A frame that has arrived is returned even after the deadline.
+    pub fn receive(&mut self, deadline: Instant) -> io::Result<Option<(Received, SocketAddr)>> {
+        match &mut self.socket {
+            Socket::Udp(socket) => receive_from(socket, deadline, &self.seal),
+            Socket::Tcp(all) => all.receive(deadline, &self.seal),
+        }
+    }
+
+    /// Sends a frame. A frame that cannot be sent shows when no answer arrives, or when `receive` finds the connection closed.
     pub fn send(&mut self, frame: &Frame, to: SocketAddr) -> io::Result<()> {
         let bytes = self.seal.encode(frame);
         match &mut self.socket {
-            ListenerSocket::Udp(socket) => delivered(socket.send_to(&bytes, to)),
-            ListenerSocket::Tcp(all) => {
-                let client = all.client.iter_mut().map(|(from, stream)| (from, stream));
-                let visitors = all.visitors.iter_mut().map(|(from, stream, _)| (from, stream));
-                let stream = client.chain(visitors).find(|(from, _)| **from == to);
-                stream.map_or(Ok(()), |(_, stream)| stream.send(&bytes))
+            // A client's socket is connected: some systems then refuse an address.
+            Socket::Udp(socket) if self.seal.side == Side::Client => delivered(socket.send(&bytes)),
+            Socket::Udp(socket) => delivered(socket.send_to(&bytes, to)),
+            Socket::Tcp(all) => {
+                let connection = all
+                    .peer
+                    .iter_mut()
+                    .chain(&mut all.visitors)
+                    .find(|connection| connection.from == to);
+                connection.map_or(Ok(()), |connection| connection.send(&bytes))
             }
         }
     }
 
     /// The session is that of this client.
     pub fn prefer(&mut self, client: SocketAddr) {
-        if let ListenerSocket::Tcp(all) = &mut self.socket
-            && let Some(index) = all.visitors.iter().position(|(from, ..)| *from == client)
+        if let Socket::Tcp(all) = &mut self.socket
+            && let Some(index) = all.visitors.iter().position(|visitor| visitor.from == client)
         {
-            let (from, stream, _) = all.visitors.swap_remove(index);
-            all.client = Some((from, stream));
+            all.peer = Some(all.visitors.swap_remove(index));
         }
     }
 
     pub fn close(&mut self, client: SocketAddr) {
-        if let ListenerSocket::Tcp(all) = &mut self.socket {
-            all.client.take_if(|(from, _)| *from == client);
-            all.visitors.retain(|(from, ..)| *from != client);
+        if let Socket::Tcp(all) = &mut self.socket {
+            all.peer.take_if(|peer| peer.from == client);
+            all.visitors.retain(|visitor| visitor.from != client);
         }
     }
 }
@@ -171,37 +259,36 @@ impl Listener {
 impl Connections {
     fn receive(&mut self, deadline: Instant, seal: &Seal) -> io::Result<Option<(Received, SocketAddr)>> {
         loop {
-            while let Ok((stream, from)) = self.listener.accept() {
-                // One that fails has been closed.
-                if let Ok(stream) = FrameStream::new(stream, seal.size()) {
-                    self.visitors.push((from, stream, Instant::now()));
-                }
+            while let Some(Ok((stream, from))) = self.listener.as_ref().map(TcpListener::accept) {
+                // A connection without options has been closed.
+                self.visitors.extend(Connection::new(stream, from, seal.size()));
             }
-            // Visitors are not waited for: they cost their client, and each other, no time.
+            // Visitors are not waited for: they cost the client of the session, and each other, no time.
             for index in (0..self.visitors.len()).rev() {
-                let (from, stream, since) = &mut self.visitors[index];
-                let from = *from;
-                let received = stream.receive(Instant::now(), seal)?;
+                let visitor = &mut self.visitors[index];
+                let received = visitor
+                    .receive(Instant::now(), seal)?
+                    .map(|frame| (frame, visitor.from));
                 let ends = match &received {
-                    None => since.elapsed() > HELLO,
+                    None => visitor.since.elapsed() > HELLO,
                     // Another version gets an answer.
-                    Some(Err(error)) => !matches!(error, FrameError::Version(_)),
-                    Some(Ok(_)) => false,
+                    Some((Err(error), _)) => !matches!(error, FrameError::Version(_)),
+                    Some((Ok(_), _)) => false,
                 };
                 if ends {
                     drop(self.visitors.swap_remove(index));
                 }
-                if let Some(received) = received {
-                    return Ok(Some((received, from)));
+                if received.is_some() {
+                    return Ok(received);
                 }
             }
-            if let Some((from, stream)) = &mut self.client {
-                let from = *from;
-                let received = stream.receive(deadline, seal)?;
-                if matches!(received, Some(Err(FrameError::Closed))) {
-                    self.client = None;
+            if let Some(peer) = &mut self.peer {
+                let received = peer.receive(deadline, seal)?.map(|frame| (frame, peer.from));
+                // A server forgets the connection; a client reads again that it is closed.
+                if matches!(received, Some((Err(FrameError::Closed), _))) && self.listener.is_some() {
+                    self.peer = None;
                 }
-                return Ok(received.map(|received| (received, from)));
+                return Ok(received);
             }
             let left = deadline.saturating_duration_since(Instant::now());
             if left.is_zero() {
@@ -214,19 +301,22 @@ impl Connections {
 
 /// A TCP connection.
 #[derive(Debug)]
-pub(super) struct FrameStream {
+struct Connection {
     stream: TcpStream,
+    from: SocketAddr,
+    since: Instant,
     bytes: Vec<u8>,
     /// Number of bytes of the next frame that have arrived.
     filled: usize,
 }
 
-impl FrameStream {
-    fn new(stream: TcpStream, size: usize) -> io::Result<Self> {
+impl Connection {
+    fn new(stream: TcpStream, from: SocketAddr, size: usize) -> io::Result<Self> {
         // Without this, the system collects small messages before it sends them.
         stream.set_nodelay(true)?;
         stream.set_write_timeout(Some(SEND))?;
-        Ok(Self { stream, bytes: vec![0; size], filled: 0 })
+        let (since, bytes) = (Instant::now(), vec![0; size]);
+        Ok(Self { stream, from, since, bytes, filled: 0 })
     }
 
     fn send(&mut self, bytes: &[u8]) -> io::Result<()> {
@@ -237,7 +327,7 @@ impl FrameStream {
     }
 
     fn receive(&mut self, deadline: Instant, seal: &Seal) -> io::Result<Option<Received>> {
-        let Self { stream, bytes, filled } = self;
+        let Self { stream, bytes, filled, .. } = self;
         while *filled < bytes.len() {
             let block = |time: Option<Duration>| {
                 stream.set_nonblocking(time.is_none())?;
@@ -309,3 +399,7 @@ fn delivered(sent: io::Result<usize>) -> io::Result<()> {
         _ => Ok(()),
     }
 }
+
+#[cfg(test)]
+#[path = "../tests/unit/link.rs"]
+mod tests;

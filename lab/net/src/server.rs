@@ -1,17 +1,86 @@
-//! The server: accepts one client at a time, for a rig or a controller.
+//! The server: one session at a time, for a rig or a controller.
 
+use std::f64::consts::PI;
 use std::io;
 use std::net::SocketAddr;
 use std::time::{Duration, Instant};
 
-use super::address::Address;
-use super::error::{LinkError, ServerError};
-use super::frame::{Frame, FrameError, Kind, VERSION, flag};
-use super::handshake::{Refusal, Service};
-use super::link::{Listener, Received};
-use super::report::{Ended, Session};
-use super::run::{Run, Served};
-use super::seal::Key;
+use super::address::{Address, LinkError, ServerError};
+use super::frame::{
+    Frame, FrameError, Kind, Reading, Refusal, VERSION, flag, read_command, read_move, read_reading, write_command,
+    write_reading,
+};
+use super::link::{Key, Link, Received};
+use super::timing::{Counters, Ended, Punctuality, RealTimeClock, Session, Timing};
+use vines_testbench::rig::{Controller, Drive, Rig, RigError};
+use vines_testbench::scene::Definition;
+
+/// Largest relative difference of two sample times that count as equal.
+pub(crate) const SAME_TIME: f64 = 1e-9;
+
+/// What a server offers.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Role {
+    /// A controller.
+    Controller,
+    /// A rig.
+    Rig {
+        /// Largest drive amplitude, m. A drive above it is refused.
+        max_amplitude: f64,
+        /// What its sensors read.
+        sensors: Definition,
+    },
+}
+
+/// Settings of a server.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Service {
+    /// What it offers.
+    pub role: Role,
+    /// Sample time, s.
+    pub sample_time: f64,
+    /// Longest silence of a client before its session is shut down, s.
+    pub silence: f64,
+}
+
+impl Service {
+    /// The answer to Hello.
+    pub(crate) fn welcome(&self, hello: &Frame) -> Result<Frame, Refusal> {
+        let (flags, channels) = match self.role {
+            Role::Rig { sensors, .. } => (0, sensors.channels()),
+            Role::Controller => (flag::CONTROLLER, 0),
+        };
+        if hello.flags & flag::CONTROLLER != flags {
+            return Err(Refusal::Role);
+        }
+        // Not a number is not the same, either.
+        let same = (hello.values[0] / self.sample_time - 1.0).abs() <= SAME_TIME;
+        if !same {
+            return Err(Refusal::SampleTime(self.sample_time));
+        }
+        let mut welcome = Frame { flags, ..Frame::new(Kind::Welcome, hello.session) };
+        welcome.values[..3].copy_from_slice(&[self.sample_time, self.silence, channels.into()]);
+        Ok(welcome)
+    }
+
+    /// The drive in a frame. What is not finite or above a limit must not reach a shaker.
+    pub(crate) fn drive(&self, frame: &Frame) -> Result<Drive, Refusal> {
+        let largest = match self.role {
+            Role::Rig { max_amplitude, .. } => max_amplitude,
+            Role::Controller => 0.0,
+        };
+        let limits = [PI / self.sample_time, largest, largest];
+        for (index, limit) in limits.into_iter().enumerate() {
+            let value = frame.values[index];
+            // The displacement has a sign.
+            let size = if index == 2 { value.abs() } else { value };
+            if !(0.0..=limit).contains(&size) {
+                return Err(Refusal::Drive { index, value, limit });
+            }
+        }
+        Ok(read_command(frame).drive)
+    }
+}
 
 /// Interval at which a server without a running clock checks whether it should stop.
 const IDLE: Duration = Duration::from_millis(50);
@@ -20,7 +89,7 @@ const BURST: u32 = 256;
 
 /// A server, one session at a time. Over UDP a rig runs in real time; over TCP it is in lock-step with the drives.
 pub struct Server {
-    listener: Listener,
+    link: Link,
     service: Service,
     /// The client of the last session, and the report on it.
     last: Option<(SocketAddr, Frame)>,
@@ -29,13 +98,13 @@ pub struct Server {
 impl Server {
     /// Listens on `address`; with port 0 the system chooses a free port. With a key, only for clients that have it.
     pub fn listen(address: Address, service: Service, key: Option<Key>) -> Result<Self, LinkError> {
-        let listener = Listener::bind(address, key).map_err(|source| LinkError::Listen { address, source })?;
-        Ok(Self { listener, service, last: None })
+        let link = Link::bind(address, key).map_err(|source| LinkError::Listen { address, source })?;
+        Ok(Self { link, service, last: None })
     }
 
     /// Address of the server.
     pub fn address(&self) -> io::Result<Address> {
-        self.listener.address()
+        self.link.address()
     }
 
     /// Serves sessions until `stop` returns true. `make` creates the rig, or the controller, of a session;
@@ -52,7 +121,7 @@ impl Server {
             let (due, idle) = (run.as_ref().and_then(Run::due), Instant::now() + IDLE);
             let deadline = due.map_or(idle, |due| due.min(idle));
             let received = if burst < BURST {
-                self.listener.receive(deadline)?
+                self.link.receive(deadline)?
             } else {
                 None
             };
@@ -66,7 +135,7 @@ impl Server {
                     run = self.open(&frame, from, &mut make)?
                 }
                 (Some((received, from)), run) => self.sort(run.as_mut(), received, from)?,
-                (None, Some(run)) if due.is_some_and(|due| Instant::now() >= due) => run.pass(&mut self.listener)?,
+                (None, Some(run)) if due.is_some_and(|due| Instant::now() >= due) => run.pass(&mut self.link)?,
                 (None, _) => {}
             }
             let stopped = stop();
@@ -74,7 +143,7 @@ impl Server {
                 run.end(Ended::Stopped);
             }
             if let Some(over) = run.take_if(|run| run.is_over()) {
-                self.listener.close(over.peer);
+                self.link.close(over.peer);
                 self.last = Some((over.peer, over.report()));
                 tell(&over.finish());
             }
@@ -98,13 +167,13 @@ impl Server {
                 return Ok(None);
             }
         };
-        self.listener.prefer(from);
-        let drawn = self.listener.seal.draw().map_err(io::Error::other)?;
+        self.link.prefer(from);
+        let drawn = self.link.seal.draw().map_err(io::Error::other)?;
         welcome.values[3..5].copy_from_slice(&drawn);
-        self.listener.seal.begin(hello.session, drawn);
-        let real_time = self.listener.is_real_time();
+        self.link.seal.begin(hello.session, drawn);
+        let real_time = self.link.is_real_time();
         let mut run = Run::new(make()?, self.service, real_time, from, welcome);
-        run.welcome(&mut self.listener)?;
+        run.welcome(&mut self.link)?;
         Ok(Some(run))
     }
 
@@ -118,7 +187,7 @@ impl Server {
                 if let Some(run) = run {
                     run.counters.malformed += 1;
                     // Over TCP, the refusal closes the connection.
-                    if version && run.peer == from && !self.listener.is_real_time() {
+                    if version && run.peer == from && !self.link.is_real_time() {
                         run.end(Ended::Refused);
                     }
                 }
@@ -126,14 +195,14 @@ impl Server {
                     self.refuse(Refusal::Version(VERSION), &Frame::new(Kind::Hello, 0), from)?;
                 }
             }
-            (Ok(frame), Some(run)) if run.is_client(from, frame.session) => run.handle(&frame, &mut self.listener)?,
+            (Ok(frame), Some(run)) if run.is_client(from, frame.session) => run.handle(&frame, &mut self.link)?,
             (Ok(frame), Some(run)) => {
                 run.counters.foreign += 1;
                 if frame.kind == Kind::Hello {
                     self.refuse(Refusal::Busy, &frame, from)?;
                 }
                 // Over TCP, nobody else may keep the server from its client.
-                self.listener.close(from);
+                self.link.close(from);
             }
             // The report was lost, and the session has ended in the meantime.
             (Ok(frame), None) if frame.kind == Kind::Farewell => {
@@ -141,14 +210,14 @@ impl Server {
                     .last
                     .filter(|(to, last)| (*to, last.session) == (from, frame.session));
                 if let Some((to, report)) = report {
-                    self.listener.send(&report, to)?;
+                    self.link.send(&report, to)?;
                 }
             }
             // The session of this client has ended.
             (Ok(frame), None) if frame.kind == Kind::Drive => {
                 let mut answer = Frame { kind: Kind::Sensors, values: [0.0; 6], ..frame };
                 answer.flags = flag::SHUT_DOWN;
-                self.listener.send(&answer, from)?;
+                self.link.send(&answer, from)?;
             }
             (Ok(_), None) => {}
         }
@@ -156,8 +225,325 @@ impl Server {
     }
 
     fn refuse(&mut self, refusal: Refusal, cause: &Frame, to: SocketAddr) -> io::Result<()> {
-        self.listener.send(&refusal.answer(cause), to)?;
-        self.listener.close(to);
+        self.link.send(&refusal.answer(cause), to)?;
+        self.link.close(to);
         Ok(())
     }
 }
+
+/// Longest time from Hello to the first drive of a rig in real time.
+const FIRST_DRIVE: Duration = Duration::from_secs(5);
+
+/// What a server offers in a session.
+pub enum Served {
+    /// A rig.
+    Rig(Box<dyn Rig>),
+    /// A controller.
+    Controller(Box<dyn Controller>),
+}
+
+/// A session.
+pub(crate) struct Run {
+    served: Served,
+    service: Service,
+    real_time: bool,
+    pub peer: SocketAddr,
+    welcome: Frame,
+    opened: Instant,
+    /// Time of the last frame.
+    heard: Instant,
+    pub counters: Counters,
+    /// Number of the present sample.
+    at: u64,
+    /// Number of the newest drive of a rig in real time.
+    newest: u64,
+    drive: Ramp,
+    /// The clock of a rig in real time, from the first drive on.
+    clock: Option<RealTimeClock>,
+    ended: Option<Ended>,
+}
+
+impl Run {
+    pub fn new(served: Served, service: Service, real_time: bool, peer: SocketAddr, welcome: Frame) -> Self {
+        let opened = Instant::now();
+        Self {
+            served,
+            service,
+            real_time,
+            peer,
+            welcome,
+            opened,
+            heard: opened,
+            counters: Counters::default(),
+            at: 0,
+            newest: 0,
+            drive: Ramp::default(),
+            clock: None,
+            ended: None,
+        }
+    }
+
+    pub fn is_client(&self, from: SocketAddr, session: u64) -> bool {
+        (self.peer, self.welcome.session) == (from, session)
+    }
+
+    /// When the next sample is due in real time, or the client has been silent for too long.
+    pub fn due(&self) -> Option<Instant> {
+        match &self.clock {
+            Some(clock) => Some(clock.due(self.at + 1)),
+            // A repeated Hello is not a sign of life: anyone can send a copy.
+            None if self.real_time => Some(self.opened + FIRST_DRIVE),
+            None => self
+                .heard
+                .checked_add(Duration::try_from_secs_f64(self.service.silence).ok()?),
+        }
+    }
+
+    /// Shuts the drive down. In real time the clock continues until the drive is zero.
+    pub fn end(&mut self, ended: Ended) {
+        self.drive.shut_down();
+        self.ended.get_or_insert(ended);
+    }
+
+    pub fn is_over(&self) -> bool {
+        self.ended.is_some() && (self.clock.is_none() || self.drive.is_down())
+    }
+
+    /// Sends Welcome, and the first reading of a rig.
+    pub fn welcome(&mut self, link: &mut Link) -> Result<(), ServerError> {
+        link.send(&self.welcome, self.peer)?;
+        self.tell_reading(link)
+    }
+
+    pub fn handle(&mut self, frame: &Frame, link: &mut Link) -> Result<(), ServerError> {
+        self.heard = Instant::now();
+        self.counters.received += 1;
+        match (frame.kind, &self.served) {
+            (Kind::Drive, Served::Rig(_)) if self.real_time => self.take_drive(frame),
+            (Kind::Hello, _) if self.real_time && self.clock.is_none() => self.welcome(link)?,
+            (Kind::Hello, _) if self.real_time => {}
+            (Kind::Farewell, _) if self.real_time => {
+                self.end(Ended::Farewell);
+                link.send(&self.report(), self.peer)?;
+            }
+            _ if self.real_time => self.counters.malformed += 1,
+            _ => {
+                if let Err(refusal) = self.step(frame, link)? {
+                    let cause = Frame { sequence: self.at, ..*frame };
+                    link.send(&refusal.answer(&cause), self.peer)?;
+                    self.end(Ended::Refused);
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// Answers a frame in lock-step.
+    fn step(&mut self, frame: &Frame, link: &mut Link) -> Result<Result<(), Refusal>, ServerError> {
+        match (&mut self.served, frame.kind) {
+            _ if frame.sequence != self.at => Ok(Err(Refusal::Unexpected)),
+            (Served::Controller(controller), Kind::Sensors) => {
+                let command = controller.sample(read_reading(frame).sensors, frame.has(flag::ACTIVE))?;
+                let answer = write_command(Frame { flags: 0, ..*frame }, &command);
+                self.at += 1;
+                link.send(&answer, self.peer)?;
+                Ok(Ok(()))
+            }
+            (Served::Controller(controller), Kind::Move) => {
+                let (to, phase_target) = read_move(frame);
+                // No answer: the next drive follows from it. A refusal ends the session.
+                let held = if frame.has(flag::HOLD) {
+                    controller.hold_drive()
+                } else {
+                    controller.hold_response(to, phase_target)
+                };
+                Ok(held.map_err(Refusal::from))
+            }
+            (Served::Rig(_), Kind::Drive) => match self.service.drive(frame) {
+                Err(refusal) => Ok(Err(refusal)),
+                Ok(drive) => {
+                    self.drive.set(drive, frame.has(flag::HOLD));
+                    self.advance()?;
+                    self.tell_reading(link)?;
+                    Ok(Ok(()))
+                }
+            },
+            _ => Ok(Err(Refusal::Unexpected)),
+        }
+    }
+
+    /// Takes a drive in real time, if it is valid and newer than the last one.
+    fn take_drive(&mut self, frame: &Frame) {
+        let known = self.clock.is_some() && frame.sequence <= self.newest;
+        let drive = self.service.drive(frame).ok().filter(|_| frame.sequence <= self.at);
+        self.counters.late += u64::from(known || frame.sequence < self.at);
+        self.counters.malformed += u64::from(drive.is_none());
+        if let Some(drive) = drive.filter(|_| !known) {
+            self.drive.set(drive, frame.has(flag::HOLD));
+            self.newest = frame.sequence;
+            self.clock
+                .get_or_insert_with(|| RealTimeClock::start(self.service.sample_time));
+        }
+    }
+
+    /// The deadline has passed: a sample is due, or the client is silent.
+    pub fn pass(&mut self, link: &mut Link) -> Result<(), ServerError> {
+        let Some(clock) = &mut self.clock else {
+            self.end(Ended::Silence);
+            return Ok(());
+        };
+        clock.serve(self.at + 1);
+        if self.newest < self.at && !self.drive.is_shut_down() {
+            self.counters.hold(self.at - self.newest);
+            // The age of a drive counts from its sample, not from its arrival: a client that is too far behind is as bad as a
+            // silent one.
+            if (self.at - self.newest) as f64 * self.service.sample_time > self.service.silence {
+                self.end(Ended::Silence);
+            }
+        }
+        self.advance()?;
+        self.tell_reading(link)
+    }
+
+    fn advance(&mut self) -> Result<(), ServerError> {
+        if let Served::Rig(rig) = &mut self.served {
+            self.drive.apply(rig.as_mut(), self.service.sample_time)?;
+            self.at += 1;
+        }
+        Ok(())
+    }
+
+    /// Sends the present reading of a rig.
+    fn tell_reading(&mut self, link: &mut Link) -> Result<(), ServerError> {
+        let Served::Rig(rig) = &mut self.served else {
+            return Ok(());
+        };
+        let reading = Reading { sensors: rig.sense()?, ground_truth: rig.ground_truth()? };
+        let mut frame = write_reading(Frame::new(Kind::Sensors, self.welcome.session), &reading);
+        frame.sequence = self.at;
+        frame.time = self.at as f64 * self.service.sample_time;
+        if self.drive.is_shut_down() {
+            frame.flags |= flag::SHUT_DOWN;
+        }
+        Ok(link.send(&frame, self.peer)?)
+    }
+
+    /// The report to the client of a rig in real time.
+    pub fn report(&self) -> Frame {
+        let none = Punctuality::default();
+        let all = self.clock.as_ref().map_or(&none, |clock| &clock.punctuality);
+        let timing = Timing {
+            samples: self.at,
+            missed: all.missed,
+            worst: all.worst,
+            held: self.counters.held,
+            quantiles: [0.99, 0.9999].map(|share| all.quantile(share)),
+        };
+        timing.write(self.welcome.session)
+    }
+
+    /// Ends the ramp of a rig in lock-step, and reports.
+    pub fn finish(mut self) -> Session {
+        let samples = self.at;
+        if let Served::Rig(rig) = &mut self.served {
+            while !self.drive.is_down() {
+                // An error of the rig changes nothing now: the session ends.
+                let _ = self.drive.apply(rig.as_mut(), self.service.sample_time);
+            }
+        }
+        let began = self.clock.as_ref().map_or(self.opened, |clock| clock.due(0));
+        Session {
+            peer: self.peer,
+            ended: self.ended.unwrap_or(Ended::Stopped),
+            samples,
+            sample_time: self.service.sample_time,
+            seconds: began.elapsed().as_secs_f64(),
+            punctuality: self.clock.map(|clock| clock.punctuality),
+            counters: self.real_time.then_some(self.counters),
+        }
+    }
+}
+
+/// Number of samples of the ramp to zero after a shutdown.
+pub const RAMP_SAMPLES: u32 = 100;
+
+/// A drive that can be shut down for the rest of a session.
+#[derive(Debug, Clone, Copy, Default)]
+pub(crate) struct Ramp {
+    drive: Drive,
+    /// Whether the rig holds the displacement of the drive.
+    pub holds: bool,
+    /// The displacement before that of the drive, m, and whether the drive has arrived since the last sample.
+    before: f64,
+    is_new: bool,
+    /// Remaining samples of the ramp after the shutdown.
+    left: Option<u32>,
+}
+
+impl Ramp {
+    /// Sets a new drive; without effect after the shutdown.
+    pub fn set(&mut self, drive: Drive, holds: bool) {
+        if self.left.is_none() {
+            self.before = self.drive.displacement;
+            (self.drive, self.holds, self.is_new) = (drive, holds, true);
+        }
+    }
+
+    /// Drives the rig for the next sample period of `step` seconds.
+    pub fn apply(&mut self, rig: &mut dyn Rig, step: f64) -> Result<(), RigError> {
+        if self.holds && !self.is_new && self.left.is_none() {
+            self.extrapolate(step);
+        }
+        self.is_new = false;
+        let drive = self.next();
+        if self.holds {
+            rig.hold(drive, step)
+        } else {
+            rig.advance(drive, step)
+        }
+    }
+
+    /// Continues a sine of which the next displacement is late: a base that stops and jumps would be a disturbance of the structure.
+    /// A drive without an amplitude is not known to be a sine.
+    fn extrapolate(&mut self, step: f64) {
+        let Drive { omega, amplitude, displacement } = self.drive;
+        if amplitude > 0.0 {
+            let next = 2.0 * (omega * step).cos() * displacement - self.before;
+            self.before = displacement;
+            self.drive.displacement = next.clamp(-amplitude, amplitude);
+        }
+    }
+
+    /// Shuts the drive down for the rest of the session.
+    pub fn shut_down(&mut self) {
+        self.left.get_or_insert(RAMP_SAMPLES);
+    }
+
+    /// Whether the drive has been shut down.
+    pub fn is_shut_down(&self) -> bool {
+        self.left.is_some()
+    }
+
+    /// Whether the drive has been shut down and is zero.
+    pub fn is_down(&self) -> bool {
+        self.left == Some(0)
+    }
+
+    /// The drive of the next sample period.
+    fn next(&mut self) -> Drive {
+        let Some(left) = &mut self.left else {
+            return self.drive;
+        };
+        *left = left.saturating_sub(1);
+        let share = f64::from(*left) / f64::from(RAMP_SAMPLES);
+        Drive {
+            omega: self.drive.omega,
+            amplitude: share * self.drive.amplitude,
+            displacement: share * self.drive.displacement,
+        }
+    }
+}
+
+#[cfg(test)]
+#[path = "../tests/unit/server.rs"]
+mod tests;

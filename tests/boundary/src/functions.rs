@@ -12,7 +12,7 @@ pub type Raw = *mut c_void;
 
 /// Declares a structure with a pointer for each function.
 macro_rules! functions {
-    ($($name:ident($($argument:ty),*) $(-> $answer:ty)?;)*) => {
+    ($dollar:tt $($name:ident($($argument:ty),*) $(-> $answer:ty)?;)*) => {
         /// Every function that the standard names.
         #[derive(Clone, Copy, Debug)]
         pub struct Functions {
@@ -32,10 +32,18 @@ macro_rules! functions {
                 Ok(unsafe { Self { $($name: *library.get(stringify!($name).as_bytes())?,)* } })
             }
         }
+
+        /// The functions of a component that is linked into this program: those in the module that `fmi2_component::export!` makes.
+        #[macro_export]
+        macro_rules! functions_of {
+            ($dollar module:ident) => {
+                $dollar crate::Functions { $($name: $dollar module::$name,)* }
+            };
+        }
     };
 }
 
-functions! {
+functions! { $
     fmi2GetTypesPlatform() -> *const c_char;
     fmi2GetVersion() -> *const c_char;
     fmi2Instantiate(*const c_char, c_int, *const c_char, *const c_char, *const CallbackFunctions, c_int, c_int) -> Raw;
@@ -58,8 +66,8 @@ functions! {
     fmi2SetFMUstate(Raw, Raw) -> Status;
     fmi2FreeFMUstate(Raw, *mut Raw) -> Status;
     fmi2SerializedFMUstateSize(Raw, Raw, *mut usize) -> Status;
-    fmi2SerializeFMUstate(Raw, Raw, *mut u8, usize) -> Status;
-    fmi2DeSerializeFMUstate(Raw, *const u8, usize, *mut Raw) -> Status;
+    fmi2SerializeFMUstate(Raw, Raw, *mut c_char, usize) -> Status;
+    fmi2DeSerializeFMUstate(Raw, *const c_char, usize, *mut Raw) -> Status;
     fmi2GetDirectionalDerivative(Raw, *const c_uint, usize, *const c_uint, usize, *const f64, *mut f64) -> Status;
     fmi2SetRealInputDerivatives(Raw, *const c_uint, usize, *const c_int, *const f64) -> Status;
     fmi2GetRealOutputDerivatives(Raw, *const c_uint, usize, *const c_int, *mut f64) -> Status;

@@ -1,6 +1,6 @@
-//! The two FMUs as a master sees them: shared libraries, called through C pointers with good and with bad arguments.
+//! FMUs as a master sees them: shared libraries, called through C pointers with good and with bad arguments.
 //!
-//! This is a crate of its own because both libraries export the same names: they can be loaded into one program, but
+//! This is a crate of its own because all libraries export the same names: they can be loaded into one program, but
 //! not linked into one.
 
 mod functions;
@@ -11,4 +11,4 @@ pub mod pair;
 
 pub use functions::{Functions, Raw};
 pub use library::{CONTROLLER, Fmu, PLANT};
-pub use master::{Interface, Line, Master};
+pub use master::{Interface, Line, Master, callbacks};

@@ -11,6 +11,7 @@ use crate::functions::Functions;
 pub const PLANT: &str = include_str!("../../../modelDescription.xml");
 /// The controller's description.
 pub const CONTROLLER: &str = include_str!("../../../controller/fmu/modelDescription.xml");
+const TANK: &str = include_str!("../../../fmi2-component/example/modelDescription.xml");
 
 /// A loaded library. It is never unloaded, so that its functions can be copied about.
 #[derive(Clone, Copy, Debug)]
@@ -42,11 +43,21 @@ impl Fmu {
         Self::load("PhaseLock", CONTROLLER, &Self::path("PhaseLock"))
     }
 
+    /// `Tank`, the example of the shell, built as this program is.
+    ///
+    /// # Panics
+    /// If it cannot be built or loaded.
+    #[must_use]
+    pub fn tank() -> Self {
+        Self::load("Tank", TANK, &Self::path("Tank"))
+    }
+
     /// Where cargo puts the library of that name.
     #[must_use]
     pub fn path(name: &str) -> PathBuf {
         let library = match name {
             "LoViNes" => "lovines_fmu",
+            "Tank" => "fmi2_example_tank",
             _ => "phase_lock_fmu",
         };
         folder().join(format!("{DLL_PREFIX}{library}{DLL_SUFFIX}"))

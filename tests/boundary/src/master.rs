@@ -45,7 +45,7 @@ unsafe extern "C" fn hear(
 }
 
 /// Callbacks whose logger appends to `lines`.
-fn callbacks(lines: *mut Vec<Line>) -> CallbackFunctions {
+pub fn callbacks(lines: *mut Vec<Line>) -> CallbackFunctions {
     let hear: unsafe extern "C" fn(_, _, _, _, _) = hear;
     // SAFETY: a variadic function cannot be written in stable Rust. The named arguments travel alike, and the shell
     // passes no others.
@@ -107,17 +107,26 @@ impl Master {
         master
     }
 
+    /// Takes the instance into Initialization Mode.
+    ///
+    /// # Panics
+    /// If a call is refused.
+    pub fn enter_initialization(&self) {
+        // SAFETY: the instance is alive.
+        unsafe {
+            self.well((self.f.fmi2SetupExperiment)(self.c, 0, 0.0, 0.0, 0, 0.0));
+            self.well((self.f.fmi2EnterInitializationMode)(self.c));
+        }
+    }
+
     /// Takes the instance from its instantiation through initialization.
     ///
     /// # Panics
     /// If a call is refused.
     pub fn start(&self) {
-        // SAFETY: the instance is alive; so below.
-        unsafe {
-            self.well((self.f.fmi2SetupExperiment)(self.c, 0, 0.0, 0.0, 0, 0.0));
-            self.well((self.f.fmi2EnterInitializationMode)(self.c));
-            self.well((self.f.fmi2ExitInitializationMode)(self.c));
-        }
+        self.enter_initialization();
+        // SAFETY: the instance is alive.
+        self.well(unsafe { (self.f.fmi2ExitInitializationMode)(self.c) });
     }
 
     /// Switches on these categories of the log and no other.
@@ -140,10 +149,24 @@ impl Master {
     }
 
     /// What was logged since the last call.
-    #[must_use]
     pub fn heard(&self) -> Vec<Line> {
         // SAFETY: the list lives as long as the master, and no call is under way.
         unsafe { std::mem::take(&mut *self.lines) }
+    }
+
+    /// Asserts that one line was logged, and that it contains all of `parts`.
+    ///
+    /// # Panics
+    /// If not.
+    #[track_caller]
+    pub fn heard_one(&self, parts: &[&str]) {
+        let heard = self.heard();
+        let [line] = heard.as_slice() else {
+            panic!("not one line: {heard:?}")
+        };
+        for part in parts {
+            assert!(line.text.contains(part), "no {part:?} in {line:?}");
+        }
     }
 
     /// The value of a real variable.
@@ -169,7 +192,6 @@ impl Master {
     }
 
     /// Sets a real variable.
-    #[must_use]
     pub fn set_real(&self, vr: u32, value: f64) -> Status {
         self.set_reals(&[vr], &[value])
     }
@@ -187,14 +209,12 @@ impl Master {
     }
 
     /// Sets several real variables in one call.
-    #[must_use]
     pub fn set_reals<const N: usize>(&self, vrs: &[u32; N], values: &[f64; N]) -> Status {
         // SAFETY: as many values as references.
         unsafe { (self.f.fmi2SetReal)(self.c, vrs.as_ptr(), N, values.as_ptr()) }
     }
 
     /// Takes a step.
-    #[must_use]
     pub fn step(&self, time: f64, step: f64) -> Status {
         // SAFETY: the instance is alive.
         unsafe { (self.f.fmi2DoStep)(self.c, time, step, 1) }
@@ -213,7 +233,12 @@ impl Master {
             self.well((f.fmi2GetFMUstate)(self.c, &mut state));
             self.well((f.fmi2SerializedFMUstateSize)(self.c, state, &mut size));
             let mut bytes = vec![0; size];
-            self.well((f.fmi2SerializeFMUstate)(self.c, state, bytes.as_mut_ptr(), size));
+            self.well((f.fmi2SerializeFMUstate)(
+                self.c,
+                state,
+                bytes.as_mut_ptr().cast(),
+                size,
+            ));
             self.well((f.fmi2FreeFMUstate)(self.c, &mut state));
             bytes
         }

@@ -152,21 +152,13 @@ fn plant(interface: Interface, rig: &[f64; 13], stuck: bool) -> Master {
     m
 }
 
-fn enter_initialization_mode(m: &Master) {
-    // SAFETY: the instance is alive; so below.
-    unsafe {
-        m.well((m.f.fmi2SetupExperiment)(m.c, 0, 0.0, 0.0, 0, 0.0));
-        m.well((m.f.fmi2EnterInitializationMode)(m.c));
-    }
-}
-
 #[test]
 fn initial_unknowns_of_the_plant() {
     let d = read(Fmu::plant().description);
     let mut seen = BTreeSet::new();
     for interface in [Interface::CoSimulation, Interface::ModelExchange] {
         let m = plant(interface, &RIGS[0], false);
-        enter_initialization_mode(&m);
+        m.enter_initialization();
         for &known in [&d.parameters[..], &d.inputs, &d.starts].concat().iter() {
             let value = d.get(&m, known);
             let set = |value| d.set(&m, known, value);
@@ -259,7 +251,7 @@ fn between_steps_velocities_of_the_plant_do_not_depend_on_its_inputs() {
 fn unknowns_of_the_controller() {
     let d = read(Fmu::controller().description);
     let m = Master::new(&Fmu::controller(), Interface::CoSimulation);
-    enter_initialization_mode(&m);
+    m.enter_initialization();
     let look = |unknowns: &[usize], knowns: &[usize]| {
         let mut seen = BTreeSet::new();
         for &known in knowns {

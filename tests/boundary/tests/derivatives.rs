@@ -56,16 +56,12 @@ fn in_initialization_mode(interface: Interface) -> Master {
     for (vr, value) in VALUES {
         m.well(m.set_real(vr, value));
     }
-    // SAFETY: the instance is alive; so below.
-    unsafe {
-        m.well((m.f.fmi2SetupExperiment)(m.c, 0, 0.0, 0.0, 0, 0.0));
-        m.well((m.f.fmi2EnterInitializationMode)(m.c));
-    }
+    m.enter_initialization();
     m
 }
 
 fn leave_initialization_mode(m: &Master) {
-    // SAFETY: as above.
+    // SAFETY: the instance is alive.
     m.well(unsafe { (m.f.fmi2ExitInitializationMode)(m.c) });
 }
 

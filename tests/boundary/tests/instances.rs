@@ -154,7 +154,7 @@ fn a_foreign_or_damaged_state_is_refused() {
         let mut state = null_mut();
         let f = plant.f.fmi2DeSerializeFMUstate;
         // SAFETY: as many bytes as said.
-        let status = unsafe { f(plant.c, bytes.as_ptr(), bytes.len(), &mut state) };
+        let status = unsafe { f(plant.c, bytes.as_ptr().cast(), bytes.len(), &mut state) };
         assert_eq!(status, Status::Error);
         assert!(state.is_null());
         assert!(plant.heard()[0].text.contains("serialised state") || bytes.is_empty());

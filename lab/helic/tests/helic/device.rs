@@ -1,8 +1,6 @@
-//! The device alone: parameters, errors, generators, stream, and the loop with its latched loss of lock.
+//! The device alone: parameters, errors, oscillator, output gate, watchdog and stream.
 
-use vines_helic::Device;
 use vines_helic::codec::{ErrorCode, message};
-use vines_testbench::rig::{Drive, Rig, RigError, Sensors, Simulated};
 
 use super::host::{Host, device, scene};
 
@@ -31,9 +29,8 @@ fn every_error_code_has_its_case() {
     assert_eq!(host.set("forcing_coeffs", &cosine(10.1)), Err(ErrorCode::BadValue));
     assert_eq!(host.set("table_gain", &[2.0]), Err(ErrorCode::ReadOnly));
     assert_eq!(host.set("table_mode", &[1.0]), Err(ErrorCode::BadValue));
-    assert_eq!(host.set("pll_target_phase", &[-180.1]), Err(ErrorCode::BadValue));
-    assert_eq!(host.set("pll_demod_tau", &[f32::INFINITY]), Err(ErrorCode::BadValue));
-    assert_eq!(host.set("control_mode", &[1.0]), Err(ErrorCode::BadValue));
+    assert_eq!(host.set("mcu_reboot", &[1.0]), Err(ErrorCode::ReadOnly));
+    assert_eq!(host.set("rig_watchdog", &[f32::INFINITY]), Err(ErrorCode::BadValue));
     assert_eq!(host.set("arm", &[2.0]), Err(ErrorCode::BadValue));
     assert_eq!(host.ask(message::STREAM_START, &[1, 0]), Err(ErrorCode::BadValue));
     assert_eq!(host.set_up(&["out"], 0, 0), Err(ErrorCode::BadValue));
@@ -95,29 +92,6 @@ fn the_source_phase_is_that_of_the_forcing_of_the_same_record() {
 }
 
 #[test]
-fn a_reboot_needs_its_word_and_restores_the_start_without_the_drive() {
-    let mut host = Host::new(device());
-    host.set("freq", &[8.8]).unwrap();
-    host.set("forcing_coeffs", &cosine(0.1)).unwrap();
-    host.set("arm", &[1.0]).unwrap();
-    host.capture(&["out"], 1, 10);
-    for wrong in [0.0, 1.0] {
-        assert_eq!(host.set("mcu_reboot", &[wrong]), Err(ErrorCode::BadValue));
-    }
-    assert!(host.device.is_driven() && !host.device.has_rebooted());
-    let payload = [&host.parameters["mcu_reboot"].0.to_le_bytes()[..], b"TBER"].concat();
-    host.ask(message::SET_PAR, &payload).unwrap();
-    assert!(host.device.has_rebooted() && !host.device.is_driven());
-    assert_eq!(
-        (host.number("mcu_reboot"), host.number("arm"), host.number("ticks")),
-        (0, 0, 0)
-    );
-    assert_eq!(host.get("freq"), 0f32.to_le_bytes());
-    assert_eq!(host.set_up(&["out"], 1, 0), Ok(()));
-    assert_eq!(host.capture(&["cmd_epoch", "out"], 1, 3).1, [[0.0, 0.0]; 3]);
-}
-
-#[test]
 fn the_watchdog_disarms_a_device_whose_host_is_silent_and_is_off_at_the_start() {
     let mut host = Host::new(device());
     host.set("forcing_coeffs", &cosine(0.1)).unwrap();
@@ -154,91 +128,10 @@ fn commands_are_counted_at_the_sample_that_they_take_effect() {
     let epoch = |host: &mut Host| host.capture(&["cmd_epoch"], 1, 1).1[0][0];
     assert_eq!(epoch(&mut host), 0.0);
     host.set("freq", &[1.0]).unwrap();
-    host.set("ctrl_reset", &[0.0]).unwrap();
     host.set("diag_reset", &[1.0]).unwrap();
     host.set("arm", &[1.0]).unwrap();
     assert_eq!(epoch(&mut host), 1.0);
     host.set("freq", &[1.5]).unwrap();
     host.set("freq", &[2.0]).unwrap();
     assert_eq!(epoch(&mut host), 3.0);
-}
-
-/// A rig that answers like a resonator far below the noise until it is switched off.
-struct Resonator {
-    plant: Simulated,
-    taken: usize,
-    dies: usize,
-}
-
-impl Rig for Resonator {
-    fn sense(&mut self) -> Result<Sensors, RigError> {
-        let sensors = self.plant.sense()?;
-        Ok(if self.taken >= self.dies {
-            Sensors { response: 0.0, ..sensors }
-        } else {
-            sensors
-        })
-    }
-
-    fn advance(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.plant.advance(drive, step)
-    }
-
-    fn hold(&mut self, drive: Drive, step: f64) -> Result<(), RigError> {
-        self.taken += 1;
-        self.plant.hold(drive, step)
-    }
-}
-
-#[test]
-fn the_loop_of_the_device_finds_phase_resonance_and_a_lost_lock_latches() {
-    let scene = scene();
-    let dies = 60_000;
-    let plant = Simulated::new(scene.plant, scene.start).unwrap();
-    let rig = Resonator { plant, taken: 0, dies };
-    let mut host = Host::new(Device::new(Box::new(rig), scene.sample_time(), scene.plant.half_width).unwrap());
-    let resonance = (scene.dimensionless().omega0 / std::f64::consts::TAU) as f32;
-    // The base is held, and read before it changes: its mean is half a sample earlier.
-    let target = -90.0 + 180.0 * resonance * scene.sample_time() as f32;
-    let settings = [
-        ("pll_target_phase", target),
-        ("pll_freq_max", 1.05 * resonance),
-        ("pll_centre_freq", 1.01 * resonance),
-        ("pll_freq_min", 0.95 * resonance),
-        ("pll_demod_tau", 0.2),
-        ("pll_response_min", 0.01),
-        ("pll_acquire_timeout", 100.0),
-    ];
-    host.set("control_mode", &[2.0]).unwrap();
-    // There is no window before the host sets one.
-    assert_eq!(host.set("arm", &[1.0]), Err(ErrorCode::BadValue));
-    assert_eq!(host.number("arm"), 0);
-    for (name, value) in settings {
-        host.set(name, &[value]).unwrap();
-    }
-    // So small that nothing hits: the linear resonance.
-    host.set("forcing_coeffs", &cosine(0.02)).unwrap();
-    host.set("arm", &[1.0]).unwrap();
-    assert_eq!(host.set("control_mode", &[0.0]), Err(ErrorCode::BadValue), "armed");
-    let names = ["pll_state", "pll_phase", "pll_freq_actual", "out"];
-    // Not at one instant of every period.
-    let (_, records) = host.capture(&names, 97, (dies / 97) as u32 - 5);
-    let last = &records[records.len() - 97..];
-    let mean = |n: usize| last.iter().map(|record| record[n]).sum::<f32>() / last.len() as f32;
-    assert_eq!(mean(0), 2.0, "locked");
-    assert!((mean(1) - target).abs() < 0.2, "{}", mean(1));
-    assert!((mean(2) / resonance - 1.0).abs() < 1e-4, "{} {resonance}", mean(2));
-    // Values that do not fit together are refused while the loop runs, and change nothing.
-    assert_eq!(host.set("pll_freq_min", &[2.0 * resonance]), Err(ErrorCode::BadValue));
-    assert_eq!(host.get("pll_freq_min"), (0.95 * resonance).to_le_bytes());
-    let (_, after) = host.capture(&names, 100, 200);
-    assert_eq!((after[199][0], after[199][3]), (3.0, 0.0), "{:?}", after[199]);
-    assert_eq!(host.number("safety") & 2, 2);
-    // Arming again does not clear it; a reset does.
-    host.set("arm", &[1.0]).unwrap();
-    assert_eq!(host.capture(&names, 1, 5).1[4][0], 3.0);
-    assert_eq!(host.number("safety") & 2, 2);
-    host.set("ctrl_reset", &[1.0]).unwrap();
-    host.set("arm", &[1.0]).unwrap();
-    assert_eq!(host.capture(&names, 1, 5).1[4][0], 1.0);
 }

@@ -3,7 +3,7 @@
 use std::collections::VecDeque;
 use std::io;
 
-use vines_helic::codec::{Frame, message};
+use vines_helic::codec::Frame;
 use vines_helic::{Channels, Device, HelicRig, Transport};
 use vines_testbench::experiment::{self, Plan};
 use vines_testbench::identification::identify;
@@ -241,38 +241,4 @@ fn the_drive_has_the_phase_of_the_host_however_late_its_commands_are() {
         }
         assert!(driven > 300, "{under_way}: {driven}");
     }
-}
-
-#[test]
-fn a_device_without_the_source_phase_is_refused_in_words() {
-    /// A device that calls its source `phase` otherwise.
-    struct Old(Direct<fn(usize) -> usize>);
-    impl Transport for Old {
-        fn request(&mut self, request: &Frame) -> io::Result<Frame> {
-            let mut answer = self.0.request(request)?;
-            if request.kind == message::GET_SOURCES {
-                let at = answer
-                    .payload
-                    .windows(7)
-                    .position(|bytes| bytes == b"\0phase\0")
-                    .unwrap();
-                answer.payload[at + 1] = b'g';
-            }
-            Ok(answer)
-        }
-        fn datagram(&mut self) -> io::Result<Vec<u8>> {
-            self.0.datagram()
-        }
-        fn port(&self) -> io::Result<u16> {
-            self.0.port()
-        }
-    }
-    let old = HelicRig::new(
-        Old(Direct::new(|_| 1)),
-        Channels::default(),
-        scene().sample_time(),
-        100.0,
-    );
-    let refused = old.err().unwrap().to_string();
-    assert!(refused.contains("no source \"phase\""), "{refused}");
 }

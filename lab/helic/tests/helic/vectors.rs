@@ -1,6 +1,6 @@
 //! The vectors of the protocol, version 3 (`docs/protocol.md` of helic-daq, "Known-answer vectors").
 
-use vines_helic::codec::{BEACON_REQUEST, Frame, Packet, Status, beacon, crc16, message, take_text};
+use vines_helic::codec::{Frame, Packet, Status, crc16, message, take_text};
 
 use super::host::device;
 
@@ -80,14 +80,6 @@ fn definitions_and_sources_have_the_published_form() {
         assert_eq!(take_text(&mut rest).unwrap(), expected);
     }
     assert!(rest.is_empty());
-}
-
-#[test]
-fn the_beacon_has_the_published_form() {
-    assert_eq!(BEACON_REQUEST[..], bytes("48 4C 01"));
-    let expected = "48 4C 02 03 2E 09 02 48 4C 00 00 01 63 62 63 2D 72 69 67 00 00 00 00 00 00 00 00 00 68 65 6C 69 63 2D 64 61 71 20 73 69 6D \
-                    00 00 00";
-    assert_eq!(beacon(2350, "cbc-rig", "helic-daq sim"), bytes(expected));
 }
 
 #[test]

@@ -53,21 +53,28 @@ fn another_version_is_named_with_both_numbers() {
     assert!(text.contains("version 3") && text.contains("version 2"), "{text}");
 }
 
-#[test]
-fn a_client_of_another_version_is_informed_of_the_version_of_the_server() {
+/// The answer of a rig in real time to a datagram.
+fn answer(bytes: &[u8]) -> Frame {
     let (server, _) = real_time_rig(&scene(&[]), 1.0);
     let client = UdpSocket::bind("127.0.0.1:0").unwrap();
     client.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
-    client
-        .send_to(b"VINE\x09\x00 hello from the future", socket(server.address))
-        .unwrap();
-    let mut bytes = [0; 256];
-    let size = client.recv(&mut bytes).unwrap();
-    let answer = Frame::decode(&bytes[..size]).unwrap();
+    client.send_to(bytes, socket(server.address)).unwrap();
+    let mut answer = [0; 256];
+    let size = client.recv(&mut answer).unwrap();
+    Frame::decode(&answer[..size]).unwrap()
+}
+
+#[test]
+fn a_client_of_another_version_or_without_a_sample_time_is_refused() {
+    let newer = answer(b"VINE\x09\x00 hello from the future");
     assert_eq!(
-        (answer.kind, answer.values[..2].to_vec()),
+        (newer.kind, newer.values[..2].to_vec()),
         (Kind::Refusal, vec![4.0, 2.0])
     );
+    let mut hello = Frame::new(Kind::Hello, 1);
+    hello.values[0] = f64::NAN;
+    let refusal = answer(&hello.encode());
+    assert_eq!((refusal.kind, refusal.values[0]), (Kind::Refusal, 2.0));
 }
 
 fn refused(error: &LinkError) -> Refusal {
@@ -141,20 +148,6 @@ fn a_server_stopped_by_its_owner_reports_the_session_it_had() {
     let sessions = server.stop();
     assert_eq!(sessions.len(), 1);
     assert_eq!(sessions[0].ended, vines_net::Ended::Stopped);
-}
-
-#[test]
-fn a_sample_time_that_is_not_a_number_is_refused() {
-    let (server, _) = real_time_rig(&scene(&[]), 1.0);
-    let client = UdpSocket::bind("127.0.0.1:0").unwrap();
-    client.set_read_timeout(Some(Duration::from_secs(5))).unwrap();
-    let mut hello = Frame::new(Kind::Hello, 1);
-    hello.values[0] = f64::NAN;
-    client.send_to(&hello.encode(), socket(server.address)).unwrap();
-    let mut bytes = [0; 256];
-    let size = client.recv(&mut bytes).unwrap();
-    let answer = Frame::decode(&bytes[..size]).unwrap();
-    assert_eq!((answer.kind, answer.values[0]), (Kind::Refusal, 2.0));
 }
 
 #[test]

@@ -1,3 +1,5 @@
+//! Lost readings: gaps in a periodic motion, and an experiment that rides through them.
+
 use std::f64::consts::TAU;
 use std::ops::Range;
 

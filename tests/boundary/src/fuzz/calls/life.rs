@@ -69,7 +69,7 @@ impl Caller<'_> {
                 ),
                 4 => {
                     self.blob = vec![0; 4000];
-                    let bytes = self.blob.as_mut_ptr();
+                    let bytes = self.blob.as_mut_ptr().cast();
                     let size = random.pick(&[0, 10, self.blob.len()]);
                     (
                         "fmi2SerializeFMUstate",
@@ -80,7 +80,7 @@ impl Caller<'_> {
                     if let Some(byte) = self.blob.get_mut(random.below(4000)) {
                         *byte ^= random.pick(&[0, 0, 1, 0x80]);
                     }
-                    let (bytes, size) = (self.blob.as_ptr(), self.blob.len());
+                    let (bytes, size) = (self.blob.as_ptr().cast(), self.blob.len());
                     (
                         "fmi2DeSerializeFMUstate",
                         (f.fmi2DeSerializeFMUstate)(c, bytes, size, known),

@@ -1,8 +1,8 @@
-//! Tests of `ramp`.
-
-use vines_testbench::rig::Sensors;
+//! The drive of a served rig after a loss of frames and after a shutdown.
 
 use super::*;
+
+use vines_testbench::rig::Sensors;
 
 /// A rig that shows the base displacement.
 #[derive(Default)]

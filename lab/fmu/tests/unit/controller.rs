@@ -1,4 +1,4 @@
-//! Tests of `judge`.
+//! Whether the lock of a foreign controller has settled.
 
 use super::*;
 

@@ -1,4 +1,4 @@
-//! Tests of `seal`.
+//! Authenticated frames: replays, reflections and other keys are refused.
 
 use super::*;
 

@@ -1,13 +1,10 @@
 //! Setting and getting values, through the C functions.
 
-mod master;
-
 use std::ffi::CStr;
 use std::ptr::{null, null_mut};
 
+use crate::{new, ready};
 use fmi2_component::Status::{Error, Ok};
-use fmi2_example_tank::variables::GUID;
-use master::*;
 
 const AREA: u32 = 0;
 const HEIGHT: u32 = 1;
@@ -19,18 +16,18 @@ const FULL: u32 = 1;
 
 #[test]
 fn start_values_come_from_the_description() {
-    let master = Master::ready(GUID);
+    let master = ready();
     assert_eq!(master.real(AREA), 2.0);
     assert_eq!(master.real(LEVEL), 0.5);
     let mut label = null();
-    assert_eq!(unsafe { fmi2GetString(master.c, &0, 1, &mut label) }, Ok);
+    assert_eq!(unsafe { (master.f.fmi2GetString)(master.c, &0, 1, &mut label) }, Ok);
     assert_eq!(unsafe { CStr::from_ptr(label) }, c"A \"tank\"");
 }
 
 #[test]
 fn outputs_are_right_in_initialization_mode_however_often_inputs_are_set() {
-    let master = Master::new(GUID);
-    unsafe { fmi2EnterInitializationMode(master.c) };
+    let master = new();
+    unsafe { (master.f.fmi2EnterInitializationMode)(master.c) };
     for (inflow, level) in [(1.0, 0.1), (3.0, 0.9)] {
         assert_eq!(master.set_real(INFLOW, inflow), Ok);
         assert_eq!(master.set_real(LEVEL, level), Ok);
@@ -40,18 +37,18 @@ fn outputs_are_right_in_initialization_mode_however_often_inputs_are_set() {
     // What was set can be read back even where it makes no sense yet.
     assert_eq!(master.set_real(LEVEL, 7.0), Ok);
     assert_eq!(master.real(INFLOW), 3.0);
-    assert_eq!(unsafe { fmi2GetReal(master.c, &LEVEL, 1, &mut 0.0) }, Error);
+    assert_eq!(unsafe { (master.f.fmi2GetReal)(master.c, &LEVEL, 1, &mut 0.0) }, Error);
     master.heard_one(&["level = 7 m is refused", "height = 1 m"]);
-    assert_eq!(unsafe { fmi2ExitInitializationMode(master.c) }, Error);
+    assert_eq!(unsafe { (master.f.fmi2ExitInitializationMode)(master.c) }, Error);
     master.heard_one(&["fmi2ExitInitializationMode: level = 7 m"]);
     assert_eq!(master.set_real(HEIGHT, 8.0), Ok);
-    assert_eq!(unsafe { fmi2ExitInitializationMode(master.c) }, Ok);
+    assert_eq!(unsafe { (master.f.fmi2ExitInitializationMode)(master.c) }, Ok);
     assert_eq!(master.real(LEVEL), 7.0);
 }
 
 #[test]
 fn causality_and_variability_say_when_a_variable_may_be_set() {
-    let master = Master::new(GUID);
+    let master = new();
     for (vr, expected) in [(AREA, Ok), (HEIGHT, Ok), (INFLOW, Ok), (LEVEL, Ok), (RATE, Error)] {
         assert_eq!(master.set_real(vr, 0.5), expected);
     }
@@ -59,11 +56,11 @@ fn causality_and_variability_say_when_a_variable_may_be_set() {
         "der(level) cannot be set in state instantiated",
         "causality output, variability continuous, initial calculated",
     ]);
-    unsafe { fmi2EnterInitializationMode(master.c) };
+    unsafe { (master.f.fmi2EnterInitializationMode)(master.c) };
     for (vr, expected) in [(AREA, Ok), (HEIGHT, Ok), (INFLOW, Ok), (LEVEL, Ok), (RATE, Error)] {
         assert_eq!(master.set_real(vr, 0.5), expected);
     }
-    unsafe { fmi2ExitInitializationMode(master.c) };
+    unsafe { (master.f.fmi2ExitInitializationMode)(master.c) };
     for (vr, expected) in [(AREA, Error), (HEIGHT, Ok), (INFLOW, Ok), (LEVEL, Error)] {
         assert_eq!(master.set_real(vr, 0.5), expected);
     }
@@ -71,7 +68,7 @@ fn causality_and_variability_say_when_a_variable_may_be_set() {
 
 #[test]
 fn a_number_that_is_not_finite_is_refused_by_name_and_unit() {
-    let master = Master::ready(GUID);
+    let master = ready();
     for (wrong, text) in [(f64::NAN, "NaN"), (f64::INFINITY, "inf"), (f64::NEG_INFINITY, "-inf")] {
         assert_eq!(master.set_real(INFLOW, wrong), Error);
         master.heard_one(&["inflow", text, "m3/s", "finite"]);
@@ -81,31 +78,34 @@ fn a_number_that_is_not_finite_is_refused_by_name_and_unit() {
 
 #[test]
 fn a_component_refuses_values_of_its_own() {
-    let master = Master::new(GUID);
+    let master = new();
     assert_eq!(master.set_real(AREA, -1.0), Error);
     master.heard_one(&["fmi2SetReal: area = -1 m2 is refused; allowed is a number above 0"]);
 }
 
 #[test]
 fn nothing_is_set_where_one_of_several_is_wrong() {
-    let master = Master::ready(GUID);
+    let master = ready();
     let before = master.bytes();
     for (vr, values) in [
         ([INFLOW, 99], [1.0, 1.0]),
         ([INFLOW, AREA], [1.0, 1.0]),
         ([INFLOW, INFLOW], [1.0, f64::NAN]),
     ] {
-        assert_eq!(unsafe { fmi2SetReal(master.c, vr.as_ptr(), 2, values.as_ptr()) }, Error);
+        assert_eq!(
+            unsafe { (master.f.fmi2SetReal)(master.c, vr.as_ptr(), 2, values.as_ptr()) },
+            Error
+        );
         assert_eq!(master.bytes(), before);
     }
 }
 
 #[test]
 fn nothing_is_set_where_the_component_refuses_a_later_value() {
-    let master = Master::new(GUID);
+    let master = new();
     let before = master.bytes();
     let (vr, values) = ([HEIGHT, AREA], [5.0, -1.0]);
-    let status = unsafe { fmi2SetReal(master.c, vr.as_ptr(), 2, values.as_ptr()) };
+    let status = unsafe { (master.f.fmi2SetReal)(master.c, vr.as_ptr(), 2, values.as_ptr()) };
     assert_eq!(status, Error);
     master.heard_one(&["area = -1 m2 is refused"]);
     assert_eq!(master.bytes(), before);
@@ -113,27 +113,27 @@ fn nothing_is_set_where_the_component_refuses_a_later_value() {
 
 #[test]
 fn all_truth_values_of_a_call_are_set_or_none() {
-    let master = Master::ready(GUID);
+    let master = ready();
     let before = master.bytes();
     for (vr, reason) in [
         ([VALVE, 99], "value reference 99 is unknown"),
         ([VALVE, FULL], "full cannot be set"),
     ] {
         let values = [0, 0];
-        let status = unsafe { fmi2SetBoolean(master.c, vr.as_ptr(), 2, values.as_ptr()) };
+        let status = unsafe { (master.f.fmi2SetBoolean)(master.c, vr.as_ptr(), 2, values.as_ptr()) };
         assert_eq!(status, Error);
         master.heard_one(&[reason]);
         assert_eq!(master.bytes(), before);
     }
     let (vr, values) = ([VALVE, VALVE], [1, 0]);
-    let status = unsafe { fmi2SetBoolean(master.c, vr.as_ptr(), 2, values.as_ptr()) };
+    let status = unsafe { (master.f.fmi2SetBoolean)(master.c, vr.as_ptr(), 2, values.as_ptr()) };
     assert_eq!(status, Ok);
     assert_ne!(master.bytes(), before);
 }
 
 #[test]
 fn all_strings_of_a_call_are_set_or_none() {
-    let master = Master::new(GUID);
+    let master = new();
     let before = master.bytes();
     let new = c"another".as_ptr();
     for (vr, second, reason) in [
@@ -142,32 +142,32 @@ fn all_strings_of_a_call_are_set_or_none() {
         ([0, 0], c"".as_ptr(), "label = \"\" is refused"),
     ] {
         let values = [new, second];
-        let status = unsafe { fmi2SetString(master.c, vr.as_ptr(), 2, values.as_ptr()) };
+        let status = unsafe { (master.f.fmi2SetString)(master.c, vr.as_ptr(), 2, values.as_ptr()) };
         assert_eq!(status, Error);
         master.heard_one(&[reason]);
         assert_eq!(master.bytes(), before);
     }
-    let status = unsafe { fmi2SetString(master.c, [0, 0].as_ptr(), 2, [new, new].as_ptr()) };
+    let status = unsafe { (master.f.fmi2SetString)(master.c, [0, 0].as_ptr(), 2, [new, new].as_ptr()) };
     assert_eq!(status, Ok);
     assert_ne!(master.bytes(), before);
 }
 
 #[test]
 fn an_unknown_value_reference_is_named() {
-    let master = Master::ready(GUID);
+    let master = ready();
     assert_eq!(master.set_real(4711, 1.0), Error);
     master.heard_one(&["value reference 4711 is unknown", "type Real; expected one of 0, 1, 2"]);
-    assert_eq!(unsafe { fmi2GetInteger(master.c, &1, 1, &mut 0) }, Error);
+    assert_eq!(unsafe { (master.f.fmi2GetInteger)(master.c, &1, 1, &mut 0) }, Error);
     master.heard_one(&["value reference 1 is unknown", "type Integer; expected one of 0"]);
 }
 
 #[test]
 fn a_value_reference_may_be_given_twice() {
-    let master = Master::ready(GUID);
+    let master = ready();
     let mut values = [0.0; 2];
     let vr = [LEVEL, LEVEL];
     assert_eq!(
-        unsafe { fmi2GetReal(master.c, vr.as_ptr(), 2, values.as_mut_ptr()) },
+        unsafe { (master.f.fmi2GetReal)(master.c, vr.as_ptr(), 2, values.as_mut_ptr()) },
         Ok
     );
     assert_eq!(values, [0.5, 0.5]);
@@ -175,62 +175,62 @@ fn a_value_reference_may_be_given_twice() {
 
 #[test]
 fn null_arrays_and_absurd_counts_are_refused() {
-    let master = Master::ready(GUID);
-    let c = master.c;
+    let master = ready();
+    let (c, f) = (master.c, master.f);
     unsafe {
-        assert_eq!(fmi2GetReal(c, null(), 0, null_mut()), Ok);
-        assert_eq!(fmi2SetReal(c, null(), 0, null()), Ok);
-        assert_eq!(fmi2GetReal(c, null(), 1, &mut 0.0), Error);
+        assert_eq!((f.fmi2GetReal)(c, null(), 0, null_mut()), Ok);
+        assert_eq!((f.fmi2SetReal)(c, null(), 0, null()), Ok);
+        assert_eq!((f.fmi2GetReal)(c, null(), 1, &mut 0.0), Error);
         master.heard_one(&["vr is NULL"]);
-        assert_eq!(fmi2GetReal(c, &LEVEL, 1, null_mut()), Error);
+        assert_eq!((f.fmi2GetReal)(c, &LEVEL, 1, null_mut()), Error);
         master.heard_one(&["value is NULL"]);
-        assert_eq!(fmi2SetReal(c, &INFLOW, usize::MAX, &0.0), Error);
+        assert_eq!((f.fmi2SetReal)(c, &INFLOW, usize::MAX, &0.0), Error);
         master.heard_one(&["count of vr is 18446744073709551615"]);
         let askew = std::ptr::from_ref(&INFLOW).wrapping_byte_add(1);
-        assert_eq!(fmi2GetReal(c, askew, 1, &mut 0.0), Error);
+        assert_eq!((f.fmi2GetReal)(c, askew, 1, &mut 0.0), Error);
         master.heard_one(&["vr is not aligned"]);
-        assert_eq!(fmi2GetString(c, &0, 1, null_mut()), Error);
-        assert_eq!(fmi2GetInteger(c, null(), 1, null_mut()), Error);
-        assert_eq!(fmi2GetBoolean(c, null(), 1, null_mut()), Error);
+        assert_eq!((f.fmi2GetString)(c, &0, 1, null_mut()), Error);
+        assert_eq!((f.fmi2GetInteger)(c, null(), 1, null_mut()), Error);
+        assert_eq!((f.fmi2GetBoolean)(c, null(), 1, null_mut()), Error);
     }
 }
 
 #[test]
 fn strings_may_be_anything_that_ends_in_nul() {
-    let master = Master::new(GUID);
-    let c = master.c;
+    let master = new();
+    let (c, f) = (master.c, master.f);
     unsafe {
-        assert_eq!(fmi2SetString(c, &0, 1, &null()), Error);
+        assert_eq!((f.fmi2SetString)(c, &0, 1, &null()), Error);
         master.heard_one(&["label = NULL"]);
-        assert_eq!(fmi2SetString(c, &0, 1, &c"\xff%s".as_ptr()), Ok);
-        fmi2EnterInitializationMode(c);
+        assert_eq!((f.fmi2SetString)(c, &0, 1, &c"\xff%s".as_ptr()), Ok);
+        (f.fmi2EnterInitializationMode)(c);
         let mut label = null();
-        assert_eq!(fmi2GetString(c, &0, 1, &mut label), Ok);
+        assert_eq!((f.fmi2GetString)(c, &0, 1, &mut label), Ok);
         assert_eq!(CStr::from_ptr(label).to_str(), Result::Ok("\u{fffd}%s"));
     }
 }
 
 #[test]
 fn derivatives_have_orders_and_causalities() {
-    let master = Master::ready(GUID);
-    let c = master.c;
+    let master = ready();
+    let (c, f) = (master.c, master.f);
     master.set_real(INFLOW, 3.0);
     let mut value = f64::NAN;
     unsafe {
-        assert_eq!(fmi2GetRealOutputDerivatives(c, &LEVEL, 1, &1, &mut value), Ok);
+        assert_eq!((f.fmi2GetRealOutputDerivatives)(c, &LEVEL, 1, &1, &mut value), Ok);
         assert_eq!(value, 1.5);
-        assert_eq!(fmi2GetRealOutputDerivatives(c, &LEVEL, 1, &0, &mut value), Error);
+        assert_eq!((f.fmi2GetRealOutputDerivatives)(c, &LEVEL, 1, &0, &mut value), Error);
         master.heard_one(&["derivative 0 of level is refused"]);
-        assert_eq!(fmi2GetRealOutputDerivatives(c, &INFLOW, 1, &1, &mut value), Error);
+        assert_eq!((f.fmi2GetRealOutputDerivatives)(c, &INFLOW, 1, &1, &mut value), Error);
         master.heard_one(&["inflow", "expected an output"]);
-        assert_eq!(fmi2SetRealInputDerivatives(c, &INFLOW, 1, &1, &0.0), Error);
+        assert_eq!((f.fmi2SetRealInputDerivatives)(c, &INFLOW, 1, &1, &0.0), Error);
         master.heard_one(&["takes no input derivatives"]);
-        assert_eq!(fmi2SetRealInputDerivatives(c, &LEVEL, 1, &1, &0.0), Error);
+        assert_eq!((f.fmi2SetRealInputDerivatives)(c, &LEVEL, 1, &1, &0.0), Error);
         master.heard_one(&["level", "expected an input"]);
 
         let (unknown, known, along) = ([RATE, LEVEL], [INFLOW, AREA], [4.0, 0.0]);
         let mut answer = [f64::NAN; 2];
-        let status = fmi2GetDirectionalDerivative(
+        let status = (f.fmi2GetDirectionalDerivative)(
             c,
             unknown.as_ptr(),
             2,

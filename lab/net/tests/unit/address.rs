@@ -1,4 +1,4 @@
-//! Tests of `resolve`.
+//! Addresses from text, and which of them are allowed.
 
 use super::*;
 
