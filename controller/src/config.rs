@@ -296,76 +296,35 @@ impl Value {
     }
 }
 
-impl From<Real> for Value {
-    fn from(value: Real) -> Self {
-        Self::Real(value)
-    }
-}
-
-impl From<Option<Real>> for Value {
-    fn from(value: Option<Real>) -> Self {
-        // A value equal to the number for "none" is invalid; it must not read as "none", so that the check refuses it.
-        Self::Real(value.map_or(NONE, |value| if value == NONE { 0.0 } else { value }))
-    }
-}
-
-impl From<bool> for Value {
-    fn from(value: bool) -> Self {
-        Self::Boolean(value)
-    }
-}
-
-impl From<Detector> for Value {
-    fn from(detector: Detector) -> Self {
-        Self::Integer(detector as i32)
-    }
-}
-
-impl From<Value> for Real {
-    fn from(value: Value) -> Self {
-        value.number()
-    }
-}
-
-impl From<Value> for Option<Real> {
-    fn from(value: Value) -> Self {
-        Some(value.number()).filter(|number| *number != NONE)
-    }
-}
-
-impl From<Value> for bool {
-    fn from(value: Value) -> Self {
-        value == Value::Boolean(true)
-    }
-}
-
-impl From<Value> for Detector {
-    fn from(value: Value) -> Self {
-        if value == Value::Integer(Self::Demodulator as i32) {
-            Self::Demodulator
-        } else {
-            Self::Adaptive
-        }
-    }
-}
-
-macro_rules! whole_numbers {
-    ($($type:ty)*) => {$(
+// From a field to its value, and back. `Parameter::set` has checked the type, and the range of a whole number.
+macro_rules! conversions {
+    ($($type:ty: $field:ident => $to:expr, $value:ident => $from:expr;)*) => {$(
         impl From<$type> for Value {
-            fn from(value: $type) -> Self {
-                Self::Integer(value.try_into().unwrap_or(i32::MAX))
+            fn from($field: $type) -> Self {
+                $to
             }
         }
 
         impl From<Value> for $type {
-            fn from(value: Value) -> Self {
-                value.number() as Self
+            fn from($value: Value) -> Self {
+                $from
             }
         }
     )*};
 }
 
-whole_numbers!(u8 u32 i32);
+conversions! {
+    Real: number => Self::Real(number), value => value.number();
+    // A value equal to the number for "none" is invalid; it must not read as "none", so that the check refuses it.
+    Option<Real>: option => Self::Real(option.map_or(NONE, |number| if number == NONE { 0.0 } else { number })),
+        value => Some(value.number()).filter(|number| *number != NONE);
+    bool: flag => Self::Boolean(flag), value => value == Value::Boolean(true);
+    Detector: method => Self::Integer(method as i32),
+        value => if value == Value::Integer(Self::Demodulator as i32) { Self::Demodulator } else { Self::Adaptive };
+    u8: number => Self::Integer(number.into()), value => value.number() as Self;
+    u32: number => Self::Integer(number.try_into().unwrap_or(i32::MAX)), value => value.number() as Self;
+    i32: number => Self::Integer(number), value => value.number() as Self;
+}
 
 /// The number that means "none" for an optional parameter, where the interface knows only numbers.
 pub const NONE: Real = -1.0;
@@ -606,7 +565,7 @@ impl fmt::Display for ConfigError {
 
 impl core::error::Error for ConfigError {}
 
-#[cfg(all(test, not(feature = "f32")))]
+#[cfg(test)]
 mod tests {
     use super::*;
 

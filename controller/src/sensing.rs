@@ -38,7 +38,7 @@ pub struct Channels {
     /// Time since the loop was closed or the measurement was last valid, s.
     invalid: Real,
     /// Whether the measurement has been valid since the loop was closed.
-    seen: bool,
+    measured: bool,
 }
 
 /// Measurements of a sample.
@@ -139,7 +139,7 @@ impl Sensing {
             cosine: if is_large { cosine } else { 1.0 },
         };
         let contradicts = state.balance.contradicts(config, &powers) && config.residual_max.is_some();
-        let reason = if state.seen {
+        let reason = if state.measured {
             Fault::Implausible
         } else {
             Fault::NoSignal
@@ -156,13 +156,13 @@ impl Sensing {
 
     /// Watches the signals while the loop is closed: a sensor that has stopped, or a response that cannot be measured.
     pub fn watch(&self, config: &Config, state: &mut Channels, measured: &Measurement) -> Option<Fault> {
-        state.seen |= measured.valid;
+        state.measured |= measured.valid;
         state.closed += config.sample_time;
         state.invalid = longer(state.invalid, config.sample_time, !measured.valid);
         let has_sensor = measured.has_sensor;
-        if state.seen && (state.response.has_stopped() || has_sensor && state.base.has_stopped()) {
+        if state.measured && (state.response.has_stopped() || has_sensor && state.base.has_stopped()) {
             Some(Fault::Sensor)
-        } else if state.seen && (state.response.is_implausible || has_sensor && state.base.is_implausible) {
+        } else if state.measured && (state.response.is_implausible || has_sensor && state.base.is_implausible) {
             Some(Fault::Implausible)
         } else if config.signal_timeout.is_some_and(|limit| state.invalid > limit) {
             Some(Fault::NoSignal)
@@ -173,7 +173,7 @@ impl Sensing {
 
     /// Ends the watch when the loop opens.
     pub fn stop_watching(&self, state: &mut Channels) {
-        (state.invalid, state.closed, state.seen) = (0.0, 0.0, false);
+        (state.invalid, state.closed, state.measured) = (0.0, 0.0, false);
     }
 
     fn fault(config: &Config, response: Real, reference: Option<Real>) -> Option<Fault> {

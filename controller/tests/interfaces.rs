@@ -66,9 +66,12 @@ fn inputs_and_outputs_of_the_fmu_are_those_of_the_core() {
 #[test]
 fn the_structures_of_the_c_interface_are_the_tables_of_the_core() {
     let names = |structure| fields(structure).into_iter().map(|field| field.1).collect::<Vec<_>>();
-    assert_eq!(names("PhaseLockOutput"), spelled(OUTPUTS.iter().map(|one| one.name)));
-    assert_eq!(names("PhaseLockInput"), spelled(INPUTS.map(|one| one.0)));
-    assert_eq!(names("PhaseLockMove"), spelled(MOVE.map(|one| one.0)));
+    assert_eq!(
+        names("PhaseLockOutput"),
+        spelled(OUTPUTS.iter().map(|signal| signal.name))
+    );
+    assert_eq!(names("PhaseLockInput"), spelled(INPUTS.map(|input| input.0)));
+    assert_eq!(names("PhaseLockMove"), spelled(MOVE.map(|field| field.0)));
 }
 
 #[test]
