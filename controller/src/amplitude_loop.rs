@@ -223,6 +223,7 @@ impl AmplitudeLoop {
 }
 
 #[cfg(test)]
+#[cfg(not(feature = "f32"))]
 mod tests {
     use super::*;
 

@@ -566,6 +566,7 @@ impl fmt::Display for ConfigError {
 impl core::error::Error for ConfigError {}
 
 #[cfg(test)]
+#[cfg(not(feature = "f32"))]
 mod tests {
     use super::*;
 

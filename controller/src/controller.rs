@@ -137,12 +137,8 @@ impl PhaseLock {
             amplitude: state.drive.amplitude,
         };
         let measured = self.sensing.measure(&self.config, &mut state.channels, &input, drive);
-        let watched = if state.loop_state.is_closed() {
-            self.sensing.watch(&self.config, &mut state.channels, &measured)
-        } else {
-            self.sensing.stop_watching(&mut state.channels);
-            None
-        };
+        let is_closed = state.loop_state.is_closed();
+        let watched = Sensing::watch(&self.config, &mut state.channels, &measured, is_closed);
         self.change_state(state, input.active, measured.fault.or(watched));
         self.steer(state, &measured);
         let output = self.output(state, &measured, drive.rotor.im * state.drive.amplitude);

@@ -20,7 +20,7 @@ pub struct PhaseDetector {
     harmonics: usize,
     odd_only: bool,
     /// Share of the error of a coefficient that a sample corrects.
-    step: Real,
+    pub step: Real,
 }
 
 /// Estimate of the signal of one channel.
@@ -125,6 +125,7 @@ impl PhaseDetector {
 }
 
 #[cfg(test)]
+#[cfg(not(feature = "f32"))]
 mod tests {
     use super::*;
     use crate::oscillator::Oscillator;

@@ -78,6 +78,7 @@ fn approach(from: Real, to: Real, step: Real) -> Real {
 }
 
 #[cfg(test)]
+#[cfg(not(feature = "f32"))]
 mod tests {
     use super::*;
 

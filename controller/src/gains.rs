@@ -63,6 +63,7 @@ impl Gains {
 }
 
 #[cfg(test)]
+#[cfg(not(feature = "f32"))]
 mod tests {
     use super::*;
 

@@ -85,6 +85,7 @@ impl LoopFilter {
 }
 
 #[cfg(test)]
+#[cfg(not(feature = "f32"))]
 mod tests {
     use super::*;
 

@@ -80,6 +80,7 @@ impl Oscillator {
 }
 
 #[cfg(test)]
+#[cfg(not(feature = "f32"))]
 mod tests {
     use super::*;
 

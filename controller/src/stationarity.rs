@@ -212,6 +212,7 @@ fn joined(blocks: &[Block]) -> Block {
 }
 
 #[cfg(test)]
+#[cfg(not(feature = "f32"))]
 mod tests {
     use super::*;
 

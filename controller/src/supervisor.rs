@@ -160,6 +160,7 @@ pub struct Conditions {
 }
 
 #[cfg(test)]
+#[cfg(not(feature = "f32"))]
 mod tests {
     use super::*;
 
