@@ -4,6 +4,7 @@
 
 mod files;
 pub mod pack;
+pub mod points;
 pub mod report;
 
 pub use files::FileError;
@@ -13,4 +14,6 @@ pub use vines_model::{ArgumentError, map, numerics, orbit, regime, theory};
 pub use vines_net as net;
 #[cfg(feature = "sweep")]
 pub use vines_sweep as sweep;
-pub use vines_testbench::{advice, backbone, comparison, experiment, identification, loop_check, record, rig, scene};
+pub use vines_testbench::{
+    advice, backbone, comparison, experiment, fit, identification, loop_check, record, rig, scene,
+};

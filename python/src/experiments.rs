@@ -11,6 +11,7 @@ use pyo3::{
 use serde_json::json;
 use vines_model::{
     map::Run,
+    numerics::Estimate,
     orbit,
     theory::{SlowFlow, resonant},
 };
@@ -18,6 +19,7 @@ use vines_testbench::{
     backbone::track,
     comparison::{Comparison, TrackedComparison},
     experiment::{self, Plan},
+    fit::{Known, MeasuredPoint, fit as fitted_rig},
     identification,
     rig::{BuiltIn, Simulated, Stoppable},
 };
@@ -71,6 +73,29 @@ pub fn backbone(py: Python<'_>, scene: &Scene) -> PyResult<String> {
         let tracked = track(rig, &mut controller, scene, |_, _| {})?;
         Ok(TrackedComparison::of(&tracked, scene))
     })
+}
+
+/// `points`: response (m), frequency (rad/s) and drive (m), each with its standard uncertainty.
+#[pyfunction]
+pub fn fit(py: Python<'_>, scene: &Scene, points: Vec<[f64; 6]>, known: Vec<String>) -> PyResult<String> {
+    let known = known.iter().map(|one| one.parse::<Known>().map_err(invalid));
+    let known = known.collect::<PyResult<Vec<_>>>()?;
+    let estimate = |value, uncertainty| Estimate { value, uncertainty };
+    let point = |[response, u_response, omega, u_omega, drive, u_drive]: [f64; 6]| MeasuredPoint {
+        response: estimate(response, u_response),
+        omega: estimate(omega, u_omega),
+        drive: estimate(drive, u_drive),
+    };
+    let points: Vec<MeasuredPoint> = points.into_iter().map(point).collect();
+    let plant = scene.scene.plant;
+    let fit = py
+        .detach(|| fitted_rig(&points, scene.scene.resonance, &plant, &known))
+        .map_err(invalid)?;
+    let fitted = fit.plant(&plant);
+    json(&json!({"report": fit.report(&plant), "plant": {
+        "M": fitted.primary_mass, "k": fitted.stiffness, "c": fitted.damping,
+        "m": fitted.particle_mass, "b": fitted.half_width, "r": fitted.restitution,
+    }}))
 }
 
 #[pyfunction]

@@ -20,6 +20,7 @@ fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
     for function in [
         wrap_pyfunction!(experiments::identify, module)?,
         wrap_pyfunction!(experiments::backbone, module)?,
+        wrap_pyfunction!(experiments::fit, module)?,
         wrap_pyfunction!(experiments::orbits, module)?,
         wrap_pyfunction!(experiments::theory, module)?,
         wrap_pyfunction!(experiments::regime, module)?,

@@ -11,6 +11,7 @@ from pathlib import Path as _Path
 
 from ._native import version as __version__
 from .experiments import Backbone, Identification, Orbit, Theory, backbone, identify, orbits, theory
+from .fits import Fit, fit
 from .phaselock import Output, PhaseLock
 from .plants import KINDS, Batch, Events, Plant, Trajectory
 from .regimes import Regime, regime
@@ -23,6 +24,7 @@ __all__ = [
     "Backbone",
     "Batch",
     "Events",
+    "Fit",
     "Identification",
     "Orbit",
     "Output",
@@ -35,6 +37,7 @@ __all__ = [
     "Trajectory",
     "__version__",
     "backbone",
+    "fit",
     "fmu",
     "identify",
     "linspace",

@@ -12,9 +12,10 @@ use std::fmt::{self, Display, Formatter};
 use std::str::FromStr;
 
 use nalgebra::{Matrix6, Vector3, Vector6};
+use serde::Serialize;
 use statrs::distribution::{ChiSquared, ContinuousCDF};
 use thiserror::Error;
-use vines_model::numerics::Estimate;
+use vines_model::numerics::{Estimate, SIGNIFICANT};
 use vines_model::orbit::backbone_at_speed;
 use vines_model::theory::{BranchSide, SlowFlow};
 use vines_model::{ArgumentError, Definition};
@@ -121,6 +122,12 @@ impl Quantity {
         }
     }
 
+    /// The value of a plant.
+    #[must_use]
+    pub fn of_plant(self, plant: &Parameters) -> f64 {
+        self.of(&unknowns(plant))
+    }
+
     /// The gradient over the unknowns.
     fn gradient(self, x: &Unknowns) -> Unknowns {
         Unknowns::from_fn(|i, _| {
@@ -193,6 +200,17 @@ const REJECTED: f64 = 0.01;
 const LEFT_OUT: usize = 5;
 /// Relative standard uncertainty from which a parameter counts as not determined.
 const UNCERTAIN: f64 = 0.1;
+
+fn unknowns(plant: &Parameters) -> Unknowns {
+    Unknowns::from([
+        plant.natural_frequency().ln(),
+        0.5 * plant.damping / (plant.stiffness * plant.primary_mass).sqrt(),
+        plant.restitution,
+        plant.half_width.ln(),
+        plant.mass_ratio().ln(),
+        plant.primary_mass.ln(),
+    ])
+}
 
 fn shifted(x: &Unknowns, i: usize, step: f64) -> Unknowns {
     let mut x = *x;
@@ -351,6 +369,50 @@ pub fn fit(
     Ok(fit)
 }
 
+/// What is to be said where the points contradict the rig `expected`: which parameters fit instead. `None` where they do not, or cannot tell.
+#[must_use]
+pub fn contradiction(points: &[MeasuredPoint], definition: Definition, expected: &Parameters) -> Option<String> {
+    let problem = Problem {
+        points: points.to_vec(),
+        definition,
+        known: &[],
+        has_scale: false,
+    };
+    let sums = problem.sums(&unknowns(expected), &mut vec![None; points.len()])?;
+    let distribution = ChiSquared::new(2.0 * points.len() as f64).ok()?;
+    if distribution.sf(sums.chi_square) >= REJECTED {
+        return None;
+    }
+    let fit = fit(points, definition, expected, &[]).ok()?;
+    if fit.is_rejected() {
+        return Some("the points contradict the model, whatever its parameters; see `vines fit`".into());
+    }
+    let report = fit.report(expected);
+    let differs = |one: &&FittedParameter| (one.value - one.expected).abs() > SIGNIFICANT * one.uncertainty;
+    let texts: Vec<String> = report
+        .parameters
+        .iter()
+        .filter(differs)
+        .map(|one| {
+            let FittedParameter { symbol, unit, value, uncertainty, expected } = one;
+            let unit = if unit.is_empty() {
+                String::new()
+            } else {
+                format!(" {unit}")
+            };
+            format!("{symbol} = {value:.4e} ± {uncertainty:.1e}{unit} fits, the scene says {expected:.4e}")
+        })
+        .collect();
+    let texts = if texts.is_empty() {
+        "several parameters differ a little".into()
+    } else {
+        texts.join("; ")
+    };
+    Some(format!(
+        "the points do not belong to this scene: {texts}; see `vines fit`"
+    ))
+}
+
 /// What is minimised.
 struct Problem<'a> {
     points: Vec<MeasuredPoint>,
@@ -370,16 +432,9 @@ struct Sums {
 impl Problem<'_> {
     /// The smallest of the minima that are reached from the expected rig and from other restitution coefficients.
     fn fit(&self, expected: &Parameters) -> Result<Fit, FitError> {
-        let zeta = 0.5 * expected.damping / (expected.stiffness * expected.primary_mass).sqrt();
-        let starts = [expected.restitution].into_iter().chain(STARTS).map(|r| {
-            Unknowns::from([
-                expected.natural_frequency().ln(),
-                zeta,
-                r,
-                expected.half_width.ln(),
-                expected.mass_ratio().ln(),
-                expected.primary_mass.ln(),
-            ])
+        let starts = [expected.restitution].into_iter().chain(STARTS).map(|restitution| {
+            let plant = Parameters { restitution, ..*expected };
+            unknowns(&plant)
         });
         let minima = starts.filter_map(|start| self.minimum(start));
         let (x, sums) = minima
@@ -530,5 +585,65 @@ impl Problem<'_> {
             over(omega0 * omega, point.omega),
             over(b * epsilon * g, point.drive),
         ))
+    }
+}
+
+/// A fit in numbers, for programs.
+#[derive(Debug, Clone, Serialize)]
+pub struct FitReport {
+    /// Whether the model describes the points.
+    pub describes: bool,
+    /// Chi-square.
+    pub chi_square: f64,
+    /// Its degrees of freedom.
+    pub degrees: usize,
+    /// Probability of a larger chi-square; absent without a degree of freedom.
+    pub p_value: Option<f64>,
+    /// The parameters: first f0, zeta, r, b and epsilon, then, with a known scale, M, m, k and c.
+    pub parameters: Vec<FittedParameter>,
+    /// Correlations of the first five.
+    pub correlations: Vec<[f64; 5]>,
+    /// Residuals over their standard uncertainties: response, frequency, drive.
+    pub residuals: Vec<[f64; 3]>,
+    /// Numbers, from 1, of the points that contradict the others.
+    pub left_out: Vec<usize>,
+}
+
+/// A parameter of a fit.
+#[derive(Debug, Clone, Copy, Serialize)]
+pub struct FittedParameter {
+    /// Its symbol.
+    pub symbol: &'static str,
+    /// Its unit; empty for a pure number.
+    pub unit: &'static str,
+    /// Its value.
+    pub value: f64,
+    /// Its standard uncertainty.
+    pub uncertainty: f64,
+    /// The value that was expected.
+    pub expected: f64,
+}
+
+impl Fit {
+    /// The numbers of the fit, beside those of the rig that was expected.
+    #[must_use]
+    pub fn report(&self, expected: &Parameters) -> FitReport {
+        let fitted = &Quantity::ALL[..5];
+        let parameter = |quantity: Quantity| {
+            let (Estimate { value, uncertainty }, [symbol, unit]) = (self.estimate(quantity)?, quantity.symbol());
+            let expected = quantity.of_plant(expected);
+            Some(FittedParameter { symbol, unit, value, uncertainty, expected })
+        };
+        let correlations = |one: &Quantity| std::array::from_fn(|n| self.correlation(*one, fitted[n]));
+        FitReport {
+            describes: !self.is_rejected(),
+            chi_square: self.chi_square,
+            degrees: self.degrees,
+            p_value: self.p_value(),
+            parameters: Quantity::ALL.into_iter().filter_map(parameter).collect(),
+            correlations: fitted.iter().map(correlations).collect(),
+            residuals: self.residuals.clone(),
+            left_out: self.left_out.iter().map(|n| n + 1).collect(),
+        }
     }
 }

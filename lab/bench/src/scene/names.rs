@@ -44,6 +44,27 @@ enum NameSection {
     },
 }
 
+impl Name {
+    /// A variable in a unit.
+    ///
+    /// # Errors
+    /// An unknown unit.
+    pub fn with_unit(name: &str, unit: &str) -> Result<Self, ArgumentError> {
+        let factor = UNITS
+            .iter()
+            .find(|(symbol, _)| *symbol == unit)
+            .map(|(_, factor)| *factor);
+        let symbols = || UNITS.map(|(symbol, _)| symbol).join(", ");
+        let factor = factor.ok_or_else(|| {
+            format!(
+                "{name}: the unit {unit} is unknown; known are {}, or give a factor",
+                symbols()
+            )
+        })?;
+        Ok(Self { name: name.into(), factor })
+    }
+}
+
 impl TryFrom<NameSection> for Name {
     type Error = ArgumentError;
 
@@ -52,21 +73,9 @@ impl TryFrom<NameSection> for Name {
             NameSection::Plain(name) => (name, None, None),
             NameSection::Full { name, unit, factor } => (name, unit, factor),
         };
-        let of = |unit: &str| {
-            UNITS
-                .iter()
-                .find(|(known, _)| *known == unit)
-                .map(|(_, factor)| *factor)
-        };
-        let known = || UNITS.map(|(unit, _)| unit).join(", ");
         let factor = match (unit, factor) {
             (Some(_), Some(_)) => return Err(format!("{name}: give a unit or a factor, not both").into()),
-            (Some(unit), None) => of(&unit).ok_or_else(|| {
-                format!(
-                    "{name}: the unit {unit} is unknown; known are {}, or give a factor",
-                    known()
-                )
-            })?,
+            (Some(unit), None) => return Self::with_unit(&name, &unit),
             (None, factor) => factor.unwrap_or(1.0),
         };
         if !factor.is_finite() || factor == 0.0 {

@@ -1,0 +1,133 @@
+"""Parameters of a rig from measured points of its backbone."""
+
+import json
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from . import _native
+from .experiments import Table, _table
+from .results import Result, axes
+from .scenes import Scene, checked
+
+_COLUMNS = ("A_m", "u_A_m", "f_Hz", "u_f_Hz", "E_m", "u_E_m")
+_REGIMES = ("symmetric 1:1", "steady, symmetry unresolved")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fit(Result):
+    """A rig fitted to points of its backbone.
+
+    Attributes
+    ----------
+    parameters : dict of ndarray
+        symbol, unit, value, uncertainty and expected: f0, zeta, r, b and epsilon, and M, m, k and c if one of these is
+        known.
+    describes : bool
+        Whether the exact symmetric 1:1 motion describes the points: otherwise neither values nor uncertainties hold.
+    chi_square, p_value : float
+        Chi-square, and the probability of a larger one.
+    degrees : int
+        Degrees of freedom of chi-square.
+    correlations : ndarray
+        Of f0, zeta, r, b and epsilon, shape (5, 5).
+    residuals : ndarray
+        Of the points over their standard uncertainties, shape (points, 3): response, frequency, drive.
+    left_out : tuple of int
+        Indices of the points that contradict the others and are left out, from 0.
+    plant : dict
+        The section `plant` of a scene, for `Scene(plant=...)`.
+    """
+
+    parameters: Table
+    describes: bool
+    chi_square: float
+    p_value: float | None
+    degrees: int
+    correlations: NDArray[np.float64]
+    residuals: NDArray[np.float64]
+    left_out: tuple[int, ...]
+    plant: dict[str, float]
+
+    def __getitem__(self, symbol: str) -> tuple[float, float]:
+        """Return value and standard uncertainty of a parameter, such as `fit["r"]`."""
+        index = list(self.parameters["symbol"]).index(symbol)
+        return float(self.parameters["value"][index]), float(self.parameters["uncertainty"][index])
+
+    def plot(self, ax: Any = None) -> Any:
+        """Draw the residuals point by point with matplotlib, and return the axes."""
+        ax = axes(ax)
+        for name, values in zip(("response", "frequency", "drive"), self.residuals.T, strict=True):
+            ax.plot(values, "o", label=name)
+        ax.set(xlabel="point", ylabel="residual over standard uncertainty")
+        ax.legend()
+        return ax
+
+
+def fit(
+    points: Mapping[str, Any] | Iterable[Mapping[str, Any]],
+    scene: Scene | None = None,
+    *,
+    known: Mapping[str, float | tuple[float, float]] | None = None,
+) -> Fit:
+    """Fit natural frequency, damping ratio, restitution, half-width and mass ratio to points, as `vines fit` does.
+
+    Parameters
+    ----------
+    points : mapping or iterable of mappings
+        Columns f_Hz, A_m, E_m and their standard uncertainties u_f_Hz, u_A_m, u_E_m: `backbone().points`, a DataFrame
+        of pandas, or several locks such as `identify().lock`. Points that are not settled, or of another regime than
+        symmetric 1:1, are left out.
+    scene : Scene, optional
+        Where the search begins; default: the default scene.
+    known : mapping, optional
+        Values from elsewhere by their symbols f0 (Hz), zeta, r, b (m), epsilon, M, m (kg), k (N/m) and c (N s/m): a
+        number, which is kept, or a pair of value and standard uncertainty.
+
+    Returns
+    -------
+    Fit
+
+    Raises
+    ------
+    ValueError
+        Too few points, a missing column, or a value that is not allowed.
+
+    Examples
+    --------
+    >>> found = fit(backbone(Scene(backbone={"points": 8})).points, Scene(plant={"r": 0.75, "b": 0.011}))
+    >>> found.describes, round(found["r"][0], 3), round(found["b"][0], 5)
+    (True, 0.65, 0.01)
+    """
+    tables = [points] if isinstance(points, Mapping) or hasattr(points, "columns") else list(points)
+    rows: list[list[float]] = []
+    for table in tables:
+        missing = [name for name in _COLUMNS if name not in table]
+        if missing:
+            raise ValueError(f"the points have no column {', '.join(missing)}; a fit needs {', '.join(_COLUMNS)}")
+        columns = [np.atleast_1d(np.asarray(table[name], dtype=float)) for name in _COLUMNS]
+        kept = np.ones(columns[0].shape, dtype=bool)
+        for name in ("settled", "reached"):
+            if name in table:
+                kept &= np.atleast_1d(np.asarray(table[name], dtype=bool))
+        if "regime" in table:
+            kept &= np.isin(np.atleast_1d(np.asarray(table["regime"])), _REGIMES)
+        rows += np.column_stack(columns)[kept].tolist()
+    for row in rows:
+        row[2:4] = [math.tau * value for value in row[2:4]]
+    values = {name: value if isinstance(value, tuple) else (value, 0.0) for name, value in (known or {}).items()}
+    texts = [f"{name}={value}±{uncertainty}" for name, (value, uncertainty) in values.items()]
+    found = json.loads(_native.fit(checked(scene)._native, rows, texts))
+    report = found["report"]
+    return Fit(
+        parameters=_table(report["parameters"]),
+        correlations=np.array(report["correlations"]),
+        residuals=np.array(report["residuals"]).reshape(-1, 3),
+        left_out=tuple(number - 1 for number in report["left_out"]),
+        plant=found["plant"],
+        **{key: report[key] for key in ("describes", "chi_square", "p_value", "degrees")},
+    )
