@@ -1,7 +1,11 @@
-//! The configuration in SI units: its fields, the table that lists them by name, unit and range, and the relations between them.
+//! The settings of the controller, in SI units: one table, the relations between its rows, and what follows from it.
 //!
-//! Everything that lists parameters is derived from the table or checked against it: the checks of [`Config::build`], the FMU and its
-//! `modelDescription.xml`, the structure of the C interface, and what the lab passes to a controller FMU and writes into an SSP file.
+//! To add a setting, add a row to [`parameters!`](crate::parameters) and use the field that it makes. The row holds the description,
+//! name, type, initial value, unit and range. From it follow the field of [`Config`] or [`LockCriterion`], the initial value, the check of the
+//! range, the key of a scene in `[phase_lock]`, and what is generated from [`PARAMETERS`]: the variable in `modelDescription.xml`, the field of
+//! the C structure with its header, and the row in docs/controller-settings.md. Tests compare these files with the table;
+//! `UPDATE=1 cargo test -p phase-lock-capi -p phase-lock-fmu -p vines-testbench --test generated` writes them. A row in the middle of the
+//! table renumbers the variables of the FMU.
 
 use core::fmt;
 
@@ -24,145 +28,144 @@ pub enum Detector {
     Demodulator = 2,
 }
 
-/// Conditions under which the loop counts as locked, and under which the lock counts as lost.
-///
-/// The phase locks long before the amplitude has settled. If the slowest mode relaxes with a time constant of `T`
-/// periods, a drift of `x` per period means that the distance to the steady state is still `T x`. The values of
-/// [`LockCriterion::default`] leave 0.03 % of the amplitude and 3.3e-5 of the frequency for `T = 33`, and 0.3 % of the
-/// amplitude for `T = 270`.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct LockCriterion {
-    /// Largest phase error that counts as locked, mean over the dwell, rad.
-    pub phase_tolerance: Real,
-    /// Phase error, mean over a period, above which the lock is lost, rad; at least `phase_tolerance`.
-    pub unlock_tolerance: Real,
-    /// Largest relative drift of the frequency per period, beyond what the noise of the response explains.
-    pub frequency_drift: Real,
-    /// Largest relative drift of the response amplitude per period, beyond what its noise explains.
-    pub amplitude_drift: Real,
-    /// Time for which all conditions must hold, periods; rounded up to a multiple of 4.
-    pub dwell: u32,
-    /// Smallest share of the fundamental in the power of a valid signal, between 0 and 1. Noise has a small share.
-    pub coherence_min: Real,
-    /// Smallest valid response amplitude, as a multiple of the drive amplitude setpoint. A zero response is never valid.
-    pub response_min: Real,
-}
-
-impl Default for LockCriterion {
-    fn default() -> Self {
-        Self {
-            phase_tolerance: 5e-3,
-            unlock_tolerance: 0.2,
-            frequency_drift: 1e-6,
-            amplitude_drift: 1e-5,
-            dwell: 20,
-            coherence_min: 0.5,
-            response_min: 0.1,
+/// Invokes the macro `$with` with the table of the settings, one row each:
+/// `/// description` and `name: type = initial value, unit, range;`. The initial value may depend on `omega`, a resonance in rad/s, and on
+/// `amplitude`, of the base in m. The blocks `config` belong to [`Config`](crate::Config), and `lock` to
+/// [`LockCriterion`](crate::LockCriterion). Other crates derive code from it that names the fields. In a description, "none" is the absent option.
+#[macro_export]
+macro_rules! parameters {
+    ($with:ident) => {
+        $with! {
+            (omega, amplitude)
+            config {
+                /// Time from sample to sample; samples lie at 0, sample_time, 2 sample_time, … after the start.
+                sample_time: Real = TAU / omega / 100.0, "s", Positive;
+                /// Frequency while the loop is open, between omega_min and omega_max.
+                omega_start: Real = omega, "rad/s", Positive;
+                /// Lowest frequency.
+                omega_min: Real = 0.8 * omega, "rad/s", Positive;
+                /// Highest frequency.
+                omega_max: Real = 1.2 * omega, "rad/s", Positive;
+                /// Largest rate of change of the frequency; none: no limit.
+                omega_rate: Option<Real> = Some(0.4 * omega * omega / TAU), "rad/s2", Optional;
+                /// Setpoint of the drive amplitude, at most amplitude_max.
+                amplitude: Real = amplitude, "m", NotNegative;
+                /// Largest drive amplitude; none: no limit, and the response amplitude cannot be controlled.
+                amplitude_max: Option<Real> = Some(4.0 * amplitude), "m", Optional;
+                /// Largest rate of change of the drive amplitude in every ramp but the release: at the start, after a fault, to a new
+                /// setpoint, and while the response amplitude is controlled; none: step changes.
+                ramp_rate: Option<Real> = Some(4.0 * amplitude * omega), "m/s", Optional;
+                /// Rate of the drive ramp to 0 after active becomes false; none: switched off at once, as a free decay requires.
+                release_rate: Option<Real> = None, "m/s", Optional;
+                /// Bandwidth of the control of the measured base amplitude; none: no control, for a shaker whose gain is known.
+                base_bandwidth: Option<Real> = None, "rad/s", Optional;
+                /// Setpoint of the phase of the response relative to the reference; -pi/2 is phase resonance.
+                phase_target: Real = -FRAC_PI_2, "rad", Angle;
+                /// Method of the phase detector: 1 adaptive harmonic filter, 2 synchronous demodulation.
+                detector: Detector = Detector::Adaptive, "", Detector;
+                /// Number of harmonics of the adaptive filter, 1 to 8, including the fundamental.
+                harmonics: u8 = 3, "", Harmonics;
+                /// Whether the adaptive filter uses harmonics 1, 3, 5, … instead of 1, 2, 3, …; a rig with impacts at two equal walls has
+                /// only odd ones.
+                odd_only: bool = true, "", Boolean;
+                /// Bandwidth of the detector: the tuning parameter, from which the gains follow.
+                bandwidth: Real = 0.1 * omega, "rad/s", Positive;
+                /// Damping rate of the structure (damping ratio times natural frequency); none: unknown, and the gains suit an undamped structure.
+                damping_rate: Option<Real> = None, "rad/s", Optional;
+                /// Delay from the drive to the sample of the sensor, used if no reference is connected; half a sample for a rig that holds the
+                /// samples of drive, 0 for a rig whose own oscillator receives omega.
+                delay: Real = 0.0, "s", NotNegative;
+            }
+            lock {
+                /// Largest phase error that counts as locked, mean over the dwell.
+                phase_tolerance: Real = 5e-3, "rad", Positive;
+                /// Phase error, mean over a period, above which the lock is lost; at least lock.phase_tolerance.
+                unlock_tolerance: Real = 0.2, "rad", Positive;
+                /// Largest relative drift of the frequency per period that counts as locked, beyond what the noise of the response explains.
+                frequency_drift: Real = 1e-6, "", Positive;
+                /// Largest relative drift of the response amplitude per period that counts as locked, beyond what its noise explains.
+                amplitude_drift: Real = 1e-5, "", Positive;
+                /// Time for which phase, frequency and amplitude must be stationary; rounded up to a multiple of 4.
+                dwell: u32 = 20, "periods", Dwell;
+                /// Smallest share of the fundamental in the power of a valid signal, between 0 and 1; noise has a small share.
+                coherence_min: Real = 0.5, "", Share;
+                /// Smallest valid response amplitude, as a multiple of amplitude; a zero response is never valid.
+                response_min: Real = 0.1, "", NotNegative;
+            }
+            config {
+                /// Reading of the response above which the drive is switched off; none: no limit.
+                response_max: Option<Real> = None, "m", Optional;
+                /// Longest time from the end of the ramp to the lock, without the time in which the response amplitude is controlled; none: no
+                /// limit.
+                acquire_timeout: Option<Real> = Some(2000.0 * TAU / omega), "s", Optional;
+                /// Longest time in the closed loop without a valid measurement: with too small an amplitude or too much noise; none: no limit.
+                signal_timeout: Option<Real> = Some(20.0 * TAU / omega), "s", Optional;
+                /// Largest difference between a reading and its prediction, as a share of the amplitude, beyond twice the differences of the last
+                /// periods; none: no limit, and the response is not checked against the drive.
+                residual_max: Option<Real> = Some(0.3), "", Optional;
+                /// Whether a sensor measures the base; false: the internal oscillator with the configured delay is the reference.
+                reference_connected: bool = true, "", Boolean;
+                /// Growth rate of the response amplitude at phase resonance, per drive amplitude; half of omega0 for excitation through the base.
+                response_gain: Real = 0.5 * omega, "1/s", Positive;
+            }
         }
-    }
+    };
 }
 
-/// All parameters of the controller, in SI units. [`Config::build`] checks them;
-/// [`PARAMETERS`](crate::PARAMETERS) lists them by name.
-#[derive(Clone, Copy, Debug, PartialEq)]
-#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Config {
-    /// Sample time, s.
-    pub sample_time: Real,
-    /// Frequency while the loop is open, rad/s.
-    pub omega_start: Real,
-    /// Lowest frequency, rad/s.
-    pub omega_min: Real,
-    /// Highest frequency, rad/s.
-    pub omega_max: Real,
-    /// Largest rate of change of the frequency, rad/s².
-    pub omega_rate: Option<Real>,
-    /// Setpoint of the drive amplitude, m; tunable.
-    pub amplitude: Real,
-    /// Largest drive amplitude, m.
-    pub amplitude_max: Option<Real>,
-    /// Largest rate of change of the drive amplitude, m/s, in every ramp but the release: at the start, after a fault, to a new
-    /// setpoint, and while the response amplitude is controlled. `None`: step changes.
-    pub ramp_rate: Option<Real>,
-    /// Rate of the drive ramp to 0 after `active` becomes false, m/s. `None`: switched off at once, as a free decay requires.
-    pub release_rate: Option<Real>,
-    /// Bandwidth of the control of the *measured* base amplitude, rad/s. `None`: no control, for a shaker whose gain is known.
-    pub base_bandwidth: Option<Real>,
-    /// Setpoint of the phase of the response relative to the reference, rad; tunable.
-    pub phase_target: Real,
-    /// Method of the phase detector.
-    pub detector: Detector,
-    /// Number of harmonics of the adaptive filter, including the fundamental; 1 to [`MAX_HARMONICS`](crate::MAX_HARMONICS).
-    pub harmonics: u8,
-    /// Whether the adaptive filter uses harmonics 1, 3, 5, … instead of 1, 2, 3, …. A rig with impacts at two equal walls
-    /// has only odd ones.
-    pub odd_only: bool,
-    /// Bandwidth of the detector, rad/s: the tuning parameter, from which the gains follow.
-    pub bandwidth: Real,
-    /// Damping rate of the structure, rad/s (damping ratio times natural frequency). `None`: unknown; the gains are those of an
-    /// undamped structure.
-    pub damping_rate: Option<Real>,
-    /// Delay from the drive to the sample of the sensor, s. Used if no reference is connected. A rig with an oscillator
-    /// of its own that receives `omega` from the first sample on has no delay; a rig that holds the samples of `drive`
-    /// has a delay of half a sample.
-    pub delay: Real,
-    /// Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s. For an oscillator excited
-    /// through its base: half the natural frequency in rad/s. Used by
-    /// [`PhaseLock::hold_response`](crate::PhaseLock::hold_response), and by the check of the response against the drive.
-    pub response_gain: Real,
-    /// Lock criterion.
-    pub lock: LockCriterion,
-    /// Reading of the response sensor above which the drive is switched off, m.
-    pub response_max: Option<Real>,
-    /// Longest time from the end of the ramp to the lock, s. The time in which [`PhaseLock::hold_response`](crate::PhaseLock::hold_response)
-    /// controls the response does not count.
-    pub acquire_timeout: Option<Real>,
-    /// Longest time in the closed loop without a valid measurement, s: with too small an amplitude or too much noise.
-    pub signal_timeout: Option<Real>,
-    /// Largest difference between a reading and its prediction by the detector, as a share of the amplitude of the channel, beyond twice
-    /// the differences of the last periods. `None`: any, and the response is not checked against the drive either.
-    pub residual_max: Option<Real>,
-    /// Whether a sensor measures the base. Without it the internal oscillator with the configured `delay` is the reference.
-    pub reference_connected: bool,
+macro_rules! structures {
+    (
+        ($omega:ident, $amplitude:ident)
+        config { $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $initial:expr, $unit:literal, $range:ident;)* }
+        lock { $($(#[doc = $lock_doc:literal])+ $lock:ident: $lock_type:ty = $lock_initial:expr, $lock_unit:literal, $lock_range:ident;)* }
+        config { $($(#[doc = $last_doc:literal])+ $last:ident: $last_type:ty = $last_initial:expr, $last_unit:literal, $last_range:ident;)* }
+    ) => {
+        /// Conditions under which the loop counts as locked, and under which the lock counts as lost.
+        ///
+        /// The phase locks long before the amplitude has settled. If the slowest mode relaxes with a time constant of `T`
+        /// periods, a drift of `x` per period means that the distance to the steady state is still `T x`. The initial values
+        /// leave 0.03 % of the amplitude and 3.3e-5 of the frequency for `T = 33`, and 0.3 % of the amplitude for `T = 270`.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        pub struct LockCriterion {
+            $($(#[doc = $lock_doc])+ #[doc = concat!("\n\n[`Range::", stringify!($lock_range), "`] `", $lock_unit, " `")] pub $lock: $lock_type,)*
+        }
+
+        impl Default for LockCriterion {
+            fn default() -> Self {
+                Self { $($lock: $lock_initial,)* }
+            }
+        }
+
+        /// All settings of the controller, in SI units. [`Config::build`] checks them; [`PARAMETERS`](crate::PARAMETERS) lists them by name.
+        #[derive(Clone, Copy, Debug, PartialEq)]
+        #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+        pub struct Config {
+            $($(#[doc = $doc])+ #[doc = concat!("\n\n[`Range::", stringify!($range), "`] `", $unit, " `")] pub $field: $type,)*
+            /// Lock criterion.
+            pub lock: LockCriterion,
+            $($(#[doc = $last_doc])+ #[doc = concat!("\n\n[`Range::", stringify!($last_range), "`] `", $last_unit, " `")] pub $last: $last_type,)*
+        }
+
+        impl Config {
+            /// Suitable initial values for a structure with a resonance near `omega` (rad/s) and a base amplitude in m:
+            /// 100 samples per period, ±20 % of frequency, a bandwidth of a tenth of `omega`, at most four times the base
+            /// amplitude, changed no faster than a base with this amplitude moves, the range of the frequency in no less than a period, and
+            /// 2000 periods for the lock. Only the limit of the response must be set. The release is a step.
+            #[must_use]
+            pub fn for_resonance($omega: Real, $amplitude: Real) -> Self {
+                Self {
+                    $($field: $initial,)*
+                    lock: LockCriterion::default(),
+                    $($last: $last_initial,)*
+                }
+            }
+        }
+    };
 }
+
+parameters!(structures);
 
 impl Config {
-    /// Suitable initial values for a structure with a resonance near `omega` (rad/s) and a base amplitude in m:
-    /// 100 samples per period, ±20 % of frequency, a bandwidth of a tenth of `omega`, at most four times the base
-    /// amplitude, changed no faster than a base with this amplitude moves, the range of the frequency in no less than a period, and
-    /// 2000 periods for the lock. Only the limit of the
-    /// response must be set. The release is a step.
-    #[must_use]
-    pub fn for_resonance(omega: Real, amplitude: Real) -> Self {
-        Self {
-            sample_time: TAU / omega / 100.0,
-            omega_start: omega,
-            omega_min: 0.8 * omega,
-            omega_max: 1.2 * omega,
-            omega_rate: Some(0.4 * omega * omega / TAU),
-            amplitude,
-            amplitude_max: Some(4.0 * amplitude),
-            ramp_rate: Some(4.0 * amplitude * omega),
-            release_rate: None,
-            base_bandwidth: None,
-            phase_target: -FRAC_PI_2,
-            detector: Detector::Adaptive,
-            harmonics: 3,
-            odd_only: true,
-            bandwidth: 0.1 * omega,
-            damping_rate: None,
-            delay: 0.0,
-            response_gain: 0.5 * omega,
-            lock: LockCriterion::default(),
-            response_max: None,
-            acquire_timeout: Some(2000.0 * TAU / omega),
-            signal_timeout: Some(20.0 * TAU / omega),
-            residual_max: Some(0.3),
-            reference_connected: true,
-        }
-    }
-
     /// Largest drive amplitude, m; without a limit the largest that a parameter may have, so that no sum is infinite.
     pub(crate) fn amplitude_limit(&self) -> Real {
         self.amplitude_max.unwrap_or(LARGEST)
@@ -271,47 +274,6 @@ impl Config {
     }
 }
 
-/// Invokes the macro `$with` with one row per parameter:
-/// `group field: type, unit, range;`. The group is `config` for a field of [`Config`] and `lock` for one of
-/// [`LockCriterion`](crate::LockCriterion). Other crates derive code from it that names the fields.
-#[macro_export]
-macro_rules! parameters {
-    ($with:ident) => {
-        $with! {
-            config sample_time: real, "s", Positive;
-            config omega_start: real, "rad/s", Positive;
-            config omega_min: real, "rad/s", Positive;
-            config omega_max: real, "rad/s", Positive;
-            config omega_rate: optional, "rad/s2", Optional;
-            config amplitude: real, "m", NotNegative;
-            config amplitude_max: optional, "m", Optional;
-            config ramp_rate: optional, "m/s", Optional;
-            config release_rate: optional, "m/s", Optional;
-            config base_bandwidth: optional, "rad/s", Optional;
-            config phase_target: real, "rad", Angle;
-            config detector: detector, "", Detector;
-            config harmonics: integer, "", Harmonics;
-            config odd_only: boolean, "", Boolean;
-            config bandwidth: real, "rad/s", Positive;
-            config damping_rate: optional, "rad/s", Optional;
-            config delay: real, "s", NotNegative;
-            lock phase_tolerance: real, "rad", Positive;
-            lock unlock_tolerance: real, "rad", Positive;
-            lock frequency_drift: real, "", Positive;
-            lock amplitude_drift: real, "", Positive;
-            lock dwell: integer, "periods", Dwell;
-            lock coherence_min: real, "", Share;
-            lock response_min: real, "", NotNegative;
-            config response_max: optional, "m", Optional;
-            config acquire_timeout: optional, "s", Optional;
-            config signal_timeout: optional, "s", Optional;
-            config residual_max: optional, "", Optional;
-            config reference_connected: boolean, "", Boolean;
-            config response_gain: real, "1/s", Positive;
-        }
-    };
-}
-
 /// A value of a parameter. The types are those of FMI.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Value {
@@ -332,6 +294,36 @@ impl Value {
             Self::Boolean(value) => u8::from(value).into(),
         }
     }
+}
+
+// From a field to its value, and back. `Parameter::set` has checked the type, and the range of a whole number.
+macro_rules! conversions {
+    ($($type:ty: $field:ident => $to:expr, $value:ident => $from:expr;)*) => {$(
+        impl From<$type> for Value {
+            fn from($field: $type) -> Self {
+                $to
+            }
+        }
+
+        impl From<Value> for $type {
+            fn from($value: Value) -> Self {
+                $from
+            }
+        }
+    )*};
+}
+
+conversions! {
+    Real: number => Self::Real(number), value => value.number();
+    // A value equal to the number for "none" is invalid; it must not read as "none", so that the check refuses it.
+    Option<Real>: option => Self::Real(option.map_or(NONE, |number| if number == NONE { 0.0 } else { number })),
+        value => Some(value.number()).filter(|number| *number != NONE);
+    bool: flag => Self::Boolean(flag), value => value == Value::Boolean(true);
+    Detector: method => Self::Integer(method as i32),
+        value => if value == Value::Integer(Self::Demodulator as i32) { Self::Demodulator } else { Self::Adaptive };
+    u8: number => Self::Integer(number.into()), value => value.number() as Self;
+    u32: number => Self::Integer(number.try_into().unwrap_or(i32::MAX)), value => value.number() as Self;
+    i32: number => Self::Integer(number), value => value.number() as Self;
 }
 
 /// The number that means "none" for an optional parameter, where the interface knows only numbers.
@@ -427,6 +419,18 @@ impl Parameter {
         PARAMETERS.iter().find(|parameter| parameter.name == name)
     }
 
+    /// What the parameter is.
+    #[must_use]
+    pub fn description(&self) -> &'static str {
+        TEXTS[self.field as usize].0.trim()
+    }
+
+    /// Initial value, as a formula in `omega` and `amplitude`; see [`Config::for_resonance`].
+    #[must_use]
+    pub fn initial(&self) -> &'static str {
+        TEXTS[self.field as usize].1
+    }
+
     /// The value in a configuration.
     #[must_use]
     pub fn get(&self, config: &Config) -> Value {
@@ -481,74 +485,38 @@ macro_rules! place {
     };
 }
 
-// A setter receives a value of its type and, if it is a whole number, in its range: `Parameter::set` checks both.
-macro_rules! getter {
-    (real, $place:expr) => {
-        Value::Real($place)
-    };
-    (optional, $place:expr) => {
-        // A value equal to the number for "none" is invalid; it must not read as "none", so that the check refuses it.
-        Value::Real($place.map_or(NONE, |value| if value == NONE { 0.0 } else { value }))
-    };
-    (integer, $place:expr) => {
-        Value::Integer(i32::try_from($place).unwrap_or(i32::MAX))
-    };
-    (boolean, $place:expr) => {
-        Value::Boolean($place)
-    };
-    (detector, $place:expr) => {
-        Value::Integer($place as i32)
-    };
-}
-
-macro_rules! setter {
-    (real, $place:expr, $value:ident) => {
-        $place = $value.number()
-    };
-    (optional, $place:expr, $value:ident) => {
-        $place = Some($value.number()).filter(|number| *number != NONE)
-    };
-    (integer, $place:expr, $value:ident) => {
-        $place = $value.number() as _
-    };
-    (boolean, $place:expr, $value:ident) => {
-        $place = $value == Value::Boolean(true)
-    };
-    (detector, $place:expr, $value:ident) => {
-        $place = if $value == Value::Integer(Detector::Demodulator as i32) {
-            Detector::Demodulator
-        } else {
-            Detector::Adaptive
-        }
-    };
-}
-
 macro_rules! table {
-    ($($group:ident $field:ident: $type:ident, $unit:literal, $range:ident;)*) => {
+    (
+        ($omega:ident, $amplitude:ident)
+        $($group:ident { $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $initial:expr, $unit:literal, $range:ident;)* })*
+    ) => {
         /// The field of a parameter. (One function for all fields is smaller than one for each.)
         #[allow(non_camel_case_types)]
         #[derive(Clone, Copy, Debug)]
-        enum Field { $($field),* }
+        enum Field { $($($field,)*)* }
 
         impl Field {
             fn get(self, config: &Config) -> Value {
-                match self { $(Self::$field => getter!($type, place!(config, $group, $field)),)* }
+                match self { $($(Self::$field => place!(config, $group, $field).into(),)*)* }
             }
 
             fn set(self, config: &mut Config, value: Value) {
-                match self { $(Self::$field => setter!($type, place!(config, $group, $field), value),)* }
+                match self { $($(Self::$field => place!(config, $group, $field) = value.into(),)*)* }
             }
         }
 
         /// All parameters.
-        pub static PARAMETERS: [Parameter; [$(stringify!($field)),*].len()] = [$(
+        pub static PARAMETERS: [Parameter; [$($(stringify!($field)),*),*].len()] = [$($(
             Parameter {
                 name: name!($group, $field),
                 unit: $unit,
                 range: Range::$range,
                 field: Field::$field,
             },
-        )*];
+        )*)*];
+
+        /// Description and initial value of every parameter. (Apart from `PARAMETERS`, so that firmware does not contain them.)
+        static TEXTS: [(&str, &str); PARAMETERS.len()] = [$($((concat!($($doc),+), stringify!($initial)),)*)*];
     };
 }
 
@@ -597,5 +565,62 @@ impl fmt::Display for ConfigError {
 
 impl core::error::Error for ConfigError {}
 
-#[cfg(all(test, not(feature = "f32")))]
-mod tests;
+#[cfg(test)]
+#[cfg(not(feature = "f32"))]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_that_was_set_is_the_value_that_is_got() {
+        for parameter in &PARAMETERS {
+            let mut config = Config::for_resonance(55.0, 1e-4);
+            let before = config;
+            let value = match parameter.get(&config) {
+                Value::Real(value) => Value::Real(0.5 * value + 0.125),
+                Value::Integer(1) => Value::Integer(2),
+                Value::Integer(_) => Value::Integer(1),
+                Value::Boolean(value) => Value::Boolean(!value),
+            };
+            parameter.set(&mut config, value).expect(parameter.name);
+            assert_eq!(parameter.get(&config), value, "{}", parameter.name);
+            let changed = PARAMETERS
+                .iter()
+                .filter(|other| other.get(&config) != other.get(&before));
+            assert_eq!(changed.count(), 1, "{}", parameter.name);
+        }
+    }
+
+    #[test]
+    fn an_option_is_absent_only_at_the_number_for_none() {
+        let parameter = Parameter::find("response_max").expect("a parameter");
+        let mut config = Config::for_resonance(55.0, 1e-4);
+        for (value, expected) in [(NONE, None), (0.1, Some(0.1)), (0.0, Some(0.0)), (-2.0, Some(-2.0))] {
+            parameter.set(&mut config, Value::Real(value)).expect("a real number");
+            assert_eq!(config.response_max, expected);
+            assert_eq!(config.build().is_ok(), value == NONE || value > 0.0, "{value}");
+        }
+        config.response_max = Some(NONE);
+        assert!(config.build().is_err());
+    }
+
+    #[test]
+    fn a_value_of_another_type_is_refused_by_name_and_unit() {
+        let mut config = Config::for_resonance(55.0, 1e-4);
+        let refused = Parameter::find("delay")
+            .expect("a parameter")
+            .set(&mut config, Value::Integer(-3))
+            .expect_err("an integer is refused");
+        assert_eq!((refused.name, refused.value, refused.unit), ("delay", Some(-3.0), "s"));
+    }
+
+    #[test]
+    fn a_whole_number_out_of_range_is_refused_at_once() {
+        let mut config = Config::for_resonance(55.0, 1e-4);
+        for (name, value) in [("harmonics", 9), ("harmonics", -1), ("lock.dwell", 0), ("detector", 3)] {
+            let refused = Parameter::find(name)
+                .expect("a parameter")
+                .set(&mut config, Value::Integer(value));
+            assert_eq!(refused.expect_err(name).value, Some(f64::from(value)));
+        }
+    }
+}

@@ -2,14 +2,14 @@
 
 use crate::amplitude_loop::{AmplitudeLoop, AmplitudeState, Move};
 use crate::config::{Config, ConfigError};
-use crate::drive::{Drive, DriveState, PresentDrive};
+use crate::drive::{DriveGenerator, DriveState, PresentDrive};
 use crate::loop_filter::{Frequency, LoopFilter};
 use crate::oscillator::Oscillator;
 use crate::real::consts::FRAC_PI_2;
 use crate::real::{Real, limited};
 use crate::sensing::{Channels, Measurement, Sensing};
 use crate::signals::{Input, Output};
-use crate::stationarity::{Dwell, Reading, Stationarity};
+use crate::stationarity::{Dwell, LockSample, Stationarity};
 use crate::supervisor::{Conditions, Fault, LoopState};
 
 /// A checked configuration and its coefficients; only [`PhaseLock::retune`] changes it.
@@ -19,7 +19,7 @@ pub struct PhaseLock {
     config: Config,
     sensing: Sensing,
     filter: LoopFilter,
-    drive: Drive,
+    drive: DriveGenerator,
     amplitude_loop: AmplitudeLoop,
     stationarity: Stationarity,
 }
@@ -43,7 +43,7 @@ pub struct State {
     lost: bool,
     /// Samples since acquiring began.
     acquiring: u64,
-    /// Drive amplitude and phase target to which the dwell applies.
+    /// DriveGenerator amplitude and phase target to which the dwell applies.
     tuning: (Real, Real),
 }
 
@@ -57,7 +57,7 @@ impl Config {
         Ok(PhaseLock {
             sensing: Sensing::new(&self),
             filter: LoopFilter::new(&self),
-            drive: Drive::new(&self),
+            drive: DriveGenerator::new(&self),
             amplitude_loop: AmplitudeLoop::new(&self),
             stationarity: Stationarity::new(&self),
             config: self,
@@ -137,12 +137,8 @@ impl PhaseLock {
             amplitude: state.drive.amplitude,
         };
         let measured = self.sensing.measure(&self.config, &mut state.channels, &input, drive);
-        let watched = if state.loop_state.is_closed() {
-            self.sensing.watch(&self.config, &mut state.channels, &measured)
-        } else {
-            self.sensing.stop_watching(&mut state.channels);
-            None
-        };
+        let is_closed = state.loop_state.is_closed();
+        let watched = Sensing::watch(&self.config, &mut state.channels, &measured, is_closed);
         self.change_state(state, input.active, measured.fault.or(watched));
         self.steer(state, &measured);
         let output = self.output(state, &measured, drive.rotor.im * state.drive.amplitude);
@@ -195,7 +191,7 @@ impl PhaseLock {
         match state.loop_state {
             LoopState::Idle => {
                 filter.go_to(frequency, omega_start);
-                drive.ramp_down(&mut state.drive);
+                state.drive.ramp_down(drive.ramp_step);
             }
             LoopState::Ramping => {
                 filter.go_to(frequency, omega_start);
@@ -204,11 +200,11 @@ impl PhaseLock {
             LoopState::Acquiring | LoopState::Locked => self.close_loop(state, measured),
             LoopState::LockLost | LoopState::Tripped => {
                 filter.hold(frequency);
-                drive.ramp_down(&mut state.drive);
+                state.drive.ramp_down(drive.ramp_step);
             }
             LoopState::ShutDown => {
                 filter.hold(frequency);
-                drive.release(&mut state.drive);
+                state.drive.ramp_down(drive.release_step);
             }
         }
     }
@@ -250,7 +246,7 @@ impl PhaseLock {
         state.tuning = tuning;
         state.lost = false;
         if state.loop_state.is_closed() {
-            let reading = Reading {
+            let sample = LockSample {
                 error: measured.error,
                 integral: state.frequency.integral.get(),
                 omega: state.frequency.omega,
@@ -258,7 +254,7 @@ impl PhaseLock {
                 residual_power: state.channels.response.estimate.residual_power,
                 valid: measured.valid,
             };
-            state.lost = self.stationarity.update(&mut state.dwell, &reading, period_ends);
+            state.lost = self.stationarity.update(&mut state.dwell, &sample, period_ends);
         }
     }
 
@@ -274,7 +270,7 @@ impl PhaseLock {
             drive,
             phase_error: measured.measurable.then_some(measured.error),
             response_amplitude,
-            response_target: state.amplitude_loop.map(|l| l.setpoint),
+            response_target: state.amplitude_loop.map(|amplitude_loop| amplitude_loop.setpoint),
             reference_amplitude: measured.reference_amplitude,
             coherence: state.channels.response.estimate.coherence(),
             // Rounding can move the mean of values at a limit beyond the limit.

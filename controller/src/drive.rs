@@ -7,7 +7,7 @@ use crate::real::{self, Real};
 /// Ramps of the drive amplitude, and the control of the measured base amplitude.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
-pub struct Drive {
+pub struct DriveGenerator {
     /// m
     pub amplitude_max: Real,
     /// Largest change per sample during a ramp, m; infinite for a step change.
@@ -39,7 +39,7 @@ pub struct PresentDrive {
     pub amplitude: Real,
 }
 
-impl Drive {
+impl DriveGenerator {
     /// The drive of a configuration.
     pub fn new(config: &Config) -> Self {
         Self {
@@ -63,20 +63,13 @@ impl Drive {
         state.amplitude = approach(state.amplitude, target, self.ramp_step);
         state.amplitude == target
     }
+}
 
-    /// Ramps down for one sample after a fault.
-    pub fn ramp_down(&self, state: &mut DriveState) {
-        self.down(state, self.ramp_step);
-    }
-
-    /// Ramps down for one sample after `active` became false.
-    pub fn release(&self, state: &mut DriveState) {
-        self.down(state, self.release_step);
-    }
-
-    fn down(&self, state: &mut DriveState, step: Real) {
-        state.trim = 0.0;
-        state.amplitude = approach(state.amplitude, 0.0, step);
+impl DriveState {
+    /// Ramps down for one sample by at most `step`, m.
+    pub fn ramp_down(&mut self, step: Real) {
+        self.trim = 0.0;
+        self.amplitude = approach(self.amplitude, 0.0, step);
     }
 }
 
@@ -84,5 +77,50 @@ fn approach(from: Real, to: Real, step: Real) -> Real {
     real::limited(to, from - step, from + step)
 }
 
-#[cfg(all(test, not(feature = "f32")))]
-mod tests;
+#[cfg(test)]
+#[cfg(not(feature = "f32"))]
+mod tests {
+    use super::*;
+
+    const DRIVE: DriveGenerator = DriveGenerator {
+        amplitude_max: 2.0,
+        ramp_step: 0.3,
+        release_step: f64::INFINITY,
+        control_step: 0.1,
+    };
+
+    #[test]
+    fn a_ramp_ends_exactly_at_its_setpoint() {
+        let mut state = DriveState::default();
+        let samples = (0..10).take_while(|_| !DRIVE.ramp(&mut state, 1.0)).count();
+        assert_eq!((samples, state.amplitude), (3, 1.0));
+    }
+
+    #[test]
+    fn a_release_without_a_ramp_takes_one_sample() {
+        let mut state = DriveState { amplitude: 1.0, trim: 0.2 };
+        state.ramp_down(DRIVE.release_step);
+        assert_eq!(state, DriveState::default());
+    }
+
+    #[test]
+    fn the_control_corrects_a_shaker_of_low_gain() {
+        let mut state = DriveState::default();
+        for _ in 0..1000 {
+            DRIVE.ramp(&mut state, 1.0);
+            let measured = 0.8 * state.amplitude;
+            DRIVE.control(&mut state, 1.0, measured);
+        }
+        assert!((state.amplitude - 1.25).abs() < 1e-9);
+    }
+
+    #[test]
+    fn the_control_stays_within_its_limit_if_the_base_does_not_move() {
+        let mut state = DriveState::default();
+        for _ in 0..1000 {
+            DRIVE.ramp(&mut state, 1.0);
+            DRIVE.control(&mut state, 1.0, 0.0);
+            assert!(state.amplitude <= 2.0);
+        }
+    }
+}

@@ -49,7 +49,6 @@
 
 mod amplitude_loop;
 mod balance;
-mod channel;
 mod config;
 mod controller;
 mod detector;

@@ -1,26 +1,114 @@
-//! The measurements of a sample: phase error, amplitudes, and whether they are valid.
+//! The measurements of a sample: phase error, amplitudes, and whether they are valid and plausible. A reading that differs from the detector's
+//! prediction by far more than the readings of the last periods shows that a sensor, the drive or the clock has failed, often within a few
+//! samples.
 
 use crate::balance::{Balance, GROWING, Powers};
-use crate::channel::{Channel, ChannelState, longer};
 use crate::config::Config;
+use crate::detector::{Estimate, PhaseDetector, Rotors};
 use crate::drive::PresentDrive;
 use crate::oscillator::Complex;
 use crate::real::consts::TAU;
-use crate::real::{self, Real, larger};
+use crate::real::{self, Real, larger, smaller};
 use crate::signals::Input;
 use crate::supervisor::Fault;
+
+/// Phase, rad, after which a reading that has not changed is no gap of a connection, and within which a second implausible reading is no glitch.
+/// In twice this phase, a signal of more than eight steps of its converter changes.
+const PAUSE: Real = TAU / 12.0;
+/// Differences that count as normal, in units of the largest one of a period: noise of twice the size is too rare.
+const NORMAL: Real = 2.0;
+/// Sum of the amplitudes of all harmonics above the fundamental, as a share of the limit, above which a sensor saturates: clipping at half of
+/// the amplitude makes 0.27 of the fundamental.
+const DISTORTION: Real = 0.5;
+/// Phase, rad, for which this distortion must last: the first impacts and a change of the drive disturb the harmonics for two or three periods.
+const LASTS: Real = 5.0 * TAU;
+
+/// A channel: the estimate of its signal, and the differences between its readings and their predictions.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
+pub struct Channel {
+    /// Estimate of the signal.
+    pub estimate: Estimate,
+    /// Whether the last reading is one of several implausible ones.
+    is_implausible: bool,
+    /// The last reading, m, and the phase for which it has not changed, rad.
+    last: Real,
+    unchanged: Real,
+    /// Largest differences between readings and predictions in this period and in the two before it, m.
+    largest: [Real; 3],
+    /// Phase since the start of the period, since the last implausible reading, and for which the signal has been distorted, rad.
+    phase: Real,
+    since: Real,
+    distorted: Real,
+}
+
+impl Channel {
+    /// Whether the sensor has stopped.
+    fn has_stopped(&self) -> bool {
+        self.unchanged > 2.0 * PAUSE
+    }
+
+    /// Takes a reading, m, after a turn of the oscillator, rad. `limit`: `residual_max`. `change`: factor by which the drive has changed and the
+    /// detector has still to learn; `None`: the signal is not known yet.
+    fn take(
+        &mut self,
+        detector: &PhaseDetector,
+        limit: Option<Real>,
+        reading: Real,
+        rotors: &Rotors,
+        turn: Real,
+        change: Option<Real>,
+    ) {
+        let before = self.estimate;
+        let residual = detector.update(&mut self.estimate, reading, rotors);
+        let factor = change.unwrap_or(1.0);
+        let difference = (reading - factor * (reading - residual)).abs();
+        self.unchanged = longer(self.unchanged, turn, reading == self.last);
+        self.last = reading;
+        self.phase += turn;
+        if self.phase >= TAU {
+            self.phase = 0.0;
+            self.largest.rotate_right(1);
+            self.largest[0] = 0.0;
+        }
+        self.since += turn;
+        self.is_implausible = false;
+        let [now, last, earlier] = self.largest;
+        if let Some(limit) = limit {
+            let (amplitude, lag) = (self.estimate.amplitude, (factor - 1.0).abs());
+            let share = if self.unchanged > PAUSE { 0.0 } else { limit * factor };
+            // A fault may have begun at the end of the last period.
+            let expected = (share + lag) * amplitude + NORMAL * smaller(last, earlier);
+            let is_clear = detector.harmonics_within(&self.estimate, (DISTORTION * limit + lag) * amplitude);
+            self.distorted = longer(self.distorted, turn, !is_clear);
+            if change.is_some() && (difference > expected || self.distorted > LASTS) {
+                self.is_implausible = self.since <= PAUSE;
+                self.since = 0.0;
+                if !self.is_implausible {
+                    // The detector ignores a glitch.
+                    self.estimate = before;
+                    return;
+                }
+            }
+        }
+        self.largest[0] = larger(now, difference);
+    }
+}
+
+/// A time or phase after one more step of a condition.
+fn longer(before: Real, step: Real, condition: bool) -> Real {
+    if condition { before + step } else { 0.0 }
+}
 
 /// Coefficients of the measurement.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Sensing {
-    channel: Channel,
+    detector: PhaseDetector,
     /// `exp(-i phase_target)`
     target: Complex,
     /// Time in the closed loop before the response can be predicted, s.
     warm_up: Real,
-    /// Share of its error that the detector corrects per sample.
-    detector_step: Real,
 }
 
 /// State of the measurement.
@@ -28,8 +116,8 @@ pub struct Sensing {
 #[cfg_attr(feature = "serde", derive(serde::Serialize, serde::Deserialize))]
 pub struct Channels {
     /// Channel of the response.
-    pub response: ChannelState,
-    base: ChannelState,
+    pub response: Channel,
+    base: Channel,
     balance: Balance,
     /// The drive with the lag of the detector, m.
     drive: Real,
@@ -38,7 +126,7 @@ pub struct Channels {
     /// Time since the loop was closed or the measurement was last valid, s.
     invalid: Real,
     /// Whether the measurement has been valid since the loop was closed.
-    seen: bool,
+    measured: bool,
 }
 
 /// Measurements of a sample.
@@ -62,11 +150,10 @@ impl Sensing {
     /// The coefficients of a configuration.
     pub fn new(config: &Config) -> Self {
         Self {
-            channel: Channel::new(config),
+            detector: PhaseDetector::new(config),
             target: Complex::unit(-config.phase_target),
             // A transient of the detector has decayed to exp(-2 pi), 0.2 %.
             warm_up: larger(TAU / config.bandwidth, GROWING * TAU / config.omega_start),
-            detector_step: config.step(config.bandwidth),
         }
     }
 
@@ -76,8 +163,9 @@ impl Sensing {
         let fault = Self::fault(config, input.response, base);
         let turn = drive.omega * config.sample_time;
         // The detectors ignore an invalid reading and keep their estimates.
-        if fault != Some(Fault::Sensor) {
-            let rotors = self.channel.rotors(drive.rotor);
+        let is_read = fault != Some(Fault::Sensor);
+        if is_read {
+            let rotors = self.detector.rotors(drive.rotor);
             // The base follows the drive at once; the response grows, and its detector lags.
             let is_known = state.closed > self.warm_up;
             let change = if state.drive > 0.0 {
@@ -85,17 +173,14 @@ impl Sensing {
             } else {
                 1.0
             };
-            (self.channel).take(
-                &mut state.response,
-                input.response,
-                &rotors,
-                turn,
-                is_known.then_some(1.0),
-            );
+            let take = |channel: &mut Channel, reading: Real, change: Option<Real>| {
+                channel.take(&self.detector, config.residual_max, reading, &rotors, turn, change);
+            };
+            take(&mut state.response, input.response, is_known.then_some(1.0));
             if let Some(reading) = base {
-                self.channel.take(&mut state.base, reading, &rotors, turn, Some(change));
+                take(&mut state.base, reading, Some(change));
             }
-            state.drive += self.detector_step * (drive.amplitude - state.drive);
+            state.drive += self.detector.step * (drive.amplitude - state.drive);
         }
         let (reference, reference_amplitude) = if base.is_some() {
             (state.base.estimate.fundamental(), state.base.estimate.amplitude)
@@ -122,11 +207,7 @@ impl Sensing {
         let is_coherent = response.is_coherent(config.lock.coherence_min)
             && (base.is_none() || state.base.estimate.is_coherent(config.lock.coherence_min));
         let powers = Powers {
-            reading: if fault == Some(Fault::Sensor) {
-                0.0
-            } else {
-                input.response
-            },
+            reading: if is_read { input.response } else { 0.0 },
             turn,
             drive: drive.amplitude,
             lagging: state.drive,
@@ -139,7 +220,7 @@ impl Sensing {
             cosine: if is_large { cosine } else { 1.0 },
         };
         let contradicts = state.balance.contradicts(config, &powers) && config.residual_max.is_some();
-        let reason = if state.seen {
+        let reason = if state.measured {
             Fault::Implausible
         } else {
             Fault::NoSignal
@@ -155,25 +236,24 @@ impl Sensing {
     }
 
     /// Watches the signals while the loop is closed: a sensor that has stopped, or a response that cannot be measured.
-    pub fn watch(&self, config: &Config, state: &mut Channels, measured: &Measurement) -> Option<Fault> {
-        state.seen |= measured.valid;
+    pub fn watch(config: &Config, state: &mut Channels, measured: &Measurement, is_closed: bool) -> Option<Fault> {
+        if !is_closed {
+            (state.invalid, state.closed, state.measured) = (0.0, 0.0, false);
+            return None;
+        }
+        state.measured |= measured.valid;
         state.closed += config.sample_time;
         state.invalid = longer(state.invalid, config.sample_time, !measured.valid);
         let has_sensor = measured.has_sensor;
-        if state.seen && (state.response.has_stopped() || has_sensor && state.base.has_stopped()) {
+        if state.measured && (state.response.has_stopped() || has_sensor && state.base.has_stopped()) {
             Some(Fault::Sensor)
-        } else if state.seen && (state.response.is_implausible || has_sensor && state.base.is_implausible) {
+        } else if state.measured && (state.response.is_implausible || has_sensor && state.base.is_implausible) {
             Some(Fault::Implausible)
         } else if config.signal_timeout.is_some_and(|limit| state.invalid > limit) {
             Some(Fault::NoSignal)
         } else {
             None
         }
-    }
-
-    /// Ends the watch when the loop opens.
-    pub fn stop_watching(&self, state: &mut Channels) {
-        (state.invalid, state.closed, state.seen) = (0.0, 0.0, false);
     }
 
     fn fault(config: &Config, response: Real, reference: Option<Real>) -> Option<Fault> {

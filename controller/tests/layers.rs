@@ -12,7 +12,7 @@ fn imports() -> BTreeMap<String, BTreeSet<String>> {
         .filter(|path| path.extension().is_some_and(|extension| extension == "rs"))
         .map(|path| {
             let text = fs::read_to_string(&path).unwrap();
-            let (code, _) = text.split_once("#[cfg(all(test").unwrap_or((&text, ""));
+            let (code, _) = text.split_once("#[cfg(test)]").unwrap_or((&text, ""));
             let imported = code.split("use crate::").skip(1);
             let names = imported.map(|rest| rest.split("::").next().unwrap().to_owned());
             let module = path.file_stem().unwrap().to_str().unwrap();

@@ -65,7 +65,7 @@ typedef float PhaseLockReal;
 typedef double PhaseLockReal;
 #endif
 
-// An optional value; all zeros: not present.
+// An optional value; all zeros: none.
 typedef struct PhaseLockOptional {
   // Whether there is a value.
   bool present;
@@ -73,68 +73,85 @@ typedef struct PhaseLockOptional {
   PhaseLockReal value;
 } PhaseLockOptional;
 
-// All parameters; phase_lock_config_for_resonance gives initial values.
+// All settings; phase_lock_config_for_resonance gives initial values.
 typedef struct PhaseLockConfig {
-  // Sample time, s.
+  // Time from sample to sample, s; samples lie at 0, sample_time, 2 sample_time, … after the start.
   PhaseLockReal sample_time;
-  // Frequency while the loop is open, rad/s.
+  // Frequency while the loop is open, between omega_min and omega_max, rad/s.
   PhaseLockReal omega_start;
   // Lowest frequency, rad/s.
   PhaseLockReal omega_min;
   // Highest frequency, rad/s.
   PhaseLockReal omega_max;
-  // Largest rate of change of the frequency, rad/s^2.
+  // Largest rate of change of the frequency, rad/s2; none: no limit.
   struct PhaseLockOptional omega_rate;
-  // Setpoint of the drive amplitude, m.
+  // Setpoint of the drive amplitude, at most amplitude_max, m.
   PhaseLockReal amplitude;
-  // Largest drive amplitude, m.
+  // Largest drive amplitude, m; none: no limit, and the response amplitude cannot be controlled.
   struct PhaseLockOptional amplitude_max;
-  // Largest rate of change of the drive amplitude in a ramp, m/s; not present: step changes.
+  // Largest rate of change of the drive amplitude in every ramp but the release, m/s: at the start,
+  // after a fault, to a new setpoint, and while the response amplitude is controlled; none: step
+  // changes.
   struct PhaseLockOptional ramp_rate;
-  // Rate of the drive ramp to 0 after active becomes false, m/s; not present: switched off at once.
+  // Rate of the drive ramp to 0 after active becomes false, m/s; none: switched off at once, as a free
+  // decay requires.
   struct PhaseLockOptional release_rate;
-  // Bandwidth of the control of the measured base amplitude, rad/s; not present: no control.
+  // Bandwidth of the control of the measured base amplitude, rad/s; none: no control, for a shaker whose
+  // gain is known.
   struct PhaseLockOptional base_bandwidth;
-  // Setpoint of the phase of the response relative to the reference, rad.
+  // Setpoint of the phase of the response relative to the reference, rad; -pi/2 is phase resonance.
   PhaseLockReal phase_target;
-  // Method of the phase detector, a PhaseLockDetector; an integer, because any other value must be refused.
+  // Method of the phase detector: 1 adaptive harmonic filter, 2 synchronous demodulation.
   int32_t detector;
-  // Bandwidth of the detector, rad/s: the tuning parameter.
+  // Number of harmonics of the adaptive filter, 1 to 8, including the fundamental.
+  int32_t harmonics;
+  // Whether the adaptive filter uses harmonics 1, 3, 5, … instead of 1, 2, 3, …; a rig with impacts at
+  // two equal walls has only odd ones.
+  bool odd_only;
+  // Bandwidth of the detector, rad/s: the tuning parameter, from which the gains follow.
   PhaseLockReal bandwidth;
-  // Damping rate of the structure, rad/s; not present: unknown.
+  // Damping rate of the structure (damping ratio times natural frequency), rad/s; none: unknown, and the
+  // gains suit an undamped structure.
   struct PhaseLockOptional damping_rate;
-  // Delay from the drive to the sample of the sensor, s; used if no reference is connected.
+  // Delay from the drive to the sample of the sensor, used if no reference is connected, s; half a
+  // sample for a rig that holds the samples of drive, 0 for a rig whose own oscillator receives omega.
   PhaseLockReal delay;
-  // Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
-  PhaseLockReal response_gain;
   // Largest phase error that counts as locked, mean over the dwell, rad.
   PhaseLockReal phase_tolerance;
-  // Phase error above which the lock is lost, mean over a period, rad.
+  // Phase error, mean over a period, above which the lock is lost, rad; at least lock.phase_tolerance.
   PhaseLockReal unlock_tolerance;
-  // Largest relative drift of the frequency per period in a lock.
+  // Largest relative drift of the frequency per period that counts as locked, beyond what the noise of
+  // the response explains.
   PhaseLockReal frequency_drift;
-  // Largest relative drift of the response amplitude per period in a lock.
+  // Largest relative drift of the response amplitude per period that counts as locked, beyond what its
+  // noise explains.
   PhaseLockReal amplitude_drift;
-  // Smallest share of the fundamental in the power of a valid signal, 0 to 1.
+  // Time for which phase, frequency and amplitude must be stationary, periods; rounded up to a multiple
+  // of 4.
+  int32_t dwell;
+  // Smallest share of the fundamental in the power of a valid signal, between 0 and 1; noise has a small
+  // share.
   PhaseLockReal coherence_min;
-  // Smallest valid response amplitude, as a multiple of amplitude.
+  // Smallest valid response amplitude, as a multiple of amplitude; a zero response is never valid.
   PhaseLockReal response_min;
-  // Reading of the response sensor above which the drive is switched off, m.
+  // Reading of the response above which the drive is switched off, m; none: no limit.
   struct PhaseLockOptional response_max;
-  // Longest time from the end of the ramp to the lock, s.
+  // Longest time from the end of the ramp to the lock, without the time in which the response amplitude
+  // is controlled, s; none: no limit.
   struct PhaseLockOptional acquire_timeout;
-  // Longest time in the closed loop without a valid measurement, s.
+  // Longest time in the closed loop without a valid measurement, s: with too small an amplitude or too
+  // much noise; none: no limit.
   struct PhaseLockOptional signal_timeout;
-  // Largest difference between a reading and its prediction, as a share of the amplitude, beyond twice those of the last periods.
+  // Largest difference between a reading and its prediction, as a share of the amplitude, beyond twice
+  // the differences of the last periods; none: no limit, and the response is not checked against the
+  // drive.
   struct PhaseLockOptional residual_max;
-  // Whether a sensor measures the base.
+  // Whether a sensor measures the base; false: the internal oscillator with the configured delay is the
+  // reference.
   bool reference_connected;
-  // Time for which the lock criterion must hold, periods.
-  uint32_t dwell;
-  // Number of harmonics of the adaptive filter, 1 to 8.
-  uint8_t harmonics;
-  // Harmonics 1, 3, 5, ... instead of 1, 2, 3, ...
-  bool odd_only;
+  // Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s; half of omega0
+  // for excitation through the base.
+  PhaseLockReal response_gain;
 } PhaseLockConfig;
 
 // Storage of a controller and its state, initialised by phase_lock_init. May be copied; its content is private.

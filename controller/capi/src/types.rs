@@ -1,6 +1,8 @@
-//! The types of the header. Units are those of the core: m, s, rad, rad/s.
+//! The types of the header but the configuration, and their conversions to and from the types of the core. The units are m, s, rad, rad/s.
 
-use phase_lock::{PhaseLock, State};
+use phase_lock::{Config, ConfigError, Fault, Input, LoopState, Move, Output, PARAMETERS, PhaseLock, State, Value};
+
+use crate::config::PhaseLockConfig;
 
 /// The floating-point type: float if PHASE_LOCK_F32 is defined, for the library with the feature f32; otherwise double.
 #[cfg(feature = "f32")]
@@ -27,7 +29,7 @@ pub(crate) struct Stored {
 const _: () = assert!(size_of::<Stored>() <= size_of::<PhaseLockController>());
 const _: () = assert!(align_of::<Stored>() <= align_of::<PhaseLockController>());
 
-/// An optional value; all zeros: not present.
+/// An optional value; all zeros: none.
 #[repr(C)]
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct PhaseLockOptional {
@@ -46,72 +48,6 @@ pub enum PhaseLockDetector {
     Adaptive = 1,
     /// Synchronous demodulation.
     Demodulator = 2,
-}
-
-/// All parameters; phase_lock_config_for_resonance gives initial values.
-#[repr(C)]
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct PhaseLockConfig {
-    /// Sample time, s.
-    pub sample_time: PhaseLockReal,
-    /// Frequency while the loop is open, rad/s.
-    pub omega_start: PhaseLockReal,
-    /// Lowest frequency, rad/s.
-    pub omega_min: PhaseLockReal,
-    /// Highest frequency, rad/s.
-    pub omega_max: PhaseLockReal,
-    /// Largest rate of change of the frequency, rad/s^2.
-    pub omega_rate: PhaseLockOptional,
-    /// Setpoint of the drive amplitude, m.
-    pub amplitude: PhaseLockReal,
-    /// Largest drive amplitude, m.
-    pub amplitude_max: PhaseLockOptional,
-    /// Largest rate of change of the drive amplitude in a ramp, m/s; not present: step changes.
-    pub ramp_rate: PhaseLockOptional,
-    /// Rate of the drive ramp to 0 after active becomes false, m/s; not present: switched off at once.
-    pub release_rate: PhaseLockOptional,
-    /// Bandwidth of the control of the measured base amplitude, rad/s; not present: no control.
-    pub base_bandwidth: PhaseLockOptional,
-    /// Setpoint of the phase of the response relative to the reference, rad.
-    pub phase_target: PhaseLockReal,
-    /// Method of the phase detector, a PhaseLockDetector; an integer, because any other value must be refused.
-    pub detector: i32,
-    /// Bandwidth of the detector, rad/s: the tuning parameter.
-    pub bandwidth: PhaseLockReal,
-    /// Damping rate of the structure, rad/s; not present: unknown.
-    pub damping_rate: PhaseLockOptional,
-    /// Delay from the drive to the sample of the sensor, s; used if no reference is connected.
-    pub delay: PhaseLockReal,
-    /// Growth rate of the response amplitude at phase resonance, per drive amplitude, 1/s.
-    pub response_gain: PhaseLockReal,
-    /// Largest phase error that counts as locked, mean over the dwell, rad.
-    pub phase_tolerance: PhaseLockReal,
-    /// Phase error above which the lock is lost, mean over a period, rad.
-    pub unlock_tolerance: PhaseLockReal,
-    /// Largest relative drift of the frequency per period in a lock.
-    pub frequency_drift: PhaseLockReal,
-    /// Largest relative drift of the response amplitude per period in a lock.
-    pub amplitude_drift: PhaseLockReal,
-    /// Smallest share of the fundamental in the power of a valid signal, 0 to 1.
-    pub coherence_min: PhaseLockReal,
-    /// Smallest valid response amplitude, as a multiple of amplitude.
-    pub response_min: PhaseLockReal,
-    /// Reading of the response sensor above which the drive is switched off, m.
-    pub response_max: PhaseLockOptional,
-    /// Longest time from the end of the ramp to the lock, s.
-    pub acquire_timeout: PhaseLockOptional,
-    /// Longest time in the closed loop without a valid measurement, s.
-    pub signal_timeout: PhaseLockOptional,
-    /// Largest difference between a reading and its prediction, as a share of the amplitude, beyond twice those of the last periods.
-    pub residual_max: PhaseLockOptional,
-    /// Whether a sensor measures the base.
-    pub reference_connected: bool,
-    /// Time for which the lock criterion must hold, periods.
-    pub dwell: u32,
-    /// Number of harmonics of the adaptive filter, 1 to 8.
-    pub harmonics: u8,
-    /// Harmonics 1, 3, 5, ... instead of 1, 2, 3, ...
-    pub odd_only: bool,
 }
 
 /// Sensor readings of a sample, and the operator's request.
@@ -214,4 +150,153 @@ pub struct PhaseLockMove {
     pub omega: PhaseLockReal,
     /// Growth rate of the setpoint at the end of the move and after it, m/s; 0 to hold it.
     pub growth: PhaseLockReal,
+}
+
+impl From<PhaseLockOptional> for Option<PhaseLockReal> {
+    fn from(c: PhaseLockOptional) -> Self {
+        c.present.then_some(c.value)
+    }
+}
+
+impl From<Option<PhaseLockReal>> for PhaseLockOptional {
+    fn from(value: Option<PhaseLockReal>) -> Self {
+        Self { present: value.is_some(), value: value.unwrap_or_default() }
+    }
+}
+
+impl From<PhaseLockOptional> for Value {
+    fn from(c: PhaseLockOptional) -> Self {
+        Option::from(c).into()
+    }
+}
+
+impl From<Value> for PhaseLockOptional {
+    fn from(value: Value) -> Self {
+        Option::from(value).into()
+    }
+}
+
+/// Conversions of the configuration in both directions. Every parameter of the table is a field of the same name.
+macro_rules! conversions {
+    ($initial:tt $($group:ident { $($(#[doc = $doc:literal])+ $field:ident: $type:ty = $value:expr, $unit:literal, $range:ident;)* })*) => {
+        impl TryFrom<&PhaseLockConfig> for Config {
+            type Error = ConfigError;
+
+            fn try_from(c: &PhaseLockConfig) -> Result<Self, ConfigError> {
+                let mut config = Self::for_resonance(1.0, 1.0);
+                let values: [Value; PARAMETERS.len()] = [$($(c.$field.into(),)*)*];
+                for (parameter, value) in PARAMETERS.iter().zip(values) {
+                    parameter.set(&mut config, value)?;
+                }
+                Ok(config)
+            }
+        }
+
+        impl From<&Config> for PhaseLockConfig {
+            fn from(config: &Config) -> Self {
+                let [$($($field,)*)*] = PARAMETERS.each_ref().map(|parameter| parameter.get(config));
+                Self { $($($field: $field.into(),)*)* }
+            }
+        }
+    };
+}
+
+phase_lock::parameters!(conversions);
+
+impl From<&PhaseLockInput> for Input {
+    fn from(input: &PhaseLockInput) -> Self {
+        Self {
+            response: input.response,
+            reference: input.reference.into(),
+            active: input.active,
+        }
+    }
+}
+
+impl From<&PhaseLockMove> for Move {
+    fn from(to: &PhaseLockMove) -> Self {
+        Self {
+            response: to.response,
+            duration: to.duration,
+            amplitude: to.amplitude,
+            omega: to.omega,
+            growth: to.growth,
+        }
+    }
+}
+
+impl From<Output> for PhaseLockOutput {
+    fn from(o: Output) -> Self {
+        Self {
+            omega: o.omega,
+            amplitude: o.amplitude,
+            drive: o.drive,
+            phase_error: o.phase_error.into(),
+            response_amplitude: o.response_amplitude,
+            response_target: o.response_target.into(),
+            reference_amplitude: o.reference_amplitude,
+            coherence: o.coherence,
+            frequency: o.frequency,
+            response_mean: o.response_mean,
+            state: match o.state {
+                LoopState::Idle => PhaseLockStage::Idle,
+                LoopState::Ramping => PhaseLockStage::Ramping,
+                LoopState::Acquiring => PhaseLockStage::Acquiring,
+                LoopState::Locked => PhaseLockStage::Locked,
+                LoopState::LockLost => PhaseLockStage::LockLost,
+                LoopState::Tripped => PhaseLockStage::Tripped,
+                LoopState::ShutDown => PhaseLockStage::ShutDown,
+            },
+            fault: match o.fault {
+                None => PhaseLockFault::None,
+                Some(Fault::Sensor) => PhaseLockFault::Sensor,
+                Some(Fault::ResponseTooLarge) => PhaseLockFault::ResponseTooLarge,
+                Some(Fault::TimedOut) => PhaseLockFault::TimedOut,
+                Some(Fault::LockLost) => PhaseLockFault::LockLost,
+                Some(Fault::NoSignal) => PhaseLockFault::NoSignal,
+                Some(Fault::Implausible) => PhaseLockFault::Implausible,
+            },
+            locked: o.locked,
+            settled: o.settled,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use phase_lock::Detector;
+
+    use super::*;
+
+    #[test]
+    fn every_parameter_survives_the_way_to_c_and_back() {
+        for detector in [Detector::Adaptive, Detector::Demodulator] {
+            let mut config = Config::for_resonance(55.0, 1e-4);
+            config.detector = detector;
+            for (n, parameter) in PARAMETERS.iter().enumerate() {
+                let value = match parameter.get(&config) {
+                    Value::Real(_) => Value::Real(1.0 + n as PhaseLockReal),
+                    Value::Integer(_) if parameter.name != "detector" => Value::Integer(5),
+                    same => same,
+                };
+                parameter.set(&mut config, value).expect(parameter.name);
+            }
+            let c = PhaseLockConfig::from(&config);
+            assert_eq!(Config::try_from(&c), Ok(config));
+            assert_eq!(PhaseLockConfig::from(&config), c);
+        }
+    }
+
+    #[test]
+    fn a_detector_that_does_not_exist_is_refused() {
+        let mut c = PhaseLockConfig::from(&Config::for_resonance(55.0, 1e-4));
+        for detector in [-1, 0, 3, 4, 5, i32::MAX] {
+            c.detector = detector;
+            let refused = Config::try_from(&c).unwrap_err();
+            assert_eq!(
+                (refused.name, refused.value),
+                ("detector", Some(detector as PhaseLockReal))
+            );
+        }
+    }
 }

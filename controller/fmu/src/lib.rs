@@ -1,6 +1,6 @@
 //! The phase-lock controller as an FMI 2.0 component: maps the variables of the FMU to the core.
 //!
-//! Parameters and outputs come from the core's tables; a test compares them with `modelDescription.xml`.
+//! Parameters and outputs come from the core's tables. The parameters in `modelDescription.xml` are generated, and a test compares the outputs.
 #![forbid(unsafe_code)]
 
 use fmi2_component::{Archive, Component, Key, Log, Refusal};
@@ -11,7 +11,7 @@ mod sample_clock;
 mod signal;
 
 use sample_clock::SampleClock;
-use signal::{DERIVATIVES, Signal};
+use signal::{DERIVATIVES, InputSignal};
 
 mod variables {
     include!(concat!(env!("OUT_DIR"), "/variables.rs"));
@@ -23,8 +23,8 @@ fmi2_component::export!(Controller);
 #[derive(Clone, serde::Serialize, serde::Deserialize)]
 struct Controller {
     config: Config,
-    response: Signal,
-    reference: Signal,
+    response: InputSignal,
+    reference: InputSignal,
     active: bool,
     hold_response: bool,
     to: Move,
@@ -80,7 +80,7 @@ impl Controller {
         let name = variable.variable().name;
         let idle = Output::idle(self.config.omega_start);
         let output = self.running.as_ref().map_or(&idle, |running| &running.output);
-        if let Some(signal) = OUTPUTS.iter().find(|one| one.name == name) {
+        if let Some(signal) = OUTPUTS.iter().find(|signal| signal.name == name) {
             return signal.get(output).unwrap_or(Value::Real(0.0));
         }
         if let Some(signal) = OUTPUTS.iter().find(|signal| signal.present == Some(name)) {
@@ -113,8 +113,8 @@ impl Component for Controller {
         // The shell overwrites all values with the start values of the model description.
         Self {
             config: Config::for_resonance(1.0, 1.0),
-            response: Signal::default(),
-            reference: Signal::default(),
+            response: InputSignal::default(),
+            reference: InputSignal::default(),
             active: false,
             hold_response: false,
             to: Move::default(),

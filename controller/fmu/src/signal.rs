@@ -14,7 +14,7 @@ type Point = (f64, f64);
 
 /// A value with the coefficients of its Taylor polynomial, as the master has set it, and those before.
 #[derive(Clone, Copy, Debug, Default, serde::Serialize, serde::Deserialize)]
-pub(crate) struct Signal {
+pub(crate) struct InputSignal {
     /// The value at the communication point.
     pub value: f64,
     /// Coefficients of t, t² and t³; they hold for one step.
@@ -25,7 +25,7 @@ pub(crate) struct Signal {
     before: [Option<Point>; 2],
 }
 
-impl Signal {
+impl InputSignal {
     /// Takes the time derivative of that order, from 1 to [`DERIVATIVES`].
     pub fn set_derivative(&mut self, order: usize, value: f64) {
         let factorial: usize = (1..=order).product();
@@ -77,8 +77,8 @@ mod tests {
     use super::*;
 
     /// A channel that has read these values at these times.
-    fn read(points: &[Point]) -> Signal {
-        let mut signal = Signal::default();
+    fn read(points: &[Point]) -> InputSignal {
+        let mut signal = InputSignal::default();
         for &(time, value) in points {
             signal.value = value;
             signal.begin(time, 0.5, 1.0);

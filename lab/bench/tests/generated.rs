@@ -1,0 +1,58 @@
+//! docs/controller-settings.md follows from the controller's table of settings and the keys of a scene.
+
+use std::path::Path;
+
+use phase_lock::{PARAMETERS, Parameter};
+use vines_testbench::scene::key;
+
+const HEAD: &str = "\
+# Settings of the controller
+
+One table defines every setting of the controller (`controller/src/config.rs`). From it follow `PhaseLock.fmu`, the structure `PhaseLockConfig`
+of the C interface, the keys of a scene, and this page. The name is the name in the FMU; the C structure omits `lock.`. Initial values are those
+of `Config::for_resonance` and `phase_lock_config_for_resonance` for a resonance at `omega` (rad/s) and a base amplitude `amplitude` (m). A scene
+computes some of them from the plant. An option that is absent is \"none\": -1 in the FMU, `none` or `false` in a scene, not `present` in C. Keys
+outside `[phase_lock]` have units that suit any plant, which the file of the scene states. Magnitudes are at most 1e30, and
+above 0 at least 1e-30.
+
+| name | unit | allowed | initial value | key of a scene | meaning |
+|---|---|---|---|---|---|
+";
+
+/// The initial value as a reader writes it. The compiler chooses the spaces.
+fn initial(parameter: &Parameter) -> String {
+    let text = parameter.initial().replace(" :: ", "::").replace("- ", "-");
+    let text = text.trim_start_matches("Some(").trim_end_matches(')');
+    match text {
+        "None" => "none".into(),
+        "Detector::Adaptive" => "1".into(),
+        text => format!("`{}`", text.replace("FRAC_PI_2", "pi/2").replace("TAU", "(2 pi)")),
+    }
+}
+
+/// The range; the bounds of all magnitudes stand above the table.
+fn allowed(parameter: &Parameter) -> String {
+    let text = parameter.range.allowed().replace(" (1e-30 to 1e30)", "");
+    text.replace(", at most 1e30", "")
+        .replace(", or -1 for none", " or none")
+}
+
+#[test]
+fn the_page_of_the_settings_follows_from_the_table_and_the_keys_of_a_scene() {
+    let rows = PARAMETERS.iter().map(|parameter| {
+        let Parameter { name, unit, .. } = parameter;
+        let (allowed, meaning) = (allowed(parameter), parameter.description().trim_end_matches('.'));
+        let (initial, key) = (initial(parameter), key(name));
+        format!("| `{name}` | {unit} | {allowed} | {initial} | `{key}` | {meaning} |\n")
+    });
+    let text = HEAD.to_owned() + &rows.collect::<String>();
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/controller-settings.md");
+    if std::env::var_os("UPDATE").is_some() {
+        std::fs::write(&path, &text).unwrap();
+    }
+    let present = std::fs::read_to_string(&path).unwrap_or_default();
+    assert!(
+        present == text,
+        "docs/controller-settings.md is out of date: run this test with UPDATE=1"
+    );
+}
