@@ -33,8 +33,10 @@ pub struct Row {
     pub omega: f64,
     /// Amplitude of the response, m: the controller's or, along a free decay, of the fit.
     pub amplitude: f64,
-    /// Speed of the particle, m/s.
+    /// Speed of the particle, m/s: along a free decay, the mean over the window of the fit.
     pub speed: f64,
+    /// Whether this is a free decay with two impacts per period, along the backbone.
+    pub decays: bool,
 }
 
 /// Impacts that are kept to determine the regime from.
@@ -172,8 +174,10 @@ impl Bench {
         let output = self.lock.process(&mut self.state, input);
         let drive = self.requested(&output);
         let step = self.lock.config().sample_time;
+        let speed = self.rig.plant.state().dq2.abs();
         if drive.amplitude == 0.0 {
-            self.decay.sample(sensors.response, step);
+            self.decay.sample(sensors.response, speed, step);
+            self.decay.watch(&self.impacts, self.phase);
         } else {
             self.decay.release(drive.omega, step, self.scene.record.window_periods);
         }
@@ -190,7 +194,8 @@ impl Bench {
             drive,
             omega,
             amplitude,
-            speed: self.rig.plant.state().dq2.abs(),
+            speed: fit.map_or(speed, |_| self.decay.speed),
+            decays: drive.amplitude == 0.0 && self.decay.synchronous,
         };
         if is_last {
             self.before = (self.rig.plant, drive);

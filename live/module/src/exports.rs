@@ -2,7 +2,7 @@
 //!
 //! | call | result in the output array |
 //! |---|---|
-//! | [`run`] | rows of the record: time (s), base, response, relative displacement (m), phase error (degrees), frequency of the drive (rad/s), base amplitude, response amplitude (m), frequency of the motion (rad/s), speed of the particle (m/s) |
+//! | [`run`] | rows of the record: time (s), base, response, relative displacement (m), phase error (degrees), frequency of the drive (rad/s), base amplitude, response amplitude (m), frequency of the motion (rad/s), speed of the particle (m/s), 1 in a free decay along the backbone |
 //! | [`look`] | time (s), base, q1, q2, relative displacement (m), particle's velocity (m/s), wall that it rests on (-1, 0, 1), impacts since the start |
 //! | [`status`] | see there |
 //! | [`manifold`] | triples (B, C, 1 if stable) |
@@ -20,7 +20,7 @@ use crate::settings::{COUNT, Settings};
 /// Largest number of values of one call.
 const CAPACITY: usize = 1 << 16;
 /// Columns of a row of the record.
-const COLUMNS: usize = 10;
+const COLUMNS: usize = 11;
 
 struct Page {
     // Boxed: bytes of zeros for a bench would be a part of the module.
@@ -154,6 +154,7 @@ pub extern "C" fn run(samples: u32) -> i32 {
                 row.amplitude,
                 row.omega,
                 row.speed,
+                f64::from(u8::from(row.decays)),
             ]);
         })
     })
