@@ -27,7 +27,7 @@ export function link(page) {
 }
 
 export function csv(record) {
-  const header = "time [s],base [m],response [m],relative displacement [m],phase error [deg],frequency of the drive [rad/s],base amplitude [m],response amplitude [m],frequency of the motion [rad/s],particle speed [m/s]";
+  const header = "time [s],base [m],response [m],relative displacement [m],phase error [deg],frequency of the drive [rad/s],base amplitude [m],response amplitude [m],frequency of the motion [rad/s],particle speed [m/s],free decay along the backbone";
   const rows = Array.from({ length: record.length }, (_, i) => record.row(i).join(","));
   return `${header}\n${rows.join("\n")}\n`;
 }

@@ -130,8 +130,8 @@ class Page {
   showTime() {
     const end = this.samples * this.step;
     $("time").min = -Math.min(MINUTE, end - this.rows.row(0)[0]);
-    $("time").value = this.shown - end;
-    $("ago").textContent = `${Math.abs(this.shown - end).toFixed(1)} s ago`;
+    $("time").value = this.replays() ? this.shown - end : 0;
+    $("ago").textContent = this.replays() ? `${(end - this.shown).toFixed(1)} s ago` : "now";
   }
 
   // ---- going somewhere ----
@@ -142,7 +142,6 @@ class Page {
     if (!stable) return say(`The point ${where} is unstable under a constant drive: Track backbone reaches and holds it.`);
     if (!this.values.closed) this.change("detuning", Number(sigma.toFixed(4)));
     this.change("excitation", Number(g.toFixed(4)));
-    say(`G = ${g.toFixed(3)} leads to ${where}.`);
   }
 
   toNextImpact() {

@@ -10,9 +10,7 @@ import { Strip } from "./strip.js";
 export const MINUTE = 60;
 const POINTS = 1500;
 // Part of the past that is drawn as the trail of the present point, s.
-const TRAIL = 6;
-// Limits of the drive over omega0 (omega_min and omega_max of the default scene): no motion is looked for beyond.
-const BAND = 0.1;
+const TRAIL = 3;
 // Pixels within which a click on the backbone means a point of it.
 const NEAR = 24;
 
@@ -25,6 +23,9 @@ matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => colo
 
 // The end of an axis: `least`, or the next of its multiples by 1.25, so that it rarely changes.
 const end = (least, value) => { while (least < value && Number.isFinite(value)) least *= 1.25; return least; };
+
+// Whether a motion has a frequency: with a drive, or along a free decay until synchrony is lost.
+const onBackbone = (one) => one.G > 0 || one.decays;
 
 export class Pictures {
   // `calm`: whether motion is to be reduced.
@@ -109,7 +110,7 @@ export class Pictures {
     return {
       time: row[ROW.time], base: row[ROW.base] / (b * epsilon), v: row[ROW.response] / b, w: row[ROW.relative] / b,
       error: row[ROW.phaseError], omega: row[ROW.motion], sigma: (row[ROW.motion] / omega0 - 1) / epsilon,
-      C: row[ROW.responseAmplitude] / b, B: row[ROW.speed] / (b * omega0), G: row[ROW.amplitude] / (b * epsilon),
+      C: row[ROW.responseAmplitude] / b, B: row[ROW.speed] / (b * omega0), G: row[ROW.amplitude] / (b * epsilon), decays: row[ROW.decays] !== 0,
     };
   }
 
@@ -197,22 +198,22 @@ export class Pictures {
     const x = [past[0].time, Math.max(past.at(-1).time, past[0].time + 1)];
     const old = ghost.filter((one) => one.time >= x[0] && one.time <= x[1]);
     for (const [plot, key, name, shade] of [[phase, "error", "phase error", "violet"], [detuning, "sigma", "detuning", "green"]]) {
-      plot.begin(x, extent(past.map((one) => one[key]), key === "error" ? 1 : 0.5));
+      plot.begin(x, extent(past.filter((one) => key === "error" || onBackbone(one)).map((one) => one[key]), key === "error" ? 1 : 0.5));
       if (old.length) plot.line(old.map((one) => [one.time, one[key]]), "ghost", { label: "run before" });
-      plot.line(past.map((one) => [one.time, one[key]]), shade, { label: name });
+      plot.line(past.map((one) => (key === "error" || onBackbone(one) ? [one.time, one[key]] : null)), shade, { label: name });
       plot.cursor(cursor);
       plot.end();
     }
   }
 
   // The past as curves [x, y] of a plane: the trail of the present point, the free decay, and the run before.
-  #tracks(plot, seen, place, near) {
+  #tracks(plot, seen, place) {
     const from = (seen.at(-1)?.time ?? 0) - TRAIL;
-    const decaying = (one) => one.G === 0;
-    const inside = (one) => (near(one) ? place(one) : null);
-    plot.line(this.ghost.map(inside), "ghost", { width: 1, label: this.ghost.length ? "run before" : "" });
-    plot.line(seen.filter((one) => one.time > from).map((one) => (decaying(one) ? null : inside(one))), "red", { width: 1 });
-    plot.line(seen.map((one) => (decaying(one) ? inside(one) : null)), "decay", { width: 3, label: seen.some(decaying) ? "free decay" : "" });
+    const some = (kind) => (one) => (kind(one) ? place(one) : null);
+    const decays = (one) => one.decays;
+    plot.line(this.ghost.map(some(onBackbone)), "ghost", { width: 1, label: this.ghost.length ? "run before" : "" });
+    plot.line(seen.filter((one) => one.time > from).map(some((one) => one.G > 0)), "trail", { width: 1 });
+    plot.line(seen.map(some(decays)), "decay", { width: 3, label: seen.some(decays) ? "free decay" : "" });
   }
 
   #manifold(top, seen, point, linked) {
@@ -221,25 +222,23 @@ export class Pictures {
     if (this.manifoldEnd !== right) this.lines.manifold = page.bench.manifold((this.manifoldEnd = right), 240);
     manifold.begin([0, right], [0, top]);
     manifold.curve(this.lines.manifold, "ink", { label: "first-order theory" });
-    this.#tracks(manifold, seen, (one) => [one.B, one.C], () => true);
+    this.#tracks(manifold, seen, (one) => [one.B, one.C]);
     manifold.points([[point.B, point.C]], "red", { label: "now", radius: 5 });
     if (linked) manifold.points([[linked.B, linked.C]], "ink", { radius: 7, open: true });
     manifold.end();
   }
 
   #backbone(top, seen, point, linked, tracked) {
-    const { lines, units: { epsilon }, plots: { backbone } } = this;
-    const limit = BAND / epsilon;
-    const near = (one) => Math.abs(one.sigma) <= limit;
+    const { lines, plots: { backbone } } = this;
     const curves = [...lines.exact, ...lines.theory].filter((one) => one[1] <= top).map((one) => one[0]);
-    const sigmas = [...curves, ...[...seen.filter((one) => one.time > point.time - TRAIL || one.G === 0), point].filter(near).map((one) => one.sigma)];
+    const sigmas = [...curves, ...[...seen.filter((one) => one.time > point.time - TRAIL || one.decays), point].filter(onBackbone).map((one) => one.sigma)];
     backbone.begin(extent(sigmas, 0.5), [0, top]);
     backbone.curve(lines.theory, "ink", { label: "theory", width: 1.2 });
     backbone.curve(lines.exact, "blue", { label: "exact", width: 2.4 });
-    this.#tracks(backbone, seen, (one) => [one.sigma, one.C], near);
+    this.#tracks(backbone, seen, (one) => [one.sigma, one.C]);
     backbone.points(tracked.map((one) => [one[1], one[2]]), "violet", { label: "tracked", open: true });
-    backbone.points([[point.sigma, point.C]], "red", { label: "now", radius: 5 });
-    if (linked) backbone.points([[linked.sigma, linked.C]], "ink", { radius: 7, open: true });
+    if (onBackbone(point)) backbone.points([[point.sigma, point.C]], "red", { label: "now", radius: 5 });
+    if (linked && onBackbone(linked)) backbone.points([[linked.sigma, linked.C]], "ink", { radius: 7, open: true });
     backbone.end();
   }
 

@@ -132,10 +132,12 @@ export class Plot {
 function ticks([low, high], count) {
   const rough = (high - low) / Math.max(2, count);
   const power = 10 ** Math.floor(Math.log10(rough));
-  const step = [1, 2, 5, 10].map((factor) => factor * power).find((one) => one >= rough);
-  const values = [];
-  for (let i = Math.ceil(low / step); i * step <= high; i++) values.push(i * step);
-  return values;
+  const steps = [0.2, 0.5, 1, 2, 5, 10].map((factor) => factor * power);
+  const multiples = (step) => Array.from({ length: Math.max(0, Math.floor(high / step) - Math.ceil(low / step) + 1) }, (_, i) => (Math.ceil(low / step) + i) * step);
+  // The finest that is coarse enough, but at least two ticks.
+  let at = steps.findIndex((step) => step >= rough);
+  while (at > 0 && multiples(steps[at]).length < 2) at--;
+  return multiples(steps[at]);
 }
 
 const shown = (value) => String(Number(value.toPrecision(5))).replace("-", "−");

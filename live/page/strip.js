@@ -17,12 +17,12 @@ const REMEDIES = {
 };
 
 // The sentence, and the button that it recommends.
-function advice(page, status, regime, replay) {
+function advice(page, status, point, regime, replay) {
   if (replay) return ["A replay of the record. Run goes on from here; Now returns to the present.", "now", "Now"];
   if (page.values.closed && status.fault) return [REMEDIES[status.fault], "restart", "Restart"];
   if (!page.driving) {
-    const quiet = regime === "no impacts" ? "The particle no longer meets both walls: the mass rings down alone." : "The drive is off: the motion slides down the backbone.";
-    return [quiet, "drive", "Drive on"];
+    const where = point.decays ? "The drive is off: the motion slides down the backbone." : "The particle no longer meets both walls in turn: the backbone ends, and the mass rings down alone.";
+    return [where, "drive", "Drive on"];
   }
   if (regime === "no impacts") return ["The particle does not meet the walls: raise G, or drag it.", "defaults", "Defaults"];
   if (!page.values.closed) return ["The loop is open: the drive keeps its frequency. Close it to find resonance.", "closed", "Close the loop"];
@@ -46,7 +46,7 @@ export class Strip {
     set("sigma", `σ = ${point.sigma.toFixed(3)}`.replace("-", "−"));
     set("millimetres", `${(point.C * page.values.gap).toFixed(2)} mm`);
     set("amplitude", `C = ${point.C.toFixed(3)}`);
-    const [sentence, action, label] = advice(page, status, regime, replay);
+    const [sentence, action, label] = advice(page, status, point, regime, replay);
     set("advice", sentence);
     set("act", label);
     $("act").style.visibility = action ? "" : "hidden";

@@ -59,22 +59,36 @@ fn the_free_decay_has_the_bits_of_the_lab() {
     let mut bench = Bench::new(Bench::default_settings()).unwrap();
     bench.run(record.released, |_| {}).unwrap();
     bench.drive(false);
-    let mut fits: Vec<(f64, f64)> = Vec::new();
+    let mut fits: Vec<(f64, f64, f64)> = Vec::new();
+    let mut lost = None;
     bench
         .run(record.decay().len(), |row| {
-            if row.omega != row.drive.omega && fits.last() != Some(&(row.omega, row.amplitude)) {
-                fits.push((row.omega, row.amplitude));
+            let fit = (row.omega, row.amplitude, row.speed);
+            if row.omega != row.drive.omega && fits.last() != Some(&fit) {
+                fits.push(fit);
+            }
+            if !row.decays {
+                lost.get_or_insert(row.time - record.decay()[0].time);
             }
         })
         .unwrap();
-    for (point, (omega, amplitude)) in points.iter().zip(&fits) {
+    for (point, (omega, amplitude, speed)) in points.iter().zip(&fits) {
         assert_eq!(
             (point.f_hz, point.a_m),
             (omega / TAU, *amplitude),
             "t = {} s",
             point.t_s
         );
+        let b = scene.dimensionless().speed(*speed);
+        assert!((b - point.b.unwrap()).abs() < 1e-12, "B = {b} at t = {} s", point.t_s);
     }
+    // The last window has 2.5 periods and ends with the synchrony; the impact that is missed next is due half a period later.
+    let period = TAU / record.decay()[0].command.drive.omega;
+    let late = (lost.unwrap() - points.last().unwrap().t_s) / period;
+    assert!(
+        (1.25..2.5).contains(&late),
+        "synchrony is lost {late} periods after the last point"
+    );
     assert!(fits.len() >= points.len());
 }
 
