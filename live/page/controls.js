@@ -99,9 +99,9 @@ export function bind(page) {
     now: () => page.toEnd(),
     faster: () => page.setSpeed(10),
     closed: () => page.change("closed", 1),
-    // What dragging does, at places that are always free.
+    // What dragging does: the mass to b, the particle to a wall.
     mass: () => page.change("mass", 1),
-    particle: () => page.change("particle", 0),
+    particle: () => page.change("particle", 1),
   });
   const keys = { " ": "play", ".": "impact", d: "drive", t: "track", r: "restart", m: "mass", p: "particle", "?": "help" };
   document.addEventListener("keydown", (event) => {

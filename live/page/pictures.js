@@ -131,7 +131,7 @@ export class Pictures {
     const status = (page.status = page.bench.status());
     this.units = { b: page.values.gap * 1e-3, epsilon: page.values.mass_ratio, omega0: status.omega0 };
     const index = page.rowAt(page.shown);
-    const point = this.#point(page.rows.row(index));
+    const point = (this.now = this.#point(page.rows.row(index)));
     const replay = page.replays();
     this.past = this.#thinned(MINUTE);
 
@@ -198,9 +198,11 @@ export class Pictures {
     const x = [past[0].time, Math.max(past.at(-1).time, past[0].time + 1)];
     const old = ghost.filter((one) => one.time >= x[0] && one.time <= x[1]);
     for (const [plot, key, name, shade] of [[phase, "error", "phase error", "violet"], [detuning, "sigma", "detuning", "green"]]) {
-      plot.begin(x, extent(past.filter((one) => key === "error" || onBackbone(one)).map((one) => one[key]), key === "error" ? 1 : 0.5));
-      if (old.length) plot.line(old.map((one) => [one.time, one[key]]), "ghost", { label: "run before" });
-      plot.line(past.map((one) => (key === "error" || onBackbone(one) ? [one.time, one[key]] : null)), shade, { label: name });
+      const shows = (one) => key === "error" || onBackbone(one);
+      plot.begin(x, extent([...past, ...old].filter(shows).map((one) => one[key]), key === "error" ? 1 : 0.5));
+      const values = (run) => run.map((one) => (shows(one) ? [one.time, one[key]] : null));
+      if (old.length) plot.line(values(old), "ghost", { label: "run before" });
+      plot.line(values(past), shade, { label: name });
       plot.cursor(cursor);
       plot.end();
     }
@@ -211,7 +213,10 @@ export class Pictures {
     const from = (seen.at(-1)?.time ?? 0) - TRAIL;
     const some = (kind) => (one) => (kind(one) ? place(one) : null);
     const decays = (one) => one.decays;
-    plot.line(this.ghost.map(some(onBackbone)), "ghost", { width: 1, label: this.ghost.length ? "run before" : "" });
+    if (this.ghost.length) {
+      plot.line(this.ghost.map(some(decays)), "ghost", { width: 2 });
+      plot.points([place(this.ghost.findLast(onBackbone) ?? this.ghost[0])], "ghost", { label: "run before", radius: 5, open: true });
+    }
     plot.line(seen.filter((one) => one.time > from).map(some((one) => one.G > 0)), "trail", { width: 1 });
     plot.line(seen.map(some(decays)), "decay", { width: 3, label: seen.some(decays) ? "free decay" : "" });
   }
@@ -231,7 +236,7 @@ export class Pictures {
   #backbone(top, seen, point, linked, tracked) {
     const { lines, plots: { backbone } } = this;
     const curves = [...lines.exact, ...lines.theory].filter((one) => one[1] <= top).map((one) => one[0]);
-    const sigmas = [...curves, ...[...seen.filter((one) => one.time > point.time - TRAIL || one.decays), point].filter(onBackbone).map((one) => one.sigma)];
+    const sigmas = [...curves, ...[...seen.filter((one) => one.time > point.time - TRAIL || one.decays), ...this.ghost.filter((one) => one.decays), point].filter(onBackbone).map((one) => one.sigma)];
     backbone.begin(extent(sigmas, 0.5), [0, top]);
     backbone.curve(lines.theory, "ink", { label: "theory", width: 1.2 });
     backbone.curve(lines.exact, "blue", { label: "exact", width: 2.4 });

@@ -91,12 +91,16 @@ export class Plot {
 
   points(points, colour, { label, radius = 3, open = false } = {}) {
     const { c } = this;
-    c.fillStyle = c.strokeStyle = this.colour(colour);
+    // Whole discs, also on the edge of the axes; none beyond.
+    c.restore();
     c.lineWidth = 1.5;
-    for (const point of points) {
+    c.fillStyle = c.strokeStyle = this.colour(colour);
+    const inside = ([x, y]) => x >= this.x[0] && x <= this.x[1] && y >= this.y[0] && y <= this.y[1];
+    for (const point of points.filter(inside)) {
       c.beginPath(); c.arc(...this.#at(point), radius, 0, 7);
       if (open) c.stroke(); else c.fill();
     }
+    this.#clip();
     if (label && points.length) this.#legend(label, colour, null);
   }
 

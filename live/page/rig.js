@@ -17,7 +17,8 @@ export class Rig {
     const { colour } = this;
     c.clearRect(0, 0, width, height);
     const lengths = 2 * BASE * reach.base + SPRING + 2 * HALF + 2 * reach.mass;
-    const b = Math.min((width - 2 * SIDE) / lengths, (height - LABELS) / 2);
+    // Before the page has its layout, the canvas has no size.
+    const b = Math.max(0, Math.min((width - 2 * SIDE) / lengths, (height - LABELS) / 2));
     const floor = 0.5 * (height - LABELS) + 0.875 * b + 16;
     const slack = width - 2 * SIDE - lengths * b;
     const wall = SIDE + 0.2 * slack + BASE * (reach.base + look.base) * b;

@@ -13,7 +13,7 @@ const REMEDIES = {
   3: "No lock was found in time. Change G or the phase target, or lower the noise, then restart.",
   4: "The lock was lost. Raise G, lower the noise or widen the bandwidth, then restart.",
   5: "The motion is too small for its noise. Raise G or lower the noise, then restart.",
-  6: "The readings contradict the drive. Undo the last change or lower the noise, then restart.",
+  6: "The readings contradict the drive, as with a hand on the mass. Restart, or lower the noise first.",
 };
 
 // The sentence, and the button that it recommends.
@@ -24,7 +24,7 @@ function advice(page, status, point, regime, replay) {
     const where = point.decays ? "The drive is off: the motion slides down the backbone." : "The particle no longer meets both walls in turn: the backbone ends, and the mass rings down alone.";
     return [where, "drive", "Drive on"];
   }
-  if (regime === "no impacts") return ["The particle does not meet the walls: raise G, or drag it.", "defaults", "Defaults"];
+  if (regime === "no impacts") return ["The particle does not meet the walls: drag it to one, or raise G.", "particle", "Move it"];
   if (!page.values.closed) return ["The loop is open: the drive keeps its frequency. Close it to find resonance.", "closed", "Close the loop"];
   if (status.locked) return ["Resonance is found. Let go to see the free decay, or track the backbone.", "drive", "Let go"];
   return ["The loop changes the frequency until the phase error is zero.", page.speed < 3 ? "faster" : "", "Faster"];

@@ -76,7 +76,8 @@ impl Decay {
     /// Compares the last impacts with 1:1 motion; their times and `now` are phases of the drive before the release, rad.
     pub fn watch(&mut self, impacts: &[Impact], now: f64) {
         let last = &impacts[impacts.len().saturating_sub(LAST)..];
-        let late = |impact: &Impact| now - impact.time > 1.5 * PI;
+        // `end_of_synchrony` ends at an interval that is longer by a quarter.
+        let late = |impact: &Impact| now - impact.time > 1.25 * PI;
         let end = end_of_synchrony(last, PI);
         self.synchronous &= last
             .last()
